@@ -1,0 +1,47 @@
+# FLICKER: `make` lists the targets. Every target first brings the Python environment up to date.
+
+PYTHON ?= python3
+VENV   := .venv
+STAMP  := $(VENV)/.installed
+BIN    := $(VENV)/bin
+JOBS   ?= 2
+UNIT   ?=
+
+# What make itself was told must not reach the makes that the builds start.
+unexport MAKEFLAGS MFLAGS
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test sim lint waves clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
+	  do printf '  make %-8s %s\n' "$$name" "$$text"; done
+	@echo
+	@echo '  UNIT=name chooses a unit (tb/**/test_name.py), FLICKER_SEED=n the seed of the tests,'
+	@echo '  JOBS=n the number of parallel tests, PYTHON=path the interpreter for setup.'
+
+setup: $(STAMP) ## check the tools of the machine, create .venv with everything else
+
+$(STAMP): requirements.lock pyproject.toml scripts/setup.sh
+	@PYTHON="$(PYTHON)" scripts/setup.sh "$(VENV)"
+	@touch $@
+
+demo: $(STAMP) ## render the demo scene with the golden model and the reference renderer
+	@$(BIN)/flicker demo
+
+test: $(STAMP) lint ## lint and all tests
+	@$(BIN)/python -m pytest -n $(JOBS) tb
+
+sim: $(STAMP) ## all simulations of units, or those of one: make sim UNIT=stream_cells
+	@$(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
+
+lint: $(STAMP) ## lint of the hardware: Verilator with every module as top, Verible style
+	@$(BIN)/python scripts/lint.py
+
+waves: $(STAMP) ## simulate a unit and keep its traces: make waves UNIT=stream_cells
+	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
+	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
+
+clean: ## remove build results (not .venv)
+	rm -rf build .pytest_cache
+	find model tb scripts -name __pycache__ -type d -prune -exec rm -rf {} +

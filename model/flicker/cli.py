@@ -1,0 +1,191 @@
+"""The `flicker` command."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from .errors import FlickerError
+from .params import FAITHFUL, MAX_FIFO_DEPTH, CatMode, Coords, Form, Precision, RenderConfig
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+                  help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
+console = Console()
+
+
+def _choices(enum: type) -> type[Enum]:
+    """Lower-case string choices of an integer enum."""
+    return Enum(enum.__name__ + "Choice", {m.name: m.name.lower() for m in enum}, type=str)  # type: ignore[return-value]
+
+
+CatChoice = _choices(CatMode)
+FormChoice = _choices(Form)
+PrecisionChoice = _choices(Precision)
+CoordsChoice = _choices(Coords)
+EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
+CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
+
+
+class _RichSteps:
+    """Progress of a run on the terminal (the `Steps` protocol of `pipeline`)."""
+
+    @contextmanager
+    def step(self, text: str) -> Iterator[None]:
+        with Progress(SpinnerColumn(), TextColumn(text), TimeElapsedColumn(), console=console, transient=True) as p:
+            p.add_task(text, total=None)
+            yield
+
+    @contextmanager
+    def bar(self, text: str):
+        with Progress(TextColumn(text), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn(),
+                      console=console, transient=True) as p:
+            task = p.add_task(text, total=None)
+            yield lambda done, total: p.update(task, completed=done, total=total)
+
+
+def parse_size(text: str | None) -> tuple[int, int] | None:
+    """`WxH` to two integers; the camera checks the range."""
+    if text is None:
+        return None
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
+        raise FlickerError(f"--size: expected WxH such as 1280x720, not '{text}'")
+    return int(parts[0]), int(parts[1])
+
+
+def _writable(path: Path | None, option: str) -> None:
+    """Fail before any work when a result could not be written."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise FlickerError(f"{option}: {path} is a folder")
+    if not path.parent.is_dir():
+        raise FlickerError(f"{option}: {path.parent}: no such folder")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise FlickerError(f"{option}: {path}: not writable")
+
+
+def write_atomically(path: Path, write) -> None:
+    """Call write(temporary path), then put the file in place: no partial results."""
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        write(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _number(value) -> str:
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def summary(stats: dict, picture: Path | None) -> Table:
+    """What a run prints at its end."""
+    table = Table(show_header=False, title=f"{Path(stats['scene']).name}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    if picture is not None:
+        table.add_row("picture", str(picture))
+    engine = stats["engine"]
+    if engine != "reference":
+        engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
+    table.add_row("engine", engine)
+    if "psnr_db" in stats:
+        table.add_row("PSNR against float64", "equal" if stats["psnr_db"] is None else f"{stats['psnr_db']:.2f} dB")
+    for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("subtile_pairs", "sub-tile pairs"),
+                       ("minitiles_sent", "mini-tiles sent"), ("cycles", "cycles")):
+        if stats.get(key) is not None:
+            table.add_row(label, _number(stats[key]))
+    for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
+        if key in stats:
+            table.add_row(label, f"{stats[key]:.1%}")
+    if stats.get("simulated_cycles_per_second"):
+        table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
+    for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
+        table.add_row(f"[yellow]{reason}[/yellow]", _number(count))
+    return table
+
+
+@app.command()
+def render(
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .splat")],
+    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
+    cat: Annotated[Optional[CatChoice], typer.Option(help="contribution test [default: smooth]")] = None,
+    precision: Annotated[Optional[PrecisionChoice], typer.Option(help="number formats of the contribution test [default: mixed]")] = None,
+    form: Annotated[Optional[FormChoice], typer.Option(help="Gaussian weight in CTU and VRU [default: factored]")] = None,
+    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: 16]")] = None,
+    coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
+    faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration: conic, mixed, smooth, FIFO 16")] = False,
+    compare: Annotated[Optional[CompareChoice], typer.Option(help="report the PSNR against the float64 reference")] = None,
+    out: Annotated[Optional[Path], typer.Option(help="picture (.png)")] = None,
+    stats: Annotated[Optional[Path], typer.Option(help="statistics (.json)")] = None,
+) -> None:
+    """Render one view of a scene."""
+    given = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
+    if faithful and any(v is not None for v in given.values()):
+        names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
+        raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
+    base = FAITHFUL if faithful else RenderConfig()
+    config = base.with_(
+        cat=CatMode[cat.name] if cat else base.cat,
+        precision=Precision[precision.name] if precision else base.precision,
+        form=Form[form.name] if form else base.form,
+        fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
+        coords=Coords[coords.name],
+    )
+    if out is not None and out.suffix.lower() != ".png":
+        raise FlickerError(f"--out: {out}: only .png is written")
+    _writable(out, "--out")
+    _writable(stats, "--stats")
+    wanted = parse_size(size)
+    steps = _RichSteps()
+    with steps.step("starting"):
+        from .camera import find_cameras, select_view
+        from .image import save_png
+        from .pipeline import Engine, render_view
+        from .scene import load_scene
+    with steps.step(f"loading {scene.name}"):
+        loaded = load_scene(scene)
+        camera = select_view(find_cameras(loaded, cameras), view)
+        if wanted:
+            camera = camera.resized(*wanted)
+    result = render_view(loaded, camera, view=view, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
+    if out is not None:
+        write_atomically(out, lambda path: save_png(path, result.image))
+    if stats is not None:
+        write_atomically(stats, lambda path: path.write_text(json.dumps(result.stats, indent=2) + "\n"))
+    console.print(summary(result.stats, out))
+
+
+def main() -> None:
+    """Entry point: bad input is one line on standard error and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except FlickerError as error:
+        print(f"flicker: {error}", file=sys.stderr)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.exit(1)
+    except KeyboardInterrupt:
+        print("flicker: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

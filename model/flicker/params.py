@@ -1,0 +1,154 @@
+"""The parameter object of the rendering stage.
+
+Everything that RTL, model, tests and docs must agree on is defined here once:
+`scripts/gen_params.py` writes `rtl/common/flk_param_pkg.sv` from the constants,
+`RenderConfig.rtl_parameters()` gives the module parameters of a build.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+
+from .errors import FlickerError
+
+
+class Form(IntEnum):
+    """How the Gaussian weight E is written (docs/architecture.md, splat record)."""
+
+    CONIC = 0
+    FACTORED = 1
+
+
+class Precision(IntEnum):
+    """Number formats of the contribution test (paper, Fig. 7c)."""
+
+    FP16 = 0
+    MIXED = 1  # FP16 differences, E4M3 from there on
+    FP8 = 2  # coordinates, too, are E4M3
+
+
+class CatMode(IntEnum):
+    """Leader pixels of the contribution-aware test (paper, Sec. III-A)."""
+
+    OFF = 0  # every splat goes to all four mini-tiles
+    DENSE = 1  # Uniform-Dense: 4 corners of each mini-tile
+    SPARSE = 2  # Uniform-Sparse: 2 diagonal corners
+    SMOOTH = 3  # Smooth-Focused: dense for smooth splats, sparse for spiky ones
+    SPIKY = 4  # Spiky-Focused: the opposite
+    AUTO = 5  # Smooth-Focused, falls to Uniform-Sparse where the CTU is the bottleneck
+
+
+class Coords(IntEnum):
+    """Where the projected mean is rounded to FP16."""
+
+    LOCAL = 0  # relative to the sub-tile
+    ABSOLUTE = 1  # screen coordinates in FP16, made local by an FP16 subtraction
+
+
+TILE = 16
+SUBTILE = 8
+MINITILE = 4
+CORES = 4
+CHANNELS = 4
+VRUS_PER_CHANNEL = 2
+PIXELS_PER_VRU = MINITILE * MINITILE // VRUS_PER_CHANNEL
+SPIKY_AXIS_RATIO = 3.0
+SUBTILE_COORD_BITS = 12  # column and row of a sub-tile: pictures up to 32768 pixels wide
+COUNTER_BITS = 32
+PRTU_LATENCY = 6
+
+ALPHA_MIN = 1.0 / 255.0
+ALPHA_MAX = 0.99
+TRANSMITTANCE_MIN = 1e-4
+
+# Automatic fall to Uniform-Sparse (docs/ctu.md): widths of the per-sub-tile counts, weight of history.
+AUTO_TEST_BITS = 16
+AUTO_SENT_BITS = 13
+AUTO_DECAY_SHIFT = 2
+
+
+def fp16_bits_up(x: float) -> int:
+    """Bits of the smallest FP16 number >= x (x > 0)."""
+    h = np.float16(x)
+    if float(h) < x:
+        h = np.nextafter(h, np.float16(np.inf))
+    return int(h.view(np.uint16))
+
+
+def fp16_bits_nearest(x: float) -> int:
+    """Bits of x rounded to FP16."""
+    return int(np.float16(x).view(np.uint16))
+
+
+FP16_ONE_BITS = fp16_bits_nearest(1.0)
+ALPHA_MIN_BITS = fp16_bits_up(ALPHA_MIN)
+ALPHA_MAX_BITS = fp16_bits_nearest(ALPHA_MAX)
+TRANSMITTANCE_MIN_BITS = fp16_bits_up(TRANSMITTANCE_MIN)
+
+MAX_FIFO_DEPTH = 128
+
+
+@dataclass(frozen=True)
+class RenderConfig:
+    """One configuration of the rendering stage.
+
+    `cat` is a run-time input of the RTL; the others are elaboration parameters, except `coords`,
+    which concerns the unit that writes the records.
+    """
+
+    form: Form = Form.FACTORED
+    precision: Precision = Precision.MIXED
+    cat: CatMode = CatMode.SMOOTH
+    fifo_depth: int = 16
+    ctu_fifo_depth: int = 12
+    coords: Coords = Coords.LOCAL
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.fifo_depth <= MAX_FIFO_DEPTH:
+            raise FlickerError(f"configuration: fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.fifo_depth}")
+        if not 1 <= self.ctu_fifo_depth <= MAX_FIFO_DEPTH:
+            raise FlickerError(f"configuration: ctu_fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
+
+    def rtl_parameters(self) -> dict[str, int]:
+        """Module parameters of `flk_render_stage` (and of every unit that has them)."""
+        return {
+            "Form": int(self.form),
+            "Precision": int(self.precision),
+            "FifoDepth": self.fifo_depth,
+            "CtuFifoDepth": self.ctu_fifo_depth,
+        }
+
+    def with_(self, **changes) -> "RenderConfig":
+        """A copy with some fields changed."""
+        return replace(self, **changes)
+
+
+# The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16.
+FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH)
+NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}
+
+# ---- performance counters (order of the RTL's counter vector) ----------------------------------
+
+CORE_COUNTERS = (
+    ("cycles", "cycles since the counters were cleared"),
+    ("subtiles", "end-of-sub-tile tokens taken by the CTU"),
+    ("gaussians_in", "splats taken by the CTU"),
+    ("gaussians_rejected", "splats whose mask came out empty"),
+    ("ctu_busy", "cycles in which the CTU started a test or took a token"),
+    ("ctu_stalled", "cycles in which the CTU had input but could not take it"),
+    ("ctu_idle", "cycles in which the CTU had no input"),
+    ("minitiles_tested", "mask bits set by the test"),
+    ("minitiles_delivered", "splats written into feature FIFOs"),
+    ("minitiles_filtered", "mask bits dropped because the channel was finished"),
+)
+CHANNEL_COUNTERS = (
+    ("fifo_full", "cycles in which the feature FIFO was full"),
+    ("vru_busy", "cycles in which the channel issued a pixel to its VRUs"),
+    ("minitiles_sent", "splats that met an unfinished mini-tile, in program order"),
+    ("minitiles_discarded", "splats taken from the FIFO after the mini-tile was finished, not or not fully issued"),
+    ("pixels_finished", "pixels that ended before their list did"),
+)
+COUNTERS_PER_CORE = len(CORE_COUNTERS) + CHANNELS * len(CHANNEL_COUNTERS)

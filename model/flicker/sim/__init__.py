@@ -1,0 +1,1 @@
+"""RTL simulation of whole frames: compiled C++ harness around the verilated rendering stage."""

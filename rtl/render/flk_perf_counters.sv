@@ -1,0 +1,57 @@
+// Performance counters of one CTU and rendering core.
+//
+// Index of each counter: flk_param_pkg::CNT_*; channel c's counters follow at CORE_COUNTERS + c * CHANNEL_COUNTERS.
+// Counters wrap. `clear_i` sets all to zero; otherwise each adds its events of the cycle.
+module flk_perf_counters
+  import flk_pkg::*;
+  import flk_param_pkg::*;
+(
+  input  logic                                                clk_i,
+  input  logic                                                rst_ni,
+  input  logic                                                clear_i,
+  input  ctu_events_t                                         ctu_events_i,
+  input  dispatch_events_t                                    dispatch_events_i,
+  input  channel_events_t [CHANNELS-1:0]                      channel_events_i,
+  output logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0]      counters_o
+);
+
+  // No event counts more than 4 in a cycle.
+  logic [COUNTERS_PER_CORE-1:0][2:0] inc;
+  logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0] counters_q;
+
+  always_comb begin
+    inc = '0;
+    inc[CNT_CYCLES]              = 3'd1;
+    inc[CNT_SUBTILES]            = 3'(ctu_events_i.token);
+    inc[CNT_GAUSSIANS_IN]        = 3'(ctu_events_i.splat);
+    inc[CNT_GAUSSIANS_REJECTED]  = 3'(ctu_events_i.rejected);
+    inc[CNT_CTU_BUSY]            = 3'(ctu_events_i.busy);
+    inc[CNT_CTU_STALLED]         = 3'(ctu_events_i.stalled);
+    inc[CNT_CTU_IDLE]            = 3'(ctu_events_i.idle);
+    inc[CNT_MINITILES_TESTED]    = ctu_events_i.tested;
+    inc[CNT_MINITILES_DELIVERED] = dispatch_events_i.delivered;
+    inc[CNT_MINITILES_FILTERED]  = dispatch_events_i.filtered;
+    for (int unsigned c = 0; c < CHANNELS; c++) begin
+      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_FIFO_FULL]           = 3'(channel_events_i[c].fifo_full);
+      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_VRU_BUSY]            = 3'(channel_events_i[c].vru_busy);
+      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_MINITILES_SENT]      = 3'(channel_events_i[c].sent);
+      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_MINITILES_DISCARDED] = 3'(channel_events_i[c].discarded);
+      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_PIXELS_FINISHED]     = 3'(channel_events_i[c].finished);
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      counters_q <= '0;
+    end else if (clear_i) begin
+      counters_q <= '0;
+    end else begin
+      for (int unsigned i = 0; i < COUNTERS_PER_CORE; i++) begin
+        counters_q[i] <= counters_q[i] + COUNTER_BITS'(inc[i]);
+      end
+    end
+  end
+
+  assign counters_o = counters_q;
+
+endmodule

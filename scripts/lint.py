@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+"""Lint of the hardware: Verilator with every module as top, Verible style rules.
+
+Exits 1 on any warning. Each module is linted with its default parameters and with those of
+VARIANTS, as simulated (with assertions) and as synthesised (SYNTHESIS defined).
+Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from flicker import toolchain
+from flicker.errors import FlickerError
+
+ROOT = toolchain.ROOT
+RTL = ROOT / "rtl"
+
+# Parameters, beside the defaults, under which a module takes another shape.
+VARIANTS: dict[str, list[dict[str, int]]] = {
+    "flk_fifo": [{"Width": 1, "Depth": 1}, {"Depth": 5}, {"Depth": 128}],
+    "flk_pipe_reg": [{"Width": 1}],
+    "flk_skid_buffer": [{"Width": 1}],
+    "flk_stream_arbiter": [{"Inputs": 2, "Width": 1}, {"Inputs": 5}],
+    "flk_bitonic_sorter": [
+        {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},
+        {"Lanes": 8, "StagesPerReg": 4},
+        {"Lanes": 32, "StagesPerReg": 2},
+    ],
+}
+
+
+def check_filelist(listed: list[Path]) -> list[str]:
+    """Findings on the file list: unlisted sources, names that differ from the file's."""
+    findings = []
+    for path in sorted(set(RTL.rglob("*.sv")) - set(listed)):
+        findings.append(f"{path.relative_to(ROOT)}: not listed in rtl/flk.f")
+    for path in listed:
+        names = re.findall(r"^(?:module|package)\s+(\w+)", path.read_text(), re.M)
+        if names != [path.stem]:
+            findings.append(f"{path.relative_to(ROOT)}: must hold just {path.stem}, has {names}")
+    for name in VARIANTS.keys() - {path.stem for path in listed}:
+        findings.append(f"scripts/lint.py: VARIANTS names the unknown module {name}")
+    return findings
+
+
+def run(command: list[object]) -> str:
+    """Output of a lint tool if it found anything, else an empty string."""
+    words = [str(word) for word in command]
+    done = subprocess.run(
+        words, cwd=ROOT, env=toolchain.environment(), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )
+    return f"$ {' '.join(words)}\n{done.stdout}" if done.returncode else ""
+
+
+def main() -> int:
+    listed = toolchain.filelist()
+    findings = check_filelist(listed)
+
+    commands: list[list[object]] = []
+    for path in listed:
+        top = path.stem
+        if top.endswith("_pkg"):
+            continue
+        sources = [source.relative_to(ROOT) for source in toolchain.sources_of(top)]
+        for parameters in [{}, *VARIANTS.get(top, [])]:
+            for define in ([], ["-DSYNTHESIS"]):
+                commands.append(
+                    ["verilator", "--lint-only", "-Wall", "--quiet", *define, "--top-module", top,
+                     *(f"-G{name}={value}" for name, value in parameters.items()),
+                     "lint/waiver.vlt", *sources]
+                )
+    tools = Path(sys.executable).parent
+    commands.append(
+        [tools / "verible-verilog-lint", "--rules_config", "lint/verible.rules",
+         "--waiver_files", "lint/verible.waiver",
+         *(path.relative_to(ROOT) for path in listed)]
+    )
+    with ThreadPoolExecutor(2) as pool:
+        findings += filter(None, pool.map(run, commands))
+
+    for finding in findings:
+        print(finding.rstrip())
+    modules = sum(not path.stem.endswith("_pkg") for path in listed)
+    print(f"lint: {modules} modules, {len(commands)} checks, {len(findings)} with findings")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except FlickerError as error:
+        sys.exit(f"lint: {error}")

@@ -1,0 +1,153 @@
+"""Builds a top with Verilator (cached) and runs cocotb tests on it, under pytest.
+
+Environment: FLICKER_SEED (default 1) seeds everything random, stimulus and initial register
+values alike; WAVES=1 writes FST traces to build/waves.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pytest
+from cocotb_tools import config as cocotb_config
+from cocotb_tools.check_results import get_results
+from cocotb_tools.runner import get_runner
+
+from flicker import toolchain
+from flicker.errors import FlickerError
+from flicker_tb import signal_view
+
+TB = toolchain.ROOT / "tb"
+
+
+def seed() -> int:
+    """The seed of this run: FLICKER_SEED, 1 if unset."""
+    text = os.environ.get("FLICKER_SEED", "1")
+    try:
+        return int(text)
+    except ValueError:
+        raise FlickerError(f"FLICKER_SEED: not an integer: {text!r}") from None
+
+
+def waves() -> bool:
+    """Whether traces are wanted (WAVES=1)."""
+    return os.environ.get("WAVES", "") not in ("", "0")
+
+
+def build(
+    top: str,
+    *,
+    parameters: Mapping[str, object] | None = None,
+    extra: Sequence[Path] = (),
+    sources: Sequence[Path] | None = None,
+    args: Sequence[str] = (),
+    opt: str = "-O1",
+) -> Path:
+    """Program that runs cocotb on ``top``; built unless an equal build exists.
+
+    All signals are visible to cocotb; registers get random values at the start of a run.
+    Args as of ``flicker.toolchain.verilate``.
+    """
+    libs = cocotb_config.libs_dir
+    main = cocotb_config.share_dir / "lib" / "verilator" / "verilator.cpp"
+    trace = ["--trace-fst", "--trace-structs"] if waves() else []
+    if trace and (missing := toolchain.missing_fst_packages()):
+        raise FlickerError(f"WAVES: FST headers missing, install the packages {' '.join(missing)}")
+    return toolchain.verilate(
+        top,
+        sources,
+        extra=extra,
+        parameters=parameters,
+        args=["--vpi", "--public-flat-rw", "--assert", "--x-assign", "unique",
+              "--x-initial", "unique", *trace, *args],
+        cpp=[main],
+        ldflags=f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator",
+        opt=opt,
+        kind="sim",
+    )
+
+
+def build_and_test(
+    top: str,
+    module: str,
+    *,
+    parameters: Mapping[str, object] | None = None,
+    config: Mapping[str, object] | None = None,
+    extra: Sequence[Path] = (),
+    sources: Sequence[Path] | None = None,
+    args: Sequence[str] = (),
+    opt: str = "-O1",
+    testcase: str | Sequence[str] | None = None,
+    seeds: int = 1,
+) -> None:
+    """Build ``top`` and run the cocotb tests of the Python module ``module`` on it.
+
+    Args:
+        top, parameters, extra, sources, args, opt: as of ``build``.
+        module: importable name; the folder of the pytest file is on the path.
+        config: JSON-able settings, which the tests read with ``flicker_tb.bench.config()``.
+        testcase: names of the cocotb tests to run; default all of the module.
+        seeds: number of runs, with seeds FLICKER_SEED, FLICKER_SEED + 1, ...
+
+    Fails the pytest test if a cocotb test fails, an assertion of the design fires, or no
+    cocotb test ran.
+    """
+    program = build(top, parameters=parameters, extra=extra, sources=sources, args=args, opt=opt)
+    test = os.environ.get("PYTEST_CURRENT_TEST", f"{module}::{top} ")
+    file, _, name = test.rsplit(" ", 1)[0].partition("::")
+    unit = Path(file).stem.removeprefix("test_")
+    label = re.sub(r"[^\w.=-]+", "_", name).strip("_")
+    view = TB / "waves" / f"{top.removeprefix('flk_')}.gtkw"
+    for number in range(seed(), seed() + seeds):
+        folder = toolchain.BUILD / "sim-run" / unit / f"{label}-seed{number}"
+        shutil.rmtree(folder, ignore_errors=True)
+        trace = toolchain.BUILD / "waves" / unit / view.stem / f"{label}-seed{number}.fst"
+        trace.parent.mkdir(parents=True, exist_ok=True)
+        print(f"{top} {dict(parameters or {})} FLICKER_SEED={number}", file=sys.stderr, flush=True)
+        results = folder / "results.xml"
+        try:
+            get_runner("verilator").test(
+                test_module=module,
+                hdl_toplevel=top,
+                hdl_toplevel_lang="verilog",
+                build_dir=program.parent,
+                test_dir=folder,
+                results_xml=str(results),
+                seed=number,
+                testcase=testcase,
+                waves=waves(),
+                test_args=["--trace-file", str(trace)] if waves() else [],
+                plusargs=["+verilator+rand+reset+2", f"+verilator+seed+{_verilator_seed(number)}"],
+                extra_env={
+                    "FLICKER_TB_CONFIG": json.dumps(dict(config or {})),
+                    "COCOTB_ANSI_OUTPUT": "0",
+                },
+            )
+            ran, failed = get_results(results)
+        except (SystemExit, RuntimeError) as error:
+            ran, failed = _results_or_zero(results)
+            reason = f"{failed} of {ran} cocotb tests failed" if failed else f"simulation: {error}"
+            pytest.fail(f"{top}, FLICKER_SEED={number}: {reason}", pytrace=False)
+        finally:
+            if waves() and trace.exists():
+                signal_view.save(trace, top, view)
+        if failed or not ran:
+            pytest.fail(f"{top}: {failed} of {ran} cocotb tests failed", pytrace=False)
+
+
+def _verilator_seed(number: int) -> int:
+    """Seed for the initial register values; Verilator takes 1 to 2^31 - 1."""
+    return number % (2**31 - 1) or 1
+
+
+def _results_or_zero(results: Path) -> tuple[int, int]:
+    try:
+        return get_results(results)
+    except RuntimeError:
+        return 0, 0

@@ -1,0 +1,82 @@
+"""Writes a first GTKWave view of a trace: the signals of the top module, structs by field.
+
+Reads the hierarchy block of an FST file as Verilator writes it: a file is a sequence of blocks
+(type, big-endian length, contents), the hierarchy is LZ4 compressed behind its size.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+from imagecodecs import lz4_decode
+
+from flicker.errors import FlickerError
+
+_HIERARCHY_LZ4 = 6  # block type
+_ATTRIBUTE, _ATTRIBUTE_END, _SCOPE, _UPSCOPE = 252, 253, 254, 255
+_MODULE_SCOPE, _GENERATE_SCOPE = 0, 6
+
+
+def _hierarchy(path: Path) -> bytes:
+    """Decompressed hierarchy block of an FST file."""
+    contents, at = path.read_bytes(), 0
+    while at + 9 <= len(contents):
+        kind, length = struct.unpack_from(">BQ", contents, at)
+        if kind == _HIERARCHY_LZ4:
+            (size,) = struct.unpack_from(">Q", contents, at + 9)
+            return bytes(lz4_decode(contents[at + 17 : at + 1 + length], out=size))
+        at += 1 + length
+    raise FlickerError(f"{path}: no signal hierarchy (trace incomplete?)")
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    end = data.index(0, at)
+    return data[at:end].decode(), end + 1
+
+
+def _varint(data: bytes, at: int) -> int:
+    """Position behind a variable-length number."""
+    while data[at] & 0x80:
+        at += 1
+    return at + 1
+
+
+def signals(path: Path, top: str) -> Iterator[str]:
+    """Full names of the signals declared in the module ``top`` of a trace, structs by field.
+
+    Parameters and constants, which begin with a capital, are left out.
+    """
+    data, at = _hierarchy(path), 0
+    scopes: list[tuple[str, int]] = []
+    while at < len(data):
+        tag = data[at]
+        if tag == _SCOPE:
+            kind = data[at + 1]
+            name, at = _text(data, at + 2)
+            _, at = _text(data, at)
+            scopes.append((name, kind))
+        elif tag == _UPSCOPE:
+            scopes.pop()
+            at += 1
+        elif tag == _ATTRIBUTE:
+            _, at = _text(data, at + 3)
+            at = _varint(data, at)
+        elif tag == _ATTRIBUTE_END:
+            at += 1
+        else:
+            name, at = _text(data, at + 2)
+            at = _varint(data, _varint(data, at))
+            within = [kind for _, kind in scopes[1:]]
+            if scopes[:1] == [(top, _MODULE_SCOPE)] and not (
+                {_MODULE_SCOPE, _GENERATE_SCOPE} & set(within) or name[0].isupper()
+            ):
+                yield ".".join([*(scope for scope, _ in scopes), name.replace(" ", "")])
+
+
+def save(trace: Path, top: str, view: Path) -> None:
+    """Write the view of ``top``'s signals to ``view`` unless it exists."""
+    if not view.exists():
+        view.parent.mkdir(parents=True, exist_ok=True)
+        view.write_text("\n".join(["[timestart] 0", *signals(trace, top)]) + "\n")

@@ -1,0 +1,237 @@
+"""Stream source, sink and monitor for the valid/ready contract of docs/architecture.md.
+
+A stream is a prefix of ports: ``Stream(dut, "in")`` finds ``in_valid_i`` and ``in_ready_o``, with
+``_i`` and ``_o`` either way, and a data port per field (default ``in_data``). An item is an
+unsigned integer, or a tuple of them for a stream of several fields.
+
+All of them sample just before the rising edge and drive just after it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import cocotb
+from cocotb.triggers import Event, RisingEdge
+
+from flicker_tb import stalls
+
+Item = int | tuple[int, ...]
+
+
+class Stream:
+    """Handles of one stream of a design. Raises AttributeError naming a missing port."""
+
+    def __init__(self, dut: Any, name: str, fields: Sequence[str] = ("data",)) -> None:
+        self.name = name
+        self.clock = dut.clk_i
+        self.reset_n = dut.rst_ni
+        self.fields = tuple(fields)
+        self.valid = _port(dut, f"{name}_valid")
+        self.ready = _port(dut, f"{name}_ready")
+        self.data = [_port(dut, f"{name}_{field}") for field in fields]
+
+    def read(self) -> Item:
+        """Item on the data ports now."""
+        if len(self.data) == 1:
+            return int(self.data[0].value)
+        return tuple(int(port.value) for port in self.data)
+
+    def write(self, item: Item) -> None:
+        """Put an item on the data ports."""
+        if len(self.data) == 1:
+            self.data[0].value = item
+        else:
+            assert isinstance(item, tuple) and len(item) == len(self.data), item
+            for port, value in zip(self.data, item):
+                port.value = value
+
+    def show(self, item: Item) -> str:
+        """Item in hex, with field names if there are several."""
+        if isinstance(item, tuple):
+            return " ".join(f"{field}={value:#x}" for field, value in zip(self.fields, item))
+        return f"{item:#x}"
+
+
+def _port(dut: Any, name: str) -> Any:
+    for suffix in ("_i", "_o"):
+        if (handle := getattr(dut, name + suffix, None)) is not None:
+            return handle
+    raise AttributeError(f"{dut._name} has no port {name}_i or {name}_o")
+
+
+class StreamSource:
+    """Drives valid and data from a queue; ``idle`` says in which free cycles to pause.
+
+    While nothing is offered the data ports hold the complement of the last item (X in a
+    real design), so that a design that looks at data without valid is caught.
+    """
+
+    def __init__(self, stream: Stream, idle: Iterator[bool] | None = None) -> None:
+        self.stream = stream
+        self.idle = stalls.never() if idle is None else idle
+        self.sent = 0
+        self._queue: deque[Item] = deque()
+        self._wake = Event()
+        self._masks = [(1 << len(port)) - 1 for port in stream.data]
+        stream.valid.value = 0
+        stream.write(0 if len(stream.data) == 1 else (0,) * len(stream.data))
+        self._task = cocotb.start_soon(self._run())
+
+    def send(self, items: Iterable[Item]) -> None:
+        """Queue items."""
+        self._queue.extend(items)
+        self._wake.set()
+
+    @property
+    def pending(self) -> int:
+        """Items not yet transferred."""
+        return len(self._queue)
+
+    def _garbage(self, item: Item) -> Item:
+        if isinstance(item, tuple):
+            return tuple(value ^ mask for value, mask in zip(item, self._masks))
+        return item ^ self._masks[0]
+
+    async def _run(self) -> None:
+        stream, queue, idle = self.stream, self._queue, self.idle
+        valid, ready, reset_n = stream.valid, stream.ready, stream.reset_n
+        edge = RisingEdge(stream.clock)
+        offered = False
+        while True:
+            await edge
+            if reset_n.value != 1:
+                if offered:
+                    valid.value = 0
+                    offered = False
+                continue
+            if offered:
+                if ready.value != 1:
+                    continue
+                last = queue.popleft()
+                self.sent += 1
+                if queue and not next(idle):
+                    stream.write(queue[0])
+                    continue
+                valid.value = 0
+                stream.write(self._garbage(last))
+                offered = False
+            elif not queue:
+                self._wake.clear()
+                await self._wake.wait()
+            elif not next(idle):
+                stream.write(queue[0])
+                valid.value = 1
+                offered = True
+
+
+class StreamSink:
+    """Drives ready; ``stall`` says in which cycles to hold it low."""
+
+    def __init__(self, stream: Stream, stall: Iterator[bool] | None = None) -> None:
+        self.stream = stream
+        self.stall = stalls.never() if stall is None else stall
+        stream.ready.value = 0
+        self._task = cocotb.start_soon(self._run())
+
+    async def _run(self) -> None:
+        ready, reset_n = self.stream.ready, self.stream.reset_n
+        edge = RisingEdge(self.stream.clock)
+        driven = 0
+        while True:
+            await edge
+            wanted = 0 if reset_n.value != 1 or next(self.stall) else 1
+            if wanted != driven:
+                ready.value = driven = wanted
+
+
+class Monitor:
+    """Observes transfers; fails the test if valid or data change before their transfer.
+
+    Each transferred item goes to the functions in ``callbacks``. ``count`` counts transfers,
+    ``cycles`` the cycles out of reset, ``last`` the cycle number of the last transfer.
+    """
+
+    def __init__(self, stream: Stream, *callbacks: Callable[[Any], None]) -> None:
+        self.stream = stream
+        self.callbacks = list(callbacks)
+        self.count = 0
+        self.cycles = 0
+        self.last = -1
+        self._task = cocotb.start_soon(self._run())
+
+    async def _run(self) -> None:
+        stream = self.stream
+        valid, ready, reset_n = stream.valid, stream.ready, stream.reset_n
+        edge = RisingEdge(stream.clock)
+        waiting: Item | None = None
+        while True:
+            await edge
+            if reset_n.value != 1:
+                waiting = None
+                continue
+            self.cycles += 1
+            if valid.value != 1:
+                assert waiting is None, (
+                    f"{stream.name}: valid fell before the transfer of {stream.show(waiting)}"
+                )
+                continue
+            item = stream.read()
+            assert waiting is None or item == waiting, (
+                f"{stream.name}: data changed from {stream.show(waiting)} "
+                f"to {stream.show(item)} before the transfer"
+            )
+            if ready.value == 1:
+                self.count += 1
+                self.last = self.cycles
+                waiting = None
+                for callback in self.callbacks:
+                    callback(item)
+            else:
+                waiting = item
+
+
+class Checker:
+    """Compares the design's output with a model that is fed by the input monitor.
+
+    ``model(item)`` returns the items expected for an input item, in order (none, one or more).
+    Connect ``expect`` to the input monitor and ``check`` to the output monitor, and call
+    ``finish`` at the end: leftovers and a run without any output are failures.
+    """
+
+    def __init__(
+        self,
+        model: Callable[[Any], Iterable[Any]],
+        show: Callable[[Any], str] = lambda item: f"{item:#x}" if isinstance(item, int) else str(item),
+    ) -> None:
+        self.model = model
+        self.show = show
+        self.checked = 0
+        self._expected: deque[Any] = deque()
+
+    def expect(self, item: Any) -> None:
+        """Take an input item."""
+        self._expected.extend(self.model(item))
+
+    def check(self, item: Any) -> None:
+        """Take an output item."""
+        assert self._expected, f"output {self.checked}: {self.show(item)} was not expected"
+        expected = self._expected.popleft()
+        assert item == expected, (
+            f"output {self.checked}: got {self.show(item)}, expected {self.show(expected)}"
+        )
+        self.checked += 1
+
+    @property
+    def outstanding(self) -> int:
+        """Expected items that have not come yet."""
+        return len(self._expected)
+
+    def finish(self, at_least: int = 1) -> None:
+        """Fail if items are missing or fewer than ``at_least`` were checked."""
+        assert not self._expected, (
+            f"{len(self._expected)} expected items never came, first {self.show(self._expected[0])}"
+        )
+        assert self.checked >= at_least, f"{self.checked} items checked, {at_least} wanted"
