@@ -58,6 +58,18 @@ def run(command: list[object]) -> str:
     return f"$ {' '.join(words)}\n{done.stdout}" if done.returncode else ""
 
 
+def unseen(outputs: list[str]) -> list[str]:
+    """Outputs that say something new: a module's warning comes again under every top above it."""
+    seen: set[str] = set()
+    kept = []
+    for output in outputs:
+        said = set(re.findall(r"^%(?!Error: Exiting).*$|^rtl/.*$", output, re.M))
+        if not said or said - seen:
+            kept.append(output)
+        seen |= said
+    return kept
+
+
 def main() -> int:
     listed = toolchain.filelist()
     findings = check_filelist(listed)
@@ -82,12 +94,13 @@ def main() -> int:
          *(path.relative_to(ROOT) for path in listed)]
     )
     with ThreadPoolExecutor(2) as pool:
-        findings += filter(None, pool.map(run, commands))
+        outputs = [output for output in pool.map(run, commands) if output]
+    findings += unseen(outputs)
 
     for finding in findings:
         print(finding.rstrip())
     modules = sum(not path.stem.endswith("_pkg") for path in listed)
-    print(f"lint: {modules} modules, {len(commands)} checks, {len(findings)} with findings")
+    print(f"lint: {modules} modules, {len(commands)} checks, {len(findings)} findings")
     return 1 if findings else 0
 
 

@@ -15,7 +15,7 @@ missing=()
 if ! command -v "$python" > /dev/null; then
   missing+=("$python >= 3.11")
 elif ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
-  missing+=("Python >= 3.11 (found $("$python" -c 'import platform; print(platform.python_version())'))")
+  missing+=("Python >= 3.11 (this one is $("$python" --version))")
 elif ! "$python" -c 'import venv, ensurepip' 2> /dev/null; then
   missing+=("the venv module of $python (Debian: python3-venv)")
 fi

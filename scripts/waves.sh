@@ -17,10 +17,9 @@ WAVES=1 python -m pytest -m sim --unit "$unit" tb || status=$?
 shopt -s nullglob
 traces=("build/waves/$unit"/*/*.fst)
 if ((${#traces[@]})); then
-  printf '\nOpen a trace with its saved signal view:\n'
+  printf '\nOpen a trace with its signal view (saved in tb/waves, fitted to the trace):\n'
   for trace in "${traces[@]}"; do
-    top=$(basename "$(dirname "$trace")")
-    echo "  gtkwave $trace tb/waves/$top.gtkw"
+    echo "  gtkwave $trace ${trace%.fst}.gtkw"
   done
 fi
 exit "$status"

@@ -10,6 +10,7 @@ import pytest
 TB = Path(__file__).resolve().parent
 sys.path.insert(0, str(TB))
 
+from flicker.errors import FlickerError  # noqa: E402
 from flicker_tb import runner  # noqa: E402
 
 
@@ -19,6 +20,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "sim: simulates hardware (everything outside tb/model)")
+    try:
+        runner.seed()
+    except FlickerError as error:
+        raise pytest.UsageError(str(error)) from None
     unit = config.getoption("--unit")
     units = sorted(path.stem.removeprefix("test_") for path in TB.rglob("test_*.py"))
     if unit is not None and unit not in units:

@@ -1,1 +1,20 @@
 """FLICKER: golden model, float64 reference renderer and tools of a contribution-aware 3DGS accelerator."""
+
+import hashlib
+import os
+from pathlib import Path
+
+
+def _compiled_code_folder() -> Path:
+    """Where numba keeps compiled kernels: one folder per state of this package.
+
+    Numba itself only looks at the file a kernel stands in, not at the functions it calls.
+    """
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256()
+    for source in sorted(here.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return here.parents[1] / "build" / "numba" / digest.hexdigest()[:16]
+
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_compiled_code_folder()))

@@ -173,6 +173,44 @@ def render(
     console.print(summary(result.stats, out))
 
 
+@app.command()
+def demo(
+    size: Annotated[Optional[str], typer.Option(help="WxH [default: 640x360]")] = None,
+    folder: Annotated[Path, typer.Option("--dir", help="where scene, picture and statistics go")] = Path("build/demo"),
+    seed: Annotated[int, typer.Option(help="seed of the scene")] = 1,
+) -> None:
+    """Make the demo scene and render it through the RTL, beside the golden model and the reference."""
+    wanted = parse_size(size)
+    steps = _RichSteps()
+    with steps.step("starting"):
+        from .camera import load_cameras
+        from .demo_scene import write_demo
+        from .image import save_png
+        from .pipeline import Engine, render_view
+        from .projection import project
+        from .reference import render_reference
+        from .scene import load_scene
+    with steps.step(f"making the demo scene (seed {seed})"):
+        scene_path, cameras_path = write_demo(folder, seed)
+    scene = load_scene(scene_path)
+    camera = load_cameras(cameras_path)[0]
+    if wanted:
+        camera = camera.resized(*wanted)
+    with steps.step("rendering the float64 reference (compiling on the first run)"):
+        projected = project(scene, camera)
+        shared = {"compare": True, "projected": projected, "reference": render_reference(projected, camera), "steps": steps}
+    golden = render_view(scene, camera, engine=Engine.GOLDEN, **shared)
+    rtl = render_view(scene, camera, engine=Engine.RTL, **shared)
+    if not (golden.image == rtl.image).all():
+        raise FlickerError("demo: the RTL's picture differs from the golden model's")
+    picture = folder / "demo.png"
+    write_atomically(picture, lambda path: save_png(path, rtl.image))
+    write_atomically(folder / "stats.json", lambda path: path.write_text(json.dumps(rtl.stats, indent=2) + "\n"))
+    table = summary(rtl.stats, picture)
+    table.add_row("golden model", "equal, bit for bit")
+    console.print(table)
+
+
 def main() -> None:
     """Entry point: bad input is one line on standard error and exit code 2."""
     try:

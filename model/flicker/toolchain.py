@@ -124,12 +124,17 @@ def _digest(*parts: object) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:16]
 
 
+def _literal(value: str | int) -> str:
+    """A parameter value for the command line; truth values become numbers."""
+    return f'"{value}"' if isinstance(value, str) else str(int(value))
+
+
 def verilate(
     top: str,
     sources: Sequence[Path] | None = None,
     *,
     extra: Sequence[Path] = (),
-    parameters: Mapping[str, object] | None = None,
+    parameters: Mapping[str, str | int] | None = None,
     args: Sequence[str] = (),
     cpp: Sequence[Path] = (),
     depends: Sequence[Path] = (),
@@ -162,15 +167,17 @@ def verilate(
         cflags, ldflags = f"-fPIC {cflags}".strip(), f"-shared {ldflags}".strip()
     options = [
         *args,
-        *(f'-G{key}="{value}"' if isinstance(value, str) else f"-G{key}={int(value)}"  # type: ignore[call-overload]
-          for key, value in (parameters or {}).items()),
+        *(f"-G{key}={_literal(value)}" for key, value in (parameters or {}).items()),
     ]
     if cflags:
         options += ["-CFLAGS", cflags]
     if ldflags:
         options += ["-LDFLAGS", ldflags]
     files = [*sources, *cpp, *(Path(path).resolve() for path in depends)]
-    contents = [part for path in files for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())]
+    contents = [
+        part for path in files
+        for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())
+    ]
     key = _digest(top, verilator_root(), _versions(), opt, *options, "--", *contents)
 
     name = name or top
@@ -203,13 +210,19 @@ def _run(command: Sequence[object], log: Path) -> None:
     with log.open("a") as out:
         out.write(" ".join(map(str, command)) + "\n")
         out.flush()
-        code = subprocess.run(
-            [str(word) for word in command], env=_build_environment(), stdout=out,
-            stderr=subprocess.STDOUT,
-        ).returncode
+        try:
+            code = subprocess.run(
+                [str(word) for word in command], env=_build_environment(), stdout=out,
+                stderr=subprocess.STDOUT,
+            ).returncode
+        except OSError as error:
+            raise FlickerError(f"{command[0]}: cannot be run ({error.strerror})") from None
     if code:
-        lines = [line for line in log.read_text().splitlines() if re.search("error", line, re.I)]
-        first = lines[0] if lines else f"exit code {code}"
+        text = log.read_text()
+        for pattern in ("-USERERROR", "%Error(?!: Exiting)", "%Warning", r"\berror:", r"\*\*\*"):
+            if found := re.search(rf"^.*{pattern}.*$", text, re.M):
+                break
+        first = found[0] if found else f"exit code {code}"
         raise FlickerError(f"{Path(str(command[0])).name}: {first} (see {log})")
 
 

@@ -7,7 +7,7 @@
 module flk_stream_arbiter #(
   parameter  int unsigned Inputs    = 4,
   parameter  int unsigned Width     = 8,
-  localparam int unsigned IndexBits = $clog2(Inputs)  // 0 to Inputs - 1
+  localparam int unsigned IndexBits = Inputs > 1 ? $clog2(Inputs) : 1  // 0 to Inputs - 1
 ) (
   input  logic                         clk_i,
   input  logic                         rst_ni,

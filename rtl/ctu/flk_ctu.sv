@@ -95,11 +95,9 @@ module flk_ctu
   assign feature = in_elem_i.splat.feature;
 
   flk_log_opacity #(
-    .Base2   (Form == FORM_FACTORED),
-    .ExpBits (Wide ? 5 : 4),
-    .ManBits (Wide ? 10 : 3),
-    .Fn      (!Wide),
-    .Saturate(!Wide)
+    .Base2  (Form == FORM_FACTORED),
+    .ExpBits(Wide ? 5 : 4),
+    .ManBits(Wide ? 10 : 3)
   ) i_log (
     .opacity_i(feature.opacity),
     .log_o    (threshold)
@@ -249,19 +247,16 @@ module flk_ctu
     events_o.splat   = accept && !in_elem_i.eos;
     if (result_valid && !tag_out.eos) begin
       events_o.rejected = (result_mask == '0);
-      events_o.tested   = 3'(result_mask[0]) + 3'(result_mask[1]) + 3'(result_mask[2]) + 3'(result_mask[3]);
+      events_o.tested   = 3'(result_mask[0]) + 3'(result_mask[1])
+                        + 3'(result_mask[2]) + 3'(result_mask[3]);
     end
   end
 
 `ifndef SYNTHESIS
-  always_ff @(posedge clk_i) begin
-    if (rst_ni) begin
-      assert (!result_valid || unused_mask_ready)
-      else $error("flk_ctu: a mask has no place");
-      assert (!mask_valid || unused_elem_valid)
-      else $error("flk_ctu: a mask without its element");
-    end
-  end
+  assert property (@(posedge clk_i) disable iff (!rst_ni) result_valid |-> unused_mask_ready)
+  else $error("flk_ctu: a mask has no place");
+  assert property (@(posedge clk_i) disable iff (!rst_ni) mask_valid |-> unused_elem_valid)
+  else $error("flk_ctu: a mask without its element");
 `endif
 
 endmodule

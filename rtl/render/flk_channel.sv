@@ -139,12 +139,12 @@ module flk_channel
 
   for (genvar v = 0; v < VRUS_PER_CHANNEL; v++) begin : gen_vru
     flk_vru #(
-      .Form  (Form),
-      .FirstX((MiniTile % 2) * MINITILE),
-      .FirstY((MiniTile / 2) * MINITILE + v * VruRows)
+      .Form(Form)
     ) i_vru (
       .clk_i,
       .rst_ni,
+      .first_x_i    (3'((MiniTile % 2) * MINITILE)),
+      .first_y_i    (3'((MiniTile / 2) * MINITILE + v * VruRows)),
       .op_valid_i   (issue || issue_eos),
       .op_eos_i     (issue_eos),
       .op_pixel_i   (pixel_q),
@@ -176,7 +176,11 @@ module flk_channel
     .out_index_o(out_vru)
   );
 
-  assign out_data_o = '{subtile: subtile_q, index: {out_vru, out_pixel.index}, pixel: out_pixel.pixel};
+  assign out_data_o = '{
+    subtile: subtile_q,
+    index: {out_vru, out_pixel.index},
+    pixel: out_pixel.pixel
+  };
 
   // ---- Counters ------------------------------------------------------------------------------------------------
 

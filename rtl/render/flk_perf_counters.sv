@@ -15,6 +15,11 @@ module flk_perf_counters
   output logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0]      counters_o
 );
 
+  // Place of a channel's counter.
+  function automatic int unsigned channel(int unsigned c, int unsigned counter);
+    return CORE_COUNTERS + c * CHANNEL_COUNTERS + counter;
+  endfunction
+
   // No event counts more than 4 in a cycle.
   logic [COUNTERS_PER_CORE-1:0][2:0] inc;
   logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0] counters_q;
@@ -32,11 +37,11 @@ module flk_perf_counters
     inc[CNT_MINITILES_DELIVERED] = dispatch_events_i.delivered;
     inc[CNT_MINITILES_FILTERED]  = dispatch_events_i.filtered;
     for (int unsigned c = 0; c < CHANNELS; c++) begin
-      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_FIFO_FULL]           = 3'(channel_events_i[c].fifo_full);
-      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_VRU_BUSY]            = 3'(channel_events_i[c].vru_busy);
-      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_MINITILES_SENT]      = 3'(channel_events_i[c].sent);
-      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_MINITILES_DISCARDED] = 3'(channel_events_i[c].discarded);
-      inc[CORE_COUNTERS + c * CHANNEL_COUNTERS + CNT_CH_PIXELS_FINISHED]     = 3'(channel_events_i[c].finished);
+      inc[channel(c, CNT_CH_FIFO_FULL)]           = 3'(channel_events_i[c].fifo_full);
+      inc[channel(c, CNT_CH_VRU_BUSY)]            = 3'(channel_events_i[c].vru_busy);
+      inc[channel(c, CNT_CH_MINITILES_SENT)]      = 3'(channel_events_i[c].sent);
+      inc[channel(c, CNT_CH_MINITILES_DISCARDED)] = 3'(channel_events_i[c].discarded);
+      inc[channel(c, CNT_CH_PIXELS_FINISHED)]     = 3'(channel_events_i[c].finished);
     end
   end
 

@@ -25,14 +25,14 @@ module flk_vru
   import flk_param_pkg::*;
 #(
   parameter int unsigned Form   = FORM_FACTORED,
-  // Column and row of the first pixel within the sub-tile; pixel i is column i % 4, row i / 4 from there.
-  parameter int unsigned FirstX = 0,
-  parameter int unsigned FirstY = 0,
   localparam int unsigned N      = PIXELS_PER_VRU,
   localparam int unsigned IndexW = $clog2(N)
 ) (
   input  logic              clk_i,
   input  logic              rst_ni,
+  // First pixel's column and row in the sub-tile, constant; pixel i lies i % 4, i / 4 from it.
+  input  logic [2:0]        first_x_i,
+  input  logic [2:0]        first_y_i,
   // operations
   input  logic              op_valid_i,
   input  logic              op_eos_i,
@@ -54,10 +54,6 @@ module flk_vru
   if (Form > FORM_FACTORED) begin : gen_check_form
     $error("flk_vru: Form must be FORM_CONIC or FORM_FACTORED");
   end
-  if ((FirstX % 4 != 0) || (FirstX > 4) || (FirstY % 2 != 0) || (FirstY > 6)) begin : gen_check_first
-    $error("flk_vru: FirstX must be 0 or 4, FirstY 0, 2, 4 or 6");
-  end
-
   localparam int unsigned STAGES = 11;
   localparam int unsigned BLEND = 9;  // stage of the transmittance loop
 
@@ -95,12 +91,12 @@ module flk_vru
   fp16_t dx_d, dy_d, dx_q, dy_q;
 
   flk_fp_add i_dx (
-    .a_i  (pixel_fp16(3'(FirstX) + 3'(op_pixel_i[1:0]))),
+    .a_i  (pixel_fp16(first_x_i + 3'(op_pixel_i[1:0]))),
     .b_i  ({~op_feature_i.mean_x[15], op_feature_i.mean_x[14:0]}),
     .sum_o(dx_d)
   );
   flk_fp_add i_dy (
-    .a_i  (pixel_fp16(3'(FirstY) + 3'(op_pixel_i[2]))),
+    .a_i  (pixel_fp16(first_y_i + 3'(op_pixel_i[2]))),
     .b_i  ({~op_feature_i.mean_y[15], op_feature_i.mean_y[14:0]}),
     .sum_o(dy_d)
   );
@@ -338,12 +334,8 @@ module flk_vru
   end
 
 `ifndef SYNTHESIS
-  always_ff @(posedge clk_i) begin
-    if (rst_ni) begin
-      assert (!(op_valid_i && op_eos_i) || eos_ready_o)
-      else $error("flk_vru: token while the output buffer is in use");
-    end
-  end
+  assert property (@(posedge clk_i) disable iff (!rst_ni) op_valid_i && op_eos_i |-> eos_ready_o)
+  else $error("flk_vru: token while the output buffer is in use");
 `endif
 
 endmodule

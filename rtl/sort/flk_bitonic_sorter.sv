@@ -103,7 +103,7 @@ module flk_bitonic_sorter #(
         flk_compare_exchange #(
           .KeyWidth    (TagWidth),
           .PayloadWidth(PayloadWidth)
-        ) u_compare_exchange (
+        ) i_compare_exchange (
           .a_key_i       (unsorted[lane].key),
           .a_payload_i   (unsorted[lane].payload),
           .b_key_i       (unsorted[lane+Distance].key),
@@ -119,7 +119,7 @@ module flk_bitonic_sorter #(
     if (Register) begin : gen_register
       flk_pipe_reg #(
         .Width($bits(vector_t))
-      ) u_pipe_reg (
+      ) i_pipe_reg (
         .clk_i,
         .rst_ni,
         .in_valid_i (valid),

@@ -13,6 +13,7 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from cocotb_tools import config as cocotb_config
@@ -43,7 +44,7 @@ def waves() -> bool:
 def build(
     top: str,
     *,
-    parameters: Mapping[str, object] | None = None,
+    parameters: Mapping[str, str | int] | None = None,
     extra: Sequence[Path] = (),
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
@@ -77,13 +78,13 @@ def build_and_test(
     top: str,
     module: str,
     *,
-    parameters: Mapping[str, object] | None = None,
+    parameters: Mapping[str, str | int] | None = None,
     config: Mapping[str, object] | None = None,
     extra: Sequence[Path] = (),
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
     opt: str = "-O1",
-    testcase: str | Sequence[str] | None = None,
+    tests: Sequence[str] = (),
     seeds: int = 1,
 ) -> None:
     """Build ``top`` and run the cocotb tests of the Python module ``module`` on it.
@@ -92,7 +93,7 @@ def build_and_test(
         top, parameters, extra, sources, args, opt: as of ``build``.
         module: importable name; the folder of the pytest file is on the path.
         config: JSON-able settings, which the tests read with ``flicker_tb.bench.config()``.
-        testcase: names of the cocotb tests to run; default all of the module.
+        tests: names of the cocotb tests to run, parametrized ones in all variants; default all.
         seeds: number of runs, with seeds FLICKER_SEED, FLICKER_SEED + 1, ...
 
     Fails the pytest test if a cocotb test fails, an assertion of the design fires, or no
@@ -120,7 +121,7 @@ def build_and_test(
                 test_dir=folder,
                 results_xml=str(results),
                 seed=number,
-                testcase=testcase,
+                test_filter=rf"\.({'|'.join(tests)})(/.*)?$" if tests else None,
                 waves=waves(),
                 test_args=["--trace-file", str(trace)] if waves() else [],
                 plusargs=["+verilator+rand+reset+2", f"+verilator+seed+{_verilator_seed(number)}"],
@@ -137,8 +138,15 @@ def build_and_test(
         finally:
             if waves() and trace.exists():
                 signal_view.save(trace, top, view)
-        if failed or not ran:
-            pytest.fail(f"{top}: {failed} of {ran} cocotb tests failed", pytrace=False)
+                signal_view.fit(view, trace, top, trace.with_suffix(".gtkw"))
+        cases = ElementTree.parse(results).iter("testcase")
+        known = {case.get("name", "").split("/")[0] for case in cases}
+        if failed or not ran or not set(tests) <= known:
+            pytest.fail(
+                f"{top}: {failed} of {ran} cocotb tests failed, "
+                f"not found: {sorted(set(tests) - known)}",
+                pytrace=False,
+            )
 
 
 def _verilator_seed(number: int) -> int:

@@ -6,6 +6,7 @@ Reads the hierarchy block of an FST file as Verilator writes it: a file is a seq
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,8 @@ from pathlib import Path
 from imagecodecs import lz4_decode
 
 from flicker.errors import FlickerError
+
+MARK = "[*] Signals of the top module; replaced by larger ones until saved by GTKWave"
 
 _HIERARCHY_LZ4 = 6  # block type
 _ATTRIBUTE, _ATTRIBUTE_END, _SCOPE, _UPSCOPE = 252, 253, 254, 255
@@ -76,7 +79,24 @@ def signals(path: Path, top: str) -> Iterator[str]:
 
 
 def save(trace: Path, top: str, view: Path) -> None:
-    """Write the view of ``top``'s signals to ``view`` unless it exists."""
-    if not view.exists():
+    """Write the view of ``top``'s signals to ``view``.
+
+    A view that GTKWave has saved is left alone, one of ours is replaced if the trace has more
+    signals (the same module with larger parameters).
+    """
+    lines = [MARK, "[timestart] 0", *signals(trace, top)]
+    old = view.read_text().splitlines() if view.exists() else [MARK]
+    if old[:1] == [MARK] and len(lines) > len(old):
         view.parent.mkdir(parents=True, exist_ok=True)
-        view.write_text("\n".join(["[timestart] 0", *signals(trace, top)]) + "\n")
+        view.write_text("\n".join(lines) + "\n")
+
+
+def fit(view: Path, trace: Path, top: str, fitted: Path) -> None:
+    """Write ``view`` for one trace: signals by name, whatever range the parameters give them."""
+    names = {_without_range(name): name for name in signals(trace, top)}
+    lines = view.read_text().splitlines()
+    fitted.write_text("\n".join(names.get(_without_range(line), line) for line in lines) + "\n")
+
+
+def _without_range(name: str) -> str:
+    return re.sub(r"\[\d+:\d+\]$", "", name)

@@ -151,7 +151,8 @@ class Monitor:
     """Observes transfers; fails the test if valid or data change before their transfer.
 
     Each transferred item goes to the functions in ``callbacks``. ``count`` counts transfers,
-    ``cycles`` the cycles out of reset, ``last`` the cycle number of the last transfer.
+    ``cycles`` the cycles out of reset; ``first`` and ``last`` are the cycles of the first and
+    the last transfer.
     """
 
     def __init__(self, stream: Stream, *callbacks: Callable[[Any], None]) -> None:
@@ -159,7 +160,7 @@ class Monitor:
         self.callbacks = list(callbacks)
         self.count = 0
         self.cycles = 0
-        self.last = -1
+        self.first = self.last = -1
         self._task = cocotb.start_soon(self._run())
 
     async def _run(self) -> None:
@@ -186,6 +187,8 @@ class Monitor:
             if ready.value == 1:
                 self.count += 1
                 self.last = self.cycles
+                if self.count == 1:
+                    self.first = self.cycles
                 waiting = None
                 for callback in self.callbacks:
                     callback(item)
@@ -204,7 +207,7 @@ class Checker:
     def __init__(
         self,
         model: Callable[[Any], Iterable[Any]],
-        show: Callable[[Any], str] = lambda item: f"{item:#x}" if isinstance(item, int) else str(item),
+        show: Callable[[Any], str] = str,
     ) -> None:
         self.model = model
         self.show = show
@@ -223,6 +226,10 @@ class Checker:
             f"output {self.checked}: got {self.show(item)}, expected {self.show(expected)}"
         )
         self.checked += 1
+
+    def drop(self) -> None:
+        """Forget what is expected: the design was reset."""
+        self._expected.clear()
 
     @property
     def outstanding(self) -> int:

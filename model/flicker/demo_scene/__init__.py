@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 
 from flicker.demo_scene import light, plants, still_life, table_things
 from flicker.demo_scene.splats import Rand, Splats, dot, unit
 from flicker.demo_scene.views import EYES, demo_cameras, to_world
-from flicker.scene import Scene
+from flicker.errors import FlickerError
+from flicker.scene import Scene, save_ply
 
-__all__ = ["demo_cameras", "generate"]
+__all__ = ["demo_cameras", "generate", "write_demo"]
 
 _C0 = 0.28209479177387814
 _C1 = 0.4886025119029199
@@ -18,7 +22,7 @@ _GRID = 2.0**-16
 
 
 def generate(seed: int = 1) -> Scene:
-    """The scene: about 55,000 Gaussians with spherical harmonics of degree 1, in decimetres."""
+    """The scene: about 59,000 Gaussians with spherical harmonics of degree 1, in decimetres."""
     out = Splats()
     makers = (still_life.wall, still_life.table, still_life.cloth, still_life.vase, table_things.fruit, table_things.bowl,
               table_things.glass, table_things.candle, plants.bouquet, plants.fallen)
@@ -34,6 +38,27 @@ def generate(seed: int = 1) -> Scene:
         opacities=_rounded(np.clip(s["opacity"], 0.004, 0.995)),
         sh=_rounded(sh),
     )
+
+
+def write_demo(folder: str | Path, seed: int = 1) -> tuple[Path, Path]:
+    """Generate the scene into `folder` (made if missing): paths of demo.ply and cameras.json, both in INRIA layout.
+
+    Raises FlickerError if the folder cannot be written.
+    """
+    folder = Path(folder)
+    scene_path, cameras_path = folder / "demo.ply", folder / "cameras.json"
+    cameras = [
+        {"id": k, "img_name": c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
+         "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy}
+        for k, c in enumerate(demo_cameras())
+    ]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        save_ply(generate(seed), scene_path)
+        cameras_path.write_text(json.dumps(cameras, indent=1) + "\n")
+    except OSError as error:
+        raise FlickerError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    return scene_path, cameras_path
 
 
 def _rounded(x: np.ndarray) -> np.ndarray:

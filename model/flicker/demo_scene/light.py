@@ -11,12 +11,12 @@ import numpy as np
 
 from flicker.demo_scene.splats import dot, mix, step, unit
 
-SUN = unit(np.array([-0.80, -0.62, 0.78]))
-SUN_COLOUR = np.array([1.0, 0.86, 0.66]) * 3.3
-SUN_SPREAD = 0.075
+SUN = unit(np.array([-0.85, -0.45, 0.70]))
+SUN_COLOUR = np.array([1.0, 0.86, 0.66]) * 3.9
+SUN_SPREAD = 0.10
 SKY = unit(np.array([-0.85, -0.5, 0.55]))
-CANDLE_COLOUR = np.array([1.0, 0.55, 0.20]) * 0.33
-CELL = 0.025
+CANDLE_COLOUR = np.array([1.0, 0.55, 0.20]) * 0.42
+CELL = 0.03
 BIAS = 0.045
 
 
@@ -43,8 +43,8 @@ def room(direction: np.ndarray) -> np.ndarray:
     """Radiance (N, 3) of the unseen room: a bright soft window side, a dim warm rest."""
     side = np.clip(dot(direction, SKY), 0.0, 1.0)
     up = 0.5 + 0.5 * direction[:, 2]
-    return (np.array([0.27, 0.25, 0.235]) * (0.5 + 0.8 * up)[:, None]
-            + np.array([0.80, 0.92, 1.05]) * (side**3)[:, None] * 1.15)
+    return (np.array([0.25, 0.235, 0.225]) * (0.4 + 0.8 * up)[:, None]
+            + np.array([0.80, 0.92, 1.05]) * (side**3)[:, None] * 0.95)
 
 
 def window_mask(p: np.ndarray) -> np.ndarray:
@@ -56,13 +56,13 @@ def window_mask(p: np.ndarray) -> np.ndarray:
 
 
 def _panes(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    soft = 0.13
-    inside = step(-3.30, -3.30 + 2 * soft, u) * step(2.75, 2.75 - 2 * soft, u)
-    inside *= step(-2.6, -2.6 + 2 * soft, v) * step(3.05, 3.05 - 2 * soft, v)
-    for bar in (-1.75, -0.2, 1.35):
-        inside *= 1.0 - 0.85 * step(soft, 0.03, np.abs(u - bar))
-    for bar in (1.55,):
-        inside *= 1.0 - 0.85 * step(soft, 0.03, np.abs(v - bar))
+    soft = 0.10
+    inside = step(-3.6, -3.6 + 2 * soft, u) * step(3.4, 3.4 - 2 * soft, u)
+    inside *= step(-2.6, -2.6 + 2 * soft, v) * step(4.5, 4.5 - 2 * soft, v)
+    for bar in (-1.95, -0.15, 1.65):
+        inside *= 1.0 - 0.85 * step(0.15, 0.07, np.abs(u - bar))
+    for bar in (3.05,):
+        inside *= 1.0 - 0.85 * step(0.15, 0.07, np.abs(v - bar))
     return inside
 
 
@@ -73,12 +73,14 @@ def _reflection(direction: np.ndarray, sharp: np.ndarray) -> np.ndarray:
     ahead = np.maximum(dot(direction, SUN), 1e-3)
     u, v = dot(direction, x) / ahead, dot(direction, y) / ahead
     soft = 2.2 / np.sqrt(sharp)
-    pane = step(1.0, 0.0, (np.abs(u) - 0.34) / soft + 0.5) * step(1.0, 0.0, (np.abs(v) - 0.46) / soft + 0.5)
+    pane = step(1.0, 0.0, (np.abs(u) - 0.40) / soft + 0.5) * step(1.0, 0.0, (np.abs(v) - 0.50) / soft + 0.5)
     crisp = np.clip(sharp / 400.0, 0.0, 1.0)
     cross = np.maximum(step(0.075, 0.035, np.abs(u)), step(0.075, 0.035, np.abs(v - 0.1)))
     pane = pane * (1.0 - crisp * 0.8 * cross) * (dot(direction, SUN) > 0.0)
-    strength = np.clip(sharp / 250.0, 0.12, 1.0) * 5.0
-    return room(direction) + (pane * strength)[:, None] * np.array([1.0, 0.95, 0.86])
+    strength = np.clip(sharp / 250.0, 0.12, 1.0) * 32.0
+    below = step(0.1, -0.25, direction[:, 2])
+    surroundings = mix(room(direction), (0.16, 0.095, 0.055), below)
+    return surroundings + (pane * strength)[:, None] * np.array([1.0, 0.95, 0.86])
 
 
 def _points(s: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -86,10 +88,10 @@ def _points(s: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     solid = np.nonzero(s["casts"])[0]
     p, t, n, size = s["p"][solid], s["t"][solid], s["n"][solid], s["size"][solid]
     b = np.cross(n, t)
-    steps = np.clip(np.ceil(size[:, :2] * (2.4 / CELL)), 1, 7).astype(np.int64)
+    steps = np.clip(np.ceil(size[:, :2] * (2.2 / CELL)), 1, 6).astype(np.int64)
     points, owners = [], []
-    for along in range(1, 8):
-        for across in range(1, 8):
+    for along in range(1, 7):
+        for across in range(1, 7):
             chosen = np.nonzero((steps[:, 0] == along) & (steps[:, 1] == across))[0]
             if len(chosen) == 0:
                 continue
@@ -115,32 +117,29 @@ def hits(s: dict[str, np.ndarray], directions: np.ndarray, two_sided: np.ndarray
         x = unit(np.cross(w, [0.31, 0.17, 0.93]))
         y = np.cross(w, x)
 
-        def key(at: np.ndarray, bias: float) -> tuple[np.ndarray, np.ndarray]:
+        def key(at: np.ndarray, bias: float) -> np.ndarray:
             rel = at - centre
             cu = np.floor((dot(rel, x) + extent) / CELL).astype(np.int64)
             cv = np.floor((dot(rel, y) + extent) / CELL).astype(np.int64)
             depth = np.floor((dot(rel, w) + extent + bias) * (2.0**20 / (2.0 * extent + 1.0))).astype(np.int64)
-            cell = cu * per_row + cv
-            return cell, (cell << 20) + depth
+            return ((cu * per_row + cv) << 36) + (depth << 16)
 
-        _, keys = key(points, 0.0)
-        order = np.argsort(keys)
-        keys, who = keys[order], owners[order]
+        keys = np.sort(key(points, 0.0) + owners)
         facing = dot(s["n"], w)
         away = np.where(two_sided & (facing < 0), -1.0, 1.0)[:, None] * s["n"]
         start = s["p"] + BIAS * away
-        cell, wanted = key(start, 0.03)
-        nearest = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        hit = (keys[nearest] >= wanted) & (keys[nearest] >> 20 == cell)
-        table[k] = np.where(hit, who[nearest], -1)
+        wanted = key(start, 0.03)
+        nearest = keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)]
+        hit = (nearest >= wanted) & (nearest >> 36 == wanted >> 36)
+        table[k] = np.where(hit, nearest & 0xFFFF, -1)
     return table
 
 
-def bake(s: dict[str, np.ndarray], flame: np.ndarray, sky_count: int = 56, sun_count: int = 20) -> np.ndarray:
+def bake(s: dict[str, np.ndarray], flame: np.ndarray, sky_count: int = 48, sun_count: int = 24) -> np.ndarray:
     """Diffuse radiance (N, 3) of every splat after two bounces."""
     thin = s["through"] > 0.0
     lit = s["albedo"].sum(axis=1) > 0.0
-    albedo = s["albedo"]
+    albedo = s["albedo"] * (1.0 - 0.7 * s["metal"])[:, None]
 
     def cosine(w: np.ndarray) -> np.ndarray:
         c = dot(s["n"], w)
@@ -187,6 +186,6 @@ def highlights(s: dict[str, np.ndarray], view: np.ndarray) -> np.ndarray:
 
 def display(radiance: np.ndarray) -> np.ndarray:
     """Picture values in [0, 1]: filmic curve, then the sRGB transfer function."""
-    x = np.maximum(radiance, 0.0) * 0.80
+    x = np.maximum(radiance, 0.0) * 0.74
     x = np.clip((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)

@@ -13,8 +13,8 @@ MOUTH = VASE + [0.0, 0.0, 1.50]
 HEART = VASE + [0.0, 0.05, 1.85]
 
 
-def _stem(out: Splats, rand: Rand, top: np.ndarray, colour: str, thickness: float = 0.014, start: np.ndarray | None = None) -> None:
-    foot = MOUTH + 0.10 * rand.normal(3) * [1, 1, 0] - [0, 0, 0.1] if start is None else start
+def _stem(out: Splats, rand: Rand, top: np.ndarray, colour: str, thickness: float) -> None:
+    foot = MOUTH + 0.10 * rand.normal(3) * [1, 1, 0] - [0, 0, 0.1]
     bend = (foot + top) / 2 + [0, 0, 0.22] + 0.06 * rand.normal(3)
     count = int(10 * np.sqrt(dot(top - foot, top - foot)) / 0.4) + 4
     p, along = bezier([foot, bend, top], np.linspace(0, 1, count))
@@ -39,7 +39,7 @@ def _blade(out: Splats, rand: Rand, points: list, width: float, count: int, colo
     colour = mix(mix(srgb(colours[0]), srgb(colours[1]), np.clip(tone, 0, 1)), srgb(colours[2]), 0.75 * vein)
     lean = unit(along + (0.45 * np.sign(v) * (np.abs(v) > 0.16))[:, None] * side)
     span = max(width, 0.02)
-    long = np.clip(span * rand.uniform(count, low=0.5, high=1.0), 0.02, 0.07)
+    long = np.clip(span * rand.uniform(count, low=0.35, high=0.75), 0.018, 0.055)
     out.add(p, n, lean, (long, np.clip(long * 0.28, 0.006, 0.017), 0.003), colour, spread(rand, count, low),
             gloss=gloss, sharp=30.0, through=0.35)
 
@@ -48,9 +48,10 @@ def _peony(out: Splats, rand: Rand, at: np.ndarray, face: np.ndarray, radius: fl
     """Rings of cupped petals on nested shells, from a closed heart to open outer petals."""
     x, y, z = frame(face)
     turn0 = rand.uniform(1)[0] * TAU
-    rings = ((3, 0.34, 0.10, 0.95), (4, 0.48, 0.30, 0.85), (5, 0.63, 0.55, 0.74), (6, 0.78, 0.85, 0.62), (7, 0.92, 1.18, 0.56),
-             (7, 1.04, 1.50, 0.52))
-    heart = sample(ellipsoid(at - 0.05 * radius * z, (0.55 * radius, 0.5 * radius), tuple(z)), 60, rand)
+    # petals, radius of the shell, polar angle of the tips, half width of a petal in radians
+    rings = ((3, 0.30, 0.15, 1.15), (5, 0.48, 0.45, 0.78), (6, 0.66, 0.74, 0.66), (7, 0.85, 1.04, 0.58),
+             (8, 1.02, 1.36, 0.52))
+    heart = sample(ellipsoid(at - 0.22 * radius * z, (0.50 * radius, 0.38 * radius), tuple(z)), 60, rand)
     out.add(heart.p, heart.n, heart.du, (0.06, 0.05, 0.02), srgb(colours[0]) * 0.8, 0.97, through=0.2)
     for ring, (petals, shell, opening, spread_angle) in enumerate(rings):
         for k in range(petals):
@@ -64,34 +65,38 @@ def _peony(out: Splats, rand: Rand, at: np.ndarray, face: np.ndarray, radius: fl
                 reach = u * (1 - 0.16 * v * v + 0.05 * np.cos(9 * v + 6 * phase[0]) * u)
                 polar = 2.35 + (lift - 2.35) * reach
                 azimuth = turn + v * width * (0.25 + 0.75 * np.sqrt(np.clip(u, 0, 1)))
-                r = radius * shell * (1 + 0.10 * u**3 * (shell > 0.7) - 0.08 * v * v + 0.045 * u * u * np.sin(7 * v + 6 * phase[1]))
+                ruffle = 0.045 * u * u * np.sin(7 * v + 6 * phase[1])
+                r = radius * shell * (1 + 0.10 * u**3 * (shell > 0.7) - 0.08 * v * v + ruffle)
                 s = r * np.sin(polar)
-                return at + (s * np.cos(azimuth))[:, None] * x + (s * np.sin(azimuth))[:, None] * y + (r * np.cos(polar))[:, None] * z
+                out_of = np.cos(azimuth)[:, None] * x + np.sin(azimuth)[:, None] * y
+                return at + s[:, None] * out_of + (r * np.cos(polar))[:, None] * z
 
-            patch = sample(petal, int((15 + 34 * shell) * (radius / 0.42)), rand)
+            count = int((13 + 35 * shell) * (radius / 0.43))
+            patch = sample(petal, count, rand, lambda q: 0.25 + 0.75 * step(0.25, 0.6, q.uv[:, 0]))
             u, v = patch.uv[:, 0], patch.uv[:, 1] * 2 - 1
             streak = 0.5 + 0.5 * fbm(2 * u, 9 * v + 31 * phase[0], salt=81)
-            tone = np.clip(0.15 + 0.65 * u**1.5 + 0.45 * (streak - 0.5) + 0.12 * (phase[1] - 0.5), 0, 1)
+            tone = np.clip(step(0.45, 1.0, u - 0.12 * v * v) + 0.35 * (streak - 0.5) + 0.15 * (phase[1] - 0.5), 0, 1)
             colour = mix(srgb(colours[0]), srgb(colours[1]), tone)
-            colour = mix(colour, srgb(colours[2]), 0.8 * step(0.80, 0.98, u))
-            edge = u > 0.88
+            colour = mix(colour, srgb(colours[2]), 0.45 * step(0.84, 0.98, u))
+            edge = u > 0.93
             size = radius / 0.42
             count = len(u)
-            long = rand.uniform(count, low=0.026, high=0.058) * size
-            across = np.where(edge, 0.009, rand.uniform(count, low=0.011, high=0.021)) * size
-            out.add(patch.p, np.where((dot(patch.n, z) < 0)[:, None], -patch.n, patch.n), np.where(edge[:, None], patch.dv, patch.du),
-                    (long, across, 0.004), colour, spread(rand, count, 0.3), gloss=0.25, sharp=20.0, through=0.5)
+            long = np.where(edge, 0.020, rand.uniform(count, low=0.034, high=0.060)) * size
+            across = np.where(edge, 0.009, rand.uniform(count, low=0.0095, high=0.018)) * size
+            normal = np.where((dot(patch.n, z) < 0)[:, None], -patch.n, patch.n)
+            out.add(patch.p, normal, np.where(edge[:, None], patch.dv, patch.du), (long, across, 0.004), colour,
+                    spread(rand, count, 0.3), gloss=0.25, sharp=20.0, through=0.5)
 
 
-def _daisy(out: Splats, rand: Rand, at: np.ndarray, face: np.ndarray, radius: float, petals: int = 15) -> None:
+def _daisy(out: Splats, rand: Rand, at: np.ndarray, face: np.ndarray, radius: float, petals: int = 14) -> None:
     """A daisy: narrow white petals around a yellow dome."""
     x, y, z = frame(face)
     for k in range(petals):
         turn = (k + 0.3 * rand.uniform(1, low=-1)[0]) * TAU / petals
         out_of = np.cos(turn) * x + np.sin(turn) * y
         droop = 0.10 + 0.15 * rand.uniform(1)[0]
-        _blade(out, rand, [at + 0.16 * radius * out_of, at + 0.6 * radius * (out_of + 0.12 * z), at + radius * (out_of - droop * z)],
-               0.135 * radius, 17, ("f2efe6", "ffffff", "e9e4d2"), 0.2, tuple(z), 0.4)
+        points = [at + 0.16 * radius * out_of, at + 0.6 * radius * (out_of + 0.12 * z), at + radius * (out_of - droop * z)]
+        _blade(out, rand, points, 0.155 * radius, 16, ("f2efe6", "ffffff", "e9e4d2"), 0.2, tuple(z), 0.4)
     dome = sample(lambda uv: ellipsoid(at, (0.24 * radius, 0.14 * radius), tuple(z))(uv * [1, 0.5] + [0, 0.5]), 70, rand)
     colour = mix(srgb("c98a12"), srgb("f7cf3a"), rand.uniform(len(dome.p)))
     out.add(dome.p, dome.n, dome.du, (0.014, 0.011, 0.006), colour, spread(rand, len(dome.p), 0.6))
@@ -99,13 +104,13 @@ def _daisy(out: Splats, rand: Rand, at: np.ndarray, face: np.ndarray, radius: fl
 
 def _larkspur(out: Splats, rand: Rand, foot: np.ndarray, top: np.ndarray, colours: tuple) -> None:
     """A spire of small florets, buds towards the tip."""
-    _stem(out, rand, top, "5f7a45", 0.011)
+    _stem(out, rand, foot + 0.6 * (top - foot), "5f7a45", 0.010)
     axis = unit(top - foot)
     x, y, _ = frame(axis)
     for k in range(30):
         h = k / 29
         turn = k * 2.39996
-        size = 0.105 * (1 - 0.78 * h)
+        size = 0.14 * (1 - 0.70 * h)
         out_of = np.cos(turn) * x + np.sin(turn) * y
         centre = foot + h * (top - foot) + (0.11 * (1 - 0.75 * h)) * out_of
         fx, fy, fz = frame(out_of + 0.25 * axis + [0, -0.4, 0])
@@ -114,8 +119,8 @@ def _larkspur(out: Splats, rand: Rand, foot: np.ndarray, top: np.ndarray, colour
             around = np.cos(j * TAU / petals + k) * fx + np.sin(j * TAU / petals + k) * fy
             p = centre + size * np.array([[0.35], [0.75]]) * around
             tone = rand.uniform(2)
-            out.add(p, fz + 0.5 * around, around, (size * 0.38, size * 0.22, 0.006), mix(srgb(colours[0]), srgb(colours[1]), tone),
-                    rand.uniform(2, low=0.45, high=1.0), through=0.4)
+            out.add(p, fz + 0.5 * around, around, (size * 0.38, size * 0.22, 0.006),
+                    mix(srgb(colours[0]), srgb(colours[1]), tone), rand.uniform(2, low=0.45, high=1.0), through=0.4)
         out.add(centre[None] + 0.01 * fz, fz, fx, (0.012, 0.010, 0.006), srgb("f3ecd8"), 0.8 * (1 - h) + 0.1)
 
 
@@ -123,7 +128,8 @@ def _eucalyptus(out: Splats, rand: Rand, start: np.ndarray, middle: np.ndarray, 
     """A branch with pairs of round grey-green leaves."""
     p, along = bezier([start, middle, end], np.linspace(0, 1, 34))
     length = np.sqrt(dot(end - start, end - start)) / 30
-    out.add(p, np.cross(along, [1.0, 0.2, 0.1]), along, (length, 0.010, 0.010), srgb("7a6a55"), rand.uniform(34, low=0.6, high=1.0))
+    out.add(p, np.cross(along, [1.0, 0.2, 0.1]), along, (length, 0.010, 0.010), srgb("7a6a55"),
+            rand.uniform(34, low=0.6, high=1.0))
     for k in range(pairs):
         at, direction = bezier([start, middle, end], np.array([0.18 + 0.82 * k / (pairs - 1)]))
         at, direction = at[0], direction[0]
@@ -132,8 +138,8 @@ def _eucalyptus(out: Splats, rand: Rand, start: np.ndarray, middle: np.ndarray, 
             tilt = rand.normal(3) * 0.35
             out_of = unit(np.cross(direction, [0.1, -1.0, 0.35]) * side + 0.55 * direction + tilt)
             face = unit(np.array([0.0, -0.8, 0.6]) + 0.8 * rand.normal(3))
-            _blade(out, rand, [at, at + size * (out_of + 0.12 * UP), at + 2 * size * out_of], size * 0.85, 36,
-                   ("5d7a6c", "93ab98", "b4c2ac"), 0.35, tuple(face), 0.35)
+            _blade(out, rand, [at, at + size * (out_of + 0.12 * UP), at + 2 * size * out_of], size * 0.95, 27,
+                   ("5d7a6c", "93ab98", "b4c2ac"), 0.35, tuple(face), 0.45)
 
 
 PINK = ("b8324a", "ee8a86", "fbd3c4")
@@ -148,7 +154,7 @@ def bouquet(out: Splats, rand: Rand) -> None:
     out.add(core.p, core.n, core.du, (0.09, 0.06, 0.03), srgb("2c3f26"), 0.9)
     for offset, radius, colours in (((-0.34, -0.52, 0.10), 0.42, CORAL), ((0.50, -0.34, 0.30), 0.43, PINK),
                                     ((-0.80, -0.12, 0.52), 0.36, CREAM), ((0.06, -0.22, 0.86), 0.40, CREAM),
-                                    ((0.30, -0.60, -0.10), 0.30, CREAM), ((0.78, 0.15, 0.82), 0.33, CORAL),
+                                    ((0.30, -0.58, -0.04), 0.28, CREAM), ((0.78, 0.15, 0.82), 0.33, CORAL),
                                     ((-0.52, 0.12, 1.12), 0.30, PINK)):
         at = HEART + np.array(offset)
         face = unit(unit(at - HEART + [0, 0, 0.15]) + toward)
@@ -160,25 +166,25 @@ def bouquet(out: Splats, rand: Rand) -> None:
         face = unit(unit(at - HEART) * 0.8 + [0.0, -0.75, 0.25])
         _stem(out, rand, at - 0.02 * face, "5e8043", 0.010)
         _daisy(out, rand, at, face, radius)
-    for low, high, colours in (((-0.22, 0.12, 0.75), (-0.40, 0.16, 1.72), ("27358f", "6f86d6")),
-                               ((0.30, 0.15, 0.80), (0.52, 0.20, 1.66), ("3b2f8f", "8f7fd8")),
-                               ((-0.66, 0.15, 0.60), (-1.10, 0.22, 1.42), ("2b4596", "7fa0de"))):
+    for low, high, colours in (((-0.22, 0.12, 0.75), (-0.40, 0.10, 1.52), ("27358f", "6f86d6")),
+                               ((0.30, 0.15, 0.80), (0.52, 0.14, 1.48), ("3b2f8f", "8f7fd8")),
+                               ((-0.66, 0.15, 0.60), (-1.08, 0.16, 1.28), ("2b4596", "7fa0de"))):
         _larkspur(out, rand, HEART + np.array(low), HEART + np.array(high), colours)
     branches = (((-0.7, -0.15, 0.75), (-1.50, -0.25, 0.30), 9), ((0.75, -0.05, 0.95), (1.62, -0.12, 0.62), 9),
                 ((0.35, -0.55, 0.10), (0.72, -0.72, -0.55), 7), ((-0.45, -0.45, 0.25), (-0.86, -0.70, -0.42), 7),
-                ((0.2, 0.2, 1.0), (0.12, 0.30, 1.62), 8))
+                ((0.2, 0.2, 1.0), (0.10, 0.25, 1.40), 8))
     for middle, end, pairs in branches:
         _eucalyptus(out, rand, MOUTH, HEART + np.array(middle), HEART + np.array(end), pairs)
-    for k in range(26):
+    for k in range(20):
         turn = rand.uniform(1)[0] * TAU
         reach = 0.45 + 0.55 * rand.uniform(1)[0]
-        out_of = np.array([np.cos(turn), 0.8 * np.sin(turn) - 0.25, 0.0])
+        out_of = np.array([np.cos(turn), 0.55 * np.sin(turn) + 0.12, 0.0])
         tip = HEART + reach * out_of + [0, 0, rand.uniform(1, low=-0.45, high=0.75)[0]]
-        _blade(out, rand, [HEART + 0.25 * out_of, HEART + 0.62 * reach * out_of + [0, 0, 0.30], tip], 0.085, 64,
+        _blade(out, rand, [HEART + 0.25 * out_of, HEART + 0.62 * reach * out_of + [0, 0, 0.30], tip], 0.085, 56,
                ("2f5a2c", "6e9a48", "a9c47e"), 0.7)
-    for k in range(16):
+    for k in range(14):
         lean = rand.uniform(1, low=-1.25, high=1.35)[0]
-        tip = HEART + [lean, 0.25 * rand.normal(1)[0], 1.75 - 0.55 * abs(lean) - 0.35 * rand.uniform(1)[0]]
+        tip = HEART + [lean, 0.25 * rand.normal(1)[0], 1.55 - 0.45 * abs(lean) - 0.35 * rand.uniform(1)[0]]
         points = [MOUTH, HEART + [0.25 * lean, 0.1, 1.0], tip]
         _blade(out, rand, points, 0.016, 46, ("6f8f4a", "a8bb6a", "c9d08c"), 0.3)
         if k % 2 == 0:
@@ -196,13 +202,14 @@ def _seeds(out: Splats, rand: Rand, points: list) -> None:
 
 def fallen(out: Splats, rand: Rand) -> None:
     """Petals and leaves on the cloth and the table."""
-    for x, y, turn, colours in ((-0.35, -0.72, 0.4, CORAL), (-0.86, -1.02, 2.2, PINK), (0.05, -0.42, 4.0, CORAL), (-2.35, -0.30, 1.2, CREAM),
-                                (0.98, -1.45, 5.2, PINK), (1.55, -1.22, 3.3, CREAM), (-2.6, -1.55, 0.1, PINK), (2.35, -0.75, 2.7, CORAL)):
+    for x, y, turn, colours in ((-0.35, -0.72, 0.4, CORAL), (-0.86, -1.02, 2.2, PINK), (0.05, -0.42, 4.0, CORAL),
+                                (-2.35, -0.30, 1.2, CREAM), (0.98, -1.45, 5.2, PINK), (1.55, -1.22, 3.3, CREAM),
+                                (-2.6, -1.55, 0.1, PINK), (2.35, -0.75, 2.7, CORAL)):
         at = np.array([x, y, 0.085])
         out_of = np.array([np.cos(turn), np.sin(turn), 0.0])
-        _blade(out, rand, [at, at + 0.10 * out_of - [0, 0, 0.012], at + 0.21 * out_of + [0, 0, 0.075]], 0.085, 70, colours, 0.25,
-               (0.05, -0.1, 1.0), 0.4)
-    for x, y, turn in ((-2.25, -1.28, 2.6), (-1.72, -1.72, 5.9), (2.05, -1.30, 0.6)):
+        points = [at, at + 0.10 * out_of - [0, 0, 0.012], at + 0.21 * out_of + [0, 0, 0.075]]
+        _blade(out, rand, points, 0.085, 70, colours, 0.25, (0.05, -0.1, 1.0), 0.4)
+    for x, y, turn in ((-2.25, -1.28, 2.6), (1.92, -0.55, 5.4), (2.05, -1.30, 0.6)):
         at = np.array([x, y, 0.07])
         out_of = np.array([np.cos(turn), np.sin(turn), 0.0])
         _blade(out, rand, [at, at + 0.22 * out_of + [0, 0, 0.10], at + 0.44 * out_of + [0, 0, 0.01]], 0.095, 110,

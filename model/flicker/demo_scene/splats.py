@@ -26,13 +26,13 @@ class Rand:
     """Counter-based random numbers (SplitMix64)."""
 
     def __init__(self, seed: int) -> None:
-        self._next = np.array([seed], np.uint64) * np.uint64(0xD1342543DE82EF95)
+        self._next = np.array([seed % 2**64], np.uint64) * np.uint64(0xD1342543DE82EF95)
 
     def uniform(self, *shape: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
         """Uniform float64 in [low, high)."""
         count = int(np.prod(shape, dtype=np.int64))
         x = self._next + _GOLDEN * np.arange(1, count + 1, dtype=np.uint64)
-        self._next = self._next + _GOLDEN * np.uint64(count)
+        self._next = self._next + _GOLDEN * np.array([count], np.uint64)
         bits = (hash64(x) >> np.uint64(11)).astype(np.float64)
         return (low + (high - low) * (bits * 2.0**-53)).reshape(shape)
 
@@ -164,7 +164,8 @@ def _density(patch: Patch, weight: Callable[[Patch], np.ndarray] | None) -> np.n
 
 def _lattice(surface: Callable[[np.ndarray], np.ndarray], count: int, rand: Rand) -> Patch:
     index = np.arange(count, dtype=np.float64)[:, None]
-    uv = np.mod(rand.uniform(1, 2) + index * [0.7548776662466927, 0.5698402909980532], 1.0)
+    jitter = rand.uniform(count, 2, low=-0.35, high=0.35) / max(count, 1) ** 0.5
+    uv = np.mod(rand.uniform(1, 2) + jitter + index * [0.7548776662466927, 0.5698402909980532], 1.0)
     eps = 1e-4
     du = (surface(uv + [eps, 0.0]) - surface(uv - [eps, 0.0])) / (2 * eps)
     dv = (surface(uv + [0.0, eps]) - surface(uv - [0.0, eps])) / (2 * eps)
@@ -204,8 +205,13 @@ class Splats:
         n = unit(np.broadcast_to(np.asarray(n, float), (count, 3)))
         t = np.broadcast_to(np.asarray(t, float), (count, 3))
         t = unit(t - dot(t, n)[:, None] * n)
-        full = lambda x: np.broadcast_to(np.asarray(x, float), (count,))  # noqa: E731
-        colour = lambda x: np.broadcast_to(np.asarray(x, float).reshape(-1, np.size(x) if np.size(x) < 3 else 3), (count, 3))  # noqa: E731
+
+        def full(x: np.ndarray | float) -> np.ndarray:
+            return np.broadcast_to(np.asarray(x, float), (count,))
+
+        def colour(x: np.ndarray | float) -> np.ndarray:
+            return np.broadcast_to(np.asarray(x, float), (count, 3))
+
         self.parts.append({
             "p": np.asarray(p, float), "n": n, "t": t,
             "size": np.stack([full(s) for s in size], axis=1),
@@ -219,7 +225,7 @@ class Splats:
         return {key: np.concatenate([part[key] for part in self.parts]) for key in self.parts[0]}
 
 
-def spread(rand: Rand, count: int, low: float = 0.06, high: float = 1.0) -> np.ndarray:
+def spread(rand: Rand, count: int, low: np.ndarray | float = 0.06, high: float = 1.0) -> np.ndarray:
     """Opacities of detail splats: uniform with a peak at the upper end, as in trained scenes."""
     u = rand.uniform(2, count)
-    return np.where(u[0] < 0.3, high - 0.15 * u[1], low + (high - low) * u[1])
+    return np.where(u[0] < 0.22, high - 0.12 * u[1], low + (high - low) * u[1])

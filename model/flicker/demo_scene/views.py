@@ -8,13 +8,13 @@ from flicker.camera import Camera
 from flicker.demo_scene.splats import dot, unit
 
 WIDTH, HEIGHT = 640, 360
-HALF_WIDTH = 0.392  # tangent of half the horizontal field of view
+HALF_WIDTH = 0.424  # tangent of half the horizontal field of view
 # name, eye and target in author coordinates; the first is the hero shot
 VIEWS = (
-    ("hero", (0.30, -8.60, 4.30), (0.12, 0.0, 1.42)),
-    ("left", (-4.70, -7.10, 3.50), (-0.15, 0.1, 1.38)),
-    ("right", (4.60, -7.00, 4.90), (0.15, 0.1, 1.25)),
-    ("close", (-0.10, -5.60, 3.10), (-0.35, 0.0, 1.50)),
+    ("hero", (0.30, -8.60, 4.30), (0.12, 0.0, 1.50)),
+    ("left", (-3.70, -7.80, 3.60), (-0.05, 0.1, 1.36)),
+    ("right", (3.90, -7.60, 4.70), (0.10, 0.1, 1.44)),
+    ("close", (-0.20, -6.00, 3.20), (-0.62, 0.0, 1.62)),
 )
 EYES = np.array([eye for _, eye, _ in VIEWS])
 

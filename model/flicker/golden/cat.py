@@ -27,11 +27,11 @@ M_SPIKY = int(CatMode.SPIKY)
 
 # Leader rectangles (x top, x bottom, y top, y bottom). Dense: rectangle m holds the corners of mini-tile m.
 # Sparse: rectangle 0 the top-left, rectangle 1 the bottom-right pixels of the four mini-tiles.
-DENSE_RECTS = np.array([[0, 3, 0, 3], [4, 7, 0, 3], [0, 3, 4, 7], [4, 7, 4, 7]], np.int32)
-SPARSE_RECTS = np.array([[0, 4, 0, 4], [3, 7, 3, 7]], np.int32)
+DENSE_RECTS = np.array([[0, 3, 0, 3], [4, 7, 0, 3], [0, 3, 4, 7], [4, 7, 4, 7]], np.int64)
+SPARSE_RECTS = np.array([[0, 4, 0, 4], [3, 7, 3, 7]], np.int64)
 
 
-@numba.njit(inline="always")
+@numba.njit
 def difference(pixel, mean, precision):
     """Pixel minus mean in the format of the test (Alg. 1, line 1)."""
     if precision == P_FP16:
@@ -47,43 +47,48 @@ def threshold(opacity, form, precision):
     return log_opacity_f32(opacity, form != CONIC, precision == P_FP16)
 
 
-@numba.njit
-def _rect_weights(rect, mean_x, mean_y, s0, s1, s2, form, precision, r, e):
-    dx0 = difference(rect[0], mean_x, precision)
-    dx1 = difference(rect[1], mean_x, precision)
-    dy0 = difference(rect[2], mean_y, precision)
-    dy1 = difference(rect[3], mean_y, precision)
-    if precision != P_FP16:
-        s0 = rnd(s0, r)
-        s1 = rnd(s1, r)
-        s2 = rnd(s2, r)
+# What `rect_weights` leaves in its scratch array: the four weights, then every intermediate value.
+# Column terms (dx, xx, sx, p) have two entries, top and bottom; row terms (dy, yy, sy, q, v, vv) too; leader terms four.
+SCRATCH = 31
+COMMON_TERMS = {"shape": slice(28, 31), "dx": slice(4, 6), "dy": slice(6, 8)}
+TERMS = {
+    Form.CONIC: COMMON_TERMS
+    | {"xx": slice(8, 10), "yy": slice(10, 12), "xy": slice(16, 20), "sx": slice(12, 14), "sy": slice(14, 16)}
+    | {"t": slice(20, 24), "h": slice(24, 28)},
+    Form.FACTORED: COMMON_TERMS
+    | {"p": slice(8, 10), "q": slice(10, 12), "v": slice(12, 14), "u": slice(16, 20)}
+    | {"uu": slice(20, 24), "vv": slice(14, 16)},
+}
+
+
+@numba.njit(cache=True)
+def rect_weights(x_top, x_bot, y_top, y_bot, mean_x, mean_y, s0, s1, s2, form, precision, e):
+    """Weights of the leaders of a pixel rectangle into `e` (float32[SCRATCH]), intermediate values behind them.
+
+    Means and shape numbers are FP16 values in float32.
+    """
+    r = FP16_R if precision == P_FP16 else E4M3_R
+    e[28] = s0 if precision == P_FP16 else rnd(s0, r)
+    e[29] = s1 if precision == P_FP16 else rnd(s1, r)
+    e[30] = s2 if precision == P_FP16 else rnd(s2, r)
+    e[4] = difference(x_top, mean_x, precision)
+    e[5] = difference(x_bot, mean_x, precision)
+    e[6] = difference(y_top, mean_y, precision)
+    e[7] = difference(y_bot, mean_y, precision)
     if form == CONIC:
-        _, sx0 = conic_axis(dx0, s0, r)
-        _, sx1 = conic_axis(dx1, s0, r)
-        _, sy0 = conic_axis(dy0, s2, r)
-        _, sy1 = conic_axis(dy1, s2, r)
-        e[0] = conic_pixel(dx0, dy0, sx0, sy0, s1, r)[3]
-        e[1] = conic_pixel(dx1, dy0, sx1, sy0, s1, r)[3]
-        e[2] = conic_pixel(dx0, dy1, sx0, sy1, s1, r)[3]
-        e[3] = conic_pixel(dx1, dy1, sx1, sy1, s1, r)[3]
+        for k in range(2):
+            e[8 + k], e[12 + k] = conic_axis(e[4 + k], e[28], r)
+            e[10 + k], e[14 + k] = conic_axis(e[6 + k], e[30], r)
+        for i in range(4):
+            x = i % 2
+            y = i // 2
+            e[16 + i], e[20 + i], e[24 + i], e[i] = conic_pixel(e[4 + x], e[6 + y], e[12 + x], e[14 + y], e[29], r)
     else:
-        p0 = mul(s0, dx0, r)
-        p1 = mul(s0, dx1, r)
-        q0, _, vv0 = factored_row(dy0, s1, s2, r)
-        q1, _, vv1 = factored_row(dy1, s1, s2, r)
-        e[0] = factored_pixel(p0, q0, vv0, r)[2]
-        e[1] = factored_pixel(p1, q0, vv0, r)[2]
-        e[2] = factored_pixel(p0, q1, vv1, r)[2]
-        e[3] = factored_pixel(p1, q1, vv1, r)[2]
-
-
-@numba.njit
-def rect_weights(rect, mean_x, mean_y, s0, s1, s2, form, precision, e):
-    """The four weights of a pixel rectangle into `e` (float32[4]); arguments are FP16 values in float32."""
-    if precision == P_FP16:
-        _rect_weights(rect, mean_x, mean_y, s0, s1, s2, form, precision, FP16_R, e)
-    else:
-        _rect_weights(rect, mean_x, mean_y, s0, s1, s2, form, precision, E4M3_R, e)
+        for k in range(2):
+            e[8 + k] = mul(e[28], e[4 + k], r)
+            e[10 + k], e[12 + k], e[14 + k] = factored_row(e[6 + k], e[29], e[30], r)
+        for i in range(4):
+            e[16 + i], e[20 + i], e[i] = factored_pixel(e[8 + i % 2], e[10 + i // 2], e[14 + i // 2], r)
 
 
 @numba.njit(inline="always")
@@ -98,19 +103,21 @@ def is_dense(mode, spiky):
     return not spiky
 
 
-@numba.njit
+@numba.njit(cache=True)
 def splat_mask(mean_x, mean_y, s0, s1, s2, opacity, dense, form, precision, e):
-    """Four-bit mini-tile mask of a splat; `e` is scratch, float32[4]."""
+    """Four-bit mini-tile mask of a splat; `e` is scratch, float32[SCRATCH]."""
     t = threshold(opacity, form, precision)
     mask = 0
     if dense:
         for m in range(4):
-            rect_weights(DENSE_RECTS[m], mean_x, mean_y, s0, s1, s2, form, precision, e)
+            x0, x1, y0, y1 = DENSE_RECTS[m, 0], DENSE_RECTS[m, 1], DENSE_RECTS[m, 2], DENSE_RECTS[m, 3]
+            rect_weights(x0, x1, y0, y1, mean_x, mean_y, s0, s1, s2, form, precision, e)
             if t > e[0] or t > e[1] or t > e[2] or t > e[3]:
                 mask |= 1 << m
     else:
         for k in range(2):
-            rect_weights(SPARSE_RECTS[k], mean_x, mean_y, s0, s1, s2, form, precision, e)
+            x0, x1, y0, y1 = SPARSE_RECTS[k, 0], SPARSE_RECTS[k, 1], SPARSE_RECTS[k, 2], SPARSE_RECTS[k, 3]
+            rect_weights(x0, x1, y0, y1, mean_x, mean_y, s0, s1, s2, form, precision, e)
             for m in range(4):
                 if t > e[m]:
                     mask |= 1 << m
@@ -118,17 +125,25 @@ def splat_mask(mean_x, mean_y, s0, s1, s2, opacity, dense, form, precision, e):
 
 
 class RectTrace(NamedTuple):
-    """What a PRTU computes for one splat and one rectangle, as float32 values of the narrow format."""
+    """What a PRTU computes for one splat and one rectangle, as float32 values of the narrow format.
 
-    threshold: float
+    terms: intermediate values by name (TERMS), in the order of the hardware's stages. passes: bit i for leader i.
+    """
+
+    threshold: np.float32
+    terms: dict[str, np.ndarray]
     weights: np.ndarray
     passes: int
 
 
 def trace_rect(rect, features: np.ndarray, form: Form, precision: Precision) -> RectTrace:
-    """Model of one PRTU operation. `features` are the nine FP16 bit patterns of `feature_t`, mean_x first."""
+    """Model of one PRTU operation on the rectangle `rect` (x top, x bottom, y top, y bottom).
+
+    `features` are the nine FP16 bit patterns of `feature_t`, mean_x first.
+    """
     f = np.asarray(features, np.uint16).view(np.float16).astype(np.float32)
-    e = np.zeros(4, np.float32)
-    rect_weights(np.asarray(rect, np.int32), f[0], f[1], f[2], f[3], f[4], int(form), int(precision), e)
-    t = threshold(f[5], int(form), int(precision))
-    return RectTrace(float(t), e, int(sum(int(t > e[i]) << i for i in range(4))))
+    e = np.zeros(SCRATCH, np.float32)
+    rect_weights(*map(int, rect), *f[:5], int(form), int(precision), e)
+    t = np.float32(threshold(f[5], int(form), int(precision)))
+    terms = {name: e[place] for name, place in TERMS[form].items()}
+    return RectTrace(t, terms, e[:4], sum(int(t > e[i]) << i for i in range(4)))

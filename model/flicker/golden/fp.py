@@ -66,15 +66,15 @@ def rnd(x, r):
     """Round the float32 `x` to the format with constants `r` (nearest, ties to even, subnormals, -0 kept)."""
     drop, half, keep, min_normal, magic, max_bits, over = r
     b = _bits(x)
-    a = b & np.uint32(0x7FFFFFFF)
-    normal = (a + half + ((a >> drop) & np.uint32(1))) & keep
+    a = np.uint32(b & np.uint32(0x7FFFFFFF))  # numba widens the results of integer operations: cast back
+    normal = np.uint32(np.uint32(a + half + ((a >> drop) & np.uint32(1))) & keep)
     small = _bits(np.float32(np.float32(_float(a) + magic) - magic))
     m = small if a < min_normal else normal
     m = over if m > max_bits else m
     is_nan = a > np.uint32(0x7F800000)
     m = np.uint32(0x7FC00000) if is_nan else m
-    s = np.uint32(0) if is_nan else b & np.uint32(0x80000000)
-    return _float(s | m)
+    s = np.uint32(0) if is_nan else np.uint32(b & np.uint32(0x80000000))
+    return _float(np.uint32(s | m))
 
 
 @numba.njit(inline="always")
@@ -99,23 +99,24 @@ def sub(a, b, r):
 def fp16_value(h):
     """FP16 bit pattern (uint16) to float32."""
     h = np.uint32(h)
-    s = (h & np.uint32(0x8000)) << np.uint32(16)
-    e = (h >> np.uint32(10)) & np.uint32(0x1F)
-    m = h & np.uint32(0x3FF)
-    if e == np.uint32(0):
-        v = np.float32(m) * np.float32(2.0**-24)
-        return _float(s | _bits(v))
-    if e == np.uint32(31):
-        return _float(s | np.uint32(0x7F800000) | (m << np.uint32(13)))
-    return _float(s | ((e + np.uint32(112)) << np.uint32(23)) | (m << np.uint32(13)))
+    s = np.uint32((h & np.uint32(0x8000)) << np.uint32(16))
+    e = np.uint32((h >> np.uint32(10)) & np.uint32(0x1F))
+    m = np.uint32(h & np.uint32(0x3FF))
+    if e == 0:
+        a = _bits(np.float32(np.float32(m) * np.float32(2.0**-24)))
+    elif e == 31:
+        a = np.uint32(np.uint32(0x7F800000) | (m << np.uint32(13)))
+    else:
+        a = np.uint32(((e + np.uint32(112)) << np.uint32(23)) | (m << np.uint32(13)))
+    return _float(np.uint32(s | a))
 
 
 @numba.njit
 def fp16_bits(x):
     """float32 holding an FP16 value to its bit pattern (uint16)."""
     b = _bits(x)
-    s = (b >> np.uint32(16)) & np.uint32(0x8000)
-    a = b & np.uint32(0x7FFFFFFF)
+    s = np.uint32((b >> np.uint32(16)) & np.uint32(0x8000))
+    a = np.uint32(b & np.uint32(0x7FFFFFFF))
     if a > np.uint32(0x7F800000):
         return np.uint16(0x7E00)
     if a == np.uint32(0x7F800000):

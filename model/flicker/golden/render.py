@@ -17,7 +17,7 @@ from ..params import (
     CatMode,
     RenderConfig,
 )
-from .cat import M_OFF, M_SPARSE, is_dense, splat_mask
+from .cat import M_OFF, M_SPARSE, SCRATCH, is_dense, splat_mask
 from .fp import FP16_R, fp16_bits, fp16_value, mul, sub
 from .records import SubtileLists
 from .vru import ALPHA_MIN, CONIC, TRANSMITTANCE_MIN, alpha_of, blend, next_transmittance
@@ -90,7 +90,7 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
     col = np.empty((2, 4), np.float32)
     row = np.empty((2, 4), np.float32)
     e16 = np.empty(16, np.float32)
-    e4 = np.empty(4, np.float32)
+    scratch = np.empty(SCRATCH, np.float32)
     f = np.empty(9, np.float32)
     sent = np.zeros(4, np.int64)
     base_test = 0
@@ -106,7 +106,7 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
         else:
             dense = is_dense(mode, spiky[i])
             cycles = 2 if dense else 1
-            mask = splat_mask(f[0], f[1], f[2], f[3], f[4], f[5], dense, form, precision, e4)
+            mask = splat_mask(f[0], f[1], f[2], f[3], f[4], f[5], dense, form, precision, scratch)
         base_test += 2 if is_dense(AUTO, spiky[i]) else 1
         counts[0] += 1
         counts[1] += mask == 0

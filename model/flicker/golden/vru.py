@@ -58,7 +58,7 @@ PAIR_FIELDS = ("dx", "dy", "a0", "a1", "a2", "a3", "a4", "weight", "g", "alpha",
 """Intermediate values of a pair. a0..a4: conic (sx, sy, xy, t, h); factored (p, q, v, u, uu)."""
 
 
-@numba.njit
+@numba.njit(cache=True)
 def pair(px, py, f, form, state, out):
     """One pair: `f` nine FP16 values in float32, `state` float32[4] = T, red, green, blue; `out` takes PAIR_FIELDS.
 
@@ -132,5 +132,3 @@ class Pixels:
     def bits(self) -> np.ndarray:
         """uint16 (n, 4): transmittance, red, green, blue."""
         return self.state.astype(np.float16).view(np.uint16)
-
-

@@ -62,7 +62,7 @@ def build(config: RenderConfig) -> Path:
         TOP,
         extra=[HERE / f"{TOP}.sv"],
         parameters=config.rtl_parameters(),
-        args=["--x-assign", "unique", "--x-initial", "unique", "-O3"],
+        args=["--x-assign", "unique", "--x-initial", "unique"],
         cpp=[HERE / "render_harness.cpp"],
         cflags="-DVL_USER_STOP -DVL_USER_FATAL -std=c++17",
         opt="-O2",
