@@ -42,14 +42,15 @@ class _RichSteps:
 
     @contextmanager
     def step(self, text: str) -> Iterator[None]:
-        with Progress(SpinnerColumn(), TextColumn(text), TimeElapsedColumn(), console=console, transient=True) as p:
+        with Progress(SpinnerColumn(), TextColumn(text), TimeElapsedColumn(), console=console, transient=True,
+                      disable=not console.is_terminal) as p:
             p.add_task(text, total=None)
             yield
 
     @contextmanager
     def bar(self, text: str):
         with Progress(TextColumn(text), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn(),
-                      console=console, transient=True) as p:
+                      console=console, transient=True, disable=not console.is_terminal) as p:
             task = p.add_task(text, total=None)
             yield lambda done, total: p.update(task, completed=done, total=total)
 
@@ -214,15 +215,21 @@ def demo(
 def main() -> None:
     """Entry point: bad input is one line on standard error and exit code 2."""
     try:
-        app(standalone_mode=True)
+        sys.exit(app(standalone_mode=False) or 0)
     except FlickerError as error:
-        print(f"flicker: {error}", file=sys.stderr)
-        sys.exit(2)
+        message = str(error)
+    except typer.exceptions.TyperException as error:  # wrong use of the command line
+        message = error.format_message()
+        if not message:  # help was asked for by giving no arguments, and printed
+            sys.exit(2)
+        message += " (see 'flicker --help')"
     except BrokenPipeError:
         sys.exit(1)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         print("flicker: interrupted", file=sys.stderr)
         sys.exit(130)
+    print(f"flicker: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)
 
 
 if __name__ == "__main__":

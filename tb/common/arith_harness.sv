@@ -1,84 +1,96 @@
-// All arithmetic units under test, for arith_harness.cpp.
+// All arithmetic units in a list of formats, for a batch harness (arith_harness.cpp).
 //
-// Groups of units, each with its own clock that samples the operands, so that a step evaluates
-// one group only. Results of group g: out_o[g][word].
-//   group f               format f: sum, product, a < b
-//   group FORMATS + f     conversion of format f to each format
-//   group 2 FORMATS       exp base e, base 2; log base e to FP16, E4M3, E5M2; the same in base 2
+// Operands are registered by an edge of one bit of clk_i, either edge: only the units behind that
+// bit are evaluated. Bit f: adder, multiplier and comparison of format f; bit Formats + f:
+// conversions of format f to all formats; bit 2 Formats: functions of FP16.
 module arith_harness #(
-  localparam int unsigned FORMATS = 6,
-  localparam int unsigned GROUPS  = 2 * FORMATS + 1,
-  localparam int unsigned WORDS   = 8
+  parameter int unsigned Formats = 1,
+  // Per format, format 0 in the low bits: ExpBits, ManBits, Fn, Saturate.
+  parameter logic [Formats-1:0][9:0] Table = {4'd5, 4'd10, 2'b00}
 ) (
-  input  logic [GROUPS-1:0]                  clk_i,
-  input  logic [      15:0]                  a_i,
-  input  logic [      15:0]                  b_i,
-  output logic [GROUPS-1:0][WORDS-1:0][15:0] out_o
+  input  logic [2*Formats:0] clk_i,
+  input  logic [       15:0] a_i,
+  input  logic [       15:0] b_i,
+  output logic [       15:0] sum_o  [Formats],
+  output logic [       15:0] prod_o [Formats],
+  output logic [       15:0] lt_o   [Formats],
+  output logic [       15:0] conv_o [Formats][Formats],  // [source][target]
+  output logic [       15:0] exp_o  [2],  // natural, base 2
+  output logic [       15:0] log_o  [2][Formats]  // 0 where the exponent has less than 4 bits
 );
 
-  // FP16, E4M3, E5M2, E5M3, E4M4, E3M4: the order of FORMATS in test_arith.py.
-  localparam int unsigned ExpBits[FORMATS] = '{5, 4, 5, 5, 4, 3};
-  localparam int unsigned ManBits[FORMATS] = '{10, 3, 2, 3, 4, 4};
-  localparam bit Fn[FORMATS] = '{0, 1, 0, 0, 0, 0};
-  localparam bit Saturate[FORMATS] = '{0, 1, 1, 0, 1, 0};
+  for (genvar f = 0; f < Formats; f++) begin : gen_format
+    localparam int unsigned ExpBits = 32'(Table[f][9:6]);
+    localparam int unsigned ManBits = 32'(Table[f][5:2]);
+    localparam bit Fn = Table[f][1];
+    localparam bit Saturate = Table[f][0];
+    localparam int unsigned Width = 1 + ExpBits + ManBits;
 
-  for (genvar f = 0; f < FORMATS; f++) begin : gen_format
-    localparam int unsigned Width = 1 + ExpBits[f] + ManBits[f];
+    logic [Width-1:0] a_q, b_q, sum, prod, src_q;
+    logic lt;
 
-    logic [Width-1:0] a_q, b_q, src_q, sum, product;
-    logic             lt;
-
-    always_ff @(posedge clk_i[f]) begin
+    always_ff @(edge clk_i[f]) begin
       a_q <= a_i[Width-1:0];
       b_q <= b_i[Width-1:0];
     end
 
-    always_ff @(posedge clk_i[FORMATS+f]) begin
+    always_ff @(edge clk_i[Formats+f]) begin
       src_q <= a_i[Width-1:0];
     end
 
     flk_fp_add #(
-      .ExpBits(ExpBits[f]), .ManBits(ManBits[f]), .Fn(Fn[f]), .Saturate(Saturate[f])
+      .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)
     ) i_add (.a_i(a_q), .b_i(b_q), .sum_o(sum));
 
     flk_fp_mul #(
-      .ExpBits(ExpBits[f]), .ManBits(ManBits[f]), .Fn(Fn[f]), .Saturate(Saturate[f])
-    ) i_mul (.a_i(a_q), .b_i(b_q), .prod_o(product));
+      .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)
+    ) i_mul (.a_i(a_q), .b_i(b_q), .prod_o(prod));
 
     flk_fp_cmp #(
-      .ExpBits(ExpBits[f]), .ManBits(ManBits[f]), .Fn(Fn[f])
+      .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn)
     ) i_cmp (.a_i(a_q), .b_i(b_q), .lt_o(lt));
 
-    assign out_o[f] = {80'd0, 16'(lt), 16'(product), 16'(sum)};
+    assign sum_o[f]  = 16'(sum);
+    assign prod_o[f] = 16'(prod);
+    assign lt_o[f]   = 16'(lt);
 
-    assign out_o[FORMATS+f][WORDS-1:FORMATS] = '0;
-    for (genvar d = 0; d < FORMATS; d++) begin : gen_convert
-      localparam int unsigned DstWidth = 1 + ExpBits[d] + ManBits[d];
-      logic [DstWidth-1:0] dst;
+    for (genvar t = 0; t < Formats; t++) begin : gen_target
+      localparam int unsigned DstExpBits = 32'(Table[t][9:6]);
+      localparam int unsigned DstManBits = 32'(Table[t][5:2]);
+      logic [DstExpBits+DstManBits:0] dst;
+
       flk_fp_convert #(
-        .SrcExpBits(ExpBits[f]), .SrcManBits(ManBits[f]), .SrcFn(Fn[f]),
-        .DstExpBits(ExpBits[d]), .DstManBits(ManBits[d]), .DstFn(Fn[d]), .DstSaturate(Saturate[d])
+        .SrcExpBits(ExpBits), .SrcManBits(ManBits), .SrcFn(Fn),
+        .DstExpBits(DstExpBits), .DstManBits(DstManBits),
+        .DstFn(Table[t][1]), .DstSaturate(Table[t][0])
       ) i_convert (.src_i(src_q), .dst_o(dst));
-      assign out_o[FORMATS+f][d] = 16'(dst);
+
+      assign conv_o[f][t] = 16'(dst);
     end
   end
 
   logic [15:0] x_q;
 
-  always_ff @(posedge clk_i[GROUPS-1]) begin
+  always_ff @(edge clk_i[2*Formats]) begin
     x_q <= a_i;
   end
 
   for (genvar base2 = 0; base2 < 2; base2++) begin : gen_base
-    flk_exp_neg #(.Base2(base2)) i_exp (.e_i(x_q), .g_o(out_o[GROUPS-1][base2]));
+    flk_exp_neg #(.Base2(base2 != 0)) i_exp (.e_i(x_q), .g_o(exp_o[base2]));
 
-    for (genvar f = 0; f < 3; f++) begin : gen_log
-      localparam int unsigned Width = 1 + ExpBits[f] + ManBits[f];
-      logic [Width-1:0] log;
-      flk_log_opacity #(
-        .Base2(base2), .ExpBits(ExpBits[f]), .ManBits(ManBits[f]), .Fn(Fn[f]), .Saturate(Saturate[f])
-      ) i_log (.opacity_i(x_q), .log_o(log));
-      assign out_o[GROUPS-1][2+3*base2+f] = 16'(log);
+    for (genvar f = 0; f < Formats; f++) begin : gen_log
+      localparam int unsigned ExpBits = 32'(Table[f][9:6]);
+      localparam int unsigned ManBits = 32'(Table[f][5:2]);
+      if (ExpBits >= 4) begin : gen_unit
+        logic [ExpBits+ManBits:0] log;
+        flk_log_opacity #(
+          .Base2(base2 != 0), .ExpBits(ExpBits), .ManBits(ManBits),
+          .Fn(Table[f][1]), .Saturate(Table[f][0])
+        ) i_log (.opacity_i(x_q), .log_o(log));
+        assign log_o[base2][f] = 16'(log);
+      end else begin : gen_none
+        assign log_o[base2][f] = '0;
+      end
     end
   end
 

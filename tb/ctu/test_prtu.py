@@ -1,0 +1,22 @@
+"""Pixel-rectangle test unit against the golden model, every register of every stage.
+
+State space: random records as in real scenes, thin slanted splats (terms that cancel), covering splats, and records with special
+numbers (zeros, subnormals, largest, infinities, NaN, any bits); all leader rectangles of both sampling modes and any other
+corners; thresholds of the record's opacity and any bits; random bubbles with garbage on the inputs.
+Parameter space: both forms in all three precisions. Not covered: the space is 2^100, so arithmetic corners are the business of
+the arithmetic units' tests.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+
+from flicker.params import Form, Precision
+
+
+@pytest.mark.parametrize("precision", list(Precision), ids=lambda p: p.name.lower())
+@pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
+def test_prtu(form: Form, precision: Precision) -> None:
+    parameters = {"Form": int(form), "Precision": int(precision)}
+    build_and_test("flk_prtu", "cocotb_prtu", parameters=parameters, config=parameters)

@@ -1,0 +1,126 @@
+"""The command line: what it writes, and how it refuses bad input.
+
+Runs `flicker` as a user does, in processes of its own. The RTL engine on whole frames is tested in tb/frames; here one small frame
+shows that the engines and the files fit together.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flicker.demo_scene import write_demo
+from flicker.image import load_png
+from flicker.scene import load_scene, save_ply
+
+
+def flicker(*args: object) -> subprocess.CompletedProcess:
+    """Run the command."""
+    command = [sys.executable, "-m", "flicker.cli", *map(str, args)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory) -> Path:
+    """Folder with the demo scene and its cameras."""
+    folder = tmp_path_factory.mktemp("demo")
+    write_demo(folder)
+    return folder
+
+
+def test_engines_and_files(demo, tmp_path):
+    """Golden and RTL give the same picture and counts; the reference is what they are compared with."""
+    stats, pictures = {}, {}
+    for engine in ("reference", "golden", "rtl"):
+        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--compare", "reference",
+                      "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
+        assert run.returncode == 0, run.stderr
+        stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
+        pictures[engine] = load_png(tmp_path / f"{engine}.png")
+        assert pictures[engine].shape == (90, 160, 3)
+    assert np.array_equal(pictures["golden"], pictures["rtl"])
+    assert not np.array_equal(pictures["golden"], pictures["reference"])
+    common = ("scene", "view", "width", "height", "gaussians", "visible", "tile_pairs", "subtile_pairs")
+    for key in (*common, "minitiles_sent", "pixel_pairs", "psnr_db"):
+        assert stats["rtl"][key] == stats["golden"][key], key
+    assert all(stats["reference"][k] == stats["golden"][k] for k in common)
+    assert stats["reference"]["psnr_db"] is None  # equal to itself
+    assert stats["golden"]["psnr_db"] > 35
+    assert stats["rtl"]["engine"] == "rtl" and stats["rtl"]["cycles"] > 1000
+    assert len(stats["rtl"]["cores"]) == 4 and all(len(c["channels"]) == 4 for c in stats["rtl"]["cores"])
+    assert stats["golden"]["gaussians"] == len(load_scene(demo / "demo.ply"))
+
+
+def test_options_reach_the_engine(demo, tmp_path):
+    """Each option changes what it says; --faithful is the combination that it names."""
+    def run(*args) -> dict:
+        path = tmp_path / "s.json"
+        done = flicker("render", demo / "demo.ply", "--size", "160x90", "--compare", "reference", "--stats", path, *args)
+        assert done.returncode == 0, done.stderr
+        return json.loads(path.read_text())
+
+    base = run()
+    assert (base["form"], base["precision"], base["cat"], base["fifo_depth"]) == ("factored", "mixed", "smooth", 16)
+    faithful = run("--faithful")
+    assert (faithful["form"], faithful["precision"], faithful["cat"], faithful["fifo_depth"]) == ("conic", "mixed", "smooth", 16)
+    assert faithful["psnr_db"] == run("--form", "conic")["psnr_db"] != base["psnr_db"]
+    off = run("--cat", "off")
+    assert off["psnr_db"] > base["psnr_db"] and off["minitiles_sent"] > base["minitiles_sent"]
+    assert run("--precision", "fp8")["minitiles_sent"] != base["minitiles_sent"]
+    assert run("--coords", "absolute")["psnr_db"] != base["psnr_db"]
+    assert run("--view", "1")["visible"] != base["visible"]
+
+
+def test_bad_gaussians_are_reported(demo, tmp_path):
+    """Left out, counted in the statistics and shown; the picture is made."""
+    scene = load_scene(demo / "demo.ply")
+    scene.means[:3] = np.nan
+    save_ply(scene, tmp_path / "bad.ply")
+    run = flicker("render", tmp_path / "bad.ply", "--cameras", demo / "cameras.json", "--size", "64x32", "--stats", tmp_path / "s.json")
+    assert run.returncode == 0, run.stderr
+    stats = json.loads((tmp_path / "s.json").read_text())
+    assert sum(stats["gaussians_left_out"].values()) == 3
+    assert stats["gaussians"] == len(scene.means) - 3
+    assert all(reason in run.stdout for reason in stats["gaussians_left_out"])
+
+
+BAD = {
+    "missing file": (["nowhere.ply"], "nowhere.ply"),
+    "unknown format": (["{here}/test.txt"], "test.txt"),
+    "truncated": (["{here}/cut.ply"], "cut.ply"),
+    "no cameras file": (["{scene}", "--cameras", "nowhere.json"], "nowhere.json"),
+    "view out of range": (["{scene}", "--view", "99"], "view"),
+    "negative view": (["{scene}", "--view=-1"], "view"),
+    "zero size": (["{scene}", "--size", "0x10"], "width"),
+    "absurd size": (["{scene}", "--size", "64x1000000"], "height"),
+    "no size": (["{scene}", "--size", "big"], "--size"),
+    "fifo depth": (["{scene}", "--fifo-depth", "129"], "fifo_depth"),
+    "unknown mode": (["{scene}", "--cat", "best"], "--cat"),
+    "two configurations": (["{scene}", "--faithful", "--form", "conic"], "--form"),
+    "no folder": (["{scene}", "--out", "{here}/none/x.png"], "--out"),
+    "no png": (["{scene}", "--out", "{here}/x.jpg"], "--out"),
+    "stats is a folder": (["{scene}", "--stats", "{here}"], "--stats"),
+    "no scene": ([], "scene"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input(case, demo, tmp_path):
+    """One line on standard error that names the culprit, exit code 2, nothing written."""
+    (tmp_path / "test.txt").write_text("not a scene")
+    (tmp_path / "cut.ply").write_bytes((demo / "demo.ply").read_bytes()[:5000])
+    before = sorted(tmp_path.iterdir())
+    args, named = BAD[case]
+    args = [a.format(scene=demo / "demo.ply", here=tmp_path) for a in args]
+    if "--out" not in args:
+        args += ["--out", str(tmp_path / "out.png")]
+    run = flicker("render", *args)
+    assert run.returncode == 2, run.stdout + run.stderr
+    assert run.stderr.count("\n") == 1 and named in run.stderr, run.stderr
+    assert "Traceback" not in run.stderr + run.stdout
+    assert sorted(tmp_path.iterdir()) == before
