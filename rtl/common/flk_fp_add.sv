@@ -22,13 +22,11 @@ module flk_fp_add #(
   end
 
   typedef logic [ExpBits-1:0] exp_t;
-  typedef logic [ManBits-1:0] man_t;
   typedef logic [Width-2:0] mag_t;
 
   localparam mag_t Inf = {{ExpBits{1'b1}}, {ManBits{1'b0}}};
   localparam mag_t Nan = Fn ? '1 : Inf | (mag_t'(1) << (ManBits - 1));
-  localparam mag_t Finite = Fn ? Nan - 1'b1 : Inf - 1'b1;
-  localparam mag_t Limit = Saturate ? Finite : Inf;
+  localparam mag_t Limit = !Saturate ? Inf : (Fn ? Nan - 1'b1 : Inf - 1'b1);
 
   // Hidden bit, mantissa, guard, round and sticky bit.
   localparam int unsigned AlignBits = ManBits + 4;
@@ -39,8 +37,8 @@ module flk_fp_add #(
   // The aligned number and a carry.
   localparam int unsigned SumBits = AlignBits + 1;
   localparam int unsigned LzBits = $clog2(SumBits);
-  // The shift to normalise is limited by the exponent: compare in the wider of the two.
-  localparam int unsigned LimitBits = (ExpBits > LzBits) ? ExpBits : LzBits;
+  // Signed difference of exponent and leading zeros.
+  localparam int unsigned SignedBits = ((ExpBits > LzBits) ? ExpBits : LzBits) + 1;
 
   // Unpack: the larger magnitude first
 
@@ -49,16 +47,25 @@ module flk_fp_add #(
   logic greater_normal, lesser_normal;
   exp_t greater_exp, lesser_exp;
 
-  assign swap         = a_i[Width-2:0] < b_i[Width-2:0];
+  // The highest bit that differs decides.
+  always_comb begin
+    swap = 1'b0;
+    for (int k = 0; k < int'(Width) - 1; k++) begin
+      if (a_i[k] != b_i[k]) begin
+        swap = b_i[k];
+      end
+    end
+  end
+
   assign greater        = swap ? b_i[Width-2:0] : a_i[Width-2:0];
-  assign lesser        = swap ? a_i[Width-2:0] : b_i[Width-2:0];
-  assign sign         = swap ? b_i[Width-1] : a_i[Width-1];
-  assign subtract     = a_i[Width-1] ^ b_i[Width-1];
+  assign lesser         = a_i[Width-2:0] ^ b_i[Width-2:0] ^ greater;
+  assign sign           = swap ? b_i[Width-1] : a_i[Width-1];
+  assign subtract       = a_i[Width-1] ^ b_i[Width-1];
   assign greater_normal = |greater[Width-2:ManBits];
-  assign lesser_normal = |lesser[Width-2:ManBits];
+  assign lesser_normal  = |lesser[Width-2:ManBits];
   // Subnormals have the exponent of the smallest normal numbers.
   assign greater_exp    = {greater[Width-2:ManBits+1], greater[ManBits] | !greater_normal};
-  assign lesser_exp    = {lesser[Width-2:ManBits+1], lesser[ManBits] | !lesser_normal};
+  assign lesser_exp     = {lesser[Width-2:ManBits+1], lesser[ManBits] | !lesser_normal};
 
   // Special cases: a NaN or an infinity is the larger magnitude
 
@@ -69,16 +76,18 @@ module flk_fp_add #(
     assign is_inf = 1'b0;
   end else begin : gen_special
     assign is_inf = &greater[Width-2:ManBits];
-    assign is_nan = is_inf && (greater[ManBits-1:0] != '0 || (subtract && greater == lesser));
+    assign is_nan = is_inf
+                 && (greater[ManBits-1:0] != '0 || (subtract && &lesser[Width-2:ManBits]));
   end
 
   // Exponent
 
-  logic [DiffBits-1:0] diff;
-  logic                far;  // nothing but the sticky bit remains
+  logic [ DiffBits-1:0] diff;
+  logic [ShiftBits-1:0] distance;
 
-  assign diff = DiffBits'(greater_exp - lesser_exp);
-  assign far  = (diff >> ShiftBits) != '0;
+  // Any distance of AlignBits or more leaves nothing but the sticky bit.
+  assign diff     = DiffBits'(greater_exp - lesser_exp);
+  assign distance = diff[ShiftBits-1:0] | {ShiftBits{(diff >> ShiftBits) != '0}};
 
   // Align
 
@@ -86,11 +95,8 @@ module flk_fp_add #(
 
   always_comb begin
     aligned = {lesser_normal, lesser[ManBits-1:0], 3'b000};
-    if (far) begin
-      aligned = AlignBits'(lesser != '0);
-    end
-    for (int k = int'(ShiftBits) - 1; k >= 0; k--) begin
-      if (diff[k]) begin
+    for (int k = 0; k < int'(ShiftBits); k++) begin
+      if (distance[k]) begin
         aligned = (aligned >> (1 << k))
                 | AlignBits'((aligned & ((AlignBits'(1) << (1 << k)) - 1'b1)) != '0);
       end
@@ -99,58 +105,95 @@ module flk_fp_add #(
 
   // Add
 
+  // The larger operand has no bits in the three lowest places: a short sum, then the others.
+  logic [        3:0] sum_low;
+  logic [ManBits+1:0] sum_high;
   logic [SumBits-1:0] sum;
 
-  assign sum = {1'b0, greater_normal, greater[ManBits-1:0], 3'b000}
-             + ({1'b0, aligned} ^ {SumBits{subtract}}) + SumBits'(subtract);
+  assign sum_low  = {1'b0, aligned[2:0] ^ {3{subtract}}} + 4'(subtract);
+  assign sum_high = {1'b0, greater_normal, greater[ManBits-1:0]}
+                  + ({1'b0, aligned[AlignBits-1:3]} ^ {ManBits + 2{subtract}})
+                  + (ManBits + 2)'(sum_low[3]);
+  assign sum      = {sum_high, sum_low[2:0]};
 
   // Normalise: the highest one to the top, unless the exponent would fall below 1
 
-  // Halves the vector, filled up to a power of two; the count of an empty one does not matter.
+  // The count of an empty vector does not matter.
   function automatic logic [LzBits-1:0] leading_zeros(input logic [SumBits-1:0] value);
-    logic [(1<<LzBits)-1:0] rest;
-    rest          = (1 << LzBits)'(value) << ((1 << LzBits) - SumBits);
-    leading_zeros = '0;
-    for (int k = int'(LzBits) - 1; k >= 0; k--) begin
-      if ((rest >> ((1 << LzBits) - (1 << k))) == '0) begin
-        leading_zeros[k] = 1'b1;
-        rest             = rest << (1 << k);
+    leading_zeros = '1;
+    for (int k = 0; k < int'(SumBits); k++) begin
+      if (value[k]) begin
+        leading_zeros = LzBits'(int'(SumBits) - 1 - k);
       end
     end
   endfunction
 
-  logic [   LzBits-1:0] zeros;
-  logic [LimitBits-1:0] shift;
-  logic [  SumBits-1:0] norm;
-  logic [    ExpBits:0] exponent;
+  logic                   zero, low;
+  logic [     LzBits-1:0] zeros, shift;
+  logic [ SignedBits-1:0] spare;
+  logic [    SumBits-1:0] norm;
+  logic [    ExpBits-1:0] exponent;  // less 1 if norm has a hidden bit
 
-  assign zeros    = leading_zeros(sum);
-  assign shift    = (LimitBits'(zeros) > LimitBits'(greater_exp)) ? LimitBits'(greater_exp)
-                                                                : LimitBits'(zeros);
-  assign norm     = sum << shift;
-  // The top bit is the carry, so it counts one more than greater_exp. Without it: subnormal or 0.
-  assign exponent = norm[SumBits-1] ? {1'b0, greater_exp} + 1'b1 - (ExpBits + 1)'(shift) : '0;
+  assign zeros = leading_zeros(sum);
+  assign zero  = (sum == '0);
+  assign low   = spare[SignedBits-1];
+  assign shift = low ? LzBits'(greater_exp) : zeros;
 
-  // Round
+  // greater_exp - zeros, one carry chain.
+  always_comb begin
+    automatic logic [SignedBits-1:0] minuend, inverse;
+    automatic logic carry;
+    minuend = SignedBits'(greater_exp);
+    inverse = ~SignedBits'(zeros);
+    carry   = 1'b1;
+    for (int k = 0; k < int'(SignedBits); k++) begin
+      spare[k] = minuend[k] ^ inverse[k] ^ carry;
+      carry    = (minuend[k] & inverse[k]) | (carry & (minuend[k] | inverse[k]));
+    end
+  end
+
+  always_comb begin
+    norm = sum;
+    for (int k = int'(LzBits) - 1; k >= 0; k--) begin
+      if (shift[k]) begin
+        norm = norm << (1 << k);
+      end
+    end
+  end
+
+  // Its top bit is the carry of the sum: an exponent of greater_exp + 1 before the shift.
+  assign exponent = (low || zero) ? '0 : spare[ExpBits-1:0];
+
+  // Round: mantissa, then exponent with the mantissa's carry and the hidden bit
 
   logic                     round_up;
   logic [ExpBits+ManBits:0] rounded;
 
   assign round_up = norm[3] && (norm[4] || norm[2:0] != '0);
-  assign rounded  = {exponent, norm[SumBits-2:4]} + (ExpBits + ManBits + 1)'(round_up);
+
+  always_comb begin
+    automatic logic carry;
+    carry = round_up;
+    for (int k = 0; k < int'(ManBits); k++) begin
+      rounded[k] = norm[k+4] ^ carry;
+      carry      = norm[k+4] & carry;
+    end
+    rounded[ManBits] = exponent[0] ^ norm[SumBits-1] ^ carry;
+    carry            = (norm[SumBits-1] & carry) | (exponent[0] & (norm[SumBits-1] | carry));
+    for (int k = 1; k < int'(ExpBits); k++) begin
+      rounded[k+ManBits] = exponent[k] ^ carry;
+      carry              = exponent[k] & carry;
+    end
+    rounded[ExpBits+ManBits] = carry;
+  end
 
   // Pack
 
-  logic overflow, zero;
+  logic overflow;
 
-  assign overflow = is_inf || rounded > {1'b0, Finite};
-  assign zero     = (sum == '0);
-
-  always_comb begin
-    sum_o = {sign && !(subtract && zero), overflow ? Limit : rounded[Width-2:0]};
-    if (is_nan) begin
-      sum_o = {1'b0, Nan};
-    end
-  end
+  assign overflow = is_inf || is_nan || rounded[ExpBits+ManBits]
+                 || (Fn ? &rounded[Width-2:0] : &rounded[Width-2:ManBits]);
+  assign sum_o    = {sign && !(subtract && zero) && !is_nan,
+                     overflow ? (is_nan ? Nan : Limit) : rounded[Width-2:0]};
 
 endmodule

@@ -32,6 +32,6 @@ module flk_fp_cmp #(
   // Magnitudes of negative numbers inverted: two's-complement order, -0 just below +0.
   assign a_key     = {a_i[Width-1], a_mag ^ {Width - 1{a_i[Width-1]}}};
   assign b_key     = {b_i[Width-1], b_mag ^ {Width - 1{b_i[Width-1]}}};
-  assign lt_o      = (a_key < b_key)  && !unordered;
+  assign lt_o      = (a_key < b_key) && !both_zero && !unordered;
 
 endmodule

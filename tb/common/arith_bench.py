@@ -59,7 +59,7 @@ class Harness:
         return out
 
     def functions(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """exp_neg (n, 2 bases) and log_opacity (n, 2 bases, formats; 0 where there is no unit) of FP16 operands (n,)."""
+        """exp_neg (n, bases) and log_opacity (n, bases, formats; 0 where there is no unit) of FP16 operands (n,)."""
         exp = np.zeros((a.size, 2), np.uint16)
         log = np.zeros((a.size, 2, len(FORMATS)), np.uint16)
         self._call("arith_functions", None, a, exp, log)
@@ -103,7 +103,10 @@ def sparse() -> np.ndarray:
 
 
 def fp16_pairs(rng: np.random.Generator, random_pairs: int) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Operand pairs by kind, at most BLOCK at a time. Random kinds: `random_pairs` in all for `random`, BLOCK for others."""
+    """FP16 operand pairs by kind, at most BLOCK at a time.
+
+    `random_pairs` of kind `random` (whole blocks), a block of each other random kind, the sets of the rest in full.
+    """
     special, few, every = specials(), sparse(), all_bits(FP16)
     n = BLOCK
 
@@ -170,7 +173,7 @@ def kinds_of(fmt: FloatFormat, bits: np.ndarray) -> np.ndarray:
 def assert_same(
     what: str, fmt: FloatFormat, operands: tuple[np.ndarray, ...], got: np.ndarray, want: np.ndarray
 ) -> None:
-    """Fail if `got` differs anywhere from `want`: counts by the classes of the operands (`fmt`), three examples each."""
+    """Fail if `got` differs anywhere from `want`: counts by class of the operands (`fmt`), three examples each."""
     wrong = np.flatnonzero(got != want)
     if not wrong.size:
         return

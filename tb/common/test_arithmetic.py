@@ -131,7 +131,7 @@ def test_functions(harness: Harness, base2: bool) -> None:
 )
 def test_illegal_parameters(unit: str, parameters: dict[str, int], message: str) -> None:
     with pytest.raises(FlickerError, match=message):
-        verilate(unit, parameters=parameters, args=["-Wno-fatal"], shared=True)
+        verilate(unit, parameters=parameters, shared=True)
 
 
 @pytest.mark.parametrize("script", ["gen_params.py", "gen_tables.py"])
@@ -146,7 +146,7 @@ def test_generated_packages(script: str) -> None:
 
 
 def test_stimulus() -> None:
-    """The FP16 pairs reach what they are meant to reach: classes of exact results, in tens of thousands."""
+    """The FP16 pairs reach what they are meant to reach: classes of exact results, each at least a hundred times."""
     found: dict[str, int] = {}
     for _, a, b in fp16_pairs(random(0), BLOCK):
         x, y = FP16.decode(a), FP16.decode(b)
@@ -154,34 +154,40 @@ def test_stimulus() -> None:
         x, y = x[usable], y[usable]
         for name, exact in (("sum", x + y), ("product", x * y)):
             size = np.abs(exact)
-            place = np.ldexp(1.0, np.maximum(np.frexp(size)[1], -13) - 11)
-            steps = size / place
-            subnormal = (size < FP16.min_normal) & (exact != 0)
+            steps = np.ldexp(size, 11 - np.maximum(np.frexp(size)[1], -13))  # in units of the last place
             tie = steps % 1 == 0.5
+            subnormal = (size < FP16.min_normal) & (exact != 0)
             classes = {
-                "tie to even below": tie & (np.floor(steps) % 2 == 0),
-                "tie to even above": tie & (np.floor(steps) % 2 == 1),
+                "tie, even below": tie & (steps % 2 == 0.5),
+                "tie, even above": tie & (steps % 2 == 1.5),
                 "subnormal": subnormal,
-                "subnormal tie" if name == "product" else "zero from numbers": subnormal & tie
-                if name == "product" else (exact == 0) & (x != 0),
-                "rounds to the smallest normal" if name == "product" else "cancels":
-                    subnormal & (np.rint(steps) == 1024) if name == "product" else size < np.abs(x) / 64,
-                "overflow": size >= 65520,
                 "largest number": (size >= 65488) & (size < 65520),
+                "rounds to infinity": (size >= 65520) & (size < 65536),
+                "overflow": size >= 65536,
             }
+            if name == "sum":  # never inexact where subnormal
+                classes["zero"] = (exact == 0) & (x != 0)
+                classes["cancellation"] = size < np.abs(x) / 64
+            else:
+                classes["subnormal tie"] = subnormal & tie
+                classes["below half of the smallest"] = subnormal & (steps < 0.5)
+                classes["rounds to the smallest normal"] = subnormal & (np.rint(steps) == 1024)
             for label, hits in classes.items():
-                found[f"{name}: {label}"] = found.get(f"{name}: {label}", 0) + int(np.count_nonzero(hits))
-    assert min(found.values()) >= 1000, found
+                key = f"{name}: {label}"
+                found[key] = found.get(key, 0) + int(np.count_nonzero(hits))
+    print(found)
+    assert min(found.values()) >= 100, found
 
 
-def rounding_points(fmt: FloatFormat, rng: np.random.Generator) -> np.ndarray:
-    """float64: all numbers of a format, all midpoints, the float64 beside each, random ones of all sizes, specials."""
-    numbers = fmt.decode(np.arange(fmt.max_bits + 1))
+def rounding_points(fmt: FloatFormat, rng: np.random.Generator, dtype: type = np.float64) -> np.ndarray:
+    """All numbers of a format, all midpoints, the float64 (`dtype`) beside each, random ones of all sizes, specials."""
+    numbers = fmt.decode(np.arange(fmt.max_bits + 1)).astype(dtype)
     numbers = np.append(numbers, 2 * numbers[-1] - numbers[-2])
     points = np.concatenate([numbers, (numbers[1:] + numbers[:-1]) / 2])
-    points = np.concatenate([points, np.nextafter(points, np.inf), np.nextafter(points, 0)])
-    anything = np.exp2(rng.uniform(-30, 20, 200_000))
-    points = np.concatenate([points, anything, [5e-324, 1e300, np.inf, np.nan]])
+    points = np.concatenate([points, np.nextafter(points, dtype(np.inf)), np.nextafter(points, dtype(0))])
+    anything = np.exp2(rng.uniform(-30, 20, 200_000)).astype(dtype)
+    ends = np.array([np.finfo(dtype).smallest_subnormal, np.finfo(dtype).max, np.inf, np.nan], dtype)
+    points = np.concatenate([points, anything, ends])
     return np.concatenate([points, -points])
 
 
@@ -198,7 +204,7 @@ def test_encode(fmt: FloatFormat, round_up: bool) -> None:
 
 
 def as_type(fmt: FloatFormat, x: np.ndarray) -> np.ndarray:
-    """float64 to bit patterns by the other library's type, saturated beforehand where the format does; canonical NaN."""
+    """float64 to bit patterns by the other library's type, saturated first where the format is; canonical NaN."""
     limit = fmt.max_finite if fmt.saturate else np.inf
     with np.errstate(over="ignore", invalid="ignore"):
         y = np.clip(x, -limit, limit).astype(TYPES[fmt])
@@ -212,7 +218,8 @@ def test_model_against_types(fmt: FloatFormat) -> None:
     values = bits.astype(fmt.dtype).view(TYPES[fmt])
     with np.errstate(invalid="ignore"):
         np.testing.assert_array_equal(fmt.decode(bits), values.astype(np.float64))
-    x = rounding_points(fmt, random(2))
+    # The 8-bit types round by way of float32: give them float32 numbers.
+    x = rounding_points(fmt, random(2), np.float64 if fmt == FP16 else np.float32).astype(np.float64)
     np.testing.assert_array_equal(fmt.encode(x), as_type(fmt, x))
 
     pairs = fp16_pairs(random(3), BLOCK) if fmt == FP16 else [("all", *cross(bits, bits))]
@@ -275,7 +282,9 @@ def carrier(fmt: FloatFormat, bits: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(values), np.nan, values).astype(np.float32)
 
 
-def assert_carriers(what: str, fmt: FloatFormat, operands: tuple[np.ndarray, ...], got: np.ndarray, want: np.ndarray) -> None:
+def assert_carriers(
+    what: str, fmt: FloatFormat, operands: tuple[np.ndarray, ...], got: np.ndarray, want: np.ndarray
+) -> None:
     """float32 `got` is the carrier of bit patterns `want`, to the last bit (sign of zero, NaN)."""
     assert_same(f"{what} (float32 bits)", fmt, operands, got.view(np.uint32), carrier(fmt, want).view(np.uint32))
 
@@ -290,7 +299,8 @@ def test_carrier_rounding(fmt: FloatFormat) -> None:
         bits = high | np.uint32(low)
         x = bits.view(np.float32)
         _round_all(x, r, out)
-        want = carrier(fmt, fmt.encode(x)).view(np.uint32)
+        with np.errstate(invalid="ignore"):  # signalling NaNs
+            want = carrier(fmt, fmt.encode(x)).view(np.uint32)
         wrong = np.flatnonzero(out.view(np.uint32) != want)
         assert not wrong.size, [(hex(bits[i]), hex(out.view(np.uint32)[i]), hex(want[i])) for i in wrong[:5]]
 
@@ -304,7 +314,8 @@ def test_carrier_arithmetic(fmt: FloatFormat) -> None:
         sums, differences, products = np.empty((3, a.size), np.float32)
         _pairs_all(carrier(fmt, a), carrier(fmt, b), r, sums, differences, products)
         assert_carriers(f"{fmt.name} add, {kind}", fmt, (a, b), sums, fp_add(fmt, a, b))
-        assert_carriers(f"{fmt.name} sub, {kind}", fmt, (a, b), differences, fp_add(fmt, a, b ^ fmt.dtype(fmt.sign_bit)))
+        want = fp_add(fmt, a, b ^ fmt.dtype(fmt.sign_bit))
+        assert_carriers(f"{fmt.name} sub, {kind}", fmt, (a, b), differences, want)
         assert_carriers(f"{fmt.name} mul, {kind}", fmt, (a, b), products, fp_mul(fmt, a, b))
 
 

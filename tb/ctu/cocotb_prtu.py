@@ -16,11 +16,12 @@ from flicker.functions import log_opacity
 from flicker.golden.cat import DENSE_RECTS, SPARSE_RECTS, trace_rect
 from flicker.params import PRTU_LATENCY, Form, Precision
 
-ITEMS = 10_000
+ITEMS = 4_000
 RECT = ("x_top_i", "x_bot_i", "y_top_i", "y_bot_i")
 RECORD = ("mean_x_i", "mean_y_i", "shape0_i", "shape1_i", "shape2_i")
 INPUTS = (*RECT, *RECORD, "threshold_i")
 SHAPES = ("shape0", "shape1", "shape2")
+LEADERS = (*DENSE_RECTS.tolist(), *SPARSE_RECTS.tolist())
 
 # Registers by stage: (cycles after the input, value of the model, register).
 REGISTERS = {
@@ -53,15 +54,13 @@ def handle(dut, path: str):
     return dut
 
 
-def stimulus(rng, form: Form, base2: bool, fmt):
-    """One operation: values of INPUTS."""
+def stimulus(rng, form: Form, thresholds: list[int], width: int):
+    """One operation: values of INPUTS. `thresholds` by opacity, `width` bits wide."""
     kind = rng.choices((splats.tame, splats.thin, splats.special, splats.opaque), (4, 3, 3, 1))[0]
     features = kind(rng, form).features
-    rects = (*DENSE_RECTS.tolist(), *SPARSE_RECTS.tolist(), [rng.randrange(8) for _ in range(4)])
-    threshold = int(log_opacity(np.array([features[5]], np.uint16), base2, fmt)[0])
-    if rng.random() < 0.2:
-        threshold = rng.getrandbits(fmt.width)
-    return (*rng.choice(rects), *features[:5], threshold)
+    rect = rng.choice((*LEADERS, [rng.randrange(8) for _ in range(4)]))
+    threshold = thresholds[features[5]] if rng.random() < 0.8 else rng.getrandbits(width)
+    return (*rect, *features[:5], threshold)
 
 
 def expected(operations, form: Form, precision: Precision, fmt) -> dict[str, np.ndarray]:
@@ -96,6 +95,7 @@ async def every_stage(dut):
     form, precision = Form(config()["Form"]), Precision(config()["Precision"])
     fmt = FP16 if precision == Precision.FP16 else E4M3
     assert len(dut.threshold_i) == fmt.width
+    thresholds = log_opacity(np.arange(1 << 16), form == Form.FACTORED, fmt).tolist()
     compared = registers(form, precision)
     ports = [getattr(dut, name) for name in INPUTS]
     widths = [len(port) for port in ports]
@@ -113,7 +113,8 @@ async def every_stage(dut):
         if offered:
             seen.append((cycle, tuple(int(port.value) for port in ports)))
         offered = left > 0 and rng.random() < 0.8
-        values = stimulus(rng, form, form == Form.FACTORED, fmt) if offered else map(rng.getrandbits, widths)
+        garbage = map(rng.getrandbits, widths)
+        values = stimulus(rng, form, thresholds, fmt.width) if offered else garbage
         for port, value in zip(ports, values, strict=True):
             port.value = value
         left -= offered

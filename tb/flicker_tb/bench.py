@@ -10,6 +10,7 @@ from typing import Any
 
 import cocotb
 from cocotb.clock import Clock
+from cocotb.handle import Immediate
 from cocotb.triggers import ClockCycles, RisingEdge
 
 from flicker_tb import stalls
@@ -33,7 +34,9 @@ class Bench:
     def __init__(self, dut: Any) -> None:
         self.dut = dut
         self.rng = random.Random(random.getrandbits(64))
-        dut.rst_ni.value = 0
+        # At once: the inputs' random start values must not make a clock edge out of reset.
+        dut.rst_ni.value = Immediate(0)
+        dut.clk_i.value = Immediate(0)
         cocotb.start_soon(Clock(dut.clk_i, PERIOD_NS, unit="ns").start())
 
     def stall(self, pattern: str) -> Any:

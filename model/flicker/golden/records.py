@@ -85,9 +85,11 @@ def _round_splats(conic, cov, opacity, rgb, factored, gauss, clamped):
 @numba.njit(cache=True)
 def _span(lo, hi, size, count):
     """First and one-past-last block of `size` pixels with a pixel centre in [lo, hi], clipped to [0, count)."""
-    first = np.int64(np.floor((np.ceil(max(lo, -1.0))) / size))
-    last = np.int64(np.floor(np.floor(min(hi, 1.0e6)) / size))
-    return max(first, 0), min(last + 1, count)
+    low = np.ceil(max(lo, 0.0))
+    high = np.floor(min(hi, size * count - 1.0))
+    if not low <= high:
+        return 0, 0
+    return np.int64(low) // size, np.int64(high) // size + 1
 
 
 @numba.njit(cache=True)

@@ -35,7 +35,7 @@ CUT_NATURAL = np.float32(5.6)
 
 
 @numba.njit
-def _minitile(f, m, form, state, finished, col, row, e):
+def minitile(f, m, form, state, finished, col, row, e):
     """Blend one splat into mini-tile m; returns (pairs blended, pixels finished)."""
     x0 = (m % 2) * MINITILE
     y0 = (m // 2) * MINITILE
@@ -119,7 +119,7 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
             if left[m] == 0:
                 continue
             counts[4] += 1
-            blended, ended = _minitile(f, m, form, state, finished, col, row, e16)
+            blended, ended = minitile(f, m, form, state, finished, col, row, e16)
             left[m] -= ended
             counts[5] += blended
             counts[6] += ended

@@ -1,0 +1,123 @@
+"""The units and parameter sets that `make synth` reports, and what they are compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..toolchain import ROOT
+
+# Baselines that are not part of the design.
+EXTRA = [ROOT / "scripts" / "compare" / "flk_acu.sv"]
+
+FORMS = {"conic": 0, "factored": 1}
+PRECISIONS = {"fp16": 0, "mixed": 1, "fp8": 2}
+FEATURE_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
+FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
+
+# Units that are put together from their synthesised parts instead of being flattened: module -> parts.
+COMPOSED: dict[str, list[str]] = {
+    "flk_bitonic_sorter": ["flk_compare_exchange", "flk_pipe_reg"],
+    "flk_channel": ["flk_fifo", "flk_vru", "flk_stream_arbiter"],
+    "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity"],
+    "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
+    "flk_render_stage": ["flk_ctu", "flk_rendering_core", "flk_perf_counters"],
+}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A module with all its parameters; ``config`` is its name in the tables."""
+
+    top: str
+    config: str
+    parameters: tuple[tuple[str, int], ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        return self.top.removeprefix("flk_")
+
+
+def unit(top: str, config: str = "default", **parameters: int) -> Unit:
+    return Unit(top, config, tuple(sorted(parameters.items())))
+
+
+def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
+    """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
+    factored = parameters.get("Form", 1) == 1
+    bits = {
+        "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
+        "flk_exp_neg": ["g_o[15]"],  # so is a power
+    }.get(top, [])
+    if factored:  # v is only squared: the sign of l2 does not matter
+        bits = bits + {
+            "flk_prtu": ["shape2_i[15]"], "flk_acu": ["shape2_i[15]"], "flk_vru": ["op_feature_i[79]"],
+        }.get(top, [])
+    return bits
+
+
+def _arithmetic() -> list[Unit]:
+    formats = {
+        "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
+        "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
+        "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
+    }
+    units = []
+    for top in ("flk_fp_add", "flk_fp_mul"):
+        units += [unit(top, name, **parameters) for name, parameters in formats.items()]
+    for name, parameters in formats.items():
+        units.append(unit("flk_fp_cmp", name, **{key: parameters[key] for key in ("ExpBits", "ManBits", "Fn")}))
+    for source, target in (("fp16", "e4m3"), ("fp16", "e5m2"), ("e4m3", "fp16")):
+        src, dst = formats[source], formats[target]
+        units.append(
+            unit(
+                "flk_fp_convert", f"{source} to {target}", SrcExpBits=src["ExpBits"], SrcManBits=src["ManBits"],
+                SrcFn=src["Fn"], DstExpBits=dst["ExpBits"], DstManBits=dst["ManBits"], DstFn=dst["Fn"],
+                DstSaturate=dst["Saturate"],
+            )
+        )
+    for base, name in ((1, "2^-E"), (0, "e^-E")):
+        units.append(unit("flk_exp_neg", name, Base2=base))
+    for base, name in ((1, "log2"), (0, "ln")):
+        for fmt in ("fp16", "e4m3"):
+            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+    return units
+
+
+def _cells() -> list[Unit]:
+    units = [unit(f"flk_{cell}", f"{FEATURE_BITS} bit", Width=FEATURE_BITS) for cell in ("pipe_reg", "skid_buffer")]
+    units += [unit("flk_fifo", f"{FEATURE_BITS} x {depth}", Width=FEATURE_BITS, Depth=depth) for depth in FIFO_DEPTHS]
+    units += [
+        unit("flk_stream_arbiter", "2 x 67 bit", Inputs=2, Width=67),
+        unit("flk_stream_arbiter", "4 x 92 bit", Inputs=4, Width=92),
+        unit("flk_compare_exchange", "32+16 bit", KeyWidth=32, PayloadWidth=16),
+        unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
+    ]
+    return units
+
+
+def _stage() -> list[Unit]:
+    units = [unit("flk_mmu"), unit("flk_ctu_controller"), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    for form, f in FORMS.items():
+        units += [
+            unit("flk_vru", form, Form=f),
+            unit("flk_channel", form, Form=f, FifoDepth=16, MiniTile=0),
+            unit("flk_rendering_core", form, Form=f, FifoDepth=16),
+        ]
+        for precision, p in PRECISIONS.items():
+            config = f"{form} {precision}"
+            units += [
+                unit("flk_acu", config, Form=f, Precision=p),
+                unit("flk_prtu", config, Form=f, Precision=p),
+                unit("flk_ctu", config, Form=f, Precision=p, CtuFifoDepth=12),
+                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=12),
+            ]
+    return units
+
+
+def all_units() -> list[Unit]:
+    return _arithmetic() + _cells() + _stage()
+
+
+def extra_sources() -> list[Path]:
+    return EXTRA

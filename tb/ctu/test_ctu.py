@@ -1,0 +1,34 @@
+"""Contribution test unit as a stream: masks, order, counters, automatic fall, all against the golden model.
+
+State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000
+splats; all modes; idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it
+fall and return, under different stalls. Parameter space: every form and precision at the default depth of the internal
+FIFO, depths 1 to 3 for one. Not covered: a change of mode in mid-frame, which the contract excludes.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+from flicker_tb.splats import QUICK_BUILD
+
+from flicker.params import Form, Precision, RenderConfig
+
+
+def run(form: Form, precision: Precision, depth: int, tests: list[str]) -> None:
+    parameters = {"Form": int(form), "Precision": int(precision), "CtuFifoDepth": depth}
+    build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters, config=parameters, tests=tests, **QUICK_BUILD)
+
+
+@pytest.mark.parametrize("precision", list(Precision), ids=lambda p: p.name.lower())
+@pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
+def test_ctu(form: Form, precision: Precision) -> None:
+    tests = ["lists", "rate", "automatic"]
+    if RenderConfig(form=form, precision=precision) == RenderConfig():
+        tests += ["long_list", "saturation", "reset_forgets"]
+    run(form, precision, RenderConfig().ctu_fifo_depth, tests)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_fifo_depth(depth: int) -> None:
+    run(Form.FACTORED, Precision.MIXED, depth, ["lists", "automatic"])

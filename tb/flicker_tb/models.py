@@ -1,0 +1,127 @@
+"""Golden models of streams: contribution test unit, pixels of a sub-tile."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from flicker.golden.cat import SCRATCH, is_dense, splat_mask
+from flicker.golden.vru import PAIR_FIELDS, pair
+from flicker.params import (
+    AUTO_DECAY_SHIFT,
+    AUTO_SENT_BITS,
+    AUTO_TEST_BITS,
+    MINITILE,
+    PIXELS_PER_VRU,
+    CatMode,
+    Form,
+    Precision,
+)
+from flicker_tb import splats
+
+
+def values(features: splats.Features) -> np.ndarray:
+    """float32 (9,): the numbers of a record."""
+    return np.array(features, np.uint16).view(np.float16).astype(np.float32)
+
+
+class CtuModel:
+    """Contribution test unit: stream elements in, elements with masks out.
+
+    ``counts`` has splats, tokens, rejected, tested (mask bits) and batches; ``decisions`` whether each finished sub-tile fell to
+    sparse sampling, ``fallen`` the same for the one in progress.
+    """
+
+    def __init__(self, form: Form, precision: Precision, mode: CatMode) -> None:
+        self.form, self.precision, self.mode = form, precision, mode
+        self.counts: Counter[str] = Counter()
+        self.decisions: list[bool] = []
+        self.fallen = False
+        self._next_fallen = False  # of the next sub-tile: rests on all but the one in progress
+        self.test_cycles = 0  # of the sub-tile in progress in the base mode
+        self.sent = [0] * 4
+        self.test_avg = self.sent_avg = 0
+        self._scratch = np.zeros(SCRATCH, np.float32)
+
+    def mask(self, splat: splats.Splat) -> int:
+        """Mini-tile mask of a splat now; counts its batches."""
+        if self.mode == CatMode.OFF:
+            self.counts["batches"] += 1
+            return 15
+        dense = bool(is_dense(CatMode.SPARSE if self.fallen else self.mode, splat.spiky))
+        self.counts["batches"] += 2 if dense else 1
+        numbers = values(splat.features)[:6]
+        return int(splat_mask(*numbers, dense, int(self.form), int(self.precision), self._scratch))
+
+    def take(self, element: int) -> list[tuple[int, int]]:
+        """Outputs (feature_elem_t, mask) of a splat_elem_t."""
+        word = element & (splats.FEATURE_EOS - 1)
+        if element & splats.SPLAT_EOS:
+            self.counts["tokens"] += 1
+            self._end()
+            return [(word | splats.FEATURE_EOS, 15)]
+        splat = splats.Splat(splats.unpack(word), bool(element & splats.SPIKY))
+        mask = self.mask(splat)
+        self.counts["splats"] += 1
+        self.counts["tested"] += mask.bit_count()
+        self.counts["rejected"] += mask == 0
+        step = 1 if splat.spiky else 2
+        self.test_cycles = min(self.test_cycles + step, (1 << AUTO_TEST_BITS) - 1)
+        for m in range(4):
+            self.sent[m] = min(self.sent[m] + (mask >> m & 1), (1 << AUTO_SENT_BITS) - 1)
+        return [(word, mask)] if mask else []
+
+    def _end(self) -> None:
+        """End of a sub-tile."""
+        self.decisions.append(self.fallen)
+        if self.mode == CatMode.AUTO:
+            self.fallen = self._next_fallen
+        self.test_avg += self.test_cycles - (self.test_avg >> AUTO_DECAY_SHIFT)
+        self.sent_avg += PIXELS_PER_VRU * max(self.sent) - (self.sent_avg >> AUTO_DECAY_SHIFT)
+        self._next_fallen = self.test_avg > self.sent_avg
+        self.test_cycles, self.sent = 0, [0] * 4
+
+
+class Pixels:
+    """Some pixels of a sub-tile, blended one splat after the other by ``vru.pair``.
+
+    coords: column and row of each pixel within the sub-tile. ``state`` is float32 (n, 4): transmittance, red, green, blue.
+    """
+
+    def __init__(self, coords: list[tuple[int, int]], form: Form) -> None:
+        self.coords = coords
+        self.form = int(form)
+        self._trace = np.zeros(len(PAIR_FIELDS), np.float32)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start of a sub-tile."""
+        self.state = np.zeros((len(self.coords), 4), np.float32)
+        self.state[:, 0] = 1.0
+        self.finished = [False] * len(self.coords)
+
+    def take(self, numbers: np.ndarray) -> int:
+        """Blend a splat (``values``) into all pixels; returns how many it finished."""
+        ended = 0
+        for i, (x, y) in enumerate(self.coords):
+            if not self.finished[i] and pair(x, y, numbers, self.form, self.state[i], self._trace) == 2:
+                self.finished[i] = True
+                ended += 1
+        return ended
+
+    def words(self) -> list[int]:
+        """``pixel_t`` of each pixel."""
+        return [pixel_word(bits) for bits in self.state.astype(np.float16).view(np.uint16).tolist()]
+
+
+def pixel_word(bits: list[int]) -> int:
+    """``pixel_t`` of the bits of transmittance, red, green, blue."""
+    t, red, green, blue = bits
+    return t << 48 | red << 32 | green << 16 | blue
+
+
+def minitile_coords(minitile: int) -> list[tuple[int, int]]:
+    """Column and row within the sub-tile of the 16 pixels of a mini-tile."""
+    x0, y0 = minitile % 2 * MINITILE, minitile // 2 * MINITILE
+    return [(x0 + i % MINITILE, y0 + i // MINITILE) for i in range(MINITILE * MINITILE)]

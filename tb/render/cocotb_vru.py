@@ -1,0 +1,114 @@
+"""cocotb test of a volume rendering unit; settings: Form, stall pattern of the output."""
+
+from __future__ import annotations
+
+import cocotb
+import numpy as np
+from cocotb.triggers import RisingEdge
+from flicker_tb import splats
+from flicker_tb.bench import Bench, config
+from flicker_tb.streams import Monitor, Stream, StreamSink
+from minitile_model import lists, pixel_of
+
+from flicker.formats import FP16
+from flicker.golden.vru import PAIR_FIELDS, Pixels
+from flicker.params import ALPHA_MIN_BITS, PIXELS_PER_VRU, Form
+
+# Register that holds a value of the model (PAIR_FIELDS), and the cycles after the operation at which it does.
+COMMON = {
+    "dx": ("dx_q", 1), "dy": ("dy_q", 1), "weight": ("weight_q", 5), "g": ("g_q", 6), "alpha": ("alpha_q8", 7), "oma": ("oma_q", 8), "w": ("w_q", 9),
+}
+REGISTERS = {
+    Form.CONIC: {"a0": ("gen_conic.sx_q", 3), "a1": ("gen_conic.sy_q", 3), "a2": ("gen_conic.xy_q", 2), "a3": ("gen_conic.t_q4", 3), "a4": ("gen_conic.h_q", 4)},
+    Form.FACTORED: {"a0": ("gen_factored.p_q", 2), "a1": ("gen_factored.q_q", 2), "a2": ("gen_factored.v_q3", 2), "a3": ("gen_factored.u_q", 3), "a4": ("gen_factored.uu_q", 4)},
+}  # fmt: skip
+FIRST = (4, 2)  # column and row of the unit's first pixel
+
+
+def handle(dut, path: str):
+    """Handle of a signal below the top."""
+    for name in path.split("."):
+        dut = getattr(dut, name)
+    return dut
+
+
+@cocotb.test()
+async def every_stage(dut):
+    """Registers of every stage, state of the pixels and finished pixels equal the model's.
+
+    Operations come in random order of pixels, the same pixel in consecutive cycles included, with bubbles.
+    """
+    settings = config()
+    form = Form(settings["Form"])
+    bench = Bench(dut)
+    rng = bench.rng
+    downstream = Stream(dut, "out")
+    StreamSink(downstream, bench.stall(settings["stall"]))
+    dut.first_x_i.value, dut.first_y_i.value = FIRST
+    dut.op_valid_i.value = 0
+    dut.op_eos_i.value = 0
+    got: list[tuple] = []
+    Monitor(downstream, lambda word: got.append((word >> 64, pixel_of(word))))
+    registers = COMMON | REGISTERS[form]
+    probes = {name: handle(dut, path) for name, (path, _) in registers.items()}
+    log: dict[str, list[int]] = {name: [] for name in probes}
+    model = Pixels(np.array([(FIRST[0] + i % 4, FIRST[1] + i // 4) for i in range(PIXELS_PER_VRU)]), form)
+    expected: list[tuple] = []
+    traces: list[tuple[int, np.ndarray, bool]] = []  # cycle, values, whether the weight of the blend is meaningful
+
+    await bench.reset()
+    edge = RisingEdge(dut.clk_i)
+    queue: list[tuple] = []
+    for entries in lists(rng, form, settings["lengths"]):
+        for s in entries:
+            order = list(range(PIXELS_PER_VRU)) if rng.random() < 0.5 else [rng.randrange(PIXELS_PER_VRU) for _ in range(PIXELS_PER_VRU)]
+            queue += [(s.features, p) for p in order]
+        queue.append(None)  # token
+    cycle, finished = 0, 0
+    while queue or len(got) < len(expected):
+        await edge
+        for name, probe in probes.items():
+            log[name].append(int(probe.value))
+        finished += int(dut.finish_o.value)
+        cycle += 1
+        dut.op_valid_i.value = 0
+        assert cycle < 200_000, "output does not come"
+        if not queue or rng.random() < 0.2:
+            continue
+        # What is driven now is sampled at the next edge.
+        if queue[0] is None:
+            if int(dut.op_valid_i.value) and int(dut.op_eos_i.value):
+                continue
+            await cocotb.triggers.ReadOnly()
+            free = int(dut.eos_ready_o.value)
+            await cocotb.triggers.NextTimeStep()
+            if not free:
+                continue
+            queue.pop(0)
+            dut.op_valid_i.value = 1
+            dut.op_eos_i.value = 1
+            expected += [(i, tuple(map(int, p))) for i, p in enumerate(model.bits())]
+            model.reset()
+            continue
+        features, pixel = queue.pop(0)
+        dut.op_valid_i.value = 1
+        dut.op_eos_i.value = 0
+        dut.op_pixel_i.value = pixel
+        dut.op_feature_i.value = splats.pack(features)
+        live = not model.finished[pixel]
+        model.take(features, pixel)
+        traces.append((cycle, model.trace[pixel].copy(), live))
+    await bench.cycles(50)
+    assert got == expected, next(f"pixel {n}: got {g}, model {e}" for n, (g, e) in enumerate(zip(got, expected)) if g != e)
+    wrong = []
+    for name, (path, delay) in registers.items():
+        field = PAIR_FIELDS.index(name)
+        want = FP16.encode(np.array([t[1][field] for t in traces], np.float64))
+        have = np.array([log[name][c + delay] for c, _, _ in traces], np.uint16)
+        # A finished pixel's transmittance is the one before; w is only used where the pair is blended.
+        alpha = FP16.encode(np.array([t[1][PAIR_FIELDS.index("alpha")] for t in traces], np.float64))
+        used = np.array([t[2] for t in traces]) & (alpha >= ALPHA_MIN_BITS) if name == "w" else np.ones(len(traces), bool)
+        bad = np.flatnonzero(used & (want != have))
+        wrong += [f"{path} ({name}): got {have[n]:04x}, model {want[n]:04x} in operation {n}; {len(bad)} differ" for n in bad[:1]]
+    assert not wrong, "\n".join(wrong)
+    assert finished > 0 and len(traces) > 1000
