@@ -26,7 +26,7 @@ $(STAMP): requirements.lock pyproject.toml scripts/setup.sh
 	@PYTHON="$(PYTHON)" scripts/setup.sh "$(VENV)"
 	@touch $@
 
-demo: $(STAMP) ## render the demo scene with the golden model and the reference renderer
+demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
 test: $(STAMP) lint ## lint and all tests

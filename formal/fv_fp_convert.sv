@@ -68,13 +68,13 @@ module fv_fp_convert #(
 
   always_comb begin
     if (mag > SrcTop) begin
-      a_nan_result: assert (dst == {1'b0, DstNan});
+      a_result_nan: assert (dst == {1'b0, DstNan});
     end else begin
-      a_sign: assert (dst[DstWidth-1] == src_i[SrcWidth-1]);
+      a_result_sign: assert (dst[DstWidth-1] == src_i[SrcWidth-1]);
       if (!SrcFn && mag == SrcInf) begin
-        a_inf_result: assert (dst[DstWidth-2:0] == Limit);
+        a_result_inf: assert (dst[DstWidth-2:0] == Limit);
       end else begin
-        a_value_result: assert (ok);
+        a_result_value: assert (ok);
       end
     end
     c_subnormal: cover (mag <= SrcTop && dst[DstWidth-2:0] < (dst_t'(1) << DstManBits) && dst[0]);

@@ -76,12 +76,12 @@ module fv_fp_mul #(
 
   always_comb begin
     if (a_nan || b_nan || (a_inf && b_mag == '0) || (b_inf && a_mag == '0)) begin
-      a_nan_result: assert (result == {1'b0, Nan});
+      a_result_nan: assert (result == {1'b0, Nan});
     end else if (a_inf || b_inf) begin
-      a_inf_result: assert (result == {sign, Limit});
+      a_result_inf: assert (result == {sign, Limit});
     end else begin
-      a_sign: assert (result[Width-1] == sign);
-      a_value_result: assert (ok);
+      a_result_sign: assert (result[Width-1] == sign);
+      a_result_value: assert (ok);
     end
     c_subnormal: cover (result[Width-2:0] < (mag_t'(1) << ManBits) && result[0] && !a_nan);
     c_tie: cover (i_rounding.twice == i_rounding.high && !a_nan && !b_nan && a_mag[0] && b_mag[0]);

@@ -34,5 +34,5 @@ echo "setup: installing into $venv (a few minutes the first time)"
 [[ -x $venv/bin/python ]] || "$python" -m venv "$venv"
 pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off)
 "${pip[@]}" -r requirements.lock || fail "could not install the packages of requirements.lock"
-"${pip[@]}" --no-deps --editable . || fail "could not install the flicker package"
+"${pip[@]}" --no-deps --no-build-isolation --editable . || fail "could not install the flicker package"
 echo "setup: done"

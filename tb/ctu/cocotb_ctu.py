@@ -14,7 +14,6 @@ from flicker_tb.streams import Stream
 from flicker.params import AUTO_SENT_BITS, AUTO_TEST_BITS, PRTU_LATENCY, CatMode, Form, Precision
 
 FORM, PRECISION = Form(config()["Form"]), Precision(config()["Precision"])
-DEPTH = config()["CtuFifoDepth"]
 # Fields of ctu_events_t, least significant first.
 EVENTS = (("tested", 3), ("rejected", 1), ("splats", 1), ("tokens", 1), ("idle", 1), ("stalled", 1), ("busy", 1))
 # Patterns of idle input, blocked output, blocked acceptance.

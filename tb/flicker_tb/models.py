@@ -1,4 +1,4 @@
-"""Golden models of streams: contribution test unit, pixels of a sub-tile."""
+"""Golden model of the contribution test unit as a stream."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from collections import Counter
 import numpy as np
 
 from flicker.golden.cat import SCRATCH, is_dense, splat_mask
-from flicker.golden.vru import PAIR_FIELDS, pair
 from flicker.params import (
     AUTO_DECAY_SHIFT,
     AUTO_SENT_BITS,
     AUTO_TEST_BITS,
-    MINITILE,
     PIXELS_PER_VRU,
     CatMode,
     Form,
@@ -81,47 +79,3 @@ class CtuModel:
         self.sent_avg += PIXELS_PER_VRU * max(self.sent) - (self.sent_avg >> AUTO_DECAY_SHIFT)
         self._next_fallen = self.test_avg > self.sent_avg
         self.test_cycles, self.sent = 0, [0] * 4
-
-
-class Pixels:
-    """Some pixels of a sub-tile, blended one splat after the other by ``vru.pair``.
-
-    coords: column and row of each pixel within the sub-tile. ``state`` is float32 (n, 4): transmittance, red, green, blue.
-    """
-
-    def __init__(self, coords: list[tuple[int, int]], form: Form) -> None:
-        self.coords = coords
-        self.form = int(form)
-        self._trace = np.zeros(len(PAIR_FIELDS), np.float32)
-        self.reset()
-
-    def reset(self) -> None:
-        """Start of a sub-tile."""
-        self.state = np.zeros((len(self.coords), 4), np.float32)
-        self.state[:, 0] = 1.0
-        self.finished = [False] * len(self.coords)
-
-    def take(self, numbers: np.ndarray) -> int:
-        """Blend a splat (``values``) into all pixels; returns how many it finished."""
-        ended = 0
-        for i, (x, y) in enumerate(self.coords):
-            if not self.finished[i] and pair(x, y, numbers, self.form, self.state[i], self._trace) == 2:
-                self.finished[i] = True
-                ended += 1
-        return ended
-
-    def words(self) -> list[int]:
-        """``pixel_t`` of each pixel."""
-        return [pixel_word(bits) for bits in self.state.astype(np.float16).view(np.uint16).tolist()]
-
-
-def pixel_word(bits: list[int]) -> int:
-    """``pixel_t`` of the bits of transmittance, red, green, blue."""
-    t, red, green, blue = bits
-    return t << 48 | red << 32 | green << 16 | blue
-
-
-def minitile_coords(minitile: int) -> list[tuple[int, int]]:
-    """Column and row within the sub-tile of the 16 pixels of a mini-tile."""
-    x0, y0 = minitile % 2 * MINITILE, minitile // 2 * MINITILE
-    return [(x0 + i % MINITILE, y0 + i // MINITILE) for i in range(MINITILE * MINITILE)]

@@ -14,7 +14,7 @@ from flicker_tb import splats
 from flicker_tb.runner import seed
 
 from flicker.camera import Camera
-from flicker.golden.cat import DENSE_RECTS, SPARSE_RECTS, splat_mask, threshold, trace_rect
+from flicker.golden.cat import DENSE_RECTS, SCRATCH, SPARSE_RECTS, splat_mask, threshold, trace_rect
 from flicker.golden.records import build_lists
 from flicker.golden.render import COUNTS, minitile, render_golden, stream_order
 from flicker.golden.vru import PAIR_FIELDS, pair
@@ -57,7 +57,7 @@ def test_minitile_is_sixteen_pairs(form):
 def test_mask_is_any_leader(form, precision):
     """A mask bit is set exactly if one of the mini-tile's leaders is below the threshold."""
     rng = random.Random(seed())
-    e = np.zeros(4, np.float32)
+    e = np.zeros(SCRATCH, np.float32)
     counts = np.zeros(16, int)
     for _ in range(300):
         features = splats.mixed(rng, form).features
@@ -163,7 +163,7 @@ def test_automatic_mode():
             for n, i in zip(range(lists.start[s], lists.start[s + 1]), entries):
                 f = floats(lists.features(n))
                 dense = mode == CatMode.SMOOTH and not p.spiky[i]
-                mask = splat_mask(*f[:6], dense, int(config.form), int(config.precision), np.zeros(4, np.float32))
+                mask = splat_mask(*f[:6], dense, int(config.form), int(config.precision), np.zeros(SCRATCH, np.float32))
                 per_tile += [mask >> m & 1 for m in range(4)]
             test += int(np.where(p.spiky[entries], 1, 2).sum()) - test // 4
             sent += 8 * int(per_tile.max()) - sent // 4

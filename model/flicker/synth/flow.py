@@ -96,6 +96,11 @@ def plan(job: dict, folder: Path) -> list[tuple[str, str, dict[str, int]]]:
     return children(netlist, job["top"], job["boxes"])
 
 
+def box_name(key: str) -> str:
+    """Cell type of a part in the netlist of what contains it."""
+    return f"box_{key}".replace("-", "_")
+
+
 def _stub(name: str, child: dict) -> str:
     """Empty module with the ports of a synthesised child."""
     face = child["area"]["interface"]
@@ -146,7 +151,7 @@ def synthesise(job: dict, folder: Path) -> dict:
     count: dict[str, int] = {}
     for instance, key in job["children"].items():
         child = json.loads((Path(job["results"]) / key / "result.json").read_text())
-        kind = f"box_{key}".replace("-", "_")
+        kind = box_name(key)
         if kind not in boxes:
             stub = folder / "stub.v"
             stub.write_text(_stub(kind, child))

@@ -102,6 +102,11 @@ class Runner:
     def run(self, units: Iterable[Unit]) -> dict[Unit, dict]:
         """Results of units by unit, each with the sums over its parts."""
         wanted = {unit: self.add(unit.top, dict(unit.parameters)) for unit in units}
+        self.run_planned()
+        return {unit: self.total(key) for unit, key in wanted.items()}
+
+    def run_planned(self) -> None:
+        """Synthesise what ``add`` has planned; afterwards ``results`` holds every unit and part by key."""
         futures: dict[str, Future] = {}
         # Parts have no children and go first, the slow ones before the others; wholes only wait for what was submitted before.
         order = sorted(self.tasks, key=lambda key: bool(self.tasks[key]["children"]))
@@ -117,7 +122,6 @@ class Runner:
                 pool.shutdown(cancel_futures=True)
                 raise
         self.results = {key: json.loads((UNITS / key / "result.json").read_text()) for key in self.tasks}
-        return {unit: self.total(key) for unit, key in wanted.items()}
 
     def _one(self, key: str, futures: dict[str, Future]) -> None:
         job = self.tasks[key]

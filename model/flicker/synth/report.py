@@ -1,0 +1,295 @@
+"""What `make synth` prints and writes: tables, CSV, Markdown, chart."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from .run import Runner
+from .units import FIFO_DEPTHS, FORMS, PRECISIONS, Unit
+
+# 28 nm from gate equivalents: a NAND2 of about 0.5 um2 (9-track cells, 0.9 um x 0.56 um), no allowance for routing.
+UM2_PER_GE = 0.5
+# SRAM: a 6T bit cell of 0.127 um2, half of a macro being bit cells.
+UM2_PER_BIT = 0.127 / 0.5
+
+# The paper's Table 2a, mm2 in 28 nm.
+PAPER = {
+    "Preprocessing core x4": 0.76, "Sorting unit x4": 0.16, "Contribution test unit x4": 0.09, "Rendering core x4": 0.96,
+    "Feature buffer and others (288 KB)": 1.50,
+}
+
+CSV_COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "ff", "fo4")
+
+Results = dict[Unit, dict]
+
+
+@dataclass
+class Sheet:
+    """A table: title, column heads, rows of text, remarks below."""
+
+    title: str
+    heads: list[str]
+    rows: list[list[str]]
+    note: str = ""
+
+    def print(self, console: Console) -> None:
+        table = Table(title=self.title, title_justify="left", caption=self.note or None, caption_justify="left")
+        for index, head in enumerate(self.heads):
+            numeric = all(row[index][:1].isdigit() or row[index][:1] in "-<" for row in self.rows if row[index])
+            table.add_column(head, justify="right" if numeric else "left", overflow="fold")
+        for row in self.rows:
+            table.add_row(*row)
+        console.print(table)
+
+    def markdown(self) -> str:
+        lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|" + "---|" * len(self.heads)]
+        lines += ["| " + " | ".join(row) + " |" for row in self.rows]
+        return "\n".join(lines) + "\n" + (f"\n{self.note}\n" if self.note else "")
+
+
+def _ge(value: float) -> str:
+    return f"{value:,.0f}"
+
+
+def _short(name: str) -> str:
+    """End of a path without the middle of its hierarchy."""
+    parts = name.split(".")
+    return name if len(parts) < 4 else f"{parts[0]}..{parts[-1]}"
+
+
+def units_sheet(results: Results, library: str) -> Sheet:
+    rows = []
+    for unit, result in results.items():
+        area, speed = result["area"], result["speed"]
+        path = area["paths"][0] if area["paths"] else {"from": "", "to": ""}
+        rows.append([
+            unit.name, unit.config, _ge(area["ge"]), _ge(area["ge_seq"]), _ge(area["ge_comb"]), _ge(result["mem_bits"]),
+            _ge(area["ff"]), f"{area['fo4']:.0f}", f"{_short(path['from'])} -> {_short(path['to'])}",
+            _ge(speed["ge"]), f"{speed['fo4']:.0f}",
+        ])
+    return Sheet(
+        f"Units ({library})",
+        ["unit", "configuration", "GE", "seq", "comb", "storage bits", "FF", "FO4", "longest path", "GE, fast", "FO4, fast"],
+        rows,
+        "GE: NAND2 = 1. Storage bits are flip-flops, counted in seq and FF. FO4: longest path, with registers at the ports; "
+        "'fast': the same logic mapped for speed.",
+    )
+
+
+class Comparison:
+    """Results by module and parameters, and the comparisons made of them."""
+
+    def __init__(self, runner: Runner, results: Results) -> None:
+        self.runner, self.results = runner, results
+        self.by_name = {(unit.name, unit.config): result for unit, result in results.items()}
+
+    def ge(self, name: str, config: str, mapping: str = "area") -> float:
+        return self.by_name[name, config][mapping]["ge"]
+
+    def parts(self, key: str, factor: int = 1) -> Counter:
+        """GE of a unit by module, its own glue included."""
+        own = self.runner.results[key]
+        area = own["area"]
+        parts = Counter({own["top"].removeprefix("flk_"): factor * (area["ge_seq"] + area["ge_comb"])})
+        for child, count in own["children"].items():
+            parts += self.parts(child, factor * count)
+        return parts
+
+    def prtu(self) -> Sheet:
+        rows = []
+        for form in FORMS:
+            for precision in PRECISIONS:
+                config = f"{form} {precision}"
+                prtu, acu = self.ge("prtu", config), self.ge("acu", config)
+                fast = self.ge("prtu", config, "speed") / (4 * self.ge("acu", config, "speed"))
+                rows.append([form, precision, _ge(prtu), _ge(4 * acu), f"{prtu / acu / 4:.1%}", f"{fast:.1%}"])
+        return Sheet(
+            "PRTU and four single-pixel ACUs", ["form", "precision", "PRTU", "4 ACUs", "ratio", "ratio, fast"], rows,
+            "Same precision and throughput; the logarithm of the opacity is outside both.",
+        )
+
+    def ctu(self) -> Sheet:
+        rows = []
+        for form in FORMS:
+            vrus = 8 * self.ge("vru", form)
+            for precision in PRECISIONS:
+                config = f"{form} {precision}"
+                ctu = self.ge("ctu", config)
+                parts = self.parts(self.by_name["ctu", config]["key"])
+                rows.append([
+                    form, precision, _ge(ctu), _ge(parts["prtu"]), _ge(parts["fifo"]), _ge(parts["log_opacity"]),
+                    _ge(ctu - parts["prtu"] - parts["fifo"] - parts["log_opacity"]), _ge(vrus), f"{ctu / vrus:.1%}",
+                    f"{(ctu - parts['fifo']) / vrus:.1%}",
+                ])
+        return Sheet(
+            "CTU and the eight VRUs of its core",
+            ["form", "precision", "CTU", "2 PRTUs", "FIFOs", "log", "rest", "8 VRUs", "CTU / VRUs", "without FIFOs"], rows,
+            "Paper: below 10 %.",
+        )
+
+    def alternatives(self) -> Sheet:
+        fifo = self.ge("fifo", "145 x 16")
+        rows = []
+        for form in FORMS:
+            vru = self.ge("vru", form)
+            for precision in PRECISIONS:
+                ctu = self.ge("ctu", f"{form} {precision}")
+                ours = 32 * vru + 4 * ctu + 16 * fifo
+                memory = 32 * vru + 4 * ctu + 16 * 2320 * UM2_PER_BIT / UM2_PER_GE
+                rows.append([
+                    form, precision, _ge(ours), _ge(memory), _ge(64 * vru), f"{ours / (64 * vru):.1%}",
+                    f"{memory / (64 * vru):.1%}",
+                ])
+        return Sheet(
+            "32 VRUs with 4 CTUs and 16 feature FIFOs, against 64 VRUs",
+            ["form", "precision", "32 VRU + CTU + FIFO", "FIFOs as SRAM (estimate)", "64 VRUs", "ratio", "ratio, SRAM"], rows,
+            "Rendering stage alone; the paper's 14 % saving is of the whole chip.",
+        )
+
+    def fifos(self) -> Sheet:
+        core = self.ge("vru", "factored") * 8
+        rows = []
+        for depth in FIFO_DEPTHS:
+            result = self.by_name["fifo", f"145 x {depth}"]
+            ge, bits = result["area"]["ge"], result["mem_bits"]
+            rows.append([
+                str(depth), _ge(bits), _ge(ge), f"{ge / bits:.2f}", f"{4 * ge / core:.1%}", f"{ge * UM2_PER_GE:,.0f}",
+                f"{bits * UM2_PER_BIT:,.0f}",
+            ])
+        return Sheet(
+            "Feature FIFO by depth",
+            ["depth", "bits", "GE", "GE / bit", "4 FIFOs / 8 VRUs", "um2, flip-flops (estimate)", "um2, SRAM (estimate)"], rows,
+            "SRAM: bit cells and periphery of a large macro; a memory of a few rows has far more periphery.",
+        )
+
+    def paper(self) -> Sheet:
+        total = sum(PAPER.values())
+        rows = []
+        for name, area in PAPER.items():
+            ours = {
+                "Contribution test unit x4": [4 * self.ge("ctu", f"{form} mixed") for form in FORMS],
+                "Rendering core x4": [4 * self.ge("rendering_core", form) for form in FORMS],
+            }.get(name)
+            cells = [f"{ge * UM2_PER_GE / 1e6:.2f}" for ge in ours] if ours else ["", ""]
+            rows.append([name, f"{area:.2f}", f"{area / total:.0%}", *cells])
+        ratio = [self.ge("ctu", f"{form} mixed") / self.ge("rendering_core", form) for form in FORMS]
+        rows.append(["CTU / rendering core", f"{0.09 / 0.96:.1%}", "", *(f"{value:.1%}" for value in ratio)])
+        return Sheet(
+            "Beside the paper's Table 2 (mm2 in 28 nm)",
+            ["component", "paper", "share", "here, conic mixed (estimate)", "here, factored mixed (estimate)"], rows,
+            f"Estimate: {UM2_PER_GE} um2 per GE, cells only. The paper's numbers are from Design Compiler and a memory compiler; "
+            "the other components are not built here.",
+        )
+
+    def targets(self) -> Sheet:
+        worst = max((result["area"]["fo4"], unit.name, unit.config) for unit, result in self.results.items())
+        fast = max((result["speed"]["fo4"], unit.name, unit.config) for unit, result in self.results.items())
+        ratio = max(
+            (self.ge("prtu", f"{f} {p}") / 4 / self.ge("acu", f"{f} {p}"), f"{f} {p}") for f in FORMS for p in PRECISIONS
+        )
+        default = self.ge("prtu", "factored mixed") / 4 / self.ge("acu", "factored mixed")
+        vrus = {form: 8 * self.ge("vru", form) for form in FORMS}
+        forms = max(self.ge("prtu", f"factored {p}") / self.ge("prtu", f"conic {p}") for p in PRECISIONS)
+        goals = [
+            ("FP16 adder, GE", 800, self.ge("fp_add", "fp16"), "{:.0f}"),
+            ("FP16 multiplier with subnormals, GE", 1600, self.ge("fp_mul", "fp16"), "{:.0f}"),
+            ("E4M3 adder, GE", 350, self.ge("fp_add", "e4m3"), "{:.0f}"),
+            ("E4M3 multiplier, GE", 250, self.ge("fp_mul", "e4m3"), "{:.0f}"),
+            ("PRTU / 4 ACUs, factored mixed", 0.6, default, "{:.1%}"),
+            (f"PRTU / 4 ACUs, worst ({ratio[1]})", 0.6, ratio[0], "{:.1%}"),
+            ("CTU / 8 VRUs, factored mixed", 0.1, self.ge("ctu", "factored mixed") / vrus["factored"], "{:.1%}"),
+            ("CTU / 8 VRUs, conic mixed", 0.1, self.ge("ctu", "conic mixed") / vrus["conic"], "{:.1%}"),
+            ("factored / conic PRTU, worst", 1.0, forms, "{:.1%}"),
+            (f"longest path, FO4 ({worst[1]} {worst[2]})", 60, worst[0], "{:.0f}"),
+            (f"longest path, mapped for speed ({fast[1]} {fast[2]})", 60, fast[0], "{:.0f}"),
+        ]
+        rows = [
+            [name, text.format(limit), text.format(value), "yes" if value <= limit else "no"]
+            for name, limit, value, text in goals
+        ]
+        return Sheet("Numbers to reach", ["what", "at most", "is", "reached"], rows)
+
+    def sheets(self) -> list[Sheet]:
+        return [
+            self.prtu(), self.ctu(), self.alternatives(), self.fifos(), self.paper(), self.targets(),
+        ]
+
+    def chart(self, folder: Path, library: str) -> None:
+        """Area of the render stage by unit, for every form and precision: area.png, area.svg."""
+        import matplotlib
+
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+
+        groups = {
+            "VRUs": ["vru"], "feature FIFOs": [], "PRTUs": ["prtu"], "CTU FIFOs": [], "CTU, other": [
+                "ctu", "ctu_controller", "mmu", "log_opacity",
+            ], "counters": ["perf_counters"], "arbiters, control": [],
+        }
+        configs = [f"{form} {precision}" for form in FORMS for precision in PRECISIONS]
+        heights: dict[str, list[float]] = {name: [] for name in groups}
+        for config in configs:
+            parts = self.parts(self.by_name["render_stage", config]["key"])
+            total = sum(parts.values())
+            ctu_fifo = 4 * self.parts(self.by_name["ctu", config]["key"])["fifo"]
+            values = {name: sum(parts[module] for module in modules) for name, modules in groups.items()}
+            values["feature FIFOs"], values["CTU FIFOs"] = parts["fifo"] - ctu_fifo, ctu_fifo
+            values["arbiters, control"] = total - sum(values.values())
+            for name, value in values.items():
+                heights[name].append(value / 1e6)
+        figure, axes = pyplot.subplots(figsize=(8, 4.5), layout="constrained")
+        base = [0.0] * len(configs)
+        for name, values in heights.items():
+            axes.bar([config.replace(" ", "\n") for config in configs], values, bottom=base, label=name, width=0.7)
+            base = [low + value for low, value in zip(base, values)]
+        axes.set_ylabel("million GE")
+        axes.set_title(f"Rendering stage: 4 CTUs, 32 VRUs ({library})", fontsize=10)
+        axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), frameon=False, reverse=True)
+        axes.spines[["top", "right"]].set_visible(False)
+        for ending in ("png", "svg"):
+            figure.savefig(folder / f"area.{ending}", dpi=150, metadata={"Date": None} if ending == "svg" else None)
+        pyplot.close(figure)
+
+
+def write_csv(path: Path, results: Results, mapping: str) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(CSV_COLUMNS)
+        for unit, result in results.items():
+            area = result[mapping]
+            writer.writerow([
+                unit.name, unit.config, f"{area['ge']:.1f}", f"{area['ge_seq']:.1f}", f"{area['ge_comb']:.1f}",
+                result["mem_bits"], area["ff"], f"{area['fo4']:.1f}",
+            ])
+
+
+def write_markdown(path: Path, sheets: Iterable[Sheet]) -> None:
+    path.write_text("\n".join(sheet.markdown() for sheet in sheets))
+
+
+def against(folder: Path, other: Path, library: str) -> Sheet | None:
+    """Ratios between two libraries' area.csv, unit by unit."""
+    if not (other / "area.csv").exists():
+        return None
+
+    def load(path: Path) -> dict[tuple[str, str], float]:
+        with (path / "area.csv").open() as file:
+            return {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
+
+    here, there = load(folder), load(other)
+    rows = []
+    for key in here.keys() & there.keys():
+        rows.append((there[key], key, here[key] / there[key]))
+    return Sheet(
+        f"{library} against the default library",
+        ["unit", "configuration", "GE default", "GE here", "ratio"],
+        [[*key, _ge(base), _ge(base * ratio), f"{ratio:.2f}"] for base, key, ratio in sorted(rows)],
+        "Both in gate equivalents of their own NAND2.",
+    )
