@@ -85,7 +85,8 @@ module fv_fp_mul #(
     end
     c_subnormal: cover (result[Width-2:0] < (mag_t'(1) << ManBits) && result[0] && !a_nan);
     c_tie: cover (i_rounding.twice == i_rounding.high && !a_nan && !b_nan && a_mag[0] && b_mag[0]);
-    c_small: cover (a_mag == mag_t'(1) && result[Width-2:0] > (mag_t'(1) << ManBits) && !b_nan && !b_inf);
+    c_small: cover (a_mag == mag_t'(1) && result[Width-2:0] > (mag_t'(1) << ManBits)
+                    && !b_nan && !b_inf);
     c_over: cover (result[Width-2:0] == Limit && a_mag < Limit && b_mag < Limit);
   end
 

@@ -41,12 +41,15 @@ TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets",
               "standins", "cut", "fast", "mutant_depth", "mutant"}
-MUTANT_KEYS = {"file", "find", "replace", "depth", "parameters", "slow"}
+MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters", "slow"}
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module's source with the one occurrence of ``find`` replaced."""
+    """A module's source with the one occurrence of ``find`` replaced.
+
+    With ``regex`` it is a regular expression, for text of which only a part is sure to stay.
+    """
 
     file: str
     find: str
@@ -54,6 +57,7 @@ class Mutant:
     depth: int
     parameters: Mapping[str, int]
     slow: bool = False
+    regex: bool = False
 
 
 @dataclass(frozen=True)
@@ -148,9 +152,13 @@ def tasks_of(proof: Proof, fast: bool) -> list[Task]:
 def mutated(path: Path, mutant: Mutant) -> str:
     """Text of a source with the mutation made; it must fit in exactly one place."""
     text = path.read_text()
-    if (count := text.count(mutant.find)) != 1:
+    if mutant.regex:
+        broken, count = re.subn(mutant.find, mutant.replace, text)
+    else:
+        broken, count = text.replace(mutant.find, mutant.replace), text.count(mutant.find)
+    if count != 1 or broken == text:
         raise FlickerError(f"{PROOFS}: mutant of {mutant.file}: {mutant.find!r} occurs {count} times")
-    return text.replace(mutant.find, mutant.replace)
+    return broken
 
 
 def sources_of(task: Task) -> dict[str, str]:
@@ -328,7 +336,10 @@ def main() -> int:
         bar = progress.add_task("proofs", total=len(tasks))
 
         def work(number: int) -> None:
-            results[number] = run(tasks[number])
+            try:
+                results[number] = run(tasks[number])
+            except FlickerError as error:  # a mutant that no longer fits its source
+                results[number] = Result("ERROR", str(error), 0.0, str(PROOFS.relative_to(ROOT)))
             progress.update(bar, advance=1, description=tasks[number].proof.name)
 
         list(pool.map(work, range(len(tasks))))

@@ -1,13 +1,14 @@
-// Floating-point adder, round to nearest even, subnormals supported (docs/arithmetic.md).
+// Floating-point adder, combinational: round to nearest even, subnormals, parameterised format.
 //
-// Combinational. One path: swap, align, add, normalise, round.
-// There is no subtract input: flip the sign bit of b_i outside.
+// A difference is a sum with the sign bit of b_i inverted by the user.
+// Fn: no infinity, NaN is all ones (E4M3). Saturate: an infinite result becomes the largest finite number.
+// Single path: order by magnitude, align with guard, round and sticky bit, add or subtract, normalise, round.
 module flk_fp_add #(
-  parameter  int unsigned ExpBits  = 5,
-  parameter  int unsigned ManBits  = 10,
-  parameter  bit          Fn       = 1'b0,  // no infinity, NaN is all ones
-  parameter  bit          Saturate = 1'b0,  // infinite results become the largest finite number
-  localparam int unsigned Width    = 1 + ExpBits + ManBits
+  parameter int unsigned ExpBits  = 5,
+  parameter int unsigned ManBits  = 10,
+  parameter bit          Fn       = 1'b0,
+  parameter bit          Saturate = 1'b0,
+  localparam int unsigned Width   = 1 + ExpBits + ManBits
 ) (
   input  logic [Width-1:0] a_i,
   input  logic [Width-1:0] b_i,
@@ -21,179 +22,115 @@ module flk_fp_add #(
     $error("flk_fp_add: Fn has no infinity, so Saturate must be set");
   end
 
-  typedef logic [ExpBits-1:0] exp_t;
-  typedef logic [Width-2:0] mag_t;
+  // ---- Unpack: the operand of larger magnitude first -----------------------------------------------
 
-  localparam mag_t Inf = {{ExpBits{1'b1}}, {ManBits{1'b0}}};
-  localparam mag_t Nan = Fn ? '1 : Inf | (mag_t'(1) << (ManBits - 1));
-  localparam mag_t Limit = !Saturate ? Inf : (Fn ? Nan - 1'b1 : Inf - 1'b1);
+  localparam int unsigned SigBits = ManBits + 1;  // with the leading bit
+  localparam int unsigned SumBits = SigBits + 3;  // guard, round, sticky below
+  localparam int unsigned ShiftBits = $clog2(SumBits + 1);  // 0 to SumBits
 
-  // Hidden bit, mantissa, guard, round and sticky bit.
-  localparam int unsigned AlignBits = ManBits + 4;
-  // A shift by AlignBits leaves the sticky bit alone.
-  localparam int unsigned ShiftBits = $clog2(AlignBits + 1);
-  // The difference of two exponents, or the shift amount if that is wider.
-  localparam int unsigned DiffBits = (ExpBits > ShiftBits) ? ExpBits : ShiftBits;
-  // The aligned number and a carry.
-  localparam int unsigned SumBits = AlignBits + 1;
-  localparam int unsigned LzBits = $clog2(SumBits);
-  // Signed difference of exponent and leading zeros.
-  localparam int unsigned SignedBits = ((ExpBits > LzBits) ? ExpBits : LzBits) + 1;
+  logic swap, sub;
+  logic big_sign, small_sign;
+  logic [ExpBits-1:0] big_exp, small_exp, big_eff, small_eff;
+  logic [ManBits-1:0] big_man, small_man;
 
-  // Unpack: the larger magnitude first
+  assign swap = b_i[Width-2:0] > a_i[Width-2:0];
+  assign {big_sign, big_exp, big_man} = swap ? b_i : a_i;
+  assign {small_sign, small_exp, small_man} = swap ? a_i : b_i;
+  assign sub = big_sign ^ small_sign;
+  // A subnormal number has the exponent of the smallest normal one and no leading bit.
+  assign big_eff = big_exp | ExpBits'(big_exp == '0);
+  assign small_eff = small_exp | ExpBits'(small_exp == '0);
 
-  logic swap, subtract, sign;
-  mag_t greater, lesser;
-  logic greater_normal, lesser_normal;
-  exp_t greater_exp, lesser_exp;
+  // ---- Align ---------------------------------------------------------------------------------------
 
-  // The highest bit that differs decides.
+  logic [ExpBits-1:0] diff;
+  logic [ShiftBits-1:0] align;
+  logic [SumBits-1:0] big_sig, small_sig, small_aligned, lost;
+  logic sticky;
+
+  assign diff = big_eff - small_eff;
+  assign align = (32'(diff) > SumBits) ? ShiftBits'(SumBits) : ShiftBits'(diff);
+  assign big_sig = {big_exp != '0, big_man, 3'b0};
+  assign small_sig = {small_exp != '0, small_man, 3'b0};
+  assign {small_aligned, lost} = {small_sig, SumBits'(0)} >> align;
+  assign sticky = |lost;
+
+  // ---- Add -----------------------------------------------------------------------------------------
+
+  logic [SumBits:0] sum;  // one carry bit
+  logic [SumBits-1:0] addend;
+
+  assign addend = small_aligned | SumBits'(sticky);
+  assign sum = sub ? {1'b0, big_sig} - {1'b0, addend} : {1'b0, big_sig} + {1'b0, addend};
+
+  // ---- Normalise -----------------------------------------------------------------------------------
+
+  logic [ShiftBits-1:0] zeros, shift;
+  logic [SumBits-1:0] normal;
+  logic [ExpBits-1:0] max_shift;
+  logic [ExpBits:0] exp;  // one bit more: the carry may lead beyond the largest exponent
+
   always_comb begin
-    swap = 1'b0;
-    for (int k = 0; k < int'(Width) - 1; k++) begin
-      if (a_i[k] != b_i[k]) begin
-        swap = b_i[k];
+    zeros = ShiftBits'(SumBits);
+    for (int unsigned i = 0; i < SumBits; i++) begin
+      if (sum[i]) begin
+        zeros = ShiftBits'(SumBits - 1 - i);
       end
     end
   end
 
-  assign greater        = swap ? b_i[Width-2:0] : a_i[Width-2:0];
-  assign lesser         = a_i[Width-2:0] ^ b_i[Width-2:0] ^ greater;
-  assign sign           = swap ? b_i[Width-1] : a_i[Width-1];
-  assign subtract       = a_i[Width-1] ^ b_i[Width-1];
-  assign greater_normal = |greater[Width-2:ManBits];
-  assign lesser_normal  = |lesser[Width-2:ManBits];
-  // Subnormals have the exponent of the smallest normal numbers.
-  assign greater_exp    = {greater[Width-2:ManBits+1], greater[ManBits] | !greater_normal};
-  assign lesser_exp     = {lesser[Width-2:ManBits+1], lesser[ManBits] | !lesser_normal};
-
-  // Special cases: a NaN or an infinity is the larger magnitude
-
-  logic is_nan, is_inf;
-
-  if (Fn) begin : gen_special_fn
-    assign is_nan = (greater == Nan);
-    assign is_inf = 1'b0;
-  end else begin : gen_special
-    assign is_inf = &greater[Width-2:ManBits];
-    assign is_nan = is_inf
-                 && (greater[ManBits-1:0] != '0 || (subtract && &lesser[Width-2:ManBits]));
-  end
-
-  // Exponent
-
-  logic [ DiffBits-1:0] diff;
-  logic [ShiftBits-1:0] distance;
-
-  // Any distance of AlignBits or more leaves nothing but the sticky bit.
-  assign diff     = DiffBits'(greater_exp - lesser_exp);
-  assign distance = diff[ShiftBits-1:0] | {ShiftBits{(diff >> ShiftBits) != '0}};
-
-  // Align
-
-  logic [AlignBits-1:0] aligned;
+  // Not below the smallest exponent: what remains is subnormal.
+  assign max_shift = big_eff - ExpBits'(1);
+  assign shift = (32'(zeros) > 32'(max_shift)) ? ShiftBits'(max_shift) : zeros;
 
   always_comb begin
-    aligned = {lesser_normal, lesser[ManBits-1:0], 3'b000};
-    for (int k = 0; k < int'(ShiftBits); k++) begin
-      if (distance[k]) begin
-        aligned = (aligned >> (1 << k))
-                | AlignBits'((aligned & ((AlignBits'(1) << (1 << k)) - 1'b1)) != '0);
-      end
+    if (sum[SumBits]) begin
+      normal = {sum[SumBits:2], |sum[1:0]};
+      exp = (ExpBits + 1)'(big_eff) + (ExpBits + 1)'(1);
+    end else begin
+      normal = sum[SumBits-1:0] << shift;
+      exp = normal[SumBits-1] ? (ExpBits + 1)'(big_eff) - (ExpBits + 1)'(shift) : '0;
     end
   end
 
-  // Add
+  // ---- Round to nearest even -------------------------------------------------------------------------
 
-  // The larger operand has no bits in the three lowest places: a short sum, then the others.
-  logic [        3:0] sum_low;
-  logic [ManBits+1:0] sum_high;
-  logic [SumBits-1:0] sum;
+  logic round_up;
+  logic [ExpBits+ManBits:0] rounded;  // a carry out of the mantissa raises the exponent
 
-  assign sum_low  = {1'b0, aligned[2:0] ^ {3{subtract}}} + 4'(subtract);
-  assign sum_high = {1'b0, greater_normal, greater[ManBits-1:0]}
-                  + ({1'b0, aligned[AlignBits-1:3]} ^ {ManBits + 2{subtract}})
-                  + (ManBits + 2)'(sum_low[3]);
-  assign sum      = {sum_high, sum_low[2:0]};
+  assign round_up = normal[2] && (normal[1] || normal[0] || normal[3]);
+  assign rounded = {exp, normal[SumBits-2:3]} + (ExpBits + ManBits + 1)'(round_up);
 
-  // Normalise: the highest one to the top, unless the exponent would fall below 1
+  // ---- Special cases and pack ------------------------------------------------------------------------
 
-  // The count of an empty vector does not matter.
-  function automatic logic [LzBits-1:0] leading_zeros(input logic [SumBits-1:0] value);
-    leading_zeros = '1;
-    for (int k = 0; k < int'(SumBits); k++) begin
-      if (value[k]) begin
-        leading_zeros = LzBits'(int'(SumBits) - 1 - k);
-      end
-    end
-  endfunction
+  localparam logic [ExpBits+ManBits-1:0] INF_CODE = {{ExpBits{1'b1}}, {ManBits{1'b0}}};
+  localparam logic [ExpBits+ManBits-1:0] NAN_CODE =
+      Fn ? '1 : INF_CODE | ((ExpBits + ManBits)'(1) << (ManBits - 1));
+  // First code that is not a finite number.
+  localparam logic [ExpBits+ManBits-1:0] LIMIT = Fn ? '1 : INF_CODE;
+  localparam logic [ExpBits+ManBits-1:0] OVERFLOW = Saturate ? LIMIT - 1'b1 : INF_CODE;
 
-  logic                   zero, low;
-  logic [     LzBits-1:0] zeros, shift;
-  logic [ SignedBits-1:0] spare;
-  logic [    SumBits-1:0] norm;
-  logic [    ExpBits-1:0] exponent;  // less 1 if norm has a hidden bit
+  logic nan, infinite, sign;
 
-  assign zeros = leading_zeros(sum);
-  assign zero  = (sum == '0);
-  assign low   = spare[SignedBits-1];
-  assign shift = low ? LzBits'(greater_exp) : zeros;
-
-  // greater_exp - zeros, one carry chain.
-  always_comb begin
-    automatic logic [SignedBits-1:0] minuend, inverse;
-    automatic logic carry;
-    minuend = SignedBits'(greater_exp);
-    inverse = ~SignedBits'(zeros);
-    carry   = 1'b1;
-    for (int k = 0; k < int'(SignedBits); k++) begin
-      spare[k] = minuend[k] ^ inverse[k] ^ carry;
-      carry    = (minuend[k] & inverse[k]) | (carry & (minuend[k] | inverse[k]));
-    end
+  // The operand of larger magnitude tells: NaN codes lie above all others.
+  if (Fn) begin : gen_fn
+    assign nan = &{big_exp, big_man};
+    assign infinite = 1'b0;
+  end else begin : gen_ieee
+    assign nan = (&big_exp && (big_man != '0)) || (&big_exp && &small_exp && sub);
+    assign infinite = &big_exp;
   end
+  // x - x is +0.
+  assign sign = big_sign && !(sub && (sum == '0));
 
   always_comb begin
-    norm = sum;
-    for (int k = int'(LzBits) - 1; k >= 0; k--) begin
-      if (shift[k]) begin
-        norm = norm << (1 << k);
-      end
+    if (nan) begin
+      sum_o = {1'b0, NAN_CODE};
+    end else if (infinite || (rounded >= {1'b0, LIMIT})) begin
+      sum_o = {sign, OVERFLOW};
+    end else begin
+      sum_o = {sign, rounded[ExpBits+ManBits-1:0]};
     end
   end
-
-  // Its top bit is the carry of the sum: an exponent of greater_exp + 1 before the shift.
-  assign exponent = (low || zero) ? '0 : spare[ExpBits-1:0];
-
-  // Round: mantissa, then exponent with the mantissa's carry and the hidden bit
-
-  logic                     round_up;
-  logic [ExpBits+ManBits:0] rounded;
-
-  assign round_up = norm[3] && (norm[4] || norm[2:0] != '0);
-
-  always_comb begin
-    automatic logic carry;
-    carry = round_up;
-    for (int k = 0; k < int'(ManBits); k++) begin
-      rounded[k] = norm[k+4] ^ carry;
-      carry      = norm[k+4] & carry;
-    end
-    rounded[ManBits] = exponent[0] ^ norm[SumBits-1] ^ carry;
-    carry            = (norm[SumBits-1] & carry) | (exponent[0] & (norm[SumBits-1] | carry));
-    for (int k = 1; k < int'(ExpBits); k++) begin
-      rounded[k+ManBits] = exponent[k] ^ carry;
-      carry              = exponent[k] & carry;
-    end
-    rounded[ExpBits+ManBits] = carry;
-  end
-
-  // Pack
-
-  logic overflow;
-
-  assign overflow = is_inf || is_nan || rounded[ExpBits+ManBits]
-                 || (Fn ? &rounded[Width-2:0] : &rounded[Width-2:ManBits]);
-  assign sum_o    = {sign && !(subtract && zero) && !is_nan,
-                     overflow ? (is_nan ? Nan : Limit) : rounded[Width-2:0]};
 
 endmodule

@@ -1,13 +1,14 @@
-// Floating-point multiplier, round to nearest even, subnormals supported (docs/arithmetic.md).
+// Floating-point multiplier, combinational: round to nearest even, subnormals, parameterised format.
 //
-// Combinational. One shift after the product serves subnormal operands and subnormal results; its
-// amount comes from the operands, not from the product.
+// Fn: no infinity, NaN is all ones (E4M3). Saturate: an infinite result becomes the largest finite number.
+// Subnormal operands are not normalised first: their leading zeros show up in the product, which is shifted once, left or right, to its
+// place.
 module flk_fp_mul #(
-  parameter  int unsigned ExpBits  = 5,
-  parameter  int unsigned ManBits  = 10,
-  parameter  bit          Fn       = 1'b0,  // no infinity, NaN is all ones
-  parameter  bit          Saturate = 1'b0,  // infinite results become the largest finite number
-  localparam int unsigned Width    = 1 + ExpBits + ManBits
+  parameter int unsigned ExpBits  = 5,
+  parameter int unsigned ManBits  = 10,
+  parameter bit          Fn       = 1'b0,
+  parameter bit          Saturate = 1'b0,
+  localparam int unsigned Width   = 1 + ExpBits + ManBits
 ) (
   input  logic [Width-1:0] a_i,
   input  logic [Width-1:0] b_i,
@@ -21,161 +22,110 @@ module flk_fp_mul #(
     $error("flk_fp_mul: Fn has no infinity, so Saturate must be set");
   end
 
-  typedef logic [ExpBits-1:0] exp_t;
-  typedef logic [ManBits-1:0] man_t;
-  typedef logic [Width-2:0] mag_t;
+  // ---- Unpack --------------------------------------------------------------------------------------
 
-  localparam mag_t Inf = {{ExpBits{1'b1}}, {ManBits{1'b0}}};
-  localparam mag_t Nan = Fn ? '1 : Inf | (mag_t'(1) << (ManBits - 1));
-  localparam mag_t Limit = !Saturate ? Inf : (Fn ? Nan - 1'b1 : Inf - 1'b1);
-  localparam int unsigned Bias = (1 << (ExpBits - 1)) - 1;
+  localparam int unsigned SigBits = ManBits + 1;  // with the leading bit
+  localparam int unsigned ProdBits = 2 * SigBits;
+  localparam int unsigned BIAS = 2 ** (ExpBits - 1) - 1;
+  localparam int unsigned SumBits = ExpBits + 2;  // sum of two exponents less the bias, signed
 
-  // Two significands, each with its hidden bit.
-  localparam int unsigned ProdBits = 2 * ManBits + 2;
-  // Leading zeros of a subnormal significand: at most ManBits.
-  localparam int unsigned LzBits = $clog2(ManBits + 1);
-  // The product is shifted right by Offset less its leading zeros or less a negative exponent;
-  // all ones, so that the difference is an inversion.
-  localparam int unsigned Offset = (1 << LzBits) - 1;
-  // The product and as many zeros below as put its guard bit into place by that shift.
-  localparam int unsigned WindowBits = ProdBits + 1 + Offset - ManBits;
-  // Largest shift: two subnormals, Offset + Bias - 1.
-  localparam int unsigned ShiftBits = $clog2(Offset + Bias);
-  // Signed exponent, from 1 - Bias to twice the largest.
-  localparam int unsigned SignedBits = ((ExpBits > LzBits) ? ExpBits : LzBits) + 2;
+  logic a_sign, b_sign, sign;
+  logic [ExpBits-1:0] a_exp, b_exp;
+  logic [ManBits-1:0] a_man, b_man;
 
-  typedef logic [SignedBits-1:0] signed_t;
+  assign {a_sign, a_exp, a_man} = a_i;
+  assign {b_sign, b_exp, b_man} = b_i;
+  assign sign = a_sign ^ b_sign;
 
-  // Unpack
+  // ---- Exponent and product --------------------------------------------------------------------------
 
-  mag_t a_mag, b_mag;
-  man_t a_man, b_man;
-  logic a_normal, b_normal, sign;
-
-  assign {a_mag, a_man} = {a_i[Width-2:0], a_i[ManBits-1:0]};
-  assign {b_mag, b_man} = {b_i[Width-2:0], b_i[ManBits-1:0]};
-  assign a_normal       = |a_mag[Width-2:ManBits];
-  assign b_normal       = |b_mag[Width-2:ManBits];
-  assign sign           = a_i[Width-1] ^ b_i[Width-1];
-
-  // Special cases
-
-  logic is_nan, is_inf;
-
-  if (Fn) begin : gen_special_fn
-    assign is_nan = (a_mag == Nan) || (b_mag == Nan);
-    assign is_inf = 1'b0;
-  end else begin : gen_special
-    logic a_top, b_top;
-    assign a_top  = &a_mag[Width-2:ManBits];
-    assign b_top  = &b_mag[Width-2:ManBits];
-    assign is_inf = a_top || b_top;
-    assign is_nan = (a_top && (a_man != '0 || b_mag == '0))
-                 || (b_top && (b_man != '0 || a_mag == '0));
-  end
-
-  // Exponent: of the product less 1 (at least 0 in a normal result), less leading zeros
-
-  exp_t a_exp, b_exp;
-  logic [ExpBits:0] exp_sum;
-  logic [LzBits-1:0] zeros;
-  signed_t base, spare;
-  logic below;  // the product's exponent would fall below 1
-
-  // Subnormals have the exponent of the smallest normal numbers.
-  assign a_exp   = {a_mag[Width-2:ManBits+1], a_mag[ManBits] | !a_normal};
-  assign b_exp   = {b_mag[Width-2:ManBits+1], b_mag[ManBits] | !b_normal};
-  assign exp_sum = {1'b0, a_exp} + {1'b0, b_exp};
-  // Less Bias + 1, which is 2^(ExpBits - 1): the two upper bits less 1.
-  assign base    = {{SignedBits - ExpBits - 1{exp_sum[ExpBits:ExpBits-1] == 2'd0}},
-                    exp_sum[ExpBits] == exp_sum[ExpBits-1], !exp_sum[ExpBits-1],
-                    exp_sum[ExpBits-2:0]};
-
-  // Leading zeros of a subnormal significand; the count of an empty vector does not matter.
-  function automatic logic [LzBits-1:0] leading_zeros(input logic [ManBits:0] value);
-    logic [Offset:0] rest;
-    rest          = (Offset + 1)'(value) << (Offset - ManBits);
-    leading_zeros = '0;
-    for (int k = int'(LzBits) - 1; k >= 0; k--) begin
-      if ((rest >> (Offset + 1 - (1 << k))) == '0) begin
-        leading_zeros[k] = 1'b1;
-        rest             = rest << (1 << k);
-      end
-    end
-  endfunction
-
-  // If both operands are subnormal the base is so low that the zeros don't matter.
-  assign zeros = leading_zeros({a_normal && b_normal, a_normal ? b_man : a_man});
-  assign spare = base - signed_t'(zeros);
-  assign below = spare[SignedBits-1];
-
-  // Multiply
-
+  logic signed [SumBits-1:0] exp_top;  // exponent if the product's top bit (weight 2) is set
   logic [ProdBits-1:0] product;
 
-  assign product = {{ManBits + 1{1'b0}}, a_normal, a_man} * {{ManBits + 1{1'b0}}, b_normal, b_man};
+  // A subnormal number has the exponent of the smallest normal one and no leading bit.
+  assign exp_top = SumBits'(a_exp | ExpBits'(a_exp == '0)) + SumBits'(b_exp | ExpBits'(b_exp == '0))
+                 - SumBits'(BIAS - 1);
+  assign product = {a_exp != '0, a_man} * {b_exp != '0, b_man};
 
-  // Normalise: carry, hidden bit, mantissa and guard bit go to the bottom of the window
+  // ---- Normalise -------------------------------------------------------------------------------------
 
-  logic [ ShiftBits-1:0] shift;
-  logic [WindowBits-1:0] placed, window;
-  logic                  sticky, carry, hidden;
-  logic [     ManBits:0] significand;  // mantissa and guard bit
-  logic [   ExpBits-1:0] exponent;  // less 1 if there is a hidden bit
+  // Left shift of the product within a field that begins RightMax places to the right: shifts below RightMax are to the right.
+  // A right shift by more than SigBits + 1 leaves sticky bits only.
+  localparam int unsigned RightMax = SigBits + 1;
+  localparam int unsigned FieldBits = ProdBits + RightMax;
+  localparam int unsigned ShiftBits = $clog2(FieldBits + 1);
 
-  assign placed = {product, {WindowBits - ProdBits{1'b0}}};
-  assign shift  = ShiftBits'(Offset) - (below ? ShiftBits'(base) : ShiftBits'(zeros));
-
-  assign sticky = (placed & ((WindowBits'(1) << shift) - 1'b1)) != '0;
+  logic [ShiftBits-1:0] zeros, shift;
+  logic signed [SumBits:0] room;  // left shift down to the smallest exponent, negative: right shift
+  logic [FieldBits-1:0] field;
+  logic [SigBits-1:0] sig;
+  logic guard, sticky;
+  logic [ExpBits:0] exp;
 
   always_comb begin
-    window = placed;
-    for (int k = int'(ShiftBits) - 1; k >= 0; k--) begin
-      if (shift[k]) begin
-        window = window >> (1 << k);
+    zeros = ShiftBits'(ProdBits);
+    for (int unsigned i = 0; i < ProdBits; i++) begin
+      if (product[i]) begin
+        zeros = ShiftBits'(ProdBits - 1 - i);
       end
     end
   end
 
-  assign carry       = window[ManBits+2];
-  assign hidden      = window[ManBits+2] || window[ManBits+1];
-  assign significand = carry ? window[ManBits+1:1] : window[ManBits:0];
-  // Without a hidden bit: subnormal or 0.
-  assign exponent    = (below || !hidden) ? '0 : spare[ExpBits-1:0];
-
-  // Round: mantissa, then exponent with the mantissa's carry and the hidden bit
-
-  logic                     round_up;
-  logic [ExpBits+ManBits:0] rounded;
-
-  assign round_up = significand[0] && (significand[1] || sticky || (carry && window[0]));
+  assign room = (SumBits + 1)'(exp_top) - (SumBits + 1)'(1);
 
   always_comb begin
-    automatic logic chain;
-    chain = round_up;
-    for (int k = 0; k < int'(ManBits); k++) begin
-      rounded[k] = significand[k+1] ^ chain;
-      chain      = significand[k+1] & chain;
+    if (room < -$signed((SumBits + 1)'(RightMax))) begin
+      shift = '0;
+    end else if (room < $signed((SumBits + 1)'(zeros))) begin
+      shift = ShiftBits'(RightMax) + ShiftBits'(room);
+    end else begin
+      shift = ShiftBits'(RightMax) + zeros;
     end
-    // Hidden bit and carry together add 1 or 2.
-    rounded[ManBits]   = exponent[0] ^ (hidden && !carry) ^ chain;
-    chain              = (hidden && !carry) ? exponent[0] || chain : exponent[0] && chain;
-    rounded[ManBits+1] = exponent[1] ^ carry ^ chain;
-    chain              = carry ? exponent[1] || chain : exponent[1] && chain;
-    for (int k = 2; k < int'(ExpBits); k++) begin
-      rounded[k+ManBits] = exponent[k] ^ chain;
-      chain              = exponent[k] & chain;
-    end
-    rounded[ExpBits+ManBits] = chain;
   end
 
-  // Pack
+  assign field = FieldBits'(product) << shift;
+  assign sig = field[FieldBits-1-:SigBits];
+  assign guard = field[FieldBits-1-SigBits];
+  // With shift 0 nothing has left the field to the right.
+  assign sticky = |field[FieldBits-2-SigBits:0];
+  // No leading bit: subnormal.
+  assign exp = sig[SigBits-1] ? (ExpBits + 1)'(exp_top) - (ExpBits + 1)'(zeros) : '0;
 
-  logic overflow;
+  // ---- Round to nearest even -------------------------------------------------------------------------
 
-  assign overflow = is_inf || is_nan || (!below && spare[SignedBits-2:ExpBits] != '0)
-                 || rounded[ExpBits+ManBits]
-                 || (Fn ? &rounded[Width-2:0] : &rounded[Width-2:ManBits]);
-  assign prod_o   = {sign && !is_nan, overflow ? (is_nan ? Nan : Limit) : rounded[Width-2:0]};
+  logic [ExpBits+ManBits:0] rounded;  // a carry out of the mantissa raises the exponent
+
+  assign rounded = {exp, sig[ManBits-1:0]}
+                 + (ExpBits + ManBits + 1)'(guard && (sticky || sig[0]));
+
+  // ---- Special cases and pack ------------------------------------------------------------------------
+
+  localparam logic [ExpBits+ManBits-1:0] INF_CODE = {{ExpBits{1'b1}}, {ManBits{1'b0}}};
+  localparam logic [ExpBits+ManBits-1:0] NAN_CODE =
+      Fn ? '1 : INF_CODE | ((ExpBits + ManBits)'(1) << (ManBits - 1));
+  // First code that is not a finite number.
+  localparam logic [ExpBits+ManBits-1:0] LIMIT = Fn ? '1 : INF_CODE;
+  localparam logic [ExpBits+ManBits-1:0] OVERFLOW = Saturate ? LIMIT - 1'b1 : INF_CODE;
+
+  logic nan, infinite;
+
+  if (Fn) begin : gen_fn
+    assign nan = (&{a_exp, a_man}) || (&{b_exp, b_man});
+    assign infinite = 1'b0;
+  end else begin : gen_ieee
+    assign nan = (&a_exp && (a_man != '0 || {b_exp, b_man} == '0))
+              || (&b_exp && (b_man != '0 || {a_exp, a_man} == '0));
+    assign infinite = &a_exp || &b_exp;
+  end
+
+  always_comb begin
+    if (nan) begin
+      prod_o = {1'b0, NAN_CODE};
+    end else if (infinite || (rounded >= {1'b0, LIMIT})) begin
+      prod_o = {sign, OVERFLOW};
+    end else begin
+      prod_o = {sign, rounded[ExpBits+ManBits-1:0]};
+    end
+  end
 
 endmodule

@@ -120,6 +120,19 @@ async def rate(dut, mode):
 
 
 @cocotb.test()
+async def rejected_drain(dut):
+    """Rejected splats leave the internal FIFO at full rate while the output is blocked."""
+    test = CtuTest(dut, CatMode.SPARSE)
+    test.sink.stall = iter(lambda: True, None)
+    await test.bench.reset()
+    test.source.send([splats.splat_elem(distant(test.bench.rng)) for _ in range(100)])
+    await test.bench.until(lambda: not test.source.pending, 200, "last splat taken")
+    await test.bench.cycles(PRTU_LATENCY + 3)
+    assert test.input.last - test.input.first == 99
+    assert test.counts["rejected"] == test.model.counts["rejected"] == 100
+
+
+@cocotb.test()
 @cocotb.parametrize(patterns=list(PATTERNS))
 async def automatic(dut, patterns):
     """Falls while the test is the bottleneck and returns when it is not, at the same sub-tiles under every stall pattern.

@@ -25,7 +25,7 @@ def run(form: Form, precision: Precision, depth: int, tests: list[str]) -> None:
 def test_ctu(form: Form, precision: Precision) -> None:
     tests = ["lists", "rate", "automatic"]
     if RenderConfig(form=form, precision=precision) == RenderConfig():
-        tests += ["long_list", "saturation", "reset_forgets"]
+        tests += ["rejected_drain", "long_list", "saturation", "reset_forgets"]
     run(form, precision, RenderConfig().ctu_fifo_depth, tests)
 
 

@@ -20,7 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from ..errors import FlickerError
-from ..toolchain import BUILD, sources_of
+from ..toolchain import BUILD, locked, sources_of
 from .flow import MAPPINGS
 from .units import COMPOSED, Unit, extra_sources, open_bits
 
@@ -76,8 +76,9 @@ class Runner:
         """Parts of a composed unit: instance, module, all parameters that Yosys knows of it."""
         job = self._job(top, parameters, "plan")
         folder = FOLDER / "plans" / f"{top}-{_digest(self._sources(top), parameters, job['boxes'], *self.common[::2])}"
-        if not (folder / "plan.json").exists():
-            _process(folder, job)
+        with locked(folder.with_suffix(".lock")):
+            if not (folder / "plan.json").exists():
+                _process(folder, job)
         return json.loads((folder / "plan.json").read_text())
 
     def add(self, top: str, parameters: dict[str, int]) -> str:
@@ -128,10 +129,11 @@ class Runner:
         for child in job["children"].values():
             futures[child].result()
         folder = UNITS / key
-        if (folder / "result.json").exists():
-            self.report(key, None)
-            return
-        _process(folder, job)
+        with locked(folder.with_suffix(".lock")):
+            if (folder / "result.json").exists():
+                self.report(key, None)
+                return
+            _process(folder, job)
         self.report(key, json.loads((folder / "result.json").read_text())["seconds"])
 
     def total(self, key: str) -> dict:
@@ -176,5 +178,6 @@ def _process(folder: Path, job: dict) -> None:
     if error.exists():
         raise FlickerError(error.read_text())
     if done.returncode or not (folder / ("plan.json" if job["action"] == "plan" else "result.json")).exists():
-        lines = [line for line in log.read_text(errors="replace").splitlines() if re.search(r"(?i)error|warning: wire", line)]
+        telling = re.compile(r"(?i)\berror\b|warning: (wire|found logic loop|multiple)")
+        lines = [line for line in log.read_text(errors="replace").splitlines() if telling.search(line)]
         raise FlickerError(f"{job['top']}: {lines[0] if lines else 'synthesis failed'} (see {log})")
