@@ -27,7 +27,10 @@ module flk_fp_mul #(
   localparam int unsigned SigBits = ManBits + 1;  // with the leading bit
   localparam int unsigned ProdBits = 2 * SigBits;
   localparam int unsigned BIAS = 2 ** (ExpBits - 1) - 1;
-  localparam int unsigned SumBits = ExpBits + 2;  // sum of two exponents less the bias, signed
+  // Leading zeros of the product: up to ProdBits.
+  localparam int unsigned ZeroBits = $clog2(ProdBits + 1);
+  // Sum of two exponents less the bias, or that less the leading zeros; signed.
+  localparam int unsigned SumBits = ((ExpBits > ZeroBits) ? ExpBits : ZeroBits) + 2;
 
   logic a_sign, b_sign, sign;
   logic [ExpBits-1:0] a_exp, b_exp;

@@ -17,12 +17,13 @@ from flicker.toolchain import verilate
 HERE = Path(__file__).parent
 
 # The formats of the chip, then shapes that it does not use: IEEE-like 8-bit formats, one with a mantissa as long as
-# its exponent, one with a short exponent, the smallest.
+# its exponent, one with a short exponent, one with a mantissa far longer than its exponent, the smallest.
 E5M3 = FloatFormat("E5M3", 5, 3)
 E4M4 = FloatFormat("E4M4", 4, 4)
 E3M4 = FloatFormat("E3M4", 3, 4)
+E2M8 = FloatFormat("E2M8", 2, 8)
 E2M1 = FloatFormat("E2M1", 2, 1)
-FORMATS = (FP16, E4M3, E5M2, E5M3, E4M4, E3M4, E2M1)
+FORMATS = (FP16, E4M3, E5M2, E5M3, E4M4, E3M4, E2M8, E2M1)
 LOG_FORMATS = tuple(fmt for fmt in FORMATS if fmt.exp_bits >= 4)
 BLOCK = 1 << 19  # operands at a time: what fits the caches of the model's array operations
 

@@ -1,11 +1,11 @@
 """Arithmetic units and the model of their formats and functions (docs/arithmetic.md).
 
 Units (`arith_harness.sv`, against `flicker.formats` and `flicker.functions`, bit for bit):
-  every pair of operands of the 8-bit and smaller formats and of E4M4; FP16 by special, structured and random pairs
+  every pair of operands of all formats but FP16; FP16 by special, structured and random pairs
   (all 2^32 with FLICKER_EXHAUSTIVE=1); conversions and functions: every input, between all formats.
 Model: against numpy's and ml_dtypes' types and a rounding of its own (`arith_bench.nearest`); the float32 carriers of
   the golden model against it; error bounds of the functions against float64.
-Parameter space: the chip's formats and four that it does not use (`arith_bench.FORMATS`). Not covered: other formats,
+Parameter space: the chip's formats and five that it does not use (`arith_bench.FORMATS`). Not covered: other formats,
   for which the units have no case of their own.
 """
 
