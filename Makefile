@@ -6,12 +6,13 @@ STAMP  := $(VENV)/.installed
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
+LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test sim lint waves clean
+.PHONY: help setup demo test sim lint waves synth clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -41,6 +42,9 @@ lint: $(STAMP) ## lint of the hardware: Verilator with every module as top, Veri
 waves: $(STAMP) ## simulate a unit and keep its traces: make waves UNIT=stream_cells
 	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
 	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
+
+synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu] [LIBERTY=path]
+	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
 clean: ## remove build results (not .venv)
 	rm -rf build .pytest_cache

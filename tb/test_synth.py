@@ -1,0 +1,215 @@
+"""Area and timing estimate: cell library, delays worked out by hand, netlists that equal the RTL, and designs that must be refused.
+
+Parameter space: both mappings; combinational, sequential and composed units, small ones only. Not covered: the numbers themselves,
+which are what `make synth` reports.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flicker.errors import FlickerError
+from flicker.synth import run
+from flicker.synth.flow import MAPPINGS
+from flicker.synth.gates import DEFAULT_LIBERTY, cell_models
+from flicker.synth.liberty import Library, to_verilog, truth
+from flicker.synth.timing import Timing
+from flicker.synth.units import all_units, unit
+from flicker.toolchain import ROOT, filelist
+
+
+@pytest.fixture(scope="module")
+def library() -> Library:
+    return Library(DEFAULT_LIBERTY)
+
+
+def test_library_is_generated() -> None:
+    done = subprocess.run([sys.executable, ROOT / "scripts/cells/gen_cells.py", "--check"], text=True, capture_output=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_library_scalars(library: Library) -> None:
+    assert library.ge == 1 and library.inverter.name == "INV_X1"
+    assert library.fo4 == pytest.approx(50)  # 10 (1 + 4)
+    assert library.cells["NAND2_X1"].arcs["Y"][0].resistance == pytest.approx(10)
+    assert library.cells["DFF"].setup == pytest.approx(50) and library.cells["DFF"].clock == "CK"
+    assert library.cells["DFFR"].sequential["clear"] == "!RN"
+
+
+@pytest.mark.parametrize(
+    ("function", "table"),
+    [
+        ("!(A B)", (1, 1, 1, 0)),
+        ("A' + B", (1, 1, 0, 1)),
+        ("A ^ B", (0, 1, 1, 0)),
+        ("!A*B | A&!B", (0, 1, 1, 0)),
+        ("(A + B)'", (1, 0, 0, 0)),
+    ],
+)
+def test_functions(function: str, table: tuple[int, ...]) -> None:
+    assert truth(function, ["A", "B"]) == table, to_verilog(function)
+
+
+def test_liberty_errors(tmp_path: Path) -> None:
+    path = tmp_path / "x.lib"
+    with pytest.raises(FlickerError, match="cannot be read"):
+        Library(path)
+    path.write_text("no liberty")
+    with pytest.raises(FlickerError, match="x.lib"):
+        Library(path)
+    path.write_text("library(x) { cell(INV) { area : 1; pin(A) { direction : input; } } }")
+    with pytest.raises(FlickerError, match="no cell with the function"):
+        Library(path)
+
+
+def module(cells: dict[str, tuple[str, dict[str, int]]], ports: dict[str, tuple[str, int]]) -> dict:
+    """A netlist as `write_json` gives it."""
+    return {
+        "ports": {name: {"direction": direction, "bits": [bit]} for name, (direction, bit) in ports.items()},
+        "netnames": {f"n{bit}": {"hide_name": 0, "bits": [bit]} for bit in range(20)},
+        "cells": {
+            name: {"type": kind, "connections": {pin: [bit] for pin, bit in pins.items()}}
+            for name, (kind, pins) in cells.items()
+        },
+    }
+
+
+def chain(fanout: int) -> dict:
+    """Flip-flop, inverter, flip-flops: n1 -> n2 -> ``fanout`` registers."""
+    cells = {"a": ("DFF", {"D": 0, "CK": 19, "Q": 1}), "i": ("INV_X1", {"A": 1, "Y": 2})}
+    cells |= {f"b{k}": ("DFF", {"D": 2, "CK": 19, "Q": 3}) for k in range(fanout)}
+    return module(cells, {"d": ("input", 0), "ck": ("input", 19), "q": ("output", 3)})
+
+
+def test_delays_by_hand(library: Library) -> None:
+    timing = Timing(chain(2), library, {})
+    path = next(path for path in timing.paths() if path.target == "n3" and not path.port)
+    # Clock to output 60 and load 1; inverter 10 and load 2; set-up 50.
+    assert path.delay == pytest.approx(60 + 10 * 1 + 10 + 10 * 2 + 50)
+    assert (path.source, path.target) == ("n1", "n3")
+    assert timing.driver_area == 0
+
+
+def test_large_fanout_gets_drivers(library: Library) -> None:
+    timing = Timing(chain(64), library, {})
+    path = next(path for path in timing.paths() if path.target == "n3" and not path.port)
+    # Two more inverters, each stage with an effort of 4: 3 * 4 tau + 2 parasitic delays instead of 64 tau.
+    assert path.delay == pytest.approx(60 + 10 * 1 + 10 + 10 * (3 * 4 + 2) + 50)
+    # Sizes 4 and 16, half an inverter and half of one per unit.
+    assert timing.driver_area == pytest.approx(library.inverter.area * (5 + 17) / 2)
+
+
+def test_combinational_loop(library: Library) -> None:
+    cells = {"a": ("INV_X1", {"A": 1, "Y": 2}), "b": ("INV_X1", {"A": 2, "Y": 1})}
+    with pytest.raises(FlickerError, match="combinational loop"):
+        Timing(module(cells, {}), library, {})
+
+
+def test_interface_adds_up(library: Library) -> None:
+    """A path through a black box is as long as the same path flat, up to the net at the box's output."""
+    inner = module(
+        {"i": ("INV_X1", {"A": 0, "Y": 1}), "j": ("INV_X1", {"A": 1, "Y": 2})}, {"a": ("input", 0), "y": ("output", 2)}
+    )
+    face = Timing(inner, library, {}).interface()
+    assert face["inputs"]["a"]["loads"] == [1] and face["inputs"]["a"]["capture"] is None
+    assert face["outputs"]["y"]["through"] == {"a": pytest.approx(10 + 10 + 10)}
+    cells = {
+        "a": ("DFF", {"D": 5, "CK": 19, "Q": 0}), "box": ("box", {"a": 0, "y": 2}), "b": ("DFF", {"D": 2, "CK": 19, "Q": 3})
+    }
+    timing = Timing(module(cells, {"d": ("input", 5), "q": ("output", 3)}), library, {"box": face})
+    path = next(path for path in timing.paths() if path.target == "n3" and not path.port)
+    assert path.delay == pytest.approx(60 + 10 + 30 + 10 + 50)
+
+
+def test_units_cover_the_design() -> None:
+    modules = {path.stem for path in filelist() if not path.stem.endswith("_pkg")}
+    assert modules <= {unit.top for unit in all_units()}
+
+
+def test_composed_unit_is_the_sum_of_its_parts(library: Library) -> None:
+    sorter = unit("flk_bitonic_sorter", Lanes=2, KeyWidth=4, PayloadWidth=2, StagesPerReg=1)
+    runner = run.Runner(DEFAULT_LIBERTY)
+    total = runner.run([sorter])[sorter]
+    own = runner.results[total["key"]]
+    parts = {runner.results[key]["top"]: runner.results[key] for key in own["children"]}
+    assert set(parts) == {"flk_compare_exchange", "flk_pipe_reg"}
+    for mapping in MAPPINGS:
+        area = sum(result[mapping]["ge_comb"] + result[mapping]["ge_seq"] for result in (own, *parts.values()))
+        assert total[mapping]["ge"] == pytest.approx(area)
+        cells = parts["flk_pipe_reg"][mapping]["cells"]
+        assert sum(count * library.cells[name].area for name, count in cells.items()) == pytest.approx(
+            parts["flk_pipe_reg"][mapping]["ge_comb"] + parts["flk_pipe_reg"][mapping]["ge_seq"]
+        )
+    # Two lanes of key, lane number and payload, and valid.
+    assert total["area"]["ff"] == 2 * (5 + 2) + 1
+    assert total["area"]["fo4"] >= max(path["fo4"] for path in own["area"]["paths"])
+
+
+E4M3 = dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1)
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize("top", ["flk_fp_add", "flk_fp_mul"])
+def test_netlist_equals_rtl(top: str, mapping: str, library: Library, tmp_path: Path) -> None:
+    """Proved for all inputs: the mapped netlist with the generated cell models, and the RTL, E4M3."""
+    runner = run.Runner(DEFAULT_LIBERTY)
+    key = runner.add(top, E4M3)
+    runner.run_planned()
+    cells = tmp_path / "cells.v"
+    cells.write_text(cell_models(library))
+    script = "\n".join([
+        f"read_verilog {cells} {run.UNITS / key / f'{mapping}.v'}", f"rename {top} netlist", "proc", "flatten netlist",
+        "design -stash gate",
+        f"read_slang --std 1800-2023 -F {ROOT / 'rtl/flk.f'} --top {top} " + " ".join(f"-G {k}={v}" for k, v in E4M3.items()),
+        "proc", "flatten", f"rename {top} rtl", "design -copy-from gate -as netlist netlist",
+        "miter -equiv -flatten -make_outputs rtl netlist miter", "sat -verify -prove trigger 0 miter",
+    ])
+    (tmp_path / "prove.ys").write_text(script)
+    code = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in open(sys.argv[1]).read().splitlines()]"
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "prove.ys"], capture_output=True, text=True)
+    assert done.returncode == 0 and "SAT proof finished - no model found: SUCCESS!" in done.stdout, done.stdout[-2000:]
+
+
+LATCH = "module bad (input logic e, d, output logic q); always_latch if (e) q = d; endmodule"
+MEMORY = """module bad (input logic clk, w, input logic [3:0] a, d, output logic [3:0] q);
+logic [3:0] other [16]; always_ff @(posedge clk) if (w) other[a] <= d; assign q = other[a]; endmodule"""
+OPEN_INPUT = "module bad (input logic [1:0] a, output logic y); assign y = a[0]; endmodule"
+UNDRIVEN = "module bad (input logic a, output logic [1:0] y); assign y[0] = a; endmodule"
+LOOP = "module bad (input logic a, output logic y); assign y = !(a && y); endmodule"
+SYNTAX = "module bad (input logic a; endmodule"
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (LATCH, "latch"), (MEMORY, "unintended memory other"), (OPEN_INPUT, r"input a\[1\] is not connected"),
+        (UNDRIVEN, "no driver|not connected"), (LOOP, "bad:.*(loop|problem)"), (SYNTAX, "bad: .*ERROR"),
+    ],
+    ids=["latch", "memory", "open-input", "undriven", "loop", "syntax"],
+)
+def test_bad_designs_are_refused(source: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.sv"
+    path.write_text(source)
+    job = {
+        "action": "synthesise", "top": "bad", "parameters": {}, "extra": [str(path)], "boxes": [], "children": {},
+        "child_parameters": {}, "liberty": str(DEFAULT_LIBERTY), "results": "", "open": [],
+    }
+    with pytest.raises(FlickerError, match=message):
+        run._process(tmp_path / "out", job)
+
+
+def test_report_of_one_unit() -> None:
+    """The command prints the rows of one unit and needs no comparisons."""
+    done = subprocess.run(
+        [sys.executable, ROOT / "scripts/synth.py", "--unit", "mmu"], text=True, capture_output=True, cwd=ROOT
+    )
+    assert done.returncode == 0 and "mmu" in done.stdout, done.stderr
+    result = json.loads(next((run.UNITS).glob("flk_mmu-*/result.json")).read_text())
+    assert result["area"]["ff"] == 2
+    done = subprocess.run([sys.executable, ROOT / "scripts/synth.py", "--unit", "nothing"], text=True, capture_output=True)
+    assert done.returncode == 1 and "no unit 'nothing'" in done.stderr
