@@ -1,0 +1,219 @@
+"""Named methods: what each streams, masks and draws.
+
+    view = View(project(scene, camera), camera)
+    result = run("flicker-smooth-mixed-factored", view)
+    result.image, result.work
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from ..camera import Camera
+from ..errors import FlickerError
+from ..golden.records import SubtileLists, build_lists
+from ..golden.render import assemble, stream_order
+from ..params import FAITHFUL, CatMode, Coords, Form, Precision, RenderConfig
+from ..projection import Projected
+from .leaders import DENSE_LEADERS, SPARSE_LEADERS, cat_masks, cat_operations, seele_masks, seele_operations
+from .lists import obb_lists, tile_lists
+from .operations import NONE, Operations
+from .stage import render_masked
+from .work import Work
+
+
+@dataclass
+class View:
+    """Projected splats and their camera, with the lists that methods share, made on first use."""
+
+    projected: Projected
+    camera: Camera
+    coords: Coords = Coords.LOCAL
+    _cache: dict = field(default_factory=dict, repr=False)
+
+    def lists(self, form: Form, kind: str = "subtile") -> SubtileLists:
+        """Lists of a form: `subtile` (3-sigma box on 8x8), `tile` (vanilla, 16x16), `obb` (GSCore)."""
+        key = form, kind
+        if key not in self._cache:
+            if kind == "subtile":
+                made = build_lists(self.projected, self.camera, RenderConfig(form=form, coords=self.coords))
+            else:
+                made = _LISTS[kind](self.lists(form), self.projected, self.camera)
+            self._cache[key] = made
+        return self._cache[key]
+
+    def drop(self) -> None:
+        """Forget the lists."""
+        self._cache.clear()
+
+
+_LISTS = {"tile": tile_lists, "obb": obb_lists}
+
+
+@dataclass
+class Masks:
+    """What a mask generator says; fields as in `Work`."""
+
+    mask: np.ndarray
+    test_cycles: np.ndarray
+    evaluations: np.ndarray
+    visit: np.ndarray | None = None
+    fallen: np.ndarray | None = None
+
+
+Generator = Callable[[SubtileLists, np.ndarray, np.ndarray], Masks]
+"""(lists, order, core_start) to masks."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method.
+
+    name: unique, lower case. title: for tables. family: `baseline`, `flicker`, `exact`, `rows` or `oracle`. form: of VRU and record.
+    lists: kind of `View.lists`. generate: its mask generator. config: configuration of the RTL that does the same, if there is one.
+    operations: hardware operations of the mask generator. exact: never leaves out a pixel that the VRU would have blended, proved
+    in docs/methods.md. model_only: no RTL exists. pixels: the VRUs visit single pixels. precision: formats of the generator.
+    """
+
+    name: str
+    title: str
+    family: str
+    form: Form
+    generate: Generator = field(repr=False, compare=False)
+    lists: str = "subtile"
+    config: RenderConfig | None = None
+    operations: Operations = NONE
+    exact: bool = False
+    model_only: bool = True
+    pixels: bool = False
+    precision: str = "-"
+
+
+@dataclass
+class Result:
+    """What a method gives: image float32 (H, W, 3), unquantised, rounded as the hardware does; its work; its lists."""
+
+    method: Method
+    image: np.ndarray
+    work: Work
+    lists: SubtileLists
+
+
+def whole(test_cycles: int) -> Generator:
+    """No test: every element goes to all four mini-tiles."""
+
+    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+        n = len(lists.entry)
+        return Masks(np.full(n, 15, np.uint8), np.full(n, test_cycles, np.uint8), np.zeros(n, np.uint16))
+
+    return generate
+
+
+def cat(config: RenderConfig) -> Generator:
+    """The contribution-aware test of a configuration."""
+
+    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+        mask, cycles, fallen = cat_masks(lists, config, order, core_start)
+        leaders = np.where(cycles == 2, DENSE_LEADERS, SPARSE_LEADERS).astype(np.uint16)
+        return Masks(mask, cycles, leaders, fallen=fallen)
+
+    return generate
+
+
+def seele(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+    """SeeLe's leader pixels of 2x2 groups."""
+    mask, visit = seele_masks(lists)
+    n = len(mask)
+    return Masks(mask, np.full(n, 2, np.uint8), np.full(n, 16, np.uint16), visit)
+
+
+def oracle(pixels: bool) -> Generator:
+    """Free masks without a superfluous bit: what contributes, found by running the VRUs on everything."""
+
+    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+        n = len(lists.entry)
+        _, contributing, _ = render_masked(lists, order, np.full(n, 15, np.uint8), None)
+        mask = ((contributing != 0) << np.arange(4)).sum(axis=1).astype(np.uint8)
+        return Masks(mask, np.zeros(n, np.uint8), np.zeros(n, np.uint16), contributing if pixels else None)
+
+    return generate
+
+
+def run(method: str | Method, view: View, background=(0.0, 0.0, 0.0)) -> Result:
+    """Masks, picture and work of a method in a view. Raises FlickerError for an unknown name."""
+    if isinstance(method, str):
+        method = get_method(method)
+    lists = view.lists(method.form, method.lists)
+    order, core_start = stream_order(lists)
+    masks = method.generate(lists, order, core_start)
+    pixels, contributing, pixel_finish = render_masked(lists, order, masks.mask, masks.visit)
+    fallen = np.zeros(lists.cols * lists.rows, bool) if masks.fallen is None else masks.fallen
+    work = Work(
+        lists.cols, lists.rows, order, core_start, lists.start, lists.entry, masks.test_cycles, masks.evaluations, masks.mask,
+        masks.visit, contributing, pixel_finish, fallen,
+    )
+    return Result(method, assemble(lists, pixels, background), work, lists)
+
+
+def _baselines(form: Form) -> list[Method]:
+    end = f"-{form.name.lower()}"
+    vru = f"{form.name.lower()} VRU"
+    return [
+        Method("vanilla" + end, f"vanilla 3DGS, AABB on 16x16 tiles, {vru}", "baseline", form, whole(1), lists="tile"),
+        Method(
+            "no_ctu" + end, f"FLICKER without CTU: AABB on 8x8 sub-tiles, {vru}", "baseline", form, whole(1),
+            config=RenderConfig(form=form, cat=CatMode.OFF), model_only=False,
+        ),
+        Method("gscore" + end, f"GSCore: OBB on 8x8 sub-tiles, {vru}", "baseline", form, whole(1), lists="obb"),
+        Method(
+            "seele" + end, f"SeeLe: leader pixel of each 2x2 group, {vru}", "baseline", form, seele, precision="fp16",
+            operations=seele_operations(form), pixels=True,
+        ),
+        Method("oracle_minitile" + end, f"free exact mini-tile masks, {vru}", "oracle", form, oracle(False), exact=True),
+        Method("oracle" + end, f"free exact pixel masks, {vru}", "oracle", form, oracle(True), exact=True, pixels=True),
+    ]
+
+
+def _flicker() -> list[Method]:
+    methods = []
+    for form in (Form.FACTORED, Form.CONIC):
+        for precision in Precision:
+            for mode in CatMode:
+                if mode == CatMode.OFF:
+                    continue
+                config = RenderConfig(form=form, precision=precision, cat=mode)
+                words = mode.name.lower(), precision.name.lower(), form.name.lower()
+                methods.append(Method(
+                    "-".join(("flicker", *words)), "FLICKER, " + ", ".join(words), "flicker", form, cat(config), config=config,
+                    operations=cat_operations(config), model_only=False, precision=words[1],
+                ))
+    return methods
+
+
+@lru_cache(maxsize=None)
+def methods() -> dict[str, Method]:
+    """All methods by name, in the order of tables."""
+    found = _baselines(Form.FACTORED) + _baselines(Form.CONIC) + _flicker()
+    return {m.name: m for m in found}
+
+
+ALIASES = {
+    "faithful": "-".join(("flicker", FAITHFUL.cat.name, FAITHFUL.precision.name, FAITHFUL.form.name)).lower(),
+    "flicker": "flicker-smooth-mixed-factored",
+    **{name: f"{name}-factored" for name in ("vanilla", "no_ctu", "gscore", "seele", "oracle", "oracle_minitile")},
+}
+
+
+def get_method(name: str) -> Method:
+    """The method of a name or alias; FlickerError, naming close ones, when there is none."""
+    found = methods().get(ALIASES.get(name, name))
+    if found is None:
+        import difflib
+
+        close = difflib.get_close_matches(name, [*ALIASES, *methods()], 3, 0.3)
+        raise FlickerError(f"unknown method '{name}'; close names: {', '.join(close) or 'none'} (flicker stability --list shows all)")
+    return found

@@ -1,0 +1,86 @@
+"""What a method makes the hardware do: the stream of every sub-tile with its masks, and when pixels finish.
+
+The cycle models start from this; nothing in it depends on timing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..params import CHANNELS, MINITILE, SUBTILE
+
+SUBTILE_PIXELS = SUBTILE * SUBTILE
+MINITILE_PIXELS = MINITILE * MINITILE
+
+
+@dataclass
+class Work:
+    """Work of one frame. S sub-tiles (row by row, `s = row * cols + col`), E stream elements.
+
+    Stream
+        order: int64 (S,), sub-tiles in the order of the cores: core k streams order[core_start[k]:core_start[k + 1]], one
+            end-of-sub-tile token behind each. Core k has column k % 2 and row k / 2 of every 16x16 tile.
+        core_start: int64 (5,).
+        start: int64 (S + 1,), elements of sub-tile s are start[s]:start[s + 1], near to far.
+        entry: int32 (E,), splat (row of the projection) of each element.
+
+    Mask generation
+        test_cycles: uint8 (E,), cycles that the mask generator is busy with an element (0: no generator, or free).
+        evaluations: uint16 (E,), evaluations of the Gaussian weight, or of what stands for it, that the generator makes.
+        mask: uint8 (E,), mini-tiles the element is sent to, before finished mini-tiles are filtered; bit m is mini-tile m.
+        visit: uint16 (E, 4) or None, pixels of each mini-tile that the VRUs are told to visit, before finished pixels are
+            filtered; bit i is pixel i (column i % 4, row i / 4). None: all 16 of every mini-tile in `mask`.
+
+    What the VRUs find
+        contributing: uint16 (E, 4), pixels that are visited, unfinished before this element, and have alpha >= 1/255 in
+            the VRU's arithmetic; the pair that finishes a pixel is one of them.
+        pixel_finish: int32 (S, 64), position in the sub-tile's list (0 is the first element) of the element that finishes pixel
+            16 m + i; the list's length when none does. Pixel p is unfinished before element n when n <= pixel_finish[s, p].
+
+    Counts
+        fallen: bool (S,), sub-tiles in which the automatic mode had fallen to Uniform-Sparse.
+        core_pixels: pixels a core's work unit has per element when nothing masks them (64), what `gscore` and `vanilla` blend.
+    """
+
+    cols: int
+    rows: int
+    order: np.ndarray
+    core_start: np.ndarray
+    start: np.ndarray
+    entry: np.ndarray
+    test_cycles: np.ndarray
+    evaluations: np.ndarray
+    mask: np.ndarray
+    visit: np.ndarray | None
+    contributing: np.ndarray
+    pixel_finish: np.ndarray
+    fallen: np.ndarray
+    core_pixels: int = SUBTILE_PIXELS
+    extra: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def elements(self) -> int:
+        """Number of stream elements, tokens not counted."""
+        return len(self.entry)
+
+    @property
+    def subtiles(self) -> int:
+        """Number of sub-tiles."""
+        return len(self.start) - 1
+
+    def finish(self) -> np.ndarray:
+        """int32 (S, 4): position of the element after which all 16 pixels of a mini-tile are finished; list length: never."""
+        return self.pixel_finish.reshape(-1, CHANNELS, MINITILE_PIXELS).max(axis=2)
+
+    def contributing_count(self) -> np.ndarray:
+        """uint8 (E, 4): number of contributing pixels, 0 to 16."""
+        return np.bitwise_count(self.contributing)
+
+    def visit_masks(self) -> np.ndarray:
+        """uint16 (E, 4): `visit`, or what stands for it when whole mini-tiles are visited."""
+        if self.visit is not None:
+            return self.visit
+        bits = (self.mask[:, None] >> np.arange(CHANNELS, dtype=np.uint8)) & 1
+        return bits.astype(np.uint16) * np.uint16(0xFFFF)
