@@ -1,0 +1,256 @@
+"""Formats of a scene in memory: FP16 parameters (the paper) and chunk-quantised parameters (PlayCanvas' compressed PLY).
+
+Each format stores a Gaussian in two places, as the two-step fetch needs it: geometry (mean, scale, rotation) in one array, opacity and colour in another,
+both in the order of the clusters. Encoders and decoders work on the bits; `decode` gives the scene that the chip sees.
+
+| format | geometry | opacity and colour, K coefficients | cluster header |
+|---|---|---|---|
+| FP16 | 10 x FP16 = 20 bytes | (1 + 3 K) x FP16 | 32 bytes |
+| FP16, cluster-local | the same, mean relative to the cluster | the same | 32 bytes (its box gives the origin) |
+| chunks | 11-10-11 bits position, 2-10-10-10 rotation, 11-10-11 log scale = 12 bytes | 8-8-8-8 bits colour, opacity, 8 bits a coefficient = 4 + 3 (K - 1) | 72 bytes: bounds of position, log scale, colour |
+
+The chunk format is that of PlayCanvas' splat-transform: values are rounded to the nearest code, SH codes are bins decoded at their middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FlickerError
+from ..scene import _SH_C0, Scene
+from .constants import CLUSTER_HEADER_BYTES
+
+CHUNK = 256
+_MAX_FP16 = 65504.0
+_TINY_FP16 = 2.0**-24
+_SCALE_LOG_LIMIT = 20.0
+_SQRT2 = np.sqrt(2.0)
+
+
+class MemoryFormat(str, Enum):
+    """How parameters lie in DRAM."""
+
+    FP16 = "fp16"  # world coordinates
+    FP16_LOCAL = "fp16-local"  # means relative to the centre of their cluster
+    CHUNK = "chunk"  # 256 Gaussians with common bounds
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Bytes of a format: a Gaussian's geometry, its opacity and colour, a cluster's header."""
+
+    geometry: int
+    colour: int
+    header: int
+
+    def total(self, gaussians: int, clusters: int) -> int:
+        """Bytes of a scene."""
+        return gaussians * (self.geometry + self.colour) + clusters * self.header
+
+
+def layout(form: MemoryFormat, coefficients: int) -> Layout:
+    """Bytes of a format for scenes with `coefficients` SH coefficients a colour."""
+    if form is MemoryFormat.CHUNK:
+        return Layout(12, 4 + 3 * (coefficients - 1), 72)
+    return Layout(20, 2 * (1 + 3 * coefficients), CLUSTER_HEADER_BYTES)
+
+
+# ---- FP16 --------------------------------------------------------------------------------------
+
+
+@dataclass(eq=False)
+class Fp16Scene:
+    """geometry: uint16 (N, 10) bits of mean, scale, quaternion. colour: uint16 (N, 1 + 3 K) bits of opacity, SH.
+
+    size: Gaussians a cluster. origin: float32 (C, 3) of the clusters' means, or None for world coordinates.
+    clamped: values beyond FP16, set to its largest number.
+    """
+
+    geometry: np.ndarray
+    colour: np.ndarray
+    size: int
+    origin: np.ndarray | None
+    clamped: int
+
+
+def _fp16(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Bits of the nearest FP16 numbers; values beyond the largest finite one are clamped and counted."""
+    values = np.asarray(values, np.float64)
+    beyond = np.abs(values) > _MAX_FP16
+    return np.clip(values, -_MAX_FP16, _MAX_FP16).astype(np.float16).view(np.uint16), int(beyond.sum())
+
+
+def encode_fp16(scene: Scene, size: int = CHUNK, local: bool = False) -> Fp16Scene:
+    """Round all parameters to FP16. local: means relative to the middle of the box of their cluster of `size` Gaussians.
+
+    A scale or opacity that would become 0 becomes the smallest FP16 number.
+    """
+    means = scene.means.astype(np.float64)
+    origin = None
+    if local:
+        start = np.arange(0, len(scene), size)
+        low = np.minimum.reduceat(scene.means, start).astype(np.float64)
+        high = np.maximum.reduceat(scene.means, start)
+        origin = ((low + high) / 2).astype(np.float32)
+        means = means - np.repeat(origin, size, axis=0)[: len(scene)]
+    geometry, clamped = _fp16(np.concatenate([means, np.maximum(scene.scales, _TINY_FP16), scene.quats], axis=1))
+    opacity = np.maximum(scene.opacities, _TINY_FP16)[:, None]
+    colour, more = _fp16(np.concatenate([opacity, scene.sh.reshape(len(scene), -1)], axis=1))
+    return Fp16Scene(geometry, colour, size, origin, clamped + more)
+
+
+def decode_fp16(data: Fp16Scene, path: Path | None = None) -> Scene:
+    """The scene that the bits say."""
+    geometry = data.geometry.view(np.float16).astype(np.float32)
+    colour = data.colour.view(np.float16).astype(np.float32)
+    means = geometry[:, :3]
+    if data.origin is not None:
+        means = means + np.repeat(data.origin, data.size, axis=0)[: len(means)]
+    quats = geometry[:, 6:].astype(np.float64)
+    return Scene(means, geometry[:, 3:6], quats / np.linalg.norm(quats, axis=1, keepdims=True), colour[:, 0],
+                 colour[:, 1:].reshape(len(colour), -1, 3), path)
+
+
+# ---- chunks ------------------------------------------------------------------------------------
+
+
+@dataclass(eq=False)
+class ChunkScene:
+    """bounds: float32 (C, 18): low and high corner of position, log scale and colour, in the order of the PLY element `chunk`.
+
+    packed: uint32 (N, 4): position, rotation, scale, colour. sh: uint8 (N, 3 (K - 1)), channel by channel (f_rest_*).
+    """
+
+    bounds: np.ndarray
+    packed: np.ndarray
+    sh: np.ndarray
+
+
+def _unit(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Place of the values between the bounds of their chunk, 0 to 1; 0 where the bounds coincide."""
+    low, high = (np.repeat(b.astype(np.float64), CHUNK, axis=0)[: len(values)] for b in (low, high))
+    extent = high - low
+    return np.clip(np.divide(values - low, extent, out=np.zeros_like(extent), where=extent > 0), 0.0, 1.0)
+
+
+def _code(unit: np.ndarray, bits: int, nearest: bool) -> np.ndarray:
+    return np.floor(unit * ((1 << bits) - 1) + (0.5 if nearest else 0.0)).astype(np.uint32)
+
+
+def _pack_111011(unit: np.ndarray, nearest: bool) -> np.ndarray:
+    x, y, z = (_code(unit[:, i], bits, nearest) for i, bits in enumerate((11, 10, 11)))
+    return x << 21 | y << 11 | z
+
+
+def encode_chunks(scene: Scene, nearest: bool = True, bounds: np.ndarray | None = None) -> ChunkScene:
+    """Quantise in chunks of 256 in the order of the scene.
+
+    nearest: round to the nearest code (splat-transform); otherwise down, as gsply's writer does. bounds: chunk bounds to use instead of the
+    tightest, float32 (C, 18).
+    """
+    n = len(scene)
+    logs = np.clip(np.log(scene.scales.astype(np.float64)), -_SCALE_LOG_LIMIT, _SCALE_LOG_LIMIT)
+    colours = 0.5 + _SH_C0 * scene.sh[:, 0].astype(np.float64)
+    parts = (scene.means.astype(np.float64), logs, colours)
+    if bounds is None:
+        start = np.arange(0, n, CHUNK)
+        bounds = np.concatenate([f.reduceat(p, start) for p in parts for f in (np.minimum, np.maximum)], axis=1).astype(np.float32)
+    elif bounds.shape != (-(-n // CHUNK), 18):
+        raise FlickerError(f"chunks: bounds are {bounds.shape}, not {(-(-n // CHUNK), 18)}")
+    units = [_unit(p, bounds[:, 6 * i : 6 * i + 3], bounds[:, 6 * i + 3 : 6 * i + 6]) for i, p in enumerate(parts)]
+    packed = np.empty((n, 4), np.uint32)
+    packed[:, 0] = _pack_111011(units[0], nearest)
+    packed[:, 2] = _pack_111011(units[1], nearest)
+    opacity = np.clip(scene.opacities.astype(np.float64), 0.0, 1.0)
+    rgba = [_code(units[2][:, i], 8, nearest) for i in range(3)] + [_code(opacity, 8, nearest)]
+    packed[:, 3] = rgba[0] << 24 | rgba[1] << 16 | rgba[2] << 8 | rgba[3]
+    quats = scene.quats.astype(np.float64)
+    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
+    largest = np.argmax(np.abs(quats), axis=1)
+    quats *= np.where(np.take_along_axis(quats, largest[:, None], axis=1) < 0, -1.0, 1.0)
+    others = quats[np.arange(4) != largest[:, None]].reshape(n, 3)
+    word = largest.astype(np.uint32) << 30
+    for i in range(3):
+        word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10, nearest) << np.uint32(20 - 10 * i)
+    packed[:, 1] = word
+    rest = scene.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1).astype(np.float64)
+    return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))
+
+
+def _unpack_111011(word: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    unit = np.stack([(word >> 21) / 2047.0, (word >> 11 & 1023) / 1023.0, (word & 2047) / 2047.0], axis=1)
+    return _between(unit, low, high)
+
+
+def _between(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    low, high = (np.repeat(b.astype(np.float64), CHUNK, axis=0)[: len(unit)] for b in (low, high))
+    return low + unit * (high - low)
+
+
+def decode_chunks(data: ChunkScene, path: Path | None = None) -> Scene:
+    """The scene that the bits say; an opacity code of 0, which never contributes, becomes 2^-24."""
+    b, packed = data.bounds, data.packed
+    n = len(packed)
+    means = _unpack_111011(packed[:, 0], b[:, 0:3], b[:, 3:6])
+    scales = np.exp(_unpack_111011(packed[:, 2], b[:, 6:9], b[:, 9:12]))
+    rgba = (packed[:, 3:4] >> np.array([24, 16, 8, 0], np.uint32) & np.uint32(255)) / 255.0
+    opacities = np.maximum(rgba[:, 3], _TINY_FP16)
+    three = ((packed[:, 1:2] >> np.array([20, 10, 0], np.uint32) & np.uint32(1023)) / 1023.0 - 0.5) * _SQRT2
+    largest = packed[:, 1] >> 30
+    quats = np.empty((n, 4))
+    quats[np.arange(4) != largest[:, None]] = three.ravel()
+    quats[np.arange(n), largest] = np.sqrt(np.maximum(0.0, 1.0 - (three**2).sum(axis=1)))
+    sh = np.empty((n, data.sh.shape[1] // 3 + 1, 3))
+    sh[:, 0] = (_between(rgba[:, :3], b[:, 12:15], b[:, 15:18]) - 0.5) / _SH_C0
+    sh[:, 1:] = ((data.sh - 127.5) / 32.0).reshape(n, 3, -1).transpose(0, 2, 1)
+    return Scene(means, scales, quats / np.linalg.norm(quats, axis=1, keepdims=True), opacities, sh, path)
+
+
+_BOUNDS = [f"{m}_{v}" for group in ("{}", "scale_{}") for m in ("min", "max") for v in map(group.format, "xyz")]
+_BOUNDS += [f"{m}_{v}" for m in ("min", "max") for v in "rgb"]
+_PACKED = [f"packed_{v}" for v in ("position", "rotation", "scale", "color")]
+
+
+def save_chunks(data: ChunkScene, path: str | Path) -> None:
+    """Write a compressed PLY file. Raises OSError."""
+    n, rest = data.sh.shape
+    header = ["ply", "format binary_little_endian 1.0", f"element chunk {len(data.bounds)}"]
+    header += [f"property float {name}" for name in _BOUNDS]
+    header += [f"element vertex {n}"] + [f"property uint {name}" for name in _PACKED]
+    if rest:
+        header += [f"element sh {n}"] + [f"property uchar f_rest_{k}" for k in range(rest)]
+    body = [data.bounds.astype("<f4").tobytes(), data.packed.astype("<u4").tobytes(), data.sh.tobytes()]
+    Path(path).write_bytes("\n".join([*header, "end_header", ""]).encode() + b"".join(body))
+
+
+def load_chunks(path: str | Path) -> ChunkScene:
+    """The bits of a compressed PLY file with colour bounds, as `save_chunks` and PlayCanvas write it."""
+    path = Path(path)
+    data = path.read_bytes()
+    end = data.find(b"end_header\n")
+    words = [line.split() for line in data[: max(end, 0)].decode("ascii", "replace").splitlines()]
+    counts = {w[1]: int(w[2]) for w in words if w[:1] == ["element"] and len(w) == 3 and w[2].isdigit()}
+    names = [w[2] for w in words if w[:1] == ["property"] and len(w) == 3]
+    rest = len(names) - len(_BOUNDS) - len(_PACKED)
+    if end < 0 or names[: len(_BOUNDS) + len(_PACKED)] != _BOUNDS + _PACKED or rest not in (0, 9, 24, 45):
+        raise FlickerError(f"{path}: not a compressed PLY file with colour bounds")
+    chunks, n = counts["chunk"], counts["vertex"]
+    sizes = np.cumsum([end + len(b"end_header\n"), chunks * 72, n * 16, n * rest])
+    if chunks != -(-n // CHUNK) or sizes[-1] != len(data):
+        raise FlickerError(f"{path}: sizes do not match the header")
+    return ChunkScene(
+        np.frombuffer(data, "<f4", chunks * 18, sizes[0]).reshape(chunks, 18),
+        np.frombuffer(data, "<u4", n * 4, sizes[1]).reshape(n, 4),
+        np.frombuffer(data, "u1", n * rest, sizes[2]).reshape(n, rest),
+    )
+
+
+def through_memory(scene: Scene, form: MemoryFormat, size: int = CHUNK) -> Scene:
+    """The scene as it comes back out of memory in a format. It must be in the order of its clusters (`build_clusters`)."""
+    if form is MemoryFormat.CHUNK:
+        return decode_chunks(encode_chunks(scene), scene.path)
+    return decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)
