@@ -75,7 +75,7 @@ FEATURE_BUFFER_BYTES = 288 * 1024
 RECORD_CACHE_BYTES = 64 * 1024
 RECORD_CACHE_WAYS = 4
 GEOMETRY_BUFFER_BYTES = 4 * 2 * 1024
-RECORD_FIFO_BYTES = 4 * 2 * 1024
+RECORD_FIFO_BYTES = 4 * 1024
 
 _PAPER = "paper, Sec. V-A (hardware set-up) or Table 2a"
 _JEDEC = "JEDEC JESD209-4 LPDDR4-3200, 8 Gb a channel, as listed in DRAMSys (JEDEC_8Gb_LPDDR4-3200_16bit), clocks of 0.625 ns"
@@ -141,7 +141,7 @@ SOURCES = {
     "RECORD_CACHE_BYTES": "assumption: part of the feature buffers that keeps records for neighbouring tiles",
     "RECORD_CACHE_WAYS": "assumption",
     "GEOMETRY_BUFFER_BYTES": "assumption: two buffers of 1 KiB a preprocessing core for incoming parameters",
-    "RECORD_FIFO_BYTES": "assumption: 64 records a rendering core, so that cores may drift apart",
+    "RECORD_FIFO_BYTES": "assumption: 32 records a rendering core, so that cores may drift apart",
 }
 
 

@@ -129,10 +129,17 @@ def _boxes(mean, radii, cols, rows, width, height):
     return box
 
 
-def collect(projected, camera) -> Splats:
-    """The splats of a projection in the order of memory, that is, of the scene."""
+def collect(projected, camera, tight: bool = False) -> Splats:
+    """The splats of a projection in the order of memory, that is, of the scene.
+
+    tight: boxes no larger than the ellipse alpha = 1/255 (fewer entries, the same picture; `build_lists` does not do it).
+    """
     cols, rows = -(-camera.width // SUBTILE), -(-camera.height // SUBTILE)
-    box = _boxes(projected.mean, projected.radii, cols, rows, camera.width, camera.height)
+    radii = projected.radii
+    if tight:
+        reach = np.sqrt(2.0 * np.log(np.maximum(projected.opacity / ALPHA_MIN, 1.0)))
+        radii = np.minimum(radii, reach[:, None] * np.sqrt(projected.cov2d[:, ::2]) * (1.0 + 1e-9))
+    box = _boxes(projected.mean, radii, cols, rows, camera.width, camera.height)
     here = np.flatnonzero((box[:, 1] > box[:, 0]) & (box[:, 3] > box[:, 2]))
     here = here[np.argsort(projected.index[here], kind="stable")]
     return Splats(projected.depth[here].view(np.uint32), np.ascontiguousarray(box[here]), here, cols, rows)
@@ -592,12 +599,11 @@ def run_scheme(
         cycles["filter by mask"] = int((deepest * tiles).sum()) // c.FILTER_ENTRIES_PER_CYCLE
     cycles["hand out records"] = len(fetched) if block > 1 else -(-len(fetched) // 4)
 
-    entry_bytes = -(-scheme.entry_bits // 8)
     line = c.LINE_BYTES if scheme.method is Method.COUNTING else c.CHUNK_BYTES
     on_chip = {
         "list pointers": len(count) * c.POINTER_BYTES,
         "write combining": scheme.combiner_sets * scheme.combiner_ways * (line + c.POINTER_BYTES),
-        "sort buffers": units * 2 * scheme.sort_capacity * (-(-(c.KEY_BITS + c.ID_BITS) // 8) if scheme.method is Method.GLOBAL else entry_bytes),
+        "sort buffers": units * 2 * scheme.sort_capacity * max(scheme.entry_bits, c.KEY_BITS + c.ID_BITS) // 8,
         "record cache": scheme.record_cache_bytes + scheme.record_cache_bytes // c.RECORD_BYTES * 3,
         "record FIFOs": c.RECORD_FIFO_BYTES,
         "parameter buffers": c.GEOMETRY_BUFFER_BYTES,

@@ -1,0 +1,73 @@
+"""What memory formats and short depth keys do to the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ..camera import Camera
+from ..golden.records import build_lists
+from ..golden.render import render_golden
+from ..metrics import psnr
+from ..params import RenderConfig
+from ..projection import Projected, project
+from ..reference import render_reference
+from .clusters import build_clusters
+from .constants import CLUSTER_SIZE
+from .memory import MemoryFormat, layout, through_memory
+from .sorting import quantised_key
+
+
+@dataclass(frozen=True)
+class FormatQuality:
+    """PSNR in dB against the float64 reference of the unquantised scene; bytes of the scene and of a Gaussian.
+
+    reference_db: the decoded scene in float64. golden_db: the decoded scene through the hardware's arithmetic.
+    """
+
+    form: str
+    scene_bytes: int
+    gaussian_bytes: int
+    reference_db: float
+    golden_db: float
+
+
+def format_quality(scene, camera: Camera, config: RenderConfig, cluster_size: int = CLUSTER_SIZE) -> list[FormatQuality]:
+    """Every memory format, after a first row for the scene as loaded (float32)."""
+    scene, clusters = build_clusters(scene, cluster_size)
+    projected = project(scene, camera)
+    reference = render_reference(projected, camera)
+
+    def golden(p: Projected) -> float:
+        return psnr(render_golden(build_lists(p, camera, config), config).image(), reference)
+
+    numbers = 11 + 3 * scene.sh.shape[1]
+    rows = [FormatQuality("float32", 4 * numbers * len(scene), 4 * numbers, float("inf"), golden(projected))]
+    for form in MemoryFormat:
+        other = project(through_memory(scene, form, cluster_size), camera)
+        size = layout(form, scene.sh.shape[1])
+        rows.append(FormatQuality(
+            form.value, size.total(len(scene), len(clusters)), size.geometry + size.colour,
+            psnr(render_reference(other, camera), reference), golden(other),
+        ))
+    return rows
+
+
+KEYS = ([("float32", b) for b in (8, 10, 12, 14, 16, 18, 20, 22, 24, 31)] + [("fp16", 15)]
+        + [(kind, b) for kind in ("linear", "log") for b in (8, 12, 14, 16, 18, 20, 24)])
+
+
+def resorted(projected: Projected, key: np.ndarray) -> Projected:
+    """The projection in the order of other keys; equal keys in the order of memory."""
+    order = np.lexsort([projected.index, key])
+    return replace(projected, **{f.name: getattr(projected, f.name)[order] for f in fields(projected)})
+
+
+def key_quality(projected: Projected, camera: Camera, keys=KEYS) -> list[tuple[str, int, float]]:
+    """(kind, bits, PSNR in dB against full keys) in float64; inf when the pictures are equal."""
+    reference = render_reference(projected, camera)
+    return [
+        (kind, bits, psnr(render_reference(resorted(projected, quantised_key(projected.depth, bits, kind)), camera), reference))
+        for kind, bits in keys
+    ]
