@@ -3,7 +3,7 @@
 // of finished_o: what is written while it is high is dropped.
 //
 // Two streams are judged (fv_stream): tokens from the input to their last pixel, and all elements
-// through the FIFO. The assertions called a_link* tie them to the registers for induction.
+// through the FIFO. The assertions called l_* tie them to the registers for induction.
 module fv_channel
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -254,25 +254,25 @@ module fv_channel
       end
 
       // Links for induction.
-      a_link_fifo: assert (SlotBits'(dut.i_fifo.read_q) < SlotBits'(Depth)
+      l_fifo: assert (SlotBits'(dut.i_fifo.read_q) < SlotBits'(Depth)
                            && SlotBits'(dut.i_fifo.write_q) == slot(elems)
                            && CountBits'(dut.i_fifo.usage_q) == elems);
-      a_link_step: assert (eos == dut.gen_vru[1].i_vru.eos_q);
-      a_link_one: assert ((eos & (eos - 1'b1)) == '0 && (eos == '0 || full == '0));
-      a_link_blend: assert (dut.eos_in_vru_q == before_blend);
-      a_link_tokens: assert (CountBits'(dut.tokens_q) == queued + CountBits'(before_blend));
-      a_link_owed: assert (tokens == queued + CountBits'(outstanding));
-      a_link_next: assert (dut.pixel_q == next_q && (dut.head_valid || next_q == '0)
+      l_step: assert (eos == dut.gen_vru[1].i_vru.eos_q);
+      l_one: assert ((eos & (eos - 1'b1)) == '0 && (eos == '0 || full == '0));
+      l_blend: assert (dut.eos_in_vru_q == before_blend);
+      l_tokens: assert (CountBits'(dut.tokens_q) == queued + CountBits'(before_blend));
+      l_owed: assert (tokens == queued + CountBits'(outstanding));
+      l_next: assert (dut.pixel_q == next_q && (dut.head_valid || next_q == '0)
                            && (next_q == '0 || !dut.head.eos));
-      a_link_vrus: assert (vru_ok == '1);
-      a_link_pick: assert (!waited_q || dut.i_arbiter.first_q == index_q[3]);
+      l_vrus: assert (vru_ok == '1);
+      l_pick: assert (!waited_q || dut.i_arbiter.first_q == index_q[3]);
       if (token_watching) begin
-        a_link_view: assert (view == token_data);
+        l_view: assert (view == token_data);
       end
       if (elem_watching) begin
-        a_link_kept: assert ({kept.eos, kept.feature[RowBit], kept.feature[0]} == elem_data);
+        l_kept: assert ({kept.eos, kept.feature[RowBit], kept.feature[0]} == elem_data);
         if (late_q) begin
-          a_link_late: assert (!early_token && !before_blend && dut.finished == '1);
+          l_late: assert (!early_token && !before_blend && dut.finished == '1);
         end
       end
 

@@ -7,7 +7,7 @@
 // running sums are free (cut by the proof's script); the fall flag is read from it.
 // fv_stream judges the elements as they leave the internal FIFOs, mask beside element; a_shown
 // says that exactly those with a mask are shown at the output. For induction the assertions called
-// a_view* count masks, those stored and those still in the test pipeline, by the position of
+// l_* count masks, those stored and those still in the test pipeline, by the position of
 // their element.
 module fv_ctu
   import flk_pkg::*;
@@ -253,27 +253,27 @@ module fv_ctu
                         && events.idle == !in_valid_i);
 
       // Links for induction.
-      a_view_pointers: assert (dut.i_elem_fifo.read_q == dut.i_mask_fifo.read_q
+      l_pointers: assert (dut.i_elem_fifo.read_q == dut.i_mask_fifo.read_q
                         && SlotBits'(dut.i_elem_fifo.read_q) < SlotBits'(Depth)
                         && elems <= CountBits'(Depth)
                         && SlotBits'(dut.i_elem_fifo.write_q) == slot(elems)
                         && SlotBits'(dut.i_mask_fifo.write_q) == slot(masks));
-      a_view_known: assert (known == KnownBits'(elems));
-      a_view_order: assert (order);
-      a_view_batch: assert (half == dut.i_controller.batch_q);
-      a_view_token: assert (dut.i_controller.eos_pending_q == (token != '0));
-      a_view_oldest: assert (elems == '0 || masks != '0 || wait_q <= oldest);
-      a_view_count: assert (elems == entries);
+      l_known: assert (known == KnownBits'(elems));
+      l_order: assert (order);
+      l_batch: assert (half == dut.i_controller.batch_q);
+      l_token: assert (dut.i_controller.eos_pending_q == (token != '0));
+      l_oldest: assert (elems == '0 || masks != '0 || wait_q <= oldest);
+      l_count: assert (elems == entries);
       if (watching) begin
-        a_view_mask: assert (view == watched[DataBits-1-:4]);
-        a_view_elem: assert ({
+        l_mask: assert (view == watched[DataBits-1-:4]);
+        l_elem: assert ({
               dut.i_elem_fifo.storage_q[slot(ahead)][FEATURE_ELEM_BITS-1],
               dut.i_elem_fifo.storage_q[slot(ahead)][0],
               dut.i_elem_fifo.storage_q[slot(ahead)][47:32]
             } == watched[DataBits-5:0]);
       end
       if (half) begin
-        a_view_half: assert (in_valid_i && dense && !eos_i && in_waited_q
+        l_half: assert (in_valid_i && dense && !eos_i && in_waited_q
                              && first == mask_of(test_i, 1'b1)[1:0]);
       end
 

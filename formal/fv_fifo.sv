@@ -1,7 +1,7 @@
 // flk_fifo: a stream of Depth elements (fv_stream); ready while there is room, valid while there
 // is anything; fill level, full and empty.
 //
-// The last assertions are the link between registers and the chosen element that induction needs.
+// The assertions l_* link registers and chosen element, which induction needs.
 module fv_fifo #(
   parameter int unsigned Width = 2,
   parameter int unsigned Depth = 16
@@ -85,10 +85,10 @@ module fv_fifo #(
       a_usage: assert (usage == entries);
       a_full: assert (full == (entries == UsageBits'(Depth)));
       a_empty: assert (empty == (entries == '0));
-      a_read: assert (SlotBits'(dut.read_q) < SlotBits'(Depth));
-      a_write: assert (SlotBits'(dut.write_q) == slot(entries));
+      l_read: assert (SlotBits'(dut.read_q) < SlotBits'(Depth));
+      l_write: assert (SlotBits'(dut.write_q) == slot(entries));
       if (watching) begin
-        a_kept: assert (dut.storage_q[watched_slot] == watched);
+        l_kept: assert (dut.storage_q[watched_slot] == watched);
       end
       c_full: cover (full);
       // Long traces of a deep queue show nothing that those of a small one do not.

@@ -140,11 +140,11 @@ module fv_fifo_monitor
                           == (transfer && !in_eos_i ? ones(in_mask_i & finished_i) : '0));
 
       // Links for induction.
-      a_usage: assert (usage[which_q] == entries);
-      a_pointers: assert (read[which_q] < (CountBits + 1)'(Depth)
+      l_usage: assert (usage[which_q] == entries);
+      l_pointers: assert (read[which_q] < (CountBits + 1)'(Depth)
                           && next[which_q] == slot(read[which_q], entries));
       if (watching) begin
-        a_kept: assert (storage[which_q][slot(read[which_q], ahead)] == watched);
+        l_kept: assert (storage[which_q][slot(read[which_q], ahead)] == watched);
       end
 
       c_full: cover (full == '1);

@@ -77,7 +77,12 @@ module fv_fp_convert #(
         a_result_value: assert (ok);
       end
     end
-    c_subnormal: cover (mag <= SrcTop && dst[DstWidth-2:0] < (dst_t'(1) << DstManBits) && dst[0]);
+    if (SrcScale == 0) begin
+      c_subnormal: cover (mag <= SrcTop && dst[DstWidth-2:0] < (dst_t'(1) << DstManBits) && dst[0]);
+    end else begin
+      // The target is the finer of the two: no number of the source is rounded to zero.
+      c_finer: cover (mag < (src_t'(1) << SrcManBits) && dst[DstWidth-2:0] != '0);
+    end
     c_normal: cover (mag <= SrcTop && dst[DstWidth-2:0] > DstInf >> 1);
     c_nan: cover (mag > SrcTop);
   end

@@ -73,7 +73,7 @@ module fv_mmu (
         a_mask: assert (mask == expected);
       end
       if (batch_q) begin
-        a_kept: assert (dut.first_q == {first_q[1] != '0, first_q[0] != '0});
+        l_kept: assert (dut.first_q == {first_q[1] != '0, first_q[0] != '0});
       end
       c_dense: cover (valid_out && dense_i && !all_i && mask == 4'b1001);
       c_sparse: cover (valid_out && !dense_i && !all_i && mask == 4'b0110);

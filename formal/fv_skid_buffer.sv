@@ -53,7 +53,7 @@ module fv_skid_buffer #(
       a_ready: assert (in_ready == (entries < 2'd2));
       a_valid: assert (out_valid == (entries != '0));
       if (watching) begin
-        a_kept: assert ((ahead == '0 ? dut.out_data_q : dut.skid_data_q) == watched);
+        l_kept: assert ((ahead == '0 ? dut.out_data_q : dut.skid_data_q) == watched);
       end
       c_full: cover (!in_ready && out_ready_i);
       c_through: cover (in_valid_i && in_ready && out_valid && out_ready_i);

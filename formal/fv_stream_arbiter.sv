@@ -96,12 +96,12 @@ module fv_stream_arbiter #(
       end
       if (in_valid_i[pick_q]) begin
         a_fair: assert (passed_q < (IndexBits + 1)'(Inputs));
-        a_turn: assert (passed_q == '0 || passed_q + behind < (IndexBits + 1)'(Inputs));
+        l_turn: assert (passed_q == '0 || passed_q + behind < (IndexBits + 1)'(Inputs));
       end
-      a_first: assert (dut.first_q < (IndexBits + 1)'(Inputs));
+      l_first: assert (dut.first_q < (IndexBits + 1)'(Inputs));
       a_index: assert (out_index < (IndexBits + 1)'(Inputs));
       if (waited_q) begin
-        a_held: assert (dut.first_q == index_q && valid_q[index_q]);
+        l_held: assert (dut.first_q == index_q && valid_q[index_q]);
       end
       c_worst: cover (taken[pick_q] && passed_q == (IndexBits + 1)'(Inputs - 1));
       c_waits: cover (waited_q && transfer && out_index == pick_q);

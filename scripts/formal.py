@@ -2,7 +2,9 @@
 """Proofs of the hardware with SymbiYosys and z3 (docs/formal.md); formal/proofs.toml lists them.
 
 Each proof is three kinds of tasks: the proof itself for every set of parameters, its covers (it is
-not vacuous), and its mutants, sources with one piece of text replaced, with which it must fail.
+not vacuous), and its mutants, sources with one piece of text replaced, with which it must fail: by
+a trace from reset that violates the specification. Assertions l_*, which only link registers to the
+specification for induction, do not count and are taken out of mutants.
 Prints a table, writes build/formal/results.csv; exits 1 if a task ends otherwise than it must.
 A task is run again only if a source, a tool or its settings changed.
 """
@@ -150,14 +152,17 @@ def tasks_of(proof: Proof, fast: bool) -> list[Task]:
 
 
 def mutated(path: Path, mutant: Mutant) -> str:
-    """Text of a source with the mutation made; it must fit in exactly one place."""
+    """Text of a source with the mutation made. Raises FlickerError unless it fits in exactly one place."""
     text = path.read_text()
     if mutant.regex:
         broken, count = re.subn(mutant.find, mutant.replace, text)
     else:
         broken, count = text.replace(mutant.find, mutant.replace), text.count(mutant.find)
     if count != 1 or broken == text:
-        raise FlickerError(f"{PROOFS}: mutant of {mutant.file}: {mutant.find!r} occurs {count} times")
+        raise FlickerError(
+            f"mutant no longer fits {path.name}: {mutant.find!r} occurs {count} times, must occur once "
+            f"and be changed (formal/proofs.toml)"
+        )
     return broken
 
 
@@ -170,8 +175,9 @@ def sources_of(task: Task) -> dict[str, str]:
             path = FORMAL / "standin" / path.name
         mutate = task.mutant is not None and task.mutant.file == path.stem
         files[path.name] = mutated(path, task.mutant) if mutate else path.read_text()
-    if task.mutant is not None and f"{task.mutant.file}.sv" not in files:
-        raise FlickerError(f"{PROOFS}: mutant of {task.mutant.file}: not part of {task.proof.top}")
+    wanted = [*task.proof.standins, *([task.mutant.file] if task.mutant else [])]
+    if missing := [name for name in wanted if f"{name}.sv" not in files]:
+        raise FlickerError(f"{missing[0]} is no part of {task.proof.top} (formal/proofs.toml)")
     return files
 
 
@@ -186,6 +192,7 @@ def configuration(task: Task, files: Mapping[str, str]) -> str:
     }[task.kind]
     settings = "".join(f" -G {key}={value}" for key, value in task.parameters.items())
     cut = [f"cutpoint {' '.join('w:' + name for name in proof.cut)}"] if proof.cut else []
+    links = ["delete c:l_* c:*.l_*"] if task.kind == "mutant" else []
     return "\n".join([
         "[options]", f"mode {mode}", f"depth {depth}", f"timeout {TIMEOUT}",
         "[engines]", "smtbmc z3",
@@ -193,6 +200,7 @@ def configuration(task: Task, files: Mapping[str, str]) -> str:
         f"read_slang -j 1 --top {proof.top}{settings} {' '.join(files)}",
         f"prep -flatten -top {proof.top}",
         *cut,
+        *links,
         "setundef -undriven -anyseq",
         "async2sync",
         "memory_map",
@@ -211,6 +219,8 @@ def verdict(task: Task, code: int, log: str) -> tuple[str, str]:
             return "ERROR", "no cover in it"
         return status, f"not reached: {missed[0]}" if missed else f"{reached} reached"
     failed = re.findall(r"Assert failed in (\S+: \S+)", log)
+    if task.kind == "mutant" and status == "FAIL" and not (failed and "counterexample trace" in log):
+        return "ERROR", "no trace to a failed assertion"
     if failed:
         return status, failed[0].replace(": ", ".")
     errors = re.findall(r"ERROR: (.*)", log)
