@@ -12,9 +12,12 @@ import numba
 import numpy as np
 
 from ..camera import Camera
+from ..errors import FlickerError
+from ..golden.fp import fp16_value
 from ..golden.records import SubtileLists, _local_means
-from ..params import SUBTILE, TILE
+from ..params import SUBTILE, TILE, Form
 from ..projection import Projected, tile_range
+from .thresholds import EPSILON, radii
 
 OBB_AXIS_RATIO = 2.0  # GSCore: the oriented box is tested for splats more elongated than this
 _SIGMAS = 3.0
@@ -106,3 +109,62 @@ def obb_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> Subt
     _obb_keep(projected.mean, projected.cov2d, lists.start, lists.entry, lists.cols, camera.width, camera.height, keep)
     start = np.concatenate([[0], np.cumsum(keep)])[lists.start]
     return replace(lists, start=start, entry=lists.entry[keep], mean=lists.mean[keep])
+
+
+@numba.njit(parallel=True, cache=True)
+def _reach_keep(gauss, rho, start, entry, mean, box_only, keep):
+    last = SUBTILE - 1.0
+    for s in numba.prange(len(start) - 1):
+        for n in range(start[s], start[s + 1]):
+            i = entry[n]
+            r = rho[gauss[i, 5]]
+            l0 = np.float64(fp16_value(gauss[i, 2]))
+            l1 = np.float64(fp16_value(gauss[i, 3]))
+            l2 = np.float64(fp16_value(gauss[i, 4]))
+            x0, y0 = -np.float64(fp16_value(mean[n, 0])), -np.float64(fp16_value(mean[n, 1]))
+            x1, y1 = x0 + last, y0 + last
+            # What the VRU's roundings of u can come to (docs/methods.md), at the farthest corner.
+            r += 2.1 * EPSILON * (l0 * max(-x0, x1) + abs(l1) * max(-y0, y1)) + 2.0**-20
+            if r <= 2.0**-20 or not l0 > 0.0 or not l2 > 0.0:
+                keep[n] = r > 2.0**-20
+                continue
+            if box_only:  # extents of the ellipse u^2 + v^2 = r^2
+                half_y = r / l2
+                half_x = r * np.sqrt(1.0 + (l1 / l2) ** 2) / l0
+                keep[n] = x0 <= half_x and x1 >= -half_x and y0 <= half_y and y1 >= -half_y
+                continue
+            if x0 <= 0.0 <= x1 and y0 <= 0.0 <= y1:
+                keep[n] = True
+                continue
+            best = np.inf
+            if x0 > 0.0 or x1 < 0.0:
+                x = x0 if x0 > 0.0 else x1
+                y = min(max(-l0 * l1 / (l1 * l1 + l2 * l2) * x, y0), y1)
+                best = (l0 * x + l1 * y) ** 2 + (l2 * y) ** 2
+            if y0 > 0.0 or y1 < 0.0:
+                y = y0 if y0 > 0.0 else y1
+                x = min(max(-l1 / l0 * y, x0), x1)
+                best = min(best, (l0 * x + l1 * y) ** 2 + (l2 * y) ** 2)
+            keep[n] = best <= r * r * (1.0 + 1e-9)
+
+
+def _reach_lists(lists: SubtileLists, box_only: bool) -> SubtileLists:
+    if lists.form != Form.FACTORED:
+        raise FlickerError("lists by reach: factored form only")
+    keep = np.zeros(len(lists.entry), np.bool_)
+    _reach_keep(lists.gauss, radii(lists.form), lists.start, lists.entry, lists.mean, box_only, keep)
+    start = np.concatenate([[0], np.cumsum(keep)])[lists.start]
+    return replace(lists, start=start, entry=lists.entry[keep], mean=lists.mean[keep])
+
+
+def reach_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:
+    """Entries of `lists` whose sub-tile meets the bounding box of the ellipse alpha = 1/255: faint splats reach less than 3 sigma.
+
+    float64, on the host, with the VRU's roundings allowed for: no contributing entry is lost.
+    """
+    return _reach_lists(lists, True)
+
+
+def ellipse_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:
+    """Entries of `lists` whose sub-tile meets the ellipse alpha = 1/255 itself: one exact-rectangle test per entry when lists are made."""
+    return _reach_lists(lists, False)

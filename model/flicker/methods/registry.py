@@ -19,10 +19,13 @@ from ..golden.records import SubtileLists, build_lists
 from ..golden.render import assemble, stream_order
 from ..params import FAITHFUL, CatMode, Coords, Form, Precision, RenderConfig
 from ..projection import Projected
+from .disc import DiscFormat, disc_masks, disc_operations
+from .exact import edge_slopes, exact_masks, exact_operations
 from .leaders import DENSE_LEADERS, SPARSE_LEADERS, cat_masks, cat_operations, seele_masks, seele_operations
-from .lists import obb_lists, tile_lists
-from .operations import NONE, Operations
-from .stage import render_masked
+from .lists import ellipse_lists, obb_lists, reach_lists, tile_lists
+from .numbers import FORMATS, numbers
+from .operations import NONE, Op, Operation, Operations
+from .stage import pixel_tests, render_masked
 from .work import Work
 
 
@@ -36,7 +39,8 @@ class View:
     _cache: dict = field(default_factory=dict, repr=False)
 
     def lists(self, form: Form, kind: str = "subtile") -> SubtileLists:
-        """Lists of a form: `subtile` (3-sigma box on 8x8), `tile` (vanilla, 16x16), `obb` (GSCore)."""
+        """Lists of a form: `subtile` (3-sigma box on 8x8), `tile` (vanilla, 16x16), `obb` (GSCore),
+        `reach` and `ellipse` (as `subtile`, without entries that cannot contribute; factored form)."""
         key = form, kind
         if key not in self._cache:
             if kind == "subtile":
@@ -46,12 +50,18 @@ class View:
             self._cache[key] = made
         return self._cache[key]
 
+    def slopes(self) -> np.ndarray:
+        """Slopes of the exact-rectangle test, float64 (N, 2)."""
+        if "slopes" not in self._cache:
+            self._cache["slopes"] = edge_slopes(self.projected)
+        return self._cache["slopes"]
+
     def drop(self) -> None:
         """Forget the lists."""
         self._cache.clear()
 
 
-_LISTS = {"tile": tile_lists, "obb": obb_lists}
+_LISTS = {"tile": tile_lists, "obb": obb_lists, "reach": reach_lists, "ellipse": ellipse_lists}
 
 
 @dataclass
@@ -65,8 +75,8 @@ class Masks:
     fallen: np.ndarray | None = None
 
 
-Generator = Callable[[SubtileLists, np.ndarray, np.ndarray], Masks]
-"""(lists, order, core_start) to masks."""
+Generator = Callable[["View", SubtileLists, np.ndarray, np.ndarray], Masks]
+"""(view, lists, order, core_start) to masks."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +116,7 @@ class Result:
 def whole(test_cycles: int) -> Generator:
     """No test: every element goes to all four mini-tiles."""
 
-    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+    def generate(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
         n = len(lists.entry)
         return Masks(np.full(n, 15, np.uint8), np.full(n, test_cycles, np.uint8), np.zeros(n, np.uint16))
 
@@ -116,7 +126,7 @@ def whole(test_cycles: int) -> Generator:
 def cat(config: RenderConfig) -> Generator:
     """The contribution-aware test of a configuration."""
 
-    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+    def generate(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
         mask, cycles, fallen = cat_masks(lists, config, order, core_start)
         leaders = np.where(cycles == 2, DENSE_LEADERS, SPARSE_LEADERS).astype(np.uint16)
         return Masks(mask, cycles, leaders, fallen=fallen)
@@ -124,7 +134,7 @@ def cat(config: RenderConfig) -> Generator:
     return generate
 
 
-def seele(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+def seele(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
     """SeeLe's leader pixels of 2x2 groups."""
     mask, visit = seele_masks(lists)
     n = len(mask)
@@ -134,7 +144,7 @@ def seele(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Mas
 def oracle(pixels: bool) -> Generator:
     """Free masks without a superfluous bit: what contributes, found by running the VRUs on everything."""
 
-    def generate(lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+    def generate(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
         n = len(lists.entry)
         _, contributing, _ = render_masked(lists, order, np.full(n, 15, np.uint8), None)
         mask = ((contributing != 0) << np.arange(4)).sum(axis=1).astype(np.uint8)
@@ -143,13 +153,41 @@ def oracle(pixels: bool) -> Generator:
     return generate
 
 
+def exact(form: Form, fmt: str, bound: bool, scaled: bool) -> Generator:
+    """The exact-rectangle test of each mini-tile, one element per cycle."""
+
+    def generate(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+        mask, evaluations = exact_masks(lists, view.slopes(), numbers(fmt), bound, scaled)
+        return Masks(mask, np.ones(len(mask), np.uint8), evaluations)
+
+    return generate
+
+
+def rows(fmt: DiscFormat, pixels: bool) -> Generator:
+    """Row intervals in the unit disc, one element per cycle; eight rows count as eight evaluations."""
+
+    def generate(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+        mask, visit = disc_masks(lists, fmt)
+        n = len(mask)
+        return Masks(mask, np.ones(n, np.uint8), np.full(n, 8, np.uint16), visit if pixels else None)
+
+    return generate
+
+
+def all_pixels(view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray) -> Masks:
+    """The weight of all 64 pixels in FP16 against the threshold, eight leaders a cycle as two PRTUs have."""
+    mask, visit = pixel_tests(lists)
+    n = len(mask)
+    return Masks(mask, np.full(n, 8, np.uint8), np.full(n, 64, np.uint16), visit)
+
+
 def run(method: str | Method, view: View, background=(0.0, 0.0, 0.0)) -> Result:
     """Masks, picture and work of a method in a view. Raises FlickerError for an unknown name."""
     if isinstance(method, str):
         method = get_method(method)
     lists = view.lists(method.form, method.lists)
     order, core_start = stream_order(lists)
-    masks = method.generate(lists, order, core_start)
+    masks = method.generate(view, lists, order, core_start)
     pixels, contributing, pixel_finish = render_masked(lists, order, masks.mask, masks.visit)
     fallen = np.zeros(lists.cols * lists.rows, bool) if masks.fallen is None else masks.fallen
     work = Work(
@@ -194,16 +232,65 @@ def _flicker() -> list[Method]:
     return methods
 
 
+def pixel_operations(form: Form) -> Operations:
+    """Eight of 64 pixels a cycle: eight columns, then one row a cycle."""
+    if form == Form.FACTORED:
+        own = (Operation(Op.MUL, "FP16", 8 + 16), Operation(Op.MUL, "FP16", 8 + 64, sqr=True), Operation(Op.ADD, "FP16", 128))
+    else:
+        own = (Operation(Op.MUL, "FP16", 16 + 128), Operation(Op.MUL, "FP16", 16, sqr=True), Operation(Op.ADD, "FP16", 128))
+    return Operations((Operation(Op.LOG, "FP16", 1), Operation(Op.ADD, "FP16", 16, note="differences"), *own, Operation(Op.CMP, "FP16", 64)), cycles=8)
+
+
+def _exploration() -> list[Method]:
+    found = []
+    for form in (Form.FACTORED, Form.CONIC):
+        for fmt in FORMATS:
+            for bound in (False, True):
+                for scaled in (False, True):
+                    fixed_point = fmt.startswith("q")
+                    if scaled and (fmt == "fp16" or fixed_point) or bound and fixed_point:
+                        continue
+                    words = [form.name.lower()] + ["scaled"] * scaled + ["bound"] * bound
+                    found.append(Method(
+                        "-".join(["exact", fmt, *words]), ", ".join(["exact rectangle", fmt, *words]), "exact", form,
+                        exact(form, fmt, bound, scaled), operations=exact_operations(form, fmt, bound, scaled), exact=bound, precision=fmt,
+                    ))
+    for fmt in DISC_FORMATS:
+        for pixels in (True, False):
+            for kind in ("subtile", "reach", "ellipse"):
+                if kind != "subtile" and fmt != DISC_FORMATS[0]:
+                    continue
+                words = ["rows" if pixels else "rows_minitile", f"f{fmt.fraction}a{fmt.address}"] + [kind] * (kind != "subtile")
+                title = f"row intervals, {fmt.fraction} fraction bits, {fmt.address}-bit root table, {'pixel' if pixels else 'mini-tile'} masks"
+                found.append(Method(
+                    "-".join(words), title + _LIST_TITLES[kind], "rows", Form.FACTORED, rows(fmt, pixels), lists=kind,
+                    operations=disc_operations(fmt), exact=True, pixels=pixels, precision=f"fixed f{fmt.fraction}a{fmt.address}",
+                ))
+    for form in (Form.FACTORED, Form.CONIC):
+        found.append(Method(
+            f"pixels-fp16-{form.name.lower()}", f"all 64 pixels tested in FP16, {form.name.lower()}", "rows", form, all_pixels,
+            operations=pixel_operations(form), exact=True, pixels=True, precision="fp16",
+        ))
+    return found
+
+
+# The first is the recommended one.
+DISC_FORMATS = [DiscFormat(f, a) for f, a in ((8, 8), (6, 6), (7, 5), (7, 7), (8, 6), (9, 7), (10, 10))]
+_LIST_TITLES = {"subtile": "", "reach": ", lists by the box of the reach", "ellipse": ", lists by the ellipse"}
+
+
 @lru_cache(maxsize=None)
 def methods() -> dict[str, Method]:
     """All methods by name, in the order of tables."""
-    found = _baselines(Form.FACTORED) + _baselines(Form.CONIC) + _flicker()
+    found = _baselines(Form.FACTORED) + _baselines(Form.CONIC) + _flicker() + _exploration()
     return {m.name: m for m in found}
 
 
 ALIASES = {
     "faithful": "-".join(("flicker", FAITHFUL.cat.name, FAITHFUL.precision.name, FAITHFUL.form.name)).lower(),
     "flicker": "flicker-smooth-mixed-factored",
+    "exact": "exact-fp16-factored-bound",
+    "rows": "rows-f8a8",
     **{name: f"{name}-factored" for name in ("vanilla", "no_ctu", "gscore", "seele", "oracle", "oracle_minitile")},
 }
 

@@ -15,6 +15,7 @@ from ..golden.render import CUT_BASE2, CUT_NATURAL
 from ..golden.vru import ALPHA_MIN, CONIC, TRANSMITTANCE_MIN, alpha_of, blend, next_transmittance
 from ..golden.weight import conic_axis, conic_pixel, factored_pixel, factored_row
 from ..params import MINITILE
+from .thresholds import thresholds
 
 
 @numba.njit
@@ -161,3 +162,33 @@ def missed_pixels(lists: SubtileLists, mask: np.ndarray, visit: np.ndarray | Non
     visit = np.zeros((0, 4), np.uint16) if visit is None else visit
     _misses(lists.gauss, lists.start, lists.entry, lists.mean, mask, visit, int(lists.form), pixel_finish, missed)
     return missed
+
+
+@numba.njit(parallel=True, cache=True)
+def _pixel_tests(gauss, limit, start, entry, mean, form, mask, visit):
+    for s in numba.prange(len(start) - 1):
+        col = np.empty((2, 4), np.float32)
+        row = np.empty((2, 4), np.float32)
+        e = np.empty(16, np.float32)
+        f = np.empty(9, np.float32)
+        for n in range(start[s], start[s + 1]):
+            load_splat(n, entry[n], gauss, mean, f)
+            t = np.float32(limit[gauss[entry[n], 5]])
+            send = 0
+            for m in range(4):
+                minitile_weights(f, m, form, col, row, e)
+                v = 0
+                for k in range(16):
+                    v |= int(e[k] >= 0 and t > e[k]) << k
+                visit[n, m] = v
+                send |= int(v != 0) << m
+            mask[n] = send
+
+
+def pixel_tests(lists: SubtileLists) -> tuple[np.ndarray, np.ndarray]:
+    """(mask, visit) when every pixel is tested: 0 <= E < log(255 o), all in FP16 as in the VRU."""
+    n = len(lists.entry)
+    mask, visit = np.empty(n, np.uint8), np.empty((n, 4), np.uint16)
+    limit = thresholds(lists.form)
+    _pixel_tests(lists.gauss, limit, lists.start, lists.entry, lists.mean, int(lists.form), mask, visit)
+    return mask, visit
