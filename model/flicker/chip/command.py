@@ -70,10 +70,11 @@ def chip(
     """Estimate a whole frame: culling, memory, lists, sorting, rendering."""
     from ..camera import find_cameras, select_view
     from ..cli import _writable, parse_size, write_atomically
+    from ..golden.render import render_golden
     from ..params import FAITHFUL, RenderConfig
     from ..scene import load_scene
     from .constants import constant_table
-    from .frame import ChipConfig, frame_estimate, prepare, render_bound
+    from .frame import ChipConfig, frame_estimate, prepare, render_bound, subtile_bound
     from .lists import RECOMMENDED, SCHEMES, run_scheme
     from .memory import MemoryFormat
     from .tables import scheme_rows
@@ -94,10 +95,12 @@ def chip(
     config = FAITHFUL if faithful else RenderConfig()
     setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
     prepared = prepare(loaded, camera, config, setting.cluster_size)
+    golden = render_golden(prepared.lists, config)
+    subtile_cycles = subtile_bound(prepared.lists, config, golden)
     if render_cycles is None:
-        render_cycles = render_bound(prepared.lists, config)
+        render_cycles = render_bound(prepared.lists, config, golden)
         console.print("rendering stage: lower bound from the golden model's counts (--render-cycles gives another number)")
-    estimate = frame_estimate(loaded, camera, config, render_cycles, setting, prepared)
+    estimate = frame_estimate(loaded, camera, config, render_cycles, setting, prepared, subtile_cycles=subtile_cycles)
     console.print(f"{scene.name}, view {view}, {camera.width}x{camera.height}, memory {memory}, scheme {scheme}")
     _show_frame(estimate)
     if schemes:

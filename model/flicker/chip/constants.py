@@ -67,7 +67,8 @@ MERGE_WAYS = 16
 SORT_CAPACITY = 2048
 LISTS_IN_FLIGHT = 16
 FILTER_ENTRIES_PER_CYCLE = 4
-FETCH_AHEAD = 64
+QUEUE_REFERENCES = 256
+REFERENCE_BYTES = 2
 
 # ---- feature buffers ---------------------------------------------------------------------------
 
@@ -75,7 +76,6 @@ FEATURE_BUFFER_BYTES = 288 * 1024
 RECORD_CACHE_BYTES = 64 * 1024
 RECORD_CACHE_WAYS = 4
 GEOMETRY_BUFFER_BYTES = 4 * 2 * 1024
-RECORD_FIFO_BYTES = 4 * 1024
 
 _PAPER = "paper, Sec. V-A (hardware set-up) or Table 2a"
 _JEDEC = "JEDEC JESD209-4 LPDDR4-3200, 8 Gb a channel, as listed in DRAMSys (JEDEC_8Gb_LPDDR4-3200_16bit), clocks of 0.625 ns"
@@ -136,12 +136,12 @@ SOURCES = {
     "SORT_CAPACITY": "assumption: entries a sorting unit holds; longer lists are sorted in depth chunks",
     "LISTS_IN_FLIGHT": "assumption: lists read ahead over the four units, to hide the latency of a chain of chunks",
     "FILTER_ENTRIES_PER_CYCLE": "assumption: entries whose mask is looked at in a cycle",
-    "FETCH_AHEAD": "assumption: records fetched beyond the one that finishes a sub-tile",
+    "QUEUE_REFERENCES": "assumption: records that may wait for a rendering core; they stay in the record cache, the core's queue holds their places",
+    "REFERENCE_BYTES": "assumption: place of a record in the record cache",
     "FEATURE_BUFFER_BYTES": _PAPER,
     "RECORD_CACHE_BYTES": "assumption: part of the feature buffers that keeps records for neighbouring tiles",
     "RECORD_CACHE_WAYS": "assumption",
     "GEOMETRY_BUFFER_BYTES": "assumption: two buffers of 1 KiB a preprocessing core for incoming parameters",
-    "RECORD_FIFO_BYTES": "assumption: 32 records a rendering core, so that cores may drift apart",
 }
 
 

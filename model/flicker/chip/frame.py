@@ -14,16 +14,17 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from ..camera import Camera
+from ..errors import FlickerError
 from ..golden.records import SubtileLists, build_lists
-from ..golden.render import Frame, render_golden, stream_order
+from ..golden.render import COUNTS, Frame, render_golden, stream_order
 from ..params import CHANNELS, PIXELS_PER_VRU, TILE, RenderConfig
 from ..projection import Projected, project
 from ..scene import Scene
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
 from .dram import READ, WRITE, DramConfig, Stream, interleave, simulate
-from .lists import RECOMMENDED, SCHEMES, Addresses, Scheme, SchemeResult, Splats, collect, consumed, run_scheme
-from .memory import MemoryFormat, layout
+from .lists import RECOMMENDED, SCHEMES, Addresses, Scheme, SchemeResult, Splats, broadcast_cycles, collect, consumed, run_scheme
+from .memory import CHUNK, MemoryFormat, layout
 
 _GEOMETRY_BASE = 0
 _COLOUR_BASE = 1 << 28
@@ -46,6 +47,12 @@ class ChipConfig:
     scheme: Scheme = SCHEMES[RECOMMENDED]
     early_stop: bool = True
     dram: DramConfig = field(default_factory=DramConfig)
+
+    def __post_init__(self) -> None:
+        if self.memory is MemoryFormat.CHUNK and self.cluster_size != CHUNK:
+            raise FlickerError(f"chip: cluster_size must be {CHUNK} with chunks, not {self.cluster_size}")
+        if self.cull_shape not in ("box", "sphere", "none"):
+            raise FlickerError(f"chip: cull_shape must be box, sphere or none, not {self.cull_shape}")
 
 
 @dataclass(eq=False)
@@ -150,13 +157,20 @@ class FrameEstimate:
         }
 
 
+def subtile_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None = None) -> np.ndarray:
+    """int64 (S,): lower bound of a core's cycles in each sub-tile, the longer of testing and of blending with balanced channels."""
+    frame = frame or render_golden(lists, config)
+    test, sent = (frame.counts[:, COUNTS.index(name)] for name in ("test_cycles", "minitiles_sent"))
+    return np.maximum(test, -(-sent * PIXELS_PER_VRU // CHANNELS))
+
+
 def render_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None = None) -> int:
-    """Lower bound of the rendering stage's cycles: the busiest core, its channels perfectly balanced, FIFOs never in the way."""
+    """Lower bound of the rendering stage's cycles: the busiest core, testing and blending overlapped over all its sub-tiles."""
     frame = frame or render_golden(lists, config)
     order, part = stream_order(lists)
-    test = [int(frame.counts[order[a:b], 2].sum()) for a, b in zip(part, part[1:])]
-    sent = [int(frame.counts[order[a:b], 4].sum()) for a, b in zip(part, part[1:])]
-    return max(*test, *(-(-s * PIXELS_PER_VRU // CHANNELS) for s in sent))
+    cores = [frame.counts[order[a:b]].sum(axis=0) for a, b in zip(part, part[1:])]
+    test, sent = COUNTS.index("test_cycles"), COUNTS.index("minitiles_sent")
+    return max(max(int(n[test]), -(-int(n[sent]) * PIXELS_PER_VRU // CHANNELS)) for n in cores)
 
 
 def _pixels(camera: Camera) -> Stream:
@@ -195,16 +209,17 @@ def _parameter_streams(prepared: Prepared, chip: ChipConfig) -> tuple[list[Strea
 
 def frame_estimate(
     scene: Scene, camera: Camera, config: RenderConfig, render_cycles: int, chip: ChipConfig = ChipConfig(),
-    prepared: Prepared | None = None, scheme_result: SchemeResult | None = None,
+    prepared: Prepared | None = None, scheme_result: SchemeResult | None = None, subtile_cycles: np.ndarray | None = None,
 ) -> FrameEstimate:
     """Estimate a frame. render_cycles: of the rendering stage, from its model or the RTL.
 
     prepared: from `prepare` with the same scene, camera and cluster size, to save time (then scene and camera are not used).
-    scheme_result: of `run_scheme` with the same scheme on the same view.
+    scheme_result: of `run_scheme` with the same scheme on the same view. subtile_cycles: of a core in each sub-tile, (S,); given, the stage
+    "render, broadcast" says what sharing one stream of records among the cores of a tile makes of them.
     """
     prepared = prepared or prepare(scene, camera, config, chip.cluster_size)
     if prepared.clusters.size != chip.cluster_size:
-        raise ValueError(f"prepared for clusters of {prepared.clusters.size}, not {chip.cluster_size}")
+        raise FlickerError(f"chip: prepared for clusters of {prepared.clusters.size}, not {chip.cluster_size}")
     result = scheme_result or run_scheme(prepared.splats, chip.scheme, prepared.needed if chip.early_stop else None)
     front, counts = _parameter_streams(prepared, chip)
     records = Stream.span("record write", Addresses().records, len(prepared.splats) * c.RECORD_BYTES, WRITE)
@@ -225,6 +240,9 @@ def frame_estimate(
         for k in ("chain latency", "sort", "filter by mask", "hand out records") if k in result.cycles
     ]
     stages.append(Stage("render", "rendering", int(render_cycles)))
+    if subtile_cycles is not None and chip.scheme.grain > 1:
+        cycles = broadcast_cycles(prepared.splats, prepared.needed, subtile_cycles, c.QUEUE_REFERENCES, chip.scheme.grain)
+        stages.append(Stage("render, broadcast", "rendering", cycles))
     counts |= {
         "list entries": result.entries, "longest list": result.longest, "sub-tile entries": len(prepared.lists.entry),
         "sub-tile entries needed": int(prepared.needed.sum()), "records fetched": result.fetched, "records from DRAM": result.missed,

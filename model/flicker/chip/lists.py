@@ -24,7 +24,7 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..golden.records import _span
-from ..params import ALPHA_MAX, ALPHA_MIN, SUBTILE, TRANSMITTANCE_MIN
+from ..params import ALPHA_MAX, ALPHA_MIN, CORES, SUBTILE, TRANSMITTANCE_MIN
 from . import constants as c
 from .dram import MASKED_WRITE, READ, WRITE, Stream
 from .sorting import merge_passes, sort_lists
@@ -469,6 +469,78 @@ def consumed(projected, lists) -> np.ndarray:
     return out
 
 
+@numba.njit(cache=True)
+def _broadcast(start, record, box, block, cols, rows, needed, service, depth):
+    """Cycles until the last core is done; see `broadcast_cycles`. start, record: lists of whole tiles or groups, sorted."""
+    bcols = (cols + block - 1) // block
+    finish = np.zeros((4, depth))  # when the records last handed to a core are done, a ring
+    given = np.zeros(4, np.int64)
+    free = np.zeros(4)
+    seen = np.zeros(4, np.int64)
+    sent = 0.0
+    for t in range(len(start) - 1):
+        x0 = t % bcols * block
+        y0 = t // bcols * block
+        for ty in range(y0, min(y0 + block, rows), 2):
+            for tx in range(x0, min(x0 + block, cols), 2):
+                seen[:] = 0
+                for e in range(start[t], start[t + 1]):
+                    r = record[e]
+                    at = sent + 1.0
+                    taken = False
+                    for step in range(2):  # when there is room everywhere; then hand out
+                        for y in range(max(ty, box[r, 2]), min(ty + 2, box[r, 3], rows)):
+                            for x in range(max(tx, box[r, 0]), min(tx + 2, box[r, 1], cols)):
+                                k = (y - ty) * 2 + x - tx
+                                s = y * cols + x
+                                if seen[k] < needed[s]:
+                                    slot = given[k] % depth
+                                    if step == 0:
+                                        taken = True
+                                        at = max(at, finish[k, slot])
+                                    else:
+                                        free[k] = max(free[k], at) + service[s]
+                                        finish[k, slot] = free[k]
+                                        given[k] += 1
+                                if step == 1:
+                                    seen[k] += 1
+                    if taken:
+                        sent = at
+    return max(free.max(), sent)
+
+
+def broadcast_cycles(splats: Splats, needed: np.ndarray, subtile_cycles: np.ndarray, depth: int, grain: Grain = Grain.TILE) -> int:
+    """Cycles of the rendering stage when the records of a tile are broadcast and every core queues `depth` of them.
+
+    A record is sent, one a cycle, once every core that takes it has room; a core works on it for the average of its sub-tile,
+    subtile_cycles (S,) / needed. With a deep queue the cores are independent, with a shallow one the slowest sub-tile of a tile holds up the
+    others, as a barrier would.
+    """
+    if depth < 1:
+        raise FlickerError(f"broadcast: depth must be at least 1, not {depth}")
+    block = int(grain)
+    count = _count(np.arange(len(splats)), splats.box, block, splats.cols, splats.rows)
+    start = np.concatenate([[0], np.cumsum(count)])
+    record = np.empty(start[-1], np.int64)
+    number = np.empty(int(splats.projected.max(initial=-1)) + 1, np.int64)
+    number[splats.projected] = np.arange(len(splats))
+    near_to_far = number[np.sort(splats.projected)]
+    _fill_lists(near_to_far, splats.box, block, splats.cols, start, record)
+    service = subtile_cycles / np.maximum(needed, 1)
+    return int(np.ceil(_broadcast(start, record, splats.box, block, splats.cols, splats.rows, needed, service, depth)))
+
+
+@numba.njit(cache=True)
+def _fill_lists(order, box, block, cols, start, record):
+    bcols = (cols + block - 1) // block
+    fill = start[:-1].copy()
+    for r in order:
+        for y in range(box[r, 2] // block, (box[r, 3] - 1) // block + 1):
+            for x in range(box[r, 0] // block, (box[r, 1] - 1) // block + 1):
+                record[fill[y * bcols + x]] = r
+                fill[y * bcols + x] += 1
+
+
 @dataclass(eq=False)
 class SchemeResult:
     """What a scheme did.
@@ -510,9 +582,12 @@ class Addresses:
 
 
 def run_scheme(
-    splats: Splats, scheme: Scheme, needed: np.ndarray | None = None, addresses: Addresses = Addresses(), ahead: int = c.FETCH_AHEAD
+    splats: Splats, scheme: Scheme, needed: np.ndarray | None = None, addresses: Addresses = Addresses(), ahead: int = c.QUEUE_REFERENCES
 ) -> SchemeResult:
-    """Execute a scheme. needed: entries of each sub-tile list that rendering takes (`consumed`), None for all."""
+    """Execute a scheme. needed: entries of each sub-tile list that rendering takes (`consumed`), None for all.
+
+    ahead: entries fetched beyond the one that finishes a sub-tile, in the worst case a full queue.
+    """
     block, cols, rows = int(scheme.grain), splats.cols, splats.rows
     total = len(splats)
     streams: list[Stream] = []
@@ -589,7 +664,8 @@ def run_scheme(
         sets = scheme.record_cache_bytes // c.RECORD_BYTES // c.RECORD_CACHE_WAYS
         keep = np.empty(len(fetched), np.int64)
         missed = keep[: _misses(fetched, sets, c.RECORD_CACHE_WAYS, keep)]
-    streams.append(Stream.items("record read", addresses.records, c.RECORD_BYTES, missed, READ))
+    burst = addresses.records // c.LINE_BYTES + missed * (c.RECORD_BYTES // c.LINE_BYTES)
+    streams.append(Stream("record read", burst, np.full(len(burst), READ, np.int8), len(burst) * c.RECORD_BYTES))
 
     if scheme.method is not Method.GLOBAL:
         place = np.arange(len(count)) if block > 1 else (np.arange(len(count)) // cols % 2) * 2 + np.arange(len(count)) % cols % 2
@@ -605,7 +681,7 @@ def run_scheme(
         "write combining": scheme.combiner_sets * scheme.combiner_ways * (line + c.POINTER_BYTES),
         "sort buffers": units * 2 * scheme.sort_capacity * max(scheme.entry_bits, c.KEY_BITS + c.ID_BITS) // 8,
         "record cache": scheme.record_cache_bytes + scheme.record_cache_bytes // c.RECORD_BYTES * 3,
-        "record FIFOs": c.RECORD_FIFO_BYTES,
+        "record queues": CORES * c.QUEUE_REFERENCES * c.REFERENCE_BYTES,
         "parameter buffers": c.GEOMETRY_BUFFER_BYTES,
     }
     front = cycles["emit entries"] + cycles.get("count entries", 0) + cycles.get("global sort", 0)

@@ -137,21 +137,17 @@ def _unit(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return np.clip(np.divide(values - low, extent, out=np.zeros_like(extent), where=extent > 0), 0.0, 1.0)
 
 
-def _code(unit: np.ndarray, bits: int, nearest: bool) -> np.ndarray:
-    return np.floor(unit * ((1 << bits) - 1) + (0.5 if nearest else 0.0)).astype(np.uint32)
+def _code(unit: np.ndarray, bits: int) -> np.ndarray:
+    return np.floor(unit * ((1 << bits) - 1) + 0.5).astype(np.uint32)
 
 
-def _pack_111011(unit: np.ndarray, nearest: bool) -> np.ndarray:
-    x, y, z = (_code(unit[:, i], bits, nearest) for i, bits in enumerate((11, 10, 11)))
+def _pack_111011(unit: np.ndarray) -> np.ndarray:
+    x, y, z = (_code(unit[:, i], bits) for i, bits in enumerate((11, 10, 11)))
     return x << 21 | y << 11 | z
 
 
-def encode_chunks(scene: Scene, nearest: bool = True, bounds: np.ndarray | None = None) -> ChunkScene:
-    """Quantise in chunks of 256 in the order of the scene.
-
-    nearest: round to the nearest code (splat-transform); otherwise down, as gsply's writer does. bounds: chunk bounds to use instead of the
-    tightest, float32 (C, 18).
-    """
+def encode_chunks(scene: Scene, bounds: np.ndarray | None = None) -> ChunkScene:
+    """Quantise in chunks of 256 in the order of the scene. bounds: chunk bounds to use instead of the tightest, float32 (C, 18)."""
     n = len(scene)
     logs = np.clip(np.log(scene.scales.astype(np.float64)), -_SCALE_LOG_LIMIT, _SCALE_LOG_LIMIT)
     colours = 0.5 + _SH_C0 * scene.sh[:, 0].astype(np.float64)
@@ -163,10 +159,10 @@ def encode_chunks(scene: Scene, nearest: bool = True, bounds: np.ndarray | None 
         raise FlickerError(f"chunks: bounds are {bounds.shape}, not {(-(-n // CHUNK), 18)}")
     units = [_unit(p, bounds[:, 6 * i : 6 * i + 3], bounds[:, 6 * i + 3 : 6 * i + 6]) for i, p in enumerate(parts)]
     packed = np.empty((n, 4), np.uint32)
-    packed[:, 0] = _pack_111011(units[0], nearest)
-    packed[:, 2] = _pack_111011(units[1], nearest)
+    packed[:, 0] = _pack_111011(units[0])
+    packed[:, 2] = _pack_111011(units[1])
     opacity = np.clip(scene.opacities.astype(np.float64), 0.0, 1.0)
-    rgba = [_code(units[2][:, i], 8, nearest) for i in range(3)] + [_code(opacity, 8, nearest)]
+    rgba = [_code(units[2][:, i], 8) for i in range(3)] + [_code(opacity, 8)]
     packed[:, 3] = rgba[0] << 24 | rgba[1] << 16 | rgba[2] << 8 | rgba[3]
     quats = scene.quats.astype(np.float64)
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
@@ -175,7 +171,7 @@ def encode_chunks(scene: Scene, nearest: bool = True, bounds: np.ndarray | None 
     others = quats[np.arange(4) != largest[:, None]].reshape(n, 3)
     word = largest.astype(np.uint32) << 30
     for i in range(3):
-        word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10, nearest) << np.uint32(20 - 10 * i)
+        word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10) << np.uint32(20 - 10 * i)
     packed[:, 1] = word
     rest = scene.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1).astype(np.float64)
     return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))

@@ -13,17 +13,20 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..camera import Camera, load_cameras
 from ..cli import parse_size
 from ..demo_scene import demo_cameras, generate
 from ..errors import FlickerError
+from ..golden.render import render_golden
 from ..params import RenderConfig
 from ..scene import Scene, load_scene
 from .clusters import build_clusters, cull
 from .constants import constant_table
 from .dram import DramConfig, simulate
-from .frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare, render_bound
-from .lists import SCHEMES, Scheme, SchemeResult, collect, run_scheme
+from .frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare, render_bound, subtile_bound
+from .lists import SCHEMES, Scheme, SchemeResult, broadcast_cycles, collect, run_scheme
 from .memory import MemoryFormat
 from .quality import KEYS, format_quality, key_quality
 
@@ -129,9 +132,19 @@ def _variation_rows(title: str, p: Prepared, scheme: Scheme) -> Rows:
     return rows
 
 
-def _dram_rows() -> Rows:
-    import numpy as np
+_DEPTHS = (16, 32, 64, 128, 256, 512, 4096)
 
+
+def _broadcast_row(title: str, p: Prepared, subtile_cycles: np.ndarray) -> tuple[str, ...]:
+    rows, cols = p.lists.rows, p.lists.cols
+    grid = np.zeros((rows + rows % 2, cols + cols % 2), np.int64)
+    grid[:rows, :cols] = subtile_cycles.reshape(rows, cols)
+    parts = [grid[k // 2 :: 2, k % 2 :: 2] for k in range(4)]
+    cycles = [broadcast_cycles(p.splats, p.needed, subtile_cycles, depth) for depth in _DEPTHS]
+    return (title, f"{max(int(x.sum()) for x in parts):,}", f"{int(np.maximum.reduce(parts).sum()):,}", *(f"{n:,}" for n in cycles))
+
+
+def _dram_rows() -> Rows:
     rng = np.random.default_rng(1)
     bursts = 1 << 18
     rows = []
@@ -151,7 +164,7 @@ def _dram_rows() -> Rows:
 
 def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
     """Every table by name."""
-    culls, frames, purposes, counts, schemes, variations, formats = ([] for _ in range(7))
+    culls, frames, purposes, counts, schemes, variations, formats, broadcasts = ([] for _ in range(8))
     keys: dict[tuple[str, int], list[str]] = {k: [] for k in KEYS}
     titles = []
     config = RenderConfig()
@@ -161,7 +174,9 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
         p = prepare(scene, camera, config)
         counts.append(_count_rows(title, p))
         culls += _cull_rows(title, scene, camera, p.projected.n_visible)
-        bound = render_bound(p.lists, config)
+        golden = render_golden(p.lists, config)
+        bound = render_bound(p.lists, config, golden)
+        broadcasts.append(_broadcast_row(title, p, subtile_bound(p.lists, config, golden)))
         results = {name: run_scheme(p.splats, s, p.needed) for name, s in SCHEMES.items()}
         schemes += [(title, *row) for row in scheme_rows(list(results.values()))]
         base = ChipConfig()
@@ -188,6 +203,7 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
         "traffic": markdown(("view", "purpose", "used MB", "moved MB", "DRAM cycles alone", "efficiency"), purposes),
         "schemes": markdown(("view", *scheme_rows(None)), schemes),
         "variations": markdown(("view", "variation", "list MB", "record MB", "DRAM cycles", "sort", "chain", "on chip KB"), variations),
+        "broadcast": markdown(("view", "independent cores", "barrier after each tile", *(f"queues of {d}" for d in _DEPTHS)), broadcasts),
         "formats": markdown(("view", "format", "MB", "bytes a Gaussian", "float64, dB", "golden, dB"), formats),
         "keys": markdown(("key", "bits", *titles), [(kind, str(bits), *values) for (kind, bits), values in keys.items()]),
         "dram": markdown(("access", "efficiency", "activates a burst"), _dram_rows()),
