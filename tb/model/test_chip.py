@@ -462,11 +462,13 @@ def test_frame_bottleneck_and_choices(prepared):
     slow = frame_estimate(p.scene, p.camera, config, 10**7, base, p)
     assert slow.bottleneck == "render" and slow.interval_cycles == 10**7 and slow.fps == 100
     fp16 = replace(base, memory=MemoryFormat.FP16)
-    one_step = replace(fp16, two_step=False)
+    assert slow.bytes < frame_estimate(p.scene, p.camera, config, 0, fp16, p).bytes
+    near = prepare(p.scene, camera(focal=400), config, 16)
+    two_step = replace(fp16, cluster_size=16)
+    one_step = replace(two_step, two_step=False)
     no_cull = replace(one_step, cull_shape="none")
-    near = prepare(p.scene, camera(focal=400), config)
-    sizes = [frame_estimate(near.scene, near.camera, config, 0, chip, near).bytes for chip in (base, fp16, one_step, no_cull)]
-    assert sizes[0] < sizes[1] < sizes[2] < sizes[3]
+    sizes = [frame_estimate(near.scene, near.camera, config, 0, chip, near).bytes for chip in (two_step, one_step, no_cull)]
+    assert sizes[0] < sizes[1] < sizes[2]
     golden = render_golden(p.lists, config)
     sub = subtile_bound(p.lists, config, golden)
     bound = render_bound(p.lists, config, golden)
