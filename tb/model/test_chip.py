@@ -463,7 +463,7 @@ def test_frame_bottleneck_and_choices(prepared):
     assert slow.bottleneck == "render" and slow.interval_cycles == 10**7 and slow.fps == 100
     fp16 = replace(base, memory=MemoryFormat.FP16)
     assert slow.bytes < frame_estimate(p.scene, p.camera, config, 0, fp16, p).bytes
-    near = prepare(p.scene, camera(focal=400), config, 16)
+    near = prepare(p.scene, camera(distance=0), config, 16)  # half of the scene is behind the camera
     two_step = replace(fp16, cluster_size=16)
     one_step = replace(two_step, two_step=False)
     no_cull = replace(one_step, cull_shape="none")
