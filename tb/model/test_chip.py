@@ -146,6 +146,20 @@ def test_chunks_round_to_the_nearest_code():
     assert (again.packed[:, 1] == data.packed[:, 1]).mean() > 0.99  # the two largest components may tie
 
 
+def test_scaled_sh_codes(tmp_path):
+    scene, _ = build_clusters(random_scene(seed(), 700, 2), 256)
+    scene.sh[256:512, 1:] = 0  # a chunk without any
+    scene.sh[300, 0] = 5
+    data = encode_chunks(scene, scaled_sh=True)
+    back = decode_chunks(data)
+    largest = np.repeat([np.abs(scene.sh[k : k + 256, 1:]).max() for k in (0, 256, 512)], 256)[:700]
+    assert (np.abs(back.sh[:, 1:] - scene.sh[:, 1:]).max(axis=(1, 2)) <= largest / 254 + 1e-6).all()
+    assert (back.sh[256:512, 1:] == 0).all() and data.sh.min() >= 1
+    assert np.array_equal(decode_chunks(encode_chunks(scene)).means, back.means)
+    with pytest.raises(FlickerError, match="scaled"):
+        save_chunks(data, tmp_path / "a.ply")
+
+
 @pytest.mark.parametrize("degree", [0, 1, 3])
 def test_chunks_in_a_file_are_what_gsply_reads(tmp_path, degree):
     scene, _ = build_clusters(random_scene(seed(), 600, degree), 256)
@@ -261,6 +275,16 @@ def test_schemes_end_with_the_lists_of_the_golden_model(prepared, scheme, early)
     used = result.entries * scheme.entry_bits // 8
     assert moved["list write"].used_bytes == used <= moved["list write"].moved_bytes
     assert result.early_stop > 0 if early else result.early_stop == 0
+
+
+def test_short_keys_make_the_lists_that_they_say(prepared):
+    p = prepared
+    result = run_scheme(p.splats, replace(SCHEMES[RECOMMENDED], key_bits=10))
+    short = resorted(p.projected, quantised_key(p.projected.depth, 10, "linear"))
+    lists = build_lists(short, p.camera, RenderConfig())
+    assert np.array_equal(p.projected.index[p.splats.projected[result.record]], short.index[lists.entry])
+    assert not np.array_equal(p.splats.projected[result.record], p.lists.entry)
+    assert result.scheme.entry_bits == 10 + 24 + 4
 
 
 def test_counting_fills_lines_when_the_buffer_is_large(prepared):

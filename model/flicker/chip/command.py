@@ -59,7 +59,7 @@ def chip(
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
     faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration of the rendering stage")] = False,
     render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: a lower bound]")] = None,
-    memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk")] = "chunk",
+    memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
     scheme: Annotated[Optional[str], typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
     schemes: Annotated[bool, typer.Option("--schemes", help="compare all schemes")] = False,
     formats: Annotated[bool, typer.Option("--formats", help="picture quality and bytes of the memory formats")] = False,

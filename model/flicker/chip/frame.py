@@ -49,7 +49,7 @@ class ChipConfig:
     dram: DramConfig = field(default_factory=DramConfig)
 
     def __post_init__(self) -> None:
-        if self.memory is MemoryFormat.CHUNK and self.cluster_size != CHUNK:
+        if self.memory.chunked and self.cluster_size != CHUNK:
             raise FlickerError(f"chip: cluster_size must be {CHUNK} with chunks, not {self.cluster_size}")
         if self.cull_shape not in ("box", "sphere", "none"):
             raise FlickerError(f"chip: cull_shape must be box, sphere or none, not {self.cull_shape}")

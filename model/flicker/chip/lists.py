@@ -27,7 +27,7 @@ from ..golden.records import _span
 from ..params import ALPHA_MAX, ALPHA_MIN, CORES, SUBTILE, TRANSMITTANCE_MIN
 from . import constants as c
 from .dram import MASKED_WRITE, READ, WRITE, Stream
-from .sorting import merge_passes, sort_lists
+from .sorting import merge_passes, quantised_key, sort_lists
 
 
 class Grain(IntEnum):
@@ -49,7 +49,11 @@ class Method(str, Enum):
 
 @dataclass(frozen=True)
 class Scheme:
-    """A way to build and sort the lists. record_cache_bytes: 0 for none."""
+    """A way to build and sort the lists. record_cache_bytes: 0 for none.
+
+    key_bits: 32, the depth as it is, or fewer for fixed point between the nearest and the farthest depth of the frame; then the lists
+    may differ in the order of entries that such keys cannot tell apart.
+    """
 
     method: Method
     grain: Grain
@@ -57,11 +61,14 @@ class Scheme:
     combiner_sets: int = c.COMBINER_SETS
     combiner_ways: int = c.COMBINER_WAYS
     sort_capacity: int = c.SORT_CAPACITY
+    key_bits: int = c.KEY_BITS
 
     def __post_init__(self) -> None:
         for name in ("combiner_sets", "combiner_ways"):
             if getattr(self, name) < 1:
                 raise FlickerError(f"lists: {name} must be at least 1, not {getattr(self, name)}")
+        if not 1 <= self.key_bits <= c.KEY_BITS:
+            raise FlickerError(f"lists: key_bits must be 1 to {c.KEY_BITS}, not {self.key_bits}")
         if self.record_cache_bytes and self.record_cache_bytes < c.RECORD_BYTES * c.RECORD_CACHE_WAYS:
             raise FlickerError(f"lists: record_cache_bytes must be 0 or at least {c.RECORD_BYTES * c.RECORD_CACHE_WAYS}")
 
@@ -75,7 +82,7 @@ class Scheme:
 
     @property
     def entry_bits(self) -> int:
-        key = 0 if self.method is Method.GLOBAL else c.KEY_BITS
+        key = 0 if self.method is Method.GLOBAL else self.key_bits
         return key + c.ID_BITS + self.mask_bits
 
     @property
@@ -595,10 +602,13 @@ def run_scheme(
     units = c.SORTING_UNITS
     cores = c.PREPROCESSING_CORES * c.ENTRIES_PER_CYCLE
     order = np.arange(total)
+    key = splats.key
+    if scheme.key_bits < c.KEY_BITS:
+        key = quantised_key(key.view(np.float32), scheme.key_bits, "linear")
     if scheme.method is Method.GLOBAL:
-        one = sort_lists(np.array([0, total]), splats.key, order, capacity=max(total, c.SORT_LANES))
+        one = sort_lists(np.array([0, total]), key, order, capacity=max(total, c.SORT_LANES))
         order = one.record[::-1].copy()
-        size = c.KEY_BITS + c.ID_BITS
+        size = scheme.key_bits + c.ID_BITS
         runs = -(-total // scheme.sort_capacity)
         passes = int(merge_passes(runs, 1, c.MERGE_WAYS))
         inner = max(int(merge_passes(min(total, scheme.sort_capacity), c.SORT_LANES, c.MERGE_WAYS)), 1)
@@ -626,14 +636,14 @@ def run_scheme(
     if scheme.method is Method.GLOBAL:
         tag_record, busy, reads = lists.record, np.zeros(len(count), np.int64), (count > 0).astype(np.int64)
     else:
-        done = sort_lists(lists.start, splats.key[lists.record], lists.record, capacity=scheme.sort_capacity)
+        done = sort_lists(lists.start, key[lists.record], lists.record, capacity=scheme.sort_capacity)
         tag_record, busy, reads = done.record, done.busy, done.reads
     sub_record = np.empty(sub_start[-1], np.int64)
     _split(lists.start, tag_record, splats.box, block, cols, rows, sub_start, sub_record)
     out, deepest = np.empty(sub_start[-1], np.int64), np.zeros(len(count), np.int64)
     fetched = out[: _fetches(lists.walk, lists.start, tag_record, splats.box, block, cols, rows, limit, out, deepest)]
     if scheme.method is not Method.GLOBAL and (count > scheme.sort_capacity).any():
-        done = sort_lists(lists.start, splats.key[lists.record], lists.record, deepest, capacity=scheme.sort_capacity)
+        done = sort_lists(lists.start, key[lists.record], lists.record, deepest, capacity=scheme.sort_capacity)
         busy, reads = done.busy, done.reads
 
     # Reading the lists. Sorted chains stop where rendering stops; others are read whole, long ones once a depth chunk.
@@ -679,7 +689,7 @@ def run_scheme(
     on_chip = {
         "list pointers": len(count) * c.POINTER_BYTES,
         "write combining": scheme.combiner_sets * scheme.combiner_ways * (line + c.POINTER_BYTES),
-        "sort buffers": units * 2 * scheme.sort_capacity * max(scheme.entry_bits, c.KEY_BITS + c.ID_BITS) // 8,
+        "sort buffers": units * 2 * scheme.sort_capacity * max(scheme.entry_bits, scheme.key_bits + c.ID_BITS) // 8,
         "record cache": scheme.record_cache_bytes + scheme.record_cache_bytes // c.RECORD_BYTES * 3,
         "record queues": CORES * c.QUEUE_REFERENCES * c.REFERENCE_BYTES,
         "parameter buffers": c.GEOMETRY_BUFFER_BYTES,

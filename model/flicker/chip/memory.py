@@ -8,8 +8,10 @@ both in the order of the clusters. Encoders and decoders work on the bits; `deco
 | FP16 | 10 x FP16 = 20 bytes | (1 + 3 K) x FP16 | 32 bytes |
 | FP16, cluster-local | the same, mean relative to the cluster | the same | 32 bytes (its box gives the origin) |
 | chunks | 11-10-11 bits position, 2-10-10-10 rotation, 11-10-11 log scale = 12 bytes | 8-8-8-8 bits colour, opacity, 8 bits a coefficient = 4 + 3 (K - 1) | 72 bytes: bounds of position, log scale, colour |
+| chunks, scaled SH | the same | the same, coefficients as signed 8 bits of the chunk's largest | 76 bytes: and the largest coefficient |
 
-The chunk format is that of PlayCanvas' splat-transform: values are rounded to the nearest code, SH codes are bins decoded at their middle.
+The chunk format is that of PlayCanvas' splat-transform: values are rounded to the nearest code; SH codes are bins of 1/32 decoded at their
+middle, so that no code means 0. The last format is ours and differs in the SH codes only.
 """
 
 from __future__ import annotations
@@ -37,6 +39,11 @@ class MemoryFormat(str, Enum):
     FP16 = "fp16"  # world coordinates
     FP16_LOCAL = "fp16-local"  # means relative to the centre of their cluster
     CHUNK = "chunk"  # 256 Gaussians with common bounds
+    CHUNK_SH = "chunk-sh"  # the same, SH scaled by the largest coefficient of the chunk
+
+    @property
+    def chunked(self) -> bool:
+        return self in (MemoryFormat.CHUNK, MemoryFormat.CHUNK_SH)
 
 
 @dataclass(frozen=True)
@@ -54,8 +61,8 @@ class Layout:
 
 def layout(form: MemoryFormat, coefficients: int) -> Layout:
     """Bytes of a format for scenes with `coefficients` SH coefficients a colour."""
-    if form is MemoryFormat.CHUNK:
-        return Layout(12, 4 + 3 * (coefficients - 1), 72)
+    if form.chunked:
+        return Layout(12, 4 + 3 * (coefficients - 1), 76 if form is MemoryFormat.CHUNK_SH else 72)
     return Layout(20, 2 * (1 + 3 * coefficients), CLUSTER_HEADER_BYTES)
 
 
@@ -123,11 +130,13 @@ class ChunkScene:
     """bounds: float32 (C, 18): low and high corner of position, log scale and colour, in the order of the PLY element `chunk`.
 
     packed: uint32 (N, 4): position, rotation, scale, colour. sh: uint8 (N, 3 (K - 1)), channel by channel (f_rest_*).
+    sh_scale: float32 (C,), largest coefficient of a chunk, codes then being 128 + 127 coefficient / largest; None for PlayCanvas' codes.
     """
 
     bounds: np.ndarray
     packed: np.ndarray
     sh: np.ndarray
+    sh_scale: np.ndarray | None = None
 
 
 def _unit(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -146,8 +155,11 @@ def _pack_111011(unit: np.ndarray) -> np.ndarray:
     return x << 21 | y << 11 | z
 
 
-def encode_chunks(scene: Scene, bounds: np.ndarray | None = None) -> ChunkScene:
-    """Quantise in chunks of 256 in the order of the scene. bounds: chunk bounds to use instead of the tightest, float32 (C, 18)."""
+def encode_chunks(scene: Scene, bounds: np.ndarray | None = None, scaled_sh: bool = False) -> ChunkScene:
+    """Quantise in chunks of 256 in the order of the scene.
+
+    bounds: chunk bounds to use instead of the tightest, float32 (C, 18). scaled_sh: SH codes scaled by chunk.
+    """
     n = len(scene)
     logs = np.clip(np.log(scene.scales.astype(np.float64)), -_SCALE_LOG_LIMIT, _SCALE_LOG_LIMIT)
     colours = 0.5 + _SH_C0 * scene.sh[:, 0].astype(np.float64)
@@ -174,7 +186,14 @@ def encode_chunks(scene: Scene, bounds: np.ndarray | None = None) -> ChunkScene:
         word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10) << np.uint32(20 - 10 * i)
     packed[:, 1] = word
     rest = scene.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1).astype(np.float64)
-    return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))
+    if not scaled_sh:
+        return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))
+    largest = np.zeros(len(bounds), np.float32)
+    if rest.shape[1]:
+        largest = np.maximum.reduceat(np.abs(rest).max(axis=1), np.arange(0, n, CHUNK)).astype(np.float32)
+    scale = np.repeat(np.where(largest > 0, largest, 1).astype(np.float64), CHUNK)[:n, None]
+    codes = np.clip(np.floor(rest / scale * 127.0 + 128.5), 1, 255).astype(np.uint8)
+    return ChunkScene(bounds, packed, codes, largest)
 
 
 def _unpack_111011(word: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -202,7 +221,10 @@ def decode_chunks(data: ChunkScene, path: Path | None = None) -> Scene:
     quats[np.arange(n), largest] = np.sqrt(np.maximum(0.0, 1.0 - (three**2).sum(axis=1)))
     sh = np.empty((n, data.sh.shape[1] // 3 + 1, 3))
     sh[:, 0] = (_between(rgba[:, :3], b[:, 12:15], b[:, 15:18]) - 0.5) / _SH_C0
-    sh[:, 1:] = ((data.sh - 127.5) / 32.0).reshape(n, 3, -1).transpose(0, 2, 1)
+    rest = (data.sh - 127.5) / 32.0
+    if data.sh_scale is not None:
+        rest = (data.sh - 128.0) / 127.0 * np.repeat(data.sh_scale.astype(np.float64), CHUNK)[:n, None]
+    sh[:, 1:] = rest.reshape(n, 3, -1).transpose(0, 2, 1)
     return Scene(means, scales, quats / np.linalg.norm(quats, axis=1, keepdims=True), opacities, sh, path)
 
 
@@ -212,7 +234,9 @@ _PACKED = [f"packed_{v}" for v in ("position", "rotation", "scale", "color")]
 
 
 def save_chunks(data: ChunkScene, path: str | Path) -> None:
-    """Write a compressed PLY file. Raises OSError."""
+    """Write a compressed PLY file. Raises OSError, and FlickerError for SH codes that the file format does not know."""
+    if data.sh_scale is not None:
+        raise FlickerError(f"{path}: compressed PLY has no SH codes scaled by chunk")
     n, rest = data.sh.shape
     header = ["ply", "format binary_little_endian 1.0", f"element chunk {len(data.bounds)}"]
     header += [f"property float {name}" for name in _BOUNDS]
@@ -247,6 +271,6 @@ def load_chunks(path: str | Path) -> ChunkScene:
 
 def through_memory(scene: Scene, form: MemoryFormat, size: int = CHUNK) -> Scene:
     """The scene as it comes back out of memory in a format. It must be in the order of its clusters (`build_clusters`)."""
-    if form is MemoryFormat.CHUNK:
-        return decode_chunks(encode_chunks(scene), scene.path)
+    if form.chunked:
+        return decode_chunks(encode_chunks(scene, scaled_sh=form is MemoryFormat.CHUNK_SH), scene.path)
     return decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)

@@ -11,6 +11,7 @@ import argparse
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,8 @@ _VARIATIONS = (
     ("write combining 2048 lines", {"combiner_ways": 8}),
     ("sort capacity 1024", {"sort_capacity": 1024}),
     ("sort capacity 4096", {"sort_capacity": 4096}),
+    ("keys of 24 bits", {"key_bits": 24}),
+    ("keys of 16 bits", {"key_bits": 16}),
     ("no record cache", {"record_cache_bytes": 0}),
     ("record cache 32 KB", {"record_cache_bytes": 32 * 1024}),
     ("record cache 128 KB", {"record_cache_bytes": 128 * 1024}),
@@ -126,8 +129,7 @@ _VARIATIONS = (
 def _variation_rows(title: str, p: Prepared, scheme: Scheme) -> Rows:
     rows = []
     for label, changes in (("as recommended", {}), *_VARIATIONS):
-        other = Scheme(**{**{k: getattr(scheme, k) for k in scheme.__dataclass_fields__}, **changes})
-        (row,) = scheme_rows([run_scheme(p.splats, other, p.needed)])
+        (row,) = scheme_rows([run_scheme(p.splats, replace(scheme, **changes), p.needed)])
         rows.append((title, label, row[3], row[4], row[6], row[10], row[11], row[14]))
     return rows
 
