@@ -14,7 +14,7 @@ import numpy as np
 from ..camera import Camera
 from ..errors import FlickerError
 from ..golden.fp import fp16_value
-from ..golden.records import SubtileLists, _local_means
+from ..golden.records import MAX_FP16, SubtileLists, _local_means
 from ..params import SUBTILE, TILE, Form
 from ..projection import Projected, tile_range
 from .thresholds import EPSILON, radii
@@ -57,6 +57,14 @@ def _with_entries(lists: SubtileLists, projected: Projected, start: np.ndarray, 
     mean = np.empty((len(entry), 2), np.uint16)
     _local_means(projected.mean, start, entry, lists.cols, False, mean)
     return replace(lists, start=start, entry=entry, mean=mean, tile_pairs=tile_pairs)
+
+
+def absolute_means(lists: SubtileLists, projected: Projected, origin: tuple[int, int]) -> np.ndarray:
+    """uint16 (E, 2): means of the entries when they are rounded to FP16 in screen coordinates first (`Coords.ABSOLUTE`)."""
+    screen = np.clip(projected.mean + origin, -MAX_FP16, MAX_FP16).astype(np.float16).astype(np.float64) - origin
+    mean = np.empty((len(lists.entry), 2), np.uint16)
+    _local_means(screen, lists.start, lists.entry, lists.cols, False, mean)
+    return mean
 
 
 def tile_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:

@@ -22,7 +22,7 @@ from ..projection import Projected
 from .disc import DiscFormat, disc_masks, disc_operations
 from .exact import edge_slopes, exact_masks, exact_operations
 from .leaders import DENSE_LEADERS, SPARSE_LEADERS, cat_masks, cat_operations, seele_masks, seele_operations
-from .lists import ellipse_lists, obb_lists, reach_lists, tile_lists
+from .lists import absolute_means, ellipse_lists, obb_lists, reach_lists, tile_lists
 from .numbers import FORMATS, numbers
 from .operations import NONE, Op, Operation, Operations
 from .stage import pixel_tests, render_masked
@@ -31,11 +31,16 @@ from .work import Work
 
 @dataclass
 class View:
-    """Projected splats and their camera, with the lists that methods share, made on first use."""
+    """Projected splats and their camera, with the lists that methods share, made on first use.
+
+    origin: position of the picture's first pixel on the screen, when the picture is a window of a larger one; matters for absolute
+    coordinates only.
+    """
 
     projected: Projected
     camera: Camera
     coords: Coords = Coords.LOCAL
+    origin: tuple[int, int] = (0, 0)
     _cache: dict = field(default_factory=dict, repr=False)
 
     def lists(self, form: Form, kind: str = "subtile") -> SubtileLists:
@@ -44,7 +49,11 @@ class View:
         key = form, kind
         if key not in self._cache:
             if kind == "subtile":
-                made = build_lists(self.projected, self.camera, RenderConfig(form=form, coords=self.coords))
+                made = build_lists(self.projected, self.camera, RenderConfig(form=form))
+                if self.coords == Coords.ABSOLUTE:
+                    made.mean = absolute_means(made, self.projected, self.origin)
+            elif self.coords == Coords.ABSOLUTE:
+                raise FlickerError(f"lists '{kind}': absolute coordinates are there for sub-tile lists only")
             else:
                 made = _LISTS[kind](self.lists(form), self.projected, self.camera)
             self._cache[key] = made
