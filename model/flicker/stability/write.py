@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -31,18 +30,21 @@ def _value(x: float) -> str:
 
 
 def break_table(result: Stability) -> Table:
-    """One row per method, one column per family: where it breaks, with its PSNR there; a dot and the lowest PSNR where it never does."""
-    table = Table(title=f"First step with PSNR < {BROKEN_PSNR:g} dB or an error > {BROKEN_ERROR:g} (seed {result.seed})", caption="value: PSNR in dB there; '.': never, lowest PSNR")
-    table.add_column("method", style="bold", no_wrap=True)
-    for family in result.families:
-        table.add_column(family, justify="right")
+    """Where each method breaks: one row for all methods with the same list of families, value and PSNR there."""
+    groups: dict[str, list[str]] = {}
     for method in result.methods:
-        cells = []
-        for family in result.families:
-            point = result.breaks(family, method)
-            lowest = min(p.psnr_db for p in result.sweep(family, method))
-            cells.append(f". {lowest:.0f}" if point is None else f"[yellow]{_value(point.value)}[/yellow]: {point.psnr_db:.0f}")
-        table.add_row(method, *cells)
+        broken = [(f, result.breaks(f, method)) for f in result.families]
+        text = ", ".join(f"{f} {_value(p.value)} ({p.psnr_db:.0f})" for f, p in broken if p is not None)
+        groups.setdefault(text or "nowhere", []).append(method)
+    table = Table(
+        title=f"First step with PSNR < {BROKEN_PSNR:g} dB or an error > {BROKEN_ERROR:g}; seed {result.seed}",
+        caption=f"family, value (PSNR in dB); {len(result.families)} families: {', '.join(result.families)}",
+    )
+    table.add_column("methods", overflow="fold")
+    table.add_column("break at")
+    for text, names in groups.items():
+        table.add_row("\n".join(names), text)
+        table.add_section()
     return table
 
 
@@ -118,13 +120,3 @@ LINES = (
     "vanilla-factored", "no_ctu-factored", "no_ctu-conic", "seele-factored", "flicker-smooth-mixed-conic", "flicker-smooth-mixed-factored",
     "flicker-dense-fp16-factored", "exact-e4m3-factored", "rows-f8a8", "no_ctu-factored@absolute",
 )
-
-
-def summary_counts(result: Stability) -> dict[str, int]:
-    """Number of families in which each method never breaks."""
-    return {m: sum(result.breaks(f, m) is None for f in result.families) for m in result.methods}
-
-
-def worst(result: Stability) -> Point:
-    """The point with the lowest PSNR."""
-    return min(result.points, key=lambda p: p.psnr_db if not math.isnan(p.psnr_db) else -math.inf)
