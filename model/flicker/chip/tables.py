@@ -190,7 +190,7 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
         ):
             e = frame_estimate(scene, camera, config, bound, chip, p, results[chip.scheme.name])
             frames.append(_frame_row(title, label, e))
-            if label in ("chunk", "fp16"):
+            if label in ("chunk", "fp16") and (title.startswith("flowers") or folder is None):
                 purposes += _purpose_rows(f"{title}, {label}", e)
         formats += [(title, q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), _decibel(q.reference_db), _decibel(q.golden_db))
                     for q in format_quality(scene, camera, config)]
