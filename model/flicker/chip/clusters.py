@@ -1,14 +1,17 @@
-"""Clusters ("big Gaussians"): groups of neighbouring Gaussians, culled against the view frustum before their members are read.
+"""Clusters ("big Gaussians"): groups of neighbouring Gaussians, culled against the view frustum before their members are
+read.
 
-Source of the idea: paper, Sec. IV-A, after Jo et al. How clusters are made is our choice: the scene is put into Morton order of the
-means and cut into runs of equal size, which PlayCanvas' writer does too; a cluster is then a contiguous piece of memory.
+Source of the idea: paper, Sec. IV-A, after Jo et al. How clusters are made is our choice: the scene is put into
+Morton order of the means and cut into runs of equal size, which PlayCanvas' writer does too; a cluster is then a
+contiguous piece of memory.
 
-The cull is conservative with respect to `projection.project`: it never drops a Gaussian whose circle touches the picture. With camera-space mean
-(X, Y, z), z > NEAR, standard deviations <= s and the Jacobian's clamped slopes a, b (|a| <= lim_x, |b| <= lim_y) the long axis of
-the undilated footprint is at most s f sqrt(1 + a^2 + b^2) / z =: s F / z with f = max(fx, fy), and the circle's radius at most
-3 s F / z + 3 sqrt(DILATION + sqrt(0.1)) + 1 =: 3 s F / z + m (dilation, the rasterizer's floor under its discriminant, rounding
-up). The left border is therefore reached only if fx X + (c_x + m) z + 3 s F > 0, a half-space; likewise the others and z > NEAR. A cluster is
-dropped when the largest value of a left-hand side over its box or sphere of means, with its largest s, is not positive.
+The cull is conservative with respect to `projection.project`: it never drops a Gaussian whose circle touches the
+picture. With camera-space mean (X, Y, z), z > NEAR, standard deviations <= s and the Jacobian's clamped slopes a, b
+(|a| <= lim_x, |b| <= lim_y) the long axis of the undilated footprint is at most s f sqrt(1 + a^2 + b^2) / z =: s F /
+z with f = max(fx, fy), and the circle's radius at most 3 s F / z + 3 sqrt(DILATION + sqrt(0.1)) + 1 =: 3 s F / z + m
+(dilation, the rasterizer's floor under its discriminant, rounding up). The left border is therefore reached only if
+fx X + (c_x + m) z + 3 s F > 0, a half-space; likewise the others and z > NEAR. A cluster is dropped when the largest
+value of a left-hand side over its box or sphere of means, with its largest s, is not positive.
 """
 
 from __future__ import annotations

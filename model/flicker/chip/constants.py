@@ -1,4 +1,5 @@
-"""Every constant of the chip model with its source. What starts with "assumption" was chosen here, not taken from a publication."""
+"""Every constant of the chip model with its source. What starts with "assumption" was chosen here, not taken from a
+publication."""
 
 from __future__ import annotations
 
@@ -136,7 +137,8 @@ SOURCES = {
     "SORT_CAPACITY": "assumption: entries a sorting unit holds; longer lists are sorted in depth chunks",
     "LISTS_IN_FLIGHT": "assumption: lists read ahead over the four units, to hide the latency of a chain of chunks",
     "FILTER_ENTRIES_PER_CYCLE": "assumption: entries whose mask is looked at in a cycle",
-    "QUEUE_REFERENCES": "assumption: records that may wait for a rendering core; they stay in the record cache, the core's queue holds their places",
+    "QUEUE_REFERENCES": "assumption: records that may wait for a rendering core; they stay in the record cache, the core's "
+                        "queue holds their places",
     "REFERENCE_BYTES": "assumption: place of a record in the record cache",
     "FEATURE_BUFFER_BYTES": _PAPER,
     "RECORD_CACHE_BYTES": "assumption: part of the feature buffers that keeps records for neighbouring tiles",

@@ -1,10 +1,11 @@
 """LPDDR4 at the level of commands: how long a sequence of bursts takes.
 
-Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is served, the oldest among equals, so that
-row hits go first, activates overlap with the data of other banks and the bus turns as rarely as the window allows; a burst is passed over at
-most 4 x window times. All-bank refresh every tREFI. Consecutive addresses go to the channels in turn, `interleave_bytes`
-each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed with the row. Left out: the command bus, latency of the
-controller, dependences between bursts (the streams of a phase touch different arrays), per-bank refresh.
+Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is
+served, the oldest among equals, so that row hits go first, activates overlap with the data of other banks and the bus
+turns as rarely as the window allows; a burst is passed over at most 4 x window times. All-bank refresh every tREFI.
+Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks
+in turn, the bank number exclusive-or'ed with the row. Left out: the command bus, latency of the controller,
+dependences between bursts (the streams of a phase touch different arrays), per-bank refresh.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Estimate of a whole frame: cycles of every stage, bytes of every purpose, the bottleneck.
 
-Two phases share the memory: preprocessing (cull, project, colour, records and lists to DRAM) and rendering (lists and records from DRAM, sort, contribution
-test and blending, pixels to DRAM). A list is complete only when the last Gaussian has been seen, so the phases of one frame follow
-each other; with double-buffered lists the rendering of one frame overlaps the preprocessing of the next. Hence two figures: the interval between frames
-(the slowest stage, DRAM being one) and the latency of a single frame. Stages within a phase overlap fully.
+Two phases share the memory: preprocessing (cull, project, colour, records and lists to DRAM) and rendering (lists and
+records from DRAM, sort, contribution test and blending, pixels to DRAM). A list is complete only when the last
+Gaussian has been seen, so the phases of one frame follow each other; with double-buffered lists the rendering of one
+frame overlaps the preprocessing of the next. Hence two figures: the interval between frames (the slowest stage, DRAM
+being one) and the latency of a single frame. Stages within a phase overlap fully.
 """
 
 from __future__ import annotations

@@ -1,22 +1,26 @@
 """Schemes that make the sorted sub-tile lists, executed step by step with what each step moves.
 
-Input are the visible Gaussians in the order of memory (`collect`): depth key, box of sub-tiles, record number. Every scheme ends with the same
-lists as `golden.records.build_lists` (equal depths in the order of memory); what differs is on the way there.
+Input are the visible Gaussians in the order of memory (`collect`): depth key, box of sub-tiles, record number. Every
+scheme ends with the same lists as `golden.records.build_lists` (equal depths in the order of memory); what differs is
+on the way there.
 
-Grain, what one list stands for: a sub-tile; a tile, whose records are broadcast to the four cores with a 4-bit mask; a group of 2x2 or 4x4
-tiles, whose list is sorted once and filtered per tile by a bit mask (GS-TG). Method, how a list comes to lie in DRAM:
+Grain, what one list stands for: a sub-tile; a tile, whose records are broadcast to the four cores with a 4-bit mask;
+a group of 2x2 or 4x4 tiles, whose list is sorted once and filtered per tile by a bit mask (GS-TG). Method, how a list
+comes to lie in DRAM:
 
-- counting: a first pass counts the entries of each list, a second writes them where they belong. Entries of a list lie together, writes scatter.
-- linked: one pass; a full chunk of 64 bytes goes to the next free place and carries the number of the chunk before it. Writes are one stream,
-  reads follow the chain from the newest chunk back.
-- global: all records are sorted by depth first, far to near, then linked: chains are read near to far and need no further sort.
+- counting: a first pass counts the entries of each list, a second writes them where they belong. Entries of a list
+  lie together, writes scatter.
+- linked: one pass; a full chunk of 64 bytes goes to the next free place and carries the number of the chunk before
+  it. Writes are one stream, reads follow the chain from the newest chunk back.
+- global: all records are sorted by depth first, far to near, then linked: chains are read near to far and need no
+  further sort.
 
 A small write-combining buffer (sets x ways lines, least recently used) collects entries before they are written.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 import numba
@@ -657,7 +661,7 @@ def run_scheme(
         chain = lists.chain[lists.walk]
         begin = np.concatenate([[0], np.cumsum(chain)])[:-1]
         if scheme.method is Method.GLOBAL:
-            share = deepest / np.maximum(count, 1)
+            share = deepest / np.maximum(count, 1)  # chunks are filled unevenly; a list's are taken to be alike
             taken = np.ceil(share[lists.walk] * chain).astype(np.int64)
             times = np.ones(len(chain), np.int64)
         else:

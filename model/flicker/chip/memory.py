@@ -1,17 +1,18 @@
 """Formats of a scene in memory: FP16 parameters (the paper) and chunk-quantised parameters (PlayCanvas' compressed PLY).
 
-Each format stores a Gaussian in two places, as the two-step fetch needs it: geometry (mean, scale, rotation) in one array, opacity and colour in another,
-both in the order of the clusters. Encoders and decoders work on the bits; `decode` gives the scene that the chip sees.
+Each format stores a Gaussian in two places, as the two-step fetch needs it: geometry (mean, scale, rotation) in one
+array, opacity and colour in another, both in the order of the clusters. Encoders and decoders work on the bits;
+`decode` gives the scene that the chip sees.
 
 | format | geometry | opacity and colour, K coefficients | cluster header |
 |---|---|---|---|
 | FP16 | 10 x FP16 = 20 bytes | (1 + 3 K) x FP16 | 32 bytes |
 | FP16, cluster-local | the same, mean relative to the cluster | the same | 32 bytes (its box gives the origin) |
-| chunks | 11-10-11 bits position, 2-10-10-10 rotation, 11-10-11 log scale = 12 bytes | 8-8-8-8 bits colour, opacity, 8 bits a coefficient = 4 + 3 (K - 1) | 72 bytes: bounds of position, log scale, colour |
-| chunks, scaled SH | the same | the same, coefficients as signed 8 bits of the chunk's largest | 76 bytes: and the largest coefficient |
+| chunks | position 11-10-11, rotation 2-10-10-10, log scale 11-10-11 bits | 8-8-8-8 bits, 8 bits a coefficient | 72 bytes: bounds |
+| chunks, scaled SH | the same | the same, in units of the chunk's largest coefficient | 76 bytes |
 
-The chunk format is that of PlayCanvas' splat-transform: values are rounded to the nearest code; SH codes are bins of 1/32 decoded at their
-middle, so that no code means 0. The last format is ours and differs in the SH codes only.
+The chunk format is that of PlayCanvas' splat-transform: values are rounded to the nearest code; SH codes are bins of
+1/32 decoded at their middle, so that no code means 0. The last format is ours and differs in the SH codes only.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Sorting unit and depth keys.
 
-A unit sorts one list: runs of `SORT_LANES` through the bitonic network of `rtl/sort` (one vector a cycle), then passes of a merge tree with
-`MERGE_WAYS` inputs (one entry a cycle). It holds `SORT_CAPACITY` entries. A longer list is sorted in depth chunks, nearest first: every pass
-reads the list, drops what earlier passes delivered and keeps the nearest `SORT_CAPACITY` of the rest, so a list that
-ends early never pays for its far chunks and no list is too long. Equal keys come out in the order of the records, because the record number follows
-the key in the comparison.
+A unit sorts one list: runs of `SORT_LANES` through the bitonic network of `rtl/sort` (one vector a cycle), then
+passes of a merge tree with `MERGE_WAYS` inputs (one entry a cycle). It holds `SORT_CAPACITY` entries. A longer list
+is sorted in depth chunks, nearest first: every pass reads the list, drops what earlier passes delivered and keeps the
+nearest `SORT_CAPACITY` of the rest, so a list that ends early never pays for its far chunks and no list is too long.
+Equal keys come out in the order of the records, because the record number follows the key in the comparison.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
     python -m flicker.chip.tables FOLDER [--size WxH] [--docs docs]
 
-FOLDER holds the real scenes (docs/scenes.md); the demo scene is made. Tables stand between `<!-- NAME -->` and `<!-- end -->`.
+FOLDER holds the real scenes (docs/scenes.md); the demo scene is made. Tables stand between `<!-- NAME -->` and `<!--
+end -->`.
 """
 
 from __future__ import annotations
@@ -24,14 +25,18 @@ from ..golden.render import render_golden
 from ..params import RenderConfig
 from ..scene import Scene, load_scene
 from .clusters import build_clusters, cull
-from .constants import constant_table
+from .constants import CLOCK_HZ, DRAM_BYTES_PER_SECOND, constant_table
 from .dram import DramConfig, simulate
 from .frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare, render_bound, subtile_bound
 from .lists import SCHEMES, Scheme, SchemeResult, broadcast_cycles, collect, run_scheme
 from .memory import MemoryFormat
 from .quality import KEYS, format_quality, key_quality
 
-VIEWS = (("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1), ("stpeter", "st-peter.sog", 0))
+VIEWS = (
+    ("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1),
+    ("stpeter", "st-peter.sog", 0),
+)
+PEAK = DRAM_BYTES_PER_SECOND / CLOCK_HZ  # bytes a cycle
 CLUSTER_SIZES = (32, 64, 128, 256, 512, 1024)
 
 Rows = list[tuple[str, ...]]
@@ -51,7 +56,8 @@ def scheme_rows(results: Sequence[SchemeResult] | None) -> Rows:
         second = r.cycles.get("count entries", 0) + r.cycles.get("global sort", 0)
         rows.append((
             r.scheme.name, f"{r.entries:,}", f"{r.longest:,}", f"{mb['list write'] + mb['list read']:.1f}", f"{mb['record read']:.1f}",
-            f"{other:.1f}", f"{cycles:,}", f"{r.bytes() / (cycles * 51.2):.0%}" if cycles else "-", f"{r.cycles['emit entries']:,}", f"{second:,}",
+            f"{other:.1f}", f"{cycles:,}", f"{r.bytes() / (cycles * PEAK):.0%}" if cycles else "-",
+            f"{r.cycles['emit entries']:,}", f"{second:,}",
             *(f"{r.cycles.get(k, 0):,}" for k in ("sort", "chain latency", "filter by mask", "hand out records")),
             f"{sum(r.on_chip.values()) / 1024:.0f}",
         ))
@@ -199,7 +205,8 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
     return {
         "counts": markdown(("view", "Gaussians", "visible", "records", "sub-tile entries", "tile entries", "sub-tile, tight boxes",
                             "tile, tight boxes", "sub-tile entries needed", "cut by early stop"), counts),
-        "culling": markdown(("view", "cluster", "clusters", "kept", "members read, box", "members read, sphere", "visible", "headers KB"), culls),
+        "culling": markdown(("view", "cluster", "clusters", "kept", "members read, box", "members read, sphere", "visible",
+                             "headers KB"), culls),
         "frames": markdown(("view", "memory", "MB", "preprocess", "lists and sort", "render (bound)", "DRAM preprocess", "DRAM render",
                             "bottleneck", "FPS", "FPS, no overlap"), frames),
         "traffic": markdown(("view", "purpose", "used MB", "moved MB", "DRAM cycles alone", "efficiency"), purposes),
