@@ -5,6 +5,11 @@ module fv_fp_add #(
   parameter  int unsigned ManBits  = 10,
   parameter  bit          Fn       = 1'b0,
   parameter  bit          Saturate = 1'b0,
+  // A part of all operands, where the whole is too much for the solver: exponents that differ by Least to Most; only equal (0) or different
+  // (1) signs, or both (2).
+  parameter  int unsigned Least    = 0,
+  parameter  int unsigned Most     = (1 << ExpBits) - 1,
+  parameter  int unsigned Signs    = 2,
   localparam int unsigned Width    = 1 + ExpBits + ManBits
 ) (
   input logic [Width-1:0] a_i,
@@ -80,7 +85,19 @@ module fv_fp_add #(
     .ok_o   (ok)
   );
 
+  // A subnormal number has the exponent of the smallest normal one.
+  function automatic logic [ExpBits-1:0] exponent(mag_t mag);
+    return mag[Width-2:ManBits] == '0 ? ExpBits'(1) : mag[Width-2:ManBits];
+  endfunction
+
+  logic [ExpBits-1:0] apart;
+
+  assign apart = exponent(a_mag) > exponent(b_mag) ? exponent(a_mag) - exponent(b_mag)
+                                                   : exponent(b_mag) - exponent(a_mag);
+
   always_comb begin
+    assume (apart >= ExpBits'(Least) && apart <= ExpBits'(Most));
+    assume (Signs == 2 || (a_sign ^ b_sign) == (Signs == 1));
     if (a_nan || b_nan || (a_inf && b_inf && a_sign != b_sign)) begin
       a_result_nan: assert (result == {1'b0, Nan});
     end else if (a_inf || b_inf) begin

@@ -23,7 +23,7 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,9 +39,11 @@ FORMAL = ROOT / "formal"
 PROOFS = FORMAL / "proofs.toml"
 FOLDER = toolchain.BUILD / "formal"
 TOOLS = Path(sys.executable).parent
+DOCS = ROOT / "docs" / "formal.md"
+MARKS = ("<!-- scripts/formal.py --docs -->", "<!-- end -->")
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
-PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets",
+PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
               "standins", "cut", "fast", "mutant_depth", "mutant"}
 MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters", "slow"}
 
@@ -74,6 +76,7 @@ class Proof:
     steps: int = 1
     cover_depth: int = 1
     cover_sets: int = 0
+    cover_parameters: list[Mapping[str, int]] = field(default_factory=list)
     standins: list[str] = field(default_factory=list)
     cut: list[str] = field(default_factory=list)
     fast: bool = False
@@ -142,7 +145,7 @@ def read_proofs(path: Path = PROOFS) -> list[Proof]:
 def tasks_of(proof: Proof, fast: bool) -> list[Task]:
     """Tasks of a proof; with ``fast`` those of its first set of parameters."""
     sets = proof.parameters[:1] if fast else proof.parameters
-    covered = sets[: proof.cover_sets or len(sets)]
+    covered = proof.cover_parameters or sets[: proof.cover_sets or len(sets)]
     return [
         *(Task(proof, "proof", parameters) for parameters in sets),
         *(Task(proof, "cover", parameters) for parameters in covered),
@@ -287,17 +290,17 @@ def write_csv(pairs: Pairs) -> Path:
         writer = csv.writer(out)
         writer.writerow(["proof", "kind", "parameters", "mutation", "status", "detail", "seconds"])
         for task, result in pairs:
-            mutation = f"{task.mutant.file}: {task.mutant.find}" if task.mutant else ""
+            mutation = " ".join(f"{task.mutant.file}: {task.mutant.find}".split()) if task.mutant else ""
             writer.writerow([task.proof.name, task.kind, task.settings, mutation, result.status,
                              result.detail, result.seconds])
     return path
 
 
-def table(proofs: list[Proof], pairs: Pairs) -> Table:
-    """One line per proof: as expected / all of its proofs, covers and mutants."""
-    sheet = Table(title="make formal")
-    for column in ("proof", "method", "parameter sets", "proved", "covers", "mutants failed", "s"):
-        sheet.add_column(column, justify="left" if column in ("proof", "method") else "right")
+COLUMNS = ("proof", "method", "proved", "covers reached", "mutants refuted", "s")
+
+
+def rows(proofs: list[Proof], pairs: Pairs) -> Iterator[list[str]]:
+    """Of each proof: sets of parameters proved / all, covers reached, mutants refuted / all, seconds; red where something is wrong."""
     for proof in proofs:
         cells = []
         for kind in ("proof", "cover", "mutant"):
@@ -310,9 +313,28 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
             if len(good) < len(own):
                 cells[-1] = f"[red]{cells[-1]}[/red]"
         seconds = sum(result.seconds for task, result in pairs if task.proof is proof)
-        sets = len({task.settings for task, _ in pairs if task.proof is proof})
-        sheet.add_row(proof.name, proof.method, str(sets), *cells, f"{seconds:.0f}")
+        yield [proof.name, proof.method, *cells, f"{seconds:.0f}"]
+
+
+def table(proofs: list[Proof], pairs: Pairs) -> Table:
+    """The rows for the terminal."""
+    sheet = Table(title="make formal")
+    for column in COLUMNS:
+        sheet.add_column(column, justify="left" if column in ("proof", "method") else "right")
+    for row in rows(proofs, pairs):
+        sheet.add_row(*row)
     return sheet
+
+
+def write_docs(proofs: list[Proof], pairs: Pairs, jobs: int) -> None:
+    """Put the rows into docs/formal.md, between its two marks."""
+    lines = [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
+    lines += [f"| {' | '.join(row)} |" for row in rows(proofs, pairs)]
+    total = sum(result.seconds for _, result in pairs)
+    lines += ["", f"{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time."]
+    before, rest = DOCS.read_text().split(MARKS[0])
+    after = rest.split(MARKS[1])[1]
+    DOCS.write_text(f"{before}{MARKS[0]}\n" + "\n".join(lines) + f"\n{MARKS[1]}{after}")
 
 
 def main() -> int:
@@ -320,10 +342,14 @@ def main() -> int:
     parser.add_argument("--fast", action="store_true", help="only the part that make test runs")
     parser.add_argument("--unit", help="only the proof of this name")
     parser.add_argument("--jobs", type=int, default=2, help="tasks at a time")
+    parser.add_argument("--docs", action="store_true", help="write the table into docs/formal.md")
+    parser.add_argument("--proofs", type=Path, default=PROOFS, help="another list of proofs")
     arguments = parser.parse_args()
+    if arguments.docs and (arguments.unit or arguments.fast):
+        raise FlickerError("--docs needs all proofs")
     console = Console(width=None if sys.stdout.isatty() else 120)
 
-    proofs = read_proofs()
+    proofs = read_proofs(arguments.proofs)
     if arguments.unit:
         name = arguments.unit.removeprefix("flk_")
         if name not in (names := [proof.name for proof in proofs]):
@@ -367,6 +393,8 @@ def main() -> int:
     path = write_csv(pairs)
     console.print(f"formal: {len(tasks)} tasks, {len(wrong)} wrong, {seconds:.0f} s; "
                   f"{path.relative_to(ROOT)}", highlight=False)
+    if arguments.docs and not wrong:
+        write_docs(proofs, pairs, arguments.jobs)
     return 1 if wrong else 0
 
 
