@@ -117,7 +117,7 @@ def test_equals_golden(name, demo):
     assert int(work.test_cycles.sum()) == frame.total("test_cycles")
     assert int(np.bitwise_count(work.mask).sum()) == frame.total("minitiles_tested")
     assert np.array_equal(work.fallen, frame.counts[:, 7] != 0)
-    sent = ((work.mask[:, None] >> np.arange(4)) & 1).astype(bool) & (alive(work) != 0)
+    sent = ((work.mask[:, None] >> np.arange(4)) & 1).astype(bool) & (work.unfinished() != 0)
     assert int(sent.sum()) == frame.total("minitiles_sent")
     assert int(np.bitwise_count(work.contributing).sum()) == frame.total("pairs_blended") + frame.total("pixels_finished")
     ended = (work.pixel_finish < np.diff(work.start)[:, None]).sum()
@@ -129,8 +129,11 @@ def test_work_is_consistent(demo):
     for name in ("vanilla", "gscore", "seele", "flicker", "faithful", "exact", "rows", "oracle", "oracle_minitile"):
         result = run(name, demo)
         work = result.work
+        assert np.array_equal(work.unfinished(), alive(work))
+        totals = work.totals()
+        assert totals["pixels_contributing"] <= totals["pixels_visited"] <= 16 * totals["minitiles_sent"] <= 16 * totals["minitiles_masked"]
         assert work.start[-1] == work.elements == len(work.mask) and work.order.size == work.subtiles
-        assert ((work.contributing & ~(work.visit_masks() & alive(work))) == 0).all()
+        assert ((work.contributing & ~(work.visit_masks() & work.unfinished())) == 0).all()
         assert np.array_equal(work.finish(), work.pixel_finish.reshape(-1, 4, 16).max(axis=2))
         assert np.isfinite(result.image).all()
         if work.visit is not None:
@@ -347,7 +350,7 @@ def test_rows_are_tight(demo):
     visited = []
     for name in ("oracle", "rows-f10a10", "rows-f8a8", "rows-f7a5", "rows-f6a6"):
         work = run(name, demo).work
-        visited.append(int(np.bitwise_count(work.visit & alive(work)).sum()))
+        visited.append(int(np.bitwise_count(work.visit & work.unfinished()).sum()))
     assert visited == sorted(visited)
     assert visited[2] < 1.06 * visited[0] and visited[4] < 1.2 * visited[0]
 

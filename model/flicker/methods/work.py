@@ -5,14 +5,25 @@ The cycle models start from this; nothing in it depends on timing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+import numba
 import numpy as np
 
-from ..params import CHANNELS, MINITILE, SUBTILE
+from ..params import CHANNELS, MINITILE
 
-SUBTILE_PIXELS = SUBTILE * SUBTILE
 MINITILE_PIXELS = MINITILE * MINITILE
+
+
+@numba.njit(parallel=True, cache=True)
+def _unfinished(start, pixel_finish, alive):
+    for s in numba.prange(len(start) - 1):
+        for n in range(start[s], start[s + 1]):
+            for m in range(4):
+                bits = 0
+                for k in range(16):
+                    bits |= int(n - start[s] <= pixel_finish[s, m * 16 + k]) << k
+                alive[n, m] = bits
 
 
 @dataclass
@@ -39,9 +50,8 @@ class Work:
         pixel_finish: int32 (S, 64), position in the sub-tile's list (0 is the first element) of the element that finishes pixel
             16 m + i; the list's length when none does. Pixel p is unfinished before element n when n <= pixel_finish[s, p].
 
-    Counts
-        fallen: bool (S,), sub-tiles in which the automatic mode had fallen to Uniform-Sparse.
-        core_pixels: pixels a core's work unit has per element when nothing masks them (64), what `gscore` and `vanilla` blend.
+    Automatic mode
+        fallen: bool (S,), sub-tiles in which it had fallen to Uniform-Sparse.
     """
 
     cols: int
@@ -57,8 +67,6 @@ class Work:
     contributing: np.ndarray
     pixel_finish: np.ndarray
     fallen: np.ndarray
-    core_pixels: int = SUBTILE_PIXELS
-    extra: dict[str, int] = field(default_factory=dict)
 
     @property
     def elements(self) -> int:
@@ -84,3 +92,23 @@ class Work:
             return self.visit
         bits = (self.mask[:, None] >> np.arange(CHANNELS, dtype=np.uint8)) & 1
         return bits.astype(np.uint16) * np.uint16(0xFFFF)
+
+    def unfinished(self) -> np.ndarray:
+        """uint16 (E, 4): pixels unfinished before each element."""
+        alive = np.empty((self.elements, CHANNELS), np.uint16)
+        _unfinished(self.start, self.pixel_finish, alive)
+        return alive
+
+    def totals(self) -> dict[str, int]:
+        """Sums over the frame, finished pixels and mini-tiles left out of what VRUs visit."""
+        visited = self.visit_masks() & self.unfinished()
+        return {
+            "elements": self.elements,
+            "elements_rejected": int((self.mask == 0).sum()),
+            "test_cycles": int(self.test_cycles.sum()),
+            "evaluations": int(self.evaluations.sum()),
+            "minitiles_masked": int(np.bitwise_count(self.mask).sum()),
+            "minitiles_sent": int((visited != 0).sum()),
+            "pixels_visited": int(np.bitwise_count(visited).sum()),
+            "pixels_contributing": int(np.bitwise_count(self.contributing).sum()),
+        }

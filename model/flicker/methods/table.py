@@ -1,0 +1,78 @@
+"""Tables of docs/methods.md: picture quality and work of methods on real views.
+
+    FLICKER_SCENES=folder python -m flicker.methods.table [--size WxH] [--methods NAME ...] [--scenes NAME ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from ..camera import load_cameras
+from ..cli import parse_size
+from ..errors import FlickerError
+from ..metrics import psnr
+from ..projection import project
+from ..reference import render_reference
+from ..scene import load_scene
+from .registry import View, get_method, run
+from .stage import missed_pixels
+
+REAL = {
+    "flowers": ("flowers.compressed.ply", 0), "playbot": ("playbot.sog", 1), "guitar": ("guitar.ply", 1), "stpeter": ("st-peter.sog", 0),
+}
+METHODS = (
+    "vanilla", "no_ctu", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored",
+    "exact-fp16-factored", "exact-fp16-factored-bound", "exact-e5m6-factored", "exact-e5m6-factored-bound", "exact-e4m4-factored",
+    "exact-e5m3-factored", "exact-e4m3-factored", "exact-e4m3-factored-scaled", "exact-e4m3-factored-bound", "exact-e5m2-factored",
+    "exact-q8.8-factored", "exact-fp16-conic", "exact-fp16-conic-bound", "exact-e4m3-conic", "rows_minitile-f8a8", "rows-f6a6",
+    "rows-f7a5", "rows-f8a6", "rows-f8a8", "rows-f8a8-ellipse", "rows-f10a10", "pixels-fp16-factored", "oracle",
+)
+
+
+def main() -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--methods", nargs="+", default=METHODS)
+    parser.add_argument("--scenes", nargs="+", default=list(REAL), choices=list(REAL))
+    args = parser.parse_args()
+    size = parse_size(args.size)
+    folder = os.environ.get("FLICKER_SCENES")
+    if not folder:
+        raise FlickerError("FLICKER_SCENES: not set; it names the folder of the scenes")
+    picked = [get_method(name) for name in args.methods]
+    for name in args.scenes:
+        file, number = REAL[name]
+        base = Path(folder) / name
+        camera = load_cameras(base / "cameras.json")[number].resized(*size)
+        view = View(project(load_scene(base / file), camera), camera)
+        reference = render_reference(view.projected, camera)
+        print(f"\n### {name} {number}, {args.size}\n")
+        print("| method | PSNR, dB | elements, k | mini-tiles sent, k | pixels visited, M | contributing, M | visited / contributing | missed |")
+        print("|---|---|---|---|---|---|---|---|")
+        for method in picked:
+            result = run(method, view)
+            t = result.work.totals()
+            missed = "-"
+            if method.lists == "subtile":
+                missed = f"{int(np.bitwise_count(missed_pixels(result.lists, result.work.mask, result.work.visit, result.work.pixel_finish)).sum()):,}"
+            print(
+                f"| `{method.name}` | {psnr(result.image, reference):.2f} | {t['elements'] / 1e3:,.0f} | {t['minitiles_sent'] / 1e3:,.0f} | "
+                f"{t['pixels_visited'] / 1e6:.2f} | {t['pixels_contributing'] / 1e6:.2f} | "
+                f"{t['pixels_visited'] / max(t['pixels_contributing'], 1):.3f} | {missed} |", flush=True,
+            )
+        view.drop()
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except FlickerError as error:
+        print(f"flicker.methods.table: {error}", file=sys.stderr)
+        sys.exit(2)
