@@ -149,6 +149,8 @@ def _sort_lists(start, tag, needed, lanes, ways, capacity, busy, reads):
                     count = total
                     fresh = 0
             reads[s] += 1
+            if count == 0:
+                break  # only when entries are equal, which records of one list never are
             for k in range(count):
                 tag[low + done + k] = kept[k]
             done += count
