@@ -154,6 +154,8 @@ def test_command(tmp_path):
     assert listing.exit_code == 0 and "thin_far" in listing.output and "rows-f8a8" in listing.output
     done = runner.invoke(stability_app, ["--family", "faint", "--method", "faithful", "--quick", "--out", str(tmp_path / "o")])
     assert done.exit_code == 0, done.output
+    table = (tmp_path / "o" / "stability.md").read_text()
+    assert "| `flicker-smooth-mixed-conic` |" in table and "| faint | " in table
     assert len((tmp_path / "o" / "stability.csv").read_text().splitlines()) == 4
     bad = runner.invoke(stability_app, ["--family", "nothing", "--out", str(tmp_path / "o")])
     assert isinstance(bad.exception, FlickerError)

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from .families import FAMILIES
 from .run import run_stability, suite_methods
-from .write import break_table, check_folder, write_csv, write_pictures
+from .write import break_table, check_folder, write_csv, write_markdown, write_pictures
 
 stability_app = typer.Typer(invoke_without_command=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -22,7 +22,7 @@ def stability(
     method: Annotated[Optional[list[str]], typer.Option(help="method, repeatable [default: all]")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen methods")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
-    out: Annotated[Path, typer.Option(help="folder for stability.csv and the pictures")] = Path("build/stability"),
+    out: Annotated[Path, typer.Option(help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
     show: Annotated[bool, typer.Option("--list", help="list families and methods, run nothing")] = False,
 ) -> None:
     """Run families of hard inputs through every method: error against float64, and where each method breaks."""
@@ -43,6 +43,7 @@ def stability(
             family, method, seed=seed, quick=quick, progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     write_csv(result, out / "stability.csv")
+    write_markdown(result, out / "stability.md")
     pictures = write_pictures(result, out)
     console.print(break_table(result))
     console.print(f"{out / 'stability.csv'}, {', '.join(map(str, pictures))}", soft_wrap=True)

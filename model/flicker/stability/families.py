@@ -1,4 +1,7 @@
-"""Families of hard inputs. Each is swept over one parameter, from harmless to extreme; small pictures, seeded."""
+"""Families of hard inputs. Each is swept over one parameter, from harmless to extreme; small pictures, seeded.
+
+All steps of a sweep draw from the same random numbers, so that neighbouring steps differ in the parameter only.
+"""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def _points(steps: list, picked: list, seed: int, progress: Callable[[int, int],
     for done, (family, k) in enumerate(steps):
         progress(done, len(steps))
         value = family.values[k]
-        case = family.make(value, np.random.default_rng([seed, crc32(family.name.encode()), k]))
+        case = family.make(value, np.random.default_rng([seed, crc32(family.name.encode())]))
         reference = render_reference(case.truth or case.projected, case.camera)
         views = {coords: View(case.projected, case.camera, coords, case.origin) for coords in Coords}
         for name, method, coords in picked:

@@ -48,6 +48,23 @@ def break_table(result: Stability) -> Table:
     return table
 
 
+def write_markdown(result: Stability, path: Path) -> None:
+    """Table of chosen methods (LINES), families as rows: where each breaks, or its lowest PSNR. Raises FlickerError."""
+    shown = [m for m in LINES if m in result.methods] or result.methods
+    lines = ["| family | " + " | ".join(f"`{m}`" for m in shown) + " |", "|---|" + "---|" * len(shown)]
+    for family in result.families:
+        cells = []
+        for method in shown:
+            point = result.breaks(family, method)
+            lowest = min(p.psnr_db for p in result.sweep(family, method))
+            cells.append(f"- ({lowest:.0f})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
+        lines.append(f"| {family} | " + " | ".join(cells) + " |")
+    try:
+        path.write_text("\n".join(lines) + "\n")
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+
+
 def write_csv(result: Stability, path: Path) -> None:
     """One line per point. Raises FlickerError when the file cannot be written."""
     names = [f.name for f in fields(Point)] + ["broken"]
