@@ -51,7 +51,7 @@ def test_harmless_steps(quick):
 def test_known_failures(quick):
     """What docs/stability.md says fails, fails here: the suite sees what it is there for."""
     worst = {(f, m): min(p.psnr_db for p in quick.sweep(f, m)) for f in quick.families for m in quick.methods}
-    assert worst["thin", "no_ctu-conic"] < 30 < worst["thin", "no_ctu-factored"] - 5
+    assert worst["thin", "no_ctu-conic"] < 30 and worst["thin", "no_ctu-factored"] > worst["thin", "no_ctu-conic"] + 10
     assert worst["far_mean", "no_ctu-conic"] < 30 and worst["far_mean", "no_ctu-factored"] > 50
     assert worst["screen", "no_ctu-factored" + ABSOLUTE] < 35 and worst["screen", "no_ctu-factored"] > 55
     assert worst["thin", "flicker-smooth-mixed-factored"] < 35
