@@ -138,7 +138,12 @@ def test_work_is_consistent(demo):
         assert np.isfinite(result.image).all()
         if work.visit is not None:
             assert np.array_equal((work.visit != 0) @ (1 << np.arange(4)), work.mask)
+        assert totals["pixels_visited"] <= work.vru_slots("checkerboard") and work.vru_slots("halves") <= 16 * totals["minitiles_sent"]
     off = run("no_ctu", demo)
+    exact = run("oracle", demo)
+    exact.work.visit[:], exact.work.pixel_finish[:] = 0, 1 << 30
+    exact.work.visit[0, 0] = 0b0000_0000_0011_0111  # columns 0, 1, 2 of row 0 and 0, 1 of row 1: five in a half, three and two in the checkerboard
+    assert exact.work.vru_slots("halves") == 10 and exact.work.vru_slots("checkerboard") == 6
     exact = run("oracle", demo)
     assert np.array_equal(exact.work.visit, exact.work.contributing)
     assert np.array_equal(exact.work.contributing, off.work.contributing) and np.array_equal(exact.image, off.image)

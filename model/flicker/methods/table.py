@@ -21,6 +21,7 @@ from ..reference import render_reference
 from ..scene import load_scene
 from .registry import View, get_method, run
 from .stage import missed_pixels
+from .work import SPLITS
 
 REAL = {
     "flowers": ("flowers.compressed.ply", 0), "playbot": ("playbot.sog", 1), "guitar": ("guitar.ply", 1), "stpeter": ("st-peter.sog", 0),
@@ -55,6 +56,7 @@ def main() -> int:
         print(f"\n### {name} {number}, {args.size}\n")
         print("| method | PSNR, dB | elements, k | mini-tiles sent, k | pixels visited, M | contributing, M | visited / contributing | missed |")
         print("|---|---|---|---|---|---|---|---|")
+        slots = []
         for method in picked:
             result = run(method, view)
             t = result.work.totals()
@@ -66,6 +68,10 @@ def main() -> int:
                 f"{t['pixels_visited'] / 1e6:.2f} | {t['pixels_contributing'] / 1e6:.2f} | "
                 f"{t['pixels_visited'] / max(t['pixels_contributing'], 1):.3f} | {missed} |", flush=True,
             )
+            if method.pixels:
+                shares = (f"{split} {result.work.vru_slots(split) / t['pixels_visited']:.3f}" for split in SPLITS)
+                slots.append(f"`{method.name}` {', '.join(shares)}")
+        print("\nVRU slots per visited pixel: " + "; ".join(slots) if slots else "")
         view.drop()
     return 0
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..params import CHANNELS, MINITILE
 
 MINITILE_PIXELS = MINITILE * MINITILE
+SPLITS = {"halves": 0x00FF, "checkerboard": 0xA5A5}  # pixels of the first VRU: rows 0 and 1 (the RTL); column + row even
 
 
 @numba.njit(parallel=True, cache=True)
@@ -98,6 +99,13 @@ class Work:
         alive = np.empty((self.elements, CHANNELS), np.uint16)
         _unfinished(self.start, self.pixel_finish, alive)
         return alive
+
+    def vru_slots(self, split: str) -> int:
+        """Pixel slots of the VRUs over the frame when a mini-tile's two VRUs wait for each other after every element (SPLITS)."""
+        visited = self.visit_masks() & self.unfinished()
+        first = np.uint16(SPLITS[split])
+        cycles = np.maximum(np.bitwise_count(visited & first), np.bitwise_count(visited & ~first))
+        return 2 * int(cycles.sum(dtype=np.int64))
 
     def totals(self) -> dict[str, int]:
         """Sums over the frame, finished pixels and mini-tiles left out of what VRUs visit."""
