@@ -25,6 +25,13 @@ def text() -> str:
     def bits(name: str, width: int, value: int, note: str) -> None:
         out.append(f"  localparam logic [{width - 1}:0] {name} = {width}'h{value:0{(width + 3) // 4}x};  // {note}")
 
+    def table(name: str, values: list, note: str) -> None:
+        nested = isinstance(values[0], list)
+        rows = [", ".join(f"8'd{value}" for value in reversed(row)) for row in (values if nested else [values])]
+        text = ", ".join(f"{{{row}}}" for row in reversed(rows))
+        size = f"[{len(values) - 1}:0]" + (f"[{len(values[0]) - 1}:0]" if nested else "")
+        out.append(f"  localparam logic {size}[7:0] {name} = {f'{{{text}}}' if nested else text};  // {note}")
+
     out.append("  // Geometry")
     for name in ("TILE", "SUBTILE", "MINITILE", "CORES", "CHANNELS", "VRUS_PER_CHANNEL", "PIXELS_PER_VRU"):
         const(name, getattr(p, name))
@@ -43,7 +50,14 @@ def text() -> str:
     out.append("\n  // Defaults and latencies")
     const("FIFO_DEPTH", p.RenderConfig().fifo_depth)
     const("CTU_FIFO_DEPTH", p.RenderConfig().ctu_fifo_depth)
-    const("PRTU_LATENCY", p.PRTU_LATENCY)
+    for name in ("FP16_ADD", "FP16_SUM", "FP16_MUL", "FP8_ADD", "FP8_SUM", "FP8_MUL", "LOG"):
+        const(f"{name}_STAGES", getattr(p, f"{name}_STAGES"))
+    const("FIXED_INT_BITS", p.FIXED_INT_BITS, "of a mean in PRECISION_FIXED")
+    const("FIXED_FRAC_BITS", p.FIXED_FRAC_BITS)
+    table("EXP_STAGES", [p.EXP_STAGES[form] for form in p.Form], "by form")
+    table("PRTU_SHAPE_DELAY", [p.prtu_shape_delay(precision) for precision in p.Precision], "by precision")
+    rows = [[p.prtu_latency(form, precision) for precision in p.Precision] for form in p.Form]
+    table("PRTU_LATENCY", rows, "by form and precision")
     out.append("\n  // Automatic fall to Uniform-Sparse (docs/ctu.md)")
     const("AUTO_TEST_BITS", p.AUTO_TEST_BITS)
     const("AUTO_SENT_BITS", p.AUTO_SENT_BITS)

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Area and timing of every unit, from a Yosys netlist (docs/synthesis.md).
 
-Prints tables and writes area.csv (mapped for area), speed.csv (mapped for speed), report.md, area.png and area.svg to build/synth,
-or with another cell library to build/synth/<library>.
+Prints tables and writes area.csv, report.md, area.png and area.svg to build/synth, or with another cell library to build/synth/<library>.
 Exits 1 if a unit cannot be synthesised or has a latch, an unintended memory or an unconnected port.
 """
 
@@ -58,8 +57,7 @@ def main() -> int:
         folder.mkdir(parents=True, exist_ok=True)
         comparison = report.Comparison(runner, results)
         sheets += comparison.sheets()
-        report.write_csv(folder / "area.csv", results, "area")
-        report.write_csv(folder / "speed.csv", results, "speed")
+        report.write_csv(folder / "area.csv", results)
         if folder != FOLDER and (sheet := report.against(folder, FOLDER, library)):
             sheets.append(sheet)
         report.write_markdown(folder / "report.md", sheets)

@@ -1,6 +1,6 @@
 """Area and timing estimate: cell library, delays worked out by hand, netlists that equal the RTL, and designs that must be refused.
 
-Parameter space: both mappings; combinational, sequential and composed units, small ones only. Not covered: the numbers themselves,
+Parameter space: combinational, sequential and composed units, small ones only. Not covered: the numbers themselves,
 which are what `make synth` reports.
 """
 
@@ -15,7 +15,6 @@ import pytest
 
 from flicker.errors import FlickerError
 from flicker.synth import run
-from flicker.synth.flow import MAPPINGS
 from flicker.synth.gates import DEFAULT_LIBERTY, cell_models
 from flicker.synth.liberty import Library, to_verilog, truth
 from flicker.synth.timing import Timing
@@ -138,24 +137,22 @@ def test_composed_unit_is_the_sum_of_its_parts(library: Library) -> None:
     own = runner.results[total["key"]]
     parts = {runner.results[key]["top"]: runner.results[key] for key in own["children"]}
     assert set(parts) == {"flk_compare_exchange", "flk_pipe_reg"}
-    for mapping in MAPPINGS:
-        area = sum(result[mapping]["ge_comb"] + result[mapping]["ge_seq"] for result in (own, *parts.values()))
-        assert total[mapping]["ge"] == pytest.approx(area)
-        cells = parts["flk_pipe_reg"][mapping]["cells"]
-        assert sum(count * library.cells[name].area for name, count in cells.items()) == pytest.approx(
-            parts["flk_pipe_reg"][mapping]["ge_comb"] + parts["flk_pipe_reg"][mapping]["ge_seq"]
-        )
+    area = sum(result["ge_comb"] + result["ge_seq"] for result in (own, *parts.values()))
+    assert total["ge"] == pytest.approx(area)
+    cells = parts["flk_pipe_reg"]["cells"]
+    assert sum(count * library.cells[name].area for name, count in cells.items()) == pytest.approx(
+        parts["flk_pipe_reg"]["ge_comb"] + parts["flk_pipe_reg"]["ge_seq"]
+    )
     # Two lanes of key, lane number and payload, and valid.
-    assert total["area"]["ff"] == 2 * (5 + 2) + 1
-    assert total["area"]["fo4"] >= max(path["fo4"] for path in own["area"]["paths"])
+    assert total["ff"] == 2 * (5 + 2) + 1
+    assert total["fo4"] >= max(path["fo4"] for path in own["paths"])
 
 
 E4M3 = dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1)
 
 
-@pytest.mark.parametrize("mapping", MAPPINGS)
 @pytest.mark.parametrize("top", ["flk_fp_add", "flk_fp_mul"])
-def test_netlist_equals_rtl(top: str, mapping: str, library: Library, tmp_path: Path) -> None:
+def test_netlist_equals_rtl(top: str, library: Library, tmp_path: Path) -> None:
     """Proved for all inputs: the mapped netlist with the generated cell models, and the RTL, E4M3."""
     runner = run.Runner(DEFAULT_LIBERTY)
     key = runner.add(top, E4M3)
@@ -163,7 +160,7 @@ def test_netlist_equals_rtl(top: str, mapping: str, library: Library, tmp_path: 
     cells = tmp_path / "cells.v"
     cells.write_text(cell_models(library))
     script = "\n".join([
-        f"read_verilog {cells} {run.UNITS / key / f'{mapping}.v'}", f"rename {top} netlist", "proc", "flatten netlist",
+        f"read_verilog {cells} {run.UNITS / key / 'netlist.v'}", f"rename {top} netlist", "proc", "flatten netlist",
         "design -stash gate",
         f"read_slang --std 1800-2023 -F {ROOT / 'rtl/flk.f'} --top {top} " + " ".join(f"-G {k}={v}" for k, v in E4M3.items()),
         "proc", "flatten", f"rename {top} rtl", "design -copy-from gate -as netlist netlist",
@@ -210,6 +207,6 @@ def test_report_of_one_unit() -> None:
     )
     assert done.returncode == 0 and "mmu" in done.stdout, done.stderr
     result = json.loads(next((run.UNITS).glob("flk_mmu-*/result.json")).read_text())
-    assert result["area"]["ff"] == 2
+    assert result["ff"] == 2
     done = subprocess.run([sys.executable, ROOT / "scripts/synth.py", "--unit", "nothing"], text=True, capture_output=True)
     assert done.returncode == 1 and "no unit 'nothing'" in done.stderr

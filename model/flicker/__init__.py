@@ -12,7 +12,8 @@ def _compiled_code_folder() -> Path:
     """
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    for source in sorted([*here.glob("*.py"), *here.glob("golden/*.py")]):
+    folders = ("", "golden/", "methods/", "perf/", "chip/")
+    for source in sorted(path for folder in folders for path in here.glob(f"{folder}*.py")):
         digest.update(source.read_bytes())
     return here.parents[1] / "build" / "numba" / digest.hexdigest()[:16]
 

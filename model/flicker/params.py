@@ -28,6 +28,7 @@ class Precision(IntEnum):
     FP16 = 0
     MIXED = 1  # FP16 differences, E4M3 from there on
     FP8 = 2  # coordinates, too, are E4M3
+    FIXED = 3  # fixed-point differences, E4M3 from there on
 
 
 class CatMode(IntEnum):
@@ -58,7 +59,41 @@ PIXELS_PER_VRU = MINITILE * MINITILE // VRUS_PER_CHANNEL
 SPIKY_AXIS_RATIO = 3.0
 SUBTILE_COORD_BITS = 12  # column and row of a sub-tile: pictures up to 32768 pixels wide
 COUNTER_BITS = 32
-PRTU_LATENCY = 6
+
+# Fixed-point differences (Precision.FIXED): bits of the mean's magnitude.
+FIXED_INT_BITS = 9
+FIXED_FRAC_BITS = 8
+
+# Registers of the pipelined operators (= their latency), so that no path is longer than 60 FO4 (docs/synthesis.md).
+# A sum is an addition that cannot cancel: both operands are squares or of one sign.
+FP16_ADD_STAGES = 3
+FP16_SUM_STAGES = 2
+FP16_MUL_STAGES = 2
+FP8_ADD_STAGES = 2
+FP8_SUM_STAGES = 1
+FP8_MUL_STAGES = 1
+LOG_STAGES = 3
+EXP_STAGES = {Form.CONIC: 3, Form.FACTORED: 2}
+
+
+def prtu_shape_delay(precision: Precision) -> int:
+    """Cycles after the mean at which a PRTU takes the splat's shape numbers: its differences are ready."""
+    return {
+        Precision.FP16: FP16_ADD_STAGES,
+        Precision.MIXED: FP16_ADD_STAGES + 1,  # conversion
+        Precision.FP8: 1 + FP8_ADD_STAGES,
+        Precision.FIXED: 3,  # mean to fixed point, subtraction, conversion
+    }[precision]
+
+
+def prtu_latency(form: Form, precision: Precision) -> int:
+    """Cycles from a PRTU's mean to its answer; the threshold is taken one cycle before the answer."""
+    wide = precision == Precision.FP16
+    add = FP16_ADD_STAGES if wide else FP8_ADD_STAGES
+    sum_ = FP16_SUM_STAGES if wide else FP8_SUM_STAGES
+    mul = FP16_MUL_STAGES if wide else FP8_MUL_STAGES
+    weight = 2 * mul + 2 * add if form == Form.CONIC else 2 * mul + add + sum_
+    return prtu_shape_delay(precision) + weight + 1
 
 ALPHA_MIN = 1.0 / 255.0
 ALPHA_MAX = 0.99
@@ -68,6 +103,14 @@ TRANSMITTANCE_MIN = 1e-4
 AUTO_TEST_BITS = 16
 AUTO_SENT_BITS = 13
 AUTO_DECAY_SHIFT = 2
+
+
+def vru_stages(form: Form) -> tuple[int, int]:
+    """Cycles from a VRU's operation to the blend of transmittance and to that of colour (rtl/render/flk_vru.sv)."""
+    add, sum_, mul = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
+    weight = 1 + add + mul + (mul + 2 * add if form == Form.CONIC else add + mul + sum_)
+    blend = weight + EXP_STAGES[form] + mul + 1 + add + mul
+    return blend, blend + mul + sum_
 
 
 def fp16_bits_up(x: float) -> int:
@@ -96,21 +139,22 @@ class RenderConfig:
     """One configuration of the rendering stage.
 
     `cat` is a run-time input of the RTL; the others are elaboration parameters, except `coords`,
-    which concerns the unit that writes the records.
+    which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
+    is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper.
     """
 
     form: Form = Form.FACTORED
-    precision: Precision = Precision.MIXED
+    precision: Precision = Precision.FIXED
     cat: CatMode = CatMode.SMOOTH
     fifo_depth: int = 16
-    ctu_fifo_depth: int = 12
+    ctu_fifo_depth: int = 0
     coords: Coords = Coords.LOCAL
 
     def __post_init__(self) -> None:
         if not 1 <= self.fifo_depth <= MAX_FIFO_DEPTH:
             raise FlickerError(f"configuration: fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.fifo_depth}")
-        if not 1 <= self.ctu_fifo_depth <= MAX_FIFO_DEPTH:
-            raise FlickerError(f"configuration: ctu_fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
+        if not 0 <= self.ctu_fifo_depth <= MAX_FIFO_DEPTH:
+            raise FlickerError(f"configuration: ctu_fifo_depth must be 0 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
 
     def rtl_parameters(self) -> dict[str, int]:
         """Module parameters of `flk_render_stage` (and of every unit that has them)."""
@@ -126,8 +170,9 @@ class RenderConfig:
         return replace(self, **changes)
 
 
-# The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16.
-FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH)
+# The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
+# the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
+FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
 NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}
 
 # ---- performance counters (order of the RTL's counter vector) ----------------------------------

@@ -17,6 +17,7 @@ package flk_param_pkg;
   localparam int unsigned PRECISION_FP16 = 0;
   localparam int unsigned PRECISION_MIXED = 1;
   localparam int unsigned PRECISION_FP8 = 2;
+  localparam int unsigned PRECISION_FIXED = 3;
   localparam logic [2:0] CAT_OFF = 3'h0;  // run-time mode
   localparam logic [2:0] CAT_DENSE = 3'h1;  // run-time mode
   localparam logic [2:0] CAT_SPARSE = 3'h2;  // run-time mode
@@ -32,8 +33,19 @@ package flk_param_pkg;
 
   // Defaults and latencies
   localparam int unsigned FIFO_DEPTH = 16;
-  localparam int unsigned CTU_FIFO_DEPTH = 12;
-  localparam int unsigned PRTU_LATENCY = 6;
+  localparam int unsigned CTU_FIFO_DEPTH = 0;
+  localparam int unsigned FP16_ADD_STAGES = 3;
+  localparam int unsigned FP16_SUM_STAGES = 2;
+  localparam int unsigned FP16_MUL_STAGES = 2;
+  localparam int unsigned FP8_ADD_STAGES = 2;
+  localparam int unsigned FP8_SUM_STAGES = 1;
+  localparam int unsigned FP8_MUL_STAGES = 1;
+  localparam int unsigned LOG_STAGES = 3;
+  localparam int unsigned FIXED_INT_BITS = 9;  // of a mean in PRECISION_FIXED
+  localparam int unsigned FIXED_FRAC_BITS = 8;
+  localparam logic [1:0][7:0] EXP_STAGES = {8'd2, 8'd3};  // by form
+  localparam logic [3:0][7:0] PRTU_SHAPE_DELAY = {8'd3, 8'd3, 8'd4, 8'd3};  // by precision
+  localparam logic [1:0][3:0][7:0] PRTU_LATENCY = {{8'd9, 8'd9, 8'd10, 8'd13}, {8'd10, 8'd10, 8'd11, 8'd14}};  // by form and precision
 
   // Automatic fall to Uniform-Sparse (docs/ctu.md)
   localparam int unsigned AUTO_TEST_BITS = 16;

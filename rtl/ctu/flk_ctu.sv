@@ -3,13 +3,15 @@
 // in  splat_elem_t, one list per sub-tile, each closed by a token (eos).
 // out the same elements in the same order with a 4-bit mask; splats with an empty mask are taken out and counted,
 //     tokens pass with mask 1111.
-// Throughput one splat per cycle with sparse, one per two cycles with dense sampling. Latency from acceptance to out_valid_o
-// is PRTU_LATENCY + 1 cycles.
+// Throughput one splat per cycle with sparse, one per two cycles with dense sampling.
 //
-// No stall reaches the PRTUs. An element is written into the internal FIFO when it is accepted and waits there for its mask;
-// nothing is accepted while that FIFO is full, so every result has its place and nothing in flight can be lost. `stall_i` (a
-// feature FIFO is full) stops acceptance, not the output.
-// in_ready_o depends combinationally on in_elem_i and stall_i; outputs come from registers.
+// Elements travel beside their test in one pipeline of LATENCY stages; the last one is the output. Nothing in flight can be lost:
+// CtuFifoDepth 0: the whole pipeline stands still while its last element waits for out_ready_i. An element comes out LATENCY cycles after
+//   it was accepted.
+// CtuFifoDepth > 0: the pipeline never stands still, its results go into an output FIFO (paper, Sec. IV-C), one cycle later; an element is
+//   accepted only if it has a place there.
+// `stall_i` (a feature FIFO is full) stops acceptance, not the output. in_ready_o depends combinationally on in_elem_i, stall_i and, without
+// FIFO, on out_ready_i; out_valid_o, out_elem_o and out_mask_o do not depend on inputs.
 //
 // This stream interface is all that the neighbours know of the test: another test with the same ports can take its place.
 module flk_ctu
@@ -17,7 +19,7 @@ module flk_ctu
   import flk_param_pkg::*;
 #(
   parameter int unsigned Form         = FORM_FACTORED,
-  parameter int unsigned Precision    = PRECISION_MIXED,
+  parameter int unsigned Precision    = PRECISION_FIXED,
   parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
 ) (
   input  logic          clk_i,
@@ -47,13 +49,18 @@ module flk_ctu
     logic base_dense;
   } tag_t;
 
+  localparam int unsigned LATENCY = 32'(PRTU_LATENCY[Form][Precision]);
+  localparam int unsigned SHAPE_DELAY = 32'(PRTU_SHAPE_DELAY[Precision]);
+
   logic issue, issue_batch, issue_dense, issue_all, issue_base_dense;
-  logic space, accept;
-  logic result_valid;
+  logic advance, space, accept;
+  logic result_valid, mask_valid;
   logic [3:0] result_mask;
   logic unused_fallen;
-  logic [PRTU_LATENCY-1:0] tag_valid_q;
-  tag_t [PRTU_LATENCY-1:0] tag_q;
+  // Stage i of these is what entered i + 1 steps ago.
+  logic [LATENCY-1:0] tag_valid_q;
+  tag_t [LATENCY-1:0] tag_q;
+  feature_t [LATENCY-1:0] feature_q;
   tag_t tag_in, tag_out;
 
   flk_ctu_controller i_controller (
@@ -64,7 +71,7 @@ module flk_ctu
     .ready_o            (in_ready_o),
     .eos_i              (in_elem_i.eos),
     .spiky_i            (in_elem_i.splat.spiky),
-    .space_i            (space),
+    .space_i            (space && advance),
     .stall_i,
     .issue_o            (issue),
     .issue_batch_o      (issue_batch),
@@ -80,40 +87,97 @@ module flk_ctu
 
   assign accept = in_valid_i && in_ready_o;
 
-  // ---- Test pipeline ---------------------------------------------------------------------------------
+  // ---- Pipeline ----------------------------------------------------------------------------------------
+
+  assign tag_in = '{
+    dense: issue_dense,
+    batch: issue_batch,
+    all: issue_all,
+    eos: in_elem_i.eos,
+    base_dense: issue_base_dense
+  };
+  assign tag_out = tag_q[LATENCY-1];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      tag_valid_q <= '0;
+    end else if (advance) begin
+      tag_valid_q <= {tag_valid_q[LATENCY-2:0], issue};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance) begin
+      tag_q <= {tag_q[LATENCY-2:0], tag_in};
+      feature_q <= {feature_q[LATENCY-2:0], in_elem_i.splat.feature};
+    end
+  end
+
+  // ---- Test ----------------------------------------------------------------------------------------------
 
   localparam bit Wide = (Precision == PRECISION_FP16);
   localparam int unsigned QuadBits = Wide ? 16 : 8;
 
-  feature_t feature;
-  logic [QuadBits-1:0] threshold;
-  // Leader pixels of the two rectangles: columns and rows, top and bottom.
-  logic [2:0] a_x0, a_x1, a_y0, a_y1, b_x0, b_x1, b_y0, b_y1;
+  // Shape and threshold are taken from the pipeline where the PRTUs need them.
+  logic [2:0][QuadBits-1:0] shape_q;
+  logic [QuadBits-1:0] threshold_q;
+  // Leader pixels of the two rectangles: columns and rows.
+  logic [1:0][2:0] a_x, a_y, b_x, b_y;
   logic [3:0] pass_a, pass_b;
   logic [3:0][QuadBits-1:0] unused_weight_a, unused_weight_b;
 
-  assign feature = in_elem_i.splat.feature;
+  if (Wide) begin : gen_shape16
+    assign shape_q = {
+      feature_q[SHAPE_DELAY-1].shape2,
+      feature_q[SHAPE_DELAY-1].shape1,
+      feature_q[SHAPE_DELAY-1].shape0
+    };
+  end else begin : gen_shape8
+    fp16_t [2:0] shape16;
+    logic [2:0][7:0] shape8;
+    assign shape16 = {
+      feature_q[SHAPE_DELAY-2].shape2,
+      feature_q[SHAPE_DELAY-2].shape1,
+      feature_q[SHAPE_DELAY-2].shape0
+    };
+    for (genvar i = 0; i < 3; i++) begin : gen_convert
+      flk_fp_convert i_shape (
+        .src_i(shape16[i]),
+        .dst_o(shape8[i])
+      );
+    end
+    always_ff @(posedge clk_i) begin
+      if (advance) begin
+        shape_q <= shape8;
+      end
+    end
+  end
 
-  flk_log_opacity #(
-    .Base2  (Form == FORM_FACTORED),
-    .ExpBits(Wide ? 5 : 4),
-    .ManBits(Wide ? 10 : 3)
+  flk_log_opacity_pipe #(
+    .Base2   (Form == FORM_FACTORED),
+    .ExpBits (Wide ? 5 : 4),
+    .ManBits (Wide ? 10 : 3),
+    .Fn      (!Wide),
+    .Saturate(!Wide),
+    .Stages  (LOG_STAGES)
   ) i_log (
-    .opacity_i(feature.opacity),
-    .log_o    (threshold)
+    .clk_i,
+    .en_i     (advance),
+    .opacity_i(feature_q[LATENCY-2-LOG_STAGES].opacity),
+    .log_o    (threshold_q)
   );
 
   // Dense: rectangles are the corners of mini-tiles 0 and 1, then 2 and 3. Sparse: top-left pixels, bottom-right pixels.
   always_comb begin
-    {a_x0, a_x1} = {3'd0, 3'd4};
-    {a_y0, a_y1} = {3'd0, 3'd4};
-    {b_x0, b_x1} = {3'd3, 3'd7};
-    {b_y0, b_y1} = {3'd3, 3'd7};
+    a_x = {3'd4, 3'd0};
+    a_y = {3'd4, 3'd0};
+    b_x = {3'd7, 3'd3};
+    b_y = {3'd7, 3'd3};
     if (issue_dense) begin
-      {a_x0, a_x1} = {3'd0, 3'd3};
-      {b_x0, b_x1} = {3'd4, 3'd7};
-      {a_y0, a_y1} = issue_batch ? {3'd4, 3'd7} : {3'd0, 3'd3};
-      {b_y0, b_y1} = {a_y0, a_y1};
+      a_x = {3'd3, 3'd0};
+      b_x = {3'd7, 3'd4};
+      a_y = issue_batch ? {3'd7, 3'd4} : {3'd3, 3'd0};
+      b_y = a_y;
     end
   end
 
@@ -122,16 +186,13 @@ module flk_ctu
     .Precision(Precision)
   ) i_prtu_a (
     .clk_i,
-    .x_top_i    (a_x0),
-    .x_bot_i    (a_x1),
-    .y_top_i    (a_y0),
-    .y_bot_i    (a_y1),
-    .mean_x_i   (feature.mean_x),
-    .mean_y_i   (feature.mean_y),
-    .shape0_i   (feature.shape0),
-    .shape1_i   (feature.shape1),
-    .shape2_i   (feature.shape2),
-    .threshold_i(threshold),
+    .en_i       (advance),
+    .x_i        (a_x),
+    .y_i        (a_y),
+    .mean_x_i   (in_elem_i.splat.feature.mean_x),
+    .mean_y_i   (in_elem_i.splat.feature.mean_y),
+    .shape_i    (shape_q),
+    .threshold_i(threshold_q),
     .pass_o     (pass_a),
     .weight_o   (unused_weight_a)
   );
@@ -141,44 +202,20 @@ module flk_ctu
     .Precision(Precision)
   ) i_prtu_b (
     .clk_i,
-    .x_top_i    (b_x0),
-    .x_bot_i    (b_x1),
-    .y_top_i    (b_y0),
-    .y_bot_i    (b_y1),
-    .mean_x_i   (feature.mean_x),
-    .mean_y_i   (feature.mean_y),
-    .shape0_i   (feature.shape0),
-    .shape1_i   (feature.shape1),
-    .shape2_i   (feature.shape2),
-    .threshold_i(threshold),
+    .en_i       (advance),
+    .x_i        (b_x),
+    .y_i        (b_y),
+    .mean_x_i   (in_elem_i.splat.feature.mean_x),
+    .mean_y_i   (in_elem_i.splat.feature.mean_y),
+    .shape_i    (shape_q),
+    .threshold_i(threshold_q),
     .pass_o     (pass_b),
     .weight_o   (unused_weight_b)
   );
 
-  assign tag_in = '{
-    dense: issue_dense,
-    batch: issue_batch,
-    all: issue_all,
-    eos: in_elem_i.eos,
-    base_dense: issue_base_dense
-  };
-  assign tag_out = tag_q[PRTU_LATENCY-1];
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      tag_valid_q <= '0;
-    end else begin
-      tag_valid_q <= {tag_valid_q[PRTU_LATENCY-2:0], issue};
-    end
-  end
-
-  always_ff @(posedge clk_i) begin
-    tag_q <= {tag_q[PRTU_LATENCY-2:0], tag_in};
-  end
-
   flk_mmu i_mmu (
     .clk_i,
-    .valid_i (tag_valid_q[PRTU_LATENCY-1]),
+    .valid_i (tag_valid_q[LATENCY-1] && advance),
     .dense_i (tag_out.dense),
     .batch_i (tag_out.batch),
     .all_i   (tag_out.all),
@@ -188,53 +225,66 @@ module flk_ctu
     .mask_o  (result_mask)
   );
 
-  // ---- Internal FIFOs: elements from acceptance, masks from the MMU ------------------------------------
+  // ---- Output --------------------------------------------------------------------------------------------
 
-  feature_elem_t elem_in;
-  logic unused_elem_valid, unused_mask_ready, mask_valid, pop, empty_mask;
-  logic [$clog2(CtuFifoDepth + 1)-1:0] unused_elem_usage, unused_mask_usage;
-  logic unused_elem_full, unused_elem_empty, unused_mask_full, unused_mask_empty;
+  feature_elem_t elem;
 
-  assign elem_in = '{eos: in_elem_i.eos, feature: feature};
+  assign elem = '{eos: tag_out.eos, feature: feature_q[LATENCY-1]};
+  // A mask at the end of the pipeline, whether it moves or not.
+  assign mask_valid = tag_valid_q[LATENCY-1] && (!tag_out.dense || tag_out.batch);
 
-  flk_fifo #(
-    .Width(FEATURE_ELEM_BITS),
-    .Depth(CtuFifoDepth)
-  ) i_elem_fifo (
-    .clk_i,
-    .rst_ni,
-    .in_valid_i (accept),
-    .in_ready_o (space),
-    .in_data_i  (elem_in),
-    .out_valid_o(unused_elem_valid),
-    .out_ready_i(pop),
-    .out_data_o (out_elem_o),
-    .usage_o    (unused_elem_usage),
-    .full_o     (unused_elem_full),
-    .empty_o    (unused_elem_empty)
-  );
+  if (CtuFifoDepth == 0) begin : gen_hold
+    assign space       = 1'b1;
+    assign out_valid_o = mask_valid && (result_mask != '0);
+    assign out_elem_o  = elem;
+    assign out_mask_o  = result_mask;
+    assign advance     = !out_valid_o || out_ready_i;
+  end else begin : gen_fifo
+    // Places taken: elements accepted that have neither left the FIFO nor been rejected.
+    localparam int unsigned UsageBits = $clog2(CtuFifoDepth + 1);
+    logic [UsageBits-1:0] taken_d, taken_q, unused_usage;
+    logic fifo_ready, unused_full, unused_empty, leaves, rejects;
 
-  // Never full before the element FIFO is: an element enters that one first and both are popped together.
-  flk_fifo #(
-    .Width(4),
-    .Depth(CtuFifoDepth)
-  ) i_mask_fifo (
-    .clk_i,
-    .rst_ni,
-    .in_valid_i (result_valid),
-    .in_ready_o (unused_mask_ready),
-    .in_data_i  (result_mask),
-    .out_valid_o(mask_valid),
-    .out_ready_i(pop),
-    .out_data_o (out_mask_o),
-    .usage_o    (unused_mask_usage),
-    .full_o     (unused_mask_full),
-    .empty_o    (unused_mask_empty)
-  );
+    assign advance = 1'b1;
+    assign space   = (taken_q != UsageBits'(CtuFifoDepth));
+    assign leaves  = out_valid_o && out_ready_i;
+    assign rejects = mask_valid && (result_mask == '0);
+    assign taken_d = taken_q + UsageBits'(accept) - UsageBits'(leaves) - UsageBits'(rejects);
 
-  assign empty_mask  = (out_mask_o == '0);
-  assign out_valid_o = mask_valid && !empty_mask;
-  assign pop         = mask_valid && (empty_mask || out_ready_i);
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        taken_q <= '0;
+      end else begin
+        taken_q <= taken_d;
+      end
+    end
+
+    flk_fifo #(
+      .Width(4 + FEATURE_ELEM_BITS),
+      .Depth(CtuFifoDepth)
+    ) i_fifo (
+      .clk_i,
+      .rst_ni,
+      .in_valid_i (mask_valid && (result_mask != '0)),
+      .in_ready_o (fifo_ready),
+      .in_data_i  ({result_mask, elem}),
+      .out_valid_o,
+      .out_ready_i,
+      .out_data_o ({out_mask_o, out_elem_o}),
+      .usage_o    (unused_usage),
+      .full_o     (unused_full),
+      .empty_o    (unused_empty)
+    );
+
+`ifdef SYNTHESIS
+    logic unused_ready;
+    assign unused_ready = fifo_ready;
+`else
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        mask_valid && (result_mask != '0) |-> fifo_ready)
+    else $error("flk_ctu: a result has no place");
+`endif
+  end
 
   // ---- Counters ----------------------------------------------------------------------------------------
 
@@ -251,12 +301,5 @@ module flk_ctu
                         + 3'(result_mask[2]) + 3'(result_mask[3]);
     end
   end
-
-`ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) result_valid |-> unused_mask_ready)
-  else $error("flk_ctu: a mask has no place");
-  assert property (@(posedge clk_i) disable iff (!rst_ni) mask_valid |-> unused_elem_valid)
-  else $error("flk_ctu: a mask without its element");
-`endif
 
 endmodule

@@ -42,34 +42,34 @@ module flk_ctu_controller
   // ---- Sampling ------------------------------------------------------------------------------------
 
   logic dense, batch_d, batch_q, fall_d, fall_q, eos_pending_d, eos_pending_q, go;
+  logic update_d, update_q;
+  // The mode, decoded: whether smooth and spiky splats are sampled densely, and the rest.
+  logic dense_smooth_q, dense_spiky_q, auto_q, off_q;
 
-  always_comb begin
-    unique case (mode_i)
-      CAT_DENSE:             dense = 1'b1;
-      CAT_SMOOTH:            dense = !spiky_i;
-      CAT_SPIKY:             dense = spiky_i;
-      CAT_AUTO:              dense = !spiky_i && !fall_q;
-      default:               dense = 1'b0;  // CAT_SPARSE, CAT_OFF
-    endcase
-    if (eos_i) begin
-      dense = 1'b0;
-    end
+  always_ff @(posedge clk_i) begin
+    dense_smooth_q <= (mode_i == CAT_DENSE) || (mode_i == CAT_SMOOTH) || (mode_i == CAT_AUTO);
+    dense_spiky_q  <= (mode_i == CAT_DENSE) || (mode_i == CAT_SPIKY);
+    auto_q         <= (mode_i == CAT_AUTO);
+    off_q          <= (mode_i == CAT_OFF);
   end
+
+  assign dense = (spiky_i ? dense_spiky_q : dense_smooth_q && !(auto_q && fall_q)) && !eos_i;
 
   assign go = valid_i && space_i && !stall_i && !(eos_i && eos_pending_q);
 
   assign issue_o            = go;
   assign issue_batch_o      = batch_q;
   assign issue_dense_o      = dense;
-  assign issue_all_o        = eos_i || (mode_i == CAT_OFF);
+  assign issue_all_o        = eos_i || off_q;
   assign issue_base_dense_o = !spiky_i;
   assign ready_o            = go && (!dense || batch_q);
   assign batch_d            = go ? (dense && !batch_q) : batch_q;
 
-  // A token is in the test pipeline.
+  // A token is in the test pipeline, or the sums are about to take up its sub-tile.
+  assign update_d = result_valid_i && result_eos_i;
   always_comb begin
     eos_pending_d = eos_pending_q;
-    if (result_valid_i && result_eos_i) begin
+    if (update_q) begin
       eos_pending_d = 1'b0;
     end
     if (go && eos_i) begin
@@ -83,9 +83,9 @@ module flk_ctu_controller
   // A sum of weights 1, 3/4, 9/16, ... is below 4 times the largest term: two more bits.
   localparam int unsigned AVG_BITS = AUTO_TEST_BITS + AUTO_DECAY_SHIFT;
 
-  logic [AUTO_TEST_BITS-1:0]      test_d, test_q, test_inc;
+  logic [AUTO_TEST_BITS-1:0]      test_d, test_q, test_inc, test_last_q;
   logic [3:0][AUTO_SENT_BITS-1:0] sent_d, sent_q;
-  logic [AUTO_SENT_BITS-1:0]      max01, max23, sent_max;
+  logic [AUTO_SENT_BITS-1:0]      max01, max23, sent_max, sent_last_q;
   logic [AVG_BITS-1:0]            test_avg_d, test_avg_q, sent_avg_d, sent_avg_q;
 
   assign test_inc = result_base_dense_i ? AUTO_TEST_BITS'(2) : AUTO_TEST_BITS'(1);
@@ -94,17 +94,12 @@ module flk_ctu_controller
   assign sent_max = (max01 > max23) ? max01 : max23;
 
   always_comb begin
-    test_d     = test_q;
-    sent_d     = sent_q;
-    test_avg_d = test_avg_q;
-    sent_avg_d = sent_avg_q;
+    test_d = test_q;
+    sent_d = sent_q;
     if (result_valid_i) begin
       if (result_eos_i) begin
-        test_d     = '0;
-        sent_d     = '0;
-        test_avg_d = test_avg_q - (test_avg_q >> AUTO_DECAY_SHIFT) + AVG_BITS'(test_q);
-        sent_avg_d = sent_avg_q - (sent_avg_q >> AUTO_DECAY_SHIFT)
-                   + AVG_BITS'({sent_max, VRU_CYCLES_LOG2'(0)});
+        test_d = '0;
+        sent_d = '0;
       end else begin
         // Both counts saturate.
         test_d = (test_q > ~test_inc) ? '1 : test_q + test_inc;
@@ -117,15 +112,34 @@ module flk_ctu_controller
     end
   end
 
+  // One cycle later: what the sub-tile came to is added to the sums.
+  always_ff @(posedge clk_i) begin
+    if (update_d) begin
+      test_last_q <= test_q;
+      sent_last_q <= sent_max;
+    end
+  end
+
+  always_comb begin
+    test_avg_d = test_avg_q;
+    sent_avg_d = sent_avg_q;
+    if (update_q) begin
+      test_avg_d = test_avg_q - (test_avg_q >> AUTO_DECAY_SHIFT) + AVG_BITS'(test_last_q);
+      sent_avg_d = sent_avg_q - (sent_avg_q >> AUTO_DECAY_SHIFT)
+                 + AVG_BITS'({sent_last_q, VRU_CYCLES_LOG2'(0)});
+    end
+  end
+
   // Sub-tiles change when a token is taken: no other token is in the pipeline then.
   assign fall_d   = (go && eos_i) ? (test_avg_q > sent_avg_q) : fall_q;
-  assign fallen_o = fall_q && (mode_i == CAT_AUTO);
+  assign fallen_o = fall_q && auto_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       batch_q       <= 1'b0;
       fall_q        <= 1'b0;
       eos_pending_q <= 1'b0;
+      update_q      <= 1'b0;
       test_q        <= '0;
       sent_q        <= '0;
       test_avg_q    <= '0;
@@ -134,6 +148,7 @@ module flk_ctu_controller
       batch_q       <= batch_d;
       fall_q        <= fall_d;
       eos_pending_q <= eos_pending_d;
+      update_q      <= update_d;
       test_q        <= test_d;
       sent_q        <= sent_d;
       test_avg_q    <= test_avg_d;

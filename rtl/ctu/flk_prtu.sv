@@ -1,48 +1,53 @@
-// Pixel-rectangle test unit (PRTU): the Gaussian weights of four leader pixels and their comparison with the
-// threshold (paper, Algorithm 1; factored form: docs/prtu.md).
+// Pixel-rectangle test unit (PRTU): the Gaussian weights of the leader pixels in Cols columns and Rows rows, and their comparison with
+// the splat's threshold (paper, Algorithm 1: two columns, two rows; factored form: docs/prtu.md). With one column and one row it is the
+// plain test unit of a single pixel.
 //
-// A pixel rectangle has two columns (x_top, x_bot) and two rows (y_top, y_bot). Leader i is
-// 0 = (x_top, y_top), 1 = (x_bot, y_top), 2 = (x_top, y_bot), 3 = (x_bot, y_bot).
-// Latency flk_param_pkg::PRTU_LATENCY cycles, throughput one rectangle per cycle. No handshake and no stall:
-// what goes in comes out; the CTU keeps track of it. No register is reset.
+// Leader i lies in column i % Cols, row i / Cols: with two of each, 0 is top left, 1 top right, 2 bottom left, 3 bottom right.
+// A splat's numbers are taken when they are needed: coordinates and mean first, shape PRTU_SHAPE_DELAY[Precision] cycles later, threshold
+// in the last cycle before the answer; pass_o and weight_o come PRTU_LATENCY[Form][Precision] cycles after the mean. Throughput one rectangle
+// per cycle. All registers load while en_i is high; none is reset. No handshake: the CTU keeps track of what is inside.
 // pass_o[i] is high when threshold_i > weight i; a NaN weight does not pass.
 //
-// The format of the test (`Quad`) is FP16 or E4M3; threshold_i is in it, and lies beside the rectangle's inputs in time.
+// The format of the test (`Quad`), in which shape, threshold and weights are, is FP16 or E4M3.
 module flk_prtu
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
   parameter int unsigned Form      = FORM_FACTORED,
-  parameter int unsigned Precision = PRECISION_MIXED,
+  parameter int unsigned Precision = PRECISION_FIXED,
+  parameter int unsigned Cols      = 2,
+  parameter int unsigned Rows      = 2,
+  localparam int unsigned Leaders  = Cols * Rows,
   // Bits of the quad format: FP16 for PRECISION_FP16, else E4M3.
   localparam int unsigned QuadBits = (Precision == PRECISION_FP16) ? 16 : 8
 ) (
-  input  logic                     clk_i,
-  input  logic [              2:0] x_top_i,
-  input  logic [              2:0] x_bot_i,
-  input  logic [              2:0] y_top_i,
-  input  logic [              2:0] y_bot_i,
-  input  fp16_t                    mean_x_i,
-  input  fp16_t                    mean_y_i,
-  input  fp16_t                    shape0_i,
-  input  fp16_t                    shape1_i,
-  input  fp16_t                    shape2_i,
-  input  logic [     QuadBits-1:0] threshold_i,
-  output logic [              3:0] pass_o,
-  output logic [3:0][QuadBits-1:0] weight_o
+  input  logic                             clk_i,
+  input  logic                             en_i,
+  input  logic [   Cols-1:0][         2:0] x_i,
+  input  logic [   Rows-1:0][         2:0] y_i,
+  input  fp16_t                            mean_x_i,
+  input  fp16_t                            mean_y_i,
+  input  logic [        2:0][QuadBits-1:0] shape_i,
+  input  logic [QuadBits-1:0]              threshold_i,
+  output logic [Leaders-1:0]               pass_o,
+  output logic [Leaders-1:0][QuadBits-1:0] weight_o
 );
 
   if (Form > FORM_FACTORED) begin : gen_check_form
     $error("flk_prtu: Form must be FORM_CONIC or FORM_FACTORED");
   end
-  if (Precision > PRECISION_FP8) begin : gen_check_precision
-    $error("flk_prtu: Precision must be PRECISION_FP16, _MIXED or _FP8");
+  if (Precision > PRECISION_FIXED) begin : gen_check_precision
+    $error("flk_prtu: Precision must be PRECISION_FP16, _MIXED, _FP8 or _FIXED");
   end
 
-  localparam int unsigned ExpBits = (Precision == PRECISION_FP16) ? 5 : 4;
-  localparam int unsigned ManBits = (Precision == PRECISION_FP16) ? 10 : 3;
-  localparam bit Fn = (Precision != PRECISION_FP16);
-  localparam bit Saturate = (Precision != PRECISION_FP16);
+  localparam bit Wide = (Precision == PRECISION_FP16);
+  localparam int unsigned ExpBits = Wide ? 5 : 4;
+  localparam int unsigned ManBits = Wide ? 10 : 3;
+  localparam bit Fn = !Wide;
+  localparam bit Saturate = !Wide;
+  localparam int unsigned ADD = Wide ? FP16_ADD_STAGES : FP8_ADD_STAGES;
+  localparam int unsigned SUM = Wide ? FP16_SUM_STAGES : FP8_SUM_STAGES;
+  localparam int unsigned MUL = Wide ? FP16_MUL_STAGES : FP8_MUL_STAGES;
 
   typedef logic [QuadBits-1:0] quad_t;
 
@@ -65,212 +70,275 @@ module flk_prtu
     endcase
   endfunction
 
-  // ---- Stage 1: differences and conversion to the quad format (Alg. 1, line 1) -----------------
+  // ---- Differences, converted to the quad format (Alg. 1, line 1) ----------------------------------
 
-  // Index 0 top, 1 bottom.
-  logic [1:0][2:0] px, py;
-  quad_t [1:0] dx_d, dy_d, dx_q, dy_q;
-  quad_t shape0_d, shape1_d, shape2_d;
+  quad_t [Cols-1:0] dx_q;
+  quad_t [Rows-1:0] dy_q;
 
-  assign px = {x_bot_i, x_top_i};
-  assign py = {y_bot_i, y_top_i};
+  // Axis 0: columns and mean_x, axis 1: rows and mean_y.
+  for (genvar axis = 0; axis < 2; axis++) begin : gen_axis
+    localparam int unsigned Count = (axis == 0) ? Cols : Rows;
+    logic [Count-1:0][2:0] pixel;
+    quad_t [Count-1:0] d_q;
+    fp16_t mean;
 
-  if (Precision == PRECISION_FP8) begin : gen_fp8_difference
-    quad_t mean_x, mean_y;
-    flk_fp_convert #(
-      .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-      .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-    ) i_mean_x (.src_i(mean_x_i), .dst_o(mean_x));
-    flk_fp_convert #(
-      .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-      .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-    ) i_mean_y (.src_i(mean_y_i), .dst_o(mean_y));
-    for (genvar k = 0; k < 2; k++) begin : gen_axis
-      flk_fp_add #(.ExpBits(4), .ManBits(3), .Fn(1), .Saturate(1)) i_dx (
-        .a_i(pixel_e4m3(px[k])), .b_i({~mean_x[7], mean_x[6:0]}), .sum_o(dx_d[k])
-      );
-      flk_fp_add #(.ExpBits(4), .ManBits(3), .Fn(1), .Saturate(1)) i_dy (
-        .a_i(pixel_e4m3(py[k])), .b_i({~mean_y[7], mean_y[6:0]}), .sum_o(dy_d[k])
-      );
+    if (axis == 0) begin : gen_x
+      assign pixel = x_i;
+      assign mean = mean_x_i;
+      assign dx_q = d_q;
+    end else begin : gen_y
+      assign pixel = y_i;
+      assign mean = mean_y_i;
+      assign dy_q = d_q;
     end
-  end else begin : gen_fp16_difference
-    fp16_t [1:0] dx16, dy16;
-    for (genvar k = 0; k < 2; k++) begin : gen_axis
-      flk_fp_add #(.ExpBits(5), .ManBits(10), .Fn(0), .Saturate(0)) i_dx (
-        .a_i(pixel_fp16(px[k])), .b_i({~mean_x_i[15], mean_x_i[14:0]}), .sum_o(dx16[k])
+
+    if (Precision == PRECISION_FP8) begin : gen_fp8
+      logic [7:0] mean8, mean8_q;
+      logic [Count-1:0][2:0] pixel_q;
+      flk_fp_convert i_mean (
+        .src_i(mean),
+        .dst_o(mean8)
       );
-      flk_fp_add #(.ExpBits(5), .ManBits(10), .Fn(0), .Saturate(0)) i_dy (
-        .a_i(pixel_fp16(py[k])), .b_i({~mean_y_i[15], mean_y_i[14:0]}), .sum_o(dy16[k])
+      always_ff @(posedge clk_i) begin
+        if (en_i) begin
+          mean8_q <= mean8;
+          pixel_q <= pixel;
+        end
+      end
+      for (genvar k = 0; k < Count; k++) begin : gen_pixel
+        flk_fp_add_pipe #(
+          .ExpBits(4), .ManBits(3), .Fn(1), .Saturate(1), .Stages(FP8_ADD_STAGES)
+        ) i_d (
+          .clk_i,
+          .en_i,
+          .a_i  (pixel_e4m3(pixel_q[k])),
+          .b_i  ({~mean8_q[7], mean8_q[6:0]}),
+          .sum_o(d_q[k])
+        );
+      end
+    end else if (Precision == PRECISION_FIXED) begin : gen_fixed
+      // Mean to fixed point; subtraction and magnitude; conversion.
+      localparam int unsigned MeanBits = FIXED_INT_BITS + FIXED_FRAC_BITS;
+      localparam int unsigned MagBits = MeanBits + 1;
+      logic mean_sign, mean_sign_q;
+      logic [MeanBits-1:0] mean_mag, mean_mag_q;
+      logic [Count-1:0][2:0] pixel_q;
+      flk_fp_to_fixed #(
+        .IntBits (FIXED_INT_BITS),
+        .FracBits(FIXED_FRAC_BITS)
+      ) i_mean (
+        .src_i (mean),
+        .sign_o(mean_sign),
+        .mag_o (mean_mag)
       );
-      if (Precision == PRECISION_MIXED) begin : gen_convert
-        flk_fp_convert #(
-          .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-          .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-        ) i_dx8 (.src_i(dx16[k]), .dst_o(dx_d[k]));
-        flk_fp_convert #(
-          .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-          .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-        ) i_dy8 (.src_i(dy16[k]), .dst_o(dy_d[k]));
-      end else begin : gen_keep
-        assign dx_d[k] = dx16[k];
-        assign dy_d[k] = dy16[k];
+      always_ff @(posedge clk_i) begin
+        if (en_i) begin
+          mean_sign_q <= mean_sign;
+          mean_mag_q  <= mean_mag;
+          pixel_q     <= pixel;
+        end
+      end
+      for (genvar k = 0; k < Count; k++) begin : gen_pixel
+        logic [MagBits-1:0] shifted;
+        logic [MagBits:0] apart;  // |mean| plus the pixel, or less it
+        logic sign_d, sign_q;
+        logic [MagBits-1:0] mag_d, mag_q;
+        quad_t code;
+        assign shifted = MagBits'(pixel_q[k]) << FIXED_FRAC_BITS;
+        assign apart = mean_sign_q ? (MagBits + 1)'(mean_mag_q) + (MagBits + 1)'(shifted)
+                                   : (MagBits + 1)'(mean_mag_q) - (MagBits + 1)'(shifted);
+        // Pixel less mean is negative if the mean is positive and the larger one.
+        assign sign_d = !mean_sign_q && !apart[MagBits];
+        assign mag_d = (!mean_sign_q && apart[MagBits]) ? -apart[MagBits-1:0] : apart[MagBits-1:0];
+        flk_fixed_to_fp #(
+          .MagBits (MagBits),
+          .FracBits(FIXED_FRAC_BITS)
+        ) i_code (
+          .sign_i(sign_q),
+          .mag_i (mag_q),
+          .dst_o (code)
+        );
+        always_ff @(posedge clk_i) begin
+          if (en_i) begin
+            sign_q <= sign_d;
+            mag_q  <= mag_d;
+            d_q[k] <= code;
+          end
+        end
+      end
+    end else begin : gen_fp16
+      for (genvar k = 0; k < Count; k++) begin : gen_pixel
+        fp16_t d16_q;
+        flk_fp_add_pipe #(
+          .Stages(FP16_ADD_STAGES)
+        ) i_d (
+          .clk_i,
+          .en_i,
+          .a_i  (pixel_fp16(pixel[k])),
+          .b_i  ({~mean[15], mean[14:0]}),
+          .sum_o(d16_q)
+        );
+        if (Precision == PRECISION_MIXED) begin : gen_convert
+          quad_t d8;
+          flk_fp_convert i_d8 (
+            .src_i(d16_q),
+            .dst_o(d8)
+          );
+          always_ff @(posedge clk_i) begin
+            if (en_i) begin
+              d_q[k] <= d8;
+            end
+          end
+        end else begin : gen_keep
+          assign d_q[k] = d16_q;
+        end
       end
     end
   end
 
-  if (Precision == PRECISION_FP16) begin : gen_shape16
-    assign shape0_d = shape0_i;
-    assign shape1_d = shape1_i;
-    assign shape2_d = shape2_i;
-  end else begin : gen_shape8
-    flk_fp_convert #(
-      .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-      .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-    ) i_shape0 (.src_i(shape0_i), .dst_o(shape0_d));
-    flk_fp_convert #(
-      .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-      .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-    ) i_shape1 (.src_i(shape1_i), .dst_o(shape1_d));
-    flk_fp_convert #(
-      .SrcExpBits(5), .SrcManBits(10), .SrcFn(0),
-      .DstExpBits(4), .DstManBits(3), .DstFn(1), .DstSaturate(1)
-    ) i_shape2 (.src_i(shape2_i), .dst_o(shape2_d));
-  end
+  // ---- Weights -----------------------------------------------------------------------------------------
 
-  quad_t shape0_q1, shape1_q1, shape2_q1;
-  always_ff @(posedge clk_i) begin
-    dx_q      <= dx_d;
-    dy_q      <= dy_d;
-    shape0_q1 <= shape0_d;
-    shape1_q1 <= shape1_d;
-    shape2_q1 <= shape2_d;
-  end
-
-  // ---- Stages 2 to 5: the weights ----------------------------------------------------------------
-
-  quad_t [3:0] weight_d, weight_q;
+  quad_t [Leaders-1:0] weight_q;
 
   if (Form == FORM_CONIC) begin : gen_conic
-    // Stage 2: squares and cross products; leader i has column i[0], row i[1].
-    quad_t [1:0] xx_d, yy_d, xx_q, yy_q;
-    quad_t [3:0] xy_d, xy_q;
-    quad_t shape0_q2, shape1_q2, shape2_q2;
-    // Stage 3: scaled by the conic.
-    quad_t [1:0] sx_d, sy_d, sx_q, sy_q;
-    quad_t [3:0] t_d, t_q3, t_q4;
-    // Stage 4: sum of the squares.
-    quad_t [3:0] h_d, h_q;
+    // Squares and cross products, then times the conic, sum of the squares, weight.
+    quad_t [Cols-1:0] xx_q, sx_q;
+    quad_t [Rows-1:0] yy_q, sy_q;
+    quad_t [Leaders-1:0] xy_q, t_q, t_late_q, h_q;
+    quad_t [2:0] shape_q;
 
-    for (genvar k = 0; k < 2; k++) begin : gen_axis
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_xx (
-        .a_i(dx_q[k]), .b_i(dx_q[k]), .prod_o(xx_d[k])
+    flk_delay #(
+      .Width(3 * QuadBits),
+      .Depth(MUL)
+    ) i_shape (
+      .clk_i,
+      .en_i,
+      .d_i(shape_i),
+      .q_o(shape_q)
+    );
+
+    for (genvar k = 0; k < Cols; k++) begin : gen_col
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_xx (
+        .clk_i, .en_i, .a_i(dx_q[k]), .b_i(dx_q[k]), .prod_o(xx_q[k])
       );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_yy (
-        .a_i(dy_q[k]), .b_i(dy_q[k]), .prod_o(yy_d[k])
-      );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_sx (
-        .a_i(xx_q[k]), .b_i(shape0_q2), .prod_o(sx_d[k])
-      );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_sy (
-        .a_i(yy_q[k]), .b_i(shape2_q2), .prod_o(sy_d[k])
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_sx (
+        .clk_i, .en_i, .a_i(xx_q[k]), .b_i(shape_q[0]), .prod_o(sx_q[k])
       );
     end
-    for (genvar i = 0; i < 4; i++) begin : gen_leader
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_xy (
-        .a_i(dx_q[i%2]), .b_i(dy_q[i/2]), .prod_o(xy_d[i])
+    for (genvar k = 0; k < Rows; k++) begin : gen_row
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_yy (
+        .clk_i, .en_i, .a_i(dy_q[k]), .b_i(dy_q[k]), .prod_o(yy_q[k])
       );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_t (
-        .a_i(xy_q[i]), .b_i(shape1_q2), .prod_o(t_d[i])
-      );
-      flk_fp_add #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_h (
-        .a_i(sx_q[i%2]), .b_i(sy_q[i/2]), .sum_o(h_d[i])
-      );
-      flk_fp_add #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_e (
-        .a_i(h_q[i]), .b_i(t_q4[i]), .sum_o(weight_d[i])
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_sy (
+        .clk_i, .en_i, .a_i(yy_q[k]), .b_i(shape_q[2]), .prod_o(sy_q[k])
       );
     end
-
-    always_ff @(posedge clk_i) begin
-      xx_q      <= xx_d;
-      yy_q      <= yy_d;
-      xy_q      <= xy_d;
-      shape0_q2 <= shape0_q1;
-      shape1_q2 <= shape1_q1;
-      shape2_q2 <= shape2_q1;
-      sx_q      <= sx_d;
-      sy_q      <= sy_d;
-      t_q3      <= t_d;
-      t_q4      <= t_q3;
-      h_q       <= h_d;
+    for (genvar i = 0; i < Leaders; i++) begin : gen_leader
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_xy (
+        .clk_i, .en_i, .a_i(dx_q[i%Cols]), .b_i(dy_q[i/Cols]), .prod_o(xy_q[i])
+      );
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_t (
+        .clk_i, .en_i, .a_i(xy_q[i]), .b_i(shape_q[1]), .prod_o(t_q[i])
+      );
+      flk_fp_add_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
+      ) i_h (
+        .clk_i, .en_i, .a_i(sx_q[i%Cols]), .b_i(sy_q[i/Cols]), .sum_o(h_q[i])
+      );
+      flk_delay #(.Width(QuadBits), .Depth(ADD)) i_t_late (
+        .clk_i, .en_i, .d_i(t_q[i]), .q_o(t_late_q[i])
+      );
+      flk_fp_add_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
+      ) i_e (
+        .clk_i, .en_i, .a_i(h_q[i]), .b_i(t_late_q[i]), .sum_o(weight_q[i])
+      );
     end
   end else begin : gen_factored
-    // Stage 2: products with the factors.
-    quad_t [1:0] p_d, q_d, v_d, p_q, q_q, v_q2, v_q3;
-    // Stage 3: u = p + q.
-    quad_t [3:0] u_d, u_q;
-    // Stage 4: squares.
-    quad_t [3:0] uu_d, uu_q;
-    quad_t [1:0] vv_d, vv_q;
+    // Products with the factors, u = p + q, squares, weight.
+    quad_t [Cols-1:0] p_q;
+    quad_t [Rows-1:0] q_q, v_q, v_late_q, vv_q;
+    quad_t [Leaders-1:0] u_q, uu_q;
 
-    for (genvar k = 0; k < 2; k++) begin : gen_axis
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_p (
-        .a_i(shape0_q1), .b_i(dx_q[k]), .prod_o(p_d[k])
-      );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_q (
-        .a_i(shape1_q1), .b_i(dy_q[k]), .prod_o(q_d[k])
-      );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_v (
-        .a_i(shape2_q1), .b_i(dy_q[k]), .prod_o(v_d[k])
-      );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_vv (
-        .a_i(v_q3[k]), .b_i(v_q3[k]), .prod_o(vv_d[k])
+    for (genvar k = 0; k < Cols; k++) begin : gen_col
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_p (
+        .clk_i, .en_i, .a_i(shape_i[0]), .b_i(dx_q[k]), .prod_o(p_q[k])
       );
     end
-    for (genvar i = 0; i < 4; i++) begin : gen_leader
-      flk_fp_add #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_u (
-        .a_i(p_q[i%2]), .b_i(q_q[i/2]), .sum_o(u_d[i])
+    for (genvar k = 0; k < Rows; k++) begin : gen_row
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_q (
+        .clk_i, .en_i, .a_i(shape_i[1]), .b_i(dy_q[k]), .prod_o(q_q[k])
       );
-      flk_fp_mul #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_uu (
-        .a_i(u_q[i]), .b_i(u_q[i]), .prod_o(uu_d[i])
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_v (
+        .clk_i, .en_i, .a_i(shape_i[2]), .b_i(dy_q[k]), .prod_o(v_q[k])
       );
-      flk_fp_add #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)) i_e (
-        .a_i(uu_q[i]), .b_i(vv_q[i/2]), .sum_o(weight_d[i])
+      flk_delay #(.Width(QuadBits), .Depth(ADD)) i_v_late (
+        .clk_i, .en_i, .d_i(v_q[k]), .q_o(v_late_q[k])
+      );
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_vv (
+        .clk_i, .en_i, .a_i(v_late_q[k]), .b_i(v_late_q[k]), .prod_o(vv_q[k])
       );
     end
-
-    always_ff @(posedge clk_i) begin
-      p_q  <= p_d;
-      q_q  <= q_d;
-      v_q2 <= v_d;
-      v_q3 <= v_q2;
-      u_q  <= u_d;
-      uu_q <= uu_d;
-      vv_q <= vv_d;
+    for (genvar i = 0; i < Leaders; i++) begin : gen_leader
+      flk_fp_add_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
+      ) i_u (
+        .clk_i, .en_i, .a_i(p_q[i%Cols]), .b_i(q_q[i/Cols]), .sum_o(u_q[i])
+      );
+      flk_fp_mul_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
+      ) i_uu (
+        .clk_i, .en_i, .a_i(u_q[i]), .b_i(u_q[i]), .prod_o(uu_q[i])
+      );
+      flk_fp_add_pipe #(
+        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Cancel(0), .Stages(SUM)
+      ) i_e (
+        .clk_i, .en_i, .a_i(uu_q[i]), .b_i(vv_q[i/Cols]), .sum_o(weight_q[i])
+      );
     end
   end
 
-  // The threshold travels beside stages 1 to 5.
-  localparam int unsigned ThresholdDelay = PRTU_LATENCY - 1;
-  quad_t [ThresholdDelay-1:0] threshold_q;
+  // ---- Comparison (Alg. 1, line 7) -----------------------------------------------------------------------
 
-  always_ff @(posedge clk_i) begin
-    weight_q    <= weight_d;
-    threshold_q <= {threshold_q[ThresholdDelay-2:0], threshold_i};
-  end
+  logic [Leaders-1:0] pass_d;
 
-  // ---- Stage 6: comparison -------------------------------------------------------------------------
-
-  logic [3:0] pass_d;
-
-  for (genvar i = 0; i < 4; i++) begin : gen_compare
-    flk_fp_cmp #(.ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn)) i_lt (
-      .a_i(weight_q[i]), .b_i(threshold_q[ThresholdDelay-1]), .lt_o(pass_d[i])
+  for (genvar i = 0; i < Leaders; i++) begin : gen_compare
+    flk_fp_cmp #(
+      .ExpBits(ExpBits),
+      .ManBits(ManBits),
+      .Fn     (Fn)
+    ) i_lt (
+      .a_i (weight_q[i]),
+      .b_i (threshold_i),
+      .lt_o(pass_d[i])
     );
   end
 
   always_ff @(posedge clk_i) begin
-    pass_o   <= pass_d;
-    weight_o <= weight_q;
+    if (en_i) begin
+      pass_o   <= pass_d;
+      weight_o <= weight_q;
+    end
   end
 
 endmodule

@@ -35,7 +35,6 @@ module flk_channel
   end
 
   localparam int unsigned PixelW = $clog2(PIXELS_PER_VRU);
-  localparam int unsigned VruRows = MINITILE / VRUS_PER_CHANNEL;
 
   // ---- Feature FIFO ------------------------------------------------------------------------------------
 
@@ -143,8 +142,8 @@ module flk_channel
     ) i_vru (
       .clk_i,
       .rst_ni,
-      .first_x_i    (3'((MiniTile % 2) * MINITILE)),
-      .first_y_i    (3'((MiniTile / 2) * MINITILE + v * VruRows)),
+      .col_i        (1'(MiniTile % 2)),
+      .row_i        (2'((MiniTile / 2) * VRUS_PER_CHANNEL + v)),
       .op_valid_i   (issue || issue_eos),
       .op_eos_i     (issue_eos),
       .op_pixel_i   (pixel_q),

@@ -1,7 +1,7 @@
 // Performance counters of one CTU and rendering core.
 //
 // Index of each counter: flk_param_pkg::CNT_*; channel c's counters follow at CORE_COUNTERS + c * CHANNEL_COUNTERS.
-// Counters wrap. `clear_i` sets all to zero; otherwise each adds its events of the cycle.
+// Counters wrap. `clear_i` sets all to zero; otherwise each adds its events of the cycle. Both take effect one cycle late, behind a register.
 module flk_perf_counters
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -21,7 +21,8 @@ module flk_perf_counters
   endfunction
 
   // No event counts more than 4 in a cycle.
-  logic [COUNTERS_PER_CORE-1:0][2:0] inc;
+  logic [COUNTERS_PER_CORE-1:0][2:0] inc, inc_q;
+  logic clear_q;
   logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0] counters_q;
 
   always_comb begin
@@ -47,12 +48,14 @@ module flk_perf_counters
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      counters_q <= '0;
-    end else if (clear_i) begin
+      inc_q      <= '0;
+      clear_q    <= 1'b0;
       counters_q <= '0;
     end else begin
+      inc_q   <= inc;
+      clear_q <= clear_i;
       for (int unsigned i = 0; i < COUNTERS_PER_CORE; i++) begin
-        counters_q[i] <= counters_q[i] + COUNTER_BITS'(inc[i]);
+        counters_q[i] <= clear_q ? '0 : counters_q[i] + COUNTER_BITS'(inc_q[i]);
       end
     end
   end

@@ -1,25 +1,33 @@
 // Volume rendering unit (VRU): blends splats into eight pixels, one pixel-Gaussian pair per cycle, FP16.
 //
 // Operations come in program order: `op_valid_i` with a splat and a pixel, or with `op_eos_i` (end of sub-tile). There is no
-// back-pressure on operations, except that a token may only come while `eos_ready_o` is high. The transmittance loop takes one
-// cycle, so the same pixel may come in consecutive cycles.
+// back-pressure on operations, except that a token may only come while `eos_ready_o` is high.
+// A splat's pixels come in order, 0 to 7, with op_feature_i held from the first to the last. So a pixel returns after 8 operations at the
+// soonest, which leaves the read-modify-write loops of transmittance and colour 4 cycles each; a splat may be broken off only when all
+// pixels of the mini-tile are finished.
 //
-// | stage | conic | factored |
+// | cycles, conic | factored | what |
 // |---|---|---|
-// | 1 | dx, dy | dx, dy |
-// | 2 | dx dx, dy dy, dx dy | l0 dx, l1 dy, l2 dy |
-// | 3 | times a/2, c/2, b | u |
-// | 4 | sum of the squares | u u, v v |
-// | 5 | E | E |
-// | 6 | e^-E | 2^-E |
-// | 7 | alpha = min(o g, 0.99) | the same |
-// | 8 | 1 - alpha; alpha >= 1/255? | |
-// | 9 | T (1 - alpha) >= 1e-4? T, w = T alpha | |
-// | 10 | w colour | |
-// | 11 | C += w colour | |
+// | 1 | 1 | pixel and mean |
+// | 3 | 3 | dx, dy |
+// | 2 | 2 | dx dx, dy dy, dx dy; or l0 dx, l1 dy, l2 dy |
+// | 2 | 3 | times a/2, c/2, b; or u |
+// | 3 | 2 | sum of the squares; or u u, v v |
+// | 3 | 2 | E |
+// | 3 | 2 | e^-E or 2^-E |
+// | 2 | 2 | o g |
+// | 1 | 1 | alpha = min(o g, 0.99); alpha >= 1/255? |
+// | 3 | 3 | 1 - alpha; the pixel's T is read |
+// | 2 | 2 | T (1 - alpha), w = T alpha |
+// | 0 | 0 | BLEND: T (1 - alpha) >= 1e-4? T is written |
+// | 2 | 2 | w colour; the pixel's C is read |
+// | 2 | 2 | C + w colour |
+// | 0 | 0 | LAST: C is written |
 //
-// A token copies T (stage 9) and C (stage 11) into the output buffer and clears the pixel state: the next sub-tile's operations
-// may follow at once. The buffer then leaves as a stream of eight pixels; the next token may come when it is empty.
+// A token copies T (at BLEND) and C (at LAST) into the output buffer and clears the pixel state: the next sub-tile's operations
+// may follow at once; what they read before the token has cleared it counts as cleared. The buffer then leaves as a stream of eight pixels; the
+// next token may come when it is empty.
+// Colours are not negative: their sign bits are ignored.
 module flk_vru
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -30,21 +38,21 @@ module flk_vru
 ) (
   input  logic              clk_i,
   input  logic              rst_ni,
-  // First pixel's column and row in the sub-tile, constant; pixel i lies i % 4, i / 4 from it.
-  input  logic [2:0]        first_x_i,
-  input  logic [2:0]        first_y_i,
+  // Place in the sub-tile, constant: pixel i lies in column 4 col_i + i % 4, row 2 row_i + i / 4.
+  input  logic              col_i,
+  input  logic [1:0]        row_i,
   // operations
   input  logic              op_valid_i,
   input  logic              op_eos_i,
   input  logic [IndexW-1:0] op_pixel_i,
   input  feature_t          op_feature_i,
   output logic              eos_ready_o,
-  // state of the sub-tile at stage 9
-  output logic              blend_valid_o,  // an operation is at stage 9
+  // state of the sub-tile at BLEND
+  output logic              blend_valid_o,  // an operation is at BLEND
   output logic [IndexW-1:0] blend_pixel_o,
-  output logic              blend_eos_o,    // a token is at stage 9
-  output logic [N-1:0]      finished_o,     // before the operation at stage 9
-  output logic              finish_o,       // the operation at stage 9 finishes its pixel
+  output logic              blend_eos_o,    // a token is at BLEND
+  output logic [N-1:0]      finished_o,     // before the operation at BLEND
+  output logic              finish_o,       // the operation at BLEND finishes its pixel
   // finished pixels
   output logic              out_valid_o,
   input  logic              out_ready_i,
@@ -54,29 +62,99 @@ module flk_vru
   if (Form > FORM_FACTORED) begin : gen_check_form
     $error("flk_vru: Form must be FORM_CONIC or FORM_FACTORED");
   end
-  localparam int unsigned STAGES = 11;
-  localparam int unsigned BLEND = 9;  // stage of the transmittance loop
+  localparam bit Factored = (Form == FORM_FACTORED);
 
-  // ---- Control pipeline: index s holds what is in the registers before stage s ------------------------
+  // Cycles after the operation at which a value is in its register.
+  localparam int unsigned DIFF = 1 + FP16_ADD_STAGES;
+  localparam int unsigned PRODUCT = DIFF + FP16_MUL_STAGES;
+  localparam int unsigned WEIGHT = Factored
+      ? PRODUCT + FP16_ADD_STAGES + FP16_MUL_STAGES + FP16_SUM_STAGES
+      : PRODUCT + FP16_MUL_STAGES + 2 * FP16_ADD_STAGES;
+  localparam int unsigned EXP = 32'(EXP_STAGES[Form]);
+  localparam int unsigned POWER = WEIGHT + EXP;
+  localparam int unsigned ALPHA = POWER + FP16_MUL_STAGES + 1;
+  localparam int unsigned OMA = ALPHA + FP16_ADD_STAGES;
+  localparam int unsigned BLEND = OMA + FP16_MUL_STAGES;
+  localparam int unsigned COLOUR = BLEND + FP16_MUL_STAGES;
+  localparam int unsigned LAST = COLOUR + FP16_SUM_STAGES;
 
-  logic [STAGES:2] valid_q, eos_q;
-  logic [STAGES:2][IndexW-1:0] pixel_q;
+  // ---- Control pipeline: index s holds what came s cycles ago -----------------------------------------
+
+  logic [LAST:1] valid_q, eos_q;
+  logic [LAST:1][IndexW-1:0] pixel_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       valid_q <= '0;
       eos_q   <= '0;
     end else begin
-      valid_q <= {valid_q[STAGES-1:2], op_valid_i && !op_eos_i};
-      eos_q   <= {eos_q[STAGES-1:2], op_valid_i && op_eos_i};
+      valid_q <= {valid_q[LAST-1:1], op_valid_i && !op_eos_i};
+      eos_q   <= {eos_q[LAST-1:1], op_valid_i && op_eos_i};
     end
   end
 
   always_ff @(posedge clk_i) begin
-    pixel_q <= {pixel_q[STAGES-1:2], op_pixel_i};
+    pixel_q <= {pixel_q[LAST-1:1], op_pixel_i};
   end
 
-  // ---- Stage 1: differences -----------------------------------------------------------------------------
+  // ---- A splat's numbers, each held for eight pixels where it is needed ---------------------------------
+
+  // Loaded when the splat's first pixel comes to the cycle in which it is used. Numbers needed long after the operation go through
+  // holders on the way, at most 8 cycles apart.
+  localparam int unsigned HOLD1 = 8;
+  localparam int unsigned HOLD2 = 16;
+  localparam int unsigned HOLD3 = 24;
+  localparam int unsigned OPACITY_AT = POWER;
+  localparam int unsigned COLOUR_AT = BLEND;
+
+  logic [LAST:2] first;  // the first pixel gets to cycle s at this edge
+  for (genvar s = 2; s <= LAST; s++) begin : gen_first
+    assign first[s] = valid_q[s-1] && (pixel_q[s-1] == '0);
+  end
+
+  fp16_t mean_x_q, mean_y_q;
+  logic [2:0][15:0] shape_q;
+  fp16_t opacity_q8, opacity_q;
+  logic [2:0][14:0] colour, colour_q8, colour_q16, colour_q24, colour_q;  // 0 red, 1 green, 2 blue
+
+  assign colour = {op_feature_i.blue[14:0], op_feature_i.green[14:0], op_feature_i.red[14:0]};
+
+  always_ff @(posedge clk_i) begin
+    if (op_pixel_i == '0) begin
+      mean_x_q <= op_feature_i.mean_x;
+      mean_y_q <= op_feature_i.mean_y;
+    end
+    if (first[Factored ? DIFF : PRODUCT]) begin
+      shape_q <= {op_feature_i.shape2, op_feature_i.shape1, op_feature_i.shape0};
+    end
+    if (first[HOLD1]) begin
+      opacity_q8 <= op_feature_i.opacity;
+      colour_q8  <= colour;
+    end
+    if (first[OPACITY_AT]) begin
+      opacity_q <= opacity_q8;
+    end
+    if (first[HOLD2]) begin
+      colour_q16 <= colour_q8;
+    end
+    if (first[COLOUR_AT]) begin
+      colour_q <= (BLEND > HOLD3) ? colour_q24 : colour_q16;
+    end
+  end
+  if (BLEND > HOLD3) begin : gen_hold3
+    always_ff @(posedge clk_i) begin
+      if (first[HOLD3]) begin
+        colour_q24 <= colour_q16;
+      end
+    end
+  end else begin : gen_no_hold3
+    assign colour_q24 = '0;
+  end
+  if (POWER > HOLD2 || BLEND <= HOLD2 || BLEND > HOLD3 + 8) begin : gen_check_hold
+    $error("flk_vru: the holders of opacity and colour do not fit the pipeline");
+  end
+
+  // ---- Differences ---------------------------------------------------------------------------------------
 
   // Integer 0..7 in FP16: exact.
   function automatic fp16_t pixel_fp16(logic [2:0] p);
@@ -88,136 +166,172 @@ module flk_vru
     endcase
   endfunction
 
-  fp16_t dx_d, dy_d, dx_q, dy_q;
+  fp16_t dx_q, dy_q;
 
-  flk_fp_add i_dx (
-    .a_i  (pixel_fp16(first_x_i + 3'(op_pixel_i[1:0]))),
-    .b_i  ({~op_feature_i.mean_x[15], op_feature_i.mean_x[14:0]}),
-    .sum_o(dx_d)
+  flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dx (
+    .clk_i,
+    .en_i (1'b1),
+    .a_i  (pixel_fp16({col_i, pixel_q[1][1:0]})),
+    .b_i  ({~mean_x_q[15], mean_x_q[14:0]}),
+    .sum_o(dx_q)
   );
-  flk_fp_add i_dy (
-    .a_i  (pixel_fp16(first_y_i + 3'(op_pixel_i[2]))),
-    .b_i  ({~op_feature_i.mean_y[15], op_feature_i.mean_y[14:0]}),
-    .sum_o(dy_d)
+  flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dy (
+    .clk_i,
+    .en_i (1'b1),
+    .a_i  (pixel_fp16({row_i, pixel_q[1][2]})),
+    .b_i  ({~mean_y_q[15], mean_y_q[14:0]}),
+    .sum_o(dy_q)
   );
 
-  // Shape numbers travel to stage 3, opacity to stage 7, colour to stage 10.
-  fp16_t shape0_q2, shape1_q2, shape2_q2;
-  fp16_t [7:2] opacity_q;
-  fp16_t [10:2] red_q, green_q, blue_q;
+  // ---- Weight ----------------------------------------------------------------------------------------------
 
-  always_ff @(posedge clk_i) begin
-    dx_q      <= dx_d;
-    dy_q      <= dy_d;
-    shape0_q2 <= op_feature_i.shape0;
-    shape1_q2 <= op_feature_i.shape1;
-    shape2_q2 <= op_feature_i.shape2;
-    opacity_q <= {opacity_q[6:2], op_feature_i.opacity};
-    red_q     <= {red_q[9:2], op_feature_i.red};
-    green_q   <= {green_q[9:2], op_feature_i.green};
-    blue_q    <= {blue_q[9:2], op_feature_i.blue};
-  end
-
-  // ---- Stages 2 to 5: weight -----------------------------------------------------------------------------
-
-  fp16_t weight_d, weight_q;
+  fp16_t weight_q;
 
   if (Form == FORM_CONIC) begin : gen_conic
-    fp16_t xx_d, yy_d, xy_d, xx_q, yy_q, xy_q;
-    fp16_t shape0_q3, shape1_q3, shape2_q3;
-    fp16_t sx_d, sy_d, t_d, sx_q, sy_q, t_q4, t_q5;
-    fp16_t h_d, h_q;
+    fp16_t xx_q, yy_q, xy_q, sx_q, sy_q, t_q, t_late_q, h_q;
 
-    flk_fp_mul i_xx (.a_i(dx_q), .b_i(dx_q), .prod_o(xx_d));
-    flk_fp_mul i_yy (.a_i(dy_q), .b_i(dy_q), .prod_o(yy_d));
-    flk_fp_mul i_xy (.a_i(dx_q), .b_i(dy_q), .prod_o(xy_d));
-    flk_fp_mul i_sx (.a_i(xx_q), .b_i(shape0_q3), .prod_o(sx_d));
-    flk_fp_mul i_sy (.a_i(yy_q), .b_i(shape2_q3), .prod_o(sy_d));
-    flk_fp_mul i_t (.a_i(xy_q), .b_i(shape1_q3), .prod_o(t_d));
-    flk_fp_add i_h (.a_i(sx_q), .b_i(sy_q), .sum_o(h_d));
-    flk_fp_add i_e (.a_i(h_q), .b_i(t_q5), .sum_o(weight_d));
-
-    always_ff @(posedge clk_i) begin
-      xx_q      <= xx_d;
-      yy_q      <= yy_d;
-      xy_q      <= xy_d;
-      shape0_q3 <= shape0_q2;
-      shape1_q3 <= shape1_q2;
-      shape2_q3 <= shape2_q2;
-      sx_q      <= sx_d;
-      sy_q      <= sy_d;
-      t_q4      <= t_d;
-      h_q       <= h_d;
-      t_q5      <= t_q4;
-    end
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_xx (
+      .clk_i, .en_i(1'b1), .a_i(dx_q), .b_i(dx_q), .prod_o(xx_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_yy (
+      .clk_i, .en_i(1'b1), .a_i(dy_q), .b_i(dy_q), .prod_o(yy_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_xy (
+      .clk_i, .en_i(1'b1), .a_i(dx_q), .b_i(dy_q), .prod_o(xy_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_sx (
+      .clk_i, .en_i(1'b1), .a_i(xx_q), .b_i(shape_q[0]), .prod_o(sx_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_sy (
+      .clk_i, .en_i(1'b1), .a_i(yy_q), .b_i(shape_q[2]), .prod_o(sy_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_t (
+      .clk_i, .en_i(1'b1), .a_i(xy_q), .b_i(shape_q[1]), .prod_o(t_q)
+    );
+    flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_h (
+      .clk_i, .en_i(1'b1), .a_i(sx_q), .b_i(sy_q), .sum_o(h_q)
+    );
+    flk_delay #(.Width(16), .Depth(FP16_ADD_STAGES)) i_t_late (
+      .clk_i, .en_i(1'b1), .d_i(t_q), .q_o(t_late_q)
+    );
+    flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_e (
+      .clk_i, .en_i(1'b1), .a_i(h_q), .b_i(t_late_q), .sum_o(weight_q)
+    );
   end else begin : gen_factored
-    fp16_t p_d, q_d, v_d, p_q, q_q, v_q3, v_q4;
-    fp16_t u_d, u_q, uu_d, vv_d, uu_q, vv_q;
+    fp16_t p_q, q_q, v_q, v_late_q, u_q, uu_q, vv_q;
 
-    flk_fp_mul i_p (.a_i(shape0_q2), .b_i(dx_q), .prod_o(p_d));
-    flk_fp_mul i_q (.a_i(shape1_q2), .b_i(dy_q), .prod_o(q_d));
-    flk_fp_mul i_v (.a_i(shape2_q2), .b_i(dy_q), .prod_o(v_d));
-    flk_fp_add i_u (.a_i(p_q), .b_i(q_q), .sum_o(u_d));
-    flk_fp_mul i_uu (.a_i(u_q), .b_i(u_q), .prod_o(uu_d));
-    flk_fp_mul i_vv (.a_i(v_q4), .b_i(v_q4), .prod_o(vv_d));
-    flk_fp_add i_e (.a_i(uu_q), .b_i(vv_q), .sum_o(weight_d));
-
-    always_ff @(posedge clk_i) begin
-      p_q  <= p_d;
-      q_q  <= q_d;
-      v_q3 <= v_d;
-      u_q  <= u_d;
-      v_q4 <= v_q3;
-      uu_q <= uu_d;
-      vv_q <= vv_d;
-    end
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_p (
+      .clk_i, .en_i(1'b1), .a_i(shape_q[0]), .b_i(dx_q), .prod_o(p_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_q (
+      .clk_i, .en_i(1'b1), .a_i(shape_q[1]), .b_i(dy_q), .prod_o(q_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_v (
+      .clk_i, .en_i(1'b1), .a_i(shape_q[2]), .b_i(dy_q), .prod_o(v_q)
+    );
+    flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_u (
+      .clk_i, .en_i(1'b1), .a_i(p_q), .b_i(q_q), .sum_o(u_q)
+    );
+    flk_delay #(.Width(16), .Depth(FP16_ADD_STAGES)) i_v_late (
+      .clk_i, .en_i(1'b1), .d_i(v_q), .q_o(v_late_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_uu (
+      .clk_i, .en_i(1'b1), .a_i(u_q), .b_i(u_q), .prod_o(uu_q)
+    );
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_vv (
+      .clk_i, .en_i(1'b1), .a_i(v_late_q), .b_i(v_late_q), .prod_o(vv_q)
+    );
+    flk_fp_add_pipe #(.Cancel(0), .Stages(FP16_SUM_STAGES)) i_e (
+      .clk_i, .en_i(1'b1), .a_i(uu_q), .b_i(vv_q), .sum_o(weight_q)
+    );
   end
 
-  // ---- Stages 6 to 8: alpha --------------------------------------------------------------------------------
+  // ---- Alpha -------------------------------------------------------------------------------------------------
 
-  fp16_t g_d, g_q, product, alpha_d, alpha_q8, alpha_q9, oma_d, oma_q;
-  logic contributes_q;
+  fp16_t g_q, product_q, alpha_q, alpha_late_q, oma_q;
+  logic contributes_q, contributes_late_q;
 
   // A negative or NaN weight gives g = 0, so that alpha is below 1/255.
-  flk_exp_neg #(
-    .Base2(Form == FORM_FACTORED)
+  flk_exp_neg_pipe #(
+    .Base2 (Factored),
+    .Stages(EXP)
   ) i_exp (
-    .e_i(weight_q),
-    .g_o(g_d)
+    .clk_i,
+    .en_i(1'b1),
+    .e_i (weight_q),
+    .g_o (g_q)
   );
-  flk_fp_mul i_alpha (.a_i(opacity_q[7]), .b_i(g_q), .prod_o(product));
-  // Products are not negative: their bits compare like integers.
-  assign alpha_d = (product > ALPHA_MAX) ? ALPHA_MAX : product;
-  flk_fp_add i_oma (.a_i(FP16_ONE), .b_i({~alpha_q8[15], alpha_q8[14:0]}), .sum_o(oma_d));
+  flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_alpha (
+    .clk_i, .en_i(1'b1), .a_i(opacity_q), .b_i(g_q), .prod_o(product_q)
+  );
 
+  // Products are not negative: their bits compare like integers.
   always_ff @(posedge clk_i) begin
-    weight_q      <= weight_d;
-    g_q           <= g_d;
-    alpha_q8      <= alpha_d;
-    alpha_q9      <= alpha_q8;
-    oma_q         <= oma_d;
-    contributes_q <= (alpha_q8 >= ALPHA_MIN);
+    alpha_q       <= (product_q > ALPHA_MAX) ? ALPHA_MAX : product_q;
+    contributes_q <= (product_q >= ALPHA_MIN);
   end
 
-  // ---- Stage 9: transmittance --------------------------------------------------------------------------------
+  flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_oma (
+    .clk_i,
+    .en_i (1'b1),
+    .a_i  (FP16_ONE),
+    .b_i  ({~alpha_q[15], alpha_q[14:0]}),
+    .sum_o(oma_q)
+  );
+  flk_delay #(
+    .Width(16),
+    .Depth(OMA - ALPHA)
+  ) i_alpha_late (
+    .clk_i,
+    .en_i(1'b1),
+    .d_i (alpha_q),
+    .q_o (alpha_late_q)
+  );
+  flk_delay #(
+    .Width(1),
+    .Depth(BLEND - ALPHA)
+  ) i_contributes (
+    .clk_i,
+    .en_i(1'b1),
+    .d_i (contributes_q),
+    .q_o (contributes_late_q)
+  );
 
-  fp16_t [N-1:0] t_q;
+  // ---- Transmittance: read for OMA, written at BLEND -----------------------------------------------------------
+
+  logic [N-1:0][14:0] t_q;  // not negative
   logic [N-1:0] finished_q;
-  fp16_t t_now, t_next, w_d, w_q;
-  logic blend, finish, blend_q10, blend_q11;
+  fp16_t t_now_q, t_next_q, w_q;
+  logic blend, finish;
   logic [IndexW-1:0] blend_pixel;
 
-  assign blend_pixel = pixel_q[BLEND];
-  assign t_now       = t_q[blend_pixel];
+  always_ff @(posedge clk_i) begin
+    // A token between here and BLEND will have cleared it.
+    t_now_q <= (|eos_q[BLEND:OMA]) ? FP16_ONE : {1'b0, t_q[pixel_q[OMA-1]]};
+  end
 
-  flk_fp_mul i_t_next (.a_i(t_now), .b_i(oma_q), .prod_o(t_next));
-  flk_fp_mul i_w (.a_i(t_now), .b_i(alpha_q9), .prod_o(w_d));
+  flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_t_next (
+    .clk_i,
+    .en_i  (1'b1),
+    .a_i   (t_now_q),
+    .b_i   (oma_q),
+    .prod_o(t_next_q)
+  );
+  flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_w (
+    .clk_i,
+    .en_i  (1'b1),
+    .a_i   (t_now_q),
+    .b_i   (alpha_late_q),
+    .prod_o(w_q)
+  );
+
+  assign blend_pixel = pixel_q[BLEND];
 
   always_comb begin
     blend  = 1'b0;
     finish = 1'b0;
-    if (valid_q[BLEND] && contributes_q && !finished_q[blend_pixel]) begin
-      if (t_next < TRANSMITTANCE_MIN) begin
+    if (valid_q[BLEND] && contributes_late_q && !finished_q[blend_pixel]) begin
+      if (t_next_q < TRANSMITTANCE_MIN) begin
         finish = 1'b1;
       end else begin
         blend = 1'b1;
@@ -227,23 +341,17 @@ module flk_vru
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      t_q        <= {N{FP16_ONE}};
+      t_q        <= {N{FP16_ONE[14:0]}};
       finished_q <= '0;
-      blend_q10  <= 1'b0;
-      blend_q11  <= 1'b0;
+    end else if (eos_q[BLEND]) begin
+      t_q        <= {N{FP16_ONE[14:0]}};
+      finished_q <= '0;
     end else begin
-      blend_q10 <= blend;
-      blend_q11 <= blend_q10;
-      if (eos_q[BLEND]) begin
-        t_q        <= {N{FP16_ONE}};
-        finished_q <= '0;
-      end else begin
-        if (blend) begin
-          t_q[blend_pixel] <= t_next;
-        end
-        if (finish) begin
-          finished_q[blend_pixel] <= 1'b1;
-        end
+      if (blend) begin
+        t_q[blend_pixel] <= t_next_q[14:0];
+      end
+      if (finish) begin
+        finished_q[blend_pixel] <= 1'b1;
       end
     end
   end
@@ -254,39 +362,54 @@ module flk_vru
   assign finished_o    = finished_q;
   assign finish_o      = finish;
 
-  // ---- Stages 10 and 11: colour ----------------------------------------------------------------------------------
+  // ---- Colour: read for COLOUR, written at LAST ------------------------------------------------------------------
 
-  // Index 0 red, 1 green, 2 blue.
-  fp16_t [2:0] colour_10, m_d, m_q, c_now, c_next;
-  fp16_t [N-1:0][2:0] c_q;
-
-  assign colour_10 = {blue_q[10], green_q[10], red_q[10]};
-  assign c_now     = c_q[pixel_q[STAGES]];
+  fp16_t [2:0] m_q, c_next_q;
+  logic [2:0][14:0] c_now_q;
+  logic [N-1:0][2:0][14:0] c_q;  // not negative
+  logic [LAST:BLEND+1] blend_q;
 
   for (genvar k = 0; k < 3; k++) begin : gen_colour
-    flk_fp_mul i_m (.a_i(w_q), .b_i(colour_10[k]), .prod_o(m_d[k]));
-    flk_fp_add i_c (.a_i(c_now[k]), .b_i(m_q[k]), .sum_o(c_next[k]));
+    flk_fp_mul_pipe #(.Stages(FP16_MUL_STAGES)) i_m (
+      .clk_i,
+      .en_i  (1'b1),
+      .a_i   (w_q),
+      .b_i   ({1'b0, colour_q[k]}),
+      .prod_o(m_q[k])
+    );
+    flk_fp_add_pipe #(.Cancel(0), .Stages(FP16_SUM_STAGES)) i_c (
+      .clk_i,
+      .en_i (1'b1),
+      .a_i  ({1'b0, c_now_q[k]}),
+      .b_i  (m_q[k]),
+      .sum_o(c_next_q[k])
+    );
   end
 
   always_ff @(posedge clk_i) begin
-    w_q <= w_d;
-    m_q <= m_d;
+    c_now_q <= (|eos_q[LAST:COLOUR]) ? '0 : c_q[pixel_q[COLOUR-1]];
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      c_q <= '0;
-    end else if (eos_q[STAGES]) begin
-      c_q <= '0;
-    end else if (blend_q11) begin
-      c_q[pixel_q[STAGES]] <= c_next;
+      c_q     <= '0;
+      blend_q <= '0;
+    end else begin
+      blend_q <= {blend_q[LAST-1:BLEND+1], blend};
+      if (eos_q[LAST]) begin
+        c_q <= '0;
+      end else if (blend_q[LAST]) begin
+        for (int unsigned k = 0; k < 3; k++) begin
+          c_q[pixel_q[LAST]][k] <= c_next_q[k][14:0];
+        end
+      end
     end
   end
 
   // ---- Output buffer -----------------------------------------------------------------------------------------------
 
-  fp16_t [N-1:0] out_t_q;
-  fp16_t [N-1:0][2:0] out_c_q;
+  logic [N-1:0][14:0] out_t_q;
+  logic [N-1:0][2:0][14:0] out_c_q;
   logic busy_q, full_q, last;
   logic [IndexW-1:0] out_index_q;
 
@@ -303,7 +426,7 @@ module flk_vru
       end else if (last) begin
         busy_q <= 1'b0;
       end
-      if (eos_q[STAGES]) begin
+      if (eos_q[LAST]) begin
         full_q <= 1'b1;
       end else if (last) begin
         full_q <= 1'b0;
@@ -318,7 +441,7 @@ module flk_vru
     if (eos_q[BLEND]) begin
       out_t_q <= t_q;
     end
-    if (eos_q[STAGES]) begin
+    if (eos_q[LAST]) begin
       out_c_q <= c_q;
     end
   end
@@ -327,15 +450,26 @@ module flk_vru
   assign out_valid_o = full_q;
   always_comb begin
     out_data_o.index               = out_index_q;
-    out_data_o.pixel.transmittance = out_t_q[out_index_q];
-    out_data_o.pixel.red           = out_c_q[out_index_q][0];
-    out_data_o.pixel.green         = out_c_q[out_index_q][1];
-    out_data_o.pixel.blue          = out_c_q[out_index_q][2];
+    out_data_o.pixel.transmittance = {1'b0, out_t_q[out_index_q]};
+    out_data_o.pixel.red           = {1'b0, out_c_q[out_index_q][0]};
+    out_data_o.pixel.green         = {1'b0, out_c_q[out_index_q][1]};
+    out_data_o.pixel.blue          = {1'b0, out_c_q[out_index_q][2]};
   end
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) op_valid_i && op_eos_i |-> eos_ready_o)
   else $error("flk_vru: token while the output buffer is in use");
+
+  // Pixels in order: so a pixel returns only when its state has been written.
+  logic [IndexW-1:0] next_pixel_q;
+  always_ff @(posedge clk_i) begin
+    if (op_valid_i) begin
+      next_pixel_q <= op_eos_i ? '0 : op_pixel_i + IndexW'(1);
+    end
+  end
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      op_valid_i && !op_eos_i && (op_pixel_i != '0) |-> op_pixel_i == next_pixel_q)
+  else $error("flk_vru: pixel out of order");
 `endif
 
 endmodule

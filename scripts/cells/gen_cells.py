@@ -10,7 +10,7 @@ one gate equivalent: area = (n + 1) / 3.
 Delay: a cell of size s has s times the drive of the unit inverter: delay = parasitic + load / s, and it has s times the pairs
 and the input loads of size 1. An input's load is its logical effort; an input that is also inverted inside loads one unit
 more, and its delay is the mean of the direct way and the way through that inverter. Flip-flops are not covered by logical effort: clock to output 6 and set-up 5 are assumptions (2 and
-1 FO4 at fan-out 4).
+1 FO4 at fan-out 4). The clock gate is a latch (7 pairs) and an AND2; its enable has the set-up of a flip-flop.
 """
 
 from __future__ import annotations
@@ -48,6 +48,9 @@ SIZES = {
 # name: (transistor pairs, asynchronous pin of the ff group)
 FLIP_FLOPS = {"DFF": (12, ""), "DFFR": (14, "clear"), "DFFS": (14, "preset")}
 CLOCK_TO_Q, SETUP, D_LOAD, CLOCK_LOAD, RESET_LOAD = 6.0, 5.0, 1.0, 2.0, 4 / 3
+
+# Integrated clock gate: transistor pairs.
+CLOCK_GATE_PAIRS = 10
 
 TAU = 10.0
 LOADS = (0.0, 16.0)  # of size 1; two points are enough for a straight line
@@ -117,6 +120,15 @@ def flip_flop(name: str) -> str:
     return text + "    }\n  }\n"
 
 
+def clock_gate() -> str:
+    return (
+        f"  cell(ICG) {{\n    area : {area(CLOCK_GATE_PAIRS)};\n    clock_gating_integrated_cell : latch_posedge;\n    dont_use : true;\n"
+        + input_pin("CK", CLOCK_LOAD, " clock : true; clock_gate_clock_pin : true;")
+        + input_pin("E", D_LOAD, " clock_gate_enable_pin : true;")
+        + "    pin(GCK) { direction : output; capacitance : 0; clock_gate_out_pin : true; }\n  }\n"
+    )
+
+
 def library() -> str:
     loads, slews = (", ".join(f"{x:g}" for x in axis) for axis in (LOADS, SLEWS))
     return (
@@ -132,6 +144,7 @@ def library() -> str:
         f'    index_1("{slews}");\n    index_2("{slews}");\n  }}\n'
         + "".join(gate(name, size) for name in GATES for size in SIZES.get(name, (1,)))
         + "".join(map(flip_flop, FLIP_FLOPS))
+        + clock_gate()
         + "}\n"
     )
 

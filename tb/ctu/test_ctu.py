@@ -2,8 +2,8 @@
 
 State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000
 splats; all modes; idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it
-fall and return, under different stalls. Parameter space: every form and precision at the default depth of the internal
-FIFO, depths 1 to 3 for one. Not covered: a change of mode in mid-frame, which the contract excludes.
+fall and return, under different stalls. Parameter space: every form and precision without output FIFO; output FIFOs of 1 to 3 places
+and that of the faithful configuration. Not covered: a change of mode in mid-frame, which the contract excludes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import pytest
 from flicker_tb.runner import build_and_test
 from flicker_tb.splats import QUICK_BUILD
 
-from flicker.params import Form, Precision, RenderConfig
+from flicker.params import FAITHFUL, Form, Precision, RenderConfig
 
 
 def run(form: Form, precision: Precision, depth: int, tests: list[str]) -> None:
@@ -26,9 +26,13 @@ def test_ctu(form: Form, precision: Precision) -> None:
     tests = ["lists", "rate", "automatic"]
     if RenderConfig(form=form, precision=precision) == RenderConfig():
         tests += ["rejected_drain", "long_list", "saturation", "reset_forgets"]
-    run(form, precision, RenderConfig().ctu_fifo_depth, tests)
+    run(form, precision, 0, tests)
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3])
 def test_fifo_depth(depth: int) -> None:
     run(Form.FACTORED, Precision.MIXED, depth, ["lists", "automatic"])
+
+
+def test_faithful() -> None:
+    run(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth, ["lists", "rate", "automatic", "rejected_drain"])

@@ -24,6 +24,11 @@ def config() -> dict[str, Any]:
     return json.loads(os.environ.get("FLICKER_TB_CONFIG", "{}"))
 
 
+def netlist() -> bool:
+    """Whether the design is its synthesised netlist (NETLIST=1): it has the RTL's ports, but not its inner names."""
+    return os.environ.get("NETLIST", "") not in ("", "0")
+
+
 class Bench:
     """One test's view of a design with ``clk_i`` and ``rst_ni``.
 

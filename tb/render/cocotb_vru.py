@@ -12,17 +12,40 @@ from minitile_model import lists, pixel_of
 
 from flicker.formats import FP16
 from flicker.golden.vru import PAIR_FIELDS, Pixels
-from flicker.params import ALPHA_MIN_BITS, PIXELS_PER_VRU, Form
+from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, FP16_SUM_STAGES, PIXELS_PER_VRU, Form
 
-# Register that holds a value of the model (PAIR_FIELDS), and the cycles after the operation at which it does.
-COMMON = {
-    "dx": ("dx_q", 1), "dy": ("dy_q", 1), "weight": ("weight_q", 5), "g": ("g_q", 6), "alpha": ("alpha_q8", 7), "oma": ("oma_q", 8), "w": ("w_q", 9),
-}
-REGISTERS = {
-    Form.CONIC: {"a0": ("gen_conic.sx_q", 3), "a1": ("gen_conic.sy_q", 3), "a2": ("gen_conic.xy_q", 2), "a3": ("gen_conic.t_q4", 3), "a4": ("gen_conic.h_q", 4)},
-    Form.FACTORED: {"a0": ("gen_factored.p_q", 2), "a1": ("gen_factored.q_q", 2), "a2": ("gen_factored.v_q3", 2), "a3": ("gen_factored.u_q", 3), "a4": ("gen_factored.uu_q", 4)},
-}  # fmt: skip
-FIRST = (4, 2)  # column and row of the unit's first pixel
+# Cycles after the operation at which a stage's registers are loaded (rtl/render/flk_vru.sv).
+ADD, SUM, MUL = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
+
+
+def registers(form: Form) -> dict[str, tuple[str, int]]:
+    """Register that holds a value of the model (PAIR_FIELDS), and the cycles after the operation at which it does."""
+    diff = 1 + ADD
+    product = diff + MUL
+    if form == Form.CONIC:
+        scaled = product + MUL
+        weight = scaled + 2 * ADD
+        own = {
+            "a0": ("gen_conic.sx_q", scaled), "a1": ("gen_conic.sy_q", scaled), "a2": ("gen_conic.xy_q", product),
+            "a3": ("gen_conic.t_q", scaled), "a4": ("gen_conic.h_q", scaled + ADD),
+        }
+    else:
+        u = product + ADD
+        weight = u + MUL + SUM
+        own = {
+            "a0": ("gen_factored.p_q", product), "a1": ("gen_factored.q_q", product), "a2": ("gen_factored.v_q", product),
+            "a3": ("gen_factored.u_q", u), "a4": ("gen_factored.uu_q", u + MUL),
+        }
+    power = weight + EXP_STAGES[form]
+    alpha = power + MUL + 1
+    return own | {
+        "dx": ("dx_q", diff), "dy": ("dy_q", diff), "weight": ("weight_q", weight), "g": ("g_q", power),
+        "alpha": ("alpha_q", alpha), "oma": ("oma_q", alpha + ADD), "w": ("w_q", alpha + ADD + MUL),
+    }
+
+
+COL, ROW = 1, 1
+FIRST = (4 * COL, 2 * ROW)  # column and row of the unit's first pixel
 
 
 def handle(dut, path: str):
@@ -36,7 +59,7 @@ def handle(dut, path: str):
 async def every_stage(dut):
     """Registers of every stage, state of the pixels and finished pixels equal the model's.
 
-    Operations come in random order of pixels, the same pixel in consecutive cycles included, with bubbles.
+    Splats come with bubbles between and within them; one is broken off now and then before a token, when all its pixels are finished.
     """
     settings = config()
     form = Form(settings["Form"])
@@ -44,13 +67,13 @@ async def every_stage(dut):
     rng = bench.rng
     downstream = Stream(dut, "out")
     StreamSink(downstream, bench.stall(settings["stall"]))
-    dut.first_x_i.value, dut.first_y_i.value = FIRST
+    dut.col_i.value, dut.row_i.value = COL, ROW
     dut.op_valid_i.value = 0
     dut.op_eos_i.value = 0
     got: list[tuple] = []
     Monitor(downstream, lambda word: got.append((word >> 64, pixel_of(word))))
-    registers = COMMON | REGISTERS[form]
-    probes = {name: handle(dut, path) for name, (path, _) in registers.items()}
+    places = registers(form)
+    probes = {name: handle(dut, path) for name, (path, _) in places.items()}
     log: dict[str, list[int]] = {name: [] for name in probes}
     model = Pixels(np.array([(FIRST[0] + i % 4, FIRST[1] + i // 4) for i in range(PIXELS_PER_VRU)]), form)
     expected: list[tuple] = []
@@ -61,8 +84,7 @@ async def every_stage(dut):
     queue: list[tuple] = []
     for entries in lists(rng, form, settings["lengths"]):
         for s in entries:
-            order = list(range(PIXELS_PER_VRU)) if rng.random() < 0.5 else [rng.randrange(PIXELS_PER_VRU) for _ in range(PIXELS_PER_VRU)]
-            queue += [(s.features, p) for p in order]
+            queue += [(s.features, p) for p in range(PIXELS_PER_VRU)]
         queue.append(None)  # token
     cycle, finished = 0, 0
     while queue or len(got) < len(expected):
@@ -74,6 +96,9 @@ async def every_stage(dut):
         dut.op_valid_i.value = 0
         assert cycle < 200_000, "output does not come"
         if not queue or rng.random() < 0.2:
+            continue
+        if queue[0] is not None and queue[0][1] == 4 and model.finished.all():
+            del queue[:4]  # broken off
             continue
         # What is driven now is sampled at the next edge.
         if queue[0] is None:
@@ -101,13 +126,14 @@ async def every_stage(dut):
     await bench.cycles(50)
     assert got == expected, next(f"pixel {n}: got {g}, model {e}" for n, (g, e) in enumerate(zip(got, expected)) if g != e)
     wrong = []
-    for name, (path, delay) in registers.items():
+    for name, (path, delay) in places.items():
         field = PAIR_FIELDS.index(name)
         want = FP16.encode(np.array([t[1][field] for t in traces], np.float64))
         have = np.array([log[name][c + delay] for c, _, _ in traces], np.uint16)
-        # A finished pixel's transmittance is the one before; w is only used where the pair is blended.
+        # Of finished pixels only the weights count: their splat may have been broken off. w is used where the pair is blended.
+        live = np.array([t[2] for t in traces])
         alpha = FP16.encode(np.array([t[1][PAIR_FIELDS.index("alpha")] for t in traces], np.float64))
-        used = np.array([t[2] for t in traces]) & (alpha >= ALPHA_MIN_BITS) if name == "w" else np.ones(len(traces), bool)
+        used = {"alpha": live, "oma": live, "w": live & (alpha >= ALPHA_MIN_BITS)}.get(name, np.ones(len(traces), bool))
         bad = np.flatnonzero(used & (want != have))
         wrong += [f"{path} ({name}): got {have[n]:04x}, model {want[n]:04x} in operation {n}; {len(bad)} differ" for n in bad[:1]]
     assert not wrong, "\n".join(wrong)

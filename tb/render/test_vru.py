@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test
+from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import Form
 
@@ -18,4 +19,4 @@ from flicker.params import Form
 def test_vru(form: Form, stall: str) -> None:
     settings = {"Form": int(form)}
     lengths = [0, 40, 30, 1, 0, 60, 25, 3, 50]
-    build_and_test("flk_vru", "cocotb_vru", parameters=settings, config={**settings, "stall": stall, "lengths": lengths})
+    build_and_test("flk_vru", "cocotb_vru", parameters=settings, config={**settings, "stall": stall, "lengths": lengths}, **QUICK_BUILD)

@@ -13,13 +13,16 @@ import numba
 import numpy as np
 
 from ..functions import log_opacity_f32
-from ..params import CatMode, Form, Precision
+from ..params import FIXED_FRAC_BITS, FIXED_INT_BITS, CatMode, Form, Precision
 from .fp import E4M3_R, FP16_R, mul, rnd, sub
 from .weight import conic_axis, conic_pixel, factored_pixel, factored_row
 
 CONIC = int(Form.CONIC)
 P_FP16 = int(Precision.FP16)
 P_FP8 = int(Precision.FP8)
+P_FIXED = int(Precision.FIXED)
+FIXED_SCALE = np.float32(2.0**FIXED_FRAC_BITS)
+FIXED_MAX = np.float32(2.0**FIXED_INT_BITS - 2.0**-FIXED_FRAC_BITS)
 M_OFF = int(CatMode.OFF)
 M_DENSE = int(CatMode.DENSE)
 M_SPARSE = int(CatMode.SPARSE)
@@ -32,12 +35,22 @@ SPARSE_RECTS = np.array([[0, 4, 0, 4], [3, 7, 3, 7]], np.int64)
 
 
 @numba.njit
+def fixed_mean(mean):
+    """A mean in fixed point, FIXED_INT_BITS.FIXED_FRAC_BITS and a sign: nearest even; infinity and NaN are the largest of their sign."""
+    if not abs(mean) < FIXED_MAX:
+        return np.copysign(FIXED_MAX, mean)
+    return np.rint(mean * FIXED_SCALE) / FIXED_SCALE
+
+
+@numba.njit
 def difference(pixel, mean, precision):
     """Pixel minus mean in the format of the test (Alg. 1, line 1)."""
     if precision == P_FP16:
         return sub(np.float32(pixel), mean, FP16_R)
     if precision == P_FP8:
         return sub(np.float32(pixel), rnd(mean, E4M3_R), E4M3_R)
+    if precision == P_FIXED:
+        return rnd(np.float32(pixel) - fixed_mean(mean), E4M3_R)
     return rnd(sub(np.float32(pixel), mean, FP16_R), E4M3_R)
 
 

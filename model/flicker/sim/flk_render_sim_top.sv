@@ -4,7 +4,7 @@ module flk_render_sim_top
   import flk_param_pkg::*;
 #(
   parameter int unsigned Form         = FORM_FACTORED,
-  parameter int unsigned Precision    = PRECISION_MIXED,
+  parameter int unsigned Precision    = PRECISION_FIXED,
   parameter int unsigned FifoDepth    = FIFO_DEPTH,
   parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
 ) (

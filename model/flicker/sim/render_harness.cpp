@@ -182,7 +182,12 @@ class Simulation {
       if (taken >> k & 1) accepted(k);
     }
     if (taken || given) last_transfer_ = cycles_;
-    if (received_ == expected_) save_counters();
+    if (received_ == expected_) {
+      // The counters are one cycle late.
+      top_->in_valid_i = 0;
+      edge();
+      save_counters();
+    }
   }
 
   void save_counters() {

@@ -62,7 +62,7 @@ def build(config: RenderConfig) -> Path:
         TOP,
         extra=[HERE / f"{TOP}.sv"],
         parameters=config.rtl_parameters(),
-        args=["--x-assign", "unique", "--x-initial", "unique"],
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "--no-assert"],
         cpp=[HERE / "render_harness.cpp"],
         cflags="-DVL_USER_STOP -DVL_USER_FATAL -std=c++17",
         opt="-O2",

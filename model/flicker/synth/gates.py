@@ -7,13 +7,18 @@ from pathlib import Path
 
 from ..toolchain import ROOT, locked
 from .flow import box_name
-from .liberty import Cell, Library, to_verilog
+from .liberty import CLOCK_GATE, Cell, Library, to_verilog
 from .run import FOLDER, UNITS, Runner
 
 DEFAULT_LIBERTY = ROOT / "scripts" / "cells" / "flicker.lib"
 
 
 def _model(cell: Cell) -> str:
+    if cell.name == CLOCK_GATE:
+        return (
+            f"module {CLOCK_GATE} (input ce, input clk, output gclk);\n  reg open;\n"
+            "  always @* if (!clk) open = ce;\n  assign gclk = clk & open;\nendmodule\n"
+        )
     inputs, outputs = list(cell.loads), list(cell.functions)
     ports = [f"input {pin}" for pin in inputs] + [f"output {pin}" for pin in outputs]
     lines = [f"module {cell.name} ({', '.join(ports)});"]
@@ -40,10 +45,10 @@ def _model(cell: Cell) -> str:
 
 def cell_models(library: Library) -> str:
     """A Verilog module for every cell of the library, zero delay, from its Liberty function."""
-    return "/* verilator lint_off DECLFILENAME */\n" + "\n".join(map(_model, library.cells.values()))
+    return "/* verilator lint_off DECLFILENAME */\n/* verilator lint_off COMBDLY */\n" + "\n".join(map(_model, library.cells.values()))
 
 
-def sources(top: str, parameters: dict[str, int], mapping: str = "area", liberty: Path = DEFAULT_LIBERTY) -> list[Path]:
+def sources(top: str, parameters: dict[str, int], liberty: Path = DEFAULT_LIBERTY) -> list[Path]:
     """Verilog files that hold the netlist of ``top`` (a module without parameters) and the cells it uses.
 
     The unit is synthesised if it is not in the cache. Parts of a composed unit come as modules of their own.
@@ -66,9 +71,9 @@ def sources(top: str, parameters: dict[str, int], mapping: str = "area", liberty
                 continue
             seen.add(part)
             name = top if part == key else box_name(part)
-            text = (UNITS / part / f"{mapping}.v").read_text()
+            text = (UNITS / part / "netlist.v").read_text()
             text = re.sub(rf"\bmodule {runner.tasks[part]['top']}\b", f"module {name}", text)
-            path = folder / mapping / part / f"{name}.v"
+            path = folder / part / f"{name}.v"
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists() or path.read_text() != text:
                 path.write_text(text)

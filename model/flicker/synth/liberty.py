@@ -135,6 +135,10 @@ def truth(function: str, pins: list[str]) -> tuple[int, ...]:
 # ---- Cells --------------------------------------------------------------------------------------------------------
 
 
+# Cell type of a clock gate in a netlist: enable ce, clock clk, gated clock gclk.
+CLOCK_GATE = "FLK_CLOCK_GATE"
+
+
 @dataclass
 class Arc:
     """Delay from an input to an output: intrinsic + resistance * load, in library units."""
@@ -159,8 +163,9 @@ class Cell:
 class Library:
     """A Liberty library with the scalars of the estimate.
 
-    Attributes: ``cells`` (all with a function), ``ge`` (area of the smallest NAND2), ``inverter`` (the smallest), ``fo4``
-    (delay of the inverter with a load of four of its kind), ``slew`` (its output transition).
+    Attributes: ``cells`` (all with a function, and ``CLOCK_GATE``), ``ge`` (area of the smallest NAND2), ``inverter`` (the
+    smallest), ``fo4`` (delay of the inverter with a load of four of its kind), ``slew`` (its output transition), ``ps``
+    (picoseconds in a time unit).
     """
 
     def __init__(self, path: Path) -> None:
@@ -178,6 +183,8 @@ class Library:
         self.cells = {
             name: cell for name, group in raw.items() if (cell := self._cell(name, group)) is not None
         }
+        number, unit = re.match(r"([\d.]+)\s*(ps|ns)", group.get("time_unit", "1ns")).groups()
+        self.ps = float(number) * {"ps": 1.0, "ns": 1000.0}[unit]
         self.inverter = self.cells[inverter]
         arc = next(iter(self.inverter.arcs.values()))[0]
         self.inverter_load = next(iter(self.inverter.loads.values()))
@@ -189,6 +196,7 @@ class Library:
         )
         if self.flip_flop is None:
             raise FlickerError(f"{path}: no flip-flop")
+        self.cells[CLOCK_GATE] = self._clock_gate(raw)
 
     def _smallest(self, raw: dict[str, Group], function: str, inputs: int) -> str:
         found = []
@@ -203,6 +211,22 @@ class Library:
         if not found:
             raise FlickerError(f"{self.path}: no cell with the function {function}")
         return min(found)[1]
+
+    def _clock_gate(self, raw: dict[str, Group]) -> Cell:
+        """Clock gate: the library's own, else the area of a latch (or flip-flop), an AND2 and an inverter."""
+        own = [cell for cell in raw.values() if cell.get("clock_gating_integrated_cell")]
+        if own:
+            area = min(float(cell.get("area")) for cell in own)
+        else:
+            latches = [float(cell.get("area")) for cell in raw.values() if cell.all("latch")]
+            both = self.cells[self._smallest(raw, "A*B", 2)]
+            area = min([*latches, self.flip_flop.area]) + both.area + self.inverter.area
+        flop = self.flip_flop
+        data = re.sub(r"\W", "", flop.sequential["next_state"])
+        return Cell(
+            CLOCK_GATE, area, {"ce": flop.loads[data], "clk": flop.loads[flop.clock]}, {"gclk": "gate"}, {"gclk": []},
+            {"state": "gate", "inverse": "", "next_state": "ce", "clocked_on": "clk"}, flop.setup, "clk",
+        )
 
     # Tables
 

@@ -21,8 +21,7 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..toolchain import BUILD, locked, sources_of
-from .flow import MAPPINGS
-from .units import COMPOSED, Unit, extra_sources, open_bits
+from .units import COMPOSED, Unit, open_bits
 
 FOLDER = BUILD / "synth"
 UNITS = FOLDER / "units"
@@ -61,13 +60,11 @@ class Runner:
     # Planning
 
     def _sources(self, top: str) -> str:
-        return "".join(path.read_text() for path in sources_of(top, extra_sources()))
+        return "".join(path.read_text() for path in sources_of(top))
 
     def _job(self, top: str, parameters: dict[str, int], action: str) -> dict:
-        names = {path.stem for path in sources_of(top, extra_sources())}
-        extra = [str(path) for path in extra_sources() if path.stem in names]
         return {
-            "action": action, "top": top, "parameters": parameters, "extra": extra, "boxes": COMPOSED.get(top, []),
+            "action": action, "top": top, "parameters": parameters, "extra": [], "boxes": COMPOSED.get(top, []),
             "children": {}, "child_parameters": {}, "liberty": str(self.liberty), "results": str(UNITS),
             "open": open_bits(top, parameters),
         }
@@ -88,7 +85,7 @@ class Runner:
             return self.keys[identity]
         job = self._job(top, parameters, "synthesise")
         for instance, module, everything in self._children(top, parameters) if top in COMPOSED else []:
-            text = next(path for path in sources_of(top, extra_sources()) if path.stem == module).read_text()
+            text = next(path for path in sources_of(top) if path.stem == module).read_text()
             own = re.findall(r"^\s*parameter\s+[\w\s]*?(\w+)\s*=", text, re.M)
             key = self.add(module, {name: everything[name] for name in own if name in everything})
             job["children"][instance] = key
@@ -111,7 +108,7 @@ class Runner:
         futures: dict[str, Future] = {}
         # Parts have no children and go first, the slow ones before the others; wholes only wait for what was submitted before.
         order = sorted(self.tasks, key=lambda key: bool(self.tasks[key]["children"]))
-        slow = ("flk_vru", "flk_prtu", "flk_fifo", "flk_acu")
+        slow = ("flk_vru", "flk_prtu", "flk_fifo")
         order.sort(key=lambda key: (bool(self.tasks[key]["children"]), not key.startswith(slow)))
         with ThreadPoolExecutor(self.jobs) as pool:
             for key in order:
@@ -137,29 +134,23 @@ class Runner:
         self.report(key, json.loads((folder / "result.json").read_text())["seconds"])
 
     def total(self, key: str) -> dict:
-        """Sums of a unit over itself and its parts, per mapping: ge, ge_seq, ge_comb, ge_drivers, ff; mem_bits; paths."""
+        """Sums of a unit over itself and its parts: ge, ge_seq, ge_comb, ge_drivers, ff, mem_bits; fo4 and paths."""
         own = self.results[key]
-        total: dict = {"top": own["top"], "mem_bits": own["mem_bits"], "key": key, "seconds": own["seconds"]}
-        for mapping in MAPPINGS:
-            part = own[mapping]
-            total[mapping] = {name: part[name] for name in ("ge_seq", "ge_comb", "ge_drivers", "ff")}
-            total[mapping]["paths"] = list(part["paths"])
+        sums = ("ge_seq", "ge_comb", "ge_drivers", "ff", "mem_bits")
+        total: dict = {name: own[name] for name in ("top", "seconds", *sums)} | {"key": key, "paths": list(own["paths"])}
         for child, count in own["children"].items():
             inside = self.total(child)
-            total["mem_bits"] += count * inside["mem_bits"]
-            for mapping in MAPPINGS:
-                for name in ("ge_seq", "ge_comb", "ge_drivers", "ff"):
-                    total[mapping][name] += count * inside[mapping][name]
-                # A part's own ports are judged where it is used: only paths between its registers count here.
-                label = self.results[child]["top"].removeprefix("flk_")
-                total[mapping]["paths"] += [
-                    {**path, "from": f"{label}.{path['from']}", "to": f"{label}.{path['to']}"}
-                    for path in inside[mapping]["paths"] if not path.get("port")
-                ]
-        for mapping in MAPPINGS:
-            total[mapping]["ge"] = total[mapping]["ge_seq"] + total[mapping]["ge_comb"]
-            total[mapping]["paths"].sort(key=lambda path: -path["fo4"])
-            total[mapping]["fo4"] = total[mapping]["paths"][0]["fo4"] if total[mapping]["paths"] else 0.0
+            for name in sums:
+                total[name] += count * inside[name]
+            # A part's own ports are judged where it is used: only paths between its registers count here.
+            label = self.results[child]["top"].removeprefix("flk_")
+            total["paths"] += [
+                {**path, "from": f"{label}.{path['from']}", "to": f"{label}.{path['to']}"}
+                for path in inside["paths"] if not path.get("port")
+            ]
+        total["ge"] = total["ge_seq"] + total["ge_comb"]
+        total["paths"].sort(key=lambda path: -path["fo4"])
+        total["fo4"] = total["paths"][0]["fo4"] if total["paths"] else 0.0
         return total
 
 

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from ..toolchain import ROOT
-
-# Baselines that are not part of the design.
-EXTRA = [ROOT / "scripts" / "compare" / "flk_acu.sv"]
+from ..params import FAITHFUL
 
 FORMS = {"conic": 0, "factored": 1}
 PRECISIONS = {"fp16": 0, "mixed": 1, "fp8": 2}
@@ -19,10 +15,14 @@ FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 COMPOSED: dict[str, list[str]] = {
     "flk_bitonic_sorter": ["flk_compare_exchange", "flk_pipe_reg"],
     "flk_channel": ["flk_fifo", "flk_vru", "flk_stream_arbiter"],
-    "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity"],
+    "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity_pipe"],
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
     "flk_render_stage": ["flk_ctu", "flk_rendering_core", "flk_perf_counters"],
 }
+
+
+# Operators with registers inside, and the number that the design uses.
+PIPES = {"flk_fp_add_pipe": 3, "flk_fp_mul_pipe": 2, "flk_exp_neg_pipe": 2, "flk_log_opacity_pipe": 3}
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,17 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     factored = parameters.get("Form", 1) == 1
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
+        "flk_log_opacity_pipe": ["opacity_i[15]"],
         "flk_exp_neg": ["g_o[15]"],  # so is a power
+        "flk_exp_neg_pipe": ["g_o[15]"],
+        "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
     }.get(top, [])
+    # What a combinational operator does not use.
+    if top in PIPES and parameters.get("Stages", 1) == 0:
+        bits = [*bits, "clk_i[0]", "en_i[0]"]
     if factored:  # v is only squared: the sign of l2 does not matter
-        bits = bits + {
-            "flk_prtu": ["shape2_i[15]"], "flk_acu": ["shape2_i[15]"], "flk_vru": ["op_feature_i[79]"],
-        }.get(top, [])
+        quad = 16 if parameters.get("Precision", 1) == 0 else 8
+        bits = bits + {"flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_vru": ["op_feature_i[79]"]}.get(top, [])
     return bits
 
 
@@ -81,11 +86,14 @@ def _arithmetic() -> list[Unit]:
     for base, name in ((1, "log2"), (0, "ln")):
         for fmt in ("fp16", "e4m3"):
             units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+    for top, stages in PIPES.items():
+        units.append(unit(top, f"fp16, {stages} stages", Stages=stages))
     return units
 
 
 def _cells() -> list[Unit]:
     units = [unit(f"flk_{cell}", f"{FEATURE_BITS} bit", Width=FEATURE_BITS) for cell in ("pipe_reg", "skid_buffer")]
+    units.append(unit("flk_delay", f"{FEATURE_BITS} bit x 4", Width=FEATURE_BITS, Depth=4))
     units += [unit("flk_fifo", f"{FEATURE_BITS} x {depth}", Width=FEATURE_BITS, Depth=depth) for depth in FIFO_DEPTHS]
     units += [
         unit("flk_stream_arbiter", "2 x 67 bit", Inputs=2, Width=67),
@@ -107,17 +115,15 @@ def _stage() -> list[Unit]:
         for precision, p in PRECISIONS.items():
             config = f"{form} {precision}"
             units += [
-                unit("flk_acu", config, Form=f, Precision=p),
-                unit("flk_prtu", config, Form=f, Precision=p),
-                unit("flk_ctu", config, Form=f, Precision=p, CtuFifoDepth=12),
-                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=12),
+                unit("flk_prtu", config, Form=f, Precision=p, Cols=2, Rows=2),
+                unit("flk_prtu", f"{config}, 1 pixel", Form=f, Precision=p, Cols=1, Rows=1),
+                unit("flk_ctu", config, Form=f, Precision=p, CtuFifoDepth=0),
+                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0),
             ]
+    units.append(unit("flk_ctu", "faithful", **{k: v for k, v in FAITHFUL.rtl_parameters().items() if k != "FifoDepth"}))
+    units.append(unit("flk_render_stage", "faithful", **FAITHFUL.rtl_parameters()))
     return units
 
 
 def all_units() -> list[Unit]:
     return _arithmetic() + _cells() + _stage()
-
-
-def extra_sources() -> list[Path]:
-    return EXTRA
