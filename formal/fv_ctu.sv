@@ -162,14 +162,19 @@ module fv_ctu
 
   // Accepted with an empty mask, not yet counted as rejected.
   logic [3:0] empty_q;
+  logic [Last:0] token;  // stages of the test that hold one
+  // A token was in the test in the last cycle.
+  logic token_q;
   // Cycles without anything at the output although something must come.
   logic [4:0] wait_q;
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      token_q <= 1'b0;
       empty_q <= '0;
       wait_q  <= '0;
     end else begin
+      token_q <= token != '0;
       empty_q <= empty_q + 4'(accept && mask == '0) - 4'(events.rejected);
       wait_q  <= (entries == '0 || out_valid) ? '0 : wait_q + 1'b1;
     end
@@ -238,7 +243,7 @@ module fv_ctu
     end
   end
 
-  logic [Last:0] valid, token, final_batch, rect_ok;
+  logic [Last:0] valid, final_batch, rect_ok;
   logic [Last:0][15:0] tests;  // of the element in each stage
   logic [Last:0][3:0] masks;
 
@@ -327,7 +332,8 @@ module fv_ctu
   always_comb begin
     if (rst_n) begin
       // No deadlock: taken when nothing stands against it, and out again within the latency.
-      a_taken: assert (!in_valid_i || stall_i || !room || events.busy || (eos_i && token != '0));
+      a_taken: assert (!in_valid_i || stall_i || !room || events.busy 
+                       || (eos_i && (token != '0 || token_q)));
       a_accepted: assert (!events.busy || in_ready || (dense && !dut.i_controller.batch_q));
       a_stall: assert (!stall_i || !events.busy);
       a_latency: assert (wait_q < 5'(Steps));
@@ -348,7 +354,14 @@ module fv_ctu
       l_count: assert (shown == 6'(entries));
       l_empty: assert (empty == empty_q);
       l_batch: assert (half == dut.i_controller.batch_q);
-      l_token: assert (dut.i_controller.eos_pending_q == (token != '0));
+      l_token: assert (dut.i_controller.eos_pending_q
+                       == (token != '0 || dut.i_controller.update_q));
+      l_update: assert (!dut.i_controller.update_q || (token_q && token == '0));
+      l_mode: assert ({dut.i_controller.dense_smooth_q, dut.i_controller.dense_spiky_q}
+                      == {mode_q inside {CAT_DENSE, CAT_SMOOTH, CAT_AUTO},
+                          mode_q inside {CAT_DENSE, CAT_SPIKY}}
+                      && dut.i_controller.auto_q == (mode_q == CAT_AUTO)
+                      && dut.i_controller.off_q == (mode_q == CAT_OFF));
       l_wait: assert (wait_q == '0 || stored != '0 || wait_q + oldest < 5'(Latency));
       l_taken: assert (taken_ok);
       if (watching) begin

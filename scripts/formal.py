@@ -378,7 +378,11 @@ def main() -> int:
                 results[number] = Result("ERROR", str(error), 0.0, str(PROOFS.relative_to(ROOT)))
             progress.update(bar, advance=1, description=tasks[number].proof.name)
 
-        list(pool.map(work, range(len(tasks))))
+        try:
+            list(pool.map(work, range(len(tasks))))
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            raise FlickerError(f"interrupted; {len(results)} of {len(tasks)} tasks are done") from None
     seconds = time.monotonic() - started
 
     pairs = [(tasks[number], results[number]) for number in range(len(tasks))]
