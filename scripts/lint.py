@@ -26,6 +26,12 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_pipe_reg": [{"Width": 1}],
     "flk_skid_buffer": [{"Width": 1}],
     "flk_stream_arbiter": [{"Inputs": 2, "Width": 1}, {"Inputs": 5}],
+    "flk_vru": [{"Form": 0}],
+    "flk_prtu": [{"Form": f, "Precision": p} for f in (0, 1) for p in (0, 1, 2)],
+    "flk_ctu": [{"Form": 0, "Precision": 1, "CtuFifoDepth": 16}, {"Precision": 0}, {"Precision": 2}],
+    "flk_fp_add_pipe": [{"Stages": 0}, {"Stages": 2, "Cancel": 0}],
+    "flk_fp_mul_pipe": [{"Stages": 0}],
+    "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
     "flk_bitonic_sorter": [
         {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},
         {"Lanes": 8, "StagesPerReg": 4},

@@ -114,7 +114,7 @@ module flk_vru
 
   fp16_t mean_x_q, mean_y_q;
   logic [2:0][15:0] shape_q;
-  fp16_t opacity_q8, opacity_q;
+  fp16_t opacity_q8, opacity_q16, opacity_q;
   logic [2:0][14:0] colour, colour_q8, colour_q16, colour_q24, colour_q;  // 0 red, 1 green, 2 blue
 
   assign colour = {op_feature_i.blue[14:0], op_feature_i.green[14:0], op_feature_i.red[14:0]};
@@ -132,25 +132,34 @@ module flk_vru
       colour_q8  <= colour;
     end
     if (first[OPACITY_AT]) begin
-      opacity_q <= opacity_q8;
+      opacity_q <= (OPACITY_AT > HOLD2) ? opacity_q16 : opacity_q8;
     end
     if (first[HOLD2]) begin
       colour_q16 <= colour_q8;
     end
     if (first[COLOUR_AT]) begin
-      colour_q <= (BLEND > HOLD3) ? colour_q24 : colour_q16;
+      colour_q <= (COLOUR_AT > HOLD3) ? colour_q24 : colour_q16;
     end
   end
-  if (BLEND > HOLD3) begin : gen_hold3
+  if (OPACITY_AT > HOLD2) begin : gen_opacity16
+    always_ff @(posedge clk_i) begin
+      if (first[HOLD2]) begin
+        opacity_q16 <= opacity_q8;
+      end
+    end
+  end else begin : gen_no_opacity16
+    assign opacity_q16 = '0;
+  end
+  if (COLOUR_AT > HOLD3) begin : gen_colour24
     always_ff @(posedge clk_i) begin
       if (first[HOLD3]) begin
         colour_q24 <= colour_q16;
       end
     end
-  end else begin : gen_no_hold3
+  end else begin : gen_no_colour24
     assign colour_q24 = '0;
   end
-  if (POWER > HOLD2 || BLEND <= HOLD2 || BLEND > HOLD3 + 8) begin : gen_check_hold
+  if (OPACITY_AT <= HOLD1 || OPACITY_AT > HOLD3 || COLOUR_AT <= HOLD2 || COLOUR_AT > HOLD3 + 8) begin : gen_check_hold
     $error("flk_vru: the holders of opacity and colour do not fit the pipeline");
   end
 
