@@ -159,7 +159,8 @@ module flk_vru
   end else begin : gen_no_colour24
     assign colour_q24 = '0;
   end
-  if (OPACITY_AT <= HOLD1 || OPACITY_AT > HOLD3 || COLOUR_AT <= HOLD2 || COLOUR_AT > HOLD3 + 8) begin : gen_check_hold
+  if (OPACITY_AT <= HOLD1 || OPACITY_AT > HOLD3 || COLOUR_AT <= HOLD2
+      || COLOUR_AT > HOLD3 + 8) begin : gen_check_hold
     $error("flk_vru: the holders of opacity and colour do not fit the pipeline");
   end
 
