@@ -1,0 +1,450 @@
+"""Figures and tables of the report: each one a picture (PNG, SVG) and its numbers (CSV)."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+from matplotlib.figure import Figure as Canvas  # noqa: E402
+
+from ..errors import FlickerError  # noqa: E402
+from ..stability.run import Stability  # noqa: E402
+from .claims import (  # noqa: E402
+    DENSE, FAITHFUL, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
+    drop, test_loss,
+)
+from .collect import FIFO_SWEPT, TILE_SIZES, ViewResult  # noqa: E402
+
+STYLE = {
+    "font.size": 8, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.fonttype": "none", "svg.hashsalt": "flicker",
+    "figure.dpi": 110,
+}
+COLOURS = ("#3b6fb6", "#d1772d", "#4a9a5b", "#b5484f", "#8465a8", "#7d6248", "#c979ab", "#6e6e6e")
+MODES = {"Uniform-Dense": DENSE, "Uniform-Sparse": SPARSE, "Smooth-Focused": SMOOTH, "Spiky-Focused": SPIKY}
+INTERSECTIONS = {"AABB 16x16": VANILLA, "AABB 8x8": NO_CTU, "OBB 8x8": GSCORE, "Mini-Tile CAT": DENSE}
+PRECISIONS = {"full FP16": WIDE, "mixed": SMOOTH, "full FP8": NARROW}
+BUILDS = {"no CTU, 32 VRUs": NO_CTU, "no CTU, 64 VRUs": NO_CTU_64, "GSCore, 64 VRUs": GSCORE, "FLICKER, 32 VRUs": FAITHFUL, "Uniform-Sparse": SPARSE}
+
+
+@dataclass
+class Figure:
+    """One figure. name: of its files. of: figure of the paper it stands beside, or "". bitmap: the page shows the PNG, not the SVG."""
+
+    name: str
+    title: str
+    of: str
+    note: str
+    header: list[str]
+    rows: list[list]
+    canvas: Canvas | None = None
+    bitmap: bool = False
+    written: dict[str, bytes] = field(default_factory=dict)
+
+    def write(self, folder: Path) -> None:
+        """NAME.csv, NAME.png, NAME.svg; the picture's bytes stay in `written`. Raises FlickerError."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.header)
+        writer.writerows([_cell(v) for v in row] for row in self.rows)
+        files = {f"{self.name}.csv": text.getvalue().encode()}
+        if self.canvas is not None:
+            for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
+                buffer = io.BytesIO()
+                with plt.rc_context(STYLE):
+                    self.canvas.savefig(buffer, format=kind, metadata=metadata, dpi=110)
+                files[f"{self.name}.{kind}"] = self.written[kind] = buffer.getvalue()
+            plt.close(self.canvas)
+        try:
+            for name, data in files.items():
+                (folder / name).write_bytes(data)
+        except OSError as error:
+            raise FlickerError(f"{folder}: cannot be written ({error.strerror})") from None
+
+    @property
+    def image(self) -> str:
+        """The picture as a data URL."""
+        kind, mime = ("png", "image/png") if self.bitmap else ("svg", "image/svg+xml")
+        return f"data:{mime};base64,{base64.b64encode(self.written[kind]).decode()}" if kind in self.written else ""
+
+
+def _cell(value):
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else value
+
+
+def _axes(count: int = 1, width: float = 4.2, height: float = 2.7):
+    figure, axes = plt.subplots(1, count, figsize=(width * count, height), layout="constrained", squeeze=False)
+    return figure, list(axes[0])
+
+
+def _bars(axes, views: Sequence[str], series: dict[str, Sequence[float]], label: str, form: str = "{:.2f}", paper: dict[str, float] | None = None) -> None:
+    """Groups of bars, one group per view and one more with the paper's values."""
+    groups = list(views) + (["paper"] if paper else [])
+    step = 0.84 / len(series)
+    for k, (name, values) in enumerate(series.items()):
+        values = list(values) + ([paper.get(name, math.nan)] if paper else [])
+        at = np.arange(len(groups)) - 0.42 + (k + 0.5) * step
+        bars = axes.bar(at, np.nan_to_num(values), step * 0.92, label=name, color=COLOURS[k % len(COLOURS)])
+        axes.bar_label(bars, ["" if math.isnan(v) else form.format(v) for v in values], fontsize=5.5, rotation=90 if len(series) * len(groups) > 10 else 0, padding=2)
+    axes.set_xticks(range(len(groups)), groups, rotation=20 if len(groups) > 3 else 0, ha="right" if len(groups) > 3 else "center")
+    axes.set_ylabel(label)
+    axes.margins(y=0.22)
+
+
+def _with(views: Sequence[ViewResult], *names: str) -> list[ViewResult]:
+    """Views that have all the configurations."""
+    return [v for v in views if all(n in v.rows for n in names)]
+
+
+def _titles(views: Sequence[ViewResult]) -> list[str]:
+    return [v.target.title for v in views]
+
+
+def _finite(value: float, top: float = 120.0) -> float:
+    return min(value, top)
+
+
+def sampling_modes(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 3a."""
+    views = _with(views, NO_CTU, *MODES.values())
+    if not views:
+        return None
+    rows = []
+    for v in views:
+        for mode, name in MODES.items():
+            row, extra = v.rows[name], v.extras[name]
+            rows.append([v.target.scene, v.target.view, mode, name, row["psnr_db"], v.rows[NO_CTU]["psnr_db"], test_loss(v, name, NO_CTU, PAPER_VANILLA_PSNR),
+                         extra["evaluations"], extra["leaders_per_element"]])
+    figure, (a, b, c) = _axes(3, 3.8)
+    _bars(a, _titles(views), {m: [_finite(v.rows[n]["psnr_db"]) for v in views] for m, n in MODES.items()}, "PSNR against float64, dB", "{:.1f}")
+    _bars(b, _titles(views), {m: [test_loss(v, n, NO_CTU, PAPER_VANILLA_PSNR) for v in views] for m, n in MODES.items()},
+          f"loss at {PAPER_VANILLA_PSNR} dB, dB", "{:.3f}", {"Uniform-Dense": 0.08})
+    _bars(c, _titles(views), {m: [v.extras[n]["leaders_per_element"] for v in views] for m, n in MODES.items()}, "leader pixels per stream element", "{:.1f}")
+    a.legend(fontsize=6, ncols=2, loc="lower center")
+    return Figure(
+        "fig3a_modes", "Sampling modes: PSNR and leader pixels", "3a",
+        f"Conic form, mixed precision. Loss: of a picture that is {PAPER_VANILLA_PSNR} dB from its photograph, if the test's error is uncorrelated with that distance; "
+        "what the VRU loses without a test is taken off.",
+        ["scene", "view", "mode", "config", "psnr_db", "psnr_db_without_test", "loss_db_at_25.56", "leader_pixels", "leader_pixels_per_element"], rows, figure,
+    )
+
+
+def intersection(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 4."""
+    views = _with(views, *INTERSECTIONS.values())
+    if not views:
+        return None
+    rows = []
+    for v in views:
+        for title, name in INTERSECTIONS.items():
+            extra = v.extras[name]
+            rows.append([v.target.scene, v.target.view, "gaussians_per_pixel", title, extra["visited_per_pixel"], extra["listed_per_pixel"],
+                         extra["visited_per_pixel"] / v.extras[VANILLA]["visited_per_pixel"]])
+        for size in TILE_SIZES:
+            pairs = v.facts["duplicates"]
+            rows.append([v.target.scene, v.target.view, "duplicates", f"{size}x{size}", pairs[str(size)], None, pairs[str(size)] / pairs["16"]])
+    figure, (a, b) = _axes(2, 5)
+    _bars(a, _titles(views), {t: [v.extras[n]["visited_per_pixel"] for v in views] for t, n in INTERSECTIONS.items()}, "Gaussians processed per pixel", "{:.0f}")
+    for k, v in enumerate(views):
+        pairs = v.facts["duplicates"]
+        b.plot(TILE_SIZES, [pairs[str(s)] / pairs["16"] for s in TILE_SIZES], "o-", color=COLOURS[k % len(COLOURS)], label=v.target.title)
+    b.plot([4, 16], [4, 1], "k^", label="paper", markersize=5, fillstyle="none")
+    b.set(xscale="log", yscale="log", xlabel="tile size, pixels", ylabel="Gaussian-tile pairs, 16x16 = 1")
+    b.set_xticks(TILE_SIZES, [str(s) for s in TILE_SIZES])
+    b.minorticks_off()
+    a.legend(fontsize=6)
+    b.legend(fontsize=6)
+    return Figure(
+        "fig4_intersection", "Gaussians per pixel for each intersection method, duplicates for tile sizes", "4",
+        "Left: Gaussians a pixel goes through before it is finished; Mini-Tile CAT with four leaders a mini-tile (Uniform-Dense, conic, mixed). "
+        "Right: pairs of Gaussian and tile with per-axis 3-sigma boxes.",
+        ["scene", "view", "what", "method_or_tile", "value", "listed_per_pixel", "relative_to_16x16"], rows, figure,
+    )
+
+
+CROP = 96  # pixels
+
+
+def _worst_crop(view: ViewResult) -> tuple[int, int, int]:
+    """Left, top and side of the square in which FP8 differs most from full FP16."""
+    side = min(CROP, *view.reference.shape[:2])
+    error = np.abs(view.pictures[NARROW].astype(np.float64) - view.pictures[WIDE]).sum(axis=2)
+    total = np.pad(error.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    box = total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]
+    top, left = np.unravel_index(int(box.argmax()), box.shape)
+    return int(left), int(top), side
+
+
+def precision(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 7c."""
+    views = [v for v in _with(views, *PRECISIONS.values()) if all(n in v.pictures for n in PRECISIONS.values())]
+    if not views:
+        return None
+    rows = [[v.target.scene, v.target.view, t, n, *(v.rows[n][k] for k in ("psnr_db", "ssim", "flip"))] for v in views for t, n in PRECISIONS.items()]
+    figure, axes = plt.subplots(len(views), 4, figsize=(8.8, 2.35 * len(views)), layout="constrained", squeeze=False)
+    for line, v in zip(axes, views):
+        left, top, side = _worst_crop(v)
+        pictures = {"float64": (v.reference, None)} | {t: (v.pictures[n], v.rows[n]["psnr_db"]) for t, n in PRECISIONS.items()}
+        for a, (title, (picture, value)) in zip(line, pictures.items()):
+            a.imshow(picture[top : top + side, left : left + side], interpolation="nearest")
+            a.set_xticks([])
+            a.set_yticks([])
+            a.set_title(title if value is None else f"{title}: {value:.1f} dB")
+        line[0].set_ylabel(f"{v.target.title}\n({left}, {top})")
+    return Figure(
+        "fig7c_precision", "Precision schemes", "7c", f"Smooth-Focused, conic form. PSNR of the whole picture against float64; crops of {CROP} pixels where full FP8 "
+        "differs most from full FP16.", ["scene", "view", "scheme", "config", "psnr_db", "ssim", "flip"], rows, figure, bitmap=True,
+    )
+
+
+def rendering_stage(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 8."""
+    views = _with(views, *BUILDS.values())
+    if not views:
+        return None
+    rows = []
+    for v in views:
+        for title, name in BUILDS.items():
+            row, base = v.rows[name], v.rows[NO_CTU]
+            rows.append([v.target.scene, v.target.view, title, name, row["cycles"], base["cycles"] / row["cycles"], row["energy_uj"],
+                         _ratio(base["energy_uj"], row["energy_uj"]), row["area_ge"]])
+    figure, (a, b) = _axes(2, 5.4)
+    _bars(a, _titles(views), {t: [v.rows[NO_CTU]["cycles"] / v.rows[n]["cycles"] for v in views] for t, n in BUILDS.items()}, "speed, no CTU with 32 VRUs = 1", "{:.2f}",
+          {"no CTU, 32 VRUs": 1, "GSCore, 64 VRUs": 4, "FLICKER, 32 VRUs": 4, "Uniform-Sparse": 4.4})
+    _bars(b, _titles(views), {t: [_ratio(v.rows[GSCORE]["energy_uj"], v.rows[n]["energy_uj"]) or math.nan for v in views] for t, n in BUILDS.items()},
+          "energy efficiency, GSCore = 1", "{:.2f}", {"GSCore, 64 VRUs": 1, "FLICKER, 32 VRUs": 1.6})
+    a.legend(fontsize=6, ncols=2)
+    return Figure(
+        "fig8_rendering_stage", "Rendering stage: speed and energy against GSCore and builds without CTU", "8",
+        "Conic form everywhere. GSCore's work unit is a whole sub-tile, its cycles are a closed form without latencies. The paper's bar of energy is its maximum.",
+        ["scene", "view", "build", "config", "cycles", "speed_vs_no_ctu_32", "energy_uj", "efficiency_vs_no_ctu_32", "area_ge"], rows, figure,
+    )
+
+
+def _ratio(a: float | None, b: float | None) -> float | None:
+    return None if not a or not b else a / b
+
+
+def fifo_depth(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 9."""
+    views = [v for v in views if "fifo" in v.facts]
+    if not views:
+        return None
+    rows = []
+    figure, (a, b) = _axes(2, 4.6)
+    for k, v in enumerate(views):
+        fifo = v.facts["fifo"]
+        speed = [fifo["cycles"][0] / c for c in fifo["cycles"]]
+        rows += [[v.target.scene, v.target.view, *values] for values in zip(fifo["depth"], fifo["cycles"], speed, fifo["stall_rate"], fifo["utilisation"])]
+        a.plot(fifo["depth"], speed, "o-", color=COLOURS[k % len(COLOURS)], label=v.target.title)
+        b.plot(fifo["depth"], [100 * r for r in fifo["stall_rate"]], "o-", color=COLOURS[k % len(COLOURS)])
+    a.plot([1, 16, 128], [1, 0.96 * 1.36, 1.36], "k^", label="paper", markersize=5, fillstyle="none")
+    for axes in (a, b):
+        axes.set(xscale="log", xlabel="FIFO depth")
+        axes.set_xticks(views[0].facts["fifo"]["depth"], [str(d) for d in views[0].facts["fifo"]["depth"]])
+        axes.minorticks_off()
+    a.set_ylabel("speed, depth 1 = 1")
+    b.set_ylabel("CTU stalled, % of cycles")
+    b.set_ylim(bottom=0)
+    a.legend(fontsize=6)
+    return Figure(
+        "fig9_fifo_depth", "Speed and CTU stall rate against the depth of the feature FIFOs", "9", f"Configuration {FIFO_SWEPT}, by the cycle model that equals the RTL.",
+        ["scene", "view", "fifo_depth", "cycles", "speed", "ctu_stall_rate", "vru_utilisation"], rows, figure,
+    )
+
+
+def whole_system(views: Sequence[ViewResult]) -> Figure | None:
+    """Figure 10."""
+    views = [v for v in views if GSCORE in v.facts.get("chip", {})]
+    if not views:
+        return None
+    names = [n for n in views[0].facts["chip"] if all(n in v.facts["chip"] for v in views)]
+    rows = []
+    for v in views:
+        base = v.facts["chip"][GSCORE]
+        for name, fact in v.facts["chip"].items():
+            rows.append([v.target.scene, v.target.view, name, fact["render_cycles"], fact["interval_cycles"], fact["latency_cycles"], fact["bottleneck"], fact["dram_bytes"],
+                         base["interval_cycles"] / fact["interval_cycles"], fact["energy_uj"], _ratio(base["energy_uj"], fact["energy_uj"])])
+    figure, (a, b) = _axes(2, 5.4)
+    chip = [v.facts["chip"] for v in views]
+    _bars(a, _titles(views), {n: [c[GSCORE]["interval_cycles"] / c[n]["interval_cycles"] for c in chip] for n in names}, "frames a second, GSCore = 1", "{:.2f}",
+          {GSCORE: 1, FAITHFUL: 1.1})
+    _bars(b, _titles(views), {n: [_ratio(c[GSCORE]["energy_uj"], c[n]["energy_uj"]) or math.nan for c in chip] for n in names}, "energy efficiency, GSCore = 1", "{:.2f}",
+          {GSCORE: 1, FAITHFUL: 2.6})
+    a.legend(fontsize=6, ncols=2)
+    return Figure(
+        "fig10_whole_system", "Whole system", "10", "The proposed front end, sorting and memory of docs/chip_model.md around each rendering stage: a model, no RTL. Cycles "
+        "between frames; energy of the rendering stage and of DRAM traffic (front end and sorting have no energy model). The paper's speed is its average, its "
+        "energy its maximum. Jetson XNX: published only, 1/14.4 of FLICKER's speed on average.",
+        ["scene", "view", "config", "render_cycles", "interval_cycles", "latency_cycles", "bottleneck", "dram_bytes", "speed_vs_gscore", "energy_uj", "efficiency_vs_gscore"],
+        rows, figure,
+    )
+
+
+def contribution_test(views: Sequence[ViewResult]) -> Figure | None:
+    """Table 1, its last step."""
+    views = _with(views, NO_CTU, FAITHFUL)
+    if not views:
+        return None
+    rows = [[v.target.scene, v.target.view, *(v.rows[n][k] for n in (NO_CTU, FAITHFUL) for k in ("psnr_db", "ssim", "flip")),
+             test_loss(v, FAITHFUL, NO_CTU, PAPER_PRUNED_PSNR), drop(float(v.rows[NO_CTU]["psnr_db"]), PAPER_PRUNED_PSNR)] for v in views]
+    return Figure(
+        "table1_contribution_test", "Table 1, last step: the contribution test against the same model without it", "Table 1",
+        f"Against float64, conic form. The last two columns: loss of PSNR at {PAPER_PRUNED_PSNR} dB from a photograph, by the test, and by the VRU's FP16. The paper: 0.11 dB on "
+        "average. The paper's rows against photographs wait for trained scenes with photographs.",
+        ["scene", "view", "psnr_db_without", "ssim_without", "flip_without", "psnr_db_with", "ssim_with", "flip_with", "loss_db_by_test", "loss_db_by_vru"], rows,
+    )
+
+
+def area(areas: dict[tuple[str, str], float]) -> Figure:
+    """Table 2."""
+    note = "Square millimetres here: 0.5 um2 per GE, an estimate (docs/synthesis.md). Parts without RTL are left empty."
+    units = {"contribution test units": ("ctu", "conic mixed"), "rendering cores": ("rendering_core", "conic")}
+    if not areas:
+        note += " No build/synth/area.csv: run `make synth` for the columns of this repository."
+    rows = []
+    for part, published in PAPER_AREA.items():
+        ge = areas.get(units[part]) if part in units else None
+        rows.append([part, published, None if ge is None else 4 * ge, None if ge is None else 4 * ge * UM2_PER_GE / 1e6])
+    return Figure("table2_area", "Table 2: area", "Table 2", note, ["component", "paper_mm2", "ge", "mm2_estimate"], rows)
+
+
+def stability_table(result: Stability) -> Figure:
+    """Where methods fail."""
+    rows = []
+    for method in result.methods:
+        for family in result.families:
+            point = result.breaks(family, method)
+            lowest = min(p.psnr_db for p in result.sweep(family, method))
+            rows.append([family, method, None if point is None else point.value, None if point is None else point.psnr_db,
+                         None if point is None else point.max_error, lowest])
+    return Figure(
+        "stability", "Where methods fail", "", "Quick stability suite: first, middle and last step of each family (docs/stability.md). First step with a PSNR below 40 dB, an error above "
+        "0.25 or a NaN, PSNR there in brackets; `-`: never broken, lowest PSNR of the sweep.",
+        ["family", "method", "breaks_at", "psnr_db", "max_error", "lowest_psnr_db"], rows,
+    )
+
+
+MAPS = {
+    "gaussians": ("Gaussians per pixel", "viridis"), "cycles": ("cycles per sub-tile", "magma"), "imbalance": ("busiest channel / mean", "cividis"),
+    "error": ("FLIP", "inferno"),
+}
+
+
+def heat(view: ViewResult) -> Figure | None:
+    """Heat maps of one view: a line per configuration, columns with a common scale."""
+    names = [n for n in view.rows if n in view.maps]
+    if not names:
+        return None
+    height, width = view.reference.shape[:2]
+    figure, axes = plt.subplots(len(names), 4, figsize=(13, (13 / 4 * height / width + 0.45) * len(names)), layout="constrained", squeeze=False)
+    rows = []
+    for column, (key, (title, colours)) in enumerate(MAPS.items()):
+        shown = [view.maps[n][key] for n in names if key in view.maps[n]]
+        top = max((float(np.nanpercentile(m, 99.5)) for m in shown if np.isfinite(m).any()), default=1.0)
+        for a, name in zip(axes[:, column], names):
+            a.set_xticks([])
+            a.set_yticks([])
+            values = view.maps[name].get(key)
+            if values is None:
+                a.text(0.5, 0.5, "cycles are a closed form", ha="center", va="center", transform=a.transAxes)
+            else:
+                low = 1.0 if key == "imbalance" else 0.0
+                drawn = a.imshow(values, cmap=colours, vmin=low, vmax=max(top, low + 1e-6), interpolation="nearest", aspect="auto")
+                figure.colorbar(drawn, ax=a, shrink=0.8)
+                rows.append([view.target.scene, view.target.view, name, key, float(np.nanmean(values)), float(np.nanpercentile(values, 99)), float(np.nanmax(values))])
+            a.set_title(f"{name}: {title}")
+    return Figure(
+        f"heat_{view.target.scene}_{view.target.view}", f"Heat maps, {view.target.title}", "", "Gaussians that VRUs visit before a pixel is finished; cycles from the end of a sub-tile to the "
+        "end of the next in the same core; pixels visited by the busiest channel over the mean of four; FLIP against float64. Common scale per column, cut at the 99.5 % quantile.",
+        ["scene", "view", "config", "map", "mean", "percentile_99", "max"], rows, figure, bitmap=True,
+    )
+
+
+AXES = {  # name in the row: label, higher is better
+    "cycles": ("cycles", False), "psnr_db": ("PSNR, dB", True), "ssim": ("SSIM", True), "flip": ("FLIP", False), "area_ge": ("area, GE", False),
+    "energy_uj": ("energy, uJ", False),
+}
+
+
+def pareto(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Indices of points (cost, gain) that no other one beats: none has at most the cost and at least the gain, and one of them better."""
+    order = sorted(range(len(points)), key=lambda i: (points[i][0], -points[i][1]))
+    front, best = [], -math.inf
+    for i in order:
+        if points[i][1] > best:
+            front.append(i)
+            best = points[i][1]
+    return front
+
+
+def overall(views: Sequence[ViewResult]) -> list[dict]:
+    """One point per configuration over all views: geometric mean of cycles and energy relative to `relative_to`, mean PSNR, SSIM, FLIP."""
+    names = [n for n in views[0].rows if all(n in v.rows for v in views)]
+    points = []
+    for name in names:
+        rows = [v.rows[name] for v in views]
+        energies = [r["energy_uj"] for r in rows]
+        points.append({
+            "scene": "all", "view": "", "config": name, "title": rows[0]["title"], "model_only": rows[0]["model_only"], "area_ge": rows[0]["area_ge"],
+            "cycles": math.exp(sum(math.log(max(r["cycles"], 1)) for r in rows) / len(rows)),
+            "psnr_db": sum(_finite(r["psnr_db"]) for r in rows) / len(rows),
+            "ssim": sum(r["ssim"] for r in rows) / len(rows), "flip": sum(r["flip"] for r in rows) / len(rows),
+            "energy_uj": None if None in energies else math.exp(sum(math.log(max(e, 1e-9)) for e in energies) / len(rows)),
+        })
+    return points
+
+
+def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
+    """Every configuration a point: speed against accuracy, Pareto fronts per view and over all."""
+    groups = {v.target.title: list(v.rows.values()) for v in views}
+    if len(views) > 1:
+        groups["all views"] = overall(views)
+    columns = min(3, len(groups))
+    lines = -(-len(groups) // columns)
+    figure, grid = plt.subplots(lines, columns, figsize=(4.6 * columns, 3.4 * lines), layout="constrained", squeeze=False)
+    for a in grid.flat[len(groups) :]:
+        a.axis("off")
+    rows = []
+    for a, (title, points) in zip(grid.flat, groups.items()):
+        values = [(float(p["cycles"]), _finite(float(p["psnr_db"]))) for p in points]
+        front = pareto(values)
+        for model_only, marker, label in ((False, "o", "RTL exists"), (True, "^", "model only")):
+            chosen = [v for v, p in zip(values, points) if p["model_only"] == model_only]
+            a.plot([v[0] for v in chosen], [v[1] for v in chosen], marker, color=COLOURS[int(model_only)], markersize=4, alpha=0.8, label=label)
+        a.plot([values[i][0] for i in front], [values[i][1] for i in front], "-", color="black", linewidth=0.8, label="Pareto front")
+        for i in front:
+            a.annotate(points[i]["config"], values[i], fontsize=5, xytext=(3, -7), textcoords="offset points")
+        a.set(xscale="log", xlabel="cycles", ylabel="PSNR against float64, dB", title=title)
+        rows += [[title, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front]
+                 for i, p in enumerate(points)]
+    grid.flat[0].legend(fontsize=6)
+    return Figure(
+        "speed_accuracy", "Speed against accuracy", "", "Over all views: geometric mean of cycles and energy, mean of PSNR, SSIM and FLIP.",
+        ["group", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only", "pareto_cycles_psnr"], rows, figure,
+    )
+
+
+def paper_figures(views: Sequence[ViewResult], areas: dict[tuple[str, str], float]) -> list[Figure]:
+    """Those of the paper that this run's configurations allow, in its order."""
+    with plt.rc_context(STYLE):
+        made = [make(views) for make in (sampling_modes, intersection, precision, rendering_stage, fifo_depth, whole_system, contribution_test)]
+        return [f for f in made if f is not None] + [area(areas)]
+
+
+def own_figures(views: Sequence[ViewResult]) -> tuple[Figure, list[Figure]]:
+    """Speed against accuracy, and the heat maps of every view."""
+    with plt.rc_context(STYLE):
+        return speed_accuracy(views), [f for f in map(heat, views) if f is not None]

@@ -1,0 +1,124 @@
+"""`index.html`: one page with everything in it, no network."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..stability.run import BROKEN_ERROR, BROKEN_PSNR, Stability
+from .claims import Verdict
+from .collect import ViewResult
+from .figures import Figure, overall
+
+_MARKS = {"yes": "holds", "no": "does not hold here", "partly": "holds in part", "open": "open"}
+_FOLDER = Path(__file__).resolve().parent
+
+
+def _e(text: object) -> str:
+    return html.escape(str(text))
+
+
+def _points(views: Sequence[ViewResult]) -> str:
+    """The configurations as JSON for the chart: numbers that JSON has, inf as null."""
+    keys = ("config", "title", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only")
+    groups = {v.target.title: list(v.rows.values()) for v in views}
+    if len(views) > 1:
+        groups["all views"] = overall(views)
+
+    def plain(value):
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    data = {title: [{k: plain(p[k]) for k in keys} for p in points] for title, points in groups.items()}
+    return json.dumps(data, default=float).replace("</", "<\\/")
+
+
+def _number(value: object) -> str:
+    if value is None or value == "":
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 10000 else f"{value:.4g}"
+    return _e(value)
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence], classes: str = "") -> str:
+    head = "".join(f"<th>{_e(h)}</th>" for h in header)
+    body = "".join("<tr>" + "".join(f"<td>{_number(v)}</td>" for v in row) + "</tr>" for row in rows)
+    return f'<div class="wide"><table class="{classes}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _verdicts(verdicts: Sequence[Verdict]) -> str:
+    rows = []
+    for v in verdicts:
+        ours = "<br>".join(f"{_e(title)}: {_e(text)}" for title, text in v.ours.items())
+        rows.append(f'<tr class="{v.kind}"><td>{_e(v.figure)}</td><td>{_e(v.claim)}</td><td>{_e(v.paper)}</td><td>{ours}</td><td>{_e(v.verdict)}</td></tr>')
+    head = "".join(f"<th>{h}</th>" for h in ("figure", "claim", "paper", "here", "verdict"))
+    return f'<div class="wide"><table class="verdicts"><thead><tr>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
+
+
+def _figure(figure: Figure, verdicts: Sequence[Verdict] = ()) -> str:
+    links = " ".join(f'<a href="figures/{figure.name}.{kind}">{kind.upper()}</a>' for kind in ("csv", *figure.written))
+    picture = f'<img alt="{_e(figure.title)}" src="{figure.image}">' if figure.image else ""
+    of = f"Figure {figure.of}: " if figure.of and not figure.of.startswith("Table") else ""
+    table = _table(figure.header, figure.rows)
+    if figure.image:
+        table = f"<details><summary>{len(figure.rows)} rows</summary>{table}</details>"
+    return f'<section id="{figure.name}"><h3>{_e(of + figure.title)}</h3><p>{_e(figure.note)} {links}</p>{picture}{table}{_verdicts(verdicts) if verdicts else ""}</section>'
+
+
+def _stability(result: Stability, figure: Figure) -> str:
+    header = "".join(f"<th>{_e(m)}</th>" for m in result.methods)
+    rows = []
+    for family in result.families:
+        cells = []
+        for method in result.methods:
+            point = result.breaks(family, method)
+            lowest = min(p.psnr_db for p in result.sweep(family, method))
+            cells.append(f"<td>- ({lowest:.0f})</td>" if point is None else
+                         f'<td class="broken" title="error {point.max_error:.2f}">{point.value:g} ({point.psnr_db:.0f})</td>')
+        rows.append(f"<tr><th>{_e(family)}</th>{''.join(cells)}</tr>")
+    return (
+        f'<section id="stability"><p>{_e(figure.note)} Broken: PSNR below {BROKEN_PSNR:g} dB or error above {BROKEN_ERROR:g}; seed {result.seed}. '
+        f'<a href="figures/stability.csv">CSV</a></p><div class="wide"><table class="slanted"><thead><tr><th></th>{header}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
+    )
+
+
+def page(
+    views: Sequence[ViewResult], verdicts: Sequence[Verdict], paper: Sequence[Figure], chart: Figure, heats: Sequence[Figure],
+    stability: tuple[Stability, Figure], about: dict[str, str],
+) -> str:
+    """The whole page. about: facts of the run, by name."""
+    counts = {kind: sum(v.kind == kind for v in verdicts) for kind in _MARKS}
+    tally = ", ".join(f"{count} {_MARKS[kind]}" for kind, count in counts.items())
+    facts = "".join(f"<dt>{_e(k)}</dt><dd>{_e(v)}</dd>" for k, v in about.items())
+    of_figure = {f.name: [v for v in verdicts if v.figure.rstrip("abc") == f.of.rstrip("abc") and f.of] for f in paper}
+    chart_links = " ".join(f'<a href="figures/{chart.name}.{kind}">{kind.upper()}</a>' for kind in ("csv", "png", "svg"))
+    parts = [
+        "<!doctype html><html lang='en'><head><meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>FLICKER report</title>",
+        f"<style>{(_FOLDER / 'page.css').read_text()}</style></head><body>",
+        "<h1>FLICKER: speed, accuracy, area, energy</h1>",
+        f"<p>Written by <code>flicker report</code>. Numbers in <a href='summary.csv'>summary.csv</a> and beside every figure.</p><dl>{facts}</dl>",
+        "<nav><a href='#chart'>speed against accuracy</a> <a href='#claims'>claims of the paper</a> <a href='#paper'>figures of the paper</a> "
+        "<a href='#heat'>heat maps</a> <a href='#fail'>where methods fail</a></nav>",
+        "<h2 id='chart'>Speed against accuracy</h2>",
+        "<p>Every configuration is a point; the line is the Pareto front of the two axes shown. Point at one to read it, click to keep it. "
+        f"FPS are those of the rendering stage at 1 GHz. {_e(chart.note)} {chart_links}</p>",
+        "<div id='controls'></div><div id='plot'><svg id='scatter' viewBox='0 0 900 480' role='img' aria-label='scatter chart'></svg><pre id='read'>no point chosen</pre></div>",
+        f"<details><summary>for every view, printed</summary><img alt='{_e(chart.title)}' src='{chart.image}'></details>",
+        f"<h2 id='claims'>Claims of the paper</h2><p>{len(verdicts)} claims: {tally}. What a verdict asks for stands in it.</p>",
+        _verdicts(verdicts),
+        "<h2 id='paper'>Figures of the paper</h2><p>Figure 1 (GPU profile) appears with its published numbers only, in the table above.</p>",
+        *(_figure(f, of_figure[f.name]) for f in paper),
+        "<h2 id='heat'>Heat maps</h2>",
+        *(_figure(f) for f in heats),
+        "<h2 id='fail'>Where methods fail</h2>", _stability(*stability),
+        f"<script>const DATA = {_points(views)};\n{(_FOLDER / 'page.js').read_text()}</script></body></html>\n",
+    ]
+    return "\n".join(parts)
