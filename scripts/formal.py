@@ -44,7 +44,7 @@ MARKS = ("<!-- scripts/formal.py --docs -->", "<!-- end -->")
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
-              "standins", "cut", "fast", "mutant_depth", "mutant"}
+              "standins", "cut", "fast", "long", "mutant_depth", "mutant"}
 MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters", "slow"}
 
 
@@ -80,6 +80,7 @@ class Proof:
     standins: list[str] = field(default_factory=list)
     cut: list[str] = field(default_factory=list)
     fast: bool = False
+    long: bool = False
 
 
 @dataclass(frozen=True)
@@ -355,6 +356,8 @@ def main() -> int:
         if name not in (names := [proof.name for proof in proofs]):
             raise FlickerError(f"no proof {name!r}; there are {', '.join(names)}")
         proofs = [proof for proof in proofs if proof.name == name]
+    else:
+        proofs = [proof for proof in proofs if not proof.long]
     if arguments.fast:
         proofs = [proof for proof in proofs if proof.fast]
     tasks = [task for proof in proofs for task in tasks_of(proof, arguments.fast)]
