@@ -144,7 +144,7 @@ def stage_energy(
     vrus: over all channels. pairs: pixel-Gaussian pairs that the VRUs work on, where the default does not apply: with whole mini-tiles
     what the stage issued (without counters: 16 for each mini-tile sent), else the visited pixels.
 
-    "clock, idle": clock pins behind no clock gate, over all cycles. Left out: wires between units, input buffers, what the sorting unit does.
+    "ungated clock": clock pins behind no clock gate, over all cycles. Left out: wires between units, input buffers, what the sorting unit does.
     """
     if stage is None and cycles is None:
         raise FlickerError("energy: without the stage's counters the number of cycles is needed")
@@ -183,7 +183,7 @@ def stage_energy(
         "feature FIFOs": pushed * fifo_pj(fifo_depth, width),
         "mask generators": masks,
         "counters, arbiters": control,
-        "clock, idle": cycles * clock_pj(free),
+        "ungated clock": cycles * clock_pj(free),
         "leakage": area * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12,
     }
     return {name: value * 1e-6 for name, value in picojoules.items()}

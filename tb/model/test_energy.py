@@ -1,0 +1,164 @@
+"""Area and energy: the parts add up to what was synthesised, energies are the counts times what an operation costs.
+
+That area and energy are right in silicon is not covered; one operator is held against a published figure.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_samples import random_scene
+
+from flicker import area, energy
+from flicker.area import fifo_area, generator_area, part, stage_area, stage_parts, vru_area
+from flicker.camera import orbit_camera
+from flicker.errors import FlickerError
+from flicker.methods.operations import NONE
+from flicker.methods.registry import View, get_method, methods, run
+from flicker.params import CORES, Form, Precision, RenderConfig
+from flicker.perf.render_stage import simulate
+from flicker.projection import project
+
+
+@pytest.fixture(autouse=True)
+def committed_table(monkeypatch):
+    """The package's own table, whatever `make synth` has left."""
+    monkeypatch.setattr(area, "SYNTHESIS", Path("/nonexistent"))
+    for function in (area.parts, area.overhead):
+        function.cache_clear()
+    yield
+    monkeypatch.undo()
+    for function in (area.parts, area.overhead):
+        function.cache_clear()
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    scene = random_scene(7, 300, 0)
+    camera = orbit_camera(scene, 0).resized(64, 48)
+    return View(project(scene, camera), camera)
+
+
+# ---- area ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["conic", "factored"])
+@pytest.mark.parametrize("precision", ["fp16", "mixed", "fp8"])
+def test_rtl_stage_is_what_was_synthesised(form, precision):
+    assert stage_area(form, precision) == pytest.approx(part("render_stage", f"{form} {precision}").ge, abs=2)
+
+
+def test_faithful_stage():
+    """The CTU's output FIFO is interpolated by width, so within 0.1 %."""
+    assert stage_area("conic", "mixed", ctu_fifo_depth=16) == pytest.approx(part("render_stage", "faithful").ge, rel=1e-3)
+
+
+def test_fifo_area():
+    for depth in (4, 8, 16, 32, 64, 128):
+        assert fifo_area(depth) == part("fifo", f"145 x {depth}").ge
+    areas = [fifo_area(depth) for depth in range(0, 129)]
+    assert areas[0] == 0 and np.all(np.diff(areas) > 0)
+    assert fifo_area(16, 290) == pytest.approx(2 * fifo_area(16))
+    with pytest.raises(FlickerError, match="depth"):
+        fifo_area(-1)
+
+
+def test_stage_without_generator_and_with_more_vrus():
+    none = stage_area("factored", None)
+    assert none == stage_area("factored", "fp16", generator=NONE)
+    assert none == pytest.approx(stage_area("factored", "fp16") - CORES * part("ctu", "factored fp16").ge)
+    more = stage_parts("factored", None, vrus=64)
+    assert more["VRUs"] == 64 * vru_area("factored", 4) and none < sum(more.values()) < 2 * none
+    assert vru_area("factored", 4) < vru_area("factored", 8) == part("vru", "factored").ge < vru_area("factored", 16)
+
+
+def test_generators():
+    """Every method's generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
+    for method in methods().values():
+        assert (generator_area(method.operations) > 0) == bool(method.operations.per_element), method.name
+    factored, conic = (generator_area(get_method(f"flicker-dense-fp16-{form}").operations) for form in ("factored", "conic"))
+    assert factored == pytest.approx(part("ctu", "factored fp16").ge)
+    assert conic == pytest.approx(part("ctu", "conic fp16").ge, rel=0.15)
+    rows = get_method("rows-f8a8").operations
+    assert stage_area("factored", None, generator=rows, pixels=True) > stage_area("factored", None, generator=rows)
+
+
+def test_bad_area_arguments():
+    for arguments, message in (
+        (("round", "fp16"), "unknown form 'round'"), (("conic", "fp4"), "unknown precision 'fp4'"), (("conic", "fp16", 16, 0, 33), "not 33"),
+    ):
+        with pytest.raises(FlickerError, match=message):
+            stage_area(*arguments)
+
+
+def test_synthesis_comes_first(tmp_path, monkeypatch):
+    path = tmp_path / "area.csv"
+    path.write_text("unit,config,ge,ge_seq,ge_comb,mem_bits,ff,fo4\nvru,conic,1000.0,1,1,0,7,50\n")
+    old = part("vru", "conic")
+    monkeypatch.setattr(area, "SYNTHESIS", path)
+    area.parts.cache_clear()
+    new = part("vru", "conic")
+    assert (new.ge, new.ff, new.load) == (1000.0, 7, old.load) and new.ge != old.ge
+
+
+# ---- energy -------------------------------------------------------------------------------------
+
+
+def test_constants_have_sources():
+    names = {name for name in vars(energy) if re.fullmatch(r"[A-Z][A-Z0-9_]+", name)}
+    imported = {"CHANNELS", "CORES", "PIXELS_PER_VRU", "RECORD_BITS", "VRUS_PER_CHANNEL", "SOURCES"}
+    assert names - imported == set(energy.SOURCES)
+    assert [value for _, value, _ in energy.constant_table()] == [getattr(energy, name) for name in energy.SOURCES]
+
+
+def test_operators_beside_published_figures():
+    """FP16 multiplier and adder: 1.1 and 0.4 pJ in 45 nm (Horowitz, ISSCC 2014), times 28/45."""
+    for unit, published in (("fp_mul", 1.1), ("fp_add", 0.4)):
+        assert energy.switching_pj(part(unit, "fp16").load) == pytest.approx(published * 28 / 45, rel=0.25)
+
+
+def test_stage_energy_counts(view):
+    """Parts are counters times energy per operation."""
+    method = get_method("flicker-dense-fp16-factored")
+    work = run(method, view).work
+    stage = simulate(work, RenderConfig(form=Form.FACTORED, precision=Precision.FP16))
+    parts = energy.stage_energy(work, stage, "factored", "fp16")
+    assert set(parts) == {"VRUs", "feature FIFOs", "mask generators", "counters, arbiters", "ungated clock", "leakage"}
+    assert all(value > 0 for value in parts.values())
+    assert parts["VRUs"] == pytest.approx(2 * stage.channel("vru_busy").sum() * energy.vru_pj("factored") * 1e-6)
+    assert parts["feature FIFOs"] == pytest.approx(stage.core("minitiles_delivered").sum() * energy.fifo_pj(16) * 1e-6)
+    assert parts["mask generators"] == pytest.approx(2 * work.elements * energy.ctu_pj("factored", "fp16") * 1e-6)
+    twice = energy.stage_energy(work, stage, "factored", "fp16", cycles=2 * stage.cycles)
+    assert twice["VRUs"] == parts["VRUs"] and twice["ungated clock"] == pytest.approx(2 * parts["ungated clock"])
+    assert energy.stage_energy(work, stage, "factored", "fp16", operations=NONE)["mask generators"] == 0
+    # The estimate by operators reproduces the unit that it is scaled by.
+    by_operators = energy.stage_energy(work, stage, "factored", None, operations=method.operations)
+    assert by_operators["mask generators"] == pytest.approx(parts["mask generators"])
+
+
+def test_less_work_takes_less_energy(view):
+    """Pixel masks visit fewer pixels than mini-tile masks, these fewer than none; without counters the cycles must be given."""
+    found = {}
+    for name in ("no_ctu", "oracle_minitile", "oracle"):
+        work = run(name, view).work
+        found[name] = energy.stage_energy(work, None, "factored", None, cycles=1000)
+        pairs = work.totals()["pixels_visited"]
+        assert found[name]["VRUs"] == pytest.approx(pairs * energy.vru_pj("factored") * 1e-6)
+    assert found["oracle"]["VRUs"] < found["oracle_minitile"]["VRUs"] < found["no_ctu"]["VRUs"]
+    share = energy.ratios(found, "no_ctu")
+    assert share["no_ctu"] == 1 and share["oracle"] < share["oracle_minitile"] < 1
+    with pytest.raises(FlickerError, match="no configuration 'x'"):
+        energy.ratios(found, "x")
+    with pytest.raises(FlickerError, match="cycles"):
+        energy.stage_energy(work, None, "factored", None)
+
+
+def test_memories():
+    """Published points of the SRAM, in 28 nm; LPDDR4 by the bit."""
+    assert energy.sram_pj(64, 8192) == pytest.approx(10 * 28 / 45)
+    assert energy.sram_pj(64, 32768) == pytest.approx(20 * 28 / 45)
+    assert energy.sram_pj(64, 1 << 20) == pytest.approx(100 * 28 / 45, rel=0.15)
+    assert energy.memory_energy(1_000_000)["LPDDR4"] == pytest.approx(64)

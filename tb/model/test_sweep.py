@@ -1,0 +1,204 @@
+"""Sweeps: points equal `evaluate`, nothing is computed twice, a killed worker loses nothing that was finished, bad input is refused first.
+
+Two local worker processes on a scene of 300 Gaussians at 64x48. Not covered: clusters of several machines.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from scene_samples import random_scene
+
+from flicker.errors import FlickerError
+from flicker.evaluate import evaluate, load_view
+from flicker.scene import save_ply
+from flicker.sweep import load_results, load_sweep, run_sweep
+from flicker.sweep.results import KEY, plain
+from flicker.sweep.run import connect
+
+CONFIGURATIONS = ["no-ctu-32", "no-ctu-64", "gscore", "oracle", "flicker-*-fp16-factored", "flicker-*-mixed-factored"]
+
+
+def write(folder: Path, **changes) -> Path:
+    """A sweep file; None removes a key."""
+    import yaml
+
+    data = {"scenes": ["tiny.ply"], "views": [0, 1], "size": "64x48", "configurations": CONFIGURATIONS, "out": str(folder / "out"),
+            "cluster": {"workers": 2}}
+    data |= changes
+    path = folder / "sweep.yaml"
+    path.write_text(yaml.safe_dump({k: v for k, v in data.items() if v is not None}))
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    save_ply(random_scene(5, 300, 0), tmp_path / "tiny.ply")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory):
+    """Two worker processes. What they run is compiled here first, so that they find it in the cache."""
+    folder = tmp_path_factory.mktemp("warm")
+    save_ply(random_scene(5, 300, 0), folder / "tiny.ply")
+    sweep = load_sweep(write(folder))
+    data = load_view(folder / "tiny.ply", 0, 64, 48)
+    for name in sweep.configurations:
+        evaluate(data, name)
+    with connect(sweep) as client:
+        yield client
+
+
+def test_rows_equal_evaluate_and_are_resumed(folder, client):
+    sweep = load_sweep(write(folder))
+    result = run_sweep(sweep, client=client)
+    assert (result.computed, result.resumed, result.lost) == (28, 0, 0)
+    assert [(r["view"], r["config"]) for r in result.rows] == [(p.view, p.configuration) for p in sweep.points]
+    data = load_view(folder / "tiny.ply", 1, 64, 48)
+    for row in result.rows:
+        if row["view"] == 1 and row["config"] in ("gscore", "oracle", "flicker-smooth-mixed-factored"):
+            expected = {name: plain(value) for name, value in evaluate(data, row["config"]).row.items()}
+            assert {name: row[name] for name in expected} == expected
+    before = (sweep.folder / "results.parquet").read_bytes()
+    again = run_sweep(sweep)  # no client: nothing to do, so no cluster is started
+    assert (again.computed, again.resumed) == (0, 28)
+    assert again.rows == result.rows == load_results(sweep.folder)
+    assert (sweep.folder / "results.parquet").read_bytes() == before
+    assert not (sweep.folder / "points").exists()
+
+
+def test_interrupted_sweep_continues(folder, client):
+    sweep = load_sweep(write(folder, views=[0]))
+
+    def interrupt(done: int, total: int, event: dict) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(sweep, client=client, on_point=interrupt)
+    kept = len(list((sweep.folder / "points").glob("*.parquet")))
+    assert kept >= 3
+    with pytest.raises(FlickerError, match="not complete"):
+        load_results(sweep.folder)
+    damaged = next((sweep.folder / "points").glob("*.parquet"))
+    damaged.write_bytes(b"PAR1")
+    result = run_sweep(sweep, client=client)
+    assert result.resumed == kept - 1 and result.resumed + result.computed == 14
+    assert len({row[KEY] for row in result.rows}) == 14
+
+
+def test_killed_worker_loses_nothing_finished(folder, client):
+    sweep = load_sweep(write(folder))
+    finished, killed = Counter(), []
+
+    def kill_first(done: int, total: int, event: dict) -> None:
+        if not event:
+            return
+        finished[event["key"]] += 1
+        if not killed and event["pid"] is not None:
+            killed.append(event["pid"])
+            os.kill(event["pid"], signal.SIGKILL)
+
+    result = run_sweep(sweep, client=client, on_point=kill_first)
+    assert killed and result.lost >= 1
+    assert sorted(finished) == sorted(p.key for p in sweep.points)
+    assert set(finished.values()) == {1}
+    assert Counter(row[KEY] for row in load_results(sweep.folder)) == finished
+
+
+def test_hash_follows_content(folder):
+    """The same file elsewhere is the same sweep; other contents, size, view or configuration are another."""
+    sweep = load_sweep(write(folder))
+    other = folder / "elsewhere"
+    other.mkdir()
+    (other / "tiny.ply").write_bytes((folder / "tiny.ply").read_bytes())
+    same = load_sweep(write(other, cluster={"workers": 1}))
+    assert same.hash == sweep.hash and [p.key for p in same.points] == [p.key for p in sweep.points]
+    hashes = {sweep.hash, load_sweep(write(folder, size="64x49")).hash, load_sweep(write(folder, views=[1])).hash}
+    hashes.add(load_sweep(write(folder, configurations=["gscore"])).hash)
+    save_ply(random_scene(6, 300, 0), folder / "tiny.ply")
+    hashes.add(load_sweep(write(folder)).hash)
+    assert len(hashes) == 5
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"scenes": ["no.ply"]}, r"scenes\[0\]: .*no.ply: no such file"),
+    ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*expected .ply"),
+    ({"scenes": [{"path": "tiny.ply", "camera": "x"}]}, r"scenes\[0\]: unknown key 'camera'; did you mean 'cameras'"),
+    ({"scenes": [{"path": "tiny.ply", "cameras": "x.json"}]}, r"scenes\[0\]: cameras: .*x.json: no such file"),
+    ({"scenes": ["tiny.ply", "tiny.ply"]}, "is there twice"),
+    ({"scenes": None}, "key 'scenes' is missing"),
+    ({"scenes": []}, "scenes: expected a list"),
+    ({"views": [8]}, "view 8: there are 8 cameras"),
+    ({"views": [-1]}, "views: expected camera numbers"),
+    ({"size": "64"}, "size: expected WxH"),
+    ({"size": "0x48"}, "size: width and height must be 1 to"),
+    ({"configuration": ["gscore"]}, "unknown key 'configuration'; did you mean 'configurations'"),
+    ({"configurations": ["gscor"]}, "'gscor' is unknown; close names: gscore"),
+    ({"configurations": ["x*"]}, "no configuration matches 'x\\*'"),
+    ({"cluster": {"workers": 0}}, "cluster: workers: must be 1 to"),
+    ({"cluster": {"workers": 1, "address": "tcp://a:1"}}, "either workers or address"),
+    ({"cluster": {"nodes": 1}}, "cluster: unknown key 'nodes'"),
+])
+def test_bad_configuration(folder, changes, message):
+    path = write(folder, **changes)
+    with pytest.raises(FlickerError, match=message) as raised:
+        load_sweep(path)
+    assert str(path) in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_bad_files(folder):
+    with pytest.raises(FlickerError, match="cannot be read"):
+        load_sweep(folder / "no.yaml")
+    (folder / "bad.yaml").write_text("scenes: [demo\nviews: {")
+    with pytest.raises(FlickerError, match="bad.yaml: line 2: not YAML"):
+        load_sweep(folder / "bad.yaml")
+    (folder / "list.yaml").write_text("- demo\n")
+    with pytest.raises(FlickerError, match="expected a mapping"):
+        load_sweep(folder / "list.yaml")
+
+
+def test_unwritable_folder_and_unreachable_cluster(folder):
+    """Found before any work: nothing is reported as finished."""
+    (folder / "file").write_text("")
+    sweep = load_sweep(write(folder, out=str(folder / "file")))
+    with pytest.raises(FlickerError, match="cannot be written"):
+        run_sweep(sweep)
+    sweep = replace(load_sweep(write(folder)), address="tcp://127.0.0.1:1", workers=None)
+    done = []
+    with pytest.raises(FlickerError, match="cluster tcp://127.0.0.1:1: cannot be reached") as raised:
+        run_sweep(sweep, on_point=lambda *a: done.append(a[0]))
+    assert done == [0] and "\n" not in str(raised.value)
+    for address in ("nonsense://x", "tcp://host:port"):
+        with pytest.raises(FlickerError, match="cannot be reached"):
+            run_sweep(replace(sweep, address=address))
+
+
+def test_failed_view_keeps_the_others(folder, client):
+    """A scene that cannot be rendered ends with one line; the rows of the other scene are there."""
+    (folder / "broken.ply").write_bytes((folder / "tiny.ply").read_bytes()[:2000])
+    sweep = load_sweep(write(folder, scenes=["broken.ply", "tiny.ply"], views=[0], configurations=["gscore"]))
+    with pytest.raises(FlickerError, match="1 of 2 views failed; .*broken.ply view 0") as raised:
+        run_sweep(sweep, client=client)
+    assert "\n" not in str(raised.value)
+    assert len(list((sweep.folder / "points").glob("*.parquet"))) == 1
+
+
+def test_command_refuses(folder):
+    """One line on standard error, exit code 2, no Dask cluster started."""
+    code = (
+        "import sys; from flicker import cli; from flicker.sweep.command import sweep\n"
+        "if 'sweep' not in {c.name for c in cli.app.registered_commands}: cli.app.command('sweep')(sweep)\n"
+        "sys.argv = ['flicker', *sys.argv[1:]]; cli.main()"
+    )
+    run = subprocess.run([sys.executable, "-c", code, "sweep", str(write(folder, scenes=["no.ply"]))], capture_output=True, text=True)
+    assert run.returncode == 2 and run.stdout == ""
+    assert run.stderr.count("\n") == 1 and "no.ply: no such file" in run.stderr
