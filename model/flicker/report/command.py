@@ -1,4 +1,4 @@
-"""`flicker report`: a typer application, mounted in `cli.py` with `app.add_typer(report_app, name="report")`."""
+"""`flicker report`: a typer application, mounted in `cli.py` with `app.add_typer(report_app)`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from rich.console import Console
 
 from ..errors import FlickerError
 
-report_app = typer.Typer(invoke_without_command=True, add_completion=False, pretty_exceptions_enable=False)
+report_app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
-@report_app.callback(invoke_without_command=True)
+@report_app.command("report")
 def report(
     scenes: Annotated[Optional[list[str]], typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
     out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures and the cache")] = Path("build/report"),

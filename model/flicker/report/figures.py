@@ -16,6 +16,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.colors import LogNorm, Normalize  # noqa: E402
 from matplotlib.figure import Figure as Canvas  # noqa: E402
 
 from ..errors import FlickerError  # noqa: E402
@@ -341,6 +342,7 @@ MAPS = {
     "gaussians": ("Gaussians per pixel", "viridis"), "cycles": ("cycles per sub-tile", "magma"), "imbalance": ("busiest channel / mean", "cividis"),
     "error": ("FLIP", "inferno"),
 }
+LOGARITHMIC = ("gaussians", "cycles")
 
 
 def heat(view: ViewResult) -> Figure | None:
@@ -362,13 +364,15 @@ def heat(view: ViewResult) -> Figure | None:
                 a.text(0.5, 0.5, "cycles are a closed form", ha="center", va="center", transform=a.transAxes)
             else:
                 low = 1.0 if key == "imbalance" else 0.0
-                drawn = a.imshow(values, cmap=colours, vmin=low, vmax=max(top, low + 1e-6), interpolation="nearest", aspect="auto")
+                high = max(top, low + 1e-6)
+                scale = LogNorm(max(high / 1000, 1.0), max(high, 2.0), clip=True) if key in LOGARITHMIC else Normalize(low, high)
+                drawn = a.imshow(values, cmap=colours, norm=scale, interpolation="nearest", aspect="auto")
                 figure.colorbar(drawn, ax=a, shrink=0.8)
                 rows.append([view.target.scene, view.target.view, name, key, float(np.nanmean(values)), float(np.nanpercentile(values, 99)), float(np.nanmax(values))])
             a.set_title(f"{name}: {title}")
     return Figure(
         f"heat_{view.target.scene}_{view.target.view}", f"Heat maps, {view.target.title}", "", "Gaussians that VRUs visit before a pixel is finished; cycles from the end of a sub-tile to the "
-        "end of the next in the same core; pixels visited by the busiest channel over the mean of four; FLIP against float64. Common scale per column, cut at the 99.5 % quantile.",
+        "end of the next in the same core; pixels visited by the busiest channel over the mean of four; FLIP against float64. Common scale per column, cut at the 99.5 % quantile, the first two logarithmic.",
         ["scene", "view", "config", "map", "mean", "percentile_99", "max"], rows, figure, bitmap=True,
     )
 
