@@ -6,13 +6,14 @@ STAMP  := $(VENV)/.installed
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
+NETLIST ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test sim lint waves synth clean
+.PHONY: help setup demo test sim lint waves synth formal report clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -30,11 +31,12 @@ $(STAMP): requirements.lock pyproject.toml scripts/setup.sh
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-test: $(STAMP) lint ## lint and all tests
+test: $(STAMP) lint ## lint, all tests, the fast proofs
 	@$(BIN)/python -m pytest -n $(JOBS) tb
+	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
-sim: $(STAMP) ## all simulations of units, or those of one: make sim UNIT=stream_cells
-	@$(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
+sim: $(STAMP) ## simulations of units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
+	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
 
 lint: $(STAMP) ## lint of the hardware: Verilator with every module as top, Verible style
 	@$(BIN)/python scripts/lint.py
@@ -45,6 +47,12 @@ waves: $(STAMP) ## simulate a unit and keep its traces: make waves UNIT=stream_c
 
 synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu] [LIBERTY=path]
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(LIBERTY),--liberty "$(LIBERTY)")
+
+formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
+	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))
+
+report: $(STAMP) ## build/report/index.html: make report [SCENES="a.ply b.sog"]
+	@$(BIN)/flicker report $(SCENES)
 
 clean: ## remove build results (not .venv)
 	rm -rf build .pytest_cache

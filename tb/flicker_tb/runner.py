@@ -23,6 +23,7 @@ from cocotb_tools.runner import get_runner
 from flicker import toolchain
 from flicker.errors import FlickerError
 from flicker_tb import signal_view
+from flicker_tb.bench import netlist
 
 TB = toolchain.ROOT / "tb"
 
@@ -52,9 +53,15 @@ def build(
 ) -> Path:
     """Program that runs cocotb on ``top``; built unless an equal build exists.
 
-    All signals are visible to cocotb; registers get random values at the start of a run.
+    All signals are visible to cocotb; registers get random values at the start of a run. With NETLIST=1 in the environment
+    the design is its synthesised netlist instead of the RTL.
     Args as of ``flicker.toolchain.verilate``.
     """
+    if netlist() and sources is None and not extra:
+        from flicker.synth.gates import sources as gates
+
+        sources = gates(top, {name: int(value) for name, value in (parameters or {}).items()})
+        parameters, args = None, [*args, "-Wno-fatal"]
     libs = cocotb_config.libs_dir
     main = cocotb_config.share_dir / "lib" / "verilator" / "verilator.cpp"
     trace = ["--trace-fst", "--trace-structs"] if waves() else []

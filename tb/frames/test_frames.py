@@ -1,4 +1,5 @@
-"""Whole frames: the verilated rendering stage equals the golden model, pixel for pixel and count for count.
+"""Whole frames: the verilated rendering stage equals the golden model, pixel for pixel and count for count, and without stalls the cycle
+model, in cycles and every counter.
 
 State space: the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and back-pressure;
 one view of each real scene at 320x180 when FLICKER_SCENES names their folder. The other builds are covered by unit tests, and the
@@ -7,6 +8,7 @@ remaining forms and precisions on a small frame here. Not covered: pictures abov
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from functools import cache
 from pathlib import Path
@@ -18,7 +20,19 @@ from flicker.camera import load_cameras
 from flicker.demo_scene import demo_cameras, generate
 from flicker.golden.records import build_lists
 from flicker.golden.render import render_golden
-from flicker.params import CORES, FAITHFUL, CatMode, Form, Precision, RenderConfig
+from flicker.methods.registry import View, run
+from flicker.params import (
+    CHANNEL_COUNTERS,
+    CHANNELS,
+    CORE_COUNTERS,
+    CORES,
+    FAITHFUL,
+    CatMode,
+    Form,
+    Precision,
+    RenderConfig,
+)
+from flicker.perf.render_stage import simulate
 from flicker.projection import project
 from flicker.scene import load_scene
 from flicker.sim.render_stage import render_rtl
@@ -57,8 +71,34 @@ def compare(projected, camera, config: RenderConfig, **stalls):
     assert channel["minitiles_sent"] <= core["minitiles_delivered"]
     assert core["minitiles_delivered"] - channel["minitiles_discarded"] <= channel["vru_busy"] / 8 <= core["minitiles_delivered"]
     assert golden.total("pairs_blended") > 0
-    assert rtl.counters.shape[0] == CORES and (rtl.core_counter("cycles") >= rtl.cycles).all()
+    assert rtl.counters.shape[0] == CORES and (rtl.core_counter("cycles") == rtl.cycles).all()
+    if not stalls:
+        compare_cycles(projected, camera, config, rtl)
     return golden, rtl
+
+
+def compare_cycles(projected, camera, config: RenderConfig, rtl) -> None:
+    """The cycle model gives the same cycles and every counter the same value."""
+    words = (config.cat.name, config.precision.name, config.form.name)
+    name = f"no_ctu-{config.form.name.lower()}" if config.cat == CatMode.OFF else "-".join(("flicker", *words)).lower()
+    model = simulate(run(name, View(projected, camera)).work, config)
+    names = [name for name, _ in CORE_COUNTERS] + [f"channel {c} {name}" for c in range(CHANNELS) for name, _ in CHANNEL_COUNTERS]
+    wrong = [
+        f"core {k} {names[i]}: RTL {rtl.counters[k, i]}, model {model.counters[k, i]}"
+        for k, i in np.argwhere(rtl.counters != model.counters)
+    ]
+    assert rtl.cycles == model.cycles and not wrong, f"{rtl.cycles} cycles, model {model.cycles}; " + "; ".join(wrong[:8])
+
+
+def random_splats(seed: int, count: int, size: int):
+    """Splats of the demo scene thrown anywhere on a small picture, in random order of depth, many of them opaque."""
+    projected, camera = demo(160, 90)
+    rng = np.random.default_rng(seed)
+    picked = rng.integers(0, len(projected.depth), count)
+    fields = {f.name: getattr(projected, f.name)[picked] for f in dataclasses.fields(projected)}
+    fields["mean"] = rng.uniform(-8, size + 8, (count, 2))
+    fields["opacity"] = rng.choice([0.02, 0.3, 0.99, 1.0], count)
+    return type(projected)(**fields), camera.resized(size, size)
 
 
 @pytest.mark.parametrize("cat", list(CatMode), ids=lambda m: m.name.lower())
@@ -69,7 +109,16 @@ def test_demo_modes(base, cat):
     compare(projected, camera, base.with_(cat=cat), seed=int(cat) + 1, idle=0.2, stall=0.3)
 
 
-@pytest.mark.parametrize("form,precision", [(Form.FACTORED, Precision.FP16), (Form.CONIC, Precision.FP8)])
+@pytest.mark.parametrize("cat", list(CatMode), ids=lambda m: m.name.lower())
+@pytest.mark.parametrize("base", [DEFAULT, FAITHFUL], ids=["default", "faithful"])
+def test_cycle_model(base, cat):
+    """Every mode without stalls, cycle for cycle: a small frame, and random streams with few and with thousands of splats per sub-tile."""
+    compare(*demo(96, 54), base.with_(cat=cat))
+    compare(*random_splats(int(cat), 200, 64), base.with_(cat=cat))
+    compare(*random_splats(10 + int(cat), 4000, 24), base.with_(cat=cat))
+
+
+@pytest.mark.parametrize("form,precision", [(Form.FACTORED, Precision.FP16), (Form.CONIC, Precision.FP8), (Form.FACTORED, Precision.MIXED)])
 def test_demo_formats(form, precision):
     """Builds of the other precisions, one of each form."""
     projected, camera = demo(160, 90)
@@ -78,9 +127,10 @@ def test_demo_formats(form, precision):
 
 @pytest.mark.parametrize("fifo_depth", [1, 128])
 def test_fifo_depth(fifo_depth):
-    """Shallowest and deepest feature FIFO: the same picture."""
-    projected, camera = demo(160, 90)
-    compare(projected, camera, DEFAULT.with_(fifo_depth=fifo_depth), stall=0.1)
+    """Shallowest and deepest feature FIFO: the same picture, and the cycles of the model."""
+    compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth))
+    compare(*random_splats(fifo_depth, 4000, 24), DEFAULT.with_(fifo_depth=fifo_depth))
+    compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth), stall=0.1)
 
 
 def test_demo_full():

@@ -49,8 +49,8 @@ def next_transmittance(t, alpha):
 
 @numba.njit(inline="always")
 def blend(c, w, colour):
-    """(w colour, C + w colour)."""
-    m = mul(w, colour, FP16_R)
+    """(w colour, C + w colour); a colour is not negative: its sign is ignored."""
+    m = mul(w, abs(colour), FP16_R)
     return m, add(c, m, FP16_R)
 
 

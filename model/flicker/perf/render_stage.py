@@ -173,7 +173,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                         count[FILTERED] += filtered >> c & 1
         advance = ctu_depth > 0 or out_pos == -3 or transfer
         # ---- channels: issue, drop, token
-        busy = 0
+        popped = False
         for c in range(4):
             if used[c] == 0:
                 continue
@@ -182,7 +182,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if head == TOKEN:
                 if waiting[c] == 0:
                     pop = True
-                    busy += 1
                     tokens[c] -= 1
                     token_gone[c] = t
                     done_at[c] = NEVER
@@ -194,11 +193,9 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                     open_pixels[c] = 16
             elif done_at[c] <= t:
                 pop = True
-                busy += 1
                 pixel[c] = 0
                 count[N_CORE + c * N_CHANNEL + DISCARDED] += 1
             else:
-                busy += 1
                 base = N_CORE + c * N_CHANNEL
                 count[base + VRU_BUSY] += 1
                 s = order[sub[c]]
@@ -211,6 +208,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                     pixel[c] = 0
                     pop = True
             if pop:
+                popped = True
                 read[c] += 1
                 if read[c] == depth:
                     read[c] = 0
@@ -342,6 +340,39 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if head_slot == ctu_latency:
                 head_slot = 0
         t += 1
+        if popped or transfer or issued or n_waiting > 0 or (advance and in_flight > 0):
+            continue
+        # ---- nothing but pixels being issued: the same until a channel takes its next element, or a flag or output buffer is due
+        skip = NEVER
+        for c in range(4):
+            if done_at[c] > t:
+                skip = min(skip, done_at[c] - t)
+            if token_gone[c] + blend + 1 > t:
+                skip = min(skip, token_gone[c] + blend + 1 - t)
+            if waiting[c] > 0:
+                for v in range(vrus):
+                    skip = min(skip, full_at[c, v] - t)
+            if used[c] > 0 and fifo[c, read[c]] != TOKEN:
+                skip = 0 if done_at[c] <= t else min(skip, per_vru - 1 - pixel[c])
+            if skip <= 0:
+                break
+        if skip <= 0 or skip >= NEVER // 2:
+            continue
+        for c in range(4):
+            base = N_CORE + c * N_CHANNEL
+            if full_mask >> c & 1:
+                count[base + FULL] += skip
+            if used[c] > 0 and fifo[c, read[c]] != TOKEN:
+                head = fifo[c, read[c]]
+                s = order[sub[c]]
+                count[base + VRU_BUSY] += skip
+                if pixel[c] == 0 and head <= finish[s, c]:
+                    count[base + SENT] += 1
+                if head == finish[s, c] and pixel[c] <= finish_op[s, c] < pixel[c] + skip:
+                    done_at[c] = t + finish_op[s, c] - pixel[c] + blend + 1
+                pixel[c] += skip
+        count[STALLED if sub_in < n_sub else IDLE] += skip
+        t += skip
     return t
 
 
