@@ -212,6 +212,22 @@ def demo(
     console.print(table)
 
 
+def _mount() -> None:
+    """Sub-commands that live beside what they run."""
+    from .chip.command import app as chip_app
+    from .report.command import report_app
+    from .stability.command import stability_app
+    from .sweep.command import sweep
+
+    app.add_typer(chip_app)
+    app.add_typer(report_app)
+    app.add_typer(stability_app, name="stability", help="Error of every method on families of hard inputs, and where each breaks.")
+    app.command("sweep")(sweep)
+
+
+_mount()
+
+
 def main() -> None:
     """Entry point: bad input is one line on standard error and exit code 2."""
     try:
