@@ -37,18 +37,18 @@ DRAM_PJ_PER_BIT = 8.0
 
 _HOROWITZ = "M. Horowitz, Computing's Energy Problem, ISSCC 2014 (45 nm, 0.9 V)"
 SOURCES = {
-    "VOLTAGE": "V; nominal supply of 28 nm high-performance processes",
+    "VOLTAGE": "assumption: V, a usual nominal supply in 28 nm",
     "INVERTER_FF": "fF of gate capacitance of the unit inverter in 28 nm: 1.7 fF of INV_X1 in the Nangate 45 nm Open Cell Library, times 28/45, rounded down",
     "PARASITIC": "drain capacitance over gate capacitance of a gate; parasitic delay of an inverter = 1 (Sutherland, Sproull, Harris: Logical Effort)",
     "WIRE": "assumption: a net's wire has the capacitance of the pins that it drives; there is no layout",
-    "ACTIVITY": "assumption: transitions of a node per operation, glitches included. With it the FP16 multiplier and adder take 0.57 and 0.28 pJ; "
-                "1.1 and 0.4 pJ of " + _HOROWITZ + ", times 28/45, are 0.68 and 0.25 pJ",
+    "ACTIVITY": "transitions of a node per operation, glitches included; chosen so that the FP16 multiplier and adder, 0.57 and 0.28 pJ, lie around "
+                "published ones: 1.1 and 0.4 pJ of " + _HOROWITZ + ", times 28/45, are 0.68 and 0.25 pJ",
     "LEAKAGE_NW_PER_GE": "assumption: nW a gate equivalent, typical corner, mixed thresholds",
     "CLOCK_HZ": "assumption: 1 GHz, the clock GSCore (ASPLOS 2024) states for 28 nm; turns leakage power into energy",
     "SRAM_PJ_PER_BIT_8K": "pJ a bit of an 8 KiB memory with 64-bit accesses, 10 pJ an access: " + _HOROWITZ,
     "SRAM_NODE_SCALE": "assumption: capacitance in proportion to the feature size, 45 to 28 nm, same supply",
     "SRAM_EXPONENT": "energy an access grows with this power of the capacity: 8 KiB 10 pJ, 32 KiB 20 pJ, 1 MiB 100 pJ: " + _HOROWITZ,
-    "DRAM_PJ_PER_BIT": "pJ a bit of LPDDR4, interface included: table of Accelergy and Timeloop (A. Parashar et al., ISPASS 2019; CACTI plug-in)",
+    "DRAM_PJ_PER_BIT": "pJ a bit of LPDDR4: value of the CACTI plug-in of Accelergy and Timeloop (type2energy), given there as public data",
 }
 
 
@@ -209,3 +209,63 @@ def ratios(energies: dict[str, float | dict[str, float]], base: str) -> dict[str
     if not total[base] > 0 or not math.isfinite(total[base]):
         raise FlickerError(f"energy: '{base}' has no energy to compare with")
     return {name: value / total[base] for name, value in total.items()}
+
+
+def event_table() -> list[tuple[str, str, float]]:
+    """(event, configuration, pJ) of what a frame is made of."""
+    from .methods.registry import get_method
+
+    rows = [("FP16 multiplication", "", switching_pj(part("fp_mul", "fp16").load)), ("FP16 addition", "", switching_pj(part("fp_add", "fp16").load)),
+            ("E4M3 multiplication", "", switching_pj(part("fp_mul", "e4m3").load)), ("E4M3 addition", "", switching_pj(part("fp_add", "e4m3").load))]
+    for form in Form:
+        rows.append(("pixel-Gaussian pair in a VRU", _name(form), vru_pj(form)))
+        rows.append(("cycle of a VRU's ungated clock", _name(form), clock_pj(part("vru", _name(form)).clock_free)))
+        for precision in Precision:
+            rows.append(("test cycle of a CTU", f"{_name(form)} {_name(precision)}", ctu_pj(form, precision)))
+    for name in ("exact", "rows", "pixels-fp16-factored"):
+        rows.append(("element in a mask generator", name, generator_pj(get_method(name).operations)))
+    rows += [("record through a feature FIFO", f"depth {depth}", fifo_pj(depth)) for depth in (4, 16, 64)]
+    rows.append(("64 bits of SRAM", "288 KiB", sram_pj(64, 288 * 1024)))
+    rows.append(("64 bits of LPDDR4", "", dram_pj(8)))
+    return rows
+
+
+TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows")
+
+
+def frame_table(scene: str, view: int, base: str = "gscore") -> list[tuple[str, float, float, dict[str, float]]]:
+    """(configuration, energy over that of `base`, microjoules, parts) of one view at 1280x720. GSCore's VRUs work on all 64 pixels of a sub-tile."""
+    from .camera import find_cameras, select_view
+    from .evaluate import get_configuration, stage_cycles
+    from .methods.registry import View, get_method, run
+    from .projection import project
+    from .scene import load_scene
+
+    loaded = load_scene(scene)
+    camera = select_view(find_cameras(loaded), view).resized(1280, 720)
+    shared = View(project(loaded, camera), camera)
+    found = {}
+    for name in TABLE_CONFIGURATIONS:
+        configuration = get_configuration(name)
+        method = get_method(configuration.method)
+        work = run(method, shared).work
+        cycles, stage = stage_cycles(configuration, work)
+        has_ctu = method.config is not None and method.config.cat != CatMode.OFF
+        pairs = 64 * int(np.minimum(work.finish().max(axis=1) + 1, np.diff(work.start)).sum()) if name == "gscore" else None
+        found[name] = stage_energy(
+            work, stage, method.form, method.config.precision if has_ctu else None, cycles=cycles, operations=method.operations,
+            vrus=configuration.vrus, fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth, pairs=pairs,
+        )
+    shares = ratios(found, base)
+    return [(name, shares[name], sum(energy.values()), energy) for name, energy in found.items()]
+
+
+if __name__ == "__main__":
+    import sys
+
+    if len(sys.argv) > 1:
+        for name, share, total, energy_parts in frame_table(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 0):
+            print(f"| `{name}` | {share:.2f} | {total:,.0f} | {' / '.join(f'{value:,.0f}' for value in energy_parts.values())} |", flush=True)
+    else:
+        for event, configuration, value in event_table():
+            print(f"| {event} | {configuration} | {value:,.2f} |")

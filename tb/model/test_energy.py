@@ -109,7 +109,7 @@ def test_synthesis_comes_first(tmp_path, monkeypatch):
 
 def test_constants_have_sources():
     names = {name for name in vars(energy) if re.fullmatch(r"[A-Z][A-Z0-9_]+", name)}
-    imported = {"CHANNELS", "CORES", "PIXELS_PER_VRU", "RECORD_BITS", "VRUS_PER_CHANNEL", "SOURCES"}
+    imported = {"CHANNELS", "CORES", "PIXELS_PER_VRU", "RECORD_BITS", "VRUS_PER_CHANNEL", "SOURCES", "TABLE_CONFIGURATIONS"}
     assert names - imported == set(energy.SOURCES)
     assert [value for _, value, _ in energy.constant_table()] == [getattr(energy, name) for name in energy.SOURCES]
 

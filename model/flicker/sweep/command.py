@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Optional
@@ -10,6 +11,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+
+TABLE_ROWS = 60  # longer results are in the file only
 
 
 def sweep(
@@ -32,7 +35,7 @@ def sweep(
         wanted = replace(wanted, workers=workers, address=None)
     if out is not None:
         wanted = replace(wanted, out=out)
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 140)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, transient=True, disable=not console.is_terminal,
@@ -43,8 +46,14 @@ def sweep(
             name = f"{event['row']['scene']} {event['row']['view']}" if event else "sweep"
             progress.update(task, completed=done, total=total, description=name)
 
-        result = run_sweep(wanted, on_point=report)
-    console.print(summary(result.rows))
+        try:
+            result = run_sweep(wanted, on_point=report)
+        except KeyboardInterrupt:
+            done = int(progress.tasks[task].completed)
+            typer.echo(f"flicker: interrupted; {done} of {len(wanted.points)} points are kept, the next run continues", err=True)
+            raise typer.Exit(130) from None
+    if len(result.rows) <= TABLE_ROWS:
+        console.print(summary(result.rows))
     note = f", {result.lost} workers lost" if result.lost else ""
     console.print(f"{wanted.folder / 'results.parquet'}: {len(result.rows)} points, {result.computed} computed, {result.resumed} resumed{note}",
                   soft_wrap=True)
@@ -55,7 +64,7 @@ def summary(rows: list[dict]) -> Table:
     table = Table()
     for name, justify in (("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"),
                           ("SSIM", "right"), ("FLIP", "right"), ("GE", "right"), ("uJ", "right")):
-        table.add_column(name, justify=justify)
+        table.add_column(name, justify=justify, no_wrap=True)
 
     def text(value, form: str) -> str:
         return "" if value is None else format(value, form)
