@@ -14,7 +14,7 @@ from ..errors import FlickerError
 from ..stability.run import Point, Stability, run_stability
 from ..stability.write import check_folder
 from .claims import Verdict, all_verdicts, read_areas
-from .collect import Cache, Target, check_configurations, code_digest, collect, known_configurations, parse_target
+from .collect import Cache, Target, check_configurations, code_digest, collect, file_digest, known_configurations, parse_target
 from .figures import own_figures, paper_figures, stability_table
 from .page import page
 
@@ -58,10 +58,18 @@ def check(scenes: Sequence[str], folder: Path, size: tuple[int, int], configurat
     return Job(tuple(targets), tuple(names), size, folder)
 
 
-def _demo(folder: Path) -> Target:
-    from ..demo_scene import write_demo
+def _demo(folder: Path, cache: Cache) -> Target:
+    """The demo scene in a folder; made when it is not there as its makers in this state left it."""
+    from .. import demo_scene
 
-    return Target(write_demo(folder / "demo")[0])
+    makers = sorted(Path(demo_scene.__file__).parent.glob("*.py"))
+    key = cache.key("demo scene", *(file_digest(path) for path in makers))
+    files = folder / "demo" / "demo.ply", folder / "demo" / "cameras.json"
+    stored = cache.load(key)
+    if stored is None or any(not f.exists() or file_digest(f) != stored[0][f.name] for f in files):
+        demo_scene.write_demo(folder / "demo")
+        cache.store(key, {f.name: file_digest(f) for f in files}, {})
+    return Target(files[0])
 
 
 def _stability(cache: Cache, seed: int) -> Stability:
@@ -77,10 +85,12 @@ def _stability(cache: Cache, seed: int) -> Stability:
 
 def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], None] = lambda done, total, text: None) -> Written:
     """Measure, draw, write. What is measured stays in the folder's cache, also after an interruption."""
-    targets = job.targets or (_demo(job.folder),)
+    cache = Cache(job.folder / "cache")
+    progress(0, 1, "scenes")
+    targets = job.targets or (_demo(job.folder, cache),)
     views = collect(targets, job.configurations, job.size, job.folder / "cache", progress)
     progress(1, 1, "stability suite")
-    stability = _stability(Cache(job.folder / "cache"), seed)
+    stability = _stability(cache, seed)
     progress(1, 1, "figures")
     areas = read_areas(SYNTHESIS)
     verdicts = all_verdicts(views, areas)
