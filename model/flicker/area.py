@@ -210,3 +210,28 @@ def stage_area(
 ) -> float:
     """GE of a rendering stage; arguments as of `stage_parts`."""
     return sum(stage_parts(form, precision, fifo_depth, ctu_fifo_depth, vrus, generator, pixels).values())
+
+
+def area_table() -> list[tuple[str, dict[str, float]]]:
+    """(stage, GE by part) of the RTL and of some alternatives."""
+    from .methods.registry import get_method
+
+    def estimate(name: str) -> dict[str, float]:
+        method = get_method(name)
+        return stage_parts(method.form, None, generator=method.operations, pixels=method.pixels)
+
+    return [
+        ("FLICKER, mixed, factored", stage_parts("factored", "mixed")),
+        ("FLICKER, FP16, factored", stage_parts("factored", "fp16")),
+        ("FLICKER as in the paper (`faithful`)", stage_parts("conic", "mixed", ctu_fifo_depth=16)),
+        ("no mask generator, 32 VRUs", stage_parts("factored", None)),
+        ("no mask generator, 64 VRUs (estimate)", stage_parts("factored", None, vrus=64)),
+        ("exact rectangle, FP16 with bound (estimate)", estimate("exact")),
+        ("exact rectangle, E4M3 (estimate)", estimate("exact-e4m3-factored")),
+        ("row intervals, pixel masks (estimate)", estimate("rows")),
+    ]
+
+
+if __name__ == "__main__":
+    for title, by_part in area_table():
+        print(f"| {title} | {sum(by_part.values()) / 1e6:.2f} | {' / '.join(f'{ge / 1e6:.2f}' for ge in by_part.values())} |")

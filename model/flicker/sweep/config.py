@@ -23,7 +23,7 @@ DEMO = "demo"
 ORBIT_VIEWS = 8  # flicker.camera.find_cameras
 MAX_WORKERS = 1024
 # Parts of the package that no result depends on.
-_NOT_IN_RESULTS = ("sweep", "stability", "sim", "synth", "chip", "cli.py", "pipeline.py", "report")
+_NOT_IN_RESULTS = ("sweep", "stability", "sim", "synth", "cli.py", "pipeline.py", "report")
 
 KEYS = {
     "scenes": "list of scene files, or of mappings with path, cameras, views",
