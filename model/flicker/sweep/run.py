@@ -6,6 +6,7 @@ once (a Dask event); this process writes it to disk. When a worker is lost, what
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -72,7 +73,7 @@ def connect(sweep: Sweep) -> Iterator:
     if sweep.address is not None:
         try:
             client = Client(sweep.address, timeout=CONNECT_SECONDS)
-        except (OSError, ValueError, TypeError) as error:  # TimeoutError is an OSError
+        except (Exception, asyncio.CancelledError) as error:  # of many kinds, by protocol and by how the connection ends
             raise FlickerError(f"cluster {sweep.address}: cannot be reached ({' '.join(str(error).split())[:120] or type(error).__name__})") from None
         with client:
             yield client
