@@ -65,7 +65,7 @@ def test_options_reach_the_engine(demo, tmp_path):
         return json.loads(path.read_text())
 
     base = run()
-    assert (base["form"], base["precision"], base["cat"], base["fifo_depth"]) == ("factored", "mixed", "smooth", 16)
+    assert (base["form"], base["precision"], base["cat"], base["fifo_depth"]) == ("factored", "fixed", "smooth", 16)
     faithful = run("--faithful")
     assert (faithful["form"], faithful["precision"], faithful["cat"], faithful["fifo_depth"]) == ("conic", "mixed", "smooth", 16)
     assert faithful["psnr_db"] == run("--form", "conic")["psnr_db"] != base["psnr_db"]

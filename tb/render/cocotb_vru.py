@@ -77,7 +77,7 @@ async def every_stage(dut):
     log: dict[str, list[int]] = {name: [] for name in probes}
     model = Pixels(np.array([(FIRST[0] + i % 4, FIRST[1] + i // 4) for i in range(PIXELS_PER_VRU)]), form)
     expected: list[tuple] = []
-    traces: list[tuple[int, np.ndarray, bool]] = []  # cycle, values, whether the weight of the blend is meaningful
+    traces: list[tuple[int, np.ndarray, bool, bool]] = []  # cycle, values, pixel unfinished, splat not broken off
 
     await bench.reset()
     edge = RisingEdge(dut.clk_i)
@@ -86,7 +86,7 @@ async def every_stage(dut):
         for s in entries:
             queue += [(s.features, p) for p in range(PIXELS_PER_VRU)]
         queue.append(None)  # token
-    cycle, finished = 0, 0
+    cycle, finished, dead = 0, 0, False
     while queue or len(got) < len(expected):
         await edge
         for name, probe in probes.items():
@@ -97,8 +97,10 @@ async def every_stage(dut):
         assert cycle < 200_000, "output does not come"
         if not queue or rng.random() < 0.2:
             continue
-        if queue[0] is not None and queue[0][1] == 4 and model.finished.all():
-            del queue[:4]  # broken off
+        if queue[0] is not None and queue[0][1] == 0:
+            dead = model.finished.all()
+        if queue[0] is not None and queue[0][1] == 4 and dead:
+            del queue[:4]  # broken off: all pixels were finished before the splat
             continue
         # What is driven now is sampled at the next edge.
         if queue[0] is None:
@@ -122,18 +124,19 @@ async def every_stage(dut):
         dut.op_feature_i.value = splats.pack(features)
         live = not model.finished[pixel]
         model.take(features, pixel)
-        traces.append((cycle, model.trace[pixel].copy(), live))
+        traces.append((cycle, model.trace[pixel].copy(), live, not dead))
     await bench.cycles(50)
     assert got == expected, next(f"pixel {n}: got {g}, model {e}" for n, (g, e) in enumerate(zip(got, expected)) if g != e)
     wrong = []
     for name, (path, delay) in places.items():
         field = PAIR_FIELDS.index(name)
         want = FP16.encode(np.array([t[1][field] for t in traces], np.float64))
-        have = np.array([log[name][c + delay] for c, _, _ in traces], np.uint16)
-        # Of finished pixels only the weights count: their splat may have been broken off. w is used where the pair is blended.
-        live = np.array([t[2] for t in traces])
+        have = np.array([log[name][c + delay] for c, *_ in traces], np.uint16)
+        # A splat that was broken off has had its numbers taken away; of finished pixels only the weights count; w is used where
+        # the pair is blended.
+        whole, live = np.array([t[3] for t in traces]), np.array([t[2] for t in traces])
         alpha = FP16.encode(np.array([t[1][PAIR_FIELDS.index("alpha")] for t in traces], np.float64))
-        used = {"alpha": live, "oma": live, "w": live & (alpha >= ALPHA_MIN_BITS)}.get(name, np.ones(len(traces), bool))
+        used = {"alpha": live, "oma": live, "w": live & (alpha >= ALPHA_MIN_BITS)}.get(name, whole)
         bad = np.flatnonzero(used & (want != have))
         wrong += [f"{path} ({name}): got {have[n]:04x}, model {want[n]:04x} in operation {n}; {len(bad)} differ" for n in bad[:1]]
     assert not wrong, "\n".join(wrong)

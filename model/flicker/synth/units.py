@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..params import FAITHFUL
+from ..params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS
 
 FORMS = {"conic": 0, "factored": 1}
-PRECISIONS = {"fp16": 0, "mixed": 1, "fp8": 2}
+PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
 FEATURE_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
@@ -81,6 +81,10 @@ def _arithmetic() -> list[Unit]:
                 DstSaturate=dst["Saturate"],
             )
         )
+    units += [
+        unit("flk_fp_to_fixed", "fp16 to 9.8", IntBits=FIXED_INT_BITS, FracBits=FIXED_FRAC_BITS),
+        unit("flk_fixed_to_fp", "10.8 to e4m3", MagBits=FIXED_INT_BITS + FIXED_FRAC_BITS + 1, FracBits=FIXED_FRAC_BITS),
+    ]
     for base, name in ((1, "2^-E"), (0, "e^-E")):
         units.append(unit("flk_exp_neg", name, Base2=base))
     for base, name in ((1, "log2"), (0, "ln")):
