@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from .energy import stage_energy
 from .errors import FlickerError
 from .methods.registry import View, get_method, run
 from .methods.work import Work
-from .params import CHANNELS, CORES, FAITHFUL, Precision, RenderConfig
+from .params import CHANNELS, CORES, FAITHFUL, CatMode, Precision, RenderConfig
 from .perf.pixel_stage import simulate_pixels
 from .perf.render_stage import StageCycles, simulate
 from .projection import Projected, project
@@ -141,10 +142,14 @@ def _per_core(work: Work, cycles: np.ndarray) -> int:
     return int(max(cycles[work.order[a:b]].sum() for a, b in zip(work.core_start, work.core_start[1:])))
 
 
+def taken_by_subtiles(work: Work) -> np.ndarray:
+    """int64 (S,): splats that a sub-tile takes as a whole, until all its pixels are finished."""
+    return np.minimum(work.finish().max(axis=1) + 1, np.diff(work.start)).astype(np.int64)
+
+
 def gscore_cycles(work: Work, vrus: int) -> int:
     """The work unit is the sub-tile: every listed splat takes 64 pixels on a core's VRUs, until all are finished. Idealised."""
-    taken = np.minimum(work.finish().max(axis=1) + 1, np.diff(work.start))
-    return _per_core(work, taken * (64 * CORES // vrus))
+    return _per_core(work, taken_by_subtiles(work) * (64 * CORES // vrus))
 
 
 def barrier_cycles(work: Work, vrus_per_channel: int) -> int:
@@ -183,13 +188,18 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
     result = run(method, data.methods_view)
     cycles, stage = stage_cycles(configuration, result.work)
     totals = result.work.totals()
-    precision = method.config.precision if method.config is not None else None
-    tested = method.family not in ("baseline", "oracle") or method.name.startswith("seele")
+    tests = method.config is not None and method.config.cat != CatMode.OFF
+    precision = method.config.precision if tests else None
+    generated = method.family not in ("baseline", "oracle") or method.name.startswith("seele")
+    stage_size = {"vrus": configuration.vrus, "fifo_depth": configuration.fifo_depth, "ctu_fifo_depth": configuration.ctu_fifo_depth}
     area = stage_area(
-        method.form, precision, configuration.fifo_depth, configuration.ctu_fifo_depth, configuration.vrus,
-        generator=method.operations if precision is None and tested else None,
+        method.form, precision, **stage_size, generator=method.operations if generated and not tests else None, pixels=method.pixels
     )
-    energy = stage_energy(result.work, stage, method.form, precision, cycles=cycles, operations=method.operations)
+    whole_subtiles = method.name.startswith("gscore")
+    energy = stage_energy(
+        result.work, stage, method.form, precision, cycles=cycles, operations=method.operations, **stage_size,
+        pairs=64 * int(taken_by_subtiles(result.work).sum()) if whole_subtiles else None,
+    )
     bound = totals["pixels_contributing"] / configuration.vrus
     row = {
         "scene": data.scene, "view": data.view, "config": configuration.name, "title": configuration.title,
@@ -198,6 +208,6 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
         "psnr_db": metrics.psnr(result.image, data.reference), "ssim": metrics.ssim(result.image, data.reference),
         "flip": metrics.flip(result.image, data.reference), "area_ge": area, "energy_uj": sum(energy.values()),
         "vru_utilisation": stage.utilisation if stage else None, "ctu_stall_rate": stage.stall_rate if stage else None,
-        "model_only": configuration.model_only, **totals, **{f"energy_uj_{part}": value for part, value in energy.items()},
+        "model_only": configuration.model_only, **totals, **{f"energy_uj_{re.sub(r'\W+', '_', part)}": value for part, value in energy.items()},
     }
     return Evaluation(configuration, row, result.image, result.work, stage)
