@@ -276,6 +276,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                 full_mask |= 1 << c
         # ---- CTU: acceptance and results
         issued = False
+        moved = False  # an element has left the pipeline
         if sub_in < n_sub:
             s = order[sub_in]
             token = at == start[s + 1]
@@ -293,6 +294,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             gone_mask = pipe_mask[head_slot]
             if gone != -3:
                 in_flight -= 1
+                moved = True
             if gone >= TOKEN:
                 if gone == TOKEN:
                     eos_free = t + 2
@@ -340,7 +342,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if head_slot == ctu_latency:
                 head_slot = 0
         t += 1
-        if popped or transfer or issued or n_waiting > 0 or (advance and in_flight > 0):
+        if popped or transfer or issued or moved or n_waiting > 0 or (advance and in_flight > 0):
             continue
         # ---- nothing but pixels being issued: the same until a channel takes its next element, or a flag or output buffer is due
         skip = NEVER
