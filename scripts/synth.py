@@ -23,10 +23,21 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 DEFAULT = ROOT / "scripts" / "cells" / "flicker.lib"
 
 
+DOCS = ROOT / "docs" / "synthesis.md"
+MARK = "<!-- written by scripts/synth.py --docs -->\n"
+
+
+def write_docs(sheets: list[report.Sheet]) -> None:
+    """Put the tables, the units' last, behind the mark at the end of the docs page."""
+    head = DOCS.read_text().split(MARK)[0]
+    DOCS.write_text(head + MARK + "\n" + "\n".join(sheet.markdown() for sheet in [*sheets[1:], sheets[0]]))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
+    parser.add_argument("--docs", action="store_true", help="write the tables into docs/synthesis.md")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)
@@ -62,6 +73,8 @@ def main() -> int:
             sheets.append(sheet)
         report.write_markdown(folder / "report.md", sheets)
         comparison.chart(folder, library)
+        if arguments.docs:
+            write_docs(sheets)
     for sheet in sheets:
         sheet.print(console)
     console.print(f"synth: {len(units)} rows, {time.monotonic() - started:.0f} s" + (
