@@ -5,7 +5,7 @@ dispatch with filter of finished mini-tiles, feature FIFOs, issue to the VRUs, t
 token's wait for the output buffers, both levels of pixel arbiters. Left out: numbers (masks and finished pixels are
 recorded events, `flicker.methods.work.Work`), stalls from outside, i.e. input is always there and pixels are always taken.
 
-Cores are independent; the frame ends with the last pixel of the last core. Time within a core jumps over cycles in which nothing changes.
+Cores are independent; the frame ends with the last pixel of the last core.
 """
 
 from __future__ import annotations
@@ -173,7 +173,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                         count[FILTERED] += filtered >> c & 1
         advance = ctu_depth > 0 or out_pos == -3 or transfer
         # ---- channels: issue, drop, token
-        popped = False
         for c in range(4):
             if used[c] == 0:
                 continue
@@ -208,7 +207,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                     pixel[c] = 0
                     pop = True
             if pop:
-                popped = True
                 read[c] += 1
                 if read[c] == depth:
                     read[c] = 0
@@ -276,7 +274,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                 full_mask |= 1 << c
         # ---- CTU: acceptance and results
         issued = False
-        moved = False  # an element has left the pipeline
         if sub_in < n_sub:
             s = order[sub_in]
             token = at == start[s + 1]
@@ -294,7 +291,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             gone_mask = pipe_mask[head_slot]
             if gone != -3:
                 in_flight -= 1
-                moved = True
             if gone >= TOKEN:
                 if gone == TOKEN:
                     eos_free = t + 2
@@ -342,39 +338,6 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if head_slot == ctu_latency:
                 head_slot = 0
         t += 1
-        if popped or transfer or issued or moved or n_waiting > 0 or (advance and in_flight > 0):
-            continue
-        # ---- nothing but pixels being issued: the same until a channel takes its next element, or a flag or output buffer is due
-        skip = NEVER
-        for c in range(4):
-            if done_at[c] > t:
-                skip = min(skip, done_at[c] - t)
-            if token_gone[c] + blend + 1 > t:
-                skip = min(skip, token_gone[c] + blend + 1 - t)
-            if waiting[c] > 0:
-                for v in range(vrus):
-                    skip = min(skip, full_at[c, v] - t)
-            if used[c] > 0 and fifo[c, read[c]] != TOKEN:
-                skip = 0 if done_at[c] <= t else min(skip, per_vru - 1 - pixel[c])
-            if skip <= 0:
-                break
-        if skip <= 0 or skip >= NEVER // 2:
-            continue
-        for c in range(4):
-            base = N_CORE + c * N_CHANNEL
-            if full_mask >> c & 1:
-                count[base + FULL] += skip
-            if used[c] > 0 and fifo[c, read[c]] != TOKEN:
-                head = fifo[c, read[c]]
-                s = order[sub[c]]
-                count[base + VRU_BUSY] += skip
-                if pixel[c] == 0 and head <= finish[s, c]:
-                    count[base + SENT] += 1
-                if head == finish[s, c] and pixel[c] <= finish_op[s, c] < pixel[c] + skip:
-                    done_at[c] = t + finish_op[s, c] - pixel[c] + blend + 1
-                pixel[c] += skip
-        count[STALLED if sub_in < n_sub else IDLE] += skip
-        t += skip
     return t
 
 
