@@ -1,6 +1,6 @@
 """Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/synthesis.md).
 
-    stage_area("factored", "mixed")                                   # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
+    stage_area("factored", "fixed")                                   # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
     stage_area("factored", None, vrus=64)                             # no contribution test, 64 VRUs
     stage_area("factored", None, generator=get_method("rows-f8a8").operations, pixels=True)
 
@@ -139,14 +139,8 @@ def vru_area(form: Form | str, pixels: int = PIXELS_PER_VRU) -> float:
 
 
 def ctu_area(form: Form | str, precision: Precision | str, ctu_fifo_depth: int = 0) -> float:
-    """A CTU with its output FIFO. FIXED counts as MIXED as long as it has not been synthesised."""
-    form, precision = _word(form, Form), _word(precision, Precision)
-    found = parts().get(("ctu", f"{form} {precision}"))
-    if found is None and precision == "fixed":
-        found = part("ctu", f"{form} mixed")
-    if found is None:
-        found = part("ctu", f"{form} {precision}")
-    return found.ge + fifo_area(ctu_fifo_depth, RECORD_BITS + CHANNELS)
+    """A CTU with its output FIFO."""
+    return part("ctu", f"{_word(form, Form)} {_word(precision, Precision)}").ge + fifo_area(ctu_fifo_depth, RECORD_BITS + CHANNELS)
 
 
 def operators_area(generator: Operations) -> float:
@@ -221,6 +215,7 @@ def area_table() -> list[tuple[str, dict[str, float]]]:
         return stage_parts(method.form, None, generator=method.operations, pixels=method.pixels)
 
     return [
+        ("FLICKER, fixed, factored (default)", stage_parts("factored", "fixed")),
         ("FLICKER, mixed, factored", stage_parts("factored", "mixed")),
         ("FLICKER, FP16, factored", stage_parts("factored", "fp16")),
         ("FLICKER as in the paper (`faithful`)", stage_parts("conic", "mixed", ctu_fifo_depth=16)),

@@ -1,6 +1,6 @@
 """Energy of a rendered frame: operations and accesses counted by the models, times energy per operation.
 
-    stage_energy(result.work, simulate(result.work, config), "factored", "mixed")       # microjoules by part
+    stage_energy(result.work, simulate(result.work, config), "factored", "fixed")       # microjoules by part
 
 Logic: switched capacitance of the synthesised netlists (`flicker.area`: input capacitance of all cells), scaled to 28 nm by the constants
 below. Memories: published figures. Every constant has its source in SOURCES. Absolute values are estimates without layout; ratios between
@@ -91,12 +91,8 @@ def fifo_pj(depth: int, width: int = RECORD_BITS) -> float:
 
 
 def ctu(form: Form | str, precision: Precision | str) -> Part:
-    """The CTU; FIXED counts as MIXED as long as it has not been synthesised."""
-    form, precision = _name(form), _name(precision)
-    found = parts().get(("ctu", f"{form} {precision}"))
-    if precision == "fixed" and (found is None or not found.load):
-        return part("ctu", f"{form} mixed")
-    return found if found is not None else part("ctu", f"{form} {precision}")
+    """The CTU."""
+    return part("ctu", f"{_name(form)} {_name(precision)}")
 
 
 def ctu_pj(form: Form | str, precision: Precision | str) -> float:
@@ -234,28 +230,11 @@ TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful
 
 
 def frame_table(scene: str, view: int, base: str = "gscore") -> list[tuple[str, float, float, dict[str, float]]]:
-    """(configuration, energy over that of `base`, microjoules, parts) of one view at 1280x720. GSCore's VRUs work on all 64 pixels of a sub-tile."""
-    from .camera import find_cameras, select_view
-    from .evaluate import get_configuration, stage_cycles
-    from .methods.registry import View, get_method, run
-    from .projection import project
-    from .scene import load_scene
+    """(configuration, energy over that of `base`, microjoules, parts) of one view at 1280x720."""
+    from .evaluate import evaluate, load_view
 
-    loaded = load_scene(scene)
-    camera = select_view(find_cameras(loaded), view).resized(1280, 720)
-    shared = View(project(loaded, camera), camera)
-    found = {}
-    for name in TABLE_CONFIGURATIONS:
-        configuration = get_configuration(name)
-        method = get_method(configuration.method)
-        work = run(method, shared).work
-        cycles, stage = stage_cycles(configuration, work)
-        has_ctu = method.config is not None and method.config.cat != CatMode.OFF
-        pairs = 64 * int(np.minimum(work.finish().max(axis=1) + 1, np.diff(work.start)).sum()) if name == "gscore" else None
-        found[name] = stage_energy(
-            work, stage, method.form, method.config.precision if has_ctu else None, cycles=cycles, operations=method.operations,
-            vrus=configuration.vrus, fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth, pairs=pairs,
-        )
+    data = load_view(scene, view)
+    found = {name: evaluate(data, name).energy for name in TABLE_CONFIGURATIONS}
     shares = ratios(found, base)
     return [(name, shares[name], sum(energy.values()), energy) for name, energy in found.items()]
 

@@ -35,7 +35,8 @@ class Configuration:
     """A machine: a method (flicker.methods) on a rendering stage.
 
     vrus_per_channel: 2 is the RTL. fifo_depth, ctu_fifo_depth: as in RenderConfig. barrier: all cores wait for each other after
-    every tile (the cycles are then idealised: no latencies). title: for tables.
+    every tile (the cycles are then idealised: no latencies). pixel_stage: options of `perf.pixel_stage.simulate_pixels`, for
+    methods whose VRUs visit single pixels. title: for tables.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Configuration:
     fifo_depth: int = 16
     ctu_fifo_depth: int = 0
     barrier: bool = False
+    pixel_stage: tuple[tuple[str, int | str], ...] = ()
 
     @property
     def vrus(self) -> int:
@@ -57,6 +59,9 @@ class Configuration:
         return get_method(self.method).model_only or self.vrus_per_channel != 2 or self.barrier
 
 
+WIDE = (("ports", 4), ("buffers", 2), ("halt", False), ("loop", 2))
+
+
 def _configurations() -> dict[str, Configuration]:
     found = [
         Configuration("vanilla", "vanilla", "vanilla 3DGS, AABB on 16x16 tiles"),
@@ -66,8 +71,8 @@ def _configurations() -> dict[str, Configuration]:
         Configuration("seele", "seele", "SeeLe: leader pixel of each 2x2 group"),
         Configuration("faithful", "faithful", "FLICKER as in the paper", ctu_fifo_depth=FAITHFUL.ctu_fifo_depth),
         Configuration("faithful-barrier", "faithful", "FLICKER as in the paper, barrier after every tile", barrier=True),
-        Configuration("flicker", "flicker-smooth-fixed-factored", "FLICKER, default configuration"),
-        Configuration("flicker-barrier", "flicker-smooth-fixed-factored", "FLICKER, default, barrier after every tile", barrier=True),
+        Configuration("flicker", "flicker", "FLICKER, default configuration"),
+        Configuration("flicker-barrier", "flicker", "FLICKER, default, barrier after every tile", barrier=True),
     ]
     for form in ("factored", "conic"):
         for precision in Precision:
@@ -81,7 +86,12 @@ def _configurations() -> dict[str, Configuration]:
         Configuration("rows", "rows-f8a8", "row intervals, pixel masks"),
         Configuration("rows-ellipse", "rows-f8a8-ellipse", "row intervals, pixel masks, lists by the ellipse"),
         Configuration("rows-ellipse-64", "rows-f8a8-ellipse", "the same, FIFO depth 64", fifo_depth=64),
+        Configuration(
+            "rows-ellipse-wide", "rows-f8a8-ellipse", "the same, FIFO depth 128, four output ports, two output buffers, 2-cycle loops (area of these not counted)",
+            fifo_depth=128, pixel_stage=WIDE,
+        ),
         Configuration("oracle", "oracle", "free exact pixel masks"),
+        Configuration("oracle-wide", "oracle", "free exact pixel masks, stage as in rows-ellipse-wide", fifo_depth=128, pixel_stage=WIDE),
     ]
     return {c.name: c for c in found}
 
@@ -128,13 +138,15 @@ def load_view(scene: str | Path, view: int = 0, width: int = 1280, height: int =
 
 @dataclass
 class Evaluation:
-    """row: numbers by column. stage: None where no cycle model of the stage applies (its cycles are a closed form)."""
+    """row: numbers by column. stage: None where no cycle model of the stage applies (its cycles are a closed form).
+    energy: microjoules by part."""
 
     configuration: Configuration
     row: dict[str, Any]
     image: np.ndarray
     work: Work
     stage: StageCycles | None
+    energy: dict[str, float]
 
 
 def _per_core(work: Work, cycles: np.ndarray) -> int:
@@ -176,7 +188,10 @@ def stage_cycles(configuration: Configuration, work: Work) -> tuple[int, StageCy
         return barrier_cycles(work, configuration.vrus_per_channel), None
     if method.name.startswith("gscore"):
         return gscore_cycles(work, configuration.vrus), None
-    stage = simulate_pixels(work, config) if work.visit is not None else simulate(work, config, configuration.vrus_per_channel)
+    if work.visit is not None:
+        stage = simulate_pixels(work, config, **dict(configuration.pixel_stage))
+    else:
+        stage = simulate(work, config, configuration.vrus_per_channel)
     return stage.cycles, stage
 
 
@@ -208,6 +223,6 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
         "psnr_db": metrics.psnr(result.image, data.reference), "ssim": metrics.ssim(result.image, data.reference),
         "flip": metrics.flip(result.image, data.reference), "area_ge": area, "energy_uj": sum(energy.values()),
         "vru_utilisation": stage.utilisation if stage else None, "ctu_stall_rate": stage.stall_rate if stage else None,
-        "model_only": configuration.model_only, **totals, **{f"energy_uj_{re.sub(r'\W+', '_', part)}": value for part, value in energy.items()},
+        "model_only": configuration.model_only, **totals, **{"energy_uj_" + re.sub(r"\W+", "_", part): value for part, value in energy.items()},
     }
-    return Evaluation(configuration, row, result.image, result.work, stage)
+    return Evaluation(configuration, row, result.image, result.work, stage, energy)

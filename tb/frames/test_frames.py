@@ -20,7 +20,7 @@ from flicker.camera import load_cameras
 from flicker.demo_scene import demo_cameras, generate
 from flicker.golden.records import build_lists
 from flicker.golden.render import render_golden
-from flicker.methods.registry import View, run
+from flicker.methods.registry import View, method_name, run
 from flicker.params import (
     CHANNEL_COUNTERS,
     CHANNELS,
@@ -79,9 +79,7 @@ def compare(projected, camera, config: RenderConfig, **stalls):
 
 def compare_cycles(projected, camera, config: RenderConfig, rtl) -> None:
     """The cycle model gives the same cycles and every counter the same value."""
-    words = (config.cat.name, config.precision.name, config.form.name)
-    name = f"no_ctu-{config.form.name.lower()}" if config.cat == CatMode.OFF else "-".join(("flicker", *words)).lower()
-    model = simulate(run(name, View(projected, camera)).work, config)
+    model = simulate(run(method_name(config), View(projected, camera)).work, config)
     names = [name for name, _ in CORE_COUNTERS] + [f"channel {c} {name}" for c in range(CHANNELS) for name, _ in CHANNEL_COUNTERS]
     wrong = [
         f"core {k} {names[i]}: RTL {rtl.counters[k, i]}, model {model.counters[k, i]}"

@@ -1,7 +1,7 @@
 """Named methods: what each streams, masks and draws.
 
     view = View(project(scene, camera), camera)
-    result = run("flicker-smooth-mixed-factored", view)
+    result = run("flicker", view)
     result.image, result.work
 """
 
@@ -235,7 +235,7 @@ def _flicker() -> list[Method]:
                 config = RenderConfig(form=form, precision=precision, cat=mode)
                 words = mode.name.lower(), precision.name.lower(), form.name.lower()
                 methods.append(Method(
-                    "-".join(("flicker", *words)), "FLICKER, " + ", ".join(words), "flicker", form, cat(config), config=config,
+                    method_name(config), "FLICKER, " + ", ".join(words), "flicker", form, cat(config), config=config,
                     operations=cat_operations(config), model_only=False, precision=words[1],
                 ))
     return methods
@@ -295,9 +295,16 @@ def methods() -> dict[str, Method]:
     return {m.name: m for m in found}
 
 
+def method_name(config: RenderConfig) -> str:
+    """Name of the method that an RTL configuration is."""
+    if config.cat == CatMode.OFF:
+        return f"no_ctu-{config.form.name.lower()}"
+    return "-".join(("flicker", config.cat.name, config.precision.name, config.form.name)).lower()
+
+
 ALIASES = {
-    "faithful": "-".join(("flicker", FAITHFUL.cat.name, FAITHFUL.precision.name, FAITHFUL.form.name)).lower(),
-    "flicker": "flicker-smooth-mixed-factored",
+    "faithful": method_name(FAITHFUL),
+    "flicker": method_name(RenderConfig()),
     "exact": "exact-fp16-factored-bound",
     "rows": "rows-f8a8",
     **{name: f"{name}-factored" for name in ("vanilla", "no_ctu", "gscore", "seele", "oracle", "oracle_minitile")},
