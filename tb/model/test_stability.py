@@ -54,7 +54,7 @@ def test_known_failures(quick):
     assert worst["thin", "no_ctu-conic"] < 30 and worst["thin", "no_ctu-factored"] > worst["thin", "no_ctu-conic"] + 10
     assert worst["far_mean", "no_ctu-conic"] < 30 and worst["far_mean", "no_ctu-factored"] > 50
     assert worst["screen", "no_ctu-factored" + ABSOLUTE] < 35 and worst["screen", "no_ctu-factored"] > 55
-    assert worst["thin", "flicker-smooth-mixed-factored"] < 35
+    assert worst["thin", "flicker-smooth-fixed-factored"] < 35
     for family in quick.families:  # masks with a proof cost nothing, however hard the input
         assert worst[family, "rows-f8a8"] == worst[family, "no_ctu-factored"] == worst[family, "oracle-factored"]
         assert worst[family, "exact-fp16-conic-bound"] == worst[family, "no_ctu-conic"]
