@@ -28,6 +28,7 @@ from flicker.errors import FlickerError
 from flicker.methods.disc import DiscFormat, root_table
 from flicker.methods.operations import Op, Operation
 from flicker.methods.registry import methods
+from flicker.methods.stage import ACCUMULATOR_INT_BITS
 from flicker.params import Form, Precision
 from flicker.synth.liberty import CLOCK_GATE, Library
 from flicker.synth.run import FOLDER, UNITS, Runner
@@ -128,7 +129,11 @@ def operations() -> Iterator[Operation]:
     """Every different operation that a method has."""
     seen = set()
     for method in methods().values():
-        for o in (*method.operations.per_element, *method.operations.preprocessing):
+        vru = []
+        if method.accumulator:
+            integer, fraction = ACCUMULATOR_INT_BITS, method.accumulator
+            vru = [Operation(Op.SHIFT, f"FP16 -> q{integer}.{fraction}", 3), Operation(Op.ADD, f"fixed {integer + fraction}", 3)]
+        for o in (*method.operations.per_element, *method.operations.preprocessing, *vru):
             name = operator_name(o)
             if name not in seen:
                 seen.add(name)

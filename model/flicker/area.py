@@ -20,7 +20,9 @@ from pathlib import Path
 from .errors import FlickerError
 from .methods.leaders import cat_operations
 from .methods.operations import NONE, Op, Operation, Operations
+from .methods.stage import ACCUMULATOR_INT_BITS
 from .params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRUS_PER_CHANNEL, CatMode, Form, Precision, RenderConfig
+from .perf.lane_stage import LaneStage
 from .toolchain import BUILD
 
 TABLE = Path(__file__).with_name("areas.csv")
@@ -29,7 +31,8 @@ SYNTHESIS = BUILD / "synth" / "area.csv"
 RECORD_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
 PIXEL_MASK_BITS = MINITILE * MINITILE
 # Bits of a VRU's state per pixel: transmittance 15, finished 1, colour 3 x 15, and the output buffer's transmittance and colour.
-PIXEL_STATE_BITS = 16 + 45 + 60
+OUTPUT_STATE_BITS = 60
+PIXEL_STATE_BITS = 16 + 45 + OUTPUT_STATE_BITS
 MAX_VRUS = CORES * CHANNELS * PIXEL_MASK_BITS
 
 
@@ -206,13 +209,51 @@ def stage_area(
     return sum(stage_parts(form, precision, fifo_depth, ctu_fifo_depth, vrus, generator, pixels).values())
 
 
+def lane_vru_area(pixels: int, window: int = 1, buffers: int = 1, accumulator: int = 0) -> float:
+    """A VRU as a lane (perf.lane_stage), factored form. Estimate: the RTL's, with choice of the next pixel in each entry of the window, further output
+    buffers, and fixed-point accumulators (3 integer and `accumulator` fraction bits) for FP16 adders."""
+    bit = part("fifo", f"{RECORD_BITS} x 8").ge / (8 * RECORD_BITS)
+    ge = vru_area(Form.FACTORED, pixels) + window * part("op", "select 8").ge + (buffers - 1) * pixels * OUTPUT_STATE_BITS * bit
+    if accumulator:
+        width = ACCUMULATOR_INT_BITS + accumulator
+        convert, add = part("op", f"shift fp16 -> q{ACCUMULATOR_INT_BITS}.{accumulator}").ge, part("op", f"add fixed {width}").ge
+        ge += 3 * (convert + add + registers(width + 1) - part("fp_add_pipe", "fp16, 3 stages").ge) + 3 * pixels * (width - 15) * bit
+    return ge
+
+
+def registers(bits: int) -> float:
+    """A pipeline register."""
+    return bits * part("pipe_reg", f"{RECORD_BITS} bit").ge / RECORD_BITS
+
+
+def lane_stage_parts(lanes: LaneStage, generator: Operations | None, vrus: int, fifo_depth: int, accumulator: int = 0) -> dict[str, float]:
+    """GE of a stage of independent lanes by part; arguments as of `stage_parts`. A lane has a FIFO of its own, whose oldest `window - 1` entries lie in
+    registers behind it."""
+    pixels = CORES * CHANNELS * MINITILE * MINITILE // vrus
+    arbiter = part("stream_arbiter", "2 x 67 bit").ge
+    heads = lanes.window - 1
+    return {
+        "VRUs": vrus * lane_vru_area(pixels, lanes.window, lanes.buffers, accumulator),
+        "feature FIFOs": vrus * (fifo_area(fifo_depth - heads, RECORD_BITS + pixels) + registers(heads * (RECORD_BITS + pixels))),
+        "mask generators": CORES * lanes.width * generator_area(generator) if generator else 0.0,
+        "counters": CORES * part("perf_counters", "default").ge,
+        "arbiters, control": vrus * arbiter + stage_parts(Form.FACTORED, None)["arbiters, control"],
+    }
+
+
 def area_table() -> list[tuple[str, dict[str, float]]]:
     """(stage, GE by part) of the RTL and of some alternatives."""
+    from .evaluate import get_configuration
     from .methods.registry import get_method
 
     def estimate(name: str) -> dict[str, float]:
         method = get_method(name)
         return stage_parts(method.form, None, generator=method.operations, pixels=method.pixels)
+
+    def lane_estimate(name: str) -> dict[str, float]:
+        configuration = get_configuration(name)
+        method = get_method(configuration.method)
+        return lane_stage_parts(configuration.lanes, method.operations, configuration.vrus, configuration.fifo_depth, method.accumulator)
 
     return [
         ("FLICKER, fixed, factored (default)", stage_parts("factored", "fixed")),
@@ -224,6 +265,7 @@ def area_table() -> list[tuple[str, dict[str, float]]]:
         ("exact rectangle, FP16 with bound (estimate)", estimate("exact")),
         ("exact rectangle, E4M3 (estimate)", estimate("exact-e4m3-factored")),
         ("row intervals, pixel masks (estimate)", estimate("rows")),
+        *((f"`{name}` (estimate)", lane_estimate(name)) for name in ("lanes", "lanes-deep", "lanes-64")),
     ]
 
 

@@ -131,14 +131,15 @@ def _name(value: Form | Precision | str) -> str:
 def stage_energy(
     work: Work, stage: StageCycles | None, form: Form | str, precision: Precision | str | None, *, cycles: int | None = None,
     operations: Operations | None = None, vrus: int = CORES * CHANNELS * VRUS_PER_CHANNEL, fifo_depth: int = 16, ctu_fifo_depth: int = 0,
-    pairs: int | None = None,
+    pairs: int | None = None, area: float | None = None, lanes: bool = False,
 ) -> dict[str, float]:
     """Microjoules of a frame in the rendering stage, by part.
 
     work: of the method. stage: its cycles and counters, or None with `cycles` given. precision: of the CTU; None where there is none.
     operations: of the mask generator; `operations.NONE` says that there is none even where a precision is given, None: the CTU.
     vrus: over all channels. pairs: pixel-Gaussian pairs that the VRUs work on, where the default does not apply: with whole mini-tiles
-    what the stage issued (without counters: 16 for each mini-tile sent), else the visited pixels.
+    what the stage issued (without counters: 16 for each mini-tile sent), else the visited pixels. area: of the stage, in GE, where it is not that of
+    `stage_area`. lanes: each VRU has a FIFO of its own and says itself how many pixels it visited (perf.lane_stage).
 
     "ungated clock": clock pins behind no clock gate, over all cycles. Left out: wires between units, input buffers, what the sorting unit does.
     """
@@ -148,18 +149,22 @@ def stage_energy(
     form = _name(form)
     visited = work.visit_masks() & work.unfinished()
     if pairs is None:
-        if work.visit is not None:
+        if lanes:
+            pairs = int(stage.channel("vru_busy").sum(dtype=np.int64))
+        elif work.visit is not None:
             pairs = int(np.bitwise_count(visited).sum(dtype=np.int64))
         elif stage is not None:
             pairs = int(stage.channel("vru_busy").sum(dtype=np.int64)) * vrus // (CORES * CHANNELS)
         else:
             pairs = 16 * int((visited != 0).sum(dtype=np.int64))
     pushed = int(stage.core("minitiles_delivered").sum(dtype=np.int64)) if stage is not None else int((visited != 0).sum(dtype=np.int64))
-    width = RECORD_BITS + (16 if work.visit is not None else 0)
-    tested = int(work.test_cycles.sum(dtype=np.int64))
+    fifos = vrus if lanes else CORES * CHANNELS
+    mask_bits = 64 * CORES // vrus if lanes else 16
+    width = RECORD_BITS + (mask_bits if work.visit is not None else 0)
+    tested = int(stage.core("gaussians_in").sum(dtype=np.int64)) if lanes else int(work.test_cycles.sum(dtype=np.int64))
     no_generator = (precision is None and operations is None) or (operations is not None and not operations.per_element)
     own_ctu = precision is not None and not no_generator
-    free = vrus * part("vru", form).clock_free + CORES * part("perf_counters", "default").clock_free + CORES * CHANNELS * _free_fifo(fifo_depth)
+    free = vrus * part("vru", form).clock_free + CORES * part("perf_counters", "default").clock_free + fifos * _free_fifo(fifo_depth)
     if no_generator:
         masks = 0.0
     elif own_ctu:
@@ -172,8 +177,9 @@ def stage_energy(
     counters, arbiters = part("perf_counters", "default"), (part("stream_arbiter", "2 x 67 bit"), part("stream_arbiter", "4 x 92 bit"))
     pixels = 64 * work.subtiles
     control = CORES * cycles * (switching_pj(counters.load) + clock_pj(counters.clock_gated)) + pixels * sum(switching_pj(a.load) for a in arbiters)
-    area = stage_area(form, precision if own_ctu else None, fifo_depth, ctu_fifo_depth, vrus, None if own_ctu or no_generator else operations,
-                      work.visit is not None)
+    if area is None:
+        area = stage_area(form, precision if own_ctu else None, fifo_depth, ctu_fifo_depth, vrus, None if own_ctu or no_generator else operations,
+                          work.visit is not None)
     picojoules = {
         "VRUs": pairs * vru_pj(form),
         "feature FIFOs": pushed * fifo_pj(fifo_depth, width),
@@ -226,7 +232,7 @@ def event_table() -> list[tuple[str, str, float]]:
     return rows
 
 
-TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows")
+TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64")
 
 
 def frame_table(scene: str, view: int, base: str = "gscore") -> list[tuple[str, float, float, dict[str, float]]]:

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from . import metrics
-from .area import stage_area
+from .area import lane_stage_parts, stage_area
 from .camera import Camera, find_cameras, select_view
 from .energy import stage_energy
 from .errors import FlickerError
 from .methods.registry import View, get_method, run
 from .methods.work import Work
 from .params import CHANNELS, CORES, FAITHFUL, CatMode, Precision, RenderConfig
+from .perf.lane_stage import LaneStage, simulate_lanes
 from .perf.pixel_stage import simulate_pixels
 from .perf.render_stage import StageCycles, simulate
 from .projection import Projected, project
@@ -35,8 +36,7 @@ class Configuration:
     """A machine: a method (flicker.methods) on a rendering stage.
 
     vrus_per_channel: 2 is the RTL. fifo_depth, ctu_fifo_depth: as in RenderConfig. barrier: all cores wait for each other after
-    every tile (the cycles are then idealised: no latencies). pixel_stage: options of `perf.pixel_stage.simulate_pixels`, for
-    methods whose VRUs visit single pixels. title: for tables.
+    every tile (the cycles are then idealised: no latencies). lanes: the VRUs are lanes of their own (perf.lane_stage). title: for tables.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Configuration:
     fifo_depth: int = 16
     ctu_fifo_depth: int = 0
     barrier: bool = False
-    pixel_stage: tuple[tuple[str, int | str], ...] = ()
+    lanes: LaneStage | None = None
 
     @property
     def vrus(self) -> int:
@@ -59,7 +59,7 @@ class Configuration:
         return get_method(self.method).model_only or self.vrus_per_channel != 2 or self.barrier
 
 
-WIDE = (("ports", 4), ("buffers", 2), ("halt", False), ("loop", 2))
+LANES_METHOD = "rows-f8a8-ellipse-acc14"
 
 
 def _configurations() -> dict[str, Configuration]:
@@ -86,12 +86,17 @@ def _configurations() -> dict[str, Configuration]:
         Configuration("rows", "rows-f8a8", "row intervals, pixel masks"),
         Configuration("rows-ellipse", "rows-f8a8-ellipse", "row intervals, pixel masks, lists by the ellipse"),
         Configuration("rows-ellipse-64", "rows-f8a8-ellipse", "the same, FIFO depth 64", fifo_depth=64),
+        Configuration("lanes", LANES_METHOD, "row intervals, independent lanes", lanes=LaneStage(window=2)),
         Configuration(
-            "rows-ellipse-wide", "rows-f8a8-ellipse", "the same, FIFO depth 128, four output ports, two output buffers, 2-cycle loops (area of these not counted)",
-            fifo_depth=128, pixel_stage=WIDE,
+            "lanes-deep", LANES_METHOD, "row intervals, independent lanes, FIFO depth 40, two elements a cycle", fifo_depth=40,
+            lanes=LaneStage(window=3, width=2),
+        ),
+        Configuration(
+            "lanes-64", LANES_METHOD, "row intervals, 64 independent lanes, FIFO depth 4", vrus_per_channel=4, fifo_depth=4,
+            lanes=LaneStage(window=2),
         ),
         Configuration("oracle", "oracle", "free exact pixel masks"),
-        Configuration("oracle-wide", "oracle", "free exact pixel masks, stage as in rows-ellipse-wide", fifo_depth=128, pixel_stage=WIDE),
+        Configuration("oracle-lanes", "oracle", "free exact pixel masks, stage as in lanes-deep", fifo_depth=40, lanes=LaneStage(window=3, width=2)),
     ]
     return {c.name: c for c in found}
 
@@ -188,8 +193,10 @@ def stage_cycles(configuration: Configuration, work: Work) -> tuple[int, StageCy
         return barrier_cycles(work, configuration.vrus_per_channel), None
     if method.name.startswith("gscore"):
         return gscore_cycles(work, configuration.vrus), None
-    if work.visit is not None:
-        stage = simulate_pixels(work, config, **dict(configuration.pixel_stage))
+    if configuration.lanes is not None:
+        stage = simulate_lanes(work, config, configuration.lanes, configuration.vrus // CORES)
+    elif work.visit is not None:
+        stage = simulate_pixels(work, config)
     else:
         stage = simulate(work, config, configuration.vrus_per_channel)
     return stage.cycles, stage
@@ -207,13 +214,15 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
     precision = method.config.precision if tests else None
     generated = method.family not in ("baseline", "oracle") or method.name.startswith("seele")
     stage_size = {"vrus": configuration.vrus, "fifo_depth": configuration.fifo_depth, "ctu_fifo_depth": configuration.ctu_fifo_depth}
-    area = stage_area(
-        method.form, precision, **stage_size, generator=method.operations if generated and not tests else None, pixels=method.pixels
-    )
+    generator = method.operations if generated and not tests else None
+    if configuration.lanes is not None:
+        area = sum(lane_stage_parts(configuration.lanes, generator, configuration.vrus, configuration.fifo_depth, method.accumulator).values())
+    else:
+        area = stage_area(method.form, precision, **stage_size, generator=generator, pixels=method.pixels)
     whole_subtiles = method.name.startswith("gscore")
     energy = stage_energy(
         result.work, stage, method.form, precision, cycles=cycles, operations=method.operations, **stage_size,
-        pairs=64 * int(taken_by_subtiles(result.work).sum()) if whole_subtiles else None,
+        pairs=64 * int(taken_by_subtiles(result.work).sum()) if whole_subtiles else None, area=area, lanes=configuration.lanes is not None,
     )
     bound = totals["pixels_contributing"] / configuration.vrus
     row = {

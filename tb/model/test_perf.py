@@ -1,4 +1,4 @@
-"""Model of VRUs that visit single pixels, and closed forms of `flicker.evaluate`, against the cycle model and by hand.
+"""Models of VRUs that visit single pixels and of lanes, and closed forms of `flicker.evaluate`, against the cycle model and by hand.
 
 The cycle model of the RTL itself is compared with the RTL in tb/frames.
 """
@@ -15,6 +15,7 @@ from flicker.evaluate import barrier_cycles, gscore_cycles
 from flicker.methods.registry import View, run
 from flicker.methods.work import Work
 from flicker.params import CatMode, RenderConfig, vru_stages
+from flicker.perf.lane_stage import LaneStage, lane_of_pixel, simulate_lanes
 from flicker.perf.pixel_stage import GENERATOR_LATENCY, simulate_pixels
 from flicker.perf.render_stage import simulate
 from flicker.projection import project
@@ -29,13 +30,13 @@ def view() -> View:
     return View(replace(projected, opacity=np.minimum(projected.opacity, 0.02)), camera)  # nothing finishes early
 
 
-def one_splat(pixels: list[int]) -> Work:
-    """One 8x8 sub-tile with one splat that visits and blends the given pixels of mini-tile 0."""
-    bits = np.zeros((1, 4), np.uint16)
-    bits[0, 0] = sum(1 << p for p in pixels)
+def one_splat(pixels: list[int], times: int = 1) -> Work:
+    """One 8x8 sub-tile with a splat, so many times, that visits and blends the given pixels of mini-tile 0."""
+    bits = np.zeros((times, 4), np.uint16)
+    bits[:, 0] = sum(1 << p for p in pixels)
     return Work(
-        1, 1, np.zeros(1, np.int64), np.array([0, 1, 1, 1, 1]), np.array([0, 1]), np.zeros(1, np.int32), np.ones(1, np.uint8),
-        np.zeros(1, np.uint16), np.ones(1, np.uint8), bits, bits, np.full((1, 64), 1, np.int32), np.zeros(1, bool),
+        1, 1, np.zeros(1, np.int64), np.array([0, 1, 1, 1, 1]), np.array([0, times]), np.zeros(times, np.int32), np.ones(times, np.uint8),
+        np.zeros(times, np.uint16), np.ones(times, np.uint8), bits, bits, np.full((1, 64), times, np.int32), np.zeros(1, bool),
     )
 
 
@@ -65,6 +66,78 @@ def test_loop_and_bound(view: View) -> None:
     cycles = [simulate_pixels(work, OFF, loop=loop).cycles for loop in (1, 4, 8)]
     assert cycles[0] < cycles[1] < cycles[2]
     assert cycles[0] > work.totals()["pixels_visited"] / 32
+
+
+# ---- lanes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lanes", [8, 16])
+def test_lanes_share_evenly(lanes: int) -> None:
+    """Every lane has as many pixels; small blocks, wherever they lie, have all their pixels in different lanes."""
+    lane = np.empty((8, 8), int)
+    for p, number in enumerate(lane_of_pixel(lanes)):
+        lane[p // 32 * 4 + p % 16 // 4, p // 16 % 2 * 4 + p % 4] = number
+    assert (np.bincount(lane.ravel()) == 64 // lanes).all()
+    blocks = [(1, 8), (8, 1), (2, 3), (3, 2), (2, 2)] if lanes == 8 else [(4, 4), (1, 4), (4, 1)]
+    for height, width in blocks:
+        for y in range(9 - height):
+            for x in range(9 - width):
+                block = lane[y : y + height, x : x + width]
+                assert len(np.unique(block)) == block.size, (height, width, y, x)
+
+
+@pytest.mark.parametrize(("pixels", "times", "stage", "last"), [
+    ([0], 1, LaneStage(), 0),
+    (list(range(16)), 1, LaneStage(), 2),  # a 4x4 block has one lane three times
+    ([0], 10, LaneStage(loop=2), 18),  # one pixel again and again: a visit every two cycles
+    ([0], 10, LaneStage(loop=1), 9),
+    ([0], 10, LaneStage(loop=4, window=3), 36),  # a window does not change the order at a pixel
+    ([0], 10, LaneStage(loop=1, width=2), 9),  # the generator is not what it waits for
+])
+def test_one_splat_on_lanes(pixels: list[int], times: int, stage: LaneStage, last: int) -> None:
+    """By hand: generator, FIFO, visits, token, pipeline, then a lane's eight pixels.
+
+    last: cycle of the last visit, counted from the first. The token is in the FIFO one cycle after the last splat at the latest and
+    leaves when the entry before it has.
+    """
+    result = simulate_lanes(one_splat(pixels, times), OFF, replace(stage, ports=8))
+    assert result.channel("vru_busy")[0].sum() == len(pixels) * times and result.channel("vru_busy")[1:].sum() == 0
+    first = stage.latency + 1
+    token = first + max(last, -(-times // stage.width) - 1) + 1
+    assert result.cycles == token + vru_stages(OFF.form)[1] + 1 + 8
+    assert result.subtile_end[0] == result.cycles - 1
+
+
+def test_lanes_do_all_work(view: View) -> None:
+    """Nothing finishes here, so every set pixel is visited once, whatever the options; no stage is faster than its busiest part; what should help does."""
+    work = run("rows-f8a8", view).work
+    want = work.totals()["pixels_visited"]
+    cycles = {}
+    for name, depth, stage in (
+        ("loop 4", 16, LaneStage(loop=4)), ("plain", 16, LaneStage()), ("window", 16, LaneStage(window=3)), ("deep", 64, LaneStage(window=3)),
+        ("wide", 64, LaneStage(window=3, width=2)), ("shallow", 1, LaneStage()),
+    ):
+        result = simulate_lanes(work, OFF.with_(fifo_depth=depth), stage)
+        assert result.channel("vru_busy").sum() == want and result.channel("minitiles_discarded").sum() == 0
+        assert result.core("gaussians_in").sum() == work.elements
+        cycles[name] = result.cycles
+    assert cycles["loop 4"] > cycles["plain"] > cycles["window"] > cycles["deep"] > cycles["wide"] > want / 32
+    assert cycles["shallow"] > cycles["plain"]
+    twice = simulate_lanes(work, OFF, LaneStage(), lanes=16)
+    assert twice.channel("vru_busy").sum() == want and twice.cycles < cycles["plain"]
+
+
+def test_finished_subtiles_are_left() -> None:
+    """A sub-tile whose 64 pixels are finished takes no more splats; pixels known to be finished are not visited."""
+    times = 500
+    work = one_splat(list(range(16)), times)
+    work.visit[:] = 0xFFFF
+    work.contributing[:] = 0xFFFF
+    work.pixel_finish[:] = 9
+    result = simulate_lanes(work, OFF)
+    assert result.core("gaussians_in")[0] < 100 < times
+    assert 64 * 10 <= result.channel("vru_busy").sum() < 64 * 20
+    assert result.channel("pixels_finished").sum() == 64
 
 
 def test_closed_forms(view: View) -> None:

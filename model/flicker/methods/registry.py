@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -96,6 +96,7 @@ class Method:
     lists: kind of `View.lists`. generate: its mask generator. config: configuration of the RTL that does the same, if there is one.
     operations: hardware operations of the mask generator. exact: never leaves out a pixel that the VRU would have blended, proved
     in docs/methods.md. model_only: no RTL exists. pixels: the VRUs visit single pixels. precision: formats of the generator.
+    accumulator: fraction bits of the VRUs' colour accumulators, 0: FP16.
     """
 
     name: str
@@ -110,6 +111,7 @@ class Method:
     model_only: bool = True
     pixels: bool = False
     precision: str = "-"
+    accumulator: int = 0
 
 
 @dataclass
@@ -197,7 +199,7 @@ def run(method: str | Method, view: View, background=(0.0, 0.0, 0.0)) -> Result:
     lists = view.lists(method.form, method.lists)
     order, core_start = stream_order(lists)
     masks = method.generate(view, lists, order, core_start)
-    pixels, contributing, pixel_finish = render_masked(lists, order, masks.mask, masks.visit)
+    pixels, contributing, pixel_finish = render_masked(lists, order, masks.mask, masks.visit, method.accumulator)
     fallen = np.zeros(lists.cols * lists.rows, bool) if masks.fallen is None else masks.fallen
     work = Work(
         lists.cols, lists.rows, order, core_start, lists.start, lists.entry, masks.test_cycles, masks.evaluations, masks.mask,
@@ -275,6 +277,9 @@ def _exploration() -> list[Method]:
                     "-".join(words), title + _LIST_TITLES[kind], "rows", Form.FACTORED, rows(fmt, pixels), lists=kind,
                     operations=disc_operations(fmt), exact=True, pixels=pixels, precision=f"fixed f{fmt.fraction}a{fmt.address}",
                 ))
+    lanes = next(m for m in found if m.name == f"rows-f{DISC_FORMATS[0].fraction}a{DISC_FORMATS[0].address}-ellipse")
+    for bits in ACCUMULATORS:
+        found.append(replace(lanes, name=f"{lanes.name}-acc{bits}", title=f"{lanes.title}, colour accumulators of {bits} fraction bits", accumulator=bits))
     for form in (Form.FACTORED, Form.CONIC):
         found.append(Method(
             f"pixels-fp16-{form.name.lower()}", f"all 64 pixels tested in FP16, {form.name.lower()}", "rows", form, all_pixels,
@@ -283,6 +288,7 @@ def _exploration() -> list[Method]:
     return found
 
 
+ACCUMULATORS = (16, 10, 12, 14, 20)
 # The first is the recommended one.
 DISC_FORMATS = [DiscFormat(f, a) for f, a in ((8, 8), (6, 6), (7, 5), (7, 7), (8, 6), (9, 7), (10, 10))]
 _LIST_TITLES = {"subtile": "", "reach": ", lists by the box of the reach", "ellipse": ", lists by the ellipse"}

@@ -17,6 +17,8 @@ from ..golden.weight import conic_axis, conic_pixel, factored_pixel, factored_ro
 from ..params import MINITILE
 from .thresholds import thresholds
 
+ACCUMULATOR_INT_BITS = 3  # of fixed-point colour accumulators: up to 8
+
 
 @numba.njit
 def load_splat(n, i, gauss, mean, f):
@@ -50,8 +52,16 @@ def minitile_weights(f, m, form, col, row, e):
                 e[j * 4 + i] = factored_pixel(col[0, i], row[0, j], row[1, j], FP16_R)[2]
 
 
+@numba.njit(inline="always")
+def accumulate(c, w, colour, fraction):
+    """C + w colour in an unsigned fixed-point accumulator of ACCUMULATOR_INT_BITS and `fraction` bits, saturating; the product is FP16's."""
+    unit = np.float32(2.0**fraction)
+    m = np.float32(np.floor(mul(w, abs(colour), FP16_R) * unit + np.float32(0.5))) / unit
+    return min(c + m, np.float32(2.0**ACCUMULATOR_INT_BITS) - np.float32(1.0) / unit)
+
+
 @numba.njit
-def _visit_minitile(f, m, visit, unfinished, form, state, col, row, e):
+def _visit_minitile(f, m, visit, unfinished, form, fraction, state, col, row, e):
     """Blend one splat into the unfinished pixels of mini-tile m that `visit` names; returns (contributing, finished) masks."""
     minitile_weights(f, m, form, col, row, e)
     cut = CUT_NATURAL if form == CONIC else CUT_BASE2
@@ -73,13 +83,16 @@ def _visit_minitile(f, m, visit, unfinished, form, state, col, row, e):
             continue
         w = mul(t, alpha, FP16_R)
         for c in range(3):
-            state[1 + c, p] = blend(state[1 + c, p], w, f[8 - c])[1]
+            if fraction == 0:
+                state[1 + c, p] = blend(state[1 + c, p], w, f[8 - c])[1]
+            else:
+                state[1 + c, p] = accumulate(state[1 + c, p], w, f[8 - c], fraction)
         state[0, p] = t_next
     return contributing, ended
 
 
 @numba.njit(parallel=True, cache=True)
-def _render(order, gauss, start, entry, mean, mask, visit, form, pixels, contributing, pixel_finish):
+def _render(order, gauss, start, entry, mean, mask, visit, form, fraction, pixels, contributing, pixel_finish):
     whole = len(visit) == 0
     for o in numba.prange(len(order)):
         s = order[o]
@@ -101,7 +114,7 @@ def _render(order, gauss, start, entry, mean, mask, visit, form, pixels, contrib
                 if not (mask[n] >> m) & 1 or unfinished[m] == 0:
                     continue
                 v = np.int64(0xFFFF) if whole else np.int64(visit[n, m])
-                hit, ended = _visit_minitile(f, m, v, unfinished[m], form, state, col, row, e)
+                hit, ended = _visit_minitile(f, m, v, unfinished[m], form, fraction, state, col, row, e)
                 contributing[n, m] = hit
                 if ended:
                     unfinished[m] &= ~ended
@@ -114,16 +127,19 @@ def _render(order, gauss, start, entry, mean, mask, visit, form, pixels, contrib
 
 
 def render_masked(
-    lists: SubtileLists, order: np.ndarray, mask: np.ndarray, visit: np.ndarray | None
+    lists: SubtileLists, order: np.ndarray, mask: np.ndarray, visit: np.ndarray | None, fraction: int = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run the VRUs: (pixels uint16 (S, 64, 4) as in `golden.render.Frame`, contributing (E, 4), pixel_finish (S, 64))."""
+    """Run the VRUs: (pixels uint16 (S, 64, 4) as in `golden.render.Frame`, contributing (E, 4), pixel_finish (S, 64)).
+
+    fraction: bits behind the point of colour accumulators, whose sum is rounded to FP16 once, at the end; 0: FP16 accumulators, as the RTL's.
+    """
     n = lists.cols * lists.rows
     pixels = np.empty((n, 64, 4), np.uint16)
     contributing = np.zeros((len(lists.entry), 4), np.uint16)
     pixel_finish = np.empty((n, 64), np.int32)
     visit = np.zeros((0, 4), np.uint16) if visit is None else visit
     _render(
-        order, lists.gauss, lists.start, lists.entry, lists.mean, mask, visit, int(lists.form), pixels, contributing, pixel_finish,
+        order, lists.gauss, lists.start, lists.entry, lists.mean, mask, visit, int(lists.form), fraction, pixels, contributing, pixel_finish,
     )
     return pixels, contributing, pixel_finish
 

@@ -1,8 +1,8 @@
 """Cycle model of a rendering stage of lanes: a proposal, no RTL exists.
 
-A core's eight VRUs ("lanes") each hold eight pixels that are scattered over the whole sub-tile (`LANE`), have a FIFO of their own and never wait for
+A core's eight VRUs ("lanes") each hold eight pixels that are scattered over the whole sub-tile (`lane_of_pixel`), have a FIFO of their own and never wait for
 each other. Any splat that covers an area then spreads over all lanes evenly, wherever it lies, which mini-tiles shared by two VRUs
-(`pixel_stage`) cannot: there a small splat keeps one channel busy and seven eighths of the core idle.
+(`pixel_stage`) cannot: there a small splat keeps one channel busy and the others idle.
 
 An element comes with a 64-bit pixel mask from a generator of `latency` stages, held as the CTU's pipeline is, that takes `width` elements a cycle. Each lane
 with set pixels gets the record and its own eight mask bits, finished pixels taken out; an element waits until every lane it needs has room.
@@ -10,11 +10,14 @@ A lane visits one pixel per cycle. Of the `window` oldest entries it takes the f
 loop (`loop` cycles) is over, oldest entry first, so each pixel sees its splats in order. Entries without pixels leave at the end of a cycle.
 An end-of-sub-tile token moves the eight pixels to one of `buffers` output buffers; `ports` pixels leave a core per cycle.
 
-Sub-tiles with an empty list are not streamed (the background is theirs). With `stop`, the input goes on to the token once all 64 pixels are
-known to be finished. Finished pixels are known as late as in the RTL.
+Sub-tiles with an empty list are not streamed (the background is theirs). Once all 64 pixels are known to be finished, the input goes on to the
+token. Finished pixels are known as late as in the RTL. A 2-cycle loop is the multiplication of the transmittance in two stages; colours are
+then added in fixed-point accumulators in one (`flicker.methods.stage.accumulate`), for which the RTL's FP16 adders need three.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -28,32 +31,27 @@ from .render_stage import (
 )
 
 LANES = 8  # VRUs of a core
-LANE_PIXELS = SUBTILE * SUBTILE // LANES
-LOOP = 2  # multiplication of the transmittance in two stages; colours in fixed-point accumulators, one
 
 
-def lane_of_pixel() -> np.ndarray:
-    """int64 (64,): lane of pixel 16 m + i (mini-tile m): (column + 3 row) modulo 8.
+def lane_of_pixel(lanes: int = LANES) -> np.ndarray:
+    """int64 (64,): lane of pixel 16 m + i (mini-tile m).
 
-    All lanes are different in every row, every column and every 2x2 and 2x4 block; a 3x3 block has one lane twice.
+    Eight lanes: (column + 3 row) modulo 8; all are different in every row, every column and every 2x3 and 3x2 block, a 3x3 block
+    has one lane twice. Sixteen: column modulo 4 + 4 (row modulo 4).
     """
+    if lanes not in (8, 16):
+        raise ValueError(f"lanes: 8 or 16 a core, not {lanes}")
     lane = np.empty(CHANNELS * MINITILE * MINITILE, np.int64)
     for y in range(SUBTILE):
         for x in range(SUBTILE):
-            m = y // MINITILE * 2 + x // MINITILE
-            lane[16 * m + y % MINITILE * MINITILE + x % MINITILE] = (x + 3 * y) % LANES
+            pixel = 16 * (y // MINITILE * 2 + x // MINITILE) + y % MINITILE * MINITILE + x % MINITILE
+            lane[pixel] = (x + 3 * y) % 8 if lanes == 8 else x % 4 + 4 * (y % 4)
     return lane
-
-
-LANE = lane_of_pixel()
-# Pixel 16 m + i as bit of its lane's mask, and back.
-PLACE = np.array([int((LANE[:p] == LANE[p]).sum()) for p in range(64)])
-PIXEL = np.array([[p for p in range(64) if LANE[p] == l] for l in range(LANES)])
 
 
 @numba.njit(cache=True)
 def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth, blend, out_delay, loop, window, width, ports, buffers,
-          store, stop, count, end):
+          count, end):
     """One core; returns the cycle after its last pixel. `order` has no empty sub-tile."""
     n_sub = len(order)
     lanes, per_lane = pixel.shape
@@ -65,10 +63,6 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
     at_out = 0  # ordinal of the sub-tile at the pipeline's end
     fifo = np.zeros((lanes, depth), np.int64)
     wants = np.zeros((lanes, depth), np.int64)
-    slot = np.zeros((lanes, depth), np.int64)
-    left = np.zeros(store, np.int64)  # lanes that still need a stored record
-    s_read = 0
-    s_used = 0
     read = np.zeros(lanes, np.int64)
     used = np.zeros(lanes, np.int64)
     sub = np.zeros(lanes, np.int64)
@@ -112,10 +106,10 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
         # ---- lanes; what is written in this cycle is seen in the next
         for l in range(lanes):
             if used[l] == depth:
-                count[N_CORE + (l // 2) * N_CHANNEL + FULL] += 1
+                count[N_CORE + (l * 4 // lanes) * N_CHANNEL + FULL] += 1
         room = depth - used
         for l in range(lanes):
-            base = N_CORE + (l // 2) * N_CHANNEL
+            base = N_CORE + (l * 4 // lanes) * N_CHANNEL
             if used[l] == 0:
                 continue
             issued = False
@@ -158,12 +152,8 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                 older |= todo
                 if todo == 0 and leave == j:
                     leave = j + 1
-                    left[slot[l, e]] -= 1
             read[l] = (read[l] + leave) % depth
             used[l] -= leave
-        while s_used > 0 and left[s_read] == 0:
-            s_read = (s_read + 1) % store
-            s_used -= 1
         # ---- dispatch: the oldest masks, if they are complete
         moved = 0
         while moved < width and p_used > 0 and ready[p_read] <= t:
@@ -185,8 +175,6 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                         if sub[l] != at_out or known[l, place[p]] > t:
                             bits[l] |= 1 << place[p]
             any_lane = False
-            if not token and s_used == store:
-                fits = False
             for l in range(lanes):
                 if token or bits[l]:
                     any_lane = True
@@ -194,24 +182,19 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                         fits = False
             if not fits:
                 break
-            place_in = (s_read + s_used) % store
             for l in range(lanes):
                 if token or bits[l]:
                     w = (read[l] + used[l]) % depth
-                    slot[l, w] = place_in
                     fifo[l, w] = pos
                     wants[l, w] = bits[l]
                     used[l] += 1
                     room[l] -= 1
                     if not token:
-                        left[place_in] += 1
                         count[DELIVERED] += 1
-                        count[N_CORE + (l // 2) * N_CHANNEL + SENT] += 1
+                        count[N_CORE + (l * 4 // lanes) * N_CHANNEL + SENT] += 1
             if token:
                 at_out += 1
-            elif any_lane:
-                s_used += 1
-            else:
+            elif not any_lane:
                 count[REJECTED] += 1
             p_read = (p_read + 1) % ring
             p_used -= 1
@@ -226,7 +209,7 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                     if sub_in == n_sub:
                         break
                     s = order[sub_in]
-                    if stop and finished[sub_in] == 64 and finished_at[sub_in] <= t:
+                    if finished[sub_in] == 64 and finished_at[sub_in] <= t:
                         at = start[s + 1]
                     w = (p_read + p_used) % ring
                     ready[w] = t + latency
@@ -249,43 +232,61 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
 
 @numba.njit(parallel=True, cache=True)
 def _cores(order, core_start, start, visit, pixel_finish, lane, place, pixel, latency, depth, blend, out_delay, loop, window, width, ports,
-           buffers, store, stop, counters, end, ends):
+           buffers, counters, end, ends):
     for k in numba.prange(CORES):
         ends[k] = _core(
             order[core_start[k] : core_start[k + 1]], start, visit, pixel_finish, lane, place, pixel, latency, depth, blend, out_delay,
-            loop, window, width, ports, buffers, store, stop, counters[k], end,
+            loop, window, width, ports, buffers, counters[k], end,
         )
 
 
-def simulate_lanes(
-    work: Work, config: RenderConfig, *, latency: int = GENERATOR_LATENCY, loop: int = LOOP, window: int = 1, width: int = 1,
-    ports: int = 4, buffers: int = 2, store: int = 0, stop: bool = True, deal: bool = True,
-) -> StageCycles:
-    """Cycles of a frame on lanes; `config` gives form and FIFO depth. Channel counters are sums of two lanes; those without meaning here are 0."""
+@dataclass(frozen=True)
+class LaneStage:
+    """Options of the stage; the module's docstring says what they mean."""
+
+    window: int = 1
+    width: int = 1
+    loop: int = 2
+    ports: int = 4
+    buffers: int = 1
+    latency: int = GENERATOR_LATENCY
+
+
+def deal(work: Work) -> list[np.ndarray]:
+    """Sub-tiles that are not empty, dealt out to the cores tile by tile, every tile's first one to another core.
+
+    The RTL's fixed places in the tile load its cores up to 3 % differently.
+    """
+    row, col = np.divmod(np.arange(work.subtiles), work.cols)
+    tile = row // 2 * ((work.cols + 1) // 2) + col // 2
+    order = np.lexsort((row % 2 * 2 + col % 2, tile))
+    order = order[np.diff(work.start)[order] > 0]
+    i = np.arange(len(order))
+    return [order[(i + i // CORES) % CORES == k] for k in range(CORES)]
+
+
+def simulate_lanes(work: Work, config: RenderConfig, stage: LaneStage = LaneStage(), lanes: int = LANES) -> StageCycles:
+    """Cycles of a frame on `lanes` lanes a core; `config` gives form and FIFO depth.
+
+    Channel counters are sums over a quarter of the lanes; those without meaning here are 0.
+    """
     counters = np.zeros((CORES, COUNTERS_PER_CORE), np.int64)
     end = np.zeros(work.subtiles, np.int64)
     ends = np.zeros(CORES, np.int64)
     blend, last = vru_stages(config.form)
-    length = np.diff(work.start)
-    if deal:
-        tiles = np.arange(work.subtiles).reshape(work.rows, work.cols)
-        r, c = np.indices(tiles.shape)
-        key = ((r // 2) * ((work.cols + 1) // 2) + c // 2) * 4 + (r % 2) * 2 + c % 2
-        order = tiles.ravel()[np.argsort(key.ravel(), kind="stable")]
-        order = order[length[order] > 0]
-        i = np.arange(len(order))
-        orders = [order[(i + i // CORES) % CORES == k] for k in range(CORES)]
-    else:
-        orders = [work.order[a:b][length[work.order[a:b]] > 0] for a, b in zip(work.core_start, work.core_start[1:])]
+    lane = lane_of_pixel(lanes)
+    pixel = np.array([np.flatnonzero(lane == i) for i in range(lanes)])  # of each bit of a lane's mask
+    place = np.array([np.flatnonzero(pixel[lane[p]] == p)[0] for p in range(len(lane))])  # the bit of each pixel
+    orders = deal(work)
     core_start = np.concatenate(([0], np.cumsum([len(o) for o in orders])))
     _cores(
-        np.concatenate(orders), core_start, work.start, work.visit_masks(), work.pixel_finish, LANE, PLACE, PIXEL, latency,
-        config.fifo_depth, blend, last + 1, loop, window, width, ports, buffers, store or 8 * config.fifo_depth, stop, counters, end, ends,
+        np.concatenate(orders), core_start, work.start, work.visit_masks(), work.pixel_finish, lane, place, pixel, stage.latency,
+        config.fifo_depth, blend, last + 1, stage.loop, stage.window, stage.width, stage.ports, stage.buffers, counters, end, ends,
     )
     cycles = int(ends.max())
     counters[:, 0] = cycles
     counters[:, IDLE] += cycles - ends
-    ended = (work.pixel_finish < length[:, None]).reshape(-1, 4, 16).sum(axis=2)
+    ended = (work.pixel_finish < np.diff(work.start)[:, None]).reshape(-1, 4, 16).sum(axis=2)
     for k in range(CORES):
         counters[k, N_CORE + FINISHED :: N_CHANNEL] = ended[orders[k]].sum(axis=0)
     return StageCycles(cycles, counters, end)
