@@ -150,6 +150,18 @@ def test_work_is_consistent(demo):
     assert off.work.contributing.any() and (off.work.finish() < np.diff(off.work.start)[:, None]).any()
 
 
+def test_until_finished(demo):
+    """What is left out is visited by nobody; nothing else changes."""
+    work = run("flicker", demo).work
+    short = work.until_finished()
+    assert 0 < short.elements < work.elements
+    for name in ("minitiles_sent", "pixels_visited", "pixels_contributing"):
+        assert short.totals()[name] == work.totals()[name]
+    assert np.array_equal(short.unfinished()[short.start[0] : short.start[1]], work.unfinished()[: short.start[1]])
+    left = work.unfinished().any(axis=1).sum()
+    assert short.elements == left
+
+
 def test_names():
     """Every method runs under a name of its own; a wrong name is one line with close ones."""
     assert all(name == m.name for name, m in methods().items())

@@ -5,7 +5,7 @@ The cycle models start from this; nothing in it depends on timing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -106,6 +106,16 @@ class Work:
         first = np.uint16(SPLITS[split])
         cycles = np.maximum(np.bitwise_count(visited & first), np.bitwise_count(visited & ~first))
         return 2 * int(cycles.sum(dtype=np.int64))
+
+    def until_finished(self) -> Work:
+        """The same work without the elements that come when all 64 pixels of their sub-tile are finished."""
+        length = np.diff(self.start)
+        keep_length = np.minimum(self.pixel_finish.max(axis=1) + 1, length)
+        place = np.arange(self.elements) - np.repeat(self.start[:-1], length)
+        keep = place < np.repeat(keep_length, length)
+        elements = {name: getattr(self, name)[keep] for name in ("entry", "test_cycles", "evaluations", "mask", "contributing")}
+        visit = None if self.visit is None else self.visit[keep]
+        return replace(self, start=np.concatenate(([0], np.cumsum(keep_length))), visit=visit, **elements)
 
     def totals(self) -> dict[str, int]:
         """Sums over the frame, finished pixels and mini-tiles left out of what VRUs visit."""

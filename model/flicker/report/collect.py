@@ -37,10 +37,10 @@ CONIC_BASELINES = (
     Configuration("no-ctu-64-conic", "no_ctu-conic", "FLICKER without CTU, 64 VRUs, conic", vrus_per_channel=4),
     Configuration("gscore-conic", "gscore-conic", "GSCore: OBB on 8x8 sub-tiles, 64 VRUs, conic", vrus_per_channel=4),
 )
-MAPPED = ("vanilla", "faithful", "flicker", "rows-ellipse")
+MAPPED = ("vanilla", "faithful", "flicker", "lanes")
 PICTURED = ("flicker-smooth-fp16-conic", "flicker-smooth-mixed-conic", "flicker-smooth-fp8-conic")
 FIFO_SWEPT = "faithful"
-CHIP = ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "rows-ellipse")
+CHIP = ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64")
 SUFFIXES = (".ply", ".spz", ".sog", ".splat")
 _PACKAGE = Path(__file__).resolve().parents[1]
 _SOURCES = ("*.py", "golden/*.py", "methods/*.py", "perf/*.py", "chip/*.py", "report/collect.py")
@@ -219,7 +219,8 @@ def _pixel_grid(values: np.ndarray, cols: int, rows: int) -> np.ndarray:
 
 def heat_maps(evaluation: Evaluation, reference: np.ndarray) -> dict[str, np.ndarray]:
     """`gaussians`: uint16 (H, W), Gaussians that the VRUs visit at each pixel. `cycles`: float32 (rows, cols), cycles between the end of
-    a sub-tile and that of the one before it in the same core; absent when the stage gives no times. `imbalance`: float32 (rows, cols),
+    a sub-tile and that of the one before it in the same core; absent when the stage gives no
+    times or deals sub-tiles out otherwise. `imbalance`: float32 (rows, cols),
     busiest channel over the mean, NaN where nothing is visited. `error`: float32 (H, W), FLIP."""
     work = evaluation.work
     height, width = reference.shape[:2]
@@ -238,7 +239,7 @@ def heat_maps(evaluation: Evaluation, reference: np.ndarray) -> dict[str, np.nda
         "error": flip_map(evaluation.image, reference).astype(np.float32),
     }
     end = getattr(evaluation.stage, "subtile_end", None)
-    if end is not None:
+    if end is not None and evaluation.configuration.lanes is None:
         cycles = np.zeros(work.subtiles, np.float32)
         for k in range(len(work.core_start) - 1):
             mine = work.order[work.core_start[k] : work.core_start[k + 1]]
@@ -308,7 +309,7 @@ class _View:
 
 
 def list_kind(name: str) -> tuple[str, str]:
-    """What the lists of a configuration depend on; configurations are run in this order so that few lists are in memory."""
+    """What the lists of a configuration depend on."""
     method = get_method(known_configurations()[name].method)
     return method.lists, method.form.name
 
@@ -321,7 +322,8 @@ def collect(
     cache = Cache(folder)
     code = code_digest()
     known = known_configurations()
-    order = sorted(names, key=lambda n: (list_kind(n), names.index(n)))
+    # Few lists in memory; one method's configurations one after the other.
+    order = sorted(names, key=lambda n: (list_kind(n), get_method(known[n].method).name, names.index(n)))
     steps = len(targets) * (len(names) + 2)
     done = 0
     views = []
