@@ -92,12 +92,19 @@ def _finish_events(pixel_finish, start, per_vru, last, op):
             op[s, m] = k
 
 
+@numba.njit(inline="always")
+def _ones(mask):
+    """Set bits of a mini-tile mask."""
+    return (mask & 1) + (mask >> 1 & 1) + (mask >> 2 & 1) + (mask >> 3 & 1)
+
+
 @numba.njit(cache=True)
 def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, depth, blend, out_delay, per_vru, vrus, count, end):
     """One core: fills its counters (all but `cycles`, idle cycles after its own end and `pixels_finished`) and the end of each
     sub-tile; returns the cycle after its last pixel.
 
-    Values at the start of cycle t are those of the RTL's registers; what a cycle does is seen in the next.
+    Values at the start of cycle t are those of the RTL's registers; what a cycle does is seen in the next. What a channel does with a splat is
+    settled when it begins with it, so its state changes then and when the splat leaves the FIFO.
     """
     n_sub = len(order)
     # CTU: the pipeline holds element positions in ring slots; slot 0 is the one that entered last.
@@ -109,6 +116,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
     eos_free = np.int64(0)  # cycle from which a token may be taken
     sub_in = 0
     at = start[order[0]] if n_sub else np.int64(0)
+    last_at = start[order[0] + 1] if n_sub else np.int64(0)
     # output FIFO of the CTU
     size = max(ctu_depth, 1)
     q_pos = np.zeros(size, np.int64)
@@ -123,28 +131,25 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
     tokens = np.zeros(4, np.int64)  # in the FIFO
     token_gone = np.full(4, -NEVER, np.int64)  # cycle in which the last token was issued
     sub = np.zeros(4, np.int64)  # ordinal of the sub-tile at the pixels
-    pixel = np.zeros(4, np.int64)
     done_at = np.full(4, NEVER, np.int64)  # cycle from which all pixels are known to be finished
+    leaves_at = np.full(4, NEVER, np.int64)  # cycle in which the splat that is worked on leaves the FIFO
+    broken = np.zeros(4, np.bool_)  # it is broken off then
+    full_since = np.zeros(4, np.int64)
+    full_mask = 0  # channels whose FIFO is full
     # outputs: per channel and VRU
-    full_at = np.full((4, vrus), NEVER, np.int64)
     left = np.zeros((4, vrus), np.int64)
+    out_at = np.full(4, NEVER, np.int64)  # cycle from which a channel has pixels to give
+    next_out = NEVER  # the first of them
     waiting = np.zeros(4, np.int64)  # pixels not yet out
     first = np.zeros(4, np.int64)
     core_first = 0
     sub_out = np.zeros(4, np.int64)
-    open_pixels = np.zeros(4, np.int64)
     arrived = np.zeros(n_sub, np.int64)
-    total_out = 0
-    total_pixels = 64 * n_sub
+    subs_out = 0
+    busy = stalled = delivered = filtered_out = tested = rejected = gaussians = 0
     t = np.int64(0)
-    full_mask = 0  # channels whose FIFO is full
-    while total_out < total_pixels:
+    while subs_out < n_sub:
         # ---- dispatch and CTU, from the registers of this cycle
-        stall = full_mask != 0
-        if stall:
-            for c in range(4):
-                if full_mask >> c & 1:
-                    count[N_CORE + c * N_CHANNEL + FULL] += 1
         out_pos = np.int64(-3)
         out_mask = np.int64(0)
         if ctu_depth == 0:
@@ -168,89 +173,81 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if target & full_mask == 0:
                 transfer = True
                 if out_pos != TOKEN:
-                    for c in range(4):
-                        count[DELIVERED] += target >> c & 1
-                        count[FILTERED] += filtered >> c & 1
+                    delivered += _ones(target)
+                    filtered_out += _ones(filtered)
         advance = ctu_depth > 0 or out_pos == -3 or transfer
+        stall = full_mask != 0
         # ---- channels: issue, drop, token
+        changed = 0
         for c in range(4):
-            if used[c] == 0:
+            if used[c] == 0 or (t < leaves_at[c] and leaves_at[c] != NEVER):
                 continue
-            head = fifo[c, read[c]]
             pop = False
-            if head == TOKEN:
-                if waiting[c] == 0:
-                    pop = True
-                    tokens[c] -= 1
-                    token_gone[c] = t
-                    done_at[c] = NEVER
-                    sub[c] += 1
-                    for v in range(vrus):
-                        left[c, v] = per_vru
-                        full_at[c, v] = t + out_delay
-                    waiting[c] = 16
-                    open_pixels[c] = 16
-            elif done_at[c] <= t:
+            if leaves_at[c] == t:
                 pop = True
-                pixel[c] = 0
-                count[N_CORE + c * N_CHANNEL + DISCARDED] += 1
+                leaves_at[c] = NEVER
+                if broken[c]:
+                    count[N_CORE + c * N_CHANNEL + DISCARDED] += 1
             else:
-                base = N_CORE + c * N_CHANNEL
-                count[base + VRU_BUSY] += 1
-                s = order[sub[c]]
-                if pixel[c] == 0 and head <= finish[s, c]:
-                    count[base + SENT] += 1
-                if head == finish[s, c] and pixel[c] == finish_op[s, c]:
-                    done_at[c] = t + blend + 1
-                pixel[c] += 1
-                if pixel[c] == per_vru:
-                    pixel[c] = 0
+                head = fifo[c, read[c]]
+                if head == TOKEN:
+                    if waiting[c] == 0:
+                        pop = True
+                        tokens[c] -= 1
+                        token_gone[c] = t
+                        done_at[c] = NEVER
+                        sub[c] += 1
+                        for v in range(vrus):
+                            left[c, v] = per_vru
+                        out_at[c] = t + out_delay
+                        next_out = min(next_out, out_at[c])
+                        waiting[c] = 16
+                elif done_at[c] <= t:
                     pop = True
+                    count[N_CORE + c * N_CHANNEL + DISCARDED] += 1
+                else:
+                    s = order[sub[c]]
+                    base = N_CORE + c * N_CHANNEL
+                    if head <= finish[s, c]:
+                        count[base + SENT] += 1
+                    broken[c] = done_at[c] < t + per_vru
+                    if broken[c]:
+                        leaves_at[c] = done_at[c]
+                        count[base + VRU_BUSY] += done_at[c] - t
+                    else:
+                        leaves_at[c] = t + per_vru - 1
+                        count[base + VRU_BUSY] += per_vru
+                    if head == finish[s, c]:
+                        done_at[c] = t + finish_op[s, c] + blend + 1
             if pop:
                 read[c] += 1
                 if read[c] == depth:
                     read[c] = 0
                 used[c] -= 1
+                changed |= 1 << c
         # ---- pixels out: a round-robin choice of channel, then of VRU
-        chosen = -1
-        n_waiting = 0
-        for i in range(4):
-            c = (core_first + i) & 3
-            if waiting[c] > 0:
-                for v in range(vrus):
-                    if left[c, v] > 0 and full_at[c, v] <= t:
-                        n_waiting += 1
-                        if chosen < 0:
-                            chosen = c
-                        break
-        if n_waiting > 0:
-            for c in range(4):
-                if waiting[c] == 0:
-                    continue
-                pick = -1
-                for i in range(vrus):
-                    v = (first[c] + i) % vrus
-                    if left[c, v] > 0 and full_at[c, v] <= t:
-                        pick = v
-                        break
-                if pick < 0:
-                    continue
-                first[c] = pick
-                if c == chosen:
-                    left[c, pick] -= 1
-                    waiting[c] -= 1
-                    if left[c, pick] == 0:
-                        full_at[c, pick] = NEVER
-                    first[c] = (pick + 1) % vrus
-                    total_out += 1
-                    k = sub_out[c]
-                    arrived[k] += 1
-                    if arrived[k] == 64:
-                        end[order[k]] = t
-                    open_pixels[c] -= 1
-                    if open_pixels[c] == 0:
-                        sub_out[c] += 1
-            core_first = (chosen + 1) & 3
+        if next_out <= t:
+            c = core_first
+            while out_at[c] > t:
+                c = (c + 1) & 3
+            core_first = (c + 1) & 3
+            v = first[c]
+            while left[c, v] == 0:
+                v += 1
+                if v == vrus:
+                    v = 0
+            left[c, v] -= 1
+            first[c] = v + 1 if v + 1 < vrus else 0
+            waiting[c] -= 1
+            if waiting[c] == 0:
+                k = sub_out[c]
+                sub_out[c] += 1
+                arrived[k] += 1
+                if arrived[k] == 4:
+                    end[order[k]] = t
+                    subs_out += 1
+                out_at[c] = NEVER
+                next_out = min(min(out_at[0], out_at[1]), min(out_at[2], out_at[3]))
         # ---- writes of this cycle
         if transfer:
             for c in range(4):
@@ -262,30 +259,33 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                     used[c] += 1
                     if out_pos == TOKEN:
                         tokens[c] += 1
+            changed |= target
             if ctu_depth > 0:
                 q_read += 1
                 if q_read == size:
                     q_read = 0
                 q_used -= 1
                 taken -= 1
-        full_mask = 0
-        for c in range(4):
-            if used[c] == depth:
-                full_mask |= 1 << c
+        if changed:
+            for c in range(4):
+                if changed >> c & 1:
+                    if used[c] == depth:
+                        if not full_mask >> c & 1:
+                            full_mask |= 1 << c
+                            full_since[c] = t
+                    elif full_mask >> c & 1:
+                        full_mask &= ~(1 << c)
+                        count[N_CORE + c * N_CHANNEL + FULL] += t - full_since[c]
         # ---- CTU: acceptance and results
         issued = False
         if sub_in < n_sub:
-            s = order[sub_in]
-            token = at == start[s + 1]
             space = ctu_depth == 0 or taken + (1 if transfer and ctu_depth > 0 else 0) < ctu_depth
-            if space and advance and not stall and not (token and t < eos_free):
+            if space and advance and not stall and not (at == last_at and t < eos_free):
                 issued = True
-                count[BUSY] += 1
+                busy += 1
             else:
-                count[STALLED] += 1
-        else:
-            count[IDLE] += 1
-        if advance:
+                stalled += 1
+        if advance and (issued or in_flight > 0):
             # the end of the pipeline leaves, its slot becomes the first
             gone = pipe[head_slot]
             gone_mask = pipe_mask[head_slot]
@@ -296,11 +296,10 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                     eos_free = t + 2
                 else:
                     if gone_mask == 0:
-                        count[REJECTED] += 1
+                        rejected += 1
                         if ctu_depth > 0:
                             taken -= 1
-                    for c in range(4):
-                        count[TESTED] += gone_mask >> c & 1
+                    tested += _ones(gone_mask)
                 if ctu_depth > 0 and gone_mask != 0:
                     w = q_read + q_used
                     if w >= size:
@@ -312,24 +311,23 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             entering_mask = np.int64(0)
             if issued:
                 in_flight += 1
-                s = order[sub_in]
-                if at == start[s + 1]:
+                if at == last_at:
                     entering = TOKEN
                     entering_mask = np.int64(15)
                     eos_free = NEVER
-                    count[SUBTILES] += 1
                     sub_in += 1
                     if sub_in < n_sub:
                         at = start[order[sub_in]]
+                        last_at = start[order[sub_in] + 1]
                     taken += 1
                 elif test_cycles[at] == 2 and not batch:
                     entering = np.int64(-2)
                     batch = True
                 else:
-                    entering = at - start[s]
+                    entering = at - start[order[sub_in]]
                     entering_mask = np.int64(mask[at])
                     batch = False
-                    count[GAUSSIANS_IN] += 1
+                    gaussians += 1
                     taken += 1
                     at += 1
             pipe[head_slot] = entering
@@ -338,6 +336,15 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
             if head_slot == ctu_latency:
                 head_slot = 0
         t += 1
+    count[SUBTILES] = n_sub
+    count[GAUSSIANS_IN] = gaussians
+    count[REJECTED] = rejected
+    count[BUSY] = busy
+    count[STALLED] = stalled
+    count[IDLE] = t - busy - stalled
+    count[TESTED] = tested
+    count[DELIVERED] = delivered
+    count[FILTERED] = filtered_out
     return t
 
 
