@@ -18,7 +18,7 @@ from .area import lane_stage_parts, stage_area
 from .camera import Camera, find_cameras, select_view
 from .energy import stage_energy
 from .errors import FlickerError
-from .methods.registry import Result, View, get_method, run
+from .methods.registry import Method, Result, View, get_method, run
 from .methods.work import Work
 from .params import CHANNELS, CORES, FAITHFUL, CatMode, Precision, RenderConfig
 from .perf.lane_stage import LaneStage, simulate_lanes
@@ -131,20 +131,14 @@ class ViewData:
     projected: Projected
     reference: np.ndarray
     methods_view: View
-    _last: tuple[str, Result, dict[str, float]] | None = field(default=None, repr=False)
+    _last: Result | None = field(default=None, repr=False)
 
-    def result(self, method: str) -> tuple[Result, dict[str, float]]:
-        """A method's result and the quality of its picture; kept until another method is asked for."""
-        name = get_method(method).name
-        if self._last is None or self._last[0] != name:
+    def result(self, method: Method) -> Result:
+        """A method's result, kept until another method is asked for."""
+        if self._last is None or self._last.method.name != method.name:
             self._last = None  # before the next one takes its memory
-            found = run(name, self.methods_view)
-            quality = {
-                "psnr_db": metrics.psnr(found.image, self.reference), "ssim": metrics.ssim(found.image, self.reference),
-                "flip": metrics.flip(found.image, self.reference),
-            }
-            self._last = name, found, quality
-        return self._last[1:]
+            self._last = run(method, self.methods_view)
+        return self._last
 
 
 def load_view(scene: str | Path, view: int = 0, width: int = 1280, height: int = 720, cameras: str | Path | None = None) -> ViewData:
@@ -228,7 +222,7 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
     if isinstance(configuration, str):
         configuration = get_configuration(configuration)
     method = get_method(configuration.method)
-    result, quality = data.result(method.name)
+    result = data.result(method)
     work = result.work.until_finished() if configuration.stop else result.work
     cycles, stage = stage_cycles(configuration, work)
     totals = work.totals()
@@ -247,12 +241,15 @@ def evaluate(data: ViewData, configuration: Configuration | str) -> Evaluation:
         pairs=64 * int(taken_by_subtiles(work).sum()) if whole_subtiles else None, area=area, lanes=configuration.lanes is not None,
     )
     bound = totals["pixels_contributing"] / configuration.vrus
+    # A lane counts its own pixels, a channel of the RTL the cycles in which its VRUs work.
+    utilisation = stage.utilisation / (configuration.vrus_per_channel if configuration.lanes else 1) if stage else None
     row = {
         "scene": data.scene, "view": data.view, "config": configuration.name, "title": configuration.title,
         "width": data.camera.width, "height": data.camera.height, "cycles": cycles, "fps": CLOCK_HZ / cycles if cycles else None,
         "bound_cycles": bound, "bound_share": bound / cycles if cycles else None,
-        **quality, "area_ge": area, "energy_uj": sum(energy.values()),
-        "vru_utilisation": stage.utilisation if stage else None, "ctu_stall_rate": stage.stall_rate if stage else None,
+        "psnr_db": metrics.psnr(result.image, data.reference), "ssim": metrics.ssim(result.image, data.reference),
+        "flip": metrics.flip(result.image, data.reference), "area_ge": area, "energy_uj": sum(energy.values()),
+        "vru_utilisation": utilisation, "ctu_stall_rate": stage.stall_rate if stage else None,
         "model_only": configuration.model_only, **totals, **{"energy_uj_" + re.sub(r"\W+", "_", part): value for part, value in energy.items()},
     }
     return Evaluation(configuration, row, result.image, work, stage, energy)

@@ -14,23 +14,29 @@ from skimage.metrics import structural_similarity
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
 
 
-def _remembered(metric):
-    """Keep the last results of a slow metric by the content of both pictures: many configurations draw the same one."""
-    results: dict[tuple, float] = {}
+def _remembered(keep: int):
+    """Keep the last results of a slow function by the content of its pictures: many configurations draw the same one."""
 
-    def digest(picture: np.ndarray) -> bytes:
-        return hashlib.blake2b(np.ascontiguousarray(picture), digest_size=16).digest() + f"{picture.shape}{picture.dtype}".encode()
+    def digest(argument: np.ndarray | float) -> bytes | float:
+        if not isinstance(argument, np.ndarray):
+            return argument
+        return hashlib.blake2b(np.ascontiguousarray(argument), digest_size=16).digest() + f"{argument.shape}{argument.dtype}".encode()
 
-    @wraps(metric)
-    def wrapper(a: np.ndarray, b: np.ndarray, *more: float) -> float:
-        key = digest(a), digest(b), more
-        if key not in results:
-            if len(results) >= 256:
-                results.pop(next(iter(results)))
-            results[key] = metric(a, b, *more)
-        return results[key]
+    def decorate(function):
+        results: dict[tuple, object] = {}
 
-    return wrapper
+        @wraps(function)
+        def wrapper(*arguments):
+            key = tuple(digest(a) for a in arguments)
+            if key not in results:
+                if len(results) >= keep:
+                    results.pop(next(iter(results)))
+                results[key] = function(*arguments)
+            return results[key]
+
+        return wrapper
+
+    return decorate
 
 
 def _pair(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +52,7 @@ def psnr(a: np.ndarray, b: np.ndarray) -> float:
     return math.inf if error == 0.0 else -10.0 * math.log10(error)
 
 
-@_remembered
+@_remembered(256)
 def ssim(a: np.ndarray, b: np.ndarray) -> float:
     """Structural similarity of two pictures (H, W, 3), clamped to [0, 1].
 
@@ -151,20 +157,30 @@ def _features(y: np.ndarray, pixels_per_degree: float) -> tuple[np.ndarray, np.n
     return strengths[0], strengths[1]
 
 
+def _seen(picture: np.ndarray, pixels_per_degree: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Colours as an observer sees them (Hunt-adjusted L*a*b*), edges and points of a picture in [0, 1]."""
+    opponent = _opponent(picture)
+    colours = _hunt_lab(_contrast_filtered(opponent, pixels_per_degree))
+    return colours, *_features((opponent[..., 0] + 16) / 116, pixels_per_degree)
+
+
+_seen_reference = _remembered(2)(_seen)
+
+
 def flip_map(image: np.ndarray, reference: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> np.ndarray:
     """LDR-FLIP at every pixel, (H, W) in [0, 1], of two sRGB pictures (H, W, 3), clamped to [0, 1] (Andersson et al. 2020)."""
     image, reference = _pair(image, reference)
-    a, b = _opponent(image), _opponent(reference)
-    colour = _hyab(*(_hunt_lab(_contrast_filtered(p, pixels_per_degree)) for p in (a, b))) ** _QC
+    colours_a, edges_a, points_a = _seen(image, pixels_per_degree)
+    colours_b, edges_b, points_b = _seen_reference(reference, pixels_per_degree)
+    colour = _hyab(colours_a, colours_b) ** _QC
     largest = _largest_colour_error()
     knee = _PC * largest
     colour = np.where(colour < knee, _PT / knee * colour, _PT + (colour - knee) / (largest - knee) * (1 - _PT))
-    (edges_a, points_a), (edges_b, points_b) = (_features((p[..., 0] + 16) / 116, pixels_per_degree) for p in (a, b))
     feature = (np.maximum(np.abs(edges_a - edges_b), np.abs(points_a - points_b)) / math.sqrt(2)) ** _QF
     return np.clip(colour, 0.0, 1.0) ** (1 - np.clip(feature, 0.0, 1.0))
 
 
-@_remembered
+@_remembered(256)
 def flip(image: np.ndarray, reference: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> float:
     """Mean of `flip_map`: 0 for equal pictures, 1 at most."""
     return float(flip_map(image, reference, pixels_per_degree).mean())
