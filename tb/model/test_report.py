@@ -28,7 +28,7 @@ from flicker.report.write import SUMMARY, check, write_report
 from flicker.scene import save_ply
 
 SIZE = 160, 90
-NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "rows-ellipse"] + [
+NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "lanes"] + [
     f"flicker-{mode}-mixed-conic" for mode in ("dense", "sparse", "smooth", "spiky")
 ] + ["flicker-smooth-fp16-conic", "flicker-smooth-fp8-conic"]
 
@@ -203,7 +203,7 @@ def test_figures_hold_the_data(made):
     for r in _rows(folder / "fig8_rendering_stage.csv"):
         assert float(r["cycles"]) == float(summary[r["config"]]["cycles"])
     heat = {(r["config"], r["map"]): r for r in _rows(folder / "heat_demo_0.csv")}
-    for name in ("vanilla", "faithful", "rows-ellipse"):
+    for name in ("vanilla", "faithful", "lanes"):
         row = summary[name]
         assert float(heat[name, "gaussians"]["mean"]) == pytest.approx(int(row["pixels_visited"]) / (SIZE[0] * SIZE[1]), rel=0.1)
         assert float(heat[name, "error"]["mean"]) == pytest.approx(float(row["flip"]), rel=1e-4)
