@@ -21,8 +21,10 @@ from flicker.demo_scene import write_demo
 from flicker.errors import FlickerError
 from flicker.golden.records import build_lists
 from flicker.golden.render import render_golden
+from flicker.methods.registry import View, method_name, run
 from flicker.metrics import psnr
 from flicker.params import CHANNELS, CORES, NAMED_CONFIGS, CatMode
+from flicker.perf.render_stage import simulate
 from flicker.projection import project
 from flicker.reference import render_reference
 from flicker.scene import load_scene
@@ -77,6 +79,8 @@ def main() -> int:
         f"| float64 reference, with projection | {project_s + reference_s:.2f} | 1 |",
     ]
     rtl_lines = ["", "| RTL frame | cycles | VRUs busy | cycles/s simulated | pixels that differ from golden | PSNR, dB |", "|---|---|---|---|---|---|"]
+    model_lines = ["", "| cycle model | cycles, and counters that differ from the RTL's | million cycles/s | times the RTL | masks, VRUs and cycles, s |",
+                   "|---|---|---|---|---|"]
     for name, config in {"default": NAMED_CONFIGS["default"], "faithful": NAMED_CONFIGS["faithful"],
                          "default, test off": NAMED_CONFIGS["default"].with_(cat=CatMode.OFF)}.items():
         lists_s, lists = best(lambda: build_lists(projected, camera, config))
@@ -93,7 +97,15 @@ def main() -> int:
         busy = rtl.channel_counter("vru_busy").sum() / (rtl.cycles * CORES * CHANNELS)
         rtl_lines.append(f"| {name} | {rtl.cycles:,} | {busy:.1%} | {rtl.cycles / rtl.seconds:,.0f} | {wrong} of {lists.cols * lists.rows * 64:,} "
                          f"| {psnr(rtl.image(), reference):.2f} |")
-    text = "\n".join(lines + rtl_lines) + "\n"
+        method = method_name(config)
+        run(method, View(projected, camera))
+        run_s, result = best(lambda: run(method, View(projected, camera)))
+        simulate(result.work, config)
+        model_s, model = best(lambda: simulate(result.work, config), 5)
+        differ = int((model.counters != rtl.counters).sum())
+        model_lines.append(f"| {name} | {model.cycles:,}; {differ} of {rtl.counters.size} | {model.cycles / model_s / 1e6:.1f} "
+                           f"| {model.cycles / model_s * rtl.seconds / rtl.cycles:,.0f} | {run_s + model_s:.2f} |")
+    text = "\n".join(lines + rtl_lines + model_lines) + "\n"
     if args.out == "-":
         print(text)
     else:

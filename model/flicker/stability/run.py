@@ -79,8 +79,8 @@ class Stability:
 
 def suite_methods() -> list[str]:
     """All methods but those whose picture another one has by proof; then three with absolute coordinates."""
-    names = [m.name for m in methods().values() if m.family != "rows" or m.lists == "subtile" and m.pixels]
-    return names + [name + ABSOLUTE for name in ("no_ctu-factored", "no_ctu-conic", "flicker-smooth-mixed-factored", "flicker-smooth-mixed-conic")]
+    names = [m.name for m in methods().values() if m.family != "rows" or m.accumulator or m.lists == "subtile" and m.pixels]
+    return names + [name + ABSOLUTE for name in ("no_ctu-factored", "no_ctu-conic", "flicker-smooth-fixed-factored", "flicker-smooth-mixed-conic")]
 
 
 def _split(name: str) -> tuple[Method, Coords]:

@@ -134,6 +134,6 @@ def write_pictures(result: Stability, folder: Path) -> list[Path]:
 
 
 LINES = (
-    "vanilla-factored", "no_ctu-factored", "no_ctu-conic", "seele-factored", "flicker-smooth-mixed-conic", "flicker-smooth-mixed-factored",
-    "flicker-dense-fp16-factored", "exact-e4m3-factored", "rows-f8a8", "no_ctu-factored@absolute",
+    "vanilla-factored", "no_ctu-factored", "no_ctu-conic", "seele-factored", "flicker-smooth-mixed-conic", "flicker-smooth-fixed-factored",
+    "flicker-dense-fp16-factored", "exact-e4m3-factored", "rows-f8a8", "rows-f8a8-ellipse-acc14", "no_ctu-factored@absolute",
 )
