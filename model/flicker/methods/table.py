@@ -31,7 +31,7 @@ METHODS = (
     "exact-fp16-factored", "exact-fp16-factored-bound", "exact-e5m6-factored", "exact-e5m6-factored-bound", "exact-e4m4-factored",
     "exact-e5m3-factored", "exact-e4m3-factored", "exact-e4m3-factored-scaled", "exact-e4m3-factored-bound", "exact-e5m2-factored",
     "exact-q8.8-factored", "exact-fp16-conic", "exact-fp16-conic-bound", "exact-e4m3-conic", "rows_minitile-f8a8", "rows-f6a6",
-    "rows-f7a5", "rows-f8a6", "rows-f8a8", "rows-f8a8-ellipse", "rows-f10a10", "pixels-fp16-factored", "oracle",
+    "rows-f7a5", "rows-f8a6", "rows-f8a8", "rows-f8a8-ellipse", "rows-f8a8-ellipse-acc14", "rows-f10a10", "pixels-fp16-factored", "oracle",
 )
 
 
