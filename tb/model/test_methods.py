@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 import random
+from fractions import Fraction
 from pathlib import Path
 
 import numba
@@ -30,7 +31,7 @@ from flicker.methods.disc import DiscFormat, disc_masks, inverse_radius, root_ta
 from flicker.methods.exact import exact_masks, margins
 from flicker.methods.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
 from flicker.methods.operations import Op
-from flicker.methods.stage import pixel_tests
+from flicker.methods.stage import ACCUMULATOR_INT_BITS, accumulate, pixel_tests
 from flicker.methods.thresholds import radii, thresholds
 from flicker.metrics import psnr
 from flicker.params import Form
@@ -178,6 +179,34 @@ def test_operations():
             assert {"per", "op", "format", "count"} <= set(next(iter(m.operations.rows())))
     assert get_method("exact-fp16-factored").operations.count(Op.MUL) == 36
     assert get_method("flicker-sparse-fp16-factored").operations.count(Op.MUL) == 24
+
+
+@pytest.mark.parametrize("fraction", [10, 14, 20])
+def test_accumulate(fraction):
+    """Fixed-point accumulators: the FP16 product rounded half up to the last place, saturating, against rational arithmetic."""
+    rng = np.random.default_rng(seed())
+    unit = Fraction(1, 2**fraction)
+    top = 2**ACCUMULATOR_INT_BITS - unit
+    for _ in range(2000):
+        w = np.float16(rng.random() * 2.0 ** -int(rng.integers(0, 14)))
+        colour = np.float16(rng.choice([rng.random(), rng.random() * 40, 0.0]) * rng.choice([1, -1]))
+        before = int(rng.integers(0, 2 ** (fraction + ACCUMULATOR_INT_BITS))) * unit
+        product = Fraction(float(np.float16(abs(np.float32(w) * np.float32(colour)))))
+        want = min(before + math.floor(product / unit + Fraction(1, 2)) * unit, top)
+        assert Fraction(float(accumulate(np.float32(float(before)), np.float32(w), np.float32(colour), fraction))) == want
+
+
+def test_accumulators(demo):
+    """Colours alone change: the same pairs contribute, and pictures come nearer to the reference the more bits there are."""
+    plain = run("rows-f8a8-ellipse", demo)
+    reference = render_reference(demo.projected, demo.camera)
+    found = {}
+    for bits in (10, 14, 20):
+        result = run(f"rows-f8a8-ellipse-acc{bits}", demo)
+        assert np.array_equal(result.work.contributing, plain.work.contributing)
+        assert np.array_equal(result.work.pixel_finish, plain.work.pixel_finish)
+        found[bits] = psnr(result.image, reference)
+    assert found[10] < psnr(plain.image, reference) < found[14] and found[20] > found[10]
 
 
 # ---- lists and rivals --------------------------------------------------------------------------
