@@ -6,8 +6,8 @@ each other. Any splat that covers an area then spreads over all lanes evenly, wh
 
 An element comes with a 64-bit pixel mask from a generator of `latency` stages, held as the CTU's pipeline is, that takes `width` elements a cycle. Each lane
 with set pixels gets the record and its own eight mask bits, finished pixels taken out; an element waits until every lane it needs has room.
-A lane visits one pixel per cycle. Of the `window` oldest entries it takes the first pixel that no older entry still wants and whose read-modify-write
-loop (`loop` cycles) is over, oldest entry first, so each pixel sees its splats in order. Entries without pixels leave at the end of a cycle.
+A lane visits one pixel per cycle: of the `window` oldest entries the first pixel whose read-modify-write loop (`loop` cycles) is over, oldest entry
+first, so each pixel sees its splats in order. Entries without pixels leave at the end of a cycle.
 An end-of-sub-tile token moves the eight pixels to one of `buffers` output buffers; `ports` pixels leave a core per cycle.
 
 Sub-tiles with an empty list are not streamed (the background is theirs). Once all 64 pixels are known to be finished, the input goes on to the
@@ -113,7 +113,6 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
             if used[l] == 0:
                 continue
             issued = False
-            older = np.int64(0)
             leave = 0
             for j in range(min(window, used[l])):
                 e = (read[l] + j) % depth
@@ -138,7 +137,7 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                     if known[l, p] <= t:
                         todo &= ~(1 << p)
                         count[base + DISCARDED] += 1
-                    elif not issued and not (older >> p) & 1 and visited[l, p] + loop <= t:
+                    elif not issued and visited[l, p] + loop <= t:
                         todo &= ~(1 << p)
                         issued = True
                         visited[l, p] = t
@@ -149,7 +148,6 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                             finished[sub[l]] += 1
                             finished_at[sub[l]] = max(finished_at[sub[l]], known[l, p])
                 wants[l, e] = todo
-                older |= todo
                 if todo == 0 and leave == j:
                     leave = j + 1
             read[l] = (read[l] + leave) % depth
