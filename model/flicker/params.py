@@ -76,18 +76,23 @@ LOG_STAGES = 3
 EXP_STAGES = {Form.CONIC: 3, Form.FACTORED: 2}
 
 
+def prtu_mean_delay(precision: Precision) -> int:
+    """Cycles after the coordinates at which a PRTU takes the mean: an FP16 subtraction begins with a register for the coordinates."""
+    return int(precision in (Precision.FP16, Precision.MIXED))
+
+
 def prtu_shape_delay(precision: Precision) -> int:
-    """Cycles after the mean at which a PRTU takes the splat's shape numbers: its differences are ready."""
+    """Cycles after the coordinates at which a PRTU takes the splat's shape numbers: its differences are ready."""
     return {
-        Precision.FP16: FP16_ADD_STAGES,
-        Precision.MIXED: FP16_ADD_STAGES + 1,  # conversion
+        Precision.FP16: 1 + FP16_ADD_STAGES,
+        Precision.MIXED: 1 + FP16_ADD_STAGES + 1,  # conversion
         Precision.FP8: 1 + FP8_ADD_STAGES,
         Precision.FIXED: 3,  # mean to fixed point, subtraction, conversion
     }[precision]
 
 
 def prtu_latency(form: Form, precision: Precision) -> int:
-    """Cycles from a PRTU's mean to its answer; the threshold is taken one cycle before the answer."""
+    """Cycles from a PRTU's coordinates to its answer; the threshold is taken one cycle before the answer."""
     wide = precision == Precision.FP16
     add = FP16_ADD_STAGES if wide else FP8_ADD_STAGES
     sum_ = FP16_SUM_STAGES if wide else FP8_SUM_STAGES

@@ -50,6 +50,7 @@ module flk_ctu
   } tag_t;
 
   localparam int unsigned LATENCY = 32'(PRTU_LATENCY[Form][Precision]);
+  localparam int unsigned MEAN_DELAY = 32'(PRTU_MEAN_DELAY[Precision]);
   localparam int unsigned SHAPE_DELAY = 32'(PRTU_SHAPE_DELAY[Precision]);
 
   logic issue, issue_batch, issue_dense, issue_all, issue_base_dense;
@@ -118,13 +119,22 @@ module flk_ctu
   localparam bit Wide = (Precision == PRECISION_FP16);
   localparam int unsigned QuadBits = Wide ? 16 : 8;
 
-  // Shape and threshold are taken from the pipeline where the PRTUs need them.
+  // Mean, shape and threshold are taken from the pipeline where the PRTUs need them.
+  fp16_t mean_x, mean_y;
   logic [2:0][QuadBits-1:0] shape_q;
   logic [QuadBits-1:0] threshold_q;
   // Leader pixels of the two rectangles: columns and rows.
   logic [1:0][2:0] a_x, a_y, b_x, b_y;
   logic [3:0] pass_a, pass_b;
   logic [3:0][QuadBits-1:0] unused_weight_a, unused_weight_b;
+
+  if (MEAN_DELAY == 0) begin : gen_mean
+    assign mean_x = in_elem_i.splat.feature.mean_x;
+    assign mean_y = in_elem_i.splat.feature.mean_y;
+  end else begin : gen_mean_late
+    assign mean_x = feature_q[MEAN_DELAY-1].mean_x;
+    assign mean_y = feature_q[MEAN_DELAY-1].mean_y;
+  end
 
   if (Wide) begin : gen_shape16
     assign shape_q = {
@@ -189,8 +199,8 @@ module flk_ctu
     .en_i       (advance),
     .x_i        (a_x),
     .y_i        (a_y),
-    .mean_x_i   (in_elem_i.splat.feature.mean_x),
-    .mean_y_i   (in_elem_i.splat.feature.mean_y),
+    .mean_x_i   (mean_x),
+    .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
     .pass_o     (pass_a),
@@ -205,8 +215,8 @@ module flk_ctu
     .en_i       (advance),
     .x_i        (b_x),
     .y_i        (b_y),
-    .mean_x_i   (in_elem_i.splat.feature.mean_x),
-    .mean_y_i   (in_elem_i.splat.feature.mean_y),
+    .mean_x_i   (mean_x),
+    .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
     .pass_o     (pass_b),

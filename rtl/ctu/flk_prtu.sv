@@ -3,9 +3,10 @@
 // plain test unit of a single pixel.
 //
 // Leader i lies in column i % Cols, row i / Cols: with two of each, 0 is top left, 1 top right, 2 bottom left, 3 bottom right.
-// A splat's numbers are taken when they are needed: coordinates and mean first, shape PRTU_SHAPE_DELAY[Precision] cycles later, threshold
-// in the last cycle before the answer; pass_o and weight_o come PRTU_LATENCY[Form][Precision] cycles after the mean. Throughput one rectangle
-// per cycle. All registers load while en_i is high; none is reset. No handshake: the CTU keeps track of what is inside.
+// A splat's numbers are taken when they are needed: coordinates first, mean PRTU_MEAN_DELAY[Precision] and shape
+// PRTU_SHAPE_DELAY[Precision] cycles later, threshold in the last cycle before the answer; pass_o and weight_o come
+// PRTU_LATENCY[Form][Precision] cycles after the coordinates. Throughput one rectangle per cycle. All registers load while en_i is high;
+// none is reset. No handshake: the CTU keeps track of what is inside.
 // pass_o[i] is high when threshold_i > weight i; a NaN weight does not pass.
 //
 // The format of the test (`Quad`), in which shape, threshold and weights are, is FP16 or E4M3.
@@ -167,6 +168,13 @@ module flk_prtu
         end
       end
     end else begin : gen_fp16
+      // The CTU chooses the coordinates late in the cycle; the subtraction begins with the next.
+      logic [Count-1:0][2:0] pixel_q;
+      always_ff @(posedge clk_i) begin
+        if (en_i) begin
+          pixel_q <= pixel;
+        end
+      end
       for (genvar k = 0; k < Count; k++) begin : gen_pixel
         fp16_t d16_q;
         flk_fp_add_pipe #(
@@ -174,7 +182,7 @@ module flk_prtu
         ) i_d (
           .clk_i,
           .en_i,
-          .a_i  (pixel_fp16(pixel[k])),
+          .a_i  (pixel_fp16(pixel_q[k])),
           .b_i  ({~mean[15], mean[14:0]}),
           .sum_o(d16_q)
         );

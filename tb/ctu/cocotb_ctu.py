@@ -164,7 +164,7 @@ async def long_list(dut):
 
 @cocotb.test()
 async def saturation(dut):
-    """The counts of a sub-tile stop at their largest value; the sums take that without overflow."""
+    """The counts of a sub-tile stop at their largest value; the sums take that without overflow. It sets registers."""
     test = CtuTest(dut, CatMode.AUTO)
     rng, model, controller = test.bench.rng, test.model, dut.i_controller
     for _ in range(8):  # the sums come close to their limit

@@ -22,6 +22,7 @@ from flicker.params import (
     Form,
     Precision,
     prtu_latency,
+    prtu_mean_delay,
     prtu_shape_delay,
 )
 
@@ -32,7 +33,7 @@ LEADERS = (*DENSE_RECTS.tolist(), *SPARSE_RECTS.tolist())
 
 
 def registers(form: Form, precision: Precision):
-    """All registers that are compared: enabled cycles after the mean, value of the model, register."""
+    """All registers that are compared: enabled cycles after the coordinates, value of the model, register."""
     wide = precision == Precision.FP16
     add = FP16_ADD_STAGES if wide else FP8_ADD_STAGES
     mul = FP16_MUL_STAGES if wide else FP8_MUL_STAGES
@@ -96,7 +97,7 @@ def pack(lanes: np.ndarray, width: int) -> np.ndarray:
 
 @cocotb.test()
 async def every_stage(dut):
-    """Each register holds what the model says, that many enabled cycles after the mean; bubbles and halts don't matter.
+    """Each register holds what the model says, that many enabled cycles after the coordinates; bubbles and halts don't matter.
 
     With NETLIST set only the outputs are compared.
     """
@@ -111,7 +112,7 @@ async def every_stage(dut):
     want = expected(operations, form, precision, fmt)
     cocotb.start_soon(Clock(dut.clk_i, PERIOD_NS, unit="ns").start())
 
-    shape_at, threshold_at = prtu_shape_delay(precision), prtu_latency(form, precision) - 1
+    mean_at, shape_at, threshold_at = prtu_mean_delay(precision), prtu_shape_delay(precision), prtu_latency(form, precision) - 1
     steps: list[int | None] = []  # operation that entered with each enabled cycle
     log: dict[str, list[int]] = {path: [] for path in probes}  # after each enabled cycle
     edge = RisingEdge(dut.clk_i)
@@ -133,9 +134,10 @@ async def every_stage(dut):
             continue
         steps.append(todo.pop() if todo and rng.random() < 0.8 else None)
         if (n := steps[-1]) is not None:
-            x0, x1, y0, y1, mean_x, mean_y = operations[n][:6]
+            x0, x1, y0, y1 = operations[n][:4]
             dut.x_i.value, dut.y_i.value = x0 | x1 << 3, y0 | y1 << 3
-            dut.mean_x_i.value, dut.mean_y_i.value = mean_x, mean_y
+        if len(steps) > mean_at and (n := steps[-1 - mean_at]) is not None:
+            dut.mean_x_i.value, dut.mean_y_i.value = operations[n][4:6]
         if len(steps) > shape_at and (n := steps[-1 - shape_at]) is not None:
             dut.shape_i.value = int(want["shape"][n])
         if len(steps) > threshold_at and (n := steps[-1 - threshold_at]) is not None:

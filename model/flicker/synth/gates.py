@@ -28,15 +28,18 @@ def _model(cell: Cell) -> str:
         clock, edge = to_verilog(ff["clocked_on"]), "posedge"
         if clock.startswith("(~"):
             clock, edge = clock[2:-1], "negedge"
-        events, branches = [f"{edge} {clock}"], ""
+        events, branches, start = [f"{edge} {clock}"], "", ""
         for kind, value in (("clear", "1'b0"), ("preset", "1'b1")):
             if condition := ff.get(kind):
                 level = to_verilog(condition)
+                # A reset that is active from the start has no edge, and a gated clock may have none meanwhile.
+                start = f"  initial {state} = {value};"
                 events.append(f"negedge {level[2:-1]}" if level.startswith("(~") else f"posedge {level}")
                 branches += f"if ({level}) {state} <= {value}; else "
         lines += [
             f"  reg {state};",
             f"  wire {inverse} = ~{state};" if inverse else "",
+            start,
             f"  always @({' or '.join(events)}) {branches}{state} <= {to_verilog(ff['next_state'])};",
         ]
     lines += [f"  assign {pin} = {to_verilog(function)};" for pin, function in cell.functions.items()]
@@ -49,7 +52,8 @@ def cell_models(library: Library) -> str:
 
 
 def sources(top: str, parameters: dict[str, int], liberty: Path = DEFAULT_LIBERTY) -> list[Path]:
-    """Verilog files that hold the netlist of ``top`` (a module without parameters) and the cells it uses.
+    """Verilog files that hold the netlist of ``top`` (a module without parameters) and the cells it uses, and Verilator's
+    configuration that makes the ports of ``top`` visible to a test bench.
 
     The unit is synthesised if it is not in the cache. Parts of a composed unit come as modules of their own.
     """
@@ -79,4 +83,10 @@ def sources(top: str, parameters: dict[str, int], liberty: Path = DEFAULT_LIBERT
                 path.write_text(text)
             files.append(path)
             pending += runner.tasks[part]["children"].values()
-    return files
+        # Only the ports: Verilator may then dissolve the cells.
+        path = folder / key / "ports.vlt"
+        lines = [f'public_flat_rw -module "{top}" -var "{port}"\n' for port in runner.results[key]["widths"]]
+        text = "`verilator_config\n" + "".join(lines)
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+    return [path, *files]
