@@ -1,4 +1,4 @@
-// flk_fp_add against plain integers: the exact sum in units of the smallest subnormal number,
+// flk_fp_add_pipe without registers, which is flk_fp_add, against plain integers: the exact sum in units of the smallest subnormal number,
 // rounded to nearest even (fv_rounding); signs of zero, infinities and NaN by their rules.
 module fv_fp_add #(
   parameter  int unsigned ExpBits  = 5,
@@ -10,6 +10,8 @@ module fv_fp_add #(
   parameter  int unsigned Least    = 0,
   parameter  int unsigned Most     = (1 << ExpBits) - 1,
   parameter  int unsigned Signs    = 2,
+  // 0: the adder for operands of equal sign.
+  parameter  bit          Cancel   = 1'b1,
   localparam int unsigned Width    = 1 + ExpBits + ManBits
 ) (
   input logic [Width-1:0] a_i,
@@ -27,12 +29,16 @@ module fv_fp_add #(
 
   logic [Width-1:0] result;
 
-  flk_fp_add #(
+  flk_fp_add_pipe #(
     .ExpBits (ExpBits),
     .ManBits (ManBits),
     .Fn      (Fn),
-    .Saturate(Saturate)
+    .Saturate(Saturate),
+    .Cancel  (Cancel),
+    .Stages  (0)
   ) dut (
+    .clk_i(1'b0),
+    .en_i (1'b0),
     .a_i,
     .b_i,
     .sum_o(result)
@@ -98,6 +104,7 @@ module fv_fp_add #(
   always_comb begin
     assume (apart >= ExpBits'(Least) && apart <= ExpBits'(Most));
     assume (Signs == 2 || (a_sign ^ b_sign) == (Signs == 1));
+    assume (Cancel || a_sign == b_sign);
     if (a_nan || b_nan || (a_inf && b_inf && a_sign != b_sign)) begin
       a_result_nan: assert (result == {1'b0, Nan});
     end else if (a_inf || b_inf) begin
@@ -108,7 +115,7 @@ module fv_fp_add #(
     end
     c_subnormal: cover (result[Width-2:0] < (mag_t'(1) << ManBits) && result[0] && !a_nan);
     c_tie: cover (i_rounding.twice == i_rounding.high && !a_nan && !b_nan && exact[ValueBits-2]);
-    c_cancel: cover (exact == 1 && a_mag > (mag_t'(1) << ManBits));
+    c_cancel: cover (!Cancel || exact == 1 && a_mag > (mag_t'(1) << ManBits));
     c_over: cover (result[Width-2:0] == Limit && a_mag < Limit && b_mag < Limit);
   end
 
