@@ -290,7 +290,7 @@ module fv_channel
       l_next: assert (dut.pixel_q == next_q && (dut.head_valid || next_q == '0)
                            && (next_q == '0 || !dut.head.eos));
       l_vrus: assert (vru_ok == '1);
-      l_pick: assert (!waited_q || dut.i_arbiter.first_q == index_q[3]);
+      l_pick: assert (!waited_q || dut.gen_several.i_arbiter.first_q == index_q[3]);
       if (token_watching) begin
         l_view: assert (view == token_data);
       end

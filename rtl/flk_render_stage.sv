@@ -1,4 +1,5 @@
 // Rendering stage: four CTUs and rendering cores, together one 16x16 tile, with performance counters.
+// 32 VRUs, or 16 or 64 with VrusPerChannel 1 or 4; the picture is the same.
 //
 // Core k takes the sorted lists of the sub-tiles in column k % 2, row k / 2 of each tile, one stream per core; each list ends with a
 // token that carries the sub-tile's position. The cores run independently: no barrier between tiles.
@@ -7,10 +8,11 @@ module flk_render_stage
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Form         = FORM_FACTORED,
-  parameter int unsigned Precision    = PRECISION_FIXED,
-  parameter int unsigned FifoDepth    = FIFO_DEPTH,
-  parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
+  parameter int unsigned Form           = FORM_FACTORED,
+  parameter int unsigned Precision      = PRECISION_FIXED,
+  parameter int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
+  parameter int unsigned VrusPerChannel = VRUS_PER_CHANNEL  // 1, 2 or 4
 ) (
   input  logic                    clk_i,
   input  logic                    rst_ni,
@@ -39,6 +41,7 @@ module flk_render_stage
     flk_ctu #(
       .Form        (Form),
       .Precision   (Precision),
+      .VruCycles   (MINITILE * MINITILE / VrusPerChannel),
       .CtuFifoDepth(CtuFifoDepth)
     ) i_ctu (
       .clk_i,
@@ -56,8 +59,9 @@ module flk_render_stage
     );
 
     flk_rendering_core #(
-      .Form     (Form),
-      .FifoDepth(FifoDepth)
+      .Form          (Form),
+      .FifoDepth     (FifoDepth),
+      .VrusPerChannel(VrusPerChannel)
     ) i_core (
       .clk_i,
       .rst_ni,

@@ -35,7 +35,7 @@ CLOCK_HZ = 1e9
 class Configuration:
     """A machine: a method (flicker.methods) on a rendering stage.
 
-    vrus_per_channel: 2 is the RTL. fifo_depth, ctu_fifo_depth: as in RenderConfig. barrier: all cores wait for each other after
+    vrus_per_channel, fifo_depth, ctu_fifo_depth: as in RenderConfig. barrier: all cores wait for each other after
     every tile (the cycles are then idealised: no latencies). lanes: the VRUs are lanes of their own (perf.lane_stage). stop: the rest of a
     list is not streamed once all pixels of its sub-tile are finished; idealised, known at once. title: for tables.
     """
@@ -58,7 +58,7 @@ class Configuration:
     @property
     def model_only(self) -> bool:
         """No RTL exists."""
-        return get_method(self.method).model_only or self.vrus_per_channel != 2 or self.barrier or self.stop
+        return get_method(self.method).model_only or self.barrier or self.stop
 
 
 LANES_METHOD = "rows-f8a8-ellipse-acc14"
@@ -201,7 +201,10 @@ def barrier_cycles(work: Work, vrus_per_channel: int) -> int:
 def stage_cycles(configuration: Configuration, work: Work) -> tuple[int, StageCycles | None]:
     """Cycles of the rendering stage and, where the stage is modelled cycle by cycle, its counters."""
     method = get_method(configuration.method)
-    config = RenderConfig(form=method.form, fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth)
+    config = RenderConfig(
+        form=method.form, fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth,
+        vrus_per_channel=configuration.vrus_per_channel,
+    )
     if method.config is not None:
         config = config.with_(precision=method.config.precision, cat=method.config.cat)
     if configuration.barrier:
@@ -213,7 +216,7 @@ def stage_cycles(configuration: Configuration, work: Work) -> tuple[int, StageCy
     elif work.visit is not None:
         stage = simulate_pixels(work, config)
     else:
-        stage = simulate(work, config, configuration.vrus_per_channel)
+        stage = simulate(work, config)
     return stage.cycles, stage
 
 

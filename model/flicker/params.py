@@ -137,6 +137,7 @@ ALPHA_MAX_BITS = fp16_bits_nearest(ALPHA_MAX)
 TRANSMITTANCE_MIN_BITS = fp16_bits_up(TRANSMITTANCE_MIN)
 
 MAX_FIFO_DEPTH = 128
+VRU_COUNTS = (1, 2, 4)  # VRUs per channel that the RTL can have
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,8 @@ class RenderConfig:
 
     `cat` is a run-time input of the RTL; the others are elaboration parameters, except `coords`,
     which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
-    is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper.
+    is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
+    of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
     """
 
     form: Form = Form.FACTORED
@@ -154,12 +156,20 @@ class RenderConfig:
     fifo_depth: int = 16
     ctu_fifo_depth: int = 0
     coords: Coords = Coords.LOCAL
+    vrus_per_channel: int = VRUS_PER_CHANNEL
 
     def __post_init__(self) -> None:
         if not 1 <= self.fifo_depth <= MAX_FIFO_DEPTH:
             raise FlickerError(f"configuration: fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.fifo_depth}")
         if not 0 <= self.ctu_fifo_depth <= MAX_FIFO_DEPTH:
             raise FlickerError(f"configuration: ctu_fifo_depth must be 0 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
+        if self.vrus_per_channel not in VRU_COUNTS:
+            raise FlickerError(f"configuration: vrus_per_channel must be 1, 2 or 4, not {self.vrus_per_channel}")
+
+    @property
+    def pixels_per_vru(self) -> int:
+        """Pixels of a VRU: the cycles that a splat takes in a channel."""
+        return MINITILE * MINITILE // self.vrus_per_channel
 
     def rtl_parameters(self) -> dict[str, int]:
         """Module parameters of `flk_render_stage` (and of every unit that has them)."""
@@ -168,6 +178,7 @@ class RenderConfig:
             "Precision": int(self.precision),
             "FifoDepth": self.fifo_depth,
             "CtuFifoDepth": self.ctu_fifo_depth,
+            "VrusPerChannel": self.vrus_per_channel,
         }
 
     def with_(self, **changes) -> "RenderConfig":

@@ -15,7 +15,7 @@ from .camera import Camera
 from .golden.records import build_lists
 from .golden.render import render_golden
 from .metrics import psnr
-from .params import CHANNELS, CORES, VRUS_PER_CHANNEL, RenderConfig
+from .params import CHANNELS, CORES, RenderConfig
 from .projection import Projected, project
 from .reference import render_reference
 from .scene import Scene
@@ -50,7 +50,7 @@ class Rendered:
     stats: dict[str, Any]
 
 
-def rtl_stats(rtl) -> dict[str, Any]:
+def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
     """Cycles, counters and utilisation of a simulated frame."""
     cores = []
     for k in range(CORES):
@@ -66,7 +66,7 @@ def rtl_stats(rtl) -> dict[str, Any]:
         "vru_utilisation": float(rtl.channel_counter("vru_busy").sum() / (cycles * CORES * CHANNELS)),
         "ctu_utilisation": float(rtl.core_counter("ctu_busy").sum() / (cycles * CORES)),
         "ctu_stall_rate": float(rtl.core_counter("ctu_stalled").sum() / (cycles * CORES)),
-        "vrus": CORES * CHANNELS * VRUS_PER_CHANNEL,
+        "vrus": CORES * CHANNELS * config.vrus_per_channel,
         "cores": cores,
     }
 
@@ -119,7 +119,7 @@ def render_view(
             rtl = render_rtl(lists, config, progress=report)
         image = rtl.image()
         sent = int(rtl.channel_counter("minitiles_sent").sum())
-        stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent} | rtl_stats(rtl)
+        stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent} | rtl_stats(rtl, config)
     elif engine is Engine.GOLDEN:
         with steps.step("rendering with the golden model"):
             frame = render_golden(lists, config)

@@ -50,12 +50,6 @@ package flk_pkg;
     fp16_t blue;
   } pixel_t;
 
-  // Finished pixel of a VRU: index within the VRU.
-  typedef struct packed {
-    logic [$clog2(flk_param_pkg::PIXELS_PER_VRU)-1:0] index;
-    pixel_t                                           pixel;
-  } vru_pixel_t;
-
   // Finished pixel of a channel: index within the mini-tile.
   typedef struct packed {
     subtile_t   subtile;
@@ -94,7 +88,7 @@ package flk_pkg;
     logic       vru_busy;   // issued a pixel to each VRU
     logic       sent;       // a splat met the unfinished mini-tile, in program order
     logic       discarded;  // dropped a splat of the finished mini-tile
-    logic [1:0] finished;   // pixels that ended
+    logic [2:0] finished;   // pixels that ended, at most one in each VRU
   } channel_events_t;
 
   localparam int unsigned SPLAT_ELEM_BITS = $bits(splat_elem_t);

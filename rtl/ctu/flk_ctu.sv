@@ -20,6 +20,7 @@ module flk_ctu
 #(
   parameter int unsigned Form         = FORM_FACTORED,
   parameter int unsigned Precision    = PRECISION_FIXED,
+  parameter int unsigned VruCycles    = PIXELS_PER_VRU,  // that a splat takes in a channel
   parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
 ) (
   input  logic          clk_i,
@@ -64,7 +65,9 @@ module flk_ctu
   feature_t [LATENCY-1:0] feature_q;
   tag_t tag_in, tag_out;
 
-  flk_ctu_controller i_controller (
+  flk_ctu_controller #(
+    .VruCycles(VruCycles)
+  ) i_controller (
     .clk_i,
     .rst_ni,
     .mode_i,

@@ -7,12 +7,14 @@
 // Automatic mode: the fall is decided from data already streamed, never from FIFO state, so that stalls cannot change a picture.
 // Results come back in order; at each end-of-sub-tile result the controller compares exponentially weighted sums of
 //   test cycles the sub-tile takes in the base mode (Smooth-Focused)   and
-//   VRU cycles it takes in the busiest channel (8 per mini-tile sent),
+//   VRU cycles it takes in the busiest channel (VruCycles per mini-tile sent),
 // and falls when the first is larger. A token is taken only when no other token is in the test pipeline; therefore the
 // decision used for sub-tile j always rests on sub-tiles up to j - 2, whatever the timing.
 module flk_ctu_controller
   import flk_param_pkg::*;
-(
+#(
+  parameter int unsigned VruCycles = PIXELS_PER_VRU  // that a splat takes in a channel
+) (
   input  logic       clk_i,
   input  logic       rst_ni,
   input  logic [2:0] mode_i,
@@ -38,6 +40,10 @@ module flk_ctu_controller
   // state
   output logic       fallen_o
 );
+
+  if (VruCycles != 2 ** $clog2(VruCycles)) begin : gen_check_vru_cycles
+    $error("flk_ctu_controller: VruCycles must be a power of two");
+  end
 
   // ---- Sampling ------------------------------------------------------------------------------------
 
@@ -79,9 +85,11 @@ module flk_ctu_controller
 
   // ---- Automatic fall --------------------------------------------------------------------------------
 
-  localparam int unsigned VRU_CYCLES_LOG2 = $clog2(PIXELS_PER_VRU);
+  localparam int unsigned VRU_CYCLES_LOG2 = $clog2(VruCycles);
+  localparam int unsigned VRU_BITS = AUTO_SENT_BITS + VRU_CYCLES_LOG2;
   // A sum of weights 1, 3/4, 9/16, ... is below 4 times the largest term: two more bits.
-  localparam int unsigned AVG_BITS = AUTO_TEST_BITS + AUTO_DECAY_SHIFT;
+  localparam int unsigned AVG_BITS =
+      (VRU_BITS > AUTO_TEST_BITS ? VRU_BITS : AUTO_TEST_BITS) + AUTO_DECAY_SHIFT;
 
   logic [AUTO_TEST_BITS-1:0]      test_d, test_q, test_inc, test_last_q;
   logic [3:0][AUTO_SENT_BITS-1:0] sent_d, sent_q;

@@ -1,8 +1,8 @@
-// Channel: feature FIFO and two VRUs, together one 4x4 mini-tile.
+// Channel: feature FIFO and VRUs, two unless VrusPerChannel says otherwise, together one 4x4 mini-tile.
 //
-// Each splat is issued to both VRUs in lockstep, pixel by pixel: 8 cycles. Once all 16 pixels of the sub-tile are finished,
-// splats up to the token are dropped, one per cycle. A token is issued when both VRUs' output buffers are free; the
-// next sub-tile follows at once.
+// The VRUs divide the mini-tile row by row. Each splat is issued to all of them in lockstep, pixel by pixel: 8 cycles with two VRUs.
+// Once all 16 pixels of the sub-tile are finished, splats up to the token are dropped, one per cycle. A token is issued when the output
+// buffers of all VRUs are free; the next sub-tile follows at once.
 //
 // `finished_o` says that all pixels are finished and no token lies between the FIFO's input and the pixels, so that what is
 // written now would be dropped: the dispatch need not write it.
@@ -11,9 +11,10 @@ module flk_channel
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Form      = FORM_FACTORED,
-  parameter int unsigned FifoDepth = FIFO_DEPTH,
-  parameter int unsigned MiniTile  = 0
+  parameter int unsigned Form           = FORM_FACTORED,
+  parameter int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter int unsigned VrusPerChannel = VRUS_PER_CHANNEL,  // 1, 2 or 4
+  parameter int unsigned MiniTile       = 0
 ) (
   input  logic            clk_i,
   input  logic            rst_ni,
@@ -33,8 +34,12 @@ module flk_channel
   if (MiniTile >= CHANNELS) begin : gen_check_minitile
     $error("flk_channel: MiniTile must be 0 to 3");
   end
+  if (VrusPerChannel != 1 && VrusPerChannel != 2 && VrusPerChannel != 4) begin : gen_check_vrus
+    $error("flk_channel: VrusPerChannel must be 1, 2 or 4");
+  end
 
-  localparam int unsigned PixelW = $clog2(PIXELS_PER_VRU);
+  localparam int unsigned Pixels = MINITILE * MINITILE / VrusPerChannel;  // of a VRU
+  localparam int unsigned PixelW = $clog2(Pixels);
 
   // ---- Feature FIFO ------------------------------------------------------------------------------------
 
@@ -61,9 +66,9 @@ module flk_channel
 
   // ---- Issue ---------------------------------------------------------------------------------------------
 
-  logic [VRUS_PER_CHANNEL-1:0] eos_ready, blend_valid, blend_eos, finish;
-  logic [VRUS_PER_CHANNEL-1:0][PixelW-1:0] blend_pixel;
-  logic [VRUS_PER_CHANNEL-1:0][PIXELS_PER_VRU-1:0] finished;
+  logic [VrusPerChannel-1:0] eos_ready, blend_valid, blend_eos, finish;
+  logic [VrusPerChannel-1:0][PixelW-1:0] blend_pixel;
+  logic [VrusPerChannel-1:0][Pixels-1:0] finished;
   logic all_finished, drop, issue, issue_eos;
   logic [PixelW-1:0] pixel_d, pixel_q;
   logic eos_in_vru_d, eos_in_vru_q;
@@ -74,7 +79,7 @@ module flk_channel
   assign drop         = head_valid && !head.eos && all_finished;
   assign issue_eos    = head_valid && head.eos && (&eos_ready);
   assign issue        = head_valid && !head.eos && !all_finished;
-  assign pop          = drop || issue_eos || (issue && (pixel_q == PixelW'(PIXELS_PER_VRU - 1)));
+  assign pop          = drop || issue_eos || (issue && (pixel_q == PixelW'(Pixels - 1)));
 
   always_comb begin
     pixel_d = pixel_q;
@@ -131,19 +136,23 @@ module flk_channel
 
   // ---- VRUs ------------------------------------------------------------------------------------------------
 
-  logic [VRUS_PER_CHANNEL-1:0] vru_valid, vru_ready;
-  vru_pixel_t [VRUS_PER_CHANNEL-1:0] vru_pixel;
-  vru_pixel_t out_pixel;
-  logic out_vru;
+  // Index within the VRU and state of a finished pixel.
+  localparam int unsigned VruPixelBits = PixelW + $bits(pixel_t);
 
-  for (genvar v = 0; v < VRUS_PER_CHANNEL; v++) begin : gen_vru
+  logic [VrusPerChannel-1:0] vru_valid, vru_ready;
+  logic [VrusPerChannel-1:0][VruPixelBits-1:0] vru_data;
+  logic [3:0] out_index;
+  pixel_t out_pixel;
+
+  for (genvar v = 0; v < VrusPerChannel; v++) begin : gen_vru
     flk_vru #(
-      .Form(Form)
+      .Form  (Form),
+      .Pixels(Pixels)
     ) i_vru (
       .clk_i,
       .rst_ni,
       .col_i        (1'(MiniTile % 2)),
-      .row_i        (2'((MiniTile / 2) * VRUS_PER_CHANNEL + v)),
+      .row_i        ((5 - PixelW)'((MiniTile / 2) * VrusPerChannel + v)),
       .op_valid_i   (issue || issue_eos),
       .op_eos_i     (issue_eos),
       .op_pixel_i   (pixel_q),
@@ -156,44 +165,59 @@ module flk_channel
       .finish_o     (finish[v]),
       .out_valid_o  (vru_valid[v]),
       .out_ready_i  (vru_ready[v]),
-      .out_data_o   (vru_pixel[v])
+      .out_index_o  (vru_data[v][VruPixelBits-1:$bits(pixel_t)]),
+      .out_pixel_o  (vru_data[v][$bits(pixel_t)-1:0])
     );
   end
 
-  flk_stream_arbiter #(
-    .Inputs(VRUS_PER_CHANNEL),
-    .Width ($bits(vru_pixel_t))
-  ) i_arbiter (
-    .clk_i,
-    .rst_ni,
-    .in_valid_i (vru_valid),
-    .in_ready_o (vru_ready),
-    .in_data_i  (vru_pixel),
-    .out_valid_o,
-    .out_ready_i,
-    .out_data_o (out_pixel),
-    .out_index_o(out_vru)
-  );
+  if (VrusPerChannel == 1) begin : gen_one
+    assign out_valid_o            = vru_valid[0];
+    assign vru_ready[0]           = out_ready_i;
+    assign {out_index, out_pixel} = vru_data[0];
+  end else begin : gen_several
+    logic [$clog2(VrusPerChannel)-1:0] out_vru;
+    logic [VruPixelBits-1:0] out_vru_data;
+
+    flk_stream_arbiter #(
+      .Inputs(VrusPerChannel),
+      .Width (VruPixelBits)
+    ) i_arbiter (
+      .clk_i,
+      .rst_ni,
+      .in_valid_i (vru_valid),
+      .in_ready_o (vru_ready),
+      .in_data_i  (vru_data),
+      .out_valid_o,
+      .out_ready_i,
+      .out_data_o (out_vru_data),
+      .out_index_o(out_vru)
+    );
+
+    assign {out_index, out_pixel} = {out_vru, out_vru_data};
+  end
 
   assign out_data_o = '{
     subtile: subtile_q,
-    index: {out_vru, out_pixel.index},
-    pixel: out_pixel.pixel
+    index: out_index,
+    pixel: out_pixel
   };
 
   // ---- Counters ------------------------------------------------------------------------------------------------
 
-  // Program order: flags before the first pixel of a splat, both VRUs being in step.
+  // Program order: flags before the first pixel of a splat, the VRUs being in step.
   always_comb begin
     events_o.fifo_full = !in_ready_o;
     events_o.vru_busy  = issue;
     events_o.sent      = blend_valid[0] && (blend_pixel[0] == '0) && !(&finished);
     events_o.discarded = drop;
-    events_o.finished  = 2'(finish[0]) + 2'(finish[1]);
+    events_o.finished  = '0;
+    for (int unsigned v = 0; v < VrusPerChannel; v++) begin
+      events_o.finished += 3'(finish[v]);
+    end
   end
 
-  // Both VRUs are in step: VRU 1's copies carry nothing new.
+  // The VRUs are in step: the copies of all but VRU 0 carry nothing new.
   logic unused_step;
-  assign unused_step = ^{blend_valid[1], blend_pixel[1], blend_eos[1]};
+  assign unused_step = ^{blend_valid, blend_pixel, blend_eos};
 
 endmodule

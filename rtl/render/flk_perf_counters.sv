@@ -42,7 +42,7 @@ module flk_perf_counters
       inc[channel(c, CNT_CH_VRU_BUSY)]            = 3'(channel_events_i[c].vru_busy);
       inc[channel(c, CNT_CH_MINITILES_SENT)]      = 3'(channel_events_i[c].sent);
       inc[channel(c, CNT_CH_MINITILES_DISCARDED)] = 3'(channel_events_i[c].discarded);
-      inc[channel(c, CNT_CH_PIXELS_FINISHED)]     = 3'(channel_events_i[c].finished);
+      inc[channel(c, CNT_CH_PIXELS_FINISHED)]     = channel_events_i[c].finished;
     end
   end
 

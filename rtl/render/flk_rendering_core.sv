@@ -8,8 +8,9 @@ module flk_rendering_core
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Form      = FORM_FACTORED,
-  parameter int unsigned FifoDepth = FIFO_DEPTH
+  parameter int unsigned Form           = FORM_FACTORED,
+  parameter int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter int unsigned VrusPerChannel = VRUS_PER_CHANNEL  // 1, 2 or 4
 ) (
   input  logic                           clk_i,
   input  logic                           rst_ni,
@@ -48,9 +49,10 @@ module flk_rendering_core
 
   for (genvar c = 0; c < CHANNELS; c++) begin : gen_channel
     flk_channel #(
-      .Form     (Form),
-      .FifoDepth(FifoDepth),
-      .MiniTile (c)
+      .Form          (Form),
+      .FifoDepth     (FifoDepth),
+      .VrusPerChannel(VrusPerChannel),
+      .MiniTile      (c)
     ) i_channel (
       .clk_i,
       .rst_ni,

@@ -1,10 +1,10 @@
-// Volume rendering unit (VRU): blends splats into eight pixels, one pixel-Gaussian pair per cycle, FP16.
+// Volume rendering unit (VRU): blends splats into its pixels, one pixel-Gaussian pair per cycle, FP16.
 //
 // Operations come in program order: `op_valid_i` with a splat and a pixel, or with `op_eos_i` (end of sub-tile). There is no
 // back-pressure on operations, except that a token may only come while `eos_ready_o` is high.
-// A splat's pixels come in order, 0 to 7, with op_feature_i held from the first to the last. So a pixel returns after 8 operations at the
-// soonest, which leaves the read-modify-write loops of transmittance and colour 4 cycles each; a splat may be broken off only when all
-// pixels of the mini-tile are finished.
+// A splat's pixels come in order, 0 to Pixels - 1, with op_feature_i held from the first to the last. So a pixel returns after Pixels
+// operations at the soonest, and the read-modify-write loops of transmittance and colour take 4 cycles each; a splat may be broken off only
+// when all pixels of the mini-tile are finished.
 //
 // | cycles, conic | factored | what |
 // |---|---|---|
@@ -25,22 +25,23 @@
 // | 0 | 0 | LAST: C is written |
 //
 // A token copies T (at BLEND) and C (at LAST) into the output buffer and clears the pixel state: the next sub-tile's operations
-// may follow at once; what they read before the token has cleared it counts as cleared. The buffer then leaves as a stream of eight pixels; the
+// may follow at once; what they read before the token has cleared it counts as cleared. The buffer then leaves as a stream of pixels; the
 // next token may come when it is empty.
 // Colours are not negative: their sign bits are ignored.
 module flk_vru
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Form   = FORM_FACTORED,
-  localparam int unsigned N      = PIXELS_PER_VRU,
-  localparam int unsigned IndexW = $clog2(N)
+  parameter  int unsigned Form   = FORM_FACTORED,
+  parameter  int unsigned Pixels = PIXELS_PER_VRU,  // 4, 8 or 16
+  localparam int unsigned IndexW = $clog2(Pixels),
+  localparam int unsigned RowW   = 5 - IndexW  // of the rows 0 to 7, in which block of Pixels / 4
 ) (
   input  logic              clk_i,
   input  logic              rst_ni,
-  // Place in the sub-tile, constant: pixel i lies in column 4 col_i + i % 4, row 2 row_i + i / 4.
+  // Place in the sub-tile, constant: pixel i lies in column 4 col_i + i % 4, row (Pixels / 4) row_i + i / 4.
   input  logic              col_i,
-  input  logic [1:0]        row_i,
+  input  logic [RowW-1:0]   row_i,
   // operations
   input  logic              op_valid_i,
   input  logic              op_eos_i,
@@ -51,16 +52,20 @@ module flk_vru
   output logic              blend_valid_o,  // an operation is at BLEND
   output logic [IndexW-1:0] blend_pixel_o,
   output logic              blend_eos_o,    // a token is at BLEND
-  output logic [N-1:0]      finished_o,     // before the operation at BLEND
+  output logic [Pixels-1:0] finished_o,     // before the operation at BLEND
   output logic              finish_o,       // the operation at BLEND finishes its pixel
   // finished pixels
   output logic              out_valid_o,
   input  logic              out_ready_i,
-  output vru_pixel_t        out_data_o
+  output logic [IndexW-1:0] out_index_o,
+  output pixel_t            out_pixel_o
 );
 
   if (Form > FORM_FACTORED) begin : gen_check_form
     $error("flk_vru: Form must be FORM_CONIC or FORM_FACTORED");
+  end
+  if (Pixels != 4 && Pixels != 8 && Pixels != 16) begin : gen_check_pixels
+    $error("flk_vru: Pixels must be 4, 8 or 16");
   end
   localparam bit Factored = (Form == FORM_FACTORED);
 
@@ -97,15 +102,20 @@ module flk_vru
     pixel_q <= {pixel_q[LAST-1:1], op_pixel_i};
   end
 
-  // ---- A splat's numbers, each held for eight pixels where it is needed ---------------------------------
+  if (Pixels < BLEND - OMA + 2 || Pixels < LAST - COLOUR + 2) begin : gen_check_loops
+    $error("flk_vru: a pixel returns before its state is written");
+  end
+
+  // ---- A splat's numbers, each held for all pixels where it is needed -----------------------------------
 
   // Loaded when the splat's first pixel comes to the cycle in which it is used. Numbers needed long after the operation go through
-  // holders on the way, at most 8 cycles apart.
-  localparam int unsigned HOLD1 = 8;
-  localparam int unsigned HOLD2 = 16;
-  localparam int unsigned HOLD3 = 24;
+  // holders on the way, Pixels cycles apart: the next splat follows at that distance at the soonest.
+  localparam int unsigned SHAPE_AT = Factored ? DIFF : PRODUCT;
   localparam int unsigned OPACITY_AT = POWER;
   localparam int unsigned COLOUR_AT = BLEND;
+  localparam int unsigned SHAPE_HOLDERS = (SHAPE_AT - 1) / Pixels;
+  localparam int unsigned OPACITY_HOLDERS = (OPACITY_AT - 1) / Pixels;
+  localparam int unsigned COLOUR_HOLDERS = (COLOUR_AT - 1) / Pixels;
 
   logic [LAST:2] first;  // the first pixel gets to cycle s at this edge
   for (genvar s = 2; s <= LAST; s++) begin : gen_first
@@ -114,54 +124,59 @@ module flk_vru
 
   fp16_t mean_x_q, mean_y_q;
   logic [2:0][15:0] shape_q;
-  fp16_t opacity_q8, opacity_q16, opacity_q;
-  logic [2:0][14:0] colour, colour_q8, colour_q16, colour_q24, colour_q;  // 0 red, 1 green, 2 blue
+  fp16_t opacity_q;
+  logic [2:0][14:0] colour_q;  // 0 red, 1 green, 2 blue
+  // What comes to each holder, the last entry being what is loaded where it is used.
+  logic [SHAPE_HOLDERS:0][2:0][15:0] shape;
+  fp16_t [OPACITY_HOLDERS:0] opacity;
+  logic [COLOUR_HOLDERS:0][2:0][14:0] colour;
 
-  assign colour = {op_feature_i.blue[14:0], op_feature_i.green[14:0], op_feature_i.red[14:0]};
+  assign shape[0]   = {op_feature_i.shape2, op_feature_i.shape1, op_feature_i.shape0};
+  assign opacity[0] = op_feature_i.opacity;
+  assign colour[0]  = {op_feature_i.blue[14:0], op_feature_i.green[14:0], op_feature_i.red[14:0]};
+
+  for (genvar k = 1; k <= SHAPE_HOLDERS; k++) begin : gen_shape
+    logic [2:0][15:0] held_q;
+    always_ff @(posedge clk_i) begin
+      if (first[k*Pixels]) begin
+        held_q <= shape[k-1];
+      end
+    end
+    assign shape[k] = held_q;
+  end
+  for (genvar k = 1; k <= OPACITY_HOLDERS; k++) begin : gen_opacity
+    fp16_t held_q;
+    always_ff @(posedge clk_i) begin
+      if (first[k*Pixels]) begin
+        held_q <= opacity[k-1];
+      end
+    end
+    assign opacity[k] = held_q;
+  end
+  for (genvar k = 1; k <= COLOUR_HOLDERS; k++) begin : gen_colour_held
+    logic [2:0][14:0] held_q;
+    always_ff @(posedge clk_i) begin
+      if (first[k*Pixels]) begin
+        held_q <= colour[k-1];
+      end
+    end
+    assign colour[k] = held_q;
+  end
 
   always_ff @(posedge clk_i) begin
     if (op_pixel_i == '0) begin
       mean_x_q <= op_feature_i.mean_x;
       mean_y_q <= op_feature_i.mean_y;
     end
-    if (first[Factored ? DIFF : PRODUCT]) begin
-      shape_q <= {op_feature_i.shape2, op_feature_i.shape1, op_feature_i.shape0};
-    end
-    if (first[HOLD1]) begin
-      opacity_q8 <= op_feature_i.opacity;
-      colour_q8  <= colour;
+    if (first[SHAPE_AT]) begin
+      shape_q <= shape[SHAPE_HOLDERS];
     end
     if (first[OPACITY_AT]) begin
-      opacity_q <= (OPACITY_AT > HOLD2) ? opacity_q16 : opacity_q8;
-    end
-    if (first[HOLD2]) begin
-      colour_q16 <= colour_q8;
+      opacity_q <= opacity[OPACITY_HOLDERS];
     end
     if (first[COLOUR_AT]) begin
-      colour_q <= (COLOUR_AT > HOLD3) ? colour_q24 : colour_q16;
+      colour_q <= colour[COLOUR_HOLDERS];
     end
-  end
-  if (OPACITY_AT > HOLD2) begin : gen_opacity16
-    always_ff @(posedge clk_i) begin
-      if (first[HOLD2]) begin
-        opacity_q16 <= opacity_q8;
-      end
-    end
-  end else begin : gen_no_opacity16
-    assign opacity_q16 = '0;
-  end
-  if (COLOUR_AT > HOLD3) begin : gen_colour24
-    always_ff @(posedge clk_i) begin
-      if (first[HOLD3]) begin
-        colour_q24 <= colour_q16;
-      end
-    end
-  end else begin : gen_no_colour24
-    assign colour_q24 = '0;
-  end
-  if (OPACITY_AT <= HOLD1 || OPACITY_AT > HOLD3 || COLOUR_AT <= HOLD2
-      || COLOUR_AT > HOLD3 + 8) begin : gen_check_hold
-    $error("flk_vru: the holders of opacity and colour do not fit the pipeline");
   end
 
   // ---- Differences ---------------------------------------------------------------------------------------
@@ -176,19 +191,22 @@ module flk_vru
     endcase
   endfunction
 
+  logic [4:0] place;  // row in the sub-tile, column in the mini-tile
   fp16_t dx_q, dy_q;
+
+  assign place = {row_i, pixel_q[1]};
 
   flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dx (
     .clk_i,
     .en_i (1'b1),
-    .a_i  (pixel_fp16({col_i, pixel_q[1][1:0]})),
+    .a_i  (pixel_fp16({col_i, place[1:0]})),
     .b_i  ({~mean_x_q[15], mean_x_q[14:0]}),
     .sum_o(dx_q)
   );
   flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dy (
     .clk_i,
     .en_i (1'b1),
-    .a_i  (pixel_fp16({row_i, pixel_q[1][2]})),
+    .a_i  (pixel_fp16(place[4:2])),
     .b_i  ({~mean_y_q[15], mean_y_q[14:0]}),
     .sum_o(dy_q)
   );
@@ -309,8 +327,8 @@ module flk_vru
 
   // ---- Transmittance: read for OMA, written at BLEND -----------------------------------------------------------
 
-  logic [N-1:0][14:0] t_q;  // not negative
-  logic [N-1:0] finished_q;
+  logic [Pixels-1:0][14:0] t_q;  // not negative
+  logic [Pixels-1:0] finished_q;
   fp16_t t_now_q, t_next_q, w_q;
   logic blend, finish;
   logic [IndexW-1:0] blend_pixel;
@@ -351,10 +369,10 @@ module flk_vru
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      t_q        <= {N{FP16_ONE[14:0]}};
+      t_q        <= {Pixels{FP16_ONE[14:0]}};
       finished_q <= '0;
     end else if (eos_q[BLEND]) begin
-      t_q        <= {N{FP16_ONE[14:0]}};
+      t_q        <= {Pixels{FP16_ONE[14:0]}};
       finished_q <= '0;
     end else begin
       if (blend) begin
@@ -376,7 +394,7 @@ module flk_vru
 
   fp16_t [2:0] m_q, c_next_q;
   logic [2:0][14:0] c_now_q;
-  logic [N-1:0][2:0][14:0] c_q;  // not negative
+  logic [Pixels-1:0][2:0][14:0] c_q;  // not negative
   logic [LAST:BLEND+1] blend_q;
 
   for (genvar k = 0; k < 3; k++) begin : gen_colour
@@ -418,12 +436,12 @@ module flk_vru
 
   // ---- Output buffer -----------------------------------------------------------------------------------------------
 
-  logic [N-1:0][14:0] out_t_q;
-  logic [N-1:0][2:0][14:0] out_c_q;
+  logic [Pixels-1:0][14:0] out_t_q;
+  logic [Pixels-1:0][2:0][14:0] out_c_q;
   logic busy_q, full_q, last;
   logic [IndexW-1:0] out_index_q;
 
-  assign last = out_valid_o && out_ready_i && (out_index_q == IndexW'(N - 1));
+  assign last = out_valid_o && out_ready_i && (out_index_q == IndexW'(Pixels - 1));
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -459,11 +477,11 @@ module flk_vru
   assign eos_ready_o = !busy_q;
   assign out_valid_o = full_q;
   always_comb begin
-    out_data_o.index               = out_index_q;
-    out_data_o.pixel.transmittance = {1'b0, out_t_q[out_index_q]};
-    out_data_o.pixel.red           = {1'b0, out_c_q[out_index_q][0]};
-    out_data_o.pixel.green         = {1'b0, out_c_q[out_index_q][1]};
-    out_data_o.pixel.blue          = {1'b0, out_c_q[out_index_q][2]};
+    out_index_o               = out_index_q;
+    out_pixel_o.transmittance = {1'b0, out_t_q[out_index_q]};
+    out_pixel_o.red           = {1'b0, out_c_q[out_index_q][0]};
+    out_pixel_o.green         = {1'b0, out_c_q[out_index_q][1]};
+    out_pixel_o.blue          = {1'b0, out_c_q[out_index_q][2]};
   end
 
 `ifndef SYNTHESIS

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from flicker.demo_scene import demo_cameras, generate
+from flicker.errors import FlickerError
 from flicker.evaluate import barrier_cycles, gscore_cycles
 from flicker.methods.registry import View, run
 from flicker.methods.work import Work
@@ -47,6 +48,20 @@ def test_whole_minitiles(view: View) -> None:
     pixels = simulate_pixels(work, OFF, split="halves", loop=1)
     assert (pixels.channel("vru_busy") == model.channel("vru_busy")).all() and model.channel("vru_busy").sum() > 10_000
     assert pixels.cycles == pytest.approx(model.cycles, rel=0.01)
+
+
+def test_vrus_per_channel(view: View) -> None:
+    """Nothing finishes: VRUs of half the pixels take half the cycles of each splat. Other counts than the RTL's are refused."""
+    work = run("no_ctu", view).work
+    stages = {n: simulate(work, OFF.with_(vrus_per_channel=n)) for n in (1, 2, 4)}
+    for n, stage in stages.items():
+        assert (n * stage.channel("vru_busy") == stages[1].channel("vru_busy")).all()
+    assert stages[1].cycles > stages[2].cycles > stages[4].cycles
+    for n in (0, 3, 8):
+        with pytest.raises(FlickerError, match=f"vrus_per_channel must be 1, 2 or 4, not {n}"):
+            OFF.with_(vrus_per_channel=n)
+    with pytest.raises(ValueError, match="two VRUs per channel"):
+        simulate_pixels(run("rows-f8a8", view).work, OFF.with_(vrus_per_channel=4))
 
 
 @pytest.mark.parametrize(("pixels", "busy"), [([], 0), ([0], 1), ([0, 2], 2), ([0, 1], 1), (list(range(16)), 8)])

@@ -1,4 +1,4 @@
-"""cocotb test of a channel; settings: Form, MiniTile, lengths of the lists, idle and stall patterns."""
+"""cocotb test of a channel; settings: Form, MiniTile, VrusPerChannel, lengths of the lists, idle and stall patterns."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ async def pixels_and_counts(dut):
     count = events.total
     assert count["sent"] == want["sent"], "splats sent in program order"
     assert count["finished"] == want["finished"] > 0, "pixels finished"
-    # Whole splats take 8 cycles, dropped ones fewer.
-    whole = want["splats"] - count["discarded"]
-    assert 8 * whole <= count["vru_busy"] <= 8 * whole + 7 * count["discarded"]
+    # Whole splats take a cycle for each pixel of a VRU, dropped ones fewer.
+    whole, pixels = want["splats"] - count["discarded"], 16 // settings["VrusPerChannel"]
+    assert pixels * whole <= count["vru_busy"] <= pixels * whole + (pixels - 1) * count["discarded"]
     assert want["sent"] <= whole + count["discarded"] and count["discarded"] > 0
     assert any(p[1:] != (0, 0, 0) for pixels in expected.values() for p in pixels), "all pictures are black"
     dut._log.info(f"{want} {dict(count)}")

@@ -54,7 +54,7 @@ async def sums(dut):
         words = [draw(bench.rng, CHANNEL_EVENTS) for _ in range(CHANNELS)]
         dut.ctu_events_i.value = ctu
         dut.dispatch_events_i.value = dispatch
-        dut.channel_events_i.value = sum(w << 6 * k for k, (w, _) in enumerate(words))
+        dut.channel_events_i.value = sum(w << 7 * k for k, (w, _) in enumerate(words))
         await edge
         # Now the counters show everything up to two cycles before the one just driven.
         value = int(dut.counters_o.value)

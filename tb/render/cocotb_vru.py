@@ -1,4 +1,4 @@
-"""cocotb test of a volume rendering unit; settings: Form, stall pattern of the output."""
+"""cocotb test of a volume rendering unit; settings: Form, Pixels, stall pattern of the output."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from minitile_model import lists, pixel_of
 
 from flicker.formats import FP16
 from flicker.golden.vru import PAIR_FIELDS, Pixels
-from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, FP16_SUM_STAGES, PIXELS_PER_VRU, Form
+from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, FP16_SUM_STAGES, Form
 
 # Cycles after the operation at which a stage's registers are loaded (rtl/render/flk_vru.sv).
 ADD, SUM, MUL = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
@@ -44,8 +44,7 @@ def registers(form: Form) -> dict[str, tuple[str, int]]:
     }
 
 
-COL, ROW = 1, 1
-FIRST = (4 * COL, 2 * ROW)  # column and row of the unit's first pixel
+COL, ROW = 1, 1  # place of the unit, in units of its own width and height
 
 
 def handle(dut, path: str):
@@ -63,20 +62,20 @@ async def every_stage(dut):
     A netlist has no registers by name: only the pixels are compared.
     """
     settings = config()
-    form = Form(settings["Form"])
+    form, size = Form(settings["Form"]), settings["Pixels"]
     bench = Bench(dut)
     rng = bench.rng
-    downstream = Stream(dut, "out")
+    downstream = Stream(dut, "out", ("index", "pixel"))
     StreamSink(downstream, bench.stall(settings["stall"]))
     dut.col_i.value, dut.row_i.value = COL, ROW
     dut.op_valid_i.value = 0
     dut.op_eos_i.value = 0
     got: list[tuple] = []
-    Monitor(downstream, lambda word: got.append((word >> 64, pixel_of(word))))
+    Monitor(downstream, lambda item: got.append((item[0], pixel_of(item[1]))))
     places = {} if netlist() else registers(form)
     probes = {name: handle(dut, path) for name, (path, _) in places.items()}
     log: dict[str, list[int]] = {name: [] for name in probes}
-    model = Pixels(np.array([(FIRST[0] + i % 4, FIRST[1] + i // 4) for i in range(PIXELS_PER_VRU)]), form)
+    model = Pixels(np.array([(4 * COL + i % 4, size // 4 * ROW + i // 4) for i in range(size)]), form)
     expected: list[tuple] = []
     traces: list[tuple[int, np.ndarray, bool, bool]] = []  # cycle, values, pixel unfinished, splat not broken off
 
@@ -85,7 +84,7 @@ async def every_stage(dut):
     queue: list[tuple] = []
     for entries in lists(rng, form, settings["lengths"]):
         for s in entries:
-            queue += [(s.features, p) for p in range(PIXELS_PER_VRU)]
+            queue += [(s.features, p) for p in range(size)]
         queue.append(None)  # token
     cycle, finished, dead = 0, 0, False
     while queue or len(got) < len(expected):
@@ -100,8 +99,8 @@ async def every_stage(dut):
             continue
         if queue[0] is not None and queue[0][1] == 0:
             dead = model.finished.all()
-        if queue[0] is not None and queue[0][1] == 4 and dead:
-            del queue[:4]  # broken off: all pixels were finished before the splat
+        if queue[0] is not None and queue[0][1] == size // 2 and dead:
+            del queue[: size // 2]  # broken off: all pixels were finished before the splat
             continue
         # What is driven now is sampled at the next edge.
         if queue[0] is None:

@@ -69,7 +69,7 @@ class EventCounter:
                 word >>= bits
 
 
-CHANNEL_EVENTS = (("fifo_full", 1), ("vru_busy", 1), ("sent", 1), ("discarded", 1), ("finished", 2))
+CHANNEL_EVENTS = (("fifo_full", 1), ("vru_busy", 1), ("sent", 1), ("discarded", 1), ("finished", 3))
 DISPATCH_EVENTS = (("delivered", 3), ("filtered", 3))
 
 

@@ -1,8 +1,8 @@
 """Volume rendering unit against the golden model: every stage's registers, finished pixels, order and back-pressure of the output.
 
 State space: random splats (as in real scenes, thin, special numbers, covering), pixels in order and in random order with repeats in consecutive
-cycles, bubbles, empty sub-tiles, lists that finish pixels. Parameter space: both forms. Not covered: other positions than column 4, row 2 (the channel's
-test has all of them).
+cycles, bubbles, empty sub-tiles, lists that finish pixels. Parameter space: both forms, 4, 8 and 16 pixels. Not covered: other positions than the second column
+and row of units (the channel's test has all of them).
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from flicker_tb.splats import QUICK_BUILD
 from flicker.params import Form
 
 
-@pytest.mark.parametrize("stall", ["never", "heavy"])
-@pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
-def test_vru(form: Form, stall: str) -> None:
-    settings = {"Form": int(form)}
-    lengths = [0, 40, 30, 1, 0, 60, 25, 3, 50]
+@pytest.mark.parametrize(
+    ("form", "pixels", "stall"),
+    [*((form, 8, stall) for form in Form for stall in ("never", "heavy")), (Form.CONIC, 4, "never"), (Form.FACTORED, 4, "heavy"), (Form.CONIC, 16, "never")],
+)
+def test_vru(form: Form, pixels: int, stall: str) -> None:
+    settings = {"Form": int(form), "Pixels": pixels}
+    lengths = [0, 40, 30, 1, 0, 60, 25, 3, 50] * (8 // pixels or 1)
     build_and_test("flk_vru", "cocotb_vru", parameters=settings, config={**settings, "stall": stall, "lengths": lengths}, **QUICK_BUILD)

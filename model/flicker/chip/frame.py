@@ -18,7 +18,7 @@ from ..camera import Camera
 from ..errors import FlickerError
 from ..golden.records import SubtileLists, build_lists
 from ..golden.render import COUNTS, Frame, render_golden, stream_order
-from ..params import CHANNELS, PIXELS_PER_VRU, TILE, RenderConfig
+from ..params import CHANNELS, TILE, RenderConfig
 from ..projection import Projected, project
 from ..scene import Scene
 from . import constants as c
@@ -162,7 +162,7 @@ def subtile_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None
     """int64 (S,): lower bound of a core's cycles in each sub-tile, the longer of testing and of blending with balanced channels."""
     frame = frame or render_golden(lists, config)
     test, sent = (frame.counts[:, COUNTS.index(name)] for name in ("test_cycles", "minitiles_sent"))
-    return np.maximum(test, -(-sent * PIXELS_PER_VRU // CHANNELS))
+    return np.maximum(test, -(-sent * config.pixels_per_vru // CHANNELS))
 
 
 def render_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None = None) -> int:
@@ -171,7 +171,7 @@ def render_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None 
     order, part = stream_order(lists)
     cores = [frame.counts[order[a:b]].sum(axis=0) for a, b in zip(part, part[1:])]
     test, sent = COUNTS.index("test_cycles"), COUNTS.index("minitiles_sent")
-    return max(max(int(n[test]), -(-int(n[sent]) * PIXELS_PER_VRU // CHANNELS)) for n in cores)
+    return max(max(int(n[test]), -(-int(n[sent]) * config.pixels_per_vru // CHANNELS)) for n in cores)
 
 
 def _pixels(camera: Camera) -> Stream:

@@ -82,7 +82,7 @@ def minitile(f, m, form, state, finished, col, row, e):
 
 @numba.njit
 def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels, counts, auto):
-    """Render sub-tile s. `auto` takes (base-mode test cycles, 8 x mini-tiles of the busiest channel), saturated."""
+    """Render sub-tile s. `auto` takes (base-mode test cycles, mini-tiles of the busiest channel), saturated."""
     state = np.zeros((4, 64), np.float32)
     state[0, :] = 1.0
     finished = np.zeros(64, np.bool_)
@@ -127,7 +127,7 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
         for p in range(64):
             pixels[p, c] = fp16_bits(state[c, p])
     auto[0] = min(base_test, (1 << AUTO_TEST_BITS) - 1)
-    auto[1] = SUBTILE * min(max(max(sent[0], sent[1]), max(sent[2], sent[3])), (1 << AUTO_SENT_BITS) - 1)
+    auto[1] = min(max(max(sent[0], sent[1]), max(sent[2], sent[3])), (1 << AUTO_SENT_BITS) - 1)
 
 
 @numba.njit(parallel=True, cache=True)
@@ -139,7 +139,7 @@ def _render_fixed(order, gauss, spiky, start, entry, mean, mode, form, precision
 
 
 @numba.njit(parallel=True, cache=True)
-def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, precision, pixels, counts):
+def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, precision, pixels, counts, per_vru):
     for core in numba.prange(CORES):
         auto = np.zeros(2, np.int64)
         test_avg = 0
@@ -152,7 +152,7 @@ def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, prec
             _subtile(s, gauss, spiky, start, entry, mean, M_SPARSE if fall else AUTO, form, precision, pixels[s], counts[s], auto)
             counts[s, 7] = fall
             test_avg += auto[0] - (test_avg >> AUTO_DECAY_SHIFT)
-            sent_avg += auto[1] - (sent_avg >> AUTO_DECAY_SHIFT)
+            sent_avg += per_vru * auto[1] - (sent_avg >> AUTO_DECAY_SHIFT)
             decided = latest
             latest = test_avg > sent_avg
 
@@ -209,7 +209,7 @@ def render_golden(lists: SubtileLists, config: RenderConfig) -> Frame:
     if config.form != lists.form:
         raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
     if config.cat == CatMode.AUTO:
-        _render_auto(order, core_start, *args, *tail)
+        _render_auto(order, core_start, *args, *tail, config.pixels_per_vru)
     else:
         _render_fixed(order, *args, int(config.cat), *tail)
     return Frame(lists, pixels, counts)

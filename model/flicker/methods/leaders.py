@@ -11,7 +11,7 @@ from ..golden.records import SubtileLists
 from ..golden.vru import ALPHA_MIN, CONIC, alpha_of
 from ..golden.weight import conic_axis, conic_pixel, factored_pixel, factored_row
 from ..params import (
-    AUTO_DECAY_SHIFT, AUTO_SENT_BITS, AUTO_TEST_BITS, CHANNELS, CORES, FIXED_FRAC_BITS, FIXED_INT_BITS, SUBTILE, CatMode, Form, Precision,
+    AUTO_DECAY_SHIFT, AUTO_SENT_BITS, AUTO_TEST_BITS, CHANNELS, CORES, FIXED_FRAC_BITS, FIXED_INT_BITS, CatMode, Form, Precision,
     RenderConfig,
 )
 from .operations import Op, Operation, Operations
@@ -38,8 +38,11 @@ def _saturated(x: int, bits: int) -> int:
     return min(x, (1 << bits) - 1)
 
 
-def _fallen(order: np.ndarray, core_start: np.ndarray, base_test: np.ndarray, sent: np.ndarray, sent_sparse: np.ndarray) -> np.ndarray:
-    """Sub-tiles in which the automatic mode has fallen (docs/ctu.md). base_test (S,), sent and sent_sparse (S, 4) per sub-tile."""
+def _fallen(
+    order: np.ndarray, core_start: np.ndarray, base_test: np.ndarray, sent: np.ndarray, sent_sparse: np.ndarray, per_vru: int,
+) -> np.ndarray:
+    """Sub-tiles in which the automatic mode has fallen (docs/ctu.md). base_test (S,), sent and sent_sparse (S, 4) per sub-tile; per_vru:
+    pixels of a VRU."""
     fallen = np.zeros(len(base_test), bool)
     for core in range(CORES):
         test_avg = sent_avg = 0
@@ -48,7 +51,7 @@ def _fallen(order: np.ndarray, core_start: np.ndarray, base_test: np.ndarray, se
             fallen[s] = decided
             counts = sent_sparse[s] if decided else sent[s]
             test_avg += _saturated(int(base_test[s]), AUTO_TEST_BITS) - (test_avg >> AUTO_DECAY_SHIFT)
-            sent_avg += SUBTILE * _saturated(int(counts.max()), AUTO_SENT_BITS) - (sent_avg >> AUTO_DECAY_SHIFT)
+            sent_avg += per_vru * _saturated(int(counts.max()), AUTO_SENT_BITS) - (sent_avg >> AUTO_DECAY_SHIFT)
             decided, latest = latest, test_avg > sent_avg
     return fallen
 
@@ -83,7 +86,7 @@ def cat_masks(
     sparse_mask, sparse_cycles = fixed(CatMode.SPARSE)
     bits = np.arange(CHANNELS, dtype=np.uint8)
     sent, sent_sparse = (per_subtile((m[:, None] >> bits) & 1, lists.start) for m in (mask, sparse_mask))
-    fallen = _fallen(order, core_start, per_subtile(cycles, lists.start), sent, sent_sparse)
+    fallen = _fallen(order, core_start, per_subtile(cycles, lists.start), sent, sent_sparse, config.pixels_per_vru)
     down = np.repeat(fallen, np.diff(lists.start))
     return np.where(down, sparse_mask, mask), np.where(down, sparse_cycles, cycles), fallen
 

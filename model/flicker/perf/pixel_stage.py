@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from ..methods.work import SPLITS, Work
-from ..params import CORES, COUNTERS_PER_CORE, VRUS_PER_CHANNEL, RenderConfig, vru_stages
+from ..params import CORES, COUNTERS_PER_CORE, RenderConfig, vru_stages
 from .render_stage import (
     BUSY, DELIVERED, DISCARDED, FINISHED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
     VRU_BUSY, StageCycles,
@@ -210,11 +210,12 @@ def simulate_pixels(
     ports: int = 1, buffers: int = 1, halt: bool = True,
 ) -> StageCycles:
     """Cycles of a frame with pixel masks; `config` gives form and FIFO depth. Counters that have no meaning here are 0."""
+    if config.vrus_per_channel != 2:
+        raise ValueError("single pixels are modelled for two VRUs per channel")
     counters = np.zeros((CORES, COUNTERS_PER_CORE), np.int64)
     end = np.zeros(work.subtiles, np.int64)
     ends = np.zeros(CORES, np.int64)
     blend, last = vru_stages(config.form)
-    assert VRUS_PER_CHANNEL == 2
     _cores(
         work.order, work.core_start, work.start, work.visit_masks(), work.test_cycles, work.pixel_finish, SPLITS[split], latency,
         config.fifo_depth, blend, last + 1, loop, ports, buffers, halt, counters, end, ends,

@@ -22,8 +22,6 @@ from ..params import (
     CORE_COUNTERS,
     CORES,
     COUNTERS_PER_CORE,
-    PIXELS_PER_VRU,
-    VRUS_PER_CHANNEL,
     RenderConfig,
     prtu_latency,
     vru_stages,
@@ -357,17 +355,11 @@ def _cores(order, core_start, start, mask, test_cycles, finish, finish_op, ctu_l
         )
 
 
-def simulate(work: Work, config: RenderConfig, vrus_per_channel: int = VRUS_PER_CHANNEL) -> StageCycles:
-    """Cycles and counters of a frame.
-
-    work: of a method that sends whole mini-tiles (`work.visit` None). vrus_per_channel: 1, 2 (the RTL) or 4; the pixels of a
-    mini-tile are divided among them row by row.
-    """
+def simulate(work: Work, config: RenderConfig) -> StageCycles:
+    """Cycles and counters of a frame. work: of a method that sends whole mini-tiles (`work.visit` None)."""
     if work.visit is not None:
         raise ValueError("the RTL's VRUs visit whole mini-tiles")
-    if vrus_per_channel not in (1, 2, 4):
-        raise ValueError("VRUs per channel: 1, 2 or 4")
-    per_vru = PIXELS_PER_VRU * VRUS_PER_CHANNEL // vrus_per_channel
+    per_vru = config.pixels_per_vru
     finish = np.empty((work.subtiles, 4), np.int64)
     finish_op = np.empty((work.subtiles, 4), np.int64)
     _finish_events(work.pixel_finish, work.start, per_vru, finish, finish_op)
@@ -378,7 +370,7 @@ def simulate(work: Work, config: RenderConfig, vrus_per_channel: int = VRUS_PER_
     _cores(
         work.order, work.core_start, work.start, work.mask, work.test_cycles, finish, finish_op,
         prtu_latency(config.form, config.precision), config.ctu_fifo_depth, config.fifo_depth, blend, last + 1, per_vru,
-        vrus_per_channel, counters, end, ends,
+        config.vrus_per_channel, counters, end, ends,
     )
     cycles = int(ends.max())
     counters[:, _CORE["cycles"]] = cycles

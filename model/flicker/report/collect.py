@@ -263,13 +263,15 @@ def render_config(configuration: Configuration) -> RenderConfig:
     """The rendering stage of a configuration whose method the RTL has, or the RTL's without a test."""
     method = get_method(configuration.method)
     config = method.config or RenderConfig(form=method.form, cat=CatMode.OFF)
-    return config.with_(fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth)
+    return config.with_(
+        fifo_depth=configuration.fifo_depth, ctu_fifo_depth=configuration.ctu_fifo_depth, vrus_per_channel=configuration.vrus_per_channel,
+    )
 
 
 def fifo_sweep(work: Work, configuration: Configuration) -> dict[str, list]:
     """Cycles and CTU stall rate of one configuration's work for every FIFO depth, by the cycle model of the RTL."""
     config = render_config(configuration)
-    stages = [simulate(work, config.with_(fifo_depth=depth), configuration.vrus_per_channel) for depth in FIFO_DEPTHS]
+    stages = [simulate(work, config.with_(fifo_depth=depth)) for depth in FIFO_DEPTHS]
     return {
         "depth": list(FIFO_DEPTHS), "cycles": [s.cycles for s in stages], "stall_rate": [s.stall_rate for s in stages],
         "utilisation": [s.utilisation for s in stages],

@@ -3,10 +3,11 @@ module flk_render_sim_top
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Form         = FORM_FACTORED,
-  parameter int unsigned Precision    = PRECISION_FIXED,
-  parameter int unsigned FifoDepth    = FIFO_DEPTH,
-  parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
+  parameter int unsigned Form           = FORM_FACTORED,
+  parameter int unsigned Precision      = PRECISION_FIXED,
+  parameter int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
+  parameter int unsigned VrusPerChannel = VRUS_PER_CHANNEL  // 1, 2 or 4
 ) (
   input  logic                   clk_i,
   input  logic                   rst_ni,
@@ -32,10 +33,11 @@ module flk_render_sim_top
   end
 
   flk_render_stage #(
-    .Form        (Form),
-    .Precision   (Precision),
-    .FifoDepth   (FifoDepth),
-    .CtuFifoDepth(CtuFifoDepth)
+    .Form          (Form),
+    .Precision     (Precision),
+    .FifoDepth     (FifoDepth),
+    .CtuFifoDepth  (CtuFifoDepth),
+    .VrusPerChannel(VrusPerChannel)
   ) i_stage (
     .clk_i,
     .rst_ni,
