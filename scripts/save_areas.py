@@ -89,9 +89,9 @@ class Cached:
         total["ge"] = total["ge_seq"] + total["ge_comb"]
         return total
 
-    def find(self, u: Unit, ge: float | None) -> str | None:
-        """The newest result of a unit, of the area that area.csv gives where it has the unit."""
-        for key in reversed(self.by_unit.get((u.top, u.parameters), [])):
+    def find(self, u: Unit, ge: float | None, present: set[str]) -> str | None:
+        """A unit's result of the RTL as it is (its key is in `present`), else the newest, of the area that area.csv gives where it has the unit."""
+        for key in sorted(reversed(self.by_unit.get((u.top, u.parameters), [])), key=lambda key: key not in present):
             try:
                 if ge is None or abs(self.total(key)["ge"] - ge) < 0.06:
                     return key
@@ -273,8 +273,14 @@ def main() -> int:
             areas = {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
     rows, missing = [], []
     wanted = units()
+    present = None
+    try:
+        runner = Runner(LIBERTY)
+        present = {runner.add(u.top, dict(u.parameters)) for u in wanted}
+    except FlickerError as error:
+        print(f"save_areas: the RTL cannot be planned: {error}", file=sys.stderr)
     for u in wanted:
-        key = cached.find(u, areas.get((u.name, u.config)))
+        key = cached.find(u, areas.get((u.name, u.config)), present or set())
         if key is None:
             missing.append(f"{u.name} {u.config}")
             continue
@@ -288,13 +294,7 @@ def main() -> int:
             rows.append(synthesise(operator_name(o), text, library))
     rows.append(synthesise("select 8", SELECT, library))
 
-    try:
-        runner = Runner(LIBERTY)
-        present = {runner.add(u.top, dict(u.parameters)) for u in wanted}
-        stale = [row["unit"] for row in rows if row["unit"] != "op" and row["key"] not in present]
-    except FlickerError as error:
-        print(f"save_areas: the RTL cannot be planned: {error}", file=sys.stderr)
-        stale = ["all"]
+    stale = ["all"] if present is None else [row["unit"] for row in rows if row["unit"] != "op" and row["key"] not in present]
     rtl = hashlib.sha256("".join(path.read_text() for path in sorted((FILELIST.parent).rglob("*.sv"))).encode()).hexdigest()[:12]
     note = f"RTL {rtl}" if not stale else f"not of the RTL beside it ({rtl}): {', '.join(sorted(set(stale)))}"
     with TABLE.open("w", newline="") as file:
