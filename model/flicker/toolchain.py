@@ -17,6 +17,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -198,7 +199,7 @@ def verilate(
             log,
         )
         make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
-                f"OPT_FAST={opt}", *_MAKE_FIXES]
+                f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
         _share_runtime(folder, make, log, jobs)
         _run([*make, f"-j{jobs}"], log)
         stamp.touch()
