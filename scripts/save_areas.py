@@ -32,7 +32,7 @@ from flicker.methods.stage import ACCUMULATOR_INT_BITS
 from flicker.params import Form, Precision
 from flicker.synth.liberty import CLOCK_GATE, Library
 from flicker.synth.run import FOLDER, UNITS, Runner
-from flicker.synth.units import PRECISIONS, Unit, all_units, unit
+from flicker.synth.units import PRECISIONS, Unit, all_units, ctu_parameters, unit
 from flicker.toolchain import FILELIST, ROOT
 
 LIBERTY = ROOT / "scripts" / "cells" / "flicker.lib"
@@ -52,7 +52,7 @@ def units() -> list[Unit]:
                 continue
             config = f"{form.name.lower()} {precision.name.lower()}"
             values = {"Form": int(form), "Precision": int(precision)}
-            found += [u for u in (unit("flk_prtu", config, **values, Cols=2, Rows=2), unit("flk_ctu", config, **values, CtuFifoDepth=0))
+            found += [u for u in (unit("flk_prtu", config, **values, Cols=2, Rows=2), unit("flk_ctu", config, **ctu_parameters(form, precision)))
                       if (u.name, u.config) not in have]
     return found
 

@@ -1,12 +1,12 @@
 """Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/synthesis.md).
 
     stage_area("factored", "fixed")                                   # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
-    stage_area("factored", None, vrus=64)                             # no contribution test, 64 VRUs
+    stage_area("factored", None, vrus=64)                             # no contribution test, 64 VRUs of 4 pixels
     stage_area("factored", None, generator=get_method("rows-f8a8").operations, pixels=True)
 
 What is synthesised is added up as the RTL connects it, so that the RTL's own configurations come out as `make synth` has them. The rest
 is an estimate by rules of this file: a mask generator without RTL (sum of its synthesised operators times OVERHEAD), FIFO depths
-between synthesised ones, VRUs with other than eight pixels, pixel masks in the FIFOs.
+between synthesised ones, VRUs with other than 4, 8 or 16 pixels, pixel masks in the FIFOs.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from .errors import FlickerError
 from .methods.leaders import cat_operations
 from .methods.operations import NONE, Op, Operation, Operations
 from .methods.stage import ACCUMULATOR_INT_BITS
-from .params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRUS_PER_CHANNEL, CatMode, Form, Precision, RenderConfig
+from .params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
 from .perf.lane_stage import LaneStage
+from .synth.units import channel_config, vru_config
 from .toolchain import BUILD
 
 TABLE = Path(__file__).with_name("areas.csv")
@@ -135,10 +136,17 @@ def fifo_area(depth: int, width: int = RECORD_BITS) -> float:
 
 
 def vru_area(form: Form | str, pixels: int = PIXELS_PER_VRU) -> float:
-    """A VRU that holds `pixels` pixels. Other numbers than the RTL's eight: estimate, PIXEL_STATE_BITS a pixel at a FIFO's area per bit."""
-    ge = part("vru", _word(form, Form)).ge
+    """A VRU that holds `pixels` pixels. Other numbers than the RTL's 4, 8 and 16: estimate, from the nearest of these by PIXEL_STATE_BITS a pixel at
+    a FIFO's area per bit."""
+    known, vru = vru_part(form, pixels)
     fifo = part("fifo", f"{RECORD_BITS} x 8")
-    return ge + (pixels - PIXELS_PER_VRU) * PIXEL_STATE_BITS * fifo.ge / (8 * RECORD_BITS)
+    return vru.ge + (pixels - known) * PIXEL_STATE_BITS * fifo.ge / (8 * RECORD_BITS)
+
+
+def vru_part(form: Form | str, pixels: int = PIXELS_PER_VRU) -> tuple[int, Part]:
+    """Pixels and part of the synthesised VRU whose number of pixels is nearest."""
+    known = min((MINITILE * MINITILE // count for count in VRU_COUNTS), key=lambda n: abs(n - pixels))
+    return known, part("vru", vru_config(_word(form, Form), known))
 
 
 def ctu_area(form: Form | str, precision: Precision | str, ctu_fifo_depth: int = 0) -> float:
@@ -180,10 +188,11 @@ def stage_parts(
     if rest or per_channel not in (1, 2, 4, 8, 16):
         raise FlickerError(f"area: the number of VRUs must be {channels} times 1, 2, 4, 8 or 16, not {vrus}")
     form = _word(form, Form)
-    vru, fifo16 = part("vru", form).ge, part("fifo", f"{RECORD_BITS} x 16").ge
-    arbiter = part("stream_arbiter", "2 x 67 bit").ge
-    channel, core = part("channel", form).ge, part("rendering_core", form).ge
-    glue = channel - fifo16 - VRUS_PER_CHANNEL * vru - arbiter
+    built = min(per_channel, max(VRU_COUNTS))  # the RTL's channel; more VRUs than that have a small arbiter each
+    config = channel_config(form, built)
+    channel, core = part("channel", config).ge, part("rendering_core", config).ge
+    control = channel - part("fifo", f"{RECORD_BITS} x 16").ge - built * vru_area(form, MINITILE * MINITILE // built)
+    control += (per_channel - built) * part("stream_arbiter", "2 x 67 bit").ge
     width = RECORD_BITS + (PIXEL_MASK_BITS if pixels else 0)
     select = part("op", "select 8").ge if pixels else 0.0
     if generator is None and precision is None:
@@ -197,7 +206,7 @@ def stage_parts(
         "feature FIFOs": channels * fifo_area(fifo_depth, width),
         "mask generators": CORES * masks,
         "counters": CORES * part("perf_counters", "default").ge,
-        "arbiters, control": channels * (glue + arbiter * (per_channel - 1)) + CORES * (core - CHANNELS * channel),
+        "arbiters, control": channels * control + CORES * (core - CHANNELS * channel),
     }
 
 
@@ -261,7 +270,7 @@ def area_table() -> list[tuple[str, dict[str, float]]]:
         ("FLICKER, FP16, factored", stage_parts("factored", "fp16")),
         ("FLICKER as in the paper (`faithful`)", stage_parts("conic", "mixed", ctu_fifo_depth=16)),
         ("no mask generator, 32 VRUs", stage_parts("factored", None)),
-        ("no mask generator, 64 VRUs (estimate)", stage_parts("factored", None, vrus=64)),
+        ("no mask generator, 64 VRUs", stage_parts("factored", None, vrus=64)),
         ("exact rectangle, FP16 with bound (estimate)", estimate("exact")),
         ("exact rectangle, E4M3 (estimate)", estimate("exact-e4m3-factored")),
         ("row intervals, pixel masks (estimate)", estimate("rows")),

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from .area import RECORD_BITS, Part, operator, part, parts, stage_area
+from .area import RECORD_BITS, Part, operator, part, parts, stage_area, vru_part
 from .errors import FlickerError
 from .methods.leaders import cat_operations
 from .methods.operations import Operations
@@ -75,10 +75,11 @@ def clock_pj(load: float) -> float:
     return _swing(load)
 
 
-def vru_pj(form: Form | str) -> float:
-    """pJ of a pixel-Gaussian pair in a VRU, without clocks that always run. One pixel of eight has its state clocked, a record is taken once in eight pairs."""
-    vru = part("vru", _name(form))
-    return switching_pj(vru.load) + clock_pj(vru.clock_gated) / PIXELS_PER_VRU
+def vru_pj(form: Form | str, pixels: int = PIXELS_PER_VRU) -> float:
+    """pJ of a pixel-Gaussian pair in a VRU of `pixels` pixels, without clocks that always run. One of its pixels has its state clocked, a record is
+    taken once in as many pairs."""
+    known, vru = vru_part(form, pixels)
+    return switching_pj(vru.load) + clock_pj(vru.clock_gated) / known
 
 
 def fifo_pj(depth: int, width: int = RECORD_BITS) -> float:
@@ -158,13 +159,14 @@ def stage_energy(
         else:
             pairs = 16 * int((visited != 0).sum(dtype=np.int64))
     pushed = int(stage.core("minitiles_delivered").sum(dtype=np.int64)) if stage is not None else int((visited != 0).sum(dtype=np.int64))
+    vru_pixels = 64 * CORES // vrus
     fifos = vrus if lanes else CORES * CHANNELS
-    mask_bits = 64 * CORES // vrus if lanes else 16
+    mask_bits = vru_pixels if lanes else 16
     width = RECORD_BITS + (mask_bits if work.visit is not None else 0)
     tested = int(stage.core("gaussians_in").sum(dtype=np.int64)) if lanes else int(work.test_cycles.sum(dtype=np.int64))
     no_generator = (precision is None and operations is None) or (operations is not None and not operations.per_element)
     own_ctu = precision is not None and not no_generator
-    free = vrus * part("vru", form).clock_free + CORES * part("perf_counters", "default").clock_free + fifos * _free_fifo(fifo_depth)
+    free = vrus * vru_part(form, vru_pixels)[1].clock_free + CORES * part("perf_counters", "default").clock_free + fifos * _free_fifo(fifo_depth)
     if no_generator:
         masks = 0.0
     elif own_ctu:
@@ -181,7 +183,7 @@ def stage_energy(
         area = stage_area(form, precision if own_ctu else None, fifo_depth, ctu_fifo_depth, vrus, None if own_ctu or no_generator else operations,
                           work.visit is not None)
     picojoules = {
-        "VRUs": pairs * vru_pj(form),
+        "VRUs": pairs * vru_pj(form, vru_pixels),
         "feature FIFOs": pushed * fifo_pj(fifo_depth, width),
         "mask generators": masks,
         "counters, arbiters": control,

@@ -73,6 +73,10 @@ def test_stage_without_generator_and_with_more_vrus():
     more = stage_parts("factored", None, vrus=64)
     assert more["VRUs"] == 64 * vru_area("factored", 4) and none < sum(more.values()) < 2 * none
     assert vru_area("factored", 4) < vru_area("factored", 8) == part("vru", "factored").ge < vru_area("factored", 16)
+    assert vru_area("factored", 2) < vru_area("factored", 4) == part("vru", "factored, 4 pixels").ge
+    for vrus, core in ((16, "factored, 1 VRU"), (64, "factored, 4 VRUs")):
+        cores = sum(stage_parts("factored", None, vrus=vrus).values()) - CORES * part("perf_counters", "default").ge
+        assert cores == pytest.approx(CORES * part("rendering_core", core).ge)
 
 
 def test_generators():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS
+from ..params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, VRUS_PER_CHANNEL
 
 FORMS = {"conic": 0, "factored": 1}
 PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
@@ -40,6 +40,21 @@ class Unit:
 
 def unit(top: str, config: str = "default", **parameters: int) -> Unit:
     return Unit(top, config, tuple(sorted(parameters.items())))
+
+
+def vru_config(form: str, pixels: int) -> str:
+    """Name of a VRU in the tables."""
+    return form if pixels == PIXELS_PER_VRU else f"{form}, {pixels} pixels"
+
+
+def channel_config(form: str, vrus: int) -> str:
+    """Name of a channel, or of a core of such channels, in the tables."""
+    return form if vrus == VRUS_PER_CHANNEL else f"{form}, {vrus} VRU{'s' * (vrus > 1)}"
+
+
+def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, int]:
+    """All parameters of a CTU."""
+    return {"Form": int(form), "Precision": int(precision), "VruCycles": PIXELS_PER_VRU, "CtuFifoDepth": fifo_depth}
 
 
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
@@ -101,6 +116,7 @@ def _cells() -> list[Unit]:
     units += [unit("flk_fifo", f"{FEATURE_BITS} x {depth}", Width=FEATURE_BITS, Depth=depth) for depth in FIFO_DEPTHS]
     units += [
         unit("flk_stream_arbiter", "2 x 67 bit", Inputs=2, Width=67),
+        unit("flk_stream_arbiter", "4 x 66 bit", Inputs=4, Width=66),
         unit("flk_stream_arbiter", "4 x 92 bit", Inputs=4, Width=92),
         unit("flk_compare_exchange", "32+16 bit", KeyWidth=32, PayloadWidth=16),
         unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
@@ -109,22 +125,24 @@ def _cells() -> list[Unit]:
 
 
 def _stage() -> list[Unit]:
-    units = [unit("flk_mmu"), unit("flk_ctu_controller"), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
     for form, f in FORMS.items():
-        units += [
-            unit("flk_vru", form, Form=f),
-            unit("flk_channel", form, Form=f, FifoDepth=16, MiniTile=0),
-            unit("flk_rendering_core", form, Form=f, FifoDepth=16),
-        ]
+        for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
+            pixels = MINITILE * MINITILE // vrus
+            units += [
+                unit("flk_vru", vru_config(form, pixels), Form=f, Pixels=pixels),
+                unit("flk_channel", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MiniTile=0),
+                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus),
+            ]
         for precision, p in PRECISIONS.items():
             config = f"{form} {precision}"
             units += [
                 unit("flk_prtu", config, Form=f, Precision=p, Cols=2, Rows=2),
                 unit("flk_prtu", f"{config}, 1 pixel", Form=f, Precision=p, Cols=1, Rows=1),
-                unit("flk_ctu", config, Form=f, Precision=p, CtuFifoDepth=0),
-                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0),
+                unit("flk_ctu", config, **ctu_parameters(f, p)),
+                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0, VrusPerChannel=VRUS_PER_CHANNEL),
             ]
-    units.append(unit("flk_ctu", "faithful", **{k: v for k, v in FAITHFUL.rtl_parameters().items() if k != "FifoDepth"}))
+    units.append(unit("flk_ctu", "faithful", **ctu_parameters(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth)))
     units.append(unit("flk_render_stage", "faithful", **FAITHFUL.rtl_parameters()))
     return units
 
