@@ -385,10 +385,10 @@ def test_no_miss_on_odd_records(form):
 
 @pytest.mark.parametrize("name", PROVED)
 def test_no_miss_in_demo(name, demo):
-    """Proved methods give the picture of the test switched off."""
+    """Proved methods give the picture of the test switched off, where the VRU is the same."""
     result = run(name, demo)
     assert not missed_pixels(result.lists, result.work.mask, result.work.visit).any()
-    assert np.array_equal(result.image, run(f"no_ctu-{result.method.form.name.lower()}", demo).image)
+    assert result.method.accumulator or np.array_equal(result.image, run(f"no_ctu-{result.method.form.name.lower()}", demo).image)
 
 
 def test_rows_are_tight(demo):
