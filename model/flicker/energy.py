@@ -41,7 +41,7 @@ SOURCES = {
     "INVERTER_FF": "fF of gate capacitance of the unit inverter in 28 nm: 1.7 fF of INV_X1 in the Nangate 45 nm Open Cell Library, times 28/45, rounded down",
     "PARASITIC": "drain capacitance over gate capacitance of a gate; parasitic delay of an inverter = 1 (Sutherland, Sproull, Harris: Logical Effort)",
     "WIRE": "assumption: a net's wire has the capacitance of the pins that it drives; there is no layout",
-    "ACTIVITY": "transitions of a node per operation, glitches included; chosen so that the FP16 multiplier and adder, 0.57 and 0.28 pJ, lie around "
+    "ACTIVITY": "transitions of a node per operation, glitches included; chosen so that the FP16 multiplier and adder, 0.55 and 0.28 pJ, lie around "
                 "published ones: 1.1 and 0.4 pJ of " + _HOROWITZ + ", times 28/45, are 0.68 and 0.25 pJ",
     "LEAKAGE_NW_PER_GE": "assumption: nW a gate equivalent, typical corner, mixed thresholds",
     "CLOCK_HZ": "assumption: 1 GHz, the clock GSCore (ASPLOS 2024) states for 28 nm; turns leakage power into energy",

@@ -139,6 +139,7 @@ def verilate(
     args: Sequence[str] = (),
     cpp: Sequence[Path] = (),
     depends: Sequence[Path] = (),
+    settings: Sequence[Path] = (),
     cflags: str = "",
     ldflags: str = "",
     opt: str = "-O1",
@@ -155,6 +156,7 @@ def verilate(
         parameters: parameters of the top module; strings get quotes.
         args: further arguments of verilator.
         cpp, depends: C++ files compiled in, and files they include (only hashed).
+        settings: Verilator configuration files (.vlt).
         cflags, ldflags, opt: flags of compiler and linker; ``opt`` optimises the model.
         shared: make a shared library (for ctypes) instead of a program.
         kind, name: the build goes to ``build/<kind>/<name>-<hash>``; name defaults to top.
@@ -174,7 +176,8 @@ def verilate(
         options += ["-CFLAGS", cflags]
     if ldflags:
         options += ["-LDFLAGS", ldflags]
-    files = [*sources, *cpp, *(Path(path).resolve() for path in depends)]
+    settings = [Path(path).resolve() for path in settings]
+    files = [*sources, *cpp, *settings, *(Path(path).resolve() for path in depends)]
     contents = [
         part for path in files
         for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())
@@ -195,7 +198,7 @@ def verilate(
         log = folder / "build.log"
         _run(
             ["verilator", "-cc", "--exe", "--prefix", "Vtop", "--top-module", top, "-Mdir", folder,
-             "-o", product.name, *options, *cpp, *sources],
+             "-o", product.name, *options, *settings, *cpp, *sources],
             log,
         )
         make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",

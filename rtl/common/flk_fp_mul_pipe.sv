@@ -80,23 +80,28 @@ module flk_fp_mul_pipe #(
     } normal_t;
     normal_t a, b;
 
-    // 0 becomes any number.
-    function automatic normal_t normalise(logic [ExpBits-1:0] exp, logic [ManBits-1:0] man);
-      normal_t number;
-      number = '{exp: room_t'({1'b0, exp}), man: man};
-      if (exp == '0) begin
-        number = '{exp: room_t'(1) - room_t'(ManBits), man: '0};
-        for (int i = 1; i < ManBits; i++) begin
-          if (man[i]) begin
-            number = '{exp: room_t'(1 + i) - room_t'(ManBits), man: man << (int'(ManBits) - i)};
+    for (genvar k = 0; k < 2; k++) begin : gen_operand
+      logic [ExpBits-1:0] exp;
+      logic [ManBits-1:0] man;
+      normal_t normal;
+
+      assign {exp, man} = (k == 0) ? {a_exp, a_man} : {b_exp, b_man};
+      // 0 becomes any number.
+      always_comb begin
+        normal = '{exp: room_t'({1'b0, exp}), man: man};
+        if (exp == '0) begin
+          normal = '{exp: room_t'(1) - room_t'(ManBits), man: '0};
+          for (int i = 1; i < ManBits; i++) begin
+            if (man[i]) begin
+              normal = '{exp: room_t'(1 + i) - room_t'(ManBits), man: man << (int'(ManBits) - i)};
+            end
           end
         end
       end
-      return number;
-    endfunction
+    end
 
-    assign a = normalise(a_exp, a_man);
-    assign b = normalise(b_exp, b_man);
+    assign a = gen_operand[0].normal;
+    assign b = gen_operand[1].normal;
     // (1 + x) (1 + y) = (1 + x) + y + x y: smaller than the product of the significands.
     assign product = (ProdBits'({1'b1, a.man}) << ManBits) + (ProdBits'(b.man) << ManBits)
                    + ProdBits'(a.man) * ProdBits'(b.man);

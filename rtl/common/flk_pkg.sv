@@ -5,6 +5,12 @@ package flk_pkg;
 
   typedef logic [15:0] fp16_t;
 
+  // Pixel coordinates 0 to 7 in FP16 and E4M3: exact.
+  localparam logic [7:0][15:0] PIXEL_FP16 = {
+    16'h4700, 16'h4600, 16'h4500, 16'h4400, 16'h4200, 16'h4000, 16'h3c00, 16'h0000
+  };
+  localparam logic [7:0][7:0] PIXEL_E4M3 = {8'h4e, 8'h4c, 8'h4a, 8'h48, 8'h44, 8'h40, 8'h38, 8'h00};
+
   // The numbers a VRU needs of one splat.
   typedef struct packed {
     fp16_t red;

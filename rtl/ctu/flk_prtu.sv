@@ -52,25 +52,6 @@ module flk_prtu
 
   typedef logic [QuadBits-1:0] quad_t;
 
-  // Integer 0..7 in a format with at least 3 mantissa bits: exact.
-  function automatic fp16_t pixel_fp16(logic [2:0] p);
-    unique casez (p)
-      3'b000:  return 16'h0000;
-      3'b001:  return 16'h3c00;
-      3'b01?:  return {6'b010000, p[0], 9'b0};
-      default: return {6'b010001, p[1:0], 8'b0};
-    endcase
-  endfunction
-
-  function automatic logic [7:0] pixel_e4m3(logic [2:0] p);
-    unique casez (p)
-      3'b000:  return 8'h00;
-      3'b001:  return 8'h38;
-      3'b01?:  return {5'b01000, p[0], 2'b0};
-      default: return {5'b01001, p[1:0], 1'b0};
-    endcase
-  endfunction
-
   // ---- Differences, converted to the quad format (Alg. 1, line 1) ----------------------------------
 
   quad_t [Cols-1:0] dx_q;
@@ -112,7 +93,7 @@ module flk_prtu
         ) i_d (
           .clk_i,
           .en_i,
-          .a_i  (pixel_e4m3(pixel_q[k])),
+          .a_i  (PIXEL_E4M3[pixel_q[k]]),
           .b_i  ({~mean8_q[7], mean8_q[6:0]}),
           .sum_o(d_q[k])
         );
@@ -182,7 +163,7 @@ module flk_prtu
         ) i_d (
           .clk_i,
           .en_i,
-          .a_i  (pixel_fp16(pixel_q[k])),
+          .a_i  (PIXEL_FP16[pixel_q[k]]),
           .b_i  ({~mean[15], mean[14:0]}),
           .sum_o(d16_q)
         );

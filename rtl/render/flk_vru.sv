@@ -181,16 +181,6 @@ module flk_vru
 
   // ---- Differences ---------------------------------------------------------------------------------------
 
-  // Integer 0..7 in FP16: exact.
-  function automatic fp16_t pixel_fp16(logic [2:0] p);
-    unique casez (p)
-      3'b000:  return 16'h0000;
-      3'b001:  return 16'h3c00;
-      3'b01?:  return {6'b010000, p[0], 9'b0};
-      default: return {6'b010001, p[1:0], 8'b0};
-    endcase
-  endfunction
-
   logic [4:0] place;  // row in the sub-tile, column in the mini-tile
   fp16_t dx_q, dy_q;
 
@@ -199,14 +189,14 @@ module flk_vru
   flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dx (
     .clk_i,
     .en_i (1'b1),
-    .a_i  (pixel_fp16({col_i, place[1:0]})),
+    .a_i  (PIXEL_FP16[{col_i, place[1:0]}]),
     .b_i  ({~mean_x_q[15], mean_x_q[14:0]}),
     .sum_o(dx_q)
   );
   flk_fp_add_pipe #(.Stages(FP16_ADD_STAGES)) i_dy (
     .clk_i,
     .en_i (1'b1),
-    .a_i  (pixel_fp16(place[4:2])),
+    .a_i  (PIXEL_FP16[place[4:2]]),
     .b_i  ({~mean_y_q[15], mean_y_q[14:0]}),
     .sum_o(dy_q)
   );

@@ -26,8 +26,8 @@ from ..methods.work import Work
 from ..params import CHANNELS, CORES, COUNTERS_PER_CORE, MINITILE, SUBTILE, RenderConfig, vru_stages
 from .pixel_stage import GENERATOR_LATENCY
 from .render_stage import (
-    BUSY, DELIVERED, DISCARDED, FINISHED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
-    VRU_BUSY, StageCycles,
+    BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
+    VRU_BUSY, StageCycles, sum_up,
 )
 
 LANES = 8  # VRUs of a core
@@ -276,15 +276,10 @@ def simulate_lanes(work: Work, config: RenderConfig, stage: LaneStage = LaneStag
     pixel = np.array([np.flatnonzero(lane == i) for i in range(lanes)])  # of each bit of a lane's mask
     place = np.array([np.flatnonzero(pixel[lane[p]] == p)[0] for p in range(len(lane))])  # the bit of each pixel
     orders = deal(work)
+    order = np.concatenate(orders)
     core_start = np.concatenate(([0], np.cumsum([len(o) for o in orders])))
     _cores(
-        np.concatenate(orders), core_start, work.start, work.visit_masks(), work.pixel_finish, lane, place, pixel, stage.latency,
+        order, core_start, work.start, work.visit_masks(), work.pixel_finish, lane, place, pixel, stage.latency,
         config.fifo_depth, blend, last + 1, stage.loop, stage.window, stage.width, stage.ports, stage.buffers, counters, end, ends,
     )
-    cycles = int(ends.max())
-    counters[:, 0] = cycles
-    counters[:, IDLE] += cycles - ends
-    ended = (work.pixel_finish < np.diff(work.start)[:, None]).reshape(-1, 4, 16).sum(axis=2)
-    for k in range(CORES):
-        counters[k, N_CORE + FINISHED :: N_CHANNEL] = ended[orders[k]].sum(axis=0)
-    return StageCycles(cycles, counters, end)
+    return sum_up(work, order, core_start, counters, end, ends)

@@ -15,8 +15,8 @@ import numpy as np
 from ..methods.work import SPLITS, Work
 from ..params import CORES, COUNTERS_PER_CORE, RenderConfig, vru_stages
 from .render_stage import (
-    BUSY, DELIVERED, DISCARDED, FINISHED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
-    VRU_BUSY, StageCycles,
+    BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
+    VRU_BUSY, StageCycles, sum_up,
 )
 
 GENERATOR_LATENCY = 16
@@ -220,12 +220,4 @@ def simulate_pixels(
         work.order, work.core_start, work.start, work.visit_masks(), work.test_cycles, work.pixel_finish, SPLITS[split], latency,
         config.fifo_depth, blend, last + 1, loop, ports, buffers, halt, counters, end, ends,
     )
-    cycles = int(ends.max())
-    counters[:, 0] = cycles
-    counters[:, IDLE] += cycles - ends
-    length = np.diff(work.start)
-    ended = (work.pixel_finish < length[:, None]).reshape(-1, 4, 16).sum(axis=2)
-    for k in range(CORES):
-        mine = work.order[work.core_start[k] : work.core_start[k + 1]]
-        counters[k, N_CORE + FINISHED :: N_CHANNEL] = ended[mine].sum(axis=0)
-    return StageCycles(cycles, counters, end)
+    return sum_up(work, work.order, work.core_start, counters, end, ends)

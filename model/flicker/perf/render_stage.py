@@ -355,6 +355,22 @@ def _cores(order, core_start, start, mask, test_cycles, finish, finish_op, ctu_l
         )
 
 
+def sum_up(
+    work: Work, order: np.ndarray, core_start: np.ndarray, counters: np.ndarray, end: np.ndarray, ends: np.ndarray
+) -> StageCycles:
+    """Result of a frame that has run: adds to `counters` what is known at its end (cycles, idle time after a core's last one, pixels finished).
+
+    order, core_start: sub-tiles as the cores took them, as in `Work`; end: of each sub-tile; ends: of each core.
+    """
+    cycles = int(ends.max())
+    counters[:, _CORE["cycles"]] = cycles
+    counters[:, IDLE] += cycles - ends
+    ended = (work.pixel_finish < np.diff(work.start)[:, None]).reshape(-1, CHANNELS, 16).sum(axis=2)
+    for k in range(CORES):
+        counters[k, N_CORE + FINISHED :: N_CHANNEL] = ended[order[core_start[k] : core_start[k + 1]]].sum(axis=0)
+    return StageCycles(cycles, counters, end)
+
+
 def simulate(work: Work, config: RenderConfig) -> StageCycles:
     """Cycles and counters of a frame. work: of a method that sends whole mini-tiles (`work.visit` None)."""
     if work.visit is not None:
@@ -372,12 +388,4 @@ def simulate(work: Work, config: RenderConfig) -> StageCycles:
         prtu_latency(config.form, config.precision), config.ctu_fifo_depth, config.fifo_depth, blend, last + 1, per_vru,
         config.vrus_per_channel, counters, end, ends,
     )
-    cycles = int(ends.max())
-    counters[:, _CORE["cycles"]] = cycles
-    counters[:, IDLE] += cycles - ends
-    length = np.diff(work.start)
-    ended = (work.pixel_finish < length[:, None]).reshape(-1, CHANNELS, 16).sum(axis=2)
-    for k in range(CORES):
-        mine = work.order[work.core_start[k] : work.core_start[k + 1]]
-        counters[k, N_CORE + FINISHED :: N_CHANNEL] = ended[mine].sum(axis=0)
-    return StageCycles(cycles, counters, end)
+    return sum_up(work, work.order, work.core_start, counters, end, ends)
