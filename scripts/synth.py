@@ -25,19 +25,22 @@ DEFAULT = ROOT / "scripts" / "cells" / "flicker.lib"
 
 DOCS = ROOT / "docs" / "synthesis.md"
 MARK = "<!-- written by scripts/synth.py --docs -->\n"
+MARK_OTHER = "<!-- written by scripts/synth.py --liberty FILE --docs -->\n"
 
 
-def write_docs(sheets: list[report.Sheet]) -> None:
-    """Put the tables, the units' last, behind the mark at the end of the docs page."""
-    head = DOCS.read_text().split(MARK)[0]
-    DOCS.write_text(head + MARK + "\n" + "\n".join(sheet.markdown() for sheet in [*sheets[1:], sheets[0]]))
+def write_docs(sheets: list[report.Sheet], *, other: bool) -> None:
+    """Put tables into the docs page, behind their mark: `other`, those of another library, else our own library's, which come last."""
+    head, rest = DOCS.read_text().split(MARK_OTHER)
+    text = "\n" + "\n".join(sheet.markdown() for sheet in sheets)
+    parts = [text + "\n", rest.split(MARK)[1]] if other else [rest.split(MARK)[0], text]
+    DOCS.write_text(head + MARK_OTHER + parts[0] + MARK + parts[1])
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
-    parser.add_argument("--docs", action="store_true", help="write the tables into docs/synthesis.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)
@@ -69,12 +72,17 @@ def main() -> int:
         comparison = report.Comparison(runner, results)
         sheets += comparison.sheets()
         report.write_csv(folder / "area.csv", results)
-        if folder != FOLDER and (sheet := report.against(folder, FOLDER, library)):
-            sheets.append(sheet)
+        beside = report.against(folder, FOLDER, library) if folder != FOLDER else []
+        sheets += beside
         report.write_markdown(folder / "report.md", sheets)
         comparison.chart(folder, library)
         if arguments.docs:
-            write_docs(sheets)
+            if folder == FOLDER:
+                write_docs([*sheets[1:], sheets[0]], other=False)  # the units' table last
+            elif beside:
+                write_docs(beside[:1], other=True)
+            else:
+                raise FlickerError(f"{FOLDER.relative_to(ROOT)}/area.csv: run the default library first")
     for sheet in sheets:
         sheet.print(console)
     console.print(f"synth: {len(units)} rows, {time.monotonic() - started:.0f} s" + (

@@ -270,22 +270,46 @@ def write_markdown(path: Path, sheets: Iterable[Sheet]) -> None:
     path.write_text("\n".join(sheet.markdown() for sheet in sheets))
 
 
-def against(folder: Path, other: Path, library: str) -> Sheet | None:
-    """Ratios between two libraries' area.csv, unit by unit."""
-    if not (other / "area.csv").exists():
+Areas = dict[tuple[str, str], float]
+
+
+def _areas(folder: Path) -> Areas | None:
+    """GE by unit and configuration from a folder's area.csv; None if there is none."""
+    path = folder / "area.csv"
+    if not path.exists():
         return None
+    with path.open() as file:
+        return {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
 
-    def load(path: Path) -> dict[tuple[str, str], float]:
-        with (path / "area.csv").open() as file:
-            return {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
 
-    here, there = load(folder), load(other)
-    rows = []
-    for key in here.keys() & there.keys():
-        rows.append((there[key], key, here[key] / there[key]))
-    return Sheet(
-        f"{library} against the default library",
-        ["unit", "configuration", "GE default", "GE here", "ratio"],
-        [[*key, _ge(base), _ge(base * ratio), f"{ratio:.2f}"] for base, key, ratio in sorted(rows)],
-        "Both in gate equivalents of their own NAND2.",
+def against(folder: Path, other: Path, library: str) -> list[Sheet]:
+    """A library's area.csv beside the default library's: ratios between units first, then every unit. Empty if the default has not been run."""
+    here, there = _areas(folder), _areas(other)
+    if here is None or there is None:
+        return []
+    ratios = {}
+    for form in FORMS:
+        for precision in PRECISIONS:
+            config = f"{form} {precision}"
+            ratios[f"PRTU / 4 ACUs, {config}"] = lambda ge, c=config: ge["prtu", c] / (4 * ge["prtu", f"{c}, 1 pixel"])
+            ratios[f"CTU / 8 VRUs, {config}"] = lambda ge, c=config, f=form: ge["ctu", c] / (8 * ge["vru", f])
+    ratios["CTU / 8 VRUs, faithful"] = lambda ge: ge["ctu", "faithful"] / (8 * ge["vru", "conic"])
+    for precision in PRECISIONS:
+        ratios[f"factored / conic PRTU, {precision}"] = lambda ge, p=precision: ge["prtu", f"factored {p}"] / ge["prtu", f"conic {p}"]
+    ratios["32 VRUs with CTUs / 4 cores of 16 VRUs, factored fixed"] = (
+        lambda ge: ge["render_stage", "factored fixed"] / (4 * ge["rendering_core", "factored, 4 VRUs"])
     )
+    rows = [
+        [name, f"{ratio(there):.1%}", f"{ratio(here):.1%}", f"{ratio(here) / ratio(there) - 1:+.1%}"] for name, ratio in sorted(ratios.items())
+    ]
+    units = sorted((there[key], key) for key in here.keys() & there.keys())
+    return [
+        Sheet(
+            f"Ratios between units: {library} beside the default library", ["ratio", "default", library, "difference"], rows,
+            "Each library in gate equivalents of its own NAND2.",
+        ),
+        Sheet(
+            f"{library} against the default library", ["unit", "configuration", "GE default", "GE here", "ratio"],
+            [[*key, _ge(ge), _ge(here[key]), f"{here[key] / ge:.2f}"] for ge, key in units],
+        ),
+    ]
