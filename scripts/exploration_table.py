@@ -3,7 +3,7 @@
 
     flicker report SCENES... --out build/report && scripts/exploration_table.py [build/report/summary.csv] [--print]
 
-Writes between the markers in docs/exploration.md; --print only prints.
+Writes its parts of docs/exploration.md and README.md; --print only prints.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import csv
 import sys
 from pathlib import Path
 
+import pages
 from flicker.area import lane_stage_parts
 from flicker.errors import FlickerError
 from flicker.evaluate import LANES_METHOD, get_configuration
@@ -20,7 +21,9 @@ from flicker.perf.lane_stage import LaneStage
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "exploration.md"
-BEGIN, END = "<!-- scripts/exploration_table.py -->\n", "<!-- end -->"
+README = ROOT / "README.md"
+NAME = "scripts/exploration_table.py"
+SUMMARY = ("vanilla", "gscore", "no-ctu-64", "faithful", "flicker", "rows-ellipse", "lanes", "lanes-deep", "lanes-64")
 GROUPS = (
     ("rivals and the RTL", ("gscore", "seele", "no-ctu-32", "faithful", "flicker")),
     ("barriers, finished sub-tiles, FIFOs, VRUs", ("flicker-barrier", "flicker-stop", "flicker-fifo-64", "flicker-16", "flicker-64")),
@@ -59,6 +62,21 @@ def explored(views: dict[str, dict[str, dict[str, str]]]) -> str:
             what = get_configuration(name).title
             lines.append(f"| `{name}` | {what} | {'' if area is None else f'{area / 1e6:.2f}'} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def summary(views: dict[str, dict[str, dict[str, str]]]) -> str:
+    """For the README: what this project is about, in few rows."""
+    rows = []
+    for name in SUMMARY:
+        found = [view.get(name) for view in views.values()]
+        first = next((row for row in found if row), None)
+        if first is None:
+            raise FlickerError(f"summary.csv: no row of {name}")
+        rows.append([
+            f"`{name}`", get_configuration(name).title, f"{float(first['area_ge']) / 1e6:.2f}", "model" if first["model_only"] == "True" else "RTL",
+            *("" if row is None else f"{float(row['cycles']) / 1e6:.2f} / {float(row['psnr_db']):.1f} / {float(row['energy_uj']):,.0f}" for row in found),
+        ])
+    return pages.table(["configuration", "what", "MGE", "from", *views], rows)
 
 
 def lanes_that_fit(area: float) -> int:
@@ -101,11 +119,8 @@ def main() -> int:
     if "--print" in sys.argv:
         print(text)
         return 0
-    page = PAGE.read_text()
-    if page.count(BEGIN) != 1 or page.count(END) != 1:
-        raise FlickerError(f"{PAGE}: the markers of this script are not there once")
-    head, rest = page.split(BEGIN)
-    PAGE.write_text(f"{head}{BEGIN}{text}{END}{rest.split(END)[1]}")
+    pages.put(PAGE, NAME, text)
+    pages.put(README, NAME, summary(views))
     return 0
 
 

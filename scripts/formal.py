@@ -28,6 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pages
 from flicker import toolchain
 from flicker.errors import FlickerError
 from rich.console import Console
@@ -40,7 +41,6 @@ PROOFS = FORMAL / "proofs.toml"
 FOLDER = toolchain.BUILD / "formal"
 TOOLS = Path(sys.executable).parent
 DOCS = ROOT / "docs" / "formal.md"
-MARKS = ("<!-- scripts/formal.py --docs -->", "<!-- end -->")
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
@@ -328,14 +328,10 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
 
 
 def write_docs(proofs: list[Proof], pairs: Pairs, jobs: int) -> None:
-    """Put the rows into docs/formal.md, between its two marks."""
-    lines = [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
-    lines += [f"| {' | '.join(row)} |" for row in rows(proofs, pairs)]
+    """Put the rows into docs/formal.md."""
     total = sum(result.seconds for _, result in pairs)
-    lines += ["", f"{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time."]
-    before, rest = DOCS.read_text().split(MARKS[0])
-    after = rest.split(MARKS[1])[1]
-    DOCS.write_text(f"{before}{MARKS[0]}\n" + "\n".join(lines) + f"\n{MARKS[1]}{after}")
+    pages.put(DOCS, "scripts/formal.py --docs", pages.table(COLUMNS, rows(proofs, pairs))
+              + f"\n\n{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time.")
 
 
 def main() -> int:

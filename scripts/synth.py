@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import pages
 from flicker.errors import FlickerError
 from flicker.synth import report
 from flicker.synth.run import FOLDER, Runner
@@ -24,23 +25,19 @@ DEFAULT = ROOT / "scripts" / "cells" / "flicker.lib"
 
 
 DOCS = ROOT / "docs" / "synthesis.md"
-MARK = "<!-- written by scripts/synth.py --docs -->\n"
-MARK_OTHER = "<!-- written by scripts/synth.py --liberty FILE --docs -->\n"
+README = ROOT / "README.md"
 
 
-def write_docs(sheets: list[report.Sheet], *, other: bool) -> None:
-    """Put tables into the docs page, behind their mark: `other`, those of another library, else our own library's, which come last."""
-    head, rest = DOCS.read_text().split(MARK_OTHER)
-    text = "\n" + "\n".join(sheet.markdown() for sheet in sheets)
-    parts = [text + "\n", rest.split(MARK)[1]] if other else [rest.split(MARK)[0], text]
-    DOCS.write_text(head + MARK_OTHER + parts[0] + MARK + parts[1])
+def write_docs(sheets: list[report.Sheet], name: str) -> None:
+    """Put tables into a part of the docs page."""
+    pages.put(DOCS, name, "\n".join(sheet.markdown() for sheet in sheets))
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
-    parser.add_argument("--docs", action="store_true", help="write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md")
+    parser.add_argument("--docs", action="store_true", help="write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md, a summary into README.md")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)
@@ -78,9 +75,10 @@ def main() -> int:
         comparison.chart(folder, library)
         if arguments.docs:
             if folder == FOLDER:
-                write_docs([*sheets[1:], sheets[0]], other=False)  # the units' table last
+                write_docs([*sheets[1:], sheets[0]], "scripts/synth.py --docs")  # the units' table last
+                pages.put(README, "scripts/synth.py --docs", comparison.summary().table())
             elif beside:
-                write_docs(beside[:1], other=True)
+                write_docs(beside[:1], "scripts/synth.py --liberty FILE --docs")
             else:
                 raise FlickerError(f"{FOLDER.relative_to(ROOT)}/area.csv: run the default library first")
     for sheet in sheets:

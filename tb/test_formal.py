@@ -39,6 +39,7 @@ def formal() -> ModuleType:
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
+    sys.path.append(str(SCRIPT.parent))  # its neighbour pages.py
     spec.loader.exec_module(module)
     return module
 

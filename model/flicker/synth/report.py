@@ -48,10 +48,13 @@ class Sheet:
             table.add_row(*row)
         console.print(table)
 
+    def table(self) -> str:
+        """Markdown of heads and rows."""
+        lines = ["| " + " | ".join(self.heads) + " |", "|" + "---|" * len(self.heads)]
+        return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in self.rows]) + "\n"
+
     def markdown(self) -> str:
-        lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|" + "---|" * len(self.heads)]
-        lines += ["| " + " | ".join(row) + " |" for row in self.rows]
-        return "\n".join(lines) + "\n" + (f"\n{self.note}\n" if self.note else "")
+        return f"### {self.title}\n\n{self.table()}" + (f"\n{self.note}\n" if self.note else "")
 
 
 def _ge(value: float) -> str:
@@ -188,6 +191,34 @@ class Comparison:
             f"Estimate: {UM2_PER_GE} um2 per GE, cells only. The paper's numbers are from Design Compiler and a memory compiler; "
             "the other components are not built here.",
         )
+
+    def summary(self) -> Sheet:
+        """For the README: area and longest path of the main units, default and as in the paper."""
+        units = [
+            ("FP16 adder, multiplier (combinational)", ("fp_add", "fp16"), ("fp_mul", "fp16")),
+            ("E4M3 adder, multiplier (combinational)", ("fp_add", "e4m3"), ("fp_mul", "e4m3")),
+            ("PRTU: four leader pixels a cycle, default", ("prtu", "factored fixed")),
+            ("CTU, default", ("ctu", "factored fixed")),
+            ("CTU, `faithful`", ("ctu", "faithful")),
+            ("VRU, default", ("vru", "factored")),
+            ("VRU, `faithful`", ("vru", "conic")),
+            ("rendering core: 8 VRUs, 4 FIFOs of 16, default", ("rendering_core", "factored")),
+            ("rendering stage: 4 cores with CTUs, default", ("render_stage", "factored fixed")),
+            ("rendering stage, `faithful`", ("render_stage", "faithful")),
+        ]
+        rows = []
+        for name, *keys in units:
+            results = [self.by_name[key] for key in keys]
+            rows.append([
+                name, ", ".join(_ge(result["ge"]) for result in results), ", ".join(_ge(result["ff"]) for result in results) if results[0]["ff"] else "",
+                ", ".join(f"{result['fo4']:.0f}" for result in results),
+            ])
+        rows += [
+            ["PRTU / four single-pixel units, default", f"{self.prtu_ratio('factored fixed'):.1%}", "", ""],
+            ["CTU / eight VRUs, default", f"{self.ge('ctu', 'factored fixed') / (8 * self.ge('vru', 'factored')):.1%}", "", ""],
+            ["CTU / eight VRUs, `faithful`", f"{self.ge('ctu', 'faithful') / (8 * self.ge('vru', 'conic')):.1%}", "", ""],
+        ]
+        return Sheet("Area and timing", ["unit", "GE (NAND2 = 1)", "flip-flops", "longest path, FO4"], rows)
 
     def targets(self) -> Sheet:
         clocked = [(result["fo4"], unit.name, unit.config) for unit, result in self.results.items() if result["ff"]]
