@@ -41,6 +41,7 @@ PROOFS = FORMAL / "proofs.toml"
 FOLDER = toolchain.BUILD / "formal"
 TOOLS = Path(sys.executable).parent
 DOCS = ROOT / "docs" / "formal.md"
+PART = "scripts/formal.py --docs"  # of that page
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
@@ -330,7 +331,7 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
 def write_docs(proofs: list[Proof], pairs: Pairs, jobs: int) -> None:
     """Put the rows into docs/formal.md."""
     total = sum(result.seconds for _, result in pairs)
-    pages.put(DOCS, "scripts/formal.py --docs", pages.table(COLUMNS, rows(proofs, pairs))
+    pages.put(DOCS, PART, pages.table(COLUMNS, rows(proofs, pairs))
               + f"\n\n{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time.")
 
 

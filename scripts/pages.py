@@ -10,13 +10,23 @@ from flicker.errors import FlickerError
 END = "<!-- end -->"
 
 
+def _split(page: Path, name: str) -> tuple[str, str, str]:
+    """Text before, in and after a part."""
+    pieces = page.read_text().split(f"<!-- {name} -->\n")
+    if len(pieces) != 2 or END not in pieces[1]:
+        raise FlickerError(f"{page}: not one part <!-- {name} --> ... {END}")
+    return (pieces[0], *pieces[1].split(END, 1))
+
+
+def get(page: Path, name: str) -> str:
+    """The part `name` of a page. Raises FlickerError if it is not there once."""
+    return _split(page, name)[1]
+
+
 def put(page: Path, name: str, text: str) -> None:
     """Replace the part `name` of a page. Raises FlickerError if it is not there once."""
-    begin = f"<!-- {name} -->"
-    pieces = page.read_text().split(begin)
-    if len(pieces) != 2 or END not in pieces[1]:
-        raise FlickerError(f"{page}: not one part {begin} ... {END}")
-    page.write_text(f"{pieces[0]}{begin}\n{text.strip()}\n{END}{pieces[1].split(END, 1)[1]}")
+    before, _, after = _split(page, name)
+    page.write_text(f"{before}<!-- {name} -->\n{text.strip()}\n{END}{after}")
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
