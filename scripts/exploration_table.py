@@ -3,12 +3,13 @@
 
     flicker report SCENES... --out build/report && scripts/exploration_table.py [build/report/summary.csv] [--print]
 
-Writes its parts of docs/exploration.md and README.md; --print only prints.
+Writes its parts of docs/exploration.md and README.md and copies the chart of speed against accuracy; --print only prints.
 """
 
 from __future__ import annotations
 
 import csv
+import shutil
 import sys
 from pathlib import Path
 
@@ -114,13 +115,15 @@ def halves(views: dict[str, dict[str, dict[str, str]]]) -> str:
 
 def main() -> int:
     arguments = [a for a in sys.argv[1:] if a != "--print"]
-    views = read(Path(arguments[0]) if arguments else ROOT / "build" / "report" / "summary.csv")
+    source = Path(arguments[0]) if arguments else ROOT / "build" / "report" / "summary.csv"
+    views = read(source)
     text = f"{explored(views)}\n{halves(views)}"
     if "--print" in sys.argv:
         print(text)
         return 0
     pages.put(PAGE, NAME, text)
     pages.put(README, NAME, summary(views))
+    shutil.copy(source.parent / "figures" / "speed_accuracy.png", ROOT / "docs" / "images")
     return 0
 
 

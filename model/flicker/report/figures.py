@@ -18,8 +18,11 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from matplotlib.colors import LogNorm, Normalize  # noqa: E402
 from matplotlib.figure import Figure as Canvas  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 from ..errors import FlickerError  # noqa: E402
+from ..evaluate import CONFIGURATIONS  # noqa: E402
+from ..methods import get_method  # noqa: E402
 from ..stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
     DENSE, FAITHFUL, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
@@ -411,33 +414,56 @@ def overall(views: Sequence[ViewResult]) -> list[dict]:
     return points
 
 
+def is_bound(name: str) -> bool:
+    """Whether a configuration has its masks for free: what could be had at best, not a design; it is left out of Pareto fronts."""
+    configuration = CONFIGURATIONS.get(name)
+    return configuration is not None and get_method(configuration.method).family == "oracle"
+
+
+# What speed_accuracy draws: label, marker, colour, which points.
+KINDS = (
+    ("RTL exists", "o", COLOURS[0], lambda p: not p["model_only"]),
+    ("model only", "^", COLOURS[1], lambda p: p["model_only"] and not is_bound(p["config"])),
+    ("bound: masks for free", "x", COLOURS[7], lambda p: is_bound(p["config"])),
+)
+NAMED = ("vanilla", "gscore", "no-ctu-32", "no-ctu-64", "faithful", "flicker")  # written beside their points, besides the front's
+
+
 def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
-    """Every configuration a point: speed against accuracy, Pareto fronts per view and over all."""
+    """Every configuration a point: speed against accuracy, Pareto fronts of everything and of what exists as RTL, per view and over all."""
     groups = {v.target.title: list(v.rows.values()) for v in views}
     if len(views) > 1:
         groups["all views"] = overall(views)
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
-    figure, grid = plt.subplots(lines, columns, figsize=(4.6 * columns, 3.4 * lines), layout="constrained", squeeze=False)
+    figure, grid = plt.subplots(lines, columns, figsize=(4.8 * columns, 3.8 * lines), layout="constrained", squeeze=False)
     for a in grid.flat[len(groups) :]:
         a.axis("off")
     rows = []
     for a, (title, points) in zip(grid.flat, groups.items()):
         values = [(float(p["cycles"]), _finite(float(p["psnr_db"]))) for p in points]
-        front = pareto(values)
-        for model_only, marker, label in ((False, "o", "RTL exists"), (True, "^", "model only")):
-            chosen = [v for v, p in zip(values, points) if p["model_only"] == model_only]
-            a.plot([v[0] for v in chosen], [v[1] for v in chosen], marker, color=COLOURS[int(model_only)], markersize=4, alpha=0.8, label=label)
+        for label, marker, colour, choose in KINDS:
+            chosen = [v for v, p in zip(values, points) if choose(p)]
+            a.plot([v[0] for v in chosen], [v[1] for v in chosen], marker, color=colour, markersize=4, alpha=0.8, label=label)
+        built = [i for i, p in enumerate(points) if not is_bound(p["config"])]
+        front = [built[k] for k in pareto([values[i] for i in built])]
+        real = [i for i in built if not points[i]["model_only"]]
+        real_front = [real[k] for k in pareto([values[i] for i in real])]
         a.plot([values[i][0] for i in front], [values[i][1] for i in front], "-", color="black", linewidth=0.8, label="Pareto front")
-        for i in front:
-            a.annotate(points[i]["config"], values[i], fontsize=5, xytext=(3, -7), textcoords="offset points")
-        a.set(xscale="log", xlabel="cycles", ylabel="PSNR against float64, dB", title=title)
-        rows += [[title, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front]
+        a.plot([values[i][0] for i in real_front], [values[i][1] for i in real_front], "-", color=COLOURS[0], linewidth=0.8, label="of the RTL")
+        named = {points[i]["config"]: i for i in built if points[i]["config"] in NAMED} | {points[i]["config"]: i for i in (*front[:1], *front[-1:])}
+        for name, i in named.items():
+            a.annotate(name, values[i], fontsize=6, xytext=(3, 4 if i == front[0] else -7), textcoords="offset points")
+        a.set(xscale="log", xlabel="cycles, millions", ylabel="PSNR against float64, dB", title=title)
+        a.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        a.xaxis.set_major_formatter(FuncFormatter(lambda cycles, _: f"{cycles / 1e6:g}"))
+        a.xaxis.set_minor_formatter(NullFormatter())
+        rows += [[title, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front, i in real_front]
                  for i, p in enumerate(points)]
     grid.flat[0].legend(fontsize=6)
     return Figure(
         "speed_accuracy", "Speed against accuracy", "", "Over all views: geometric mean of cycles and energy, mean of PSNR, SSIM and FLIP.",
-        ["group", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only", "pareto_cycles_psnr"], rows, figure,
+        ["group", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only", "pareto_cycles_psnr", "pareto_of_rtl"], rows, figure,
     )
 
 

@@ -32,7 +32,7 @@ function add(name, attributes, text) {
 }
 function show(n, digits) { return n === null || n === undefined ? "-" : n.toLocaleString("en", { maximumFractionDigits: digits }); }
 function describe(p) {
-  return `${p.config}\n${p.title || ""}\n${p.model_only ? "model only, no RTL" : "RTL exists"}\n\ncycles   ${show(p.cycles, 0)}\nFPS      ${show(p.fps, 0)} at 1 GHz\n` +
+  return `${p.config}\n${p.title || ""}\n${p.bound ? "masks for free: a bound, not a design" : p.model_only ? "model only, no RTL" : "RTL exists"}\n\ncycles   ${show(p.cycles, 0)}\nFPS      ${show(p.fps, 0)} at 1 GHz\n` +
     `PSNR     ${p.psnr_db === null ? "equal" : show(p.psnr_db, 2) + " dB"}\nSSIM     ${show(p.ssim, 5)}\nFLIP     ${show(p.flip, 5)}\narea     ${show(p.area_ge, 0)} GE\nenergy   ${show(p.energy_uj, 1)} uJ`;
 }
 function ticks(low, high, log) {
@@ -69,12 +69,12 @@ function draw() {
   add("text", { x: 14, y: (T + H - B) / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${(T + H - B) / 2})` }, yName + (yUp ? " (more is better)" : " (less is better)"));
   const cost = p => xUp ? -p[xk] : p[xk], gain = p => yUp ? p[yk] : -p[yk];
   let best = -Infinity;
-  const front = [...points].sort((a, b) => cost(a) - cost(b) || gain(b) - gain(a)).filter(p => gain(p) > best && ((best = gain(p)), true));
+  const front = points.filter(p => !p.bound).sort((a, b) => cost(a) - cost(b) || gain(b) - gain(a)).filter(p => gain(p) > best && ((best = gain(p)), true));
   add("polyline", { class: "front", points: front.map(p => `${x.at(p[xk])},${y.at(p[yk])}`).join(" ") });
   front.forEach((p, i) => add("text", { x: x.at(p[xk]) + 6, y: y.at(p[yk]) + (i % 2 ? -6 : 13) }, p.config));
   for (const p of points) {
     const mark = add("circle", { cx: x.at(p[xk]), cy: y.at(p[yk]), r: 5, tabindex: 0, "data-config": p.config,
-      class: "point" + (p.model_only ? " model" : "") + (kept === p.config ? " chosen" : "") });
+      class: "point" + (p.bound ? " bound" : p.model_only ? " model" : "") + (kept === p.config ? " chosen" : "") });
     mark.append(Object.assign(document.createElementNS(NS, "title"), { textContent: describe(p) }));
     const look = () => { read.textContent = describe(p); };
     const rest = () => { const k = points.find(q => q.config === kept); read.textContent = k ? describe(k) : "no point chosen"; };

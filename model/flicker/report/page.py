@@ -11,7 +11,7 @@ from pathlib import Path
 from ..stability.run import BROKEN_ERROR, BROKEN_PSNR, Stability
 from .claims import Verdict
 from .collect import ViewResult
-from .figures import Figure, overall
+from .figures import Figure, is_bound, overall
 
 _MARKS = {"yes": "holds", "no": "does not hold here", "partly": "holds in part", "open": "open"}
 _FOLDER = Path(__file__).resolve().parent
@@ -31,7 +31,9 @@ def _points(views: Sequence[ViewResult]) -> str:
     def plain(value):
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    data = {title: [{k: plain(p[k]) for k in keys} for p in points] for title, points in groups.items()}
+    data = {
+        title: [{k: plain(p[k]) for k in keys} | {"bound": is_bound(p["config"])} for p in points] for title, points in groups.items()
+    }
     return json.dumps(data, default=float).replace("</", "<\\/")
 
 
