@@ -35,8 +35,8 @@ CUT_NATURAL = np.float32(5.6)
 
 
 @numba.njit
-def minitile(f, m, form, state, finished, col, row, e):
-    """Blend one splat into mini-tile m; returns (pairs blended, pixels finished)."""
+def minitile_weights(f, m, form, col, row, e):
+    """Weights E of the 16 pixels of mini-tile m in the VRU's arithmetic; col and row are scratch, float32 (2, 4)."""
     x0 = (m % 2) * MINITILE
     y0 = (m // 2) * MINITILE
     if form == CONIC:
@@ -48,7 +48,6 @@ def minitile(f, m, form, state, finished, col, row, e):
         for j in range(4):
             for i in range(4):
                 e[j * 4 + i] = conic_pixel(col[0, i], row[0, j], col[1, i], row[1, j], f[3], FP16_R)[3]
-        cut = CUT_NATURAL
     else:
         for i in range(4):
             col[0, i] = mul(f[2], sub(np.float32(x0 + i), f[0], FP16_R), FP16_R)
@@ -56,7 +55,13 @@ def minitile(f, m, form, state, finished, col, row, e):
         for j in range(4):
             for i in range(4):
                 e[j * 4 + i] = factored_pixel(col[0, i], row[0, j], row[1, j], FP16_R)[2]
-        cut = CUT_BASE2
+
+
+@numba.njit
+def minitile(f, m, form, state, finished, col, row, e):
+    """Blend one splat into mini-tile m; returns (pairs blended, pixels finished)."""
+    minitile_weights(f, m, form, col, row, e)
+    cut = CUT_NATURAL if form == CONIC else CUT_BASE2
     blended = 0
     ended = 0
     for k in range(16):

@@ -9,12 +9,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..golden.fp import FP16_R, fp16_bits, fp16_value, mul, sub
+from ..golden.fp import FP16_R, fp16_bits, fp16_value, mul
 from ..golden.records import SubtileLists
-from ..golden.render import CUT_BASE2, CUT_NATURAL
+from ..golden.render import CUT_BASE2, CUT_NATURAL, minitile_weights
 from ..golden.vru import ALPHA_MIN, CONIC, TRANSMITTANCE_MIN, alpha_of, blend, next_transmittance
-from ..golden.weight import conic_axis, conic_pixel, factored_pixel, factored_row
-from ..params import MINITILE
 from .thresholds import thresholds
 
 ACCUMULATOR_INT_BITS = 3  # of fixed-point colour accumulators: up to 8
@@ -27,29 +25,6 @@ def load_splat(n, i, gauss, mean, f):
     f[1] = fp16_value(mean[n, 1])
     for k in range(2, 9):
         f[k] = fp16_value(gauss[i, k])
-
-
-@numba.njit
-def minitile_weights(f, m, form, col, row, e):
-    """Weights E of the 16 pixels of mini-tile m in the VRU's arithmetic; col and row are scratch, float32 (2, 4)."""
-    x0 = (m % 2) * MINITILE
-    y0 = (m // 2) * MINITILE
-    if form == CONIC:
-        for i in range(4):
-            col[0, i] = sub(np.float32(x0 + i), f[0], FP16_R)
-            col[1, i] = conic_axis(col[0, i], f[2], FP16_R)[1]
-            row[0, i] = sub(np.float32(y0 + i), f[1], FP16_R)
-            row[1, i] = conic_axis(row[0, i], f[4], FP16_R)[1]
-        for j in range(4):
-            for i in range(4):
-                e[j * 4 + i] = conic_pixel(col[0, i], row[0, j], col[1, i], row[1, j], f[3], FP16_R)[3]
-    else:
-        for i in range(4):
-            col[0, i] = mul(f[2], sub(np.float32(x0 + i), f[0], FP16_R), FP16_R)
-            row[0, i], _, row[1, i] = factored_row(sub(np.float32(y0 + i), f[1], FP16_R), f[3], f[4], FP16_R)
-        for j in range(4):
-            for i in range(4):
-                e[j * 4 + i] = factored_pixel(col[0, i], row[0, j], row[1, j], FP16_R)[2]
 
 
 @numba.njit(inline="always")
