@@ -6,6 +6,7 @@ STAMP  := $(VENV)/.installed
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
+CONFIG ?=
 NETLIST ?=
 LIBERTY ?=
 
@@ -45,8 +46,8 @@ waves: $(STAMP) ## simulate a unit and keep its traces: make waves UNIT=stream_c
 	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
 	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
 
-synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu] [LIBERTY=path]
-	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(LIBERTY),--liberty "$(LIBERTY)")
+synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG="conic fp8"]] [LIBERTY=path]
+	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
 formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))

@@ -37,6 +37,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
+    parser.add_argument("--config", help="only this parameter set of the unit, such as 'factored fixed'")
     parser.add_argument("--docs", action="store_true", help="write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md, a summary into README.md")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
@@ -48,6 +49,13 @@ def main() -> int:
         if not units:
             names = ", ".join(sorted({unit.name for unit in all_units()}))
             raise FlickerError(f"no unit {arguments.unit!r}; there are {names}")
+    if arguments.config is not None:
+        if not arguments.unit:
+            raise FlickerError("--config needs --unit")
+        names = ", ".join(unit.config for unit in units)
+        units = [unit for unit in units if unit.config == arguments.config]
+        if not units:
+            raise FlickerError(f"no parameter set {arguments.config!r} of {arguments.unit}; there are {names}")
     started = time.monotonic()
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console,

@@ -210,3 +210,15 @@ def test_report_of_one_unit() -> None:
     assert result["ff"] == 2
     done = subprocess.run([sys.executable, ROOT / "scripts/synth.py", "--unit", "nothing"], text=True, capture_output=True)
     assert done.returncode == 1 and "no unit 'nothing'" in done.stderr
+
+
+def test_one_parameter_set() -> None:
+    """One row of a unit; a set that does not exist is named beside those that do."""
+    def drive(*arguments: str) -> subprocess.CompletedProcess:
+        return subprocess.run([sys.executable, ROOT / "scripts/synth.py", *arguments], text=True, capture_output=True, cwd=ROOT)
+
+    done = drive("--unit", "fp_cmp", "--config", "e4m3")
+    assert done.returncode == 0 and "synth: 1 rows" in done.stdout and "fp16" not in done.stdout, done.stdout + done.stderr
+    done = drive("--unit", "fp_cmp", "--config", "e9m9")
+    assert done.returncode == 1 and "no parameter set 'e9m9' of fp_cmp; there are fp16, e4m3, e5m2" in done.stderr
+    assert "--config needs --unit" in drive("--config", "e4m3").stderr
