@@ -63,6 +63,9 @@ class Figure:
         writer.writerows([_cell(v) for v in row] for row in self.rows)
         files = {f"{self.name}.csv": text.getvalue().encode()}
         if self.canvas is not None:
+            with plt.rc_context(STYLE):
+                self.canvas.get_layout_engine().execute(self.canvas)
+            self.canvas.set_layout_engine("none")  # laid out once, not for each format
             for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
                 buffer = io.BytesIO()
                 with plt.rc_context(STYLE):
