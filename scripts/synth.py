@@ -43,6 +43,8 @@ def main() -> int:
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)
 
+    if arguments.docs and arguments.unit:
+        raise FlickerError("--docs needs all units")
     units = all_units()
     if arguments.unit:
         units = [unit for unit in units if unit.name == arguments.unit.removeprefix("flk_")]
