@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import pages
+from flicker import markdown
 from flicker.area import lane_stage_parts
 from flicker.errors import FlickerError
 from flicker.evaluate import LANES_METHOD, get_configuration
@@ -77,7 +78,7 @@ def summary(views: dict[str, dict[str, dict[str, str]]]) -> str:
             f"`{name}`", get_configuration(name).title, f"{float(first['area_ge']) / 1e6:.2f}", "model" if first["model_only"] == "True" else "RTL",
             *("" if row is None else f"{float(row['cycles']) / 1e6:.2f} / {float(row['psnr_db']):.1f} / {float(row['energy_uj']):,.0f}" for row in found),
         ])
-    return pages.table(["configuration", "what", "MGE", "from", *views], rows)
+    return markdown.table(["configuration", "what", "MGE", "from", *views], rows)
 
 
 def lanes_that_fit(area: float) -> int:

@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pages
-from flicker import toolchain
+from flicker import markdown, toolchain
 from flicker.errors import FlickerError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -331,7 +331,7 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
 def write_docs(proofs: list[Proof], pairs: Pairs, jobs: int) -> None:
     """Put the rows into docs/formal.md."""
     total = sum(result.seconds for _, result in pairs)
-    pages.put(DOCS, PART, pages.table(COLUMNS, rows(proofs, pairs))
+    pages.put(DOCS, PART, markdown.table(COLUMNS, rows(proofs, pairs))
               + f"\n\n{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time.")
 
 

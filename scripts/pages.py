@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from flicker.errors import FlickerError
@@ -27,8 +26,3 @@ def put(page: Path, name: str, text: str) -> None:
     """Replace the part `name` of a page. Raises FlickerError if it is not there once."""
     before, _, after = _split(page, name)
     page.write_text(f"{before}<!-- {name} -->\n{text.strip()}\n{END}{after}")
-
-
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (heads, ["---"] * len(heads), *rows))

@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 from flicker import metrics
 from flicker.errors import FlickerError
 from flicker.evaluate import evaluate, load_view
-from flicker.report import claims, collect, figures
+from flicker.report import claims, collect, figures, page
 from flicker.report.command import report_app
 from flicker.report.write import SUMMARY, check, write_report
 from flicker.scene import save_ply
@@ -258,6 +258,24 @@ def _view(title: str, **values) -> collect.ViewResult:
     view = collect.ViewResult(collect.Target(Path(f"{title}.ply")), SIZE)
     view.rows = {"a": values}
     return view
+
+
+def test_bounds_stand_in_no_front():
+    """Free masks beat everything here and are in no front; the RTL has its own; the page's points say which they are."""
+    made = {"oracle": (1.0, 90.0, True), "lanes": (2.0, 70.0, True), "flicker": (3.0, 40.0, False), "no-ctu-64": (4.0, 65.0, False), "faithful": (5.0, 30.0, False)}
+    view = _view("one")
+    view.rows = {
+        name: {"config": name, "title": name, "cycles": cycles, "psnr_db": db, "ssim": 1.0, "flip": 0.0, "area_ge": 1.0, "energy_uj": 1.0, "model_only": model}
+        for name, (cycles, db, model) in made.items()
+    }
+    figure = figures.speed_accuracy([view])
+    column = {name: figure.header.index(name) for name in figure.header}
+    fronts = {
+        which: {row[column["config"]] for row in figure.rows if row[column[which]]} for which in ("pareto_cycles_psnr", "pareto_of_rtl")
+    }
+    assert fronts == {"pareto_cycles_psnr": {"lanes"}, "pareto_of_rtl": {"flicker", "no-ctu-64"}}
+    points = json.loads(page._points([view]))["one 0"]
+    assert {p["config"] for p in points if p["bound"]} == {"oracle"}
 
 
 def test_verdicts_are_computed():

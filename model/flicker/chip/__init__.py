@@ -1,5 +1,6 @@
 """Model of the rest of the chip: a proposal with stated assumptions, to which the RTL of these units will be held.
 
-`constants` every number with its source; `clusters` culling; `memory` parameter formats; `lists` sub-tile lists and
-their sorting; `dram` LPDDR4 timing; `frame` the estimate of a whole frame; `command` the `flicker chip` command.
+`constants` every number with its source; `clusters` culling; `memory` parameter formats; `schemes` ways to make
+the sub-tile lists, `lists` building them, `sorting` the sorting unit, `delivery` what the cores take of them, `execute` a scheme
+as a whole; `dram` LPDDR4 timing; `frame` the estimate of a whole frame; `command` the `flicker chip` command.
 """

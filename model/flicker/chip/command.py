@@ -75,7 +75,8 @@ def chip(
     from ..scene import load_scene
     from .constants import constant_table
     from .frame import ChipConfig, frame_estimate, prepare, render_bound, subtile_bound
-    from .lists import RECOMMENDED, SCHEMES, run_scheme
+    from .execute import run_scheme
+    from .schemes import RECOMMENDED, SCHEMES
     from .memory import MemoryFormat
     from .tables import scheme_rows
 

@@ -23,9 +23,12 @@ from ..projection import Projected, project
 from ..scene import Scene
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
+from .delivery import broadcast_cycles, consumed
 from .dram import READ, WRITE, DramConfig, Stream, interleave, simulate
-from .lists import RECOMMENDED, SCHEMES, Addresses, Scheme, SchemeResult, Splats, broadcast_cycles, collect, consumed, run_scheme
+from .execute import Addresses, SchemeResult, run_scheme
+from .lists import Splats, collect
 from .memory import CHUNK, MemoryFormat, layout
+from .schemes import RECOMMENDED, SCHEMES, Scheme
 
 _GEOMETRY_BASE = 0
 _COLOUR_BASE = 1 << 28

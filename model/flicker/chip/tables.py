@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,21 +23,26 @@ from ..cli import parse_size
 from ..demo_scene import demo_cameras, generate
 from ..errors import FlickerError
 from ..golden.render import render_golden
+from ..markdown import table
 from ..params import RenderConfig
 from ..scene import Scene, load_scene
 from .clusters import build_clusters, cull
 from .constants import CLOCK_HZ, DRAM_BYTES_PER_SECOND, constant_table
+from .delivery import broadcast_cycles
 from .dram import DramConfig, simulate
+from .execute import SchemeResult, run_scheme
 from .frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare, render_bound, subtile_bound
-from .lists import SCHEMES, Scheme, SchemeResult, broadcast_cycles, collect, run_scheme
+from .lists import collect
 from .memory import MemoryFormat
 from .quality import KEYS, format_quality, key_quality
+from .schemes import SCHEMES, Scheme
 
 VIEWS = (
     ("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1),
     ("stpeter", "st-peter.sog", 0),
 )
 PEAK = DRAM_BYTES_PER_SECOND / CLOCK_HZ  # bytes a cycle
+_table = partial(table, numbers=True)
 CLUSTER_SIZES = (32, 64, 128, 256, 512, 1024)
 
 Rows = list[tuple[str, ...]]
@@ -62,11 +68,6 @@ def scheme_rows(results: Sequence[SchemeResult] | None) -> Rows:
             f"{sum(r.on_chip.values()) / 1024:.0f}",
         ))
     return rows
-
-
-def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
-    return "\n".join("| " + " | ".join(r) + " |" for r in (header, ["---"] + ["---:"] * (len(header) - 1), *rows))
 
 
 def _views(folder: Path | None, size: tuple[int, int]) -> Iterator[tuple[str, Scene, Camera]]:
@@ -203,20 +204,20 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
         for kind, bits, value in key_quality(p.projected, camera):
             keys[kind, bits].append(_decibel(value))
     return {
-        "counts": markdown(("view", "Gaussians", "visible", "records", "sub-tile entries", "tile entries", "sub-tile, tight boxes",
-                            "tile, tight boxes", "sub-tile entries needed", "cut by early stop"), counts),
-        "culling": markdown(("view", "cluster", "clusters", "kept", "members read, box", "members read, sphere", "visible",
-                             "headers KB"), culls),
-        "frames": markdown(("view", "memory", "MB", "preprocess", "lists and sort", "render (bound)", "DRAM preprocess", "DRAM render",
-                            "bottleneck", "FPS", "FPS, no overlap"), frames),
-        "traffic": markdown(("view", "purpose", "used MB", "moved MB", "DRAM cycles alone", "efficiency"), purposes),
-        "schemes": markdown(("view", *scheme_rows(None)), schemes),
-        "variations": markdown(("view", "variation", "list MB", "record MB", "DRAM cycles", "sort", "chain", "on chip KB"), variations),
-        "broadcast": markdown(("view", "independent cores", "barrier after each tile", *(f"queues of {d}" for d in _DEPTHS)), broadcasts),
-        "formats": markdown(("view", "format", "MB", "bytes a Gaussian", "float64, dB", "golden, dB"), formats),
-        "keys": markdown(("key", "bits", *titles), [(kind, str(bits), *values) for (kind, bits), values in keys.items()]),
-        "dram": markdown(("access", "efficiency", "activates a burst"), _dram_rows()),
-        "constants": markdown(("constant", "value", "source"), [(f"`{n}`", f"{v:,}", s) for n, v, s in constant_table()]),
+        "counts": _table(("view", "Gaussians", "visible", "records", "sub-tile entries", "tile entries", "sub-tile, tight boxes",
+                          "tile, tight boxes", "sub-tile entries needed", "cut by early stop"), counts),
+        "culling": _table(("view", "cluster", "clusters", "kept", "members read, box", "members read, sphere", "visible",
+                           "headers KB"), culls),
+        "frames": _table(("view", "memory", "MB", "preprocess", "lists and sort", "render (bound)", "DRAM preprocess", "DRAM render",
+                          "bottleneck", "FPS", "FPS, no overlap"), frames),
+        "traffic": _table(("view", "purpose", "used MB", "moved MB", "DRAM cycles alone", "efficiency"), purposes),
+        "schemes": _table(("view", *scheme_rows(None)), schemes),
+        "variations": _table(("view", "variation", "list MB", "record MB", "DRAM cycles", "sort", "chain", "on chip KB"), variations),
+        "broadcast": _table(("view", "independent cores", "barrier after each tile", *(f"queues of {d}" for d in _DEPTHS)), broadcasts),
+        "formats": _table(("view", "format", "MB", "bytes a Gaussian", "float64, dB", "golden, dB"), formats),
+        "keys": _table(("key", "bits", *titles), [(kind, str(bits), *values) for (kind, bits), values in keys.items()]),
+        "dram": _table(("access", "efficiency", "activates a burst"), _dram_rows()),
+        "constants": _table(("constant", "value", "source"), [(f"`{n}`", f"{v:,}", s) for n, v, s in constant_table()]),
     }
 
 

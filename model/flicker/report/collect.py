@@ -16,7 +16,7 @@ import numpy as np
 from ..area import SYNTHESIS
 from ..camera import Camera, find_cameras, load_cameras, select_view
 from ..chip import frame as chip
-from ..chip.lists import run_scheme
+from ..chip.execute import run_scheme
 from ..energy import memory_energy
 from ..errors import FlickerError
 from ..evaluate import CONFIGURATIONS, Configuration, Evaluation, ViewData, evaluate, load_view

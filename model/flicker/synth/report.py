@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from .. import markdown
 from .run import Runner
 from .units import FIFO_DEPTHS, FORMS, PRECISIONS, Unit, channel_config, vru_config
 
@@ -28,6 +29,7 @@ PAPER = {
 CSV_COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "ff", "fo4")
 
 Results = dict[Unit, dict]
+Areas = dict[tuple[str, str], float]  # GE by unit and configuration
 
 
 @dataclass
@@ -50,8 +52,7 @@ class Sheet:
 
     def table(self) -> str:
         """Markdown of heads and rows."""
-        lines = ["| " + " | ".join(self.heads) + " |", "|" + "---|" * len(self.heads)]
-        return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in self.rows]) + "\n"
+        return markdown.table(self.heads, self.rows) + "\n"
 
     def markdown(self) -> str:
         return f"### {self.title}\n\n{self.table()}" + (f"\n{self.note}\n" if self.note else "")
@@ -83,6 +84,17 @@ def units_sheet(results: Results, library: str) -> Sheet:
     )
 
 
+def prtu_ratio(areas: Areas, config: str) -> float:
+    """A PRTU over four single-pixel units."""
+    return areas["prtu", config] / (4 * areas["prtu", f"{config}, 1 pixel"])
+
+
+def ctu_ratio(areas: Areas, config: str) -> float:
+    """A CTU over the eight VRUs of its core."""
+    form = "conic" if config == "faithful" else config.split()[0]
+    return areas["ctu", config] / (8 * areas["vru", form])
+
+
 class Comparison:
     """Results by module and parameters, and the comparisons made of them."""
 
@@ -90,8 +102,10 @@ class Comparison:
         self.runner, self.results = runner, results
         self.by_name = {(unit.name, unit.config): result for unit, result in results.items()}
 
+        self.areas: Areas = {key: result["ge"] for key, result in self.by_name.items()}
+
     def ge(self, name: str, config: str) -> float:
-        return self.by_name[name, config]["ge"]
+        return self.areas[name, config]
 
     def parts(self, key: str, factor: int = 1) -> Counter:
         """GE of a unit by module, its own glue included."""
@@ -101,17 +115,13 @@ class Comparison:
             parts += self.parts(child, factor * count)
         return parts
 
-    def prtu_ratio(self, config: str) -> float:
-        """A PRTU over four single-pixel units."""
-        return self.ge("prtu", config) / (4 * self.ge("prtu", f"{config}, 1 pixel"))
-
     def prtu(self) -> Sheet:
         rows = []
         for form in FORMS:
             for precision in PRECISIONS:
                 config = f"{form} {precision}"
                 acus = 4 * self.ge("prtu", f"{config}, 1 pixel")
-                rows.append([form, precision, _ge(self.ge("prtu", config)), _ge(acus), f"{self.prtu_ratio(config):.1%}"])
+                rows.append([form, precision, _ge(self.ge("prtu", config)), _ge(acus), f"{prtu_ratio(self.areas, config):.1%}"])
         return Sheet(
             "PRTU and four single-pixel units (ACUs)", ["form", "precision", "PRTU", "4 ACUs", "ratio"], rows,
             "The same RTL with two columns and rows, and with one; the same precision and throughput. Logarithm of the opacity and conversion of "
@@ -126,7 +136,7 @@ class Comparison:
             parts = self.parts(self.by_name["ctu", config]["key"])
             rows.append([
                 config, _ge(ctu), _ge(parts["prtu"]), _ge(parts["log_opacity_pipe"]), _ge(parts["ctu_controller"]),
-                _ge(parts["fifo"]), _ge(parts["ctu"] + parts["mmu"]), _ge(vrus), f"{ctu / vrus:.1%}",
+                _ge(parts["fifo"]), _ge(parts["ctu"] + parts["mmu"]), _ge(vrus), f"{ctu_ratio(self.areas, config):.1%}",
             ])
         return Sheet(
             "CTU and the eight VRUs of its core",
@@ -214,18 +224,17 @@ class Comparison:
                 ", ".join(f"{result['fo4']:.0f}" for result in results),
             ])
         rows += [
-            ["PRTU / four single-pixel units, default", f"{self.prtu_ratio('factored fixed'):.1%}", "", ""],
-            ["CTU / eight VRUs, default", f"{self.ge('ctu', 'factored fixed') / (8 * self.ge('vru', 'factored')):.1%}", "", ""],
-            ["CTU / eight VRUs, `faithful`", f"{self.ge('ctu', 'faithful') / (8 * self.ge('vru', 'conic')):.1%}", "", ""],
+            ["PRTU / four single-pixel units, default", f"{prtu_ratio(self.areas, 'factored fixed'):.1%}", "", ""],
+            ["CTU / eight VRUs, default", f"{ctu_ratio(self.areas, 'factored fixed'):.1%}", "", ""],
+            ["CTU / eight VRUs, `faithful`", f"{ctu_ratio(self.areas, 'faithful'):.1%}", "", ""],
         ]
         return Sheet("Area and timing", ["unit", "GE (NAND2 = 1)", "flip-flops", "longest path, FO4"], rows)
 
     def targets(self) -> Sheet:
         clocked = [(result["fo4"], unit.name, unit.config) for unit, result in self.results.items() if result["ff"]]
         worst = max(clocked)
-        ratio = max((self.prtu_ratio(f"{f} {p}"), f"{f} {p}") for f in FORMS for p in PRECISIONS)
-        default = self.prtu_ratio("factored fixed")
-        vrus = {form: 8 * self.ge("vru", form) for form in FORMS}
+        ratio = max((prtu_ratio(self.areas, f"{f} {p}"), f"{f} {p}") for f in FORMS for p in PRECISIONS)
+        default = prtu_ratio(self.areas, "factored fixed")
         forms = max(self.ge("prtu", f"factored {p}") / self.ge("prtu", f"conic {p}") for p in PRECISIONS)
         goals = [
             ("FP16 adder, GE", 800, self.ge("fp_add", "fp16"), "{:.0f}"),
@@ -234,8 +243,8 @@ class Comparison:
             ("E4M3 multiplier, GE", 250, self.ge("fp_mul", "e4m3"), "{:.0f}"),
             ("PRTU / 4 ACUs, default (factored fixed)", 0.6, default, "{:.1%}"),
             (f"PRTU / 4 ACUs, worst ({ratio[1]})", 0.6, ratio[0], "{:.1%}"),
-            ("CTU / 8 VRUs, default (factored fixed)", 0.1, self.ge("ctu", "factored fixed") / vrus["factored"], "{:.1%}"),
-            ("CTU / 8 VRUs, conic mixed", 0.1, self.ge("ctu", "conic mixed") / vrus["conic"], "{:.1%}"),
+            ("CTU / 8 VRUs, default (factored fixed)", 0.1, ctu_ratio(self.areas, "factored fixed"), "{:.1%}"),
+            ("CTU / 8 VRUs, conic mixed", 0.1, ctu_ratio(self.areas, "conic mixed"), "{:.1%}"),
             ("factored / conic PRTU, worst", 1.0, forms, "{:.1%}"),
             (f"longest path of a unit with registers, FO4 ({worst[1]} {worst[2]})", 60, worst[0], "{:.0f}"),
         ]
@@ -301,9 +310,6 @@ def write_markdown(path: Path, sheets: Iterable[Sheet]) -> None:
     path.write_text("\n".join(sheet.markdown() for sheet in sheets))
 
 
-Areas = dict[tuple[str, str], float]
-
-
 def _areas(folder: Path) -> Areas | None:
     """GE by unit and configuration from a folder's area.csv; None if there is none."""
     path = folder / "area.csv"
@@ -322,9 +328,9 @@ def against(folder: Path, other: Path, library: str) -> list[Sheet]:
     for form in FORMS:
         for precision in PRECISIONS:
             config = f"{form} {precision}"
-            ratios[f"PRTU / 4 ACUs, {config}"] = lambda ge, c=config: ge["prtu", c] / (4 * ge["prtu", f"{c}, 1 pixel"])
-            ratios[f"CTU / 8 VRUs, {config}"] = lambda ge, c=config, f=form: ge["ctu", c] / (8 * ge["vru", f])
-    ratios["CTU / 8 VRUs, faithful"] = lambda ge: ge["ctu", "faithful"] / (8 * ge["vru", "conic"])
+            ratios[f"PRTU / 4 ACUs, {config}"] = lambda areas, c=config: prtu_ratio(areas, c)
+            ratios[f"CTU / 8 VRUs, {config}"] = lambda areas, c=config: ctu_ratio(areas, c)
+    ratios["CTU / 8 VRUs, faithful"] = lambda areas: ctu_ratio(areas, "faithful")
     for precision in PRECISIONS:
         ratios[f"factored / conic PRTU, {precision}"] = lambda ge, p=precision: ge["prtu", f"factored {p}"] / ge["prtu", f"conic {p}"]
     ratios["32 VRUs with CTUs / 4 cores of 16 VRUs, factored fixed"] = (
