@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pages
 from flicker import markdown
-from flicker.area import lane_stage_parts
+from flicker.cost.area import lane_stage_parts
 from flicker.errors import FlickerError
-from flicker.evaluate import LANES_METHOD, get_configuration
-from flicker.methods import get_method
+from flicker.explore.evaluate import LANES_METHOD, get_configuration
+from flicker.explore.methods import get_method
 from flicker.perf.lane_stage import LaneStage
 
 ROOT = Path(__file__).resolve().parents[1]

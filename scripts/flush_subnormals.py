@@ -25,7 +25,7 @@ def measure(variant: tuple[str, ...], folder: Path) -> None:
     import numba
     import numpy as np
 
-    from flicker.golden import fp
+    from flicker.arithmetic import fp
 
     def flushed(r: tuple, smallest: float) -> tuple:
         # Adding it leaves units of four smallest normal numbers, so that whatever is below one is rounded to 0.
@@ -44,9 +44,9 @@ def measure(variant: tuple[str, ...], folder: Path) -> None:
     if "e4m3" in variant:
         fp.E4M3_R = flushed(fp.E4M3_R, 2.0**-6)
 
-    from flicker.evaluate import load_view
-    from flicker.methods import run
-    from flicker.metrics import psnr
+    from flicker.explore.evaluate import load_view
+    from flicker.explore.methods import run
+    from flicker.scene.metrics import psnr
 
     for file, view in SCENES:
         data = load_view(folder / file, view)

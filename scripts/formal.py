@@ -29,7 +29,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pages
-from flicker import markdown, toolchain
+from flicker import markdown
+from flicker import toolchain
 from flicker.errors import FlickerError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn

@@ -7,7 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from flicker.demo_scene import write_demo
+from flicker.scene.demo import write_demo
 from flicker.errors import FlickerError
 
 

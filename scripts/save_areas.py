@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes model/flicker/areas.csv: area and switched load of every synthesised unit, for `flicker.area` and `flicker.energy`.
+"""Writes model/flicker/cost/areas.csv: area and switched load of every synthesised unit, for `flicker.cost.area` and `flicker.cost.energy`.
 
     make synth && python scripts/save_areas.py
 
 Units come from the cached results of `make synth` (build/synth); the operators of mask generators that have no RTL (integer products,
-tables, shifters; `flicker.methods.operations`) are synthesised here by the same flow, a second or two each, and cached in build/synth/operators.
+tables, shifters; `flicker.cost.operations`) are synthesised here by the same flow, a second or two each, and cached in build/synth/operators.
 Columns: unit, config; ge, ge_seq, ge_comb (gate equivalents); mem_bits, ff; load: capacitance of all input pins but clock pins, in inputs of
 the unit inverter; clock_free, clock_gated: capacitance of the clock pins that always toggle and of those behind clock gates; key: the cached
 result, whose hash covers the unit's sources. The first line says whether these are of the RTL beside it.
@@ -23,16 +23,16 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-from flicker.area import TABLE, format_bits, operator_name
+from flicker.cost.area import TABLE, format_bits, operator_name
 from flicker.errors import FlickerError
-from flicker.methods.disc import DiscFormat, root_table
-from flicker.methods.operations import Op, Operation
-from flicker.methods.registry import methods
-from flicker.methods.stage import ACCUMULATOR_INT_BITS
+from flicker.explore.generators.disc import DiscFormat, root_table
+from flicker.cost.operations import Op, Operation
+from flicker.explore.methods import methods
+from flicker.golden.masked import ACCUMULATOR_INT_BITS
 from flicker.params import Form, Precision
-from flicker.synth.liberty import CLOCK_GATE, Library
-from flicker.synth.run import FOLDER, UNITS, Runner
-from flicker.synth.units import PRECISIONS, Unit, all_units, ctu_parameters, unit
+from flicker.cost.synth.liberty import CLOCK_GATE, Library
+from flicker.cost.synth.run import FOLDER, UNITS, Runner
+from flicker.cost.synth.units import PRECISIONS, Unit, all_units, ctu_parameters, unit
 from flicker.toolchain import FILELIST, ROOT
 
 LIBERTY = ROOT / "scripts" / "cells" / "flicker.lib"

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pages
 from flicker.errors import FlickerError
-from flicker.synth import report
-from flicker.synth.run import FOLDER, Runner
-from flicker.synth.units import all_units
+from flicker.cost.synth import report
+from flicker.cost.synth.run import FOLDER, Runner
+from flicker.cost.synth.units import all_units
 from flicker.toolchain import ROOT
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from flicker.errors import FlickerError
-from flicker.synth import run
-from flicker.synth.gates import DEFAULT_LIBERTY, cell_models
-from flicker.synth.liberty import Library, to_verilog, truth
-from flicker.synth.timing import Timing
-from flicker.synth.units import all_units, unit
+from flicker.cost.synth import run
+from flicker.cost.synth.gates import DEFAULT_LIBERTY, cell_models
+from flicker.cost.synth.liberty import Library, to_verilog, truth
+from flicker.cost.synth.timing import Timing
+from flicker.cost.synth.units import all_units, unit
 from flicker.toolchain import ROOT, filelist
 
 

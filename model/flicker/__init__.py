@@ -12,8 +12,8 @@ def _compiled_code_folder() -> Path:
     """
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    folders = ("", "golden/", "methods/", "perf/", "chip/")
-    for source in sorted(path for folder in folders for path in here.glob(f"{folder}*.py")):
+    folders = ("arithmetic", "front", "golden", "perf", "explore/generators", "chip")
+    for source in sorted([here / "params.py", *(path for folder in folders for path in here.glob(f"{folder}/*.py"))]):
         digest.update(source.read_bytes())
     return here.parents[1] / "build" / "numba" / digest.hexdigest()[:16]
 

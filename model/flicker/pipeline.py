@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from . import params
-from .camera import Camera
-from .golden.records import build_lists
+from .scene.camera import Camera
+from .front.records import build_lists
 from .golden.render import render_golden
-from .metrics import psnr
+from .scene.metrics import psnr
 from .params import CHANNELS, CORES, RenderConfig
-from .projection import Projected, project
-from .reference import render_reference
-from .scene import Scene
+from .front.projection import Projected, project
+from .front.reference import render_reference
+from .scene.files import Scene
 from .sim.render_stage import build, render_rtl
 
 

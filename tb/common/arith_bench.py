@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flicker.formats import E4M3, E5M2, FP16, FloatFormat
+from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
 from flicker.toolchain import verilate
 
 HERE = Path(__file__).parent

@@ -8,7 +8,7 @@ import cocotb
 import numpy as np
 from cocotb.triggers import Timer
 
-from flicker.formats import E4M3
+from flicker.arithmetic.formats import E4M3
 from flicker.golden.cat import FIXED_SCALE, fixed_mean
 from flicker.params import FIXED_FRAC_BITS, FIXED_INT_BITS
 

@@ -31,14 +31,13 @@ from arith_bench import (
     cross,
     fp16_pairs,
     nearest,
-    specials,
 )
 from flicker_tb.runner import seed
 
-from flicker import functions
+from flicker.arithmetic import functions
 from flicker.errors import FlickerError
-from flicker.formats import E4M3, E5M2, FP16, FloatFormat, fp_add, fp_convert, fp_lt, fp_mul
-from flicker.golden import fp
+from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat, fp_add, fp_convert, fp_lt, fp_mul
+from flicker.arithmetic import fp
 from flicker.toolchain import ROOT, verilate
 
 RANDOM_PAIRS = 1 << 22

@@ -11,8 +11,8 @@ from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 from flicker_tb import splats
 from flicker_tb.bench import PERIOD_NS, config, netlist
 
-from flicker.formats import E4M3, FP16
-from flicker.functions import log_opacity
+from flicker.arithmetic.formats import E4M3, FP16
+from flicker.arithmetic.functions import log_opacity
 from flicker.golden.cat import DENSE_RECTS, SPARSE_RECTS, trace_rect
 from flicker.params import (
     FP8_ADD_STAGES,

@@ -61,7 +61,7 @@ def build(
     if netlist():
         if sources is not None or extra:
             pytest.skip(f"{top}: sources outside rtl/flk.f have no netlist")
-        from flicker.synth.gates import sources as gates
+        from flicker.cost.synth.gates import sources as gates
 
         sources = gates(top, {name: int(value) for name, value in (parameters or {}).items()})
         parameters, args, visible = None, [*args, "-Wno-fatal"], []

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flicker.camera import load_cameras
-from flicker.demo_scene import demo_cameras, generate
-from flicker.golden.records import build_lists
+from flicker.scene.camera import load_cameras
+from flicker.scene.demo import demo_cameras, generate
+from flicker.front.records import build_lists
 from flicker.golden.render import render_golden
-from flicker.methods.registry import View, get_method, method_name, run
-from flicker.methods.registry import cat as contribution_test
+from flicker.explore.methods import View, get_method, method_name, run
+from flicker.explore.methods import cat as contribution_test
 from flicker.params import (
     CHANNEL_COUNTERS,
     CHANNELS,
@@ -36,8 +36,8 @@ from flicker.params import (
     RenderConfig,
 )
 from flicker.perf.render_stage import simulate
-from flicker.projection import project
-from flicker.scene import load_scene
+from flicker.front.projection import project
+from flicker.scene.files import load_scene
 from flicker.sim.render_stage import render_rtl
 
 DEFAULT = RenderConfig()

@@ -6,10 +6,10 @@ import numpy as np
 from flicker_tb.runner import seed
 from scene_samples import random_scene
 
-from flicker.camera import Camera
+from flicker.scene.camera import Camera
 from flicker.chip.frame import Prepared, prepare
 from flicker.params import RenderConfig
-from flicker.scene import Scene
+from flicker.scene.files import Scene
 
 
 def camera(width: int = 96, height: int = 72, distance: float = 3.0, focal: float = 80.0) -> Camera:

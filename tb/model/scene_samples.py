@@ -14,7 +14,7 @@ import gsply
 import imagecodecs
 import numpy as np
 
-from flicker.scene import Scene, save_ply
+from flicker.scene.files import Scene, save_ply
 
 C0 = 0.28209479177387814
 

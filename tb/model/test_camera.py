@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.camera import Camera, find_cameras, load_cameras, orbit_camera, select_view
+from flicker.scene.camera import Camera, find_cameras, load_cameras, orbit_camera, select_view
 from flicker.errors import FlickerError
-from flicker.projection import project
-from flicker.reference import render_with_transmittance
-from flicker.scene import Scene, load_scene, save_ply
+from flicker.front.projection import project
+from flicker.front.reference import render_with_transmittance
+from flicker.scene.files import Scene, load_scene, save_ply
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 

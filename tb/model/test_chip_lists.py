@@ -17,7 +17,7 @@ from flicker.chip.quality import key_quality, resorted
 from flicker.chip.schemes import RECOMMENDED, SCHEMES, Grain, Method, Scheme
 from flicker.chip.sorting import network_latency, quantised_key, sort_lists, unit_cycles
 from flicker.errors import FlickerError
-from flicker.golden.records import build_lists
+from flicker.front.records import build_lists
 from flicker.params import RenderConfig
 
 

@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flicker.demo_scene import write_demo
-from flicker.image import load_png
-from flicker.scene import load_scene, save_ply
+from flicker.scene.demo import write_demo
+from flicker.scene.image import load_png
+from flicker.scene.files import load_scene, save_ply
 
 
 def flicker(*args: object) -> subprocess.CompletedProcess:
     """Run the command."""
-    command = [sys.executable, "-m", "flicker.cli", *map(str, args)]
+    command = [sys.executable, "-m", "flicker.cli.main", *map(str, args)]
     return subprocess.run(command, capture_output=True, text=True)
 
 

@@ -11,12 +11,12 @@ import hashlib
 import numpy as np
 import pytest
 
-from flicker.camera import load_cameras
-from flicker.demo_scene import demo_cameras, generate, write_demo
+from flicker.scene.camera import load_cameras
+from flicker.scene.demo import demo_cameras, generate, write_demo
 from flicker.errors import FlickerError
-from flicker.projection import project
-from flicker.reference import render_with_transmittance
-from flicker.scene import load_scene
+from flicker.front.projection import project
+from flicker.front.reference import render_with_transmittance
+from flicker.scene.files import load_scene
 
 ARRAYS = ("means", "scales", "quats", "opacities", "sh")
 # Of the arrays of generate(1); values lie on a grid of 2^-16. A deliberate change of the scene changes it.

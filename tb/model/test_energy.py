@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 from scene_samples import random_scene
 
-from flicker import area, energy
-from flicker.area import fifo_area, generator_area, part, stage_area, stage_parts, vru_area
-from flicker.camera import orbit_camera
+from flicker.cost import area
+from flicker.cost import energy
+from flicker.cost.area import fifo_area, generator_area, part, stage_area, stage_parts, vru_area
+from flicker.scene.camera import orbit_camera
 from flicker.errors import FlickerError
-from flicker.methods.operations import NONE
-from flicker.methods.registry import View, get_method, methods, run
+from flicker.cost.operations import NONE
+from flicker.explore.methods import View, get_method, methods, run
 from flicker.params import CORES, Form, Precision, RenderConfig
 from flicker.perf.render_stage import simulate
-from flicker.projection import project
+from flicker.front.projection import project
 
 
 @pytest.fixture(autouse=True)

@@ -20,25 +20,25 @@ import pytest
 from flicker_tb import splats
 from flicker_tb.runner import seed
 
-from flicker.camera import load_cameras
-from flicker.demo_scene import demo_cameras, generate
+from flicker.scene.camera import load_cameras
+from flicker.scene.demo import demo_cameras, generate
 from flicker.errors import FlickerError
-from flicker.formats import E4M3, E5M2, FP16
-from flicker.golden.records import SubtileLists
+from flicker.arithmetic.formats import E4M3, E5M2, FP16
+from flicker.front.records import SubtileLists
 from flicker.golden.render import render_golden
 from flicker.golden.vru import ALPHA_MIN, PAIR_FIELDS, alpha_of, pair
-from flicker.methods import View, get_method, methods, missed_pixels, run
-from flicker.methods.disc import DiscFormat, disc_masks, inverse_radius, root_table
-from flicker.methods.exact import exact_masks, margins
-from flicker.methods.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
-from flicker.methods.operations import Op
-from flicker.methods.stage import ACCUMULATOR_INT_BITS, accumulate, pixel_tests
-from flicker.methods.thresholds import radii, thresholds
-from flicker.metrics import psnr
+from flicker.explore.methods import View, get_method, methods, run
+from flicker.explore.generators.disc import DiscFormat, disc_masks, inverse_radius, root_table
+from flicker.explore.generators.exact import exact_masks, margins
+from flicker.explore.generators.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
+from flicker.cost.operations import Op
+from flicker.golden.masked import ACCUMULATOR_INT_BITS, accumulate, missed_pixels, pixel_tests
+from flicker.arithmetic.thresholds import radii, thresholds
+from flicker.scene.metrics import psnr
 from flicker.params import Form
-from flicker.projection import project
-from flicker.reference import render_reference
-from flicker.scene import load_scene
+from flicker.front.projection import project
+from flicker.front.reference import render_reference
+from flicker.scene.files import load_scene
 
 REAL = [("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1), ("stpeter", "st-peter.sog", 0)]
 PROVED = [m.name for m in methods().values() if m.exact and m.family != "oracle"]

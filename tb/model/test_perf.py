@@ -1,4 +1,4 @@
-"""Models of VRUs that visit single pixels and of lanes, and closed forms of `flicker.evaluate`, against the cycle model and by hand.
+"""Models of VRUs that visit single pixels and of lanes, and closed forms of `flicker.explore.evaluate`, against the cycle model and by hand.
 
 The cycle model of the RTL itself is compared with the RTL in tb/frames.
 """
@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flicker.demo_scene import demo_cameras, generate
+from flicker.scene.demo import demo_cameras, generate
 from flicker.errors import FlickerError
-from flicker.evaluate import barrier_cycles, gscore_cycles
-from flicker.methods.registry import View, run
-from flicker.methods.work import Work
+from flicker.explore.evaluate import barrier_cycles, gscore_cycles
+from flicker.explore.methods import View, run
+from flicker.perf.work import Work
 from flicker.params import CatMode, RenderConfig, vru_stages
 from flicker.perf.lane_stage import LaneStage, lane_of_pixel, simulate_lanes
 from flicker.perf.pixel_stage import GENERATOR_LATENCY, simulate_pixels
 from flicker.perf.render_stage import simulate
-from flicker.projection import project
+from flicker.front.projection import project
 
 OFF = RenderConfig(cat=CatMode.OFF)
 

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.camera import Camera, load_cameras
+from flicker.scene.camera import Camera, load_cameras
 from flicker.errors import FlickerError
-from flicker.image import load_png, save_png
-from flicker.metrics import psnr, ssim
-from flicker.projection import project
-from flicker.reference import render_reference, render_with_transmittance
-from flicker.scene import Scene, load_scene
+from flicker.scene.image import load_png, save_png
+from flicker.scene.metrics import psnr, ssim
+from flicker.front.projection import project
+from flicker.front.reference import render_reference, render_with_transmittance
+from flicker.scene.files import Scene, load_scene
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 

@@ -19,13 +19,16 @@ from scene_samples import random_scene
 from scipy.signal import convolve2d
 from typer.testing import CliRunner
 
-from flicker import metrics
+from flicker.scene import metrics
 from flicker.errors import FlickerError
-from flicker.evaluate import evaluate, load_view
-from flicker.report import claims, collect, figures, page
-from flicker.report.command import report_app
+from flicker.explore.evaluate import evaluate, load_view
+from flicker.report import claims
+from flicker.report import collect
+from flicker.report import figures
+from flicker.report import page
+from flicker.cli.main import app
 from flicker.report.write import SUMMARY, check, write_report
-from flicker.scene import save_ply
+from flicker.scene.files import save_ply
 
 SIZE = 160, 90
 NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "lanes"] + [
@@ -356,14 +359,14 @@ def test_bad_input(scene, tmp_path, monkeypatch, arguments, message):
     filled = [re.sub("SCENE|FOLDER|NOTES", lambda m: words[m[0]], a) for a in arguments]
     if "--out" not in filled:
         filled += ["--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(report_app, filled)
+    result = CliRunner().invoke(app, ["report", *filled])
     assert isinstance(result.exception, FlickerError), result.output
     assert message in str(result.exception) and "\n" not in str(result.exception)
 
 
 def test_unwritable_folder(tmp_path, monkeypatch):
     """A folder that cannot be written is found before any work, also one in the way of a file."""
-    monkeypatch.setattr("flicker.stability.write.os.access", lambda *a: False)
+    monkeypatch.setattr("flicker.explore.stability.write.os.access", lambda *a: False)
     with pytest.raises(FlickerError, match="not writable"):
         check([], tmp_path / "out", SIZE, NAMES)
     monkeypatch.undo()

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.camera import orbit_camera
+from flicker.scene.camera import orbit_camera
 from flicker.errors import FlickerError
-from flicker.metrics import psnr
-from flicker.projection import project
-from flicker.reference import render_reference
-from flicker.scene import Scene, load_scene, save_ply
+from flicker.scene.metrics import psnr
+from flicker.front.projection import project
+from flicker.front.reference import render_reference
+from flicker.scene.files import Scene, load_scene, save_ply
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 # Largest error of positions, of the logarithm of scales, of rotation matrices, of opacities, of SH coefficients.

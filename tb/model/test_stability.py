@@ -17,14 +17,14 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from flicker.errors import FlickerError
-from flicker.golden.records import build_lists
-from flicker.methods import View, run
+from flicker.front.records import build_lists
+from flicker.explore.methods import View, run
 from flicker.params import Coords, RenderConfig
-from flicker.stability import BROKEN_PSNR, FAMILIES, Stability, break_table, run_stability, write_csv, write_pictures
-from flicker.stability.command import stability_app
-from flicker.stability.families import SIZE, crop
-from flicker.stability.run import ABSOLUTE, suite_methods
-from flicker.stability.write import check_folder
+from flicker.explore.stability import BROKEN_PSNR, FAMILIES, Stability, break_table, run_stability, write_csv, write_pictures
+from flicker.cli.main import app
+from flicker.explore.stability.families import SIZE, crop
+from flicker.explore.stability.run import ABSOLUTE, suite_methods
+from flicker.explore.stability.write import check_folder
 
 
 @pytest.fixture(scope="module")
@@ -78,9 +78,9 @@ def test_repeatable():
 def test_window_of_a_large_screen():
     """A cropped window has the sub-tile lists of the whole screen, with local and with absolute coordinates."""
     family = FAMILIES["screen"]
-    from flicker.camera import Camera
-    from flicker.projection import project
-    from flicker.stability.families import _scene
+    from flicker.scene.camera import Camera
+    from flicker.front.projection import project
+    from flicker.explore.stability.families import _scene
 
     wide = Camera(1024, 1024, 1024.0, 1024.0, np.zeros(3), np.eye(3))
     rng = np.random.default_rng(seed())
@@ -150,14 +150,14 @@ def test_bad_input(tmp_path):
 def test_command(tmp_path):
     """The sub-command: list, a run with results, a bad family."""
     runner = CliRunner()
-    listing = runner.invoke(stability_app, ["--list"])
+    listing = runner.invoke(app, ["stability", "--list"])
     assert listing.exit_code == 0 and "thin_far" in listing.output and "rows-f8a8" in listing.output
-    done = runner.invoke(stability_app, ["--family", "faint", "--method", "faithful", "--quick", "--out", str(tmp_path / "o")])
+    done = runner.invoke(app, ["stability", "--family", "faint", "--method", "faithful", "--quick", "--out", str(tmp_path / "o")])
     assert done.exit_code == 0, done.output
     table = (tmp_path / "o" / "stability.md").read_text()
     assert "| `flicker-smooth-mixed-conic` |" in table and "| faint | " in table
     assert len((tmp_path / "o" / "stability.csv").read_text().splitlines()) == 4
-    bad = runner.invoke(stability_app, ["--family", "nothing", "--out", str(tmp_path / "o")])
+    bad = runner.invoke(app, ["stability", "--family", "nothing", "--out", str(tmp_path / "o")])
     assert isinstance(bad.exception, FlickerError)
 
 

@@ -17,11 +17,11 @@ import pytest
 from scene_samples import random_scene
 
 from flicker.errors import FlickerError
-from flicker.evaluate import evaluate, load_view
-from flicker.scene import save_ply
-from flicker.sweep import load_results, load_sweep, run_sweep
-from flicker.sweep.results import KEY, plain
-from flicker.sweep.run import connect
+from flicker.explore.evaluate import evaluate, load_view
+from flicker.scene.files import save_ply
+from flicker.explore.sweep import load_results, load_sweep, run_sweep
+from flicker.explore.sweep.results import KEY, plain
+from flicker.explore.sweep.run import connect
 
 CONFIGURATIONS = ["no-ctu-32", "no-ctu-64", "gscore", "oracle", "flicker-*-fp16-factored", "flicker-*-mixed-factored"]
 
@@ -194,11 +194,6 @@ def test_failed_view_keeps_the_others(folder, client):
 
 def test_command_refuses(folder):
     """One line on standard error, exit code 2, no Dask cluster started."""
-    code = (
-        "import sys; from flicker import cli; from flicker.sweep.command import sweep\n"
-        "if 'sweep' not in {c.name for c in cli.app.registered_commands}: cli.app.command('sweep')(sweep)\n"
-        "sys.argv = ['flicker', *sys.argv[1:]]; cli.main()"
-    )
-    run = subprocess.run([sys.executable, "-c", code, "sweep", str(write(folder, scenes=["no.ply"]))], capture_output=True, text=True)
+    run = subprocess.run([sys.executable, "-m", "flicker.cli.main", "sweep", str(write(folder, scenes=["no.ply"]))], capture_output=True, text=True)
     assert run.returncode == 2 and run.stdout == ""
     assert run.stderr.count("\n") == 1 and "no.ply: no such file" in run.stderr

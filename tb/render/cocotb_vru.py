@@ -10,7 +10,7 @@ from flicker_tb.bench import Bench, config, netlist
 from flicker_tb.streams import Monitor, Stream, StreamSink
 from minitile_model import lists, pixel_of
 
-from flicker.formats import FP16
+from flicker.arithmetic.formats import FP16
 from flicker.golden.vru import PAIR_FIELDS, Pixels
 from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, FP16_SUM_STAGES, Form
 

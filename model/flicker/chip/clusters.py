@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..camera import Camera
+from ..scene.camera import Camera
 from ..errors import FlickerError
 from ..params import TILE
-from ..projection import _CLAMP, DILATION, NEAR
-from ..scene import Scene
+from ..front.projection import _CLAMP, DILATION, NEAR
+from ..scene.files import Scene
 from .constants import CLUSTER_SIZE
 
 _RADIUS_MARGIN = 3.0 * np.sqrt(DILATION + np.sqrt(0.1)) + 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..errors import FlickerError
 from ..params import CORES
 from . import constants as c
 from .delivery import fetches, misses, split_by_boxes
-from .dram import READ, WRITE, Stream
+from .dram import READ, WRITE, Stream, simulate
 from .lists import Splats, build, count_entries
 from .schemes import Method, Scheme
 from .sorting import merge_passes, quantised_key, sort_lists
@@ -168,3 +169,25 @@ def run_scheme(
         scheme, sub_start, sub_record, entries, int(count.max(initial=0)), streams, ("list read", "record read"), cycles, front, back,
         on_chip, len(fetched), len(missed), int((sub_count - limit).sum()),
     )
+
+
+def scheme_rows(results: Sequence[SchemeResult] | None) -> list[tuple[str, ...]]:
+    """Results as a table: the header (for None), else one row a scheme."""
+    if results is None:
+        return [("scheme", "entries", "longest", "list MB", "record MB", "other MB", "DRAM cycles", "efficiency", "first pass",
+                "second pass", "sort", "chain", "filter", "hand out", "on chip KB")]
+    rows = []
+    for r in results:
+        mb = {s.name: s.moved_bytes / 1e6 for s in r.streams}
+        alone = [simulate(s.burst, s.kind) for s in r.streams]
+        cycles = sum(a.cycles for a in alone)
+        other = sum(v for k, v in mb.items() if k not in ("list write", "list read", "record read"))
+        second = r.cycles.get("count entries", 0) + r.cycles.get("global sort", 0)
+        rows.append((
+            r.scheme.name, f"{r.entries:,}", f"{r.longest:,}", f"{mb['list write'] + mb['list read']:.1f}", f"{mb['record read']:.1f}",
+            f"{other:.1f}", f"{cycles:,}", f"{r.bytes() / (cycles * c.DRAM_BYTES_PER_SECOND / c.CLOCK_HZ):.0%}" if cycles else "-",
+            f"{r.cycles['emit entries']:,}", f"{second:,}",
+            *(f"{r.cycles.get(k, 0):,}" for k in ("sort", "chain latency", "filter by mask", "hand out records")),
+            f"{sum(r.on_chip.values()) / 1024:.0f}",
+        ))
+    return rows

@@ -14,13 +14,13 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..camera import Camera
+from ..scene.camera import Camera
 from ..errors import FlickerError
-from ..golden.records import SubtileLists, build_lists
+from ..front.records import SubtileLists, build_lists
 from ..golden.render import COUNTS, Frame, render_golden, stream_order
 from ..params import CHANNELS, TILE, RenderConfig
-from ..projection import Projected, project
-from ..scene import Scene
+from ..front.projection import Projected, project
+from ..scene.files import Scene
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
 from .delivery import broadcast_cycles, consumed

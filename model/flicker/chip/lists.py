@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..golden.records import _span
+from ..front.records import _span
 from ..params import ALPHA_MIN, SUBTILE
 from . import constants as c
 from .dram import MASKED_WRITE, WRITE, Stream

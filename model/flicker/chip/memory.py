@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FlickerError
-from ..scene import _SH_C0, Scene
+from ..scene.files import _SH_C0, Scene
 from .constants import CLUSTER_HEADER_BYTES
 
 CHUNK = 256

@@ -6,13 +6,13 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..camera import Camera
-from ..golden.records import build_lists
+from ..scene.camera import Camera
+from ..front.records import build_lists
 from ..golden.render import render_golden
-from ..metrics import psnr
+from ..scene.metrics import psnr
 from ..params import RenderConfig
-from ..projection import Projected, project
-from ..reference import render_reference
+from ..front.projection import Projected, project
+from ..front.reference import render_reference
 from .clusters import build_clusters
 from .constants import CLUSTER_SIZE
 from .memory import MemoryFormat, layout, through_memory

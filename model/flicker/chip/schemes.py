@@ -1,7 +1,7 @@
 """Schemes that make the sorted sub-tile lists.
 
 Input are the visible Gaussians in the order of memory (`collect`): depth key, box of sub-tiles, record number. Every
-scheme ends with the same lists as `golden.records.build_lists` (equal depths in the order of memory); what differs is
+scheme ends with the same lists as `front.records.build_lists` (equal depths in the order of memory); what differs is
 on the way there.
 
 Grain, what one list stands for: a sub-tile; a tile, whose records are broadcast to the four cores with a 4-bit mask;

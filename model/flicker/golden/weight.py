@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numba
 
-from .fp import add, mul
+from ..arithmetic.fp import add, mul
 
 
 @numba.njit(inline="always")

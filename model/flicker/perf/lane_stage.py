@@ -12,7 +12,7 @@ An end-of-sub-tile token moves the eight pixels to one of `buffers` output buffe
 
 Sub-tiles with an empty list are not streamed (the background is theirs). Once all 64 pixels are known to be finished, the input goes on to the
 token. Finished pixels are known as late as in the RTL. A 2-cycle loop is the multiplication of the transmittance in two stages; colours are
-then added in fixed-point accumulators in one (`flicker.methods.stage.accumulate`), for which the RTL's FP16 adders need three.
+then added in fixed-point accumulators in one (`flicker.golden.masked.accumulate`), for which the RTL's FP16 adders need three.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..methods.work import Work
+from .work import Work
 from ..params import CHANNELS, CORES, COUNTERS_PER_CORE, MINITILE, SUBTILE, RenderConfig, vru_stages
 from .pixel_stage import GENERATOR_LATENCY
 from .render_stage import (

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..methods.work import SPLITS, Work
+from .work import SPLITS, Work
 from ..params import CORES, COUNTERS_PER_CORE, RenderConfig, vru_stages
 from .render_stage import (
     BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,

@@ -3,7 +3,7 @@
 Modelled, cycle by cycle: acceptance and stall of the CTU, its pipeline (held, or with output FIFO), the wait of a token for the one before it,
 dispatch with filter of finished mini-tiles, feature FIFOs, issue to the VRUs, the delay after which a finished mini-tile is known, dropping, the
 token's wait for the output buffers, both levels of pixel arbiters. Left out: numbers (masks and finished pixels are
-recorded events, `flicker.methods.work.Work`), stalls from outside, i.e. input is always there and pixels are always taken.
+recorded events, `flicker.perf.work.Work`), stalls from outside, i.e. input is always there and pixels are always taken.
 
 Cores are independent; the frame ends with the last pixel of the last core.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..methods.work import Work
+from .work import Work
 from ..params import (
     CHANNEL_COUNTERS,
     CHANNELS,

@@ -13,20 +13,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ..area import SYNTHESIS
-from ..camera import Camera, find_cameras, load_cameras, select_view
+from ..cost.area import SYNTHESIS
+from ..scene.camera import Camera, find_cameras, load_cameras, select_view
 from ..chip import frame as chip
 from ..chip.execute import run_scheme
-from ..energy import memory_energy
+from ..cost.energy import memory_energy
 from ..errors import FlickerError
-from ..evaluate import CONFIGURATIONS, Configuration, Evaluation, ViewData, evaluate, load_view
-from ..methods import get_method
-from ..methods.work import MINITILE_PIXELS, Work
-from ..metrics import flip_map
+from ..explore.evaluate import CONFIGURATIONS, Configuration, Evaluation, ViewData, evaluate, load_view
+from ..explore.methods import get_method
+from ..perf.work import MINITILE_PIXELS, Work
+from ..scene.metrics import flip_map
 from ..params import CHANNELS, FAITHFUL, MINITILE, SUBTILE, CatMode, RenderConfig
 from ..perf.render_stage import simulate
-from ..projection import Projected
-from ..scene import Scene, load_scene
+from ..front.projection import Projected
+from ..scene.files import Scene, load_scene
 
 TILE_SIZES = (4, 8, 16, 32)
 FIFO_DEPTHS = (1, 2, 4, 8, 16, 32, 64, 128)

@@ -21,9 +21,9 @@ from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 from ..errors import FlickerError  # noqa: E402
-from ..evaluate import CONFIGURATIONS  # noqa: E402
-from ..methods import get_method  # noqa: E402
-from ..stability.run import Stability  # noqa: E402
+from ..explore.evaluate import CONFIGURATIONS  # noqa: E402
+from ..explore.methods import get_method  # noqa: E402
+from ..explore.stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
     DENSE, FAITHFUL, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
     drop, test_loss,

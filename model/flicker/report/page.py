@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..stability.run import BROKEN_ERROR, BROKEN_PSNR, Stability
+from ..explore.stability.run import BROKEN_ERROR, BROKEN_PSNR, Stability
 from .claims import Verdict
 from .collect import ViewResult
 from .figures import Figure, is_bound, overall

@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..area import SYNTHESIS
-from ..camera import Camera
+from ..cost.area import SYNTHESIS
+from ..scene.camera import Camera
 from ..errors import FlickerError
-from ..stability.run import Point, Stability, run_stability
-from ..stability.write import check_folder
+from ..explore.stability.run import Point, Stability, run_stability
+from ..explore.stability.write import check_folder
 from .claims import Verdict, all_verdicts, read_areas
 from .collect import Cache, Target, check_configurations, code_digest, collect, file_digest, known_configurations, parse_target
 from .figures import own_figures, paper_figures, stability_table
@@ -60,7 +60,7 @@ def check(scenes: Sequence[str], folder: Path, size: tuple[int, int], configurat
 
 def _demo(folder: Path, cache: Cache) -> Target:
     """The demo scene in a folder; made when it is not there as its makers in this state left it."""
-    from .. import demo_scene
+    from ..scene import demo as demo_scene
 
     makers = sorted(Path(demo_scene.__file__).parent.glob("*.py"))
     key = cache.key("demo scene", *(file_digest(path) for path in makers))

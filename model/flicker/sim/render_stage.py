@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import params
 from ..errors import FlickerError
-from ..golden.records import SubtileLists
+from ..front.records import SubtileLists
 from ..golden.render import assemble, stream_order
 from ..params import CHANNELS, CORES, RenderConfig
 from ..toolchain import verilate

@@ -1,0 +1,131 @@
+"""`flicker chip`: the model of the rest of the chip on one view of a scene."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from ..errors import FlickerError
+
+console = Console()
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column(columns[0])
+    for name in columns[1:]:
+        table.add_column(name, justify="right")
+    return table
+
+
+def _show_frame(estimate) -> None:
+    table = _table("stages", "stage", "phase", "cycles")
+    for s in estimate.stages:
+        table.add_row(s.name, s.phase, f"{s.cycles:,}")
+    for phase, cycles in zip(("preprocessing", "rendering"), estimate.dram_cycles):
+        table.add_row("DRAM", phase, f"{cycles:,}")
+    console.print(table)
+    table = _table("DRAM traffic", "purpose", "phase", "used MB", "moved MB", "bursts", "cycles alone", "efficiency")
+    for p in estimate.purposes:
+        table.add_row(p.name, p.phase, f"{p.used_bytes / 1e6:.2f}", f"{p.moved_bytes / 1e6:.2f}", f"{p.moved_bytes // 32:,}",
+                      f"{p.dram_cycles:,}", f"{p.efficiency:.1%}")
+    table.add_row("all", "", f"{sum(p.used_bytes for p in estimate.purposes) / 1e6:.2f}", f"{estimate.bytes / 1e6:.2f}",
+                  f"{estimate.bytes // 32:,}", "", "")
+    console.print(table)
+    table = _table("on chip", "buffer", "KB")
+    for name, size in estimate.on_chip.items():
+        table.add_row(name, f"{size / 1024:.1f}")
+    table.add_row("all", f"{sum(estimate.on_chip.values()) / 1024:.1f}")
+    console.print(table)
+    table = _table("counts", "what", "number")
+    for name, number in estimate.counts.items():
+        table.add_row(name, f"{number:,}")
+    console.print(table)
+    console.print(f"interval {estimate.interval_cycles:,} cycles, {estimate.fps:.0f} FPS at 1 GHz; bottleneck: {estimate.bottleneck}")
+    console.print(f"latency  {estimate.latency_cycles:,} cycles, {estimate.latency_fps:.0f} FPS without overlap of frames")
+
+
+def chip(
+    scene: Annotated[Path, typer.Argument(help="scene file")],
+    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration of the rendering stage")] = False,
+    render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: a lower bound]")] = None,
+    memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
+    scheme: Annotated[Optional[str], typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
+    schemes: Annotated[bool, typer.Option("--schemes", help="compare all schemes")] = False,
+    formats: Annotated[bool, typer.Option("--formats", help="picture quality and bytes of the memory formats")] = False,
+    keys: Annotated[bool, typer.Option("--keys", help="picture quality of short depth keys")] = False,
+    constants: Annotated[bool, typer.Option("--constants", help="list the constants with their sources")] = False,
+    out: Annotated[Optional[Path], typer.Option(help="the estimate as JSON")] = None,
+) -> None:
+    """Estimate a whole frame: culling, memory, lists, sorting, rendering."""
+    from ..scene.camera import find_cameras, select_view
+    from .options import parse_size, writable, write_atomically
+    from ..golden.render import render_golden
+    from ..params import FAITHFUL, RenderConfig
+    from ..scene.files import load_scene
+    from ..chip.constants import constant_table
+    from ..chip.frame import ChipConfig, frame_estimate, prepare, render_bound, subtile_bound
+    from ..chip.execute import run_scheme, scheme_rows
+    from ..chip.schemes import RECOMMENDED, SCHEMES
+    from ..chip.memory import MemoryFormat
+
+    scheme = scheme or RECOMMENDED
+    if scheme not in SCHEMES:
+        raise FlickerError(f"--scheme: '{scheme}' is not one of {', '.join(SCHEMES)}")
+    if memory not in [m.value for m in MemoryFormat]:
+        raise FlickerError(f"--memory: '{memory}' is not one of {', '.join(m.value for m in MemoryFormat)}")
+    if render_cycles is not None and render_cycles < 0:
+        raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
+    writable(out, "--out")
+    wanted = parse_size(size)
+    loaded = load_scene(scene)
+    camera = select_view(find_cameras(loaded, cameras), view)
+    if wanted:
+        camera = camera.resized(*wanted)
+    config = FAITHFUL if faithful else RenderConfig()
+    setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
+    prepared = prepare(loaded, camera, config, setting.cluster_size)
+    golden = render_golden(prepared.lists, config)
+    subtile_cycles = subtile_bound(prepared.lists, config, golden)
+    if render_cycles is None:
+        render_cycles = render_bound(prepared.lists, config, golden)
+        console.print("rendering stage: lower bound from the golden model's counts (--render-cycles gives another number)")
+    estimate = frame_estimate(loaded, camera, config, render_cycles, setting, prepared, subtile_cycles=subtile_cycles)
+    console.print(f"{scene.name}, view {view}, {camera.width}x{camera.height}, memory {memory}, scheme {scheme}")
+    _show_frame(estimate)
+    if schemes:
+        table = _table("schemes", *scheme_rows(None)[0])
+        results = [run_scheme(prepared.splats, s, prepared.needed) for s in SCHEMES.values()]
+        for row in scheme_rows(results):
+            table.add_row(*row)
+        console.print(table)
+    if formats:
+        from ..chip.quality import format_quality
+
+        table = _table("memory formats", "format", "MB", "bytes a Gaussian", "float64 dB", "golden dB")
+        for q in format_quality(loaded, camera, config):
+            table.add_row(q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), f"{q.reference_db:.1f}", f"{q.golden_db:.1f}")
+        console.print(table)
+    if keys:
+        from ..chip.quality import key_quality
+
+        table = _table("depth keys", "key", "bits", "dB")
+        for kind, bits, value in key_quality(prepared.projected, camera):
+            table.add_row(kind, str(bits), f"{value:.1f}")
+        console.print(table)
+    if constants:
+        table = _table("constants", "name", "value", "source")
+        for name, value, source in constant_table():
+            table.add_row(name, f"{value:,}", source)
+        console.print(table)
+    if out is not None:
+        text = json.dumps(estimate.as_dict() | {"scene": str(scene), "view": view, "memory": memory, "scheme": scheme}, indent=2)
+        write_atomically(out, lambda path: path.write_text(text + "\n"))

@@ -1,0 +1,67 @@
+"""What the commands share: reading of options, checks of results before any work, progress on the terminal."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from ..errors import FlickerError
+
+console = Console()
+
+
+class RichSteps:
+    """Progress of a run on the terminal (`pipeline.Steps`)."""
+
+    @contextmanager
+    def step(self, text: str) -> Iterator[None]:
+        with Progress(SpinnerColumn(), TextColumn(text), TimeElapsedColumn(), console=console, transient=True,
+                      disable=not console.is_terminal) as p:
+            p.add_task(text, total=None)
+            yield
+
+    @contextmanager
+    def bar(self, text: str):
+        with Progress(TextColumn(text), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn(),
+                      console=console, transient=True, disable=not console.is_terminal) as p:
+            task = p.add_task(text, total=None)
+            yield lambda done, total: p.update(task, completed=done, total=total)
+
+
+def parse_size(text: str | None) -> tuple[int, int] | None:
+    """`WxH` to two integers; the camera checks the range."""
+    if text is None:
+        return None
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
+        raise FlickerError(f"--size: expected WxH such as 1280x720, not '{text}'")
+    return int(parts[0]), int(parts[1])
+
+
+def writable(path: Path | None, option: str) -> None:
+    """Fail before any work when a result could not be written."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise FlickerError(f"{option}: {path} is a folder")
+    if not path.parent.is_dir():
+        raise FlickerError(f"{option}: {path.parent}: no such folder")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise FlickerError(f"{option}: {path}: not writable")
+
+
+def write_atomically(path: Path, write) -> None:
+    """Call write(temporary path), then put the file in place: no partial results."""
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        write(temporary)
+        temporary.replace(path)
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        temporary.unlink(missing_ok=True)

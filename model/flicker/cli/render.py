@@ -1,0 +1,148 @@
+"""`flicker render` and `flicker demo`."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.table import Table
+
+from ..errors import FlickerError
+from ..params import FAITHFUL, MAX_FIFO_DEPTH, CatMode, Coords, Form, Precision, RenderConfig
+from .options import RichSteps, console, parse_size, writable, write_atomically
+
+def _choices(enum: type) -> type[Enum]:
+    """Lower-case string choices of an integer enum."""
+    return Enum(enum.__name__ + "Choice", {m.name: m.name.lower() for m in enum}, type=str)  # type: ignore[return-value]
+
+
+CatChoice = _choices(CatMode)
+FormChoice = _choices(Form)
+PrecisionChoice = _choices(Precision)
+CoordsChoice = _choices(Coords)
+EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
+CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
+
+
+def _number(value) -> str:
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def summary(stats: dict, picture: Path | None) -> Table:
+    """What a run prints at its end."""
+    table = Table(show_header=False, title=f"{Path(stats['scene']).name}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    if picture is not None:
+        table.add_row("picture", str(picture))
+    engine = stats["engine"]
+    if engine != "reference":
+        engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
+    table.add_row("engine", engine)
+    if "psnr_db" in stats:
+        table.add_row("PSNR against float64", "equal" if stats["psnr_db"] is None else f"{stats['psnr_db']:.2f} dB")
+    for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("subtile_pairs", "sub-tile pairs"),
+                       ("minitiles_sent", "mini-tiles sent"), ("cycles", "cycles")):
+        if stats.get(key) is not None:
+            table.add_row(label, _number(stats[key]))
+    for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
+        if key in stats:
+            table.add_row(label, f"{stats[key]:.1%}")
+    if stats.get("simulated_cycles_per_second"):
+        table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
+    for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
+        table.add_row(f"[yellow]{reason}[/yellow]", _number(count))
+    return table
+
+
+def render(
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .splat")],
+    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
+    cat: Annotated[Optional[CatChoice], typer.Option(help="contribution test [default: smooth]")] = None,
+    precision: Annotated[Optional[PrecisionChoice], typer.Option(help="number formats of the contribution test [default: mixed]")] = None,
+    form: Annotated[Optional[FormChoice], typer.Option(help="Gaussian weight in CTU and VRU [default: factored]")] = None,
+    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: 16]")] = None,
+    coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
+    faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration: conic, mixed, smooth, FIFO 16")] = False,
+    compare: Annotated[Optional[CompareChoice], typer.Option(help="report the PSNR against the float64 reference")] = None,
+    out: Annotated[Optional[Path], typer.Option(help="picture (.png)")] = None,
+    stats: Annotated[Optional[Path], typer.Option(help="statistics (.json)")] = None,
+) -> None:
+    """Render one view of a scene."""
+    given = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
+    if faithful and any(v is not None for v in given.values()):
+        names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
+        raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
+    base = FAITHFUL if faithful else RenderConfig()
+    config = base.with_(
+        cat=CatMode[cat.name] if cat else base.cat,
+        precision=Precision[precision.name] if precision else base.precision,
+        form=Form[form.name] if form else base.form,
+        fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
+        coords=Coords[coords.name],
+    )
+    if out is not None and out.suffix.lower() != ".png":
+        raise FlickerError(f"--out: {out}: only .png is written")
+    writable(out, "--out")
+    writable(stats, "--stats")
+    wanted = parse_size(size)
+    steps = RichSteps()
+    with steps.step("starting"):
+        from ..scene.camera import find_cameras, select_view
+        from ..scene.image import save_png
+        from ..pipeline import Engine, render_view
+        from ..scene.files import load_scene
+    with steps.step(f"loading {scene.name}"):
+        loaded = load_scene(scene)
+        camera = select_view(find_cameras(loaded, cameras), view)
+        if wanted:
+            camera = camera.resized(*wanted)
+    result = render_view(loaded, camera, view=view, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
+    if out is not None:
+        write_atomically(out, lambda path: save_png(path, result.image))
+    if stats is not None:
+        write_atomically(stats, lambda path: path.write_text(json.dumps(result.stats, indent=2) + "\n"))
+    console.print(summary(result.stats, out))
+
+
+def demo(
+    size: Annotated[Optional[str], typer.Option(help="WxH [default: 640x360]")] = None,
+    folder: Annotated[Path, typer.Option("--dir", help="where scene, picture and statistics go")] = Path("build/demo"),
+    seed: Annotated[int, typer.Option(help="seed of the scene")] = 1,
+) -> None:
+    """Make the demo scene and render it through the RTL, beside the golden model and the reference."""
+    wanted = parse_size(size)
+    steps = RichSteps()
+    with steps.step("starting"):
+        from ..scene.camera import load_cameras
+        from ..scene.demo import write_demo
+        from ..scene.image import save_png
+        from ..pipeline import Engine, render_view
+        from ..front.projection import project
+        from ..front.reference import render_reference
+        from ..scene.files import load_scene
+    with steps.step(f"making the demo scene (seed {seed})"):
+        scene_path, cameras_path = write_demo(folder, seed)
+    scene = load_scene(scene_path)
+    camera = load_cameras(cameras_path)[0]
+    if wanted:
+        camera = camera.resized(*wanted)
+    with steps.step("rendering the float64 reference (compiling on the first run)"):
+        projected = project(scene, camera)
+        shared = {"compare": True, "projected": projected, "reference": render_reference(projected, camera), "steps": steps}
+    golden = render_view(scene, camera, engine=Engine.GOLDEN, **shared)
+    rtl = render_view(scene, camera, engine=Engine.RTL, **shared)
+    if not (golden.image == rtl.image).all():
+        raise FlickerError("demo: the RTL's picture differs from the golden model's")
+    picture = folder / "demo.png"
+    write_atomically(picture, lambda path: save_png(path, rtl.image))
+    write_atomically(folder / "stats.json", lambda path: path.write_text(json.dumps(rtl.stats, indent=2) + "\n"))
+    table = summary(rtl.stats, picture)
+    table.add_row("golden model", "equal, bit for bit")
+    console.print(table)

@@ -1,0 +1,49 @@
+"""`flicker report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.console import Console
+
+from ..errors import FlickerError
+
+
+
+def report(
+    scenes: Annotated[Optional[list[str]], typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
+    out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures and the cache")] = Path("build/report"),
+    size: Annotated[str, typer.Option(help="WxH of every view")] = "1280x720",
+    configs: Annotated[Optional[str], typer.Option(help="configurations, separated by commas [default: all]")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
+    show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
+) -> None:
+    """Measure every configuration on every view; write tables and figures as one page."""
+    console = Console()
+    with console.status("starting"):
+        from .options import parse_size
+        from ..report.write import check, known_configurations, write_report
+    if show:
+        for c in known_configurations().values():
+            console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
+        return
+    wanted = parse_size(size)
+    names = None if configs is None else [n.strip() for n in configs.split(",")]
+    if names is not None and not all(names):
+        raise FlickerError(f"--configs: an empty name in '{configs}'")
+    job = check(scenes or [], out, wanted, names)
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    with Progress(
+        BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn(), TextColumn("{task.description}"), console=console, transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task("", total=None)
+        written = write_report(job, seed, lambda done, total, text: bar.update(task, completed=done, total=total, description=text))
+    for verdict in written.verdicts:
+        colour = {"yes": "green", "no": "red", "partly": "yellow", "open": "dim"}[verdict.kind]
+        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{verdict.verdict.split(' (')[0].split(', because')[0]}[/{colour}]", soft_wrap=True,
+                      highlight=False)
+    console.print(f"{written.page}, {written.summary}; seed {seed}", soft_wrap=True)

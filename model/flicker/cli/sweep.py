@@ -1,0 +1,77 @@
+"""`flicker sweep`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+TABLE_ROWS = 60  # longer results are in the file only
+
+
+def sweep(
+    config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/sweep.md)")],
+    cluster: Annotated[Optional[str], typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
+    workers: Annotated[Optional[int], typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
+    out: Annotated[Optional[Path], typer.Option(help="folder for results [default: build/sweep]")] = None,
+) -> None:
+    """Run scenes x views x configurations on Dask; results in Parquet, resumed where an earlier run has stopped."""
+    from ..errors import FlickerError
+    from ..explore.sweep.config import load_sweep
+    from ..explore.sweep.run import run_sweep
+
+    if cluster is not None and workers is not None:
+        raise FlickerError("--cluster: has its own workers, so it cannot be combined with --workers")
+    wanted = load_sweep(config)
+    if cluster is not None:
+        wanted = replace(wanted, address=cluster, workers=None)
+    if workers is not None:
+        wanted = replace(wanted, workers=workers, address=None)
+    if out is not None:
+        wanted = replace(wanted, out=out)
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
+        console=console, transient=True, disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task("sweep", total=len(wanted.points))
+
+        def report(done: int, total: int, event: dict) -> None:
+            name = f"{event['row']['scene']} {event['row']['view']}" if event else "sweep"
+            progress.update(task, completed=done, total=total, description=name)
+
+        try:
+            result = run_sweep(wanted, on_point=report)
+        except KeyboardInterrupt:
+            done = int(progress.tasks[task].completed)
+            typer.echo(f"flicker: interrupted; {done} of {len(wanted.points)} points are kept, the next run continues", err=True)
+            raise typer.Exit(130) from None
+    if len(result.rows) <= TABLE_ROWS:
+        console.print(summary(result.rows))
+    note = f", {result.lost} workers lost" if result.lost else ""
+    console.print(f"{wanted.folder / 'results.parquet'}: {len(result.rows)} points, {result.computed} computed, {result.resumed} resumed{note}",
+                  soft_wrap=True)
+
+
+def summary(rows: list[dict]) -> Table:
+    """One row per point."""
+    table = Table()
+    for name, justify in (("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"),
+                          ("SSIM", "right"), ("FLIP", "right"), ("GE", "right"), ("uJ", "right")):
+        table.add_column(name, justify=justify, no_wrap=True)
+
+    def text(value, form: str) -> str:
+        return "" if value is None else format(value, form)
+
+    for row in rows:
+        table.add_row(
+            row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), text(row["psnr_db"], ".2f"), text(row["ssim"], ".4f"),
+            text(row["flip"], ".4f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
+        )
+    return table

@@ -1,0 +1,283 @@
+"""Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/synthesis.md).
+
+    stage_area("factored", "fixed")                                   # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
+    stage_area("factored", None, vrus=64)                             # no contribution test, 64 VRUs of 4 pixels
+    stage_area("factored", None, generator=get_method("rows-f8a8").operations, pixels=True)
+
+What is synthesised is added up as the RTL connects it, so that the RTL's own configurations come out as `make synth` has them. The rest
+is an estimate by rules of this file: a mask generator without RTL (sum of its synthesised operators times OVERHEAD), FIFO depths
+between synthesised ones, VRUs with other than 4, 8 or 16 pixels, pixel masks in the FIFOs.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from ..errors import FlickerError
+from ..explore.generators.leaders import cat_operations
+from .operations import NONE, Op, Operation, Operations
+from ..golden.masked import ACCUMULATOR_INT_BITS
+from ..params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
+from ..perf.lane_stage import LaneStage
+from .synth.units import channel_config, vru_config
+from ..toolchain import BUILD
+
+TABLE = Path(__file__).with_name("areas.csv")
+SYNTHESIS = BUILD / "synth" / "area.csv"
+
+RECORD_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
+PIXEL_MASK_BITS = MINITILE * MINITILE
+# Bits of a VRU's state per pixel: transmittance 15, finished 1, colour 3 x 15, and the output buffer's transmittance and colour.
+OUTPUT_STATE_BITS = 60
+PIXEL_STATE_BITS = 16 + 45 + OUTPUT_STATE_BITS
+MAX_VRUS = CORES * CHANNELS * PIXEL_MASK_BITS
+
+
+@dataclass(frozen=True)
+class Part:
+    """A synthesised unit. ge: gate equivalents. load: capacitance of its input pins without clock pins; clock_free, clock_gated: of
+    the clock pins that always toggle, and of those behind clock gates; all in inputs of the unit inverter."""
+
+    ge: float
+    mem_bits: int = 0
+    ff: int = 0
+    load: float = 0.0
+    clock_free: float = 0.0
+    clock_gated: float = 0.0
+
+
+def _read(path: Path) -> dict[tuple[str, str], dict[str, str]]:
+    with path.open() as file:
+        return {(row["unit"], row["config"]): row for row in csv.DictReader(line for line in file if not line.startswith("#"))}
+
+
+@lru_cache(maxsize=None)
+def parts() -> dict[tuple[str, str], Part]:
+    """Synthesised parts by (unit, configuration): the table of this package, areas replaced by those of `make synth` where it has run."""
+    found = {}
+    for key, row in _read(TABLE).items():
+        found[key] = Part(
+            float(row["ge"]), int(row["mem_bits"]), int(row["ff"]),
+            *(float(row.get(name) or 0) for name in ("load", "clock_free", "clock_gated")),
+        )
+    if SYNTHESIS.exists():
+        for key, row in _read(SYNTHESIS).items():
+            old = found.get(key, Part(0.0))
+            found[key] = Part(float(row["ge"]), int(row["mem_bits"]), int(row["ff"]), old.load, old.clock_free, old.clock_gated)
+    return found
+
+
+def part(unit: str, config: str) -> Part:
+    """A part; FlickerError when it is not synthesised."""
+    found = parts().get((unit, config))
+    if found is None:
+        raise FlickerError(f"area: no synthesised part '{unit} {config}' in {TABLE.name}")
+    return found
+
+
+# ---- names --------------------------------------------------------------------------------------
+
+_FLOATS = {"fp16": (5, 10, 0, 0), "e4m3": (4, 3, 1, 1), "e5m2": (5, 2, 0, 1), "e5m6": (5, 6, 0, 1), "e4m4": (4, 4, 1, 1), "e5m3": (5, 3, 0, 1)}
+
+
+def format_bits(name: str) -> tuple[int, int, int, int] | None:
+    """Exponent bits, mantissa bits, no infinity, saturates of a floating-point format; `float N`: FP16's exponent and N significant bits.
+    None for another name."""
+    name = name.lower()
+    if name.startswith("float "):
+        return 5, int(name.removeprefix("float ")) - 1, 0, 0
+    return _FLOATS.get(name)
+
+
+def operator_name(o: Operation) -> str:
+    """Name of an operation's operator in the table of parts."""
+    kind = "sqr" if o.sqr else o.op.value
+    return f"{kind} {o.format.lower()}"
+
+
+def operator(o: Operation) -> Part:
+    """The operator of an operation. Logarithms of other formats than those of the RTL count as FP16's."""
+    fmt = o.format.lower()
+    if o.op == Op.LOG:
+        return part("log_opacity", "log2 e4m3" if fmt == "e4m3" else "log2 fp16")
+    if o.op == Op.TABLE and "exp" in fmt:
+        return part("exp_neg", "2^-E")
+    return part("op", operator_name(o))
+
+
+def _word(value: Form | Precision | str, kind: type) -> str:
+    """Lower-case name of a form or a precision."""
+    name = value.name.lower() if isinstance(value, kind) else str(value).lower()
+    if name not in {m.name.lower() for m in kind}:
+        raise FlickerError(f"area: unknown {kind.__name__.lower()} '{name}'; known are {', '.join(m.name.lower() for m in kind)}")
+    return name
+
+
+# ---- parts of the stage -------------------------------------------------------------------------
+
+
+def fifo_area(depth: int, width: int = RECORD_BITS) -> float:
+    """A feature FIFO. Between synthesised depths by straight lines over the depth, beyond them by the last; in proportion to its width."""
+    if depth < 0:
+        raise FlickerError(f"area: FIFO depth must not be negative, but is {depth}")
+    if depth == 0:
+        return 0.0
+    known = sorted((int(config.split(" x ")[1]), p.ge) for (unit, config), p in parts().items() if unit == "fifo")
+    low, high = known[0], known[1]
+    for low, high in zip(known, known[1:]):
+        if depth <= high[0]:
+            break
+    ge = low[1] + (depth - low[0]) * (high[1] - low[1]) / (high[0] - low[0])
+    return max(ge, RECORD_BITS * depth * 4.0) * width / RECORD_BITS  # never below its flip-flops
+
+
+def vru_area(form: Form | str, pixels: int = PIXELS_PER_VRU) -> float:
+    """A VRU that holds `pixels` pixels. Other numbers than the RTL's 4, 8 and 16: estimate, from the nearest of these by PIXEL_STATE_BITS a pixel at
+    a FIFO's area per bit."""
+    known, vru = vru_part(form, pixels)
+    fifo = part("fifo", f"{RECORD_BITS} x 8")
+    return vru.ge + (pixels - known) * PIXEL_STATE_BITS * fifo.ge / (8 * RECORD_BITS)
+
+
+def vru_part(form: Form | str, pixels: int = PIXELS_PER_VRU) -> tuple[int, Part]:
+    """Pixels and part of the synthesised VRU whose number of pixels is nearest."""
+    known = min((MINITILE * MINITILE // count for count in VRU_COUNTS), key=lambda n: abs(n - pixels))
+    return known, part("vru", vru_config(_word(form, Form), known))
+
+
+def ctu_area(form: Form | str, precision: Precision | str, ctu_fifo_depth: int = 0) -> float:
+    """A CTU with its output FIFO."""
+    return part("ctu", f"{_word(form, Form)} {_word(precision, Precision)}").ge + fifo_area(ctu_fifo_depth, RECORD_BITS + CHANNELS)
+
+
+def operators_area(generator: Operations) -> float:
+    """Sum of a mask generator's operators: as many of each as it needs at one element per `cycles` cycles."""
+    return sum(math.ceil(o.count / generator.cycles) * operator(o).ge for o in generator.per_element)
+
+
+@lru_cache(maxsize=None)
+def overhead() -> float:
+    """What pipeline registers, the record's delay and control add to a generator's operators, as a factor: that of the synthesised CTU
+    (factored, FP16) over its own operators."""
+    config = RenderConfig(form=Form.FACTORED, precision=Precision.FP16, cat=CatMode.DENSE)
+    return part("ctu", "factored fp16").ge / operators_area(cat_operations(config))
+
+
+def generator_area(generator: Operations) -> float:
+    """A mask generator without RTL: estimate."""
+    return operators_area(generator) * overhead()
+
+
+def stage_parts(
+    form: Form | str, precision: Precision | str | None, fifo_depth: int = 16, ctu_fifo_depth: int = 0, vrus: int = 32,
+    generator: Operations | None = None, pixels: bool = False,
+) -> dict[str, float]:
+    """GE of a rendering stage by part.
+
+    generator: None is the CTU of this form and precision, none if precision is None; `operations.NONE`: no mask generator; else an estimate
+    by operators.
+    vrus: over all channels, the 256 pixels of a tile divided among them. pixels: the VRUs visit single pixels, so that FIFOs hold pixel
+    masks and each VRU chooses its next pixel.
+    """
+    channels = CORES * CHANNELS
+    per_channel, rest = divmod(vrus, channels)
+    if rest or per_channel not in (1, 2, 4, 8, 16):
+        raise FlickerError(f"area: the number of VRUs must be {channels} times 1, 2, 4, 8 or 16, not {vrus}")
+    form = _word(form, Form)
+    built = min(per_channel, max(VRU_COUNTS))  # the RTL's channel; more VRUs than that have a small arbiter each
+    config = channel_config(form, built)
+    channel, core = part("channel", config).ge, part("rendering_core", config).ge
+    control = channel - part("fifo", f"{RECORD_BITS} x 16").ge - built * vru_area(form, MINITILE * MINITILE // built)
+    control += (per_channel - built) * part("stream_arbiter", "2 x 67 bit").ge
+    width = RECORD_BITS + (PIXEL_MASK_BITS if pixels else 0)
+    select = part("op", "select 8").ge if pixels else 0.0
+    if generator is None and precision is None:
+        generator = NONE
+    if generator is None:
+        masks = ctu_area(form, precision, ctu_fifo_depth)
+    else:
+        masks = generator_area(generator) + fifo_area(ctu_fifo_depth, RECORD_BITS + (CHANNELS * PIXEL_MASK_BITS if pixels else CHANNELS))
+    return {
+        "VRUs": vrus * (vru_area(form, MINITILE * MINITILE // per_channel) + select),
+        "feature FIFOs": channels * fifo_area(fifo_depth, width),
+        "mask generators": CORES * masks,
+        "counters": CORES * part("perf_counters", "default").ge,
+        "arbiters, control": channels * control + CORES * (core - CHANNELS * channel),
+    }
+
+
+def stage_area(
+    form: Form | str, precision: Precision | str | None, fifo_depth: int = 16, ctu_fifo_depth: int = 0, vrus: int = 32,
+    generator: Operations | None = None, pixels: bool = False,
+) -> float:
+    """GE of a rendering stage; arguments as of `stage_parts`."""
+    return sum(stage_parts(form, precision, fifo_depth, ctu_fifo_depth, vrus, generator, pixels).values())
+
+
+def lane_vru_area(pixels: int, window: int = 1, buffers: int = 1, accumulator: int = 0) -> float:
+    """A VRU as a lane (perf.lane_stage), factored form. Estimate: the RTL's, with choice of the next pixel in each entry of the window, further output
+    buffers, and fixed-point accumulators (3 integer and `accumulator` fraction bits) for FP16 adders."""
+    bit = part("fifo", f"{RECORD_BITS} x 8").ge / (8 * RECORD_BITS)
+    ge = vru_area(Form.FACTORED, pixels) + window * part("op", "select 8").ge + (buffers - 1) * pixels * OUTPUT_STATE_BITS * bit
+    if accumulator:
+        width = ACCUMULATOR_INT_BITS + accumulator
+        convert, add = part("op", f"shift fp16 -> q{ACCUMULATOR_INT_BITS}.{accumulator}").ge, part("op", f"add fixed {width}").ge
+        ge += 3 * (convert + add + registers(width + 1) - part("fp_add_pipe", "fp16, 3 stages").ge) + 3 * pixels * (width - 15) * bit
+    return ge
+
+
+def registers(bits: int) -> float:
+    """A pipeline register."""
+    return bits * part("pipe_reg", f"{RECORD_BITS} bit").ge / RECORD_BITS
+
+
+def lane_stage_parts(lanes: LaneStage, generator: Operations | None, vrus: int, fifo_depth: int, accumulator: int = 0) -> dict[str, float]:
+    """GE of a stage of independent lanes by part; arguments as of `stage_parts`. A lane has a FIFO of its own, whose oldest `window - 1` entries lie in
+    registers behind it."""
+    pixels = CORES * CHANNELS * MINITILE * MINITILE // vrus
+    arbiter = part("stream_arbiter", "2 x 67 bit").ge
+    heads = lanes.window - 1
+    return {
+        "VRUs": vrus * lane_vru_area(pixels, lanes.window, lanes.buffers, accumulator),
+        "feature FIFOs": vrus * (fifo_area(fifo_depth - heads, RECORD_BITS + pixels) + registers(heads * (RECORD_BITS + pixels))),
+        "mask generators": CORES * lanes.width * generator_area(generator) if generator else 0.0,
+        "counters": CORES * part("perf_counters", "default").ge,
+        "arbiters, control": vrus * arbiter + stage_parts(Form.FACTORED, None)["arbiters, control"],
+    }
+
+
+def area_table() -> list[tuple[str, dict[str, float]]]:
+    """(stage, GE by part) of the RTL and of some alternatives."""
+    from ..explore.evaluate import get_configuration
+    from ..explore.methods import get_method
+
+    def estimate(name: str) -> dict[str, float]:
+        method = get_method(name)
+        return stage_parts(method.form, None, generator=method.operations, pixels=method.pixels)
+
+    def lane_estimate(name: str) -> dict[str, float]:
+        configuration = get_configuration(name)
+        method = get_method(configuration.method)
+        return lane_stage_parts(configuration.lanes, method.operations, configuration.vrus, configuration.fifo_depth, method.accumulator)
+
+    return [
+        ("FLICKER, fixed, factored (default)", stage_parts("factored", "fixed")),
+        ("FLICKER, mixed, factored", stage_parts("factored", "mixed")),
+        ("FLICKER, FP16, factored", stage_parts("factored", "fp16")),
+        ("FLICKER as in the paper (`faithful`)", stage_parts("conic", "mixed", ctu_fifo_depth=16)),
+        ("no mask generator, 32 VRUs", stage_parts("factored", None)),
+        ("no mask generator, 64 VRUs", stage_parts("factored", None, vrus=64)),
+        ("exact rectangle, FP16 with bound (estimate)", estimate("exact")),
+        ("exact rectangle, E4M3 (estimate)", estimate("exact-e4m3-factored")),
+        ("row intervals, pixel masks (estimate)", estimate("rows")),
+        *((f"`{name}` (estimate)", lane_estimate(name)) for name in ("lanes", "lanes-deep", "lanes-64")),
+    ]
+
+
+if __name__ == "__main__":
+    for title, by_part in area_table():
+        print(f"| {title} | {sum(by_part.values()) / 1e6:.2f} | {' / '.join(f'{ge / 1e6:.2f}' for ge in by_part.values())} |")

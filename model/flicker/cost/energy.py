@@ -1,0 +1,258 @@
+"""Energy of a rendered frame: operations and accesses counted by the models, times energy per operation.
+
+    stage_energy(result.work, simulate(result.work, config), "factored", "fixed")       # microjoules by part
+
+Logic: switched capacitance of the synthesised netlists (`flicker.cost.area`: input capacitance of all cells), scaled to 28 nm by the constants
+below. Memories: published figures. Every constant has its source in SOURCES. Absolute values are estimates without layout; ratios between
+configurations are what the model is for (`ratios`), since most of what is uncertain is common to both sides.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .area import RECORD_BITS, Part, operator, part, parts, stage_area, vru_part
+from ..errors import FlickerError
+from ..explore.generators.leaders import cat_operations
+from .operations import Operations
+from ..perf.work import Work
+from ..params import CHANNELS, CORES, PIXELS_PER_VRU, VRUS_PER_CHANNEL, CatMode, Form, Precision, RenderConfig
+from ..perf.render_stage import StageCycles
+
+# ---- constants ----------------------------------------------------------------------------------
+
+VOLTAGE = 0.9
+INVERTER_FF = 1.0
+PARASITIC = 1.0
+WIRE = 1.0
+ACTIVITY = 0.1
+LEAKAGE_NW_PER_GE = 2.0
+CLOCK_HZ = 1_000_000_000
+SRAM_PJ_PER_BIT_8K = 10 / 64
+SRAM_NODE_SCALE = 28 / 45
+SRAM_EXPONENT = 0.5
+DRAM_PJ_PER_BIT = 8.0
+
+_HOROWITZ = "M. Horowitz, Computing's Energy Problem, ISSCC 2014 (45 nm, 0.9 V)"
+SOURCES = {
+    "VOLTAGE": "assumption: V, a usual nominal supply in 28 nm",
+    "INVERTER_FF": "fF of gate capacitance of the unit inverter in 28 nm: 1.7 fF of INV_X1 in the Nangate 45 nm Open Cell Library, times 28/45, rounded down",
+    "PARASITIC": "drain capacitance over gate capacitance of a gate; parasitic delay of an inverter = 1 (Sutherland, Sproull, Harris: Logical Effort)",
+    "WIRE": "assumption: a net's wire has the capacitance of the pins that it drives; there is no layout",
+    "ACTIVITY": "transitions of a node per operation, glitches included; chosen so that the FP16 multiplier and adder, 0.55 and 0.28 pJ, lie around "
+                "published ones: 1.1 and 0.4 pJ of " + _HOROWITZ + ", times 28/45, are 0.68 and 0.25 pJ",
+    "LEAKAGE_NW_PER_GE": "assumption: nW a gate equivalent, typical corner, mixed thresholds",
+    "CLOCK_HZ": "assumption: 1 GHz, the clock GSCore (ASPLOS 2024) states for 28 nm; turns leakage power into energy",
+    "SRAM_PJ_PER_BIT_8K": "pJ a bit of an 8 KiB memory with 64-bit accesses, 10 pJ an access: " + _HOROWITZ,
+    "SRAM_NODE_SCALE": "assumption: capacitance in proportion to the feature size, 45 to 28 nm, same supply",
+    "SRAM_EXPONENT": "energy an access grows with this power of the capacity: 8 KiB 10 pJ, 32 KiB 20 pJ, 1 MiB 100 pJ: " + _HOROWITZ,
+    "DRAM_PJ_PER_BIT": "pJ a bit of LPDDR4: value of the CACTI plug-in of Accelergy and Timeloop (type2energy), given there as public data",
+}
+
+
+def constant_table() -> list[tuple[str, float, str]]:
+    """(name, value, source) of every constant."""
+    return [(name, globals()[name], source) for name, source in SOURCES.items()]
+
+
+# ---- energy per event, in pJ --------------------------------------------------------------------
+
+
+def _swing(load: float) -> float:
+    """pJ to charge a load (in inputs of the unit inverter) from the supply once: C V^2."""
+    return load * INVERTER_FF * (1 + PARASITIC + WIRE) * VOLTAGE**2 * 1e-3
+
+
+def switching_pj(load: float, activity: float = ACTIVITY) -> float:
+    """pJ of an operation whose nodes make `activity` transitions each: half C V^2 a transition."""
+    return 0.5 * activity * _swing(load)
+
+
+def clock_pj(load: float) -> float:
+    """pJ of a clock cycle: two transitions."""
+    return _swing(load)
+
+
+def vru_pj(form: Form | str, pixels: int = PIXELS_PER_VRU) -> float:
+    """pJ of a pixel-Gaussian pair in a VRU of `pixels` pixels, without clocks that always run. One of its pixels has its state clocked, a record is
+    taken once in as many pairs."""
+    known, vru = vru_part(form, pixels)
+    return switching_pj(vru.load) + clock_pj(vru.clock_gated) / known
+
+
+def fifo_pj(depth: int, width: int = RECORD_BITS) -> float:
+    """pJ to write a record into a FIFO of flip-flops and to read it. Load between synthesised depths by straight lines; one row is clocked."""
+    known = sorted((int(c.split(" x ")[1]), p) for (u, c), p in parts().items() if u == "fifo" and p.load)
+    depths = [d for d, _ in known]
+    load = float(np.interp(depth, [0, *depths], [0.0, *(p.load for _, p in known)]))
+    row = known[-1][1].clock_gated / known[-1][0]
+    return (switching_pj(load) + clock_pj(row)) * width / RECORD_BITS
+
+
+def ctu(form: Form | str, precision: Precision | str) -> Part:
+    """The CTU."""
+    return part("ctu", f"{_name(form)} {_name(precision)}")
+
+
+def ctu_pj(form: Form | str, precision: Precision | str) -> float:
+    """pJ of a cycle in which a CTU tests; its pipeline is clocked in these cycles only."""
+    unit = ctu(form, precision)
+    return switching_pj(unit.load) + clock_pj(unit.clock_gated)
+
+
+def generator_pj(operations: Operations) -> float:
+    """pJ of an element in a mask generator without RTL: its operators, and in the proportion of the synthesised CTU (factored, FP16) pipeline
+    registers and their clocks."""
+    logic = sum(o.count * operator(o).load for o in operations.per_element)
+    model = part("ctu", "factored fp16")
+    own = cat_operations(RenderConfig(form=Form.FACTORED, precision=Precision.FP16, cat=CatMode.DENSE))
+    scale = model.load / sum(o.count * operator(o).load for o in own.per_element)
+    return switching_pj(logic * scale) + clock_pj(logic * scale * model.clock_gated / model.load)
+
+
+def sram_pj(bits: int, capacity_bytes: int) -> float:
+    """pJ to read or write `bits` in an SRAM of a capacity."""
+    return bits * SRAM_PJ_PER_BIT_8K * SRAM_NODE_SCALE * (max(capacity_bytes, 1) / 8192) ** SRAM_EXPONENT
+
+
+def dram_pj(n_bytes: int) -> float:
+    """pJ to move bytes between LPDDR4 and the chip."""
+    return 8 * n_bytes * DRAM_PJ_PER_BIT
+
+
+def _name(value: Form | Precision | str) -> str:
+    return value.name.lower() if isinstance(value, (Form, Precision)) else str(value).lower()
+
+
+# ---- frames -------------------------------------------------------------------------------------
+
+
+def stage_energy(
+    work: Work, stage: StageCycles | None, form: Form | str, precision: Precision | str | None, *, cycles: int | None = None,
+    operations: Operations | None = None, vrus: int = CORES * CHANNELS * VRUS_PER_CHANNEL, fifo_depth: int = 16, ctu_fifo_depth: int = 0,
+    pairs: int | None = None, area: float | None = None, lanes: bool = False,
+) -> dict[str, float]:
+    """Microjoules of a frame in the rendering stage, by part.
+
+    work: of the method. stage: its cycles and counters, or None with `cycles` given. precision: of the CTU; None where there is none.
+    operations: of the mask generator; `operations.NONE` says that there is none even where a precision is given, None: the CTU.
+    vrus: over all channels. pairs: pixel-Gaussian pairs that the VRUs work on, where the default does not apply: with whole mini-tiles
+    what the stage issued (without counters: 16 for each mini-tile sent), else the visited pixels. area: of the stage, in GE, where it is not that of
+    `stage_area`. lanes: each VRU has a FIFO of its own and says itself how many pixels it visited (perf.lane_stage).
+
+    "ungated clock": clock pins behind no clock gate, over all cycles. Left out: wires between units, input buffers, what the sorting unit does.
+    """
+    if stage is None and cycles is None:
+        raise FlickerError("energy: without the stage's counters the number of cycles is needed")
+    cycles = stage.cycles if cycles is None else cycles
+    form = _name(form)
+    visited = work.visit_masks() & work.unfinished()
+    if pairs is None:
+        if lanes:
+            pairs = int(stage.channel("vru_busy").sum(dtype=np.int64))
+        elif work.visit is not None:
+            pairs = int(np.bitwise_count(visited).sum(dtype=np.int64))
+        elif stage is not None:
+            pairs = int(stage.channel("vru_busy").sum(dtype=np.int64)) * vrus // (CORES * CHANNELS)
+        else:
+            pairs = 16 * int((visited != 0).sum(dtype=np.int64))
+    pushed = int(stage.core("minitiles_delivered").sum(dtype=np.int64)) if stage is not None else int((visited != 0).sum(dtype=np.int64))
+    vru_pixels = 64 * CORES // vrus
+    fifos = vrus if lanes else CORES * CHANNELS
+    mask_bits = vru_pixels if lanes else 16
+    width = RECORD_BITS + (mask_bits if work.visit is not None else 0)
+    tested = int(stage.core("gaussians_in").sum(dtype=np.int64)) if lanes else int(work.test_cycles.sum(dtype=np.int64))
+    no_generator = (precision is None and operations is None) or (operations is not None and not operations.per_element)
+    own_ctu = precision is not None and not no_generator
+    free = vrus * vru_part(form, vru_pixels)[1].clock_free + CORES * part("perf_counters", "default").clock_free + fifos * _free_fifo(fifo_depth)
+    if no_generator:
+        masks = 0.0
+    elif own_ctu:
+        masks = tested * ctu_pj(form, precision)
+        free += CORES * ctu(form, precision).clock_free
+    else:
+        masks = tested / operations.cycles * generator_pj(operations)
+    if ctu_fifo_depth:
+        masks += fifo_pj(ctu_fifo_depth, RECORD_BITS + CHANNELS) * int((work.mask != 0).sum(dtype=np.int64))
+    counters, arbiters = part("perf_counters", "default"), (part("stream_arbiter", "2 x 67 bit"), part("stream_arbiter", "4 x 92 bit"))
+    pixels = 64 * work.subtiles
+    control = CORES * cycles * (switching_pj(counters.load) + clock_pj(counters.clock_gated)) + pixels * sum(switching_pj(a.load) for a in arbiters)
+    if area is None:
+        area = stage_area(form, precision if own_ctu else None, fifo_depth, ctu_fifo_depth, vrus, None if own_ctu or no_generator else operations,
+                          work.visit is not None)
+    picojoules = {
+        "VRUs": pairs * vru_pj(form, vru_pixels),
+        "feature FIFOs": pushed * fifo_pj(fifo_depth, width),
+        "mask generators": masks,
+        "counters, arbiters": control,
+        "ungated clock": cycles * clock_pj(free),
+        "leakage": area * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12,
+    }
+    return {name: value * 1e-6 for name, value in picojoules.items()}
+
+
+def _free_fifo(depth: int) -> float:
+    """Clock pins of a FIFO that always toggle."""
+    known = sorted((int(c.split(" x ")[1]), p.clock_free) for (u, c), p in parts().items() if u == "fifo" and p.load)
+    return float(np.interp(depth, [d for d, _ in known], [v for _, v in known]))
+
+
+def memory_energy(dram_bytes: int, sram_bits: int = 0, capacity_bytes: int = 288 * 1024) -> dict[str, float]:
+    """Microjoules of a frame in memories: bytes moved to and from LPDDR4; bits written to and read from an on-chip SRAM of a capacity
+    (the paper's feature buffers have 288 KiB)."""
+    return {"LPDDR4": dram_pj(dram_bytes) * 1e-6, "SRAM": sram_pj(sram_bits, capacity_bytes) * 1e-6}
+
+
+def ratios(energies: dict[str, float | dict[str, float]], base: str) -> dict[str, float]:
+    """Energy of each configuration over that of `base`."""
+    if base not in energies:
+        raise FlickerError(f"energy: no configuration '{base}' to compare with")
+    total = {name: sum(e.values()) if isinstance(e, dict) else float(e) for name, e in energies.items()}
+    if not total[base] > 0 or not math.isfinite(total[base]):
+        raise FlickerError(f"energy: '{base}' has no energy to compare with")
+    return {name: value / total[base] for name, value in total.items()}
+
+
+def event_table() -> list[tuple[str, str, float]]:
+    """(event, configuration, pJ) of what a frame is made of."""
+    from ..explore.methods import get_method
+
+    rows = [("FP16 multiplication", "", switching_pj(part("fp_mul", "fp16").load)), ("FP16 addition", "", switching_pj(part("fp_add", "fp16").load)),
+            ("E4M3 multiplication", "", switching_pj(part("fp_mul", "e4m3").load)), ("E4M3 addition", "", switching_pj(part("fp_add", "e4m3").load))]
+    for form in Form:
+        rows.append(("pixel-Gaussian pair in a VRU", _name(form), vru_pj(form)))
+        rows.append(("cycle of a VRU's ungated clock", _name(form), clock_pj(part("vru", _name(form)).clock_free)))
+        for precision in Precision:
+            rows.append(("test cycle of a CTU", f"{_name(form)} {_name(precision)}", ctu_pj(form, precision)))
+    for name in ("exact", "rows", "pixels-fp16-factored"):
+        rows.append(("element in a mask generator", name, generator_pj(get_method(name).operations)))
+    rows += [("record through a feature FIFO", f"depth {depth}", fifo_pj(depth)) for depth in (4, 16, 64)]
+    rows.append(("64 bits of SRAM", "288 KiB", sram_pj(64, 288 * 1024)))
+    rows.append(("64 bits of LPDDR4", "", dram_pj(8)))
+    return rows
+
+
+TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64")
+
+
+def frame_table(scene: str, view: int, base: str = "gscore") -> list[tuple[str, float, float, dict[str, float]]]:
+    """(configuration, energy over that of `base`, microjoules, parts) of one view at 1280x720."""
+    from ..explore.evaluate import evaluate, load_view
+
+    data = load_view(scene, view)
+    found = {name: evaluate(data, name).energy for name in TABLE_CONFIGURATIONS}
+    shares = ratios(found, base)
+    return [(name, shares[name], sum(energy.values()), energy) for name, energy in found.items()]
+
+
+if __name__ == "__main__":
+    import sys
+
+    if len(sys.argv) > 1:
+        for name, share, total, energy_parts in frame_table(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 0):
+            print(f"| `{name}` | {share:.2f} | {total:,.0f} | {' / '.join(f'{value:,.0f}' for value in energy_parts.values())} |", flush=True)
+    else:
+        for event, configuration, value in event_table():
+            print(f"| {event} | {configuration} | {value:,.2f} |")

@@ -1,0 +1,151 @@
+"""The units and parameter sets that `make synth` reports, and what they are compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ...params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, VRUS_PER_CHANNEL
+
+FORMS = {"conic": 0, "factored": 1}
+PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
+FEATURE_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
+FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
+
+# Units that are put together from their synthesised parts instead of being flattened: module -> parts.
+COMPOSED: dict[str, list[str]] = {
+    "flk_bitonic_sorter": ["flk_compare_exchange", "flk_pipe_reg"],
+    "flk_channel": ["flk_fifo", "flk_vru", "flk_stream_arbiter"],
+    "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity_pipe"],
+    "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
+    "flk_render_stage": ["flk_ctu", "flk_rendering_core", "flk_perf_counters"],
+}
+
+
+# Operators with registers inside, and the number that the design uses.
+PIPES = {"flk_fp_add_pipe": 3, "flk_fp_mul_pipe": 2, "flk_exp_neg_pipe": 2, "flk_log_opacity_pipe": 3}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A module with all its parameters; ``config`` is its name in the tables."""
+
+    top: str
+    config: str
+    parameters: tuple[tuple[str, int], ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        return self.top.removeprefix("flk_")
+
+
+def unit(top: str, config: str = "default", **parameters: int) -> Unit:
+    return Unit(top, config, tuple(sorted(parameters.items())))
+
+
+def vru_config(form: str, pixels: int) -> str:
+    """Name of a VRU in the tables."""
+    return form if pixels == PIXELS_PER_VRU else f"{form}, {pixels} pixels"
+
+
+def channel_config(form: str, vrus: int) -> str:
+    """Name of a channel, or of a core of such channels, in the tables."""
+    return form if vrus == VRUS_PER_CHANNEL else f"{form}, {vrus} VRU{'s' * (vrus > 1)}"
+
+
+def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, int]:
+    """All parameters of a CTU."""
+    return {"Form": int(form), "Precision": int(precision), "VruCycles": PIXELS_PER_VRU, "CtuFifoDepth": fifo_depth}
+
+
+def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
+    """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
+    factored = parameters.get("Form", 1) == 1
+    bits = {
+        "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
+        "flk_log_opacity_pipe": ["opacity_i[15]"],
+        "flk_exp_neg": ["g_o[15]"],  # so is a power
+        "flk_exp_neg_pipe": ["g_o[15]"],
+        "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+    }.get(top, [])
+    # What a combinational operator does not use.
+    if top in PIPES and parameters.get("Stages", 1) == 0:
+        bits = [*bits, "clk_i[0]", "en_i[0]"]
+    if factored:  # v is only squared: the sign of l2 does not matter
+        quad = 16 if parameters.get("Precision", 1) == 0 else 8
+        bits = bits + {"flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_vru": ["op_feature_i[79]"]}.get(top, [])
+    return bits
+
+
+def _arithmetic() -> list[Unit]:
+    formats = {
+        "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
+        "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
+        "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
+    }
+    units = []
+    for top in ("flk_fp_add", "flk_fp_mul"):
+        units += [unit(top, name, **parameters) for name, parameters in formats.items()]
+    for name, parameters in formats.items():
+        units.append(unit("flk_fp_cmp", name, **{key: parameters[key] for key in ("ExpBits", "ManBits", "Fn")}))
+    for source, target in (("fp16", "e4m3"), ("fp16", "e5m2"), ("e4m3", "fp16")):
+        src, dst = formats[source], formats[target]
+        units.append(
+            unit(
+                "flk_fp_convert", f"{source} to {target}", SrcExpBits=src["ExpBits"], SrcManBits=src["ManBits"],
+                SrcFn=src["Fn"], DstExpBits=dst["ExpBits"], DstManBits=dst["ManBits"], DstFn=dst["Fn"],
+                DstSaturate=dst["Saturate"],
+            )
+        )
+    units += [
+        unit("flk_fp_to_fixed", "fp16 to 9.8", IntBits=FIXED_INT_BITS, FracBits=FIXED_FRAC_BITS),
+        unit("flk_fixed_to_fp", "10.8 to e4m3", MagBits=FIXED_INT_BITS + FIXED_FRAC_BITS + 1, FracBits=FIXED_FRAC_BITS),
+    ]
+    for base, name in ((1, "2^-E"), (0, "e^-E")):
+        units.append(unit("flk_exp_neg", name, Base2=base))
+    for base, name in ((1, "log2"), (0, "ln")):
+        for fmt in ("fp16", "e4m3"):
+            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+    for top, stages in PIPES.items():
+        units.append(unit(top, f"fp16, {stages} stages", Stages=stages))
+    return units
+
+
+def _cells() -> list[Unit]:
+    units = [unit(f"flk_{cell}", f"{FEATURE_BITS} bit", Width=FEATURE_BITS) for cell in ("pipe_reg", "skid_buffer")]
+    units.append(unit("flk_delay", f"{FEATURE_BITS} bit x 4", Width=FEATURE_BITS, Depth=4))
+    units += [unit("flk_fifo", f"{FEATURE_BITS} x {depth}", Width=FEATURE_BITS, Depth=depth) for depth in FIFO_DEPTHS]
+    units += [
+        unit("flk_stream_arbiter", "2 x 67 bit", Inputs=2, Width=67),
+        unit("flk_stream_arbiter", "4 x 66 bit", Inputs=4, Width=66),
+        unit("flk_stream_arbiter", "4 x 92 bit", Inputs=4, Width=92),
+        unit("flk_compare_exchange", "32+16 bit", KeyWidth=32, PayloadWidth=16),
+        unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
+    ]
+    return units
+
+
+def _stage() -> list[Unit]:
+    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    for form, f in FORMS.items():
+        for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
+            pixels = MINITILE * MINITILE // vrus
+            units += [
+                unit("flk_vru", vru_config(form, pixels), Form=f, Pixels=pixels),
+                unit("flk_channel", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MiniTile=0),
+                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus),
+            ]
+        for precision, p in PRECISIONS.items():
+            config = f"{form} {precision}"
+            units += [
+                unit("flk_prtu", config, Form=f, Precision=p, Cols=2, Rows=2),
+                unit("flk_prtu", f"{config}, 1 pixel", Form=f, Precision=p, Cols=1, Rows=1),
+                unit("flk_ctu", config, **ctu_parameters(f, p)),
+                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0, VrusPerChannel=VRUS_PER_CHANNEL),
+            ]
+    units.append(unit("flk_ctu", "faithful", **ctu_parameters(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth)))
+    units.append(unit("flk_render_stage", "faithful", **FAITHFUL.rtl_parameters()))
+    return units
+
+
+def all_units() -> list[Unit]:
+    return _arithmetic() + _cells() + _stage()

@@ -1,0 +1,1 @@
+"""Machines on views: mask generators, rendering stages, configurations; hard inputs; sweeps."""

@@ -1,0 +1,1 @@
+"""Mask generators: which mini-tiles or pixels of a sub-tile a splat is sent to."""

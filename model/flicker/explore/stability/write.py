@@ -1,0 +1,139 @@
+"""Table, CSV and pictures of a stability run."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from ...errors import FlickerError
+from .families import FAMILIES
+from .run import BROKEN_ERROR, BROKEN_PSNR, Point, Stability
+
+
+def check_folder(folder: Path) -> None:
+    """Make the folder; FlickerError when that fails or nothing can be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FlickerError(f"{folder}: no folder can be made there ({error.strerror})") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise FlickerError(f"{folder}: not writable")
+
+
+def _value(x: float) -> str:
+    return f"{x:g}"
+
+
+def break_table(result: Stability) -> Table:
+    """Where each method breaks: one row for all methods with the same list of families, value and PSNR there."""
+    groups: dict[str, list[str]] = {}
+    for method in result.methods:
+        broken = [(f, result.breaks(f, method)) for f in result.families]
+        text = ", ".join(f"{f} {_value(p.value)} ({p.psnr_db:.0f})" for f, p in broken if p is not None)
+        groups.setdefault(text or "nowhere", []).append(method)
+    table = Table(
+        title=f"First step with PSNR < {BROKEN_PSNR:g} dB or an error > {BROKEN_ERROR:g}; seed {result.seed}",
+        caption=f"family, value (PSNR in dB); {len(result.families)} families: {', '.join(result.families)}",
+    )
+    table.add_column("methods", overflow="fold")
+    table.add_column("break at")
+    for text, names in groups.items():
+        table.add_row("\n".join(names), text)
+        table.add_section()
+    return table
+
+
+def write_markdown(result: Stability, path: Path) -> None:
+    """Table of chosen methods (LINES), families as rows: where each breaks, or its lowest PSNR. Raises FlickerError."""
+    shown = [m for m in LINES if m in result.methods] or result.methods
+    lines = ["| family | " + " | ".join(f"`{m}`" for m in shown) + " |", "|---|" + "---|" * len(shown)]
+    for family in result.families:
+        cells = []
+        for method in shown:
+            point = result.breaks(family, method)
+            lowest = min(p.psnr_db for p in result.sweep(family, method))
+            cells.append(f"- ({lowest:.0f})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
+        lines.append(f"| {family} | " + " | ".join(cells) + " |")
+    try:
+        path.write_text("\n".join(lines) + "\n")
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def write_csv(result: Stability, path: Path) -> None:
+    """One line per point. Raises FlickerError when the file cannot be written."""
+    names = [f.name for f in fields(Point)] + ["broken"]
+    try:
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(names)
+            for p in result.points:
+                writer.writerow([int(v) if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in (getattr(p, n) for n in names)])
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def _save(figure, path: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    try:
+        figure.savefig(path, dpi=110)
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        plt.close(figure)
+
+
+def write_pictures(result: Stability, folder: Path) -> list[Path]:
+    """Heat map of the lowest PSNR and lines per family: stability_heat.png, stability_lines.png."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    lowest = np.array([[min(p.psnr_db for p in result.sweep(f, m)) for f in result.families] for m in result.methods])
+    lowest = np.clip(lowest, 0, 80)
+    figure, axes = plt.subplots(figsize=(2 + 0.55 * len(result.families), 1.5 + 0.19 * len(result.methods)), layout="constrained")
+    image = axes.imshow(lowest, aspect="auto", cmap="RdYlGn", vmin=10, vmax=70)
+    axes.set_xticks(range(len(result.families)), result.families, rotation=60, ha="right", fontsize=7)
+    axes.set_yticks(range(len(result.methods)), result.methods, fontsize=6)
+    if lowest.size <= 2500:
+        for y, row in enumerate(lowest):
+            for x, v in enumerate(row):
+                axes.text(x, y, f"{v:.0f}", ha="center", va="center", fontsize=5)
+    figure.colorbar(image, label="lowest PSNR of the sweep, dB", shrink=0.5)
+    axes.set_title("Stability: PSNR against float64", fontsize=9)
+    heat = folder / "stability_heat.png"
+    _save(figure, heat)
+
+    columns = 4
+    count = -(-len(result.families) // columns)
+    figure, grid = plt.subplots(count, columns, figsize=(4 * columns, 2.6 * count), layout="constrained", squeeze=False)
+    for axes in grid.flat[len(result.families) :]:
+        axes.axis("off")
+    shown = [m for m in LINES if m in result.methods] or result.methods[:8]
+    for axes, family in zip(grid.flat, result.families):
+        for method in shown:
+            sweep = result.sweep(family, method)
+            axes.plot([p.step for p in sweep], [min(max(p.psnr_db, 0.0), 100.0) for p in sweep], marker=".", label=method)
+        sweep = result.sweep(family, shown[0])
+        axes.set_xticks([p.step for p in sweep], [_value(p.value) for p in sweep], fontsize=6, rotation=45)
+        axes.axhline(BROKEN_PSNR, color="grey", linewidth=0.6)
+        axes.set_title(FAMILIES[family].title, fontsize=8)
+        axes.set_xlabel(sweep[0].parameter, fontsize=7)
+        axes.set_ylabel("PSNR, dB", fontsize=7)
+    figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7)
+    lines = folder / "stability_lines.png"
+    _save(figure, lines)
+    return [heat, lines]
+
+
+LINES = (
+    "vanilla-factored", "no_ctu-factored", "no_ctu-conic", "seele-factored", "flicker-smooth-mixed-conic", "flicker-smooth-fixed-factored",
+    "flicker-dense-fp16-factored", "exact-e4m3-factored", "rows-f8a8", "rows-f8a8-ellipse-acc14", "no_ctu-factored@absolute",
+)

@@ -1,0 +1,155 @@
+"""Projected splats to hardware records and sub-tile lists.
+
+The projection runs in float64; what reaches the hardware is rounded to FP16 here, once. A splat meets a sub-tile when its
+3-sigma box (per axis, after dilation) contains a pixel centre of it. Lists keep the near-to-far order of the projection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numba
+import numpy as np
+
+from ..params import SUBTILE, TILE, Coords, Form, RenderConfig
+from ..arithmetic.fp import FP16_R, fp16_bits, fp16_from_f64, sub
+
+LOG2E = 1.4426950408889634
+MAX_FP16 = 65504.0
+
+
+@dataclass
+class SubtileLists:
+    """Records of one frame.
+
+    gauss: uint16 (N, 9) in the order of `feature_t` (mean_x first; its two means are unused here).
+    spiky: bool (N,).
+    start: int64 (S + 1,), entries of sub-tile s are start[s]:start[s + 1].
+    entry: int32 (E,), splat of each entry; mean: uint16 (E, 2), its mean relative to the sub-tile.
+    cols, rows: sub-tile grid; sub-tile s is column s % cols, row s // cols.
+    adjusted: values that did not fit FP16, by reason (clamped to the largest finite number; reported, not silent).
+    """
+
+    width: int
+    height: int
+    form: Form
+    gauss: np.ndarray
+    spiky: np.ndarray
+    start: np.ndarray
+    entry: np.ndarray
+    mean: np.ndarray
+    cols: int
+    rows: int
+    tile_pairs: int
+    adjusted: dict[str, int] = field(default_factory=dict)
+
+    def features(self, e: int) -> np.ndarray:
+        """uint16 (9,): the feature record of entry e."""
+        f = self.gauss[self.entry[e]].copy()
+        f[0:2] = self.mean[e]
+        return f
+
+
+@numba.njit(parallel=True, cache=True)
+def _round_splats(conic, cov, opacity, rgb, factored, gauss, clamped):
+    for i in numba.prange(conic.shape[0]):
+        a = conic[i, 0]
+        b = conic[i, 1]
+        c = conic[i, 2]
+        if factored:
+            k = 0.5 * LOG2E
+            l0 = np.sqrt(a * k)
+            l1 = b * k / l0
+            l2 = np.sqrt(k / cov[i, 2])  # c' - l1^2 = det / a = 1 / cov_yy, without the cancellation
+            s = (l0, l1, l2)
+        else:
+            s = (0.5 * a, b, 0.5 * c)
+        row = gauss[i]
+        n = 0
+        for j in range(3):
+            v = s[j]
+            if not abs(v) <= MAX_FP16:
+                v = np.copysign(MAX_FP16, v)
+                n += 1
+            row[2 + j] = fp16_bits(fp16_from_f64(v))
+        row[5] = fp16_bits(fp16_from_f64(opacity[i]))
+        for j in range(3):
+            v = rgb[i, 2 - j]
+            if not v <= MAX_FP16:
+                v = MAX_FP16
+                n += 1
+            row[6 + j] = fp16_bits(fp16_from_f64(v))
+        clamped[i] = n
+
+
+@numba.njit(cache=True)
+def _span(lo, hi, size, count):
+    """First and one-past-last block of `size` pixels with a pixel centre in [lo, hi], clipped to [0, count)."""
+    low = np.ceil(max(lo, 0.0))
+    high = np.floor(min(hi, size * count - 1.0))
+    if not low <= high:
+        return 0, 0
+    return np.int64(low) // size, np.int64(high) // size + 1
+
+
+@numba.njit(cache=True)
+def _bin(mean, radii, cols, rows, width, height):
+    n = mean.shape[0]
+    box = np.empty((n, 4), np.int32)
+    count = np.zeros(cols * rows + 1, np.int64)
+    tile_pairs = 0
+    for i in range(n):
+        x0, x1 = _span(mean[i, 0] - radii[i, 0], min(mean[i, 0] + radii[i, 0], width - 1.0), SUBTILE, cols)
+        y0, y1 = _span(mean[i, 1] - radii[i, 1], min(mean[i, 1] + radii[i, 1], height - 1.0), SUBTILE, rows)
+        box[i] = x0, x1, y0, y1
+        if x1 > x0 and y1 > y0:
+            k = TILE // SUBTILE
+            tile_pairs += ((x1 - 1) // k - x0 // k + 1) * ((y1 - 1) // k - y0 // k + 1)
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                count[y * cols + x + 1] += 1
+    start = np.cumsum(count)
+    fill = start[:-1].copy()
+    entry = np.empty(start[-1], np.int32)
+    for i in range(n):
+        for y in range(box[i, 2], box[i, 3]):
+            for x in range(box[i, 0], box[i, 1]):
+                s = y * cols + x
+                entry[fill[s]] = i
+                fill[s] += 1
+    return start, entry, tile_pairs
+
+
+@numba.njit(parallel=True, cache=True)
+def _local_means(mean, start, entry, cols, absolute, out):
+    for s in numba.prange(start.shape[0] - 1):
+        ox = (s % cols) * SUBTILE
+        oy = (s // cols) * SUBTILE
+        for e in range(start[s], start[s + 1]):
+            i = entry[e]
+            if absolute:
+                x = sub(fp16_from_f64(mean[i, 0]), np.float32(ox), FP16_R)
+                y = sub(fp16_from_f64(mean[i, 1]), np.float32(oy), FP16_R)
+            else:
+                x = fp16_from_f64(min(max(mean[i, 0] - ox, -MAX_FP16), MAX_FP16))
+                y = fp16_from_f64(min(max(mean[i, 1] - oy, -MAX_FP16), MAX_FP16))
+            out[e, 0] = fp16_bits(x)
+            out[e, 1] = fp16_bits(y)
+
+
+def build_lists(projected, camera, config: RenderConfig) -> SubtileLists:
+    """Round the projected splats to records and bin them into sub-tile lists."""
+    n = len(projected.depth)
+    gauss = np.zeros((n, 9), np.uint16)
+    clamped = np.zeros(n, np.int32)
+    _round_splats(projected.conic, projected.cov2d, projected.opacity, projected.rgb, config.form == Form.FACTORED, gauss, clamped)
+    cols = -(-camera.width // SUBTILE)
+    rows = -(-camera.height // SUBTILE)
+    start, entry, tile_pairs = _bin(projected.mean, projected.radii, cols, rows, camera.width, camera.height)
+    mean = np.empty((len(entry), 2), np.uint16)
+    _local_means(projected.mean, start, entry, cols, config.coords == Coords.ABSOLUTE, mean)
+    adjusted = {"value beyond FP16 clamped": int((clamped > 0).sum())} if clamped.any() else {}
+    return SubtileLists(
+        camera.width, camera.height, config.form, gauss, np.asarray(projected.spiky, bool), start, entry, mean,
+        cols, rows, int(tile_pairs), adjusted,
+    )

@@ -1,0 +1,181 @@
+"""Pinhole cameras: INRIA `cameras.json`, orbit cameras for scenes without one.
+
+World and camera axes follow COLMAP and the INRIA code: camera x right, y down, z forward; the principal point is the
+centre of the picture; pixel centres lie on integers, so that centre is ((width - 1) / 2, (height - 1) / 2).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlickerError
+from .files import Scene
+
+MAX_SIZE = 16384
+_MAX_NUMBER = 1e30  # squares and products of such numbers stay finite in the projection
+_KEYS = ("width", "height", "fx", "fy", "position", "rotation")
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A view.
+
+    width, height: pixels, 1 to 16384. fx, fy: focal lengths in pixels.
+    position: float64 (3,), camera centre in the world.
+    rotation: float64 (3, 3), camera to world, columns right, down, forward.
+    Raises FlickerError, naming the field, when a value makes no camera.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    position: np.ndarray
+    rotation: np.ndarray
+    name: str = field(default="")
+
+    def __post_init__(self) -> None:
+        for key in ("width", "height"):
+            number = _numbers(getattr(self, key), key, ())
+            if not (1 <= number <= MAX_SIZE and number == int(number)):
+                raise FlickerError(f"{key}: {number:.12g} is not a whole number from 1 to {MAX_SIZE}")
+            object.__setattr__(self, key, int(number))
+        for key in ("fx", "fy"):
+            number = _numbers(getattr(self, key), key, ())
+            if number <= 0:
+                raise FlickerError(f"{key}: {number:.12g} is not positive")
+            object.__setattr__(self, key, float(number))
+        object.__setattr__(self, "position", _numbers(self.position, "position", (3,)))
+        rotation = _numbers(self.rotation, "rotation", (3, 3))
+        if np.abs(rotation).max() > 2 or np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+            raise FlickerError("rotation: not a rotation matrix")
+        object.__setattr__(self, "rotation", rotation)
+
+    def resized(self, width: int, height: int) -> Camera:
+        """The same view at another size: the focal lengths scale with the picture."""
+        other = replace(self, width=width, height=height)
+        return replace(other, fx=self.fx * other.width / self.width, fy=self.fy * other.height / self.height)
+
+
+def _numbers(value: Any, key: str, shape: tuple[int, ...]) -> np.ndarray:
+    """float64 array of the given shape, every number finite."""
+    what = "a number" if shape == () else f"{'x'.join(map(str, shape))} numbers"
+    try:
+        array = np.array(value)
+        if array.shape != shape or array.dtype.kind not in "iufO":  # integers beyond 64 bits are objects
+            raise FlickerError(f"{key}: not {what}")
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise FlickerError(f"{key}: not {what}") from None
+    if not np.isfinite(array).all():
+        raise FlickerError(f"{key}: not finite")
+    if (np.abs(array) > _MAX_NUMBER).any():
+        raise FlickerError(f"{key}: beyond {_MAX_NUMBER:g}")
+    return array
+
+
+def load_cameras(path: str | Path) -> list[Camera]:
+    """Cameras of an INRIA `cameras.json`: a list of objects with img_name, width, height, position, rotation, fx, fy.
+
+    Raises FlickerError naming the file, the index of the camera and the field.
+    """
+    path = Path(path)
+    try:
+        entries = json.loads(path.read_bytes())
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be read ({error.strerror})") from None
+    except (ValueError, RecursionError) as error:
+        raise FlickerError(f"{path}: not JSON ({' '.join(str(error).split())})") from None
+    if not isinstance(entries, list) or not entries:
+        raise FlickerError(f"{path}: not a list of cameras" if entries != [] else f"{path}: no cameras")
+    cameras = []
+    for i, entry in enumerate(entries):
+        where = f"{path}: camera {i}"
+        if not isinstance(entry, dict):
+            raise FlickerError(f"{where}: not an object")
+        for key in _KEYS:
+            if key not in entry:
+                raise FlickerError(f"{where}: '{key}' is missing")
+        try:
+            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=str(entry.get("img_name", i))))
+        except FlickerError as error:
+            raise FlickerError(f"{where}: {error}") from None
+    return cameras
+
+
+def _box(scene: Scene) -> np.ndarray:
+    """Where the scene lies: (3, 2), lowest and highest value an axis, from a sample.
+
+    From the 2 % to the 98 % quantile of the opacity, at most four times the largest median deviation from the median: neither
+    floaters nor a far background count.
+    """
+    sample = slice(None, None, 1 + len(scene) // 65536)
+    means = scene.means[sample].astype(np.float64)
+    weights = scene.opacities[sample].astype(np.float64)
+
+    def quantiles(x: np.ndarray, *q: float) -> np.ndarray:
+        order = np.argsort(x)
+        total = np.cumsum(weights[order])
+        return x[order[np.searchsorted(total, np.array(q) * total[-1])]]
+
+    low, middle, high = np.array([quantiles(axis, 0.02, 0.5, 0.98) for axis in means.T]).T
+    reach = 4.0 * max(quantiles(axis, 0.5)[0] for axis in np.abs(means - middle).T)
+    # A lone Gaussian has no extent but its own.
+    margin = 2.0 * np.median(scene.scales[sample].max(axis=1))
+    low, high = np.maximum(low, middle - reach), np.minimum(high, middle + reach)
+    return np.stack([np.minimum(low, (low + high) / 2 - margin), np.maximum(high, (low + high) / 2 + margin)], axis=1)
+
+
+def orbit_camera(scene: Scene, view: int = 0, views: int = 8, width: int = 1280, height: int = 720) -> Camera:
+    """Camera `view` of `views` on a circle around the scene, looking slightly down at its middle.
+
+    The world's y axis is taken to point down (COLMAP, INRIA).
+    """
+    low, high = _box(scene).T
+    centre, half = (low + high) / 2, (high - low) / 2
+    across = math.hypot(half[0], half[2])
+    tangent = math.tan(math.radians(25.0)) / min(width, height)  # half the field of view across the shorter side
+    elevation = math.radians(15.0)
+    # The cylinder that the box sweeps, from its middle, in camera axes; it must lie within the picture.
+    ring = np.linspace(0.0, 2 * math.pi, 32)
+    x, z = across * np.cos(ring), across * np.sin(ring)
+    y = np.array([[-half[1]], [half[1]]])
+    down = y * math.cos(elevation) - z * math.sin(elevation)
+    forward = y * math.sin(elevation) + z * math.cos(elevation)
+    fit = np.maximum(np.abs(x) / (tangent * width), np.abs(down) / (tangent * height)) - forward
+    distance = 1.1 * float(fit.max())
+    # Nothing nearer than 0.2 is drawn: small scenes are seen from farther away through a longer lens.
+    zoom = max(1.0, (across + half[1] + 0.4) / distance)
+    distance *= zoom
+    focal = zoom / (2 * tangent)
+    azimuth = 2 * math.pi * view / views
+    back = np.array([
+        math.sin(azimuth) * math.cos(elevation), -math.sin(elevation), -math.cos(azimuth) * math.cos(elevation),
+    ])
+    right = np.array([math.cos(azimuth), 0.0, math.sin(azimuth)])
+    return Camera(
+        width, height, focal, focal, centre + distance * back,
+        np.stack([right, np.cross(-back, right), -back], axis=1), f"orbit_{view}",
+    )
+
+
+def find_cameras(scene: Scene, cameras: str | Path | None = None) -> list[Camera]:
+    """The cameras of a scene: the file given, else `cameras.json` beside the scene, else eight orbit cameras."""
+    if cameras is not None:
+        return load_cameras(cameras)
+    if scene.path is not None and (beside := scene.path.parent / "cameras.json").exists():
+        return load_cameras(beside)
+    return [orbit_camera(scene, view) for view in range(8)]
+
+
+def select_view(cameras: list[Camera], n: int) -> Camera:
+    """Camera n, counted from 0; FlickerError when there is none."""
+    if not 0 <= n < len(cameras):
+        raise FlickerError(f"view {n}: there are {len(cameras)} cameras, 0 to {len(cameras) - 1}")
+    return cameras[n]
