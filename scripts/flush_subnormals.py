@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 VARIANTS = ((), ("fp16",), ("e4m3",), ("fp16", "e4m3"))
-METHODS = ("no_ctu-factored", "no_ctu-conic", "flicker-smooth-fixed-factored", "flicker-dense-fp8-factored", "flicker-smooth-mixed-conic")
+METHODS = ("no-ctu-32", "no-ctu-32-conic", "flicker-smooth-fixed-factored", "flicker-dense-fp8-factored", "flicker-smooth-mixed-conic")
 SCENES = (("flowers/flowers.compressed.ply", 0), ("playbot/playbot.sog", 1), ("guitar/guitar.ply", 1), ("stpeter/st-peter.sog", 0))
 
 

@@ -28,11 +28,11 @@ REAL = {
     "flowers": ("flowers.compressed.ply", 0), "playbot": ("playbot.sog", 1), "guitar": ("guitar.ply", 1), "stpeter": ("st-peter.sog", 0),
 }
 METHODS = (
-    "vanilla", "no_ctu", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored",
-    "exact-fp16-factored", "exact-fp16-factored-bound", "exact-e5m6-factored", "exact-e5m6-factored-bound", "exact-e4m4-factored",
-    "exact-e5m3-factored", "exact-e4m3-factored", "exact-e4m3-factored-scaled", "exact-e4m3-factored-bound", "exact-e5m2-factored",
-    "exact-q8.8-factored", "exact-fp16-conic", "exact-fp16-conic-bound", "exact-e4m3-conic", "rows_minitile-f8a8", "rows-f6a6",
-    "rows-f7a5", "rows-f8a6", "rows-f8a8", "rows-f8a8-ellipse", "rows-f8a8-ellipse-acc14", "rows-f10a10", "pixels-fp16-factored", "oracle",
+    "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored",
+    "exact-fp16", "exact-fp16-bound", "exact-e5m6", "exact-e5m6-bound", "exact-e4m4",
+    "exact-e5m3", "exact-e4m3", "exact-e4m3-scaled", "exact-e4m3-bound", "exact-e5m2",
+    "exact-q8.8", "exact-fp16-conic", "exact-fp16-conic-bound", "exact-e4m3-conic", "rows-minitile", "rows-f6a6",
+    "rows-f7a5", "rows-f8a6", "rows", "rows-ellipse", "rows-ellipse-acc14", "rows-f10a10", "pixels", "oracle",
 )
 
 

@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 
 from . import params
-from .scene.camera import Camera
 from .front.records import build_lists
 from .golden.render import render_golden
 from .scene.metrics import psnr
 from .params import CHANNELS, CORES, RenderConfig
-from .front.projection import Projected, project
-from .front.reference import render_reference
-from .scene.files import Scene
+from .front.view import View
 from .sim.render_stage import build, render_rtl
 
 
@@ -72,29 +69,25 @@ def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
 
 
 def render_view(
-    scene: Scene,
-    camera: Camera,
+    view: View,
     *,
-    view: int = 0,
     engine: Engine = Engine.GOLDEN,
     config: RenderConfig = RenderConfig(),
     compare: bool = False,
-    projected: Projected | None = None,
-    reference: np.ndarray | None = None,
     steps: Steps | None = None,
 ) -> Rendered:
-    """Render one view.
+    """Render a view of a scene.
 
     compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
-    projected, reference: results of an earlier call with the same scene and camera, to save time.
     """
     steps = steps or Steps()
-    if projected is None:
-        with steps.step("projecting"):
-            projected = project(scene, camera)
+    scene, camera = view.scene, view.camera
+    assert scene is not None, "statistics are of a scene"
+    with steps.step("projecting"):
+        projected = view.projected
     stats: dict[str, Any] = {
         "scene": str(scene.path),
-        "view": view,
+        "view": view.number,
         "width": camera.width,
         "height": camera.height,
         "engine": engine.value,
@@ -135,9 +128,9 @@ def render_view(
             "ctu_cycles": frame.total("test_cycles"),
             "subtiles_fallen": frame.total("fallen"),
         }
-    if engine is Engine.REFERENCE or (compare and reference is None):
+    if engine is Engine.REFERENCE or compare:
         with steps.step("rendering the float64 reference"):
-            reference = render_reference(projected, camera)
+            reference = view.reference
     if engine is Engine.REFERENCE:
         image = reference
         stats |= {"minitiles_sent": None, "pixel_pairs": None}

@@ -10,20 +10,17 @@ remaining forms and precisions on a small frame here. Not covered: pictures abov
 from __future__ import annotations
 
 import dataclasses
-import os
-from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flicker.scene.camera import load_cameras
 from flicker.scene.demo import demo_cameras, generate
 from flicker.front.records import build_lists
 from flicker.golden.render import render_golden
-from flicker.explore.methods import View, get_method, method_name, run
-from flicker.explore.methods import cat as contribution_test
+from flicker.explore.configurations import rtl_configuration, run
+from flicker.front.view import View, load_view
+from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.params import (
     CHANNEL_COUNTERS,
     CHANNELS,
@@ -35,13 +32,10 @@ from flicker.params import (
     Precision,
     RenderConfig,
 )
-from flicker.perf.render_stage import simulate
 from flicker.front.projection import project
-from flicker.scene.files import load_scene
 from flicker.sim.render_stage import render_rtl
 
 DEFAULT = RenderConfig()
-REAL = {"flowers": ("flowers.compressed.ply", 0), "playbot": ("playbot.sog", 1), "guitar": ("guitar.ply", 1), "stpeter": ("st-peter.sog", 0)}
 
 
 @cache
@@ -82,10 +76,8 @@ def compare(projected, camera, config: RenderConfig, **stalls):
 
 def compare_cycles(projected, camera, config: RenderConfig, rtl) -> None:
     """The cycle model gives the same cycles and every counter the same value."""
-    method = get_method(method_name(config))
-    if config.cat == CatMode.AUTO:  # it looks at the number of VRUs
-        method = replace(method, generate=contribution_test(config))
-    model = simulate(run(method, View(projected, camera)).work, config)
+    configuration = rtl_configuration(config)
+    _, model = configuration.simulate(run(configuration, View(camera, projected=projected)).work)
     names = [name for name, _ in CORE_COUNTERS] + [f"channel {c} {name}" for c in range(CHANNELS) for name, _ in CHANNEL_COUNTERS]
     wrong = [
         f"core {k} {names[i]}: RTL {rtl.counters[k, i]}, model {model.counters[k, i]}"
@@ -165,12 +157,11 @@ def test_stalls_do_not_change_the_picture():
         assert (f.pixels == frames[0].pixels).all()
 
 
-@pytest.mark.parametrize("name", list(REAL))
-def test_real_scene(name):
+@pytest.mark.parametrize("real_view", REAL_VIEWS, ids=lambda v: v.folder)
+def test_real_scene(real_view):
     """One view of each real scene at 320x180."""
-    folder = os.environ.get("FLICKER_SCENES")
-    if not folder:
+    scenes = real_scenes()
+    if scenes is None:
         pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
-    file, view = REAL[name]
-    camera = load_cameras(Path(folder) / name / "cameras.json")[view].resized(320, 180)
-    compare(project(load_scene(Path(folder) / name / file), camera), camera, DEFAULT)
+    view = load_view(real_view.path(scenes), real_view.number, (320, 180))
+    compare(view.projected, view.camera, DEFAULT)

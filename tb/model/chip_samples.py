@@ -8,7 +8,7 @@ from scene_samples import random_scene
 
 from flicker.scene.camera import Camera
 from flicker.chip.frame import Prepared, prepare
-from flicker.params import RenderConfig
+from flicker.front.view import View
 from flicker.scene.files import Scene
 
 
@@ -32,4 +32,4 @@ def prepared_view() -> Prepared:
     scene.scales[20:90], scene.opacities[20:90] = 0.3, 0.99
     twice = np.r_[np.arange(2000), np.arange(100)]
     scene = Scene(scene.means[twice], scene.scales[twice], scene.quats[twice], scene.opacities[twice], scene.sh[twice])
-    return prepare(scene, camera(), RenderConfig())
+    return prepare(View(camera(), scene))

@@ -21,13 +21,15 @@ from flicker.chip.clusters import build_clusters, cull, morton_order
 from flicker.cli.main import app
 from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, simulate
 from flicker.chip.execute import run_scheme
-from flicker.chip.frame import ChipConfig, frame_estimate, prepare, render_bound, subtile_bound
+from flicker.chip.compare import chip_estimates, estimate
+from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
 from flicker.chip.memory import MemoryFormat, layout, through_memory
 from flicker.chip.schemes import RECOMMENDED, SCHEMES, Grain
 from flicker.errors import FlickerError
-from flicker.golden.render import render_golden
-from flicker.params import RenderConfig
+from flicker.explore.configurations import get_configuration, run
+from flicker.explore.machine import subtile_cycles
+from flicker.front.view import View
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
 from flicker.scene.files import save_ply
@@ -172,7 +174,7 @@ def test_streams_and_interleaving():
 def test_frame_adds_up(prepared, form, name):
     p = prepared
     chip = ChipConfig(memory=form, scheme=SCHEMES[name])
-    e = frame_estimate(p.scene, p.camera, RenderConfig(), 12_345, chip, p)
+    e = frame_estimate(p, 12_345, chip)
     size = layout(form, 4)
     by_name = {q.name: q for q in e.purposes}
     result = run_scheme(p.splats, chip.scheme, p.needed)
@@ -191,25 +193,27 @@ def test_frame_adds_up(prepared, form, name):
 
 def test_frame_bottleneck_and_choices(prepared):
     p = prepared
-    config = RenderConfig()
     base = ChipConfig()
-    slow = frame_estimate(p.scene, p.camera, config, 10**7, base, p)
+    slow = frame_estimate(p, 10**7, base)
     assert slow.bottleneck == "render" and slow.interval_cycles == 10**7 and slow.fps == 100
     fp16 = replace(base, memory=MemoryFormat.FP16)
-    assert slow.bytes < frame_estimate(p.scene, p.camera, config, 0, fp16, p).bytes
-    near = prepare(p.scene, camera(distance=0), config, 16)  # half of the scene is behind the camera
+    assert slow.bytes < frame_estimate(p, 0, fp16).bytes
+    near = prepare(View(camera(distance=0), p.view.scene), 16)  # half of the scene is behind the camera
     two_step = replace(fp16, cluster_size=16)
     one_step = replace(two_step, two_step=False)
     no_cull = replace(one_step, cull_shape="none")
-    sizes = [frame_estimate(near.scene, near.camera, config, 0, chip, near).bytes for chip in (two_step, one_step, no_cull)]
+    sizes = [frame_estimate(near, 0, chip).bytes for chip in (two_step, one_step, no_cull)]
     assert sizes[0] < sizes[1] < sizes[2]
-    golden = render_golden(p.lists, config)
-    sub = subtile_bound(p.lists, config, golden)
-    bound = render_bound(p.lists, config, golden)
-    e = frame_estimate(p.scene, p.camera, config, bound, base, p, subtile_cycles=sub)
-    assert next(s.cycles for s in e.stages if s.name == "render, broadcast") >= bound
+    flicker = get_configuration("flicker")
+    work = run(flicker, p.view).work
+    cycles, counters = flicker.simulate(work)
+    e = estimate(p, flicker, base)
+    found = {s.name: s.cycles for s in e.stages}
+    assert found["render"] == cycles and subtile_cycles(work, counters).sum() > 0
+    assert found["render, broadcast"] >= 0.9 * cycles  # without the pipeline's latency
+    assert chip_estimates(p.view, ["flicker"])["flicker"]["render_cycles"] == cycles
     with pytest.raises(FlickerError, match="clusters of 256"):
-        frame_estimate(p.scene, p.camera, config, 0, replace(fp16, cluster_size=64), p)
+        frame_estimate(p, 0, replace(fp16, cluster_size=64))
     with pytest.raises(FlickerError, match="cluster_size"):
         ChipConfig(cluster_size=64)
 
@@ -225,9 +229,9 @@ def test_recommended_scheme_fits_the_feature_buffers():
 def test_scene_through_memory_looks_the_same(prepared):
     """Order of magnitude only: a field in the wrong place would leave no picture."""
     p = prepared
-    reference = render_reference(p.projected, p.camera)
+    reference = render_reference(p.view.projected, p.view.camera)
     for form in MemoryFormat:
-        other = render_reference(project(through_memory(p.scene, form, 64), p.camera), p.camera)
+        other = render_reference(project(through_memory(p.view.scene, form, 64), p.view.camera), p.view.camera)
         assert 0 < np.abs(other - reference).mean() < 0.02
 
 

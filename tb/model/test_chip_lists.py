@@ -64,9 +64,9 @@ def test_depth_keys():
 
 
 def test_full_keys_change_nothing(prepared):
-    key = quantised_key(prepared.projected.depth, 31)
-    assert np.array_equal(resorted(prepared.projected, key).index, prepared.projected.index)
-    full, coarse = (db for _, _, db in key_quality(prepared.projected, prepared.camera, [("float32", 31), ("float32", 8)]))
+    key = quantised_key(prepared.view.projected.depth, 31)
+    assert np.array_equal(resorted(prepared.view.projected, key).index, prepared.view.projected.index)
+    full, coarse = (db for _, _, db in key_quality(prepared.view.projected, prepared.view.camera, [("float32", 31), ("float32", 8)]))
     assert np.isinf(full) and coarse < 40
 
 
@@ -96,9 +96,9 @@ def test_schemes_end_with_the_lists_of_the_golden_model(prepared, scheme, early)
 def test_short_keys_make_the_lists_that_they_say(prepared):
     p = prepared
     result = run_scheme(p.splats, replace(SCHEMES[RECOMMENDED], key_bits=10))
-    short = resorted(p.projected, quantised_key(p.projected.depth, 10, "linear"))
-    lists = build_lists(short, p.camera, RenderConfig())
-    assert np.array_equal(p.projected.index[p.splats.projected[result.record]], short.index[lists.entry])
+    short = resorted(p.view.projected, quantised_key(p.view.projected.depth, 10, "linear"))
+    lists = build_lists(short, p.view.camera, RenderConfig())
+    assert np.array_equal(p.view.projected.index[p.splats.projected[result.record]], short.index[lists.entry])
     assert not np.array_equal(p.splats.projected[result.record], p.lists.entry)
     assert result.scheme.entry_bits == 10 + 24 + 4
 
@@ -130,7 +130,7 @@ def test_counting_fills_lines_when_the_buffer_is_large(prepared):
 
 def test_needed_entries_finish_their_pixels(prepared):
     """`consumed` against a plain loop over pixels, for some sub-tiles; opaque ones must be among them."""
-    projected, lists = prepared.projected, prepared.lists
+    projected, lists = prepared.view.projected, prepared.lists
     stopped = 0
     opaque = replace(projected, opacity=np.full_like(projected.opacity, 0.95))
     for p in (projected, opaque):
@@ -173,14 +173,14 @@ def test_early_stop_fetches_what_is_needed(prepared):
 
 def test_tight_boxes_change_no_picture(prepared):
     p = prepared
-    tight = collect(p.projected, p.camera, tight=True)
+    tight = collect(p.view.projected, p.view.camera, tight=True)
     assert len(tight) <= len(p.splats)
-    radii = np.minimum(p.projected.radii, (np.sqrt(2 * np.log(np.maximum(p.projected.opacity * 255, 1)))[:, None] * (1 + 1e-9)
-                                           * np.sqrt(p.projected.cov2d[:, ::2])))
-    lists = build_lists(replace(p.projected, radii=radii), p.camera, RenderConfig())
+    radii = np.minimum(p.view.projected.radii, (np.sqrt(2 * np.log(np.maximum(p.view.projected.opacity * 255, 1)))[:, None] * (1 + 1e-9)
+                                           * np.sqrt(p.view.projected.cov2d[:, ::2])))
+    lists = build_lists(replace(p.view.projected, radii=radii), p.view.camera, RenderConfig())
     widths = (tight.box[:, 1] - tight.box[:, 0]) * (tight.box[:, 3] - tight.box[:, 2])
     assert widths.sum() == len(lists.entry) < len(p.lists.entry)
-    same = consumed(p.projected, lists)
+    same = consumed(p.view.projected, lists)
     # What a list lost never contributes: the entry that finishes a sub-tile is the same.
     last = [lst.entry[lst.start[:-1] + n - 1][n < np.diff(lst.start)] for lst, n in ((p.lists, p.needed), (lists, same))]
     assert np.isin(last[1], last[0]).all()

@@ -14,14 +14,14 @@ from scene_samples import random_scene
 
 from flicker.cost import area
 from flicker.cost import energy
-from flicker.cost.area import fifo_area, generator_area, part, stage_area, stage_parts, vru_area
+from flicker.cost.area import ctu_area, fifo_area, generator_area, part, stage_parts, vru_area
 from flicker.scene.camera import orbit_camera
 from flicker.errors import FlickerError
-from flicker.cost.operations import NONE
-from flicker.explore.methods import View, get_method, methods, run
-from flicker.params import CORES, Form, Precision, RenderConfig
-from flicker.perf.render_stage import simulate
-from flicker.front.projection import project
+from flicker.explore.configurations import CONFIGURATIONS, get_configuration
+from flicker.explore.evaluate import evaluate
+from flicker.explore.machine import MaskGenerator
+from flicker.front.view import View
+from flicker.params import CORES
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +40,7 @@ def committed_table(monkeypatch):
 def view() -> View:
     scene = random_scene(7, 300, 0)
     camera = orbit_camera(scene, 0).resized(64, 48)
-    return View(project(scene, camera), camera)
+    return View(camera, scene)
 
 
 # ---- area ---------------------------------------------------------------------------------------
@@ -49,12 +49,12 @@ def view() -> View:
 @pytest.mark.parametrize("form", ["conic", "factored"])
 @pytest.mark.parametrize("precision", ["fp16", "mixed", "fp8"])
 def test_rtl_stage_is_what_was_synthesised(form, precision):
-    assert stage_area(form, precision) == pytest.approx(part("render_stage", f"{form} {precision}").ge, abs=2)
+    assert sum(stage_parts(form, ctu_area(form, precision)).values()) == pytest.approx(part("render_stage", f"{form} {precision}").ge, abs=2)
 
 
 def test_faithful_stage():
     """The CTU's output FIFO is interpolated by width, so within 0.1 %."""
-    assert stage_area("conic", "mixed", ctu_fifo_depth=16) == pytest.approx(part("render_stage", "faithful").ge, rel=1e-3)
+    assert get_configuration("faithful").area() == pytest.approx(part("render_stage", "faithful").ge, rel=1e-3)
 
 
 def test_fifo_area():
@@ -68,35 +68,35 @@ def test_fifo_area():
 
 
 def test_stage_without_generator_and_with_more_vrus():
-    none = stage_area("factored", None)
-    assert none == stage_area("factored", "fp16", generator=NONE)
-    assert none == pytest.approx(stage_area("factored", "fp16") - CORES * part("ctu", "factored fp16").ge)
-    more = stage_parts("factored", None, vrus=64)
+    none = sum(stage_parts("factored").values())
+    assert none == get_configuration("no-ctu-32").area()
+    assert none == pytest.approx(get_configuration("flicker-dense-fp16-factored").area() - CORES * part("ctu", "factored fp16").ge)
+    more = stage_parts("factored", vrus=64)
     assert more["VRUs"] == 64 * vru_area("factored", 4) and none < sum(more.values()) < 2 * none
     assert vru_area("factored", 4) < vru_area("factored", 8) == part("vru", "factored").ge < vru_area("factored", 16)
     assert vru_area("factored", 2) < vru_area("factored", 4) == part("vru", "factored, 4 pixels").ge
     for vrus, core in ((16, "factored, 1 VRU"), (64, "factored, 4 VRUs")):
-        cores = sum(stage_parts("factored", None, vrus=vrus).values()) - CORES * part("perf_counters", "default").ge
+        cores = sum(stage_parts("factored", vrus=vrus).values()) - CORES * part("perf_counters", "default").ge
         assert cores == pytest.approx(CORES * part("rendering_core", core).ge)
 
 
 def test_generators():
     """Every method's generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
-    for method in methods().values():
-        assert (generator_area(method.operations) > 0) == bool(method.operations.per_element), method.name
-    factored, conic = (generator_area(get_method(f"flicker-dense-fp16-{form}").operations) for form in ("factored", "conic"))
+    for c in CONFIGURATIONS.values():
+        assert (c.generator.area() > 0) == bool(c.generator.operations.per_element), c.name
+    factored, conic = (generator_area(get_configuration(f"flicker-dense-fp16-{form}").generator.operations) for form in ("factored", "conic"))
     assert factored == pytest.approx(part("ctu", "factored fp16").ge)
     assert conic == pytest.approx(part("ctu", "conic fp16").ge, rel=0.15)
-    rows = get_method("rows-f8a8").operations
-    assert stage_area("factored", None, generator=rows, pixels=True) > stage_area("factored", None, generator=rows)
+    assert get_configuration("rows").area() > get_configuration("rows-minitile").area()
 
 
 def test_bad_area_arguments():
-    for arguments, message in (
-        (("round", "fp16"), "unknown form 'round'"), (("conic", "fp4"), "unknown precision 'fp4'"), (("conic", "fp16", 16, 0, 33), "not 33"),
+    for make, message in (
+        (lambda: stage_parts("round"), "unknown form 'round'"), (lambda: ctu_area("conic", "fp4"), "unknown precision 'fp4'"),
+        (lambda: stage_parts("conic", vrus=33), "not 33"),
     ):
         with pytest.raises(FlickerError, match=message):
-            stage_area(*arguments)
+            make()
 
 
 def test_synthesis_comes_first(tmp_path, monkeypatch):
@@ -114,7 +114,7 @@ def test_synthesis_comes_first(tmp_path, monkeypatch):
 
 def test_constants_have_sources():
     names = {name for name in vars(energy) if re.fullmatch(r"[A-Z][A-Z0-9_]+", name)}
-    imported = {"CHANNELS", "CORES", "PIXELS_PER_VRU", "RECORD_BITS", "VRUS_PER_CHANNEL", "SOURCES", "TABLE_CONFIGURATIONS"}
+    imported = {"CHANNELS", "CORES", "PIXELS_PER_VRU", "RECORD_BITS", "VRUS_PER_CHANNEL", "SOURCES"}
     assert names - imported == set(energy.SOURCES)
     assert [value for _, value, _ in energy.constant_table()] == [getattr(energy, name) for name in energy.SOURCES]
 
@@ -127,38 +127,39 @@ def test_operators_beside_published_figures():
 
 def test_stage_energy_counts(view):
     """Parts are counters times energy per operation."""
-    method = get_method("flicker-dense-fp16-factored")
-    work = run(method, view).work
-    stage = simulate(work, RenderConfig(form=Form.FACTORED, precision=Precision.FP16))
-    parts = energy.stage_energy(work, stage, "factored", "fp16")
+    result = evaluate(view, "flicker-dense-fp16-factored")
+    parts, counters = result.energy, result.counters
     assert set(parts) == {"VRUs", "feature FIFOs", "mask generators", "counters, arbiters", "ungated clock", "leakage"}
     assert all(value > 0 for value in parts.values())
-    assert parts["VRUs"] == pytest.approx(2 * stage.channel("vru_busy").sum() * energy.vru_pj("factored") * 1e-6)
-    assert parts["feature FIFOs"] == pytest.approx(stage.core("minitiles_delivered").sum() * energy.fifo_pj(16) * 1e-6)
-    assert parts["mask generators"] == pytest.approx(2 * work.elements * energy.ctu_pj("factored", "fp16") * 1e-6)
-    twice = energy.stage_energy(work, stage, "factored", "fp16", cycles=2 * stage.cycles)
+    assert parts["VRUs"] == pytest.approx(2 * counters.channel("vru_busy").sum() * energy.vru_pj("factored") * 1e-6)
+    assert parts["feature FIFOs"] == pytest.approx(counters.core("minitiles_delivered").sum() * energy.fifo_pj(16) * 1e-6)
+    assert parts["mask generators"] == pytest.approx(2 * result.work.elements * energy.ctu_pj("factored", "fp16") * 1e-6)
+    twice = result.configuration.energy(result.work, 2 * counters.cycles, counters)
     assert twice["VRUs"] == parts["VRUs"] and twice["ungated clock"] == pytest.approx(2 * parts["ungated clock"])
-    assert energy.stage_energy(work, stage, "factored", "fp16", operations=NONE)["mask generators"] == 0
+    assert evaluate(view, "no-ctu-32").energy["mask generators"] == 0
     # The estimate by operators reproduces the unit that it is scaled by.
-    by_operators = energy.stage_energy(work, stage, "factored", None, operations=method.operations)
-    assert by_operators["mask generators"] == pytest.approx(parts["mask generators"])
+    generator = result.configuration.generator
+    tested = int(result.work.test_cycles.sum())
+    assert MaskGenerator.energy_pj(generator, result.work, tested) * 1e-6 == pytest.approx(parts["mask generators"])
+    # An output FIFO takes what passes through it.
+    held, buffered = (evaluate(view, name) for name in ("flicker-smooth-mixed-conic", "faithful"))
+    more = int((buffered.work.mask != 0).sum()) * energy.fifo_pj(16, area.RECORD_BITS + 4) * 1e-6
+    assert buffered.energy["mask generators"] - held.energy["mask generators"] == pytest.approx(more)
 
 
 def test_less_work_takes_less_energy(view):
-    """Pixel masks visit fewer pixels than mini-tile masks, these fewer than none; without counters the cycles must be given."""
+    """Pixel masks visit fewer pixels than mini-tile masks, these fewer than none."""
     found = {}
-    for name in ("no_ctu", "oracle_minitile", "oracle"):
-        work = run(name, view).work
-        found[name] = energy.stage_energy(work, None, "factored", None, cycles=1000)
-        pairs = work.totals()["pixels_visited"]
-        assert found[name]["VRUs"] == pytest.approx(pairs * energy.vru_pj("factored") * 1e-6)
-    assert found["oracle"]["VRUs"] < found["oracle_minitile"]["VRUs"] < found["no_ctu"]["VRUs"]
-    share = energy.ratios(found, "no_ctu")
-    assert share["no_ctu"] == 1 and share["oracle"] < share["oracle_minitile"] < 1
+    for name in ("no-ctu-32", "oracle-minitile", "oracle"):
+        result = evaluate(view, name)
+        found[name] = result.energy
+        issued = result.counters.channel("vru_busy").sum() * 2 if name != "oracle" else result.work.totals()["pixels_visited"]
+        assert found[name]["VRUs"] == pytest.approx(issued * energy.vru_pj("factored") * 1e-6)
+    assert found["oracle"]["VRUs"] < found["oracle-minitile"]["VRUs"] < found["no-ctu-32"]["VRUs"]
+    share = energy.ratios(found, "no-ctu-32")
+    assert share["no-ctu-32"] == 1 and share["oracle"] < share["oracle-minitile"] < 1
     with pytest.raises(FlickerError, match="no configuration 'x'"):
         energy.ratios(found, "x")
-    with pytest.raises(FlickerError, match="cycles"):
-        energy.stage_energy(work, None, "factored", None)
 
 
 def test_memories():

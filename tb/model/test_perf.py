@@ -1,4 +1,4 @@
-"""Models of VRUs that visit single pixels and of lanes, and closed forms of `flicker.explore.evaluate`, against the cycle model and by hand.
+"""Models of VRUs that visit single pixels and of lanes, and closed forms of `flicker.explore.stages`, against the cycle model and by hand.
 
 The cycle model of the RTL itself is compared with the RTL in tb/frames.
 """
@@ -12,8 +12,10 @@ import pytest
 
 from flicker.scene.demo import demo_cameras, generate
 from flicker.errors import FlickerError
-from flicker.explore.evaluate import barrier_cycles, gscore_cycles
-from flicker.explore.methods import View, run
+from flicker.explore.configurations import run
+from flicker.explore.stages.channels import barrier_cycles
+from flicker.explore.stages.subtile import gscore_cycles
+from flicker.front.view import View
 from flicker.perf.work import Work
 from flicker.params import CatMode, RenderConfig, vru_stages
 from flicker.perf.lane_stage import LaneStage, lane_of_pixel, simulate_lanes
@@ -28,7 +30,7 @@ OFF = RenderConfig(cat=CatMode.OFF)
 def view() -> View:
     camera = demo_cameras()[0].resized(96, 54)
     projected = project(generate(), camera)
-    return View(replace(projected, opacity=np.minimum(projected.opacity, 0.02)), camera)  # nothing finishes early
+    return View(camera, projected=replace(projected, opacity=np.minimum(projected.opacity, 0.02)))  # nothing finishes early
 
 
 def one_splat(pixels: list[int], times: int = 1) -> Work:
@@ -43,7 +45,7 @@ def one_splat(pixels: list[int], times: int = 1) -> Work:
 
 def test_whole_minitiles(view: View) -> None:
     """Visiting all pixels, halves to each VRU, takes what the RTL's VRUs take."""
-    work = run("no_ctu", view).work
+    work = run("no-ctu-32", view).work
     model = simulate(work, OFF)
     pixels = simulate_pixels(work, OFF, split="halves", loop=1)
     assert (pixels.channel("vru_busy") == model.channel("vru_busy")).all() and model.channel("vru_busy").sum() > 10_000
@@ -52,7 +54,7 @@ def test_whole_minitiles(view: View) -> None:
 
 def test_vrus_per_channel(view: View) -> None:
     """Nothing finishes: VRUs of half the pixels take half the cycles of each splat. Other counts than the RTL's are refused."""
-    work = run("no_ctu", view).work
+    work = run("no-ctu-32", view).work
     stages = {n: simulate(work, OFF.with_(vrus_per_channel=n)) for n in (1, 2, 4)}
     for n, stage in stages.items():
         assert (n * stage.channel("vru_busy") == stages[1].channel("vru_busy")).all()
@@ -61,7 +63,7 @@ def test_vrus_per_channel(view: View) -> None:
         with pytest.raises(FlickerError, match=f"vrus_per_channel must be 1, 2 or 4, not {n}"):
             OFF.with_(vrus_per_channel=n)
     with pytest.raises(ValueError, match="two VRUs per channel"):
-        simulate_pixels(run("rows-f8a8", view).work, OFF.with_(vrus_per_channel=4))
+        simulate_pixels(run("rows", view).work, OFF.with_(vrus_per_channel=4))
 
 
 @pytest.mark.parametrize(("pixels", "busy"), [([], 0), ([0], 1), ([0, 2], 2), ([0, 1], 1), (list(range(16)), 8)])
@@ -77,7 +79,7 @@ def test_one_splat(pixels: list[int], busy: int) -> None:
 
 def test_loop_and_bound(view: View) -> None:
     """The same pixel at once again waits for the loop; no stage is faster than its work."""
-    work = run("rows-f8a8", view).work
+    work = run("rows", view).work
     cycles = [simulate_pixels(work, OFF, loop=loop).cycles for loop in (1, 4, 8)]
     assert cycles[0] < cycles[1] < cycles[2]
     assert cycles[0] > work.totals()["pixels_visited"] / 32
@@ -125,7 +127,7 @@ def test_one_splat_on_lanes(pixels: list[int], times: int, stage: LaneStage, las
 
 def test_lanes_do_all_work(view: View) -> None:
     """Nothing finishes here, so every set pixel is visited once, whatever the options; no stage is faster than its busiest part; what should help does."""
-    work = run("rows-f8a8", view).work
+    work = run("rows", view).work
     want = work.totals()["pixels_visited"]
     cycles = {}
     for name, depth, stage in (

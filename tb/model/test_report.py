@@ -1,4 +1,4 @@
-"""Report: a small one on the demo scene, resumed from its cache; FLIP and SSIM; verdicts; bad input.
+"""Report: a small one on the demo scene, resumed from its store; FLIP and SSIM; verdicts; bad input.
 
 FLIP is compared with a second implementation by two-dimensional convolutions and with values that follow from its publication: 0 for equal
 pictures, 1 for plain green against plain blue, the largest distance of colours 41.2761. The report on real scenes is run by hand (docs/report.md).
@@ -21,13 +21,19 @@ from typer.testing import CliRunner
 
 from flicker.scene import metrics
 from flicker.errors import FlickerError
-from flicker.explore.evaluate import evaluate, load_view
+from flicker.explore import facts
+from flicker.explore.evaluate import evaluate
+from flicker.explore.points import SceneFile, Target
+from flicker.explore.store import Store
+from flicker.front.view import DEMO, load_view
+from flicker.params import Form
 from flicker.report import claims
 from flicker.report import collect
 from flicker.report import figures
 from flicker.report import page
 from flicker.cli.main import app
 from flicker.report.write import SUMMARY, check, write_report
+from flicker.explore.sweep import load_sweep, run_sweep
 from flicker.scene.files import save_ply
 
 SIZE = 160, 90
@@ -39,7 +45,8 @@ NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faith
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A report on the demo scene: (job, what was written, the calls of its progress)."""
-    job = check([], tmp_path_factory.mktemp("report") / "out", SIZE, NAMES)
+    folder = tmp_path_factory.mktemp("report")
+    job = check([], folder / "out", SIZE, NAMES, folder / "store")
     calls = []
     return job, write_report(job, seed(), lambda *call: calls.append(call)), calls
 
@@ -146,7 +153,7 @@ def test_summary(made):
     job, written, _ = made
     rows = _rows(written.summary)
     assert [r["config"] for r in rows] == NAMES and set(SUMMARY) <= set(rows[0])
-    data = load_view(job.folder / "demo" / "demo.ply", 0, *SIZE)
+    data = load_view(DEMO, 0, SIZE)
     for name in ("faithful", "vanilla"):
         row = next(r for r in rows if r["config"] == name)
         fresh = evaluate(data, name).row
@@ -219,22 +226,35 @@ def test_resumed_in_seconds(made):
     """The second run computes no configuration and writes the same bytes; a lost result is the only one computed again."""
     job, written, calls = made
     before = {p.name: p.read_bytes() for p in (written.page, written.summary)}
-    stored = {p: p.stat().st_mtime_ns for p in (job.folder / "cache").iterdir()}
+    stored = {p: p.stat().st_mtime_ns for p in job.store.iterdir()}
     assert calls[-1][:2] == (1, 1) and any(c[2] == "demo 0: faithful" for c in calls)
     again = write_report(job, seed())
     assert {p.name: p.read_bytes() for p in (again.page, again.summary)} == before
-    assert {p: p.stat().st_mtime_ns for p in (job.folder / "cache").iterdir()} == stored
-    lost = next(p for p in stored if p.suffix == ".json" and json.loads(p.read_text()).get("row", {}).get("config") == "faithful")
+    assert {p: p.stat().st_mtime_ns for p in job.store.iterdir()} == stored
+    lost = next(p for p in stored if p.suffix == ".json" and json.loads(p.read_text()).get("config") == "faithful")
     lost.write_text("{")  # a torn file counts as lost
-    collect.collect([collect.Target(job.folder / "demo" / "demo.ply")], NAMES, SIZE, job.folder / "cache")
-    changed = {p for p in (job.folder / "cache").iterdir() if p.stat().st_mtime_ns != stored.get(p)}
+    collect.collect(job.targets, NAMES, Store(job.store))
+    changed = {p for p in job.store.iterdir() if p.stat().st_mtime_ns != stored.get(p)}
     assert lost in changed and changed <= {lost, lost.with_suffix(".npz")}
+
+
+def test_sweeps_rows_are_read(scene, tmp_path):
+    """What a sweep has computed is not computed again; what only the report shows of it is."""
+    out = tmp_path / "sweep"
+    (tmp_path / "sweep.yaml").write_text(f"scenes: [{scene}]\nsize: 64x48\nconfigurations: [flicker, gscore]\nout: {out}\n")
+    run_sweep(load_sweep(tmp_path / "sweep.yaml"))
+    rows = {p: p.stat().st_mtime_ns for p in (out / "points").glob("*.json")}
+    assert len(rows) == 2
+    write_report(check([str(scene)], tmp_path / "out", (64, 48), ["flicker", "gscore"], out / "points"), seed())
+    again = {p.name: p.stat().st_mtime_ns for p in rows}
+    before = {p.name: t for p, t in rows.items()}
+    assert sum(again[name] != before[name] for name in before) == 1  # flicker, for its maps
 
 
 def test_duplicates_are_counted(scene):
     """Tile pairs by the definition: tiles with a pixel centre in the box."""
-    data = load_view(scene, 0, 96, 64)
-    found = collect.duplicates(data.projected, 96, 64)
+    data = load_view(scene, 0, (96, 64))
+    found = facts.duplicates(data.projected, 96, 64)
     low, high = data.projected.mean - data.projected.radii, data.projected.mean + data.projected.radii
     for size in (8, 32):
         total = 0
@@ -242,7 +262,7 @@ def test_duplicates_are_counted(scene):
             columns = {x // size for x in range(96) if x0 <= x <= x1}
             total += len(columns) * len({y // size for y in range(64) if y0 <= y <= y1})
         assert found[str(size)] == total
-    lists = data.methods_view.lists(collect.FAITHFUL.form)
+    lists = data.lists(Form.CONIC)
     assert found["8"] == len(lists.entry)
 
 
@@ -256,9 +276,7 @@ def test_pareto():
 
 
 def _view(title: str, **values) -> collect.ViewResult:
-    from pathlib import Path
-
-    view = collect.ViewResult(collect.Target(Path(f"{title}.ply")), SIZE)
+    view = collect.ViewResult(Target(SceneFile(f"{title}.ply"), 0, SIZE))
     view.rows = {"a": values}
     return view
 
@@ -332,7 +350,7 @@ def scene(tmp_path_factory):
 
 def test_few_configurations(scene, tmp_path):
     """A run without the paper's configurations still gives a page, and says what is missing."""
-    job = check([f"{scene}:1"], tmp_path / "out", (64, 48), ["flicker"])
+    job = check([f"{scene}:1"], tmp_path / "out", (64, 48), ["flicker"], tmp_path / "store")
     written = write_report(job, seed())
     assert [r["view"] for r in _rows(written.summary)] == ["1"]
     assert any(v.verdict == "not evaluated: this run has no flicker-dense-mixed-conic" for v in written.verdicts)
@@ -344,7 +362,7 @@ def test_few_configurations(scene, tmp_path):
     (["SCENE", "SCENE"], "is there twice"),
     (["FOLDER"], "not a readable file"),
     (["NOTES"], "not a scene file"),
-    (["SCENE", "--configs", "faithfull"], "unknown configuration 'faithfull'; close names: faithful"),
+    (["SCENE", "--configs", "faithfull"], "configuration 'faithfull' is unknown; close names: faithful"),
     (["SCENE", "--configs", "faithful,,"], "an empty name"),
     (["SCENE", "--size", "12"], "expected WxH"),
     (["SCENE", "--size", "0x90"], "0"),

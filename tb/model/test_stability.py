@@ -1,6 +1,6 @@
 """Stability suite: quick run without a NaN, known failures where they are known, writers and bad input.
 
-The full suite runs by `flicker stability`; the quick choice of methods and steps stands for it here.
+The full suite runs by `flicker stability`; the quick choice of configurations and steps stands for it here.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from typer.testing import CliRunner
 
 from flicker.errors import FlickerError
 from flicker.front.records import build_lists
-from flicker.explore.methods import View, run
+from flicker.explore.configurations import run
+from flicker.front.view import View
 from flicker.params import Coords, RenderConfig
 from flicker.explore.stability import BROKEN_PSNR, FAMILIES, Stability, break_table, run_stability, write_csv, write_pictures
 from flicker.cli.main import app
 from flicker.explore.stability.families import SIZE, crop
-from flicker.explore.stability.run import ABSOLUTE, suite_methods
+from flicker.explore.stability.run import ABSOLUTE, suite
 from flicker.explore.stability.write import check_folder
 
 
@@ -35,37 +36,37 @@ def quick() -> Stability:
 
 def test_no_nan(quick):
     """NaN never reaches a picture, at any step of any family."""
-    assert quick.families == list(FAMILIES) and len(quick.methods) >= 14
+    assert quick.families == list(FAMILIES) and len(quick.configurations) >= 14
     for p in quick.points:
         assert not p.has_nan and not math.isnan(p.psnr_db) and not math.isnan(p.max_error), p
-    assert len(quick.points) == sum(len({0, len(f.values) // 2, len(f.values) - 1}) for f in FAMILIES.values()) * len(quick.methods)
+    assert len(quick.points) == sum(len({0, len(f.values) // 2, len(f.values) - 1}) for f in FAMILIES.values()) * len(quick.configurations)
 
 
 def test_harmless_steps(quick):
     """The first step of every family is harmless: without a test every form stays above 40 dB."""
     for p in quick.points:
-        if p.step == 0 and p.method in ("vanilla-factored", "no_ctu-factored", "no_ctu-conic", "rows-f8a8"):
+        if p.step == 0 and p.configuration in ("vanilla", "no-ctu-32", "no-ctu-32-conic", "rows"):
             assert not p.broken, p
 
 
 def test_known_failures(quick):
     """What docs/stability.md says fails, fails here: the suite sees what it is there for."""
-    worst = {(f, m): min(p.psnr_db for p in quick.sweep(f, m)) for f in quick.families for m in quick.methods}
-    assert worst["thin", "no_ctu-conic"] < 30 and worst["thin", "no_ctu-factored"] > worst["thin", "no_ctu-conic"] + 10
-    assert worst["far_mean", "no_ctu-conic"] < 30 and worst["far_mean", "no_ctu-factored"] > 50
-    assert worst["screen", "no_ctu-factored" + ABSOLUTE] < 35 and worst["screen", "no_ctu-factored"] > 55
+    worst = {(f, m): min(p.psnr_db for p in quick.sweep(f, m)) for f in quick.families for m in quick.configurations}
+    assert worst["thin", "no-ctu-32-conic"] < 30 and worst["thin", "no-ctu-32"] > worst["thin", "no-ctu-32-conic"] + 10
+    assert worst["far_mean", "no-ctu-32-conic"] < 30 and worst["far_mean", "no-ctu-32"] > 50
+    assert worst["screen", "no-ctu-32" + ABSOLUTE] < 35 and worst["screen", "no-ctu-32"] > 55
     assert worst["thin", "flicker-smooth-fixed-factored"] < 35
     for family in quick.families:  # masks with a proof cost nothing, however hard the input
-        assert worst[family, "rows-f8a8"] == worst[family, "no_ctu-factored"] == worst[family, "oracle-factored"]
-        assert worst[family, "exact-fp16-conic-bound"] == worst[family, "no_ctu-conic"]
-    first = quick.breaks("thin", "no_ctu-conic")
+        assert worst[family, "rows"] == worst[family, "no-ctu-32"] == worst[family, "oracle"]
+        assert worst[family, "exact-fp16-conic-bound"] == worst[family, "no-ctu-32-conic"]
+    first = quick.breaks("thin", "no-ctu-32-conic")
     assert first is not None and first.psnr_db < BROKEN_PSNR and first.step > 0
 
 
-def test_all_methods_once():
-    """Every method of the full suite through the worst step of two families: a finite picture."""
-    full = run_stability(["thin_far", "colour"], suite_methods(), quick=True, seed=seed())
-    assert full.methods == suite_methods() and not any(p.has_nan for p in full.points)
+def test_all_configurations_once():
+    """Every configuration of the full suite through the worst step of two families: a finite picture."""
+    full = run_stability(["thin_far", "colour"], suite(), quick=True, seed=seed())
+    assert full.configurations == suite() and not any(p.has_nan for p in full.points)
     assert {p.precision for p in full.points} >= {"fp16", "mixed", "fp8", "e4m3", "e5m2", "-"} and {p.form for p in full.points} == {"conic", "factored"}
 
 
@@ -90,7 +91,7 @@ def test_window_of_a_large_screen():
     window, camera = crop(projected, wide, 768, 768)
     for coords in Coords:
         whole = build_lists(projected, wide, RenderConfig(coords=coords))
-        part = View(window, camera, coords, (768, 768)).lists(whole.form)
+        part = View(camera, projected=window, coords=coords, origin=(768, 768)).lists(whole.form)
         entries = 0
         for s in range(part.cols * part.rows):
             t = (96 + s // part.cols) * whole.cols + 96 + s % part.cols
@@ -120,15 +121,15 @@ def test_families_do_what_they_say():
 
 
 def test_writers(quick, tmp_path):
-    """Table, CSV and pictures hold every point, family and method."""
+    """Table, CSV and pictures hold every point, family and configuration."""
     write_csv(quick, tmp_path / "s.csv")
     rows = list(csv.DictReader((tmp_path / "s.csv").open()))
     assert len(rows) == len(quick.points)
-    assert {r["method"] for r in rows} == set(quick.methods) and sum(r["broken"] == "1" for r in rows) == sum(p.broken for p in quick.points)
+    assert {r["configuration"] for r in rows} == set(quick.configurations) and sum(r["broken"] == "1" for r in rows) == sum(p.broken for p in quick.points)
     console = Console(width=300, record=True, file=open(os.devnull, "w"))
     console.print(break_table(quick))
     text = console.export_text()
-    assert all(f in text for f in quick.families) and all(m in text for m in quick.methods)
+    assert all(f in text for f in quick.families) and all(m in text for m in quick.configurations)
     for picture in write_pictures(quick, tmp_path):
         assert picture.read_bytes()[:4] == b"\x89PNG"
 
@@ -137,7 +138,7 @@ def test_bad_input(tmp_path):
     """One clear line, before any work."""
     with pytest.raises(FlickerError, match="unknown family 'thim'; known are thin"):
         run_stability(["thim"])
-    with pytest.raises(FlickerError, match="unknown method 'flickr'; close names: flicker"):
+    with pytest.raises(FlickerError, match="configuration 'flickr' is unknown; close names: flicker"):
         run_stability(["thin"], ["flickr"])
     blocked = tmp_path / "file"
     blocked.write_text("")
@@ -151,8 +152,8 @@ def test_command(tmp_path):
     """The sub-command: list, a run with results, a bad family."""
     runner = CliRunner()
     listing = runner.invoke(app, ["stability", "--list"])
-    assert listing.exit_code == 0 and "thin_far" in listing.output and "rows-f8a8" in listing.output
-    done = runner.invoke(app, ["stability", "--family", "faint", "--method", "faithful", "--quick", "--out", str(tmp_path / "o")])
+    assert listing.exit_code == 0 and "thin_far" in listing.output and "rows" in listing.output
+    done = runner.invoke(app, ["stability", "--family", "faint", "--config", "faithful", "--quick", "--out", str(tmp_path / "o")])
     assert done.exit_code == 0, done.output
     table = (tmp_path / "o" / "stability.md").read_text()
     assert "| `flicker-smooth-mixed-conic` |" in table and "| faint | " in table
@@ -165,4 +166,4 @@ def test_absolute_lists_of_other_kinds():
     """Absolute coordinates are defined for sub-tile lists; asking for others is an error, not a wrong picture."""
     case = FAMILIES["screen"].make(0.0, np.random.default_rng(1))
     with pytest.raises(FlickerError, match="absolute coordinates"):
-        run("vanilla", View(case.projected, case.camera, Coords.ABSOLUTE, case.origin))
+        run("vanilla", View(case.camera, projected=case.projected, coords=Coords.ABSOLUTE, origin=case.origin))

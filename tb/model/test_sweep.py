@@ -17,10 +17,12 @@ import pytest
 from scene_samples import random_scene
 
 from flicker.errors import FlickerError
-from flicker.explore.evaluate import evaluate, load_view
+from flicker.explore.evaluate import evaluate
+from flicker.explore.store import plain
+from flicker.front.view import load_view
 from flicker.scene.files import save_ply
 from flicker.explore.sweep import load_results, load_sweep, run_sweep
-from flicker.explore.sweep.results import KEY, plain
+from flicker.explore.sweep.results import KEY
 from flicker.explore.sweep.run import connect
 
 CONFIGURATIONS = ["no-ctu-32", "no-ctu-64", "gscore", "oracle", "flicker-*-fp16-factored", "flicker-*-mixed-factored"]
@@ -50,7 +52,7 @@ def client(tmp_path_factory):
     folder = tmp_path_factory.mktemp("warm")
     save_ply(random_scene(5, 300, 0), folder / "tiny.ply")
     sweep = load_sweep(write(folder))
-    data = load_view(folder / "tiny.ply", 0, 64, 48)
+    data = load_view(folder / "tiny.ply", 0, (64, 48))
     for name in sweep.configurations:
         evaluate(data, name)
     with connect(sweep) as client:
@@ -61,18 +63,19 @@ def test_rows_equal_evaluate_and_are_resumed(folder, client):
     sweep = load_sweep(write(folder))
     result = run_sweep(sweep, client=client)
     assert (result.computed, result.resumed, result.lost) == (28, 0, 0)
-    assert [(r["view"], r["config"]) for r in result.rows] == [(p.view, p.configuration) for p in sweep.points]
-    data = load_view(folder / "tiny.ply", 1, 64, 48)
+    assert [(r["view"], r["config"]) for r in result.rows] == [(p.target.view, p.configuration) for p in sweep.points]
+    data = load_view(folder / "tiny.ply", 1, (64, 48))
     for row in result.rows:
         if row["view"] == 1 and row["config"] in ("gscore", "oracle", "flicker-smooth-mixed-factored"):
-            expected = {name: plain(value) for name, value in evaluate(data, row["config"]).row.items()}
+            expected = {name: plain(value) if hasattr(value, "dtype") else value for name, value in evaluate(data, row["config"]).row.items()}
             assert {name: row[name] for name in expected} == expected
     before = (sweep.folder / "results.parquet").read_bytes()
     again = run_sweep(sweep)  # no client: nothing to do, so no cluster is started
     assert (again.computed, again.resumed) == (0, 28)
     assert again.rows == result.rows == load_results(sweep.folder)
     assert (sweep.folder / "results.parquet").read_bytes() == before
-    assert not (sweep.folder / "points").exists()
+    part = run_sweep(load_sweep(write(folder, configurations=["gscore", "oracle"])))  # another sweep finds the points
+    assert (part.computed, part.resumed) == (0, 4)
 
 
 def test_interrupted_sweep_continues(folder, client):
@@ -84,12 +87,12 @@ def test_interrupted_sweep_continues(folder, client):
 
     with pytest.raises(KeyboardInterrupt):
         run_sweep(sweep, client=client, on_point=interrupt)
-    kept = len(list((sweep.folder / "points").glob("*.parquet")))
+    kept = len(list(sweep.store.glob("*.json")))
     assert kept >= 3
     with pytest.raises(FlickerError, match="not complete"):
         load_results(sweep.folder)
-    damaged = next((sweep.folder / "points").glob("*.parquet"))
-    damaged.write_bytes(b"PAR1")
+    damaged = next(sweep.store.glob("*.json"))
+    damaged.write_text("{")
     result = run_sweep(sweep, client=client)
     assert result.resumed == kept - 1 and result.resumed + result.computed == 14
     assert len({row[KEY] for row in result.rows}) == 14
@@ -189,7 +192,7 @@ def test_failed_view_keeps_the_others(folder, client):
     with pytest.raises(FlickerError, match="1 of 2 views failed; .*broken.ply view 0") as raised:
         run_sweep(sweep, client=client)
     assert "\n" not in str(raised.value)
-    assert len(list((sweep.folder / "points").glob("*.parquet"))) == 1
+    assert len(list(sweep.store.glob("*.json"))) == 1
 
 
 def test_command_refuses(folder):

@@ -2,5 +2,6 @@
 
 `constants` every number with its source; `clusters` culling; `memory` parameter formats; `schemes` ways to make
 the sub-tile lists, `lists` building them, `sorting` the sorting unit, `delivery` what the cores take of them, `execute` a scheme
-as a whole; `dram` LPDDR4 timing; `frame` the estimate of a whole frame; `command` the `flicker chip` command.
+as a whole; `dram` LPDDR4 timing; `frame` the estimate of a whole frame, `compare` that of
+configurations.
 """

@@ -16,11 +16,9 @@ import numpy as np
 
 from ..scene.camera import Camera
 from ..errors import FlickerError
-from ..front.records import SubtileLists, build_lists
-from ..golden.render import COUNTS, Frame, render_golden, stream_order
-from ..params import CHANNELS, TILE, RenderConfig
-from ..front.projection import Projected, project
-from ..scene.files import Scene
+from ..front.records import SubtileLists
+from ..front.view import View
+from ..params import TILE, Form
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
 from .delivery import broadcast_cycles, consumed
@@ -61,26 +59,27 @@ class ChipConfig:
 
 @dataclass(eq=False)
 class Prepared:
-    """What does not depend on the chip's configuration but on cluster size and view: reused between estimates.
+    """A view with its scene in the order of memory: what does not depend on the chip but on the size of clusters; reused between estimates.
 
-    scene: in the order of memory. needed: entries of each sub-tile list until it is finished.
+    needed: entries of each sub-tile list until it is finished.
     """
 
-    scene: Scene
+    view: View
     clusters: Clusters
-    camera: Camera
-    projected: Projected
     splats: Splats
-    lists: SubtileLists
     needed: np.ndarray
 
+    @property
+    def lists(self) -> SubtileLists:
+        """The sub-tile lists that every scheme must end with."""
+        return self.view.lists(Form.FACTORED)
 
-def prepare(scene: Scene, camera: Camera, config: RenderConfig, cluster_size: int = c.CLUSTER_SIZE) -> Prepared:
-    """Put the scene into the order of memory, project it, build its lists."""
-    scene, clusters = build_clusters(scene, cluster_size)
-    projected = project(scene, camera)
-    lists = build_lists(projected, camera, config)
-    return Prepared(scene, clusters, camera, projected, collect(projected, camera), lists, consumed(projected, lists))
+
+def prepare(view: View, cluster_size: int = c.CLUSTER_SIZE) -> Prepared:
+    """Put the scene of a view into the order of memory."""
+    scene, clusters = build_clusters(view.scene, cluster_size)
+    view = View(view.camera, scene, name=view.name, number=view.number)
+    return Prepared(view, clusters, collect(view.projected, view.camera), consumed(view.projected, view.lists(Form.FACTORED)))
 
 
 @dataclass(frozen=True)
@@ -161,22 +160,6 @@ class FrameEstimate:
         }
 
 
-def subtile_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None = None) -> np.ndarray:
-    """int64 (S,): lower bound of a core's cycles in each sub-tile, the longer of testing and of blending with balanced channels."""
-    frame = frame or render_golden(lists, config)
-    test, sent = (frame.counts[:, COUNTS.index(name)] for name in ("test_cycles", "minitiles_sent"))
-    return np.maximum(test, -(-sent * config.pixels_per_vru // CHANNELS))
-
-
-def render_bound(lists: SubtileLists, config: RenderConfig, frame: Frame | None = None) -> int:
-    """Lower bound of the rendering stage's cycles: the busiest core, testing and blending overlapped over all its sub-tiles."""
-    frame = frame or render_golden(lists, config)
-    order, part = stream_order(lists)
-    cores = [frame.counts[order[a:b]].sum(axis=0) for a, b in zip(part, part[1:])]
-    test, sent = COUNTS.index("test_cycles"), COUNTS.index("minitiles_sent")
-    return max(max(int(n[test]), -(-int(n[sent]) * config.pixels_per_vru // CHANNELS)) for n in cores)
-
-
 def _pixels(camera: Camera) -> Stream:
     """The picture, tile by tile, into a frame buffer that lies row by row."""
     tile_x, tile_y = np.arange(-(-camera.width // TILE)), np.arange(-(-camera.height // TILE))
@@ -192,11 +175,11 @@ def _pixels(camera: Camera) -> Stream:
 
 def _parameter_streams(prepared: Prepared, chip: ChipConfig) -> tuple[list[Stream], dict[str, int]]:
     """Headers, geometry and colour; the counts of the cull."""
-    clusters, scene = prepared.clusters, prepared.scene
+    clusters, scene = prepared.clusters, prepared.view.scene
     form = layout(chip.memory, scene.sh.shape[1])
-    keep = np.ones(len(clusters), bool) if chip.cull_shape == "none" else cull(clusters, prepared.camera, chip.cull_shape)
+    keep = np.ones(len(clusters), bool) if chip.cull_shape == "none" else cull(clusters, prepared.view.camera, chip.cull_shape)
     members = clusters.members(keep)
-    passing = prepared.projected.index[prepared.splats.projected]  # ascending: the order of memory
+    passing = prepared.view.projected.index[prepared.splats.projected]  # ascending: the order of memory
     size = np.diff(clusters.start)[keep]
     first = clusters.start[:-1][keep]
     streams = []
@@ -207,29 +190,27 @@ def _parameter_streams(prepared: Prepared, chip: ChipConfig) -> tuple[list[Strea
     streams.append(Stream.items("opacity and colour", _COLOUR_BASE, form.colour, coloured, READ))
     return streams, {
         "Gaussians": len(scene), "clusters": len(clusters), "clusters kept": int(keep.sum()), "geometry read": len(members),
-        "visible": prepared.projected.n_visible, "colour read": len(coloured), "records": len(passing),
+        "visible": prepared.view.projected.n_visible, "colour read": len(coloured), "records": len(passing),
     }
 
 
 def frame_estimate(
-    scene: Scene, camera: Camera, config: RenderConfig, render_cycles: int, chip: ChipConfig = ChipConfig(),
-    prepared: Prepared | None = None, scheme_result: SchemeResult | None = None, subtile_cycles: np.ndarray | None = None,
+    prepared: Prepared, render_cycles: int, chip: ChipConfig = ChipConfig(), scheme_result: SchemeResult | None = None,
+    subtile_cycles: np.ndarray | None = None,
 ) -> FrameEstimate:
     """Estimate a frame. render_cycles: of the rendering stage, from its model or the RTL.
 
-    prepared: from `prepare` with the same scene, camera and cluster size, to save time (then scene and camera are not used).
-    scheme_result: of `run_scheme` with the same scheme on the same view. subtile_cycles: of a core in each sub-tile, (S,); given, the stage
+    scheme_result: of `run_scheme` with the same scheme on the same view, to save time. subtile_cycles: of a core in each sub-tile, (S,); given, the stage
     "render, broadcast" says what sharing one stream of records among the cores of a tile makes of them.
     """
-    prepared = prepared or prepare(scene, camera, config, chip.cluster_size)
     if prepared.clusters.size != chip.cluster_size:
         raise FlickerError(f"chip: prepared for clusters of {prepared.clusters.size}, not {chip.cluster_size}")
     result = scheme_result or run_scheme(prepared.splats, chip.scheme, prepared.needed if chip.early_stop else None)
     front, counts = _parameter_streams(prepared, chip)
     records = Stream.span("record write", Addresses().records, len(prepared.splats) * c.RECORD_BYTES, WRITE)
     front += [records] + [s for s in result.streams if s.name not in result.back]
-    back = [s for s in result.streams if s.name in result.back] + [_pixels(prepared.camera)]
-    coefficients = prepared.scene.sh.shape[1]
+    back = [s for s in result.streams if s.name in result.back] + [_pixels(prepared.view.camera)]
+    coefficients = prepared.view.scene.sh.shape[1]
     cores = c.PREPROCESSING_CORES
     colour = counts["colour read"] * -(-coefficients // c.SH_COEFFICIENTS_PER_CYCLE)
     stages = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..front.records import _span
+from ..front.binning import pixel_boxes
 from ..params import ALPHA_MIN, SUBTILE
 from . import constants as c
 from .dram import MASKED_WRITE, WRITE, Stream
@@ -32,16 +32,6 @@ class Splats:
         return len(self.key)
 
 
-@numba.njit(cache=True)
-def _boxes(mean, radii, cols, rows, width, height):
-    box = np.empty((len(mean), 4), np.int32)
-    for i in range(len(mean)):
-        x0, x1 = _span(mean[i, 0] - radii[i, 0], min(mean[i, 0] + radii[i, 0], width - 1.0), SUBTILE, cols)
-        y0, y1 = _span(mean[i, 1] - radii[i, 1], min(mean[i, 1] + radii[i, 1], height - 1.0), SUBTILE, rows)
-        box[i] = x0, x1, y0, y1
-    return box
-
-
 def collect(projected, camera, tight: bool = False) -> Splats:
     """The splats of a projection in the order of memory, that is, of the scene.
 
@@ -52,7 +42,7 @@ def collect(projected, camera, tight: bool = False) -> Splats:
     if tight:
         reach = np.sqrt(2.0 * np.log(np.maximum(projected.opacity / ALPHA_MIN, 1.0)))
         radii = np.minimum(radii, reach[:, None] * np.sqrt(projected.cov2d[:, ::2]) * (1.0 + 1e-9))
-    box = _boxes(projected.mean, radii, cols, rows, camera.width, camera.height)
+    box = pixel_boxes(projected.mean, radii, SUBTILE, cols, rows, camera.width, camera.height)
     here = np.flatnonzero((box[:, 1] > box[:, 0]) & (box[:, 3] > box[:, 2]))
     here = here[np.argsort(projected.index[here], kind="stable")]
     return Splats(projected.depth[here].view(np.uint32), np.ascontiguousarray(box[here]), here, cols, rows)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..scene.camera import Camera
-from ..front.records import build_lists
-from ..golden.render import render_golden
 from ..scene.metrics import psnr
-from ..params import RenderConfig
-from ..front.projection import Projected, project
+from ..explore.configurations import get_configuration
+from ..explore.machine import run
+from ..front.projection import Projected
+from ..front.view import View
 from ..front.reference import render_reference
 from .clusters import build_clusters
 from .constants import CLUSTER_SIZE
@@ -33,23 +33,22 @@ class FormatQuality:
     golden_db: float
 
 
-def format_quality(scene, camera: Camera, config: RenderConfig, cluster_size: int = CLUSTER_SIZE) -> list[FormatQuality]:
+def format_quality(view: View, cluster_size: int = CLUSTER_SIZE) -> list[FormatQuality]:
     """Every memory format, after a first row for the scene as loaded (float32)."""
-    scene, clusters = build_clusters(scene, cluster_size)
-    projected = project(scene, camera)
-    reference = render_reference(projected, camera)
+    scene, clusters = build_clusters(view.scene, cluster_size)
+    configuration = get_configuration("flicker")
+    base = View(view.camera, scene)
 
-    def golden(p: Projected) -> float:
-        return psnr(render_golden(build_lists(p, camera, config), config).image(), reference)
+    def golden(v: View) -> float:
+        return psnr(run(configuration, v).image, base.reference)
 
     numbers = 11 + 3 * scene.sh.shape[1]
-    rows = [FormatQuality("float32", 4 * numbers * len(scene), 4 * numbers, float("inf"), golden(projected))]
+    rows = [FormatQuality("float32", 4 * numbers * len(scene), 4 * numbers, float("inf"), golden(base))]
     for form in MemoryFormat:
-        other = project(through_memory(scene, form, cluster_size), camera)
+        other = View(view.camera, through_memory(scene, form, cluster_size))
         size = layout(form, scene.sh.shape[1])
         rows.append(FormatQuality(
-            form.value, size.total(len(scene), len(clusters)), size.geometry + size.colour,
-            psnr(render_reference(other, camera), reference), golden(other),
+            form.value, size.total(len(scene), len(clusters)), size.geometry + size.colour, psnr(other.reference, base.reference), golden(other),
         ))
     return rows
 

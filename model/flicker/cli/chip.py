@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..errors import FlickerError
+from .options import parse_size, writable, write_atomically
 
 console = Console()
 
@@ -55,8 +56,8 @@ def chip(
     cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
-    faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration of the rendering stage")] = False,
-    render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: a lower bound]")] = None,
+    config: Annotated[str, typer.Option(help="configuration of the rendering stage (flicker report --list)")] = "flicker",
+    render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
     memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
     scheme: Annotated[Optional[str], typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
     schemes: Annotated[bool, typer.Option("--schemes", help="compare all schemes")] = False,
@@ -66,16 +67,14 @@ def chip(
     out: Annotated[Optional[Path], typer.Option(help="the estimate as JSON")] = None,
 ) -> None:
     """Estimate a whole frame: culling, memory, lists, sorting, rendering."""
-    from ..scene.camera import find_cameras, select_view
-    from .options import parse_size, writable, write_atomically
-    from ..golden.render import render_golden
-    from ..params import FAITHFUL, RenderConfig
-    from ..scene.files import load_scene
+    from ..chip.compare import estimate
     from ..chip.constants import constant_table
-    from ..chip.frame import ChipConfig, frame_estimate, prepare, render_bound, subtile_bound
     from ..chip.execute import run_scheme, scheme_rows
-    from ..chip.schemes import RECOMMENDED, SCHEMES
+    from ..chip.frame import ChipConfig, frame_estimate, prepare
     from ..chip.memory import MemoryFormat
+    from ..chip.schemes import RECOMMENDED, SCHEMES
+    from ..explore.configurations import get_configuration
+    from ..front.view import load_view
 
     scheme = scheme or RECOMMENDED
     if scheme not in SCHEMES:
@@ -85,21 +84,15 @@ def chip(
     if render_cycles is not None and render_cycles < 0:
         raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
     writable(out, "--out")
-    wanted = parse_size(size)
-    loaded = load_scene(scene)
-    camera = select_view(find_cameras(loaded, cameras), view)
-    if wanted:
-        camera = camera.resized(*wanted)
-    config = FAITHFUL if faithful else RenderConfig()
+    configuration = get_configuration(config)
+    loaded = load_view(scene, view, parse_size(size), cameras)
     setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
-    prepared = prepare(loaded, camera, config, setting.cluster_size)
-    golden = render_golden(prepared.lists, config)
-    subtile_cycles = subtile_bound(prepared.lists, config, golden)
+    prepared = prepare(loaded, setting.cluster_size)
     if render_cycles is None:
-        render_cycles = render_bound(prepared.lists, config, golden)
-        console.print("rendering stage: lower bound from the golden model's counts (--render-cycles gives another number)")
-    estimate = frame_estimate(loaded, camera, config, render_cycles, setting, prepared, subtile_cycles=subtile_cycles)
-    console.print(f"{scene.name}, view {view}, {camera.width}x{camera.height}, memory {memory}, scheme {scheme}")
+        frame = estimate(prepared, configuration, setting)
+    else:
+        frame = frame_estimate(prepared, render_cycles, setting)
+    console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, scheme {scheme}")
     _show_frame(estimate)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])
@@ -111,14 +104,14 @@ def chip(
         from ..chip.quality import format_quality
 
         table = _table("memory formats", "format", "MB", "bytes a Gaussian", "float64 dB", "golden dB")
-        for q in format_quality(loaded, camera, config):
+        for q in format_quality(loaded):
             table.add_row(q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), f"{q.reference_db:.1f}", f"{q.golden_db:.1f}")
         console.print(table)
     if keys:
         from ..chip.quality import key_quality
 
         table = _table("depth keys", "key", "bits", "dB")
-        for kind, bits, value in key_quality(prepared.projected, camera):
+        for kind, bits, value in key_quality(prepared.view.projected, loaded.camera):
             table.add_row(kind, str(bits), f"{value:.1f}")
         console.print(table)
     if constants:
@@ -127,5 +120,5 @@ def chip(
             table.add_row(name, f"{value:,}", source)
         console.print(table)
     if out is not None:
-        text = json.dumps(estimate.as_dict() | {"scene": str(scene), "view": view, "memory": memory, "scheme": scheme}, indent=2)
+        text = json.dumps(frame.as_dict() | {"scene": str(scene), "view": view, "config": config, "memory": memory, "scheme": scheme}, indent=2)
         write_atomically(out, lambda path: path.write_text(text + "\n"))

@@ -19,6 +19,15 @@ def _choices(enum: type) -> type[Enum]:
     return Enum(enum.__name__ + "Choice", {m.name: m.name.lower() for m in enum}, type=str)  # type: ignore[return-value]
 
 
+def _word(value: object) -> str:
+    """A configuration's value as the command line writes it."""
+    return value.name.lower() if isinstance(value, Enum) else str(value)
+
+
+def _default(field: str) -> str:
+    return _word(getattr(RenderConfig(), field))
+
+
 CatChoice = _choices(CatMode)
 FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
@@ -64,12 +73,12 @@ def render(
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    cat: Annotated[Optional[CatChoice], typer.Option(help="contribution test [default: smooth]")] = None,
-    precision: Annotated[Optional[PrecisionChoice], typer.Option(help="number formats of the contribution test [default: mixed]")] = None,
-    form: Annotated[Optional[FormChoice], typer.Option(help="Gaussian weight in CTU and VRU [default: factored]")] = None,
-    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: 16]")] = None,
+    cat: Annotated[Optional[CatChoice], typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
+    precision: Annotated[Optional[PrecisionChoice], typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
+    form: Annotated[Optional[FormChoice], typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
+    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
-    faithful: Annotated[bool, typer.Option("--faithful", help="the paper's configuration: conic, mixed, smooth, FIFO 16")] = False,
+    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {', '.join(_word(getattr(FAITHFUL, n)) for n in ('form', 'precision', 'cat'))}, FIFO {FAITHFUL.fifo_depth}")] = False,
     compare: Annotated[Optional[CompareChoice], typer.Option(help="report the PSNR against the float64 reference")] = None,
     out: Annotated[Optional[Path], typer.Option(help="picture (.png)")] = None,
     stats: Annotated[Optional[Path], typer.Option(help="statistics (.json)")] = None,
@@ -94,16 +103,12 @@ def render(
     wanted = parse_size(size)
     steps = RichSteps()
     with steps.step("starting"):
-        from ..scene.camera import find_cameras, select_view
+        from ..front.view import load_view
         from ..scene.image import save_png
         from ..pipeline import Engine, render_view
-        from ..scene.files import load_scene
     with steps.step(f"loading {scene.name}"):
-        loaded = load_scene(scene)
-        camera = select_view(find_cameras(loaded, cameras), view)
-        if wanted:
-            camera = camera.resized(*wanted)
-    result = render_view(loaded, camera, view=view, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
+        loaded = load_view(scene, view, wanted, cameras)
+    result = render_view(loaded, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
     if out is not None:
         write_atomically(out, lambda path: save_png(path, result.image))
     if stats is not None:
@@ -120,24 +125,17 @@ def demo(
     wanted = parse_size(size)
     steps = RichSteps()
     with steps.step("starting"):
-        from ..scene.camera import load_cameras
+        from ..front.view import load_view
         from ..scene.demo import write_demo
         from ..scene.image import save_png
         from ..pipeline import Engine, render_view
-        from ..front.projection import project
-        from ..front.reference import render_reference
-        from ..scene.files import load_scene
     with steps.step(f"making the demo scene (seed {seed})"):
         scene_path, cameras_path = write_demo(folder, seed)
-    scene = load_scene(scene_path)
-    camera = load_cameras(cameras_path)[0]
-    if wanted:
-        camera = camera.resized(*wanted)
+    view = load_view(scene_path, 0, wanted, cameras_path)
     with steps.step("rendering the float64 reference (compiling on the first run)"):
-        projected = project(scene, camera)
-        shared = {"compare": True, "projected": projected, "reference": render_reference(projected, camera), "steps": steps}
-    golden = render_view(scene, camera, engine=Engine.GOLDEN, **shared)
-    rtl = render_view(scene, camera, engine=Engine.RTL, **shared)
+        view.reference
+    golden = render_view(view, engine=Engine.GOLDEN, compare=True, steps=steps)
+    rtl = render_view(view, engine=Engine.RTL, compare=True, steps=steps)
     if not (golden.image == rtl.image).all():
         raise FlickerError("demo: the RTL's picture differs from the golden model's")
     picture = folder / "demo.png"

@@ -9,31 +9,34 @@ import typer
 from rich.console import Console
 
 from ..errors import FlickerError
+from .options import parse_size
 
 
 
 def report(
     scenes: Annotated[Optional[list[str]], typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
-    out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures and the cache")] = Path("build/report"),
+    out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures")] = Path("build/report"),
     size: Annotated[str, typer.Option(help="WxH of every view")] = "1280x720",
-    configs: Annotated[Optional[str], typer.Option(help="configurations, separated by commas [default: all]")] = None,
+    configs: Annotated[Optional[str], typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
+    store: Annotated[Optional[Path], typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:
-    """Measure every configuration on every view; write tables and figures as one page."""
+    """Measure configurations on every view; write tables and figures as one page."""
     console = Console()
     with console.status("starting"):
-        from .options import parse_size
-        from ..report.write import check, known_configurations, write_report
+        from ..explore.configurations import CONFIGURATIONS
+        from ..explore.store import DEFAULT
+        from ..report.write import check, write_report
     if show:
-        for c in known_configurations().values():
+        for c in CONFIGURATIONS.values():
             console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
         return
     wanted = parse_size(size)
     names = None if configs is None else [n.strip() for n in configs.split(",")]
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
-    job = check(scenes or [], out, wanted, names)
+    job = check(scenes or [], out, wanted, names, store or DEFAULT)
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(

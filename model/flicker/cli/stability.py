@@ -10,25 +10,25 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..explore.stability.families import FAMILIES
-from ..explore.stability.run import run_stability, suite_methods
+from ..explore.stability.run import run_stability, suite
 from ..explore.stability.write import break_table, check_folder, write_csv, write_markdown, write_pictures
 
 
 
 def stability(
     family: Annotated[Optional[list[str]], typer.Option(help="family of inputs, repeatable [default: all]")] = None,
-    method: Annotated[Optional[list[str]], typer.Option(help="method, repeatable [default: all]")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen methods")] = False,
+    config: Annotated[Optional[list[str]], typer.Option(help="configuration, repeatable [default: the suite]")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen configurations")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
     out: Annotated[Path, typer.Option(help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
-    show: Annotated[bool, typer.Option("--list", help="list families and methods, run nothing")] = False,
+    show: Annotated[bool, typer.Option("--list", help="list families and configurations, run nothing")] = False,
 ) -> None:
-    """Run families of hard inputs through every method: error against float64, and where each method breaks."""
+    """Run families of hard inputs through every configuration: error against float64, and where each breaks."""
     console = Console()
     if show:
         for f in FAMILIES.values():
             console.print(f"[bold]{f.name}[/bold]  {f.title}: {f.parameter} {', '.join(f'{v:g}' for v in f.values)}", soft_wrap=True)
-        for name in suite_methods():
+        for name in suite():
             console.print(name, highlight=False)
         return
     check_folder(out)
@@ -38,7 +38,7 @@ def stability(
     ) as bar:
         task = bar.add_task("cases", total=None)
         result = run_stability(
-            family, method, seed=seed, quick=quick, progress=lambda done, total: bar.update(task, completed=done, total=total),
+            family, config, seed=seed, quick=quick, progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     write_csv(result, out / "stability.csv")
     write_markdown(result, out / "stability.md")

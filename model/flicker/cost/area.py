@@ -1,8 +1,8 @@
 """Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/synthesis.md).
 
-    stage_area("factored", "fixed")                                   # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
-    stage_area("factored", None, vrus=64)                             # no contribution test, 64 VRUs of 4 pixels
-    stage_area("factored", None, generator=get_method("rows-f8a8").operations, pixels=True)
+    stage_parts("factored", ctu_area("factored", "fixed"))            # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
+    stage_parts("factored", vrus=64)                                  # no contribution test, 64 VRUs of 4 pixels
+    stage_parts("factored", generator_area(operations), pixels=True)  # a mask generator without RTL
 
 What is synthesised is added up as the RTL connects it, so that the RTL's own configurations come out as `make synth` has them. The rest
 is an estimate by rules of this file: a mask generator without RTL (sum of its synthesised operators times OVERHEAD), FIFO depths
@@ -18,8 +18,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..errors import FlickerError
-from ..explore.generators.leaders import cat_operations
-from .operations import NONE, Op, Operation, Operations
+from .operations import Op, Operation, Operations, ctu_operations
 from ..golden.masked import ACCUMULATOR_INT_BITS
 from ..params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
 from ..perf.lane_stage import LaneStage
@@ -164,7 +163,7 @@ def overhead() -> float:
     """What pipeline registers, the record's delay and control add to a generator's operators, as a factor: that of the synthesised CTU
     (factored, FP16) over its own operators."""
     config = RenderConfig(form=Form.FACTORED, precision=Precision.FP16, cat=CatMode.DENSE)
-    return part("ctu", "factored fp16").ge / operators_area(cat_operations(config))
+    return part("ctu", "factored fp16").ge / operators_area(ctu_operations(config))
 
 
 def generator_area(generator: Operations) -> float:
@@ -173,15 +172,12 @@ def generator_area(generator: Operations) -> float:
 
 
 def stage_parts(
-    form: Form | str, precision: Precision | str | None, fifo_depth: int = 16, ctu_fifo_depth: int = 0, vrus: int = 32,
-    generator: Operations | None = None, pixels: bool = False,
+    form: Form | str, generator: float = 0.0, *, fifo_depth: int = 16, vrus: int = 32, pixels: bool = False,
 ) -> dict[str, float]:
     """GE of a rendering stage by part.
 
-    generator: None is the CTU of this form and precision, none if precision is None; `operations.NONE`: no mask generator; else an estimate
-    by operators.
-    vrus: over all channels, the 256 pixels of a tile divided among them. pixels: the VRUs visit single pixels, so that FIFOs hold pixel
-    masks and each VRU chooses its next pixel.
+    generator: GE of one core's mask generator, 0: none. vrus: over all channels, the 256 pixels of a tile divided among them. pixels: the VRUs visit
+    single pixels, so that FIFOs hold pixel masks and each VRU chooses its next pixel.
     """
     channels = CORES * CHANNELS
     per_channel, rest = divmod(vrus, channels)
@@ -195,27 +191,13 @@ def stage_parts(
     control += (per_channel - built) * part("stream_arbiter", "2 x 67 bit").ge
     width = RECORD_BITS + (PIXEL_MASK_BITS if pixels else 0)
     select = part("op", "select 8").ge if pixels else 0.0
-    if generator is None and precision is None:
-        generator = NONE
-    if generator is None:
-        masks = ctu_area(form, precision, ctu_fifo_depth)
-    else:
-        masks = generator_area(generator) + fifo_area(ctu_fifo_depth, RECORD_BITS + (CHANNELS * PIXEL_MASK_BITS if pixels else CHANNELS))
     return {
         "VRUs": vrus * (vru_area(form, MINITILE * MINITILE // per_channel) + select),
         "feature FIFOs": channels * fifo_area(fifo_depth, width),
-        "mask generators": CORES * masks,
+        "mask generators": CORES * generator,
         "counters": CORES * part("perf_counters", "default").ge,
         "arbiters, control": channels * control + CORES * (core - CHANNELS * channel),
     }
-
-
-def stage_area(
-    form: Form | str, precision: Precision | str | None, fifo_depth: int = 16, ctu_fifo_depth: int = 0, vrus: int = 32,
-    generator: Operations | None = None, pixels: bool = False,
-) -> float:
-    """GE of a rendering stage; arguments as of `stage_parts`."""
-    return sum(stage_parts(form, precision, fifo_depth, ctu_fifo_depth, vrus, generator, pixels).values())
 
 
 def lane_vru_area(pixels: int, window: int = 1, buffers: int = 1, accumulator: int = 0) -> float:
@@ -235,7 +217,7 @@ def registers(bits: int) -> float:
     return bits * part("pipe_reg", f"{RECORD_BITS} bit").ge / RECORD_BITS
 
 
-def lane_stage_parts(lanes: LaneStage, generator: Operations | None, vrus: int, fifo_depth: int, accumulator: int = 0) -> dict[str, float]:
+def lane_stage_parts(lanes: LaneStage, generator: float, vrus: int, fifo_depth: int, accumulator: int = 0) -> dict[str, float]:
     """GE of a stage of independent lanes by part; arguments as of `stage_parts`. A lane has a FIFO of its own, whose oldest `window - 1` entries lie in
     registers behind it."""
     pixels = CORES * CHANNELS * MINITILE * MINITILE // vrus
@@ -244,40 +226,7 @@ def lane_stage_parts(lanes: LaneStage, generator: Operations | None, vrus: int, 
     return {
         "VRUs": vrus * lane_vru_area(pixels, lanes.window, lanes.buffers, accumulator),
         "feature FIFOs": vrus * (fifo_area(fifo_depth - heads, RECORD_BITS + pixels) + registers(heads * (RECORD_BITS + pixels))),
-        "mask generators": CORES * lanes.width * generator_area(generator) if generator else 0.0,
+        "mask generators": CORES * lanes.width * generator,
         "counters": CORES * part("perf_counters", "default").ge,
-        "arbiters, control": vrus * arbiter + stage_parts(Form.FACTORED, None)["arbiters, control"],
+        "arbiters, control": vrus * arbiter + stage_parts(Form.FACTORED)["arbiters, control"],
     }
-
-
-def area_table() -> list[tuple[str, dict[str, float]]]:
-    """(stage, GE by part) of the RTL and of some alternatives."""
-    from ..explore.evaluate import get_configuration
-    from ..explore.methods import get_method
-
-    def estimate(name: str) -> dict[str, float]:
-        method = get_method(name)
-        return stage_parts(method.form, None, generator=method.operations, pixels=method.pixels)
-
-    def lane_estimate(name: str) -> dict[str, float]:
-        configuration = get_configuration(name)
-        method = get_method(configuration.method)
-        return lane_stage_parts(configuration.lanes, method.operations, configuration.vrus, configuration.fifo_depth, method.accumulator)
-
-    return [
-        ("FLICKER, fixed, factored (default)", stage_parts("factored", "fixed")),
-        ("FLICKER, mixed, factored", stage_parts("factored", "mixed")),
-        ("FLICKER, FP16, factored", stage_parts("factored", "fp16")),
-        ("FLICKER as in the paper (`faithful`)", stage_parts("conic", "mixed", ctu_fifo_depth=16)),
-        ("no mask generator, 32 VRUs", stage_parts("factored", None)),
-        ("no mask generator, 64 VRUs", stage_parts("factored", None, vrus=64)),
-        ("exact rectangle, FP16 with bound (estimate)", estimate("exact")),
-        ("exact rectangle, E4M3 (estimate)", estimate("exact-e4m3-factored")),
-        ("row intervals, pixel masks (estimate)", estimate("rows")),
-        *((f"`{name}` (estimate)", lane_estimate(name)) for name in ("lanes", "lanes-deep", "lanes-64")),
-    ]
-
-
-if __name__ == "__main__":
-    for title, by_part in area_table():
-        print(f"| {title} | {sum(by_part.values()) / 1e6:.2f} | {' / '.join(f'{ge / 1e6:.2f}' for ge in by_part.values())} |")

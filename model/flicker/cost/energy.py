@@ -1,6 +1,6 @@
 """Energy of a rendered frame: operations and accesses counted by the models, times energy per operation.
 
-    stage_energy(result.work, simulate(result.work, config), "factored", "fixed")       # microjoules by part
+    configuration.energy(work, cycles, counters)       # microjoules by part; `stage_energy` with the stage's own counts
 
 Logic: switched capacitance of the synthesised netlists (`flicker.cost.area`: input capacitance of all cells), scaled to 28 nm by the constants
 below. Memories: published figures. Every constant has its source in SOURCES. Absolute values are estimates without layout; ratios between
@@ -13,13 +13,10 @@ import math
 
 import numpy as np
 
-from .area import RECORD_BITS, Part, operator, part, parts, stage_area, vru_part
+from .area import RECORD_BITS, Part, operator, part, parts, vru_part
 from ..errors import FlickerError
-from ..explore.generators.leaders import cat_operations
-from .operations import Operations
-from ..perf.work import Work
-from ..params import CHANNELS, CORES, PIXELS_PER_VRU, VRUS_PER_CHANNEL, CatMode, Form, Precision, RenderConfig
-from ..perf.render_stage import StageCycles
+from .operations import Operations, ctu_operations
+from ..params import CORES, PIXELS_PER_VRU, CatMode, Form, Precision, RenderConfig
 
 # ---- constants ----------------------------------------------------------------------------------
 
@@ -107,7 +104,7 @@ def generator_pj(operations: Operations) -> float:
     registers and their clocks."""
     logic = sum(o.count * operator(o).load for o in operations.per_element)
     model = part("ctu", "factored fp16")
-    own = cat_operations(RenderConfig(form=Form.FACTORED, precision=Precision.FP16, cat=CatMode.DENSE))
+    own = ctu_operations(RenderConfig(form=Form.FACTORED, precision=Precision.FP16, cat=CatMode.DENSE))
     scale = model.load / sum(o.count * operator(o).load for o in own.per_element)
     return switching_pj(logic * scale) + clock_pj(logic * scale * model.clock_gated / model.load)
 
@@ -130,62 +127,25 @@ def _name(value: Form | Precision | str) -> str:
 
 
 def stage_energy(
-    work: Work, stage: StageCycles | None, form: Form | str, precision: Precision | str | None, *, cycles: int | None = None,
-    operations: Operations | None = None, vrus: int = CORES * CHANNELS * VRUS_PER_CHANNEL, fifo_depth: int = 16, ctu_fifo_depth: int = 0,
-    pairs: int | None = None, area: float | None = None, lanes: bool = False,
+    *, cycles: int, subtiles: int, form: Form | str, vrus: int, pairs: int, pushed: int, fifos: int, fifo_depth: int, fifo_bits: int,
+    masks_pj: float, masks_clock_free: float, area: float,
 ) -> dict[str, float]:
     """Microjoules of a frame in the rendering stage, by part.
 
-    work: of the method. stage: its cycles and counters, or None with `cycles` given. precision: of the CTU; None where there is none.
-    operations: of the mask generator; `operations.NONE` says that there is none even where a precision is given, None: the CTU.
-    vrus: over all channels. pairs: pixel-Gaussian pairs that the VRUs work on, where the default does not apply: with whole mini-tiles
-    what the stage issued (without counters: 16 for each mini-tile sent), else the visited pixels. area: of the stage, in GE, where it is not that of
-    `stage_area`. lanes: each VRU has a FIFO of its own and says itself how many pixels it visited (perf.lane_stage).
+    pairs: pixel-Gaussian pairs that the VRUs work on. pushed: records of `fifo_bits` written into the FIFOs. masks_pj: of the mask generators in
+    the frame; masks_clock_free: load of clock pins that always toggle in one of them. area: of the stage, in GE.
 
     "ungated clock": clock pins behind no clock gate, over all cycles. Left out: wires between units, input buffers, what the sorting unit does.
     """
-    if stage is None and cycles is None:
-        raise FlickerError("energy: without the stage's counters the number of cycles is needed")
-    cycles = stage.cycles if cycles is None else cycles
     form = _name(form)
-    visited = work.visit_masks() & work.unfinished()
-    if pairs is None:
-        if lanes:
-            pairs = int(stage.channel("vru_busy").sum(dtype=np.int64))
-        elif work.visit is not None:
-            pairs = int(np.bitwise_count(visited).sum(dtype=np.int64))
-        elif stage is not None:
-            pairs = int(stage.channel("vru_busy").sum(dtype=np.int64)) * vrus // (CORES * CHANNELS)
-        else:
-            pairs = 16 * int((visited != 0).sum(dtype=np.int64))
-    pushed = int(stage.core("minitiles_delivered").sum(dtype=np.int64)) if stage is not None else int((visited != 0).sum(dtype=np.int64))
     vru_pixels = 64 * CORES // vrus
-    fifos = vrus if lanes else CORES * CHANNELS
-    mask_bits = vru_pixels if lanes else 16
-    width = RECORD_BITS + (mask_bits if work.visit is not None else 0)
-    tested = int(stage.core("gaussians_in").sum(dtype=np.int64)) if lanes else int(work.test_cycles.sum(dtype=np.int64))
-    no_generator = (precision is None and operations is None) or (operations is not None and not operations.per_element)
-    own_ctu = precision is not None and not no_generator
-    free = vrus * vru_part(form, vru_pixels)[1].clock_free + CORES * part("perf_counters", "default").clock_free + fifos * _free_fifo(fifo_depth)
-    if no_generator:
-        masks = 0.0
-    elif own_ctu:
-        masks = tested * ctu_pj(form, precision)
-        free += CORES * ctu(form, precision).clock_free
-    else:
-        masks = tested / operations.cycles * generator_pj(operations)
-    if ctu_fifo_depth:
-        masks += fifo_pj(ctu_fifo_depth, RECORD_BITS + CHANNELS) * int((work.mask != 0).sum(dtype=np.int64))
     counters, arbiters = part("perf_counters", "default"), (part("stream_arbiter", "2 x 67 bit"), part("stream_arbiter", "4 x 92 bit"))
-    pixels = 64 * work.subtiles
-    control = CORES * cycles * (switching_pj(counters.load) + clock_pj(counters.clock_gated)) + pixels * sum(switching_pj(a.load) for a in arbiters)
-    if area is None:
-        area = stage_area(form, precision if own_ctu else None, fifo_depth, ctu_fifo_depth, vrus, None if own_ctu or no_generator else operations,
-                          work.visit is not None)
+    free = vrus * vru_part(form, vru_pixels)[1].clock_free + CORES * (counters.clock_free + masks_clock_free) + fifos * _free_fifo(fifo_depth)
+    control = CORES * cycles * (switching_pj(counters.load) + clock_pj(counters.clock_gated)) + 64 * subtiles * sum(switching_pj(a.load) for a in arbiters)
     picojoules = {
         "VRUs": pairs * vru_pj(form, vru_pixels),
-        "feature FIFOs": pushed * fifo_pj(fifo_depth, width),
-        "mask generators": masks,
+        "feature FIFOs": pushed * fifo_pj(fifo_depth, fifo_bits),
+        "mask generators": masks_pj,
         "counters, arbiters": control,
         "ungated clock": cycles * clock_pj(free),
         "leakage": area * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12,
@@ -213,46 +173,3 @@ def ratios(energies: dict[str, float | dict[str, float]], base: str) -> dict[str
     if not total[base] > 0 or not math.isfinite(total[base]):
         raise FlickerError(f"energy: '{base}' has no energy to compare with")
     return {name: value / total[base] for name, value in total.items()}
-
-
-def event_table() -> list[tuple[str, str, float]]:
-    """(event, configuration, pJ) of what a frame is made of."""
-    from ..explore.methods import get_method
-
-    rows = [("FP16 multiplication", "", switching_pj(part("fp_mul", "fp16").load)), ("FP16 addition", "", switching_pj(part("fp_add", "fp16").load)),
-            ("E4M3 multiplication", "", switching_pj(part("fp_mul", "e4m3").load)), ("E4M3 addition", "", switching_pj(part("fp_add", "e4m3").load))]
-    for form in Form:
-        rows.append(("pixel-Gaussian pair in a VRU", _name(form), vru_pj(form)))
-        rows.append(("cycle of a VRU's ungated clock", _name(form), clock_pj(part("vru", _name(form)).clock_free)))
-        for precision in Precision:
-            rows.append(("test cycle of a CTU", f"{_name(form)} {_name(precision)}", ctu_pj(form, precision)))
-    for name in ("exact", "rows", "pixels-fp16-factored"):
-        rows.append(("element in a mask generator", name, generator_pj(get_method(name).operations)))
-    rows += [("record through a feature FIFO", f"depth {depth}", fifo_pj(depth)) for depth in (4, 16, 64)]
-    rows.append(("64 bits of SRAM", "288 KiB", sram_pj(64, 288 * 1024)))
-    rows.append(("64 bits of LPDDR4", "", dram_pj(8)))
-    return rows
-
-
-TABLE_CONFIGURATIONS = ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64")
-
-
-def frame_table(scene: str, view: int, base: str = "gscore") -> list[tuple[str, float, float, dict[str, float]]]:
-    """(configuration, energy over that of `base`, microjoules, parts) of one view at 1280x720."""
-    from ..explore.evaluate import evaluate, load_view
-
-    data = load_view(scene, view)
-    found = {name: evaluate(data, name).energy for name in TABLE_CONFIGURATIONS}
-    shares = ratios(found, base)
-    return [(name, shares[name], sum(energy.values()), energy) for name, energy in found.items()]
-
-
-if __name__ == "__main__":
-    import sys
-
-    if len(sys.argv) > 1:
-        for name, share, total, energy_parts in frame_table(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 0):
-            print(f"| `{name}` | {share:.2f} | {total:,.0f} | {' / '.join(f'{value:,.0f}' for value in energy_parts.values())} |", flush=True)
-    else:
-        for event, configuration, value in event_table():
-            print(f"| {event} | {configuration} | {value:,.2f} |")

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from ..params import FIXED_FRAC_BITS, FIXED_INT_BITS, CatMode, Form, Precision, RenderConfig
+
 
 class Op(str, Enum):
     """Kinds of operation."""
@@ -53,3 +55,25 @@ class Operations:
 
 
 NONE = Operations()
+
+
+def ctu_operations(config: RenderConfig) -> Operations:
+    """Of a CTU: two PRTUs, one pixel rectangle of four leaders each per cycle."""
+    if config.cat == CatMode.OFF:
+        return Operations()
+    fmt = "FP16" if config.precision == Precision.FP16 else "E4M3"
+    difference = {
+        Precision.FP8: "E4M3", Precision.FIXED: f"fixed {FIXED_INT_BITS + FIXED_FRAC_BITS + 2}",
+    }.get(config.precision, "FP16")
+    if config.form == Form.CONIC:  # per rectangle: xx, yy, sx, sy twice each, xy, t four times, h and E four times
+        operations = [Operation(Op.MUL, fmt, 2 * 12), Operation(Op.MUL, fmt, 2 * 4, sqr=True), Operation(Op.ADD, fmt, 2 * 8)]
+    else:  # per rectangle: p, q, v and vv twice each, u four times, uu four times, E four times
+        operations = [Operation(Op.MUL, fmt, 2 * 6), Operation(Op.MUL, fmt, 2 * 6, sqr=True), Operation(Op.ADD, fmt, 2 * 8)]
+    operations += [Operation(Op.ADD, difference, 2 * 4), Operation(Op.CMP, fmt, 2 * 4), Operation(Op.LOG, fmt, 1)]
+    if config.precision == Precision.FIXED:
+        operations.append(Operation(Op.SHIFT, f"FP16 -> q{FIXED_INT_BITS}.{FIXED_FRAC_BITS}", 2 * 2, note="means"))
+    if config.precision in (Precision.MIXED, Precision.FIXED):
+        operations.append(Operation(Op.SHIFT, "FP16 -> E4M3", 2 * 7, note="conversion"))
+    elif config.precision == Precision.FP8:
+        operations.append(Operation(Op.SHIFT, "FP16 -> E4M3", 2 * 5, note="conversion"))
+    return Operations(tuple(operations))

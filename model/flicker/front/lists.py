@@ -1,6 +1,6 @@
-"""Lists of the methods: what each core streams before any mask is made.
+"""Kinds of lists: what each core streams before any mask is made.
 
-Every list is a `SubtileLists` of 8x8 sub-tiles, so that one VRU model serves all methods: in `tile_lists` the four sub-tiles of a
+Every list is a `SubtileLists` of 8x8 sub-tiles, so that one VRU model serves all kinds: in `tile_lists` the four sub-tiles of a
 16x16 tile have the same splats.
 """
 
@@ -14,48 +14,19 @@ import numpy as np
 from ..scene.camera import Camera
 from ..errors import FlickerError
 from ..arithmetic.fp import fp16_value
-from .records import MAX_FP16, SubtileLists, _local_means
-from ..params import SUBTILE, TILE, Form
-from .projection import Projected, tile_range
+from .records import MAX_FP16, SubtileLists, build_lists, local_means
+from ..params import SUBTILE, TILE, Coords, Form, RenderConfig
+from .binning import bin_boxes, circle_boxes, pairs
+from .projection import Projected
 from ..arithmetic.thresholds import EPSILON, radii
 
 OBB_AXIS_RATIO = 2.0  # GSCore: the oriented box is tested for splats more elongated than this
 _SIGMAS = 3.0
 
 
-@numba.njit(cache=True)
-def _bin_tiles(mean, circle, cols, rows):
-    """Entries of the sub-tiles when every tile of the INRIA rasterizer's list goes to its four sub-tiles whole."""
-    side = TILE // SUBTILE
-    tiles_x = (cols + side - 1) // side
-    tiles_y = (rows + side - 1) // side
-    n = mean.shape[0]
-    count = np.zeros(cols * rows + 1, np.int64)
-    tile_pairs = 0
-    for fill in range(2):
-        if fill == 1:
-            start = np.cumsum(count)
-            place = start[:-1].copy()
-            entry = np.empty(start[-1], np.int32)
-        for i in range(n):
-            x0, x1 = tile_range(mean[i, 0], circle[i], tiles_x)
-            y0, y1 = tile_range(mean[i, 1], circle[i], tiles_y)
-            if fill == 0:
-                tile_pairs += max(x1 - x0, 0) * max(y1 - y0, 0)
-            for y in range(side * y0, min(side * y1, rows)):
-                for x in range(side * x0, min(side * x1, cols)):
-                    s = y * cols + x
-                    if fill == 0:
-                        count[s + 1] += 1
-                    else:
-                        entry[place[s]] = i
-                        place[s] += 1
-    return start, entry, tile_pairs
-
-
 def _with_entries(lists: SubtileLists, projected: Projected, start: np.ndarray, entry: np.ndarray, tile_pairs: int) -> SubtileLists:
     mean = np.empty((len(entry), 2), np.uint16)
-    _local_means(projected.mean, start, entry, lists.cols, False, mean)
+    local_means(projected.mean, start, entry, lists.cols, False, mean)
     return replace(lists, start=start, entry=entry, mean=mean, tile_pairs=tile_pairs)
 
 
@@ -63,14 +34,17 @@ def absolute_means(lists: SubtileLists, projected: Projected, origin: tuple[int,
     """uint16 (E, 2): means of the entries when they are rounded to FP16 in screen coordinates first (`Coords.ABSOLUTE`)."""
     screen = np.clip(projected.mean + origin, -MAX_FP16, MAX_FP16).astype(np.float16).astype(np.float64) - origin
     mean = np.empty((len(lists.entry), 2), np.uint16)
-    _local_means(screen, lists.start, lists.entry, lists.cols, False, mean)
+    local_means(screen, lists.start, lists.entry, lists.cols, False, mean)
     return mean
 
 
 def tile_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:
     """Lists of vanilla 3DGS: a splat meets a 16x16 tile when the bounding square of its 3-sigma circle does (INRIA rasterizer)."""
-    start, entry, pairs = _bin_tiles(projected.mean, projected.circle, lists.cols, lists.rows)
-    return _with_entries(lists, projected, start, entry, int(pairs))
+    side = TILE // SUBTILE
+    tiles = circle_boxes(projected.mean, projected.circle, -(-lists.cols // side), -(-lists.rows // side))
+    box = np.minimum(side * tiles, np.array([lists.cols, lists.cols, lists.rows, lists.rows], np.int32))
+    start, entry = bin_boxes(box, lists.cols, lists.rows)
+    return _with_entries(lists, projected, start, entry, pairs(tiles))
 
 
 @numba.njit(parallel=True, cache=True)
@@ -176,3 +150,18 @@ def reach_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> Su
 def ellipse_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:
     """Entries of `lists` whose sub-tile meets the ellipse alpha = 1/255 itself: one exact-rectangle test per entry when lists are made."""
     return _reach_lists(lists, False)
+
+
+def subtile_lists(
+    projected: Projected, camera: Camera, form: Form, coords: Coords = Coords.LOCAL, origin: tuple[int, int] = (0, 0),
+) -> SubtileLists:
+    """A splat meets an 8x8 sub-tile when its 3-sigma box (per axis, after dilation) contains a pixel centre of it. coords, origin: as in `View`."""
+    lists = build_lists(projected, camera, RenderConfig(form=form))
+    if coords == Coords.ABSOLUTE:
+        lists.mean = absolute_means(lists, projected, origin)
+    return lists
+
+
+# Kinds made from `subtile`: `tile` is vanilla's, `obb` GSCore's; `reach` and `ellipse` leave out entries that cannot contribute (factored form).
+DERIVED = {"tile": tile_lists, "obb": obb_lists, "reach": reach_lists, "ellipse": ellipse_lists}
+LISTS = ("subtile", *DERIVED)

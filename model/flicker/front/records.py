@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from ..params import SUBTILE, TILE, Coords, Form, RenderConfig
+from .binning import bin_boxes, pairs, pixel_boxes
 from ..arithmetic.fp import FP16_R, fp16_bits, fp16_from_f64, sub
 
 LOG2E = 1.4426950408889634
@@ -82,46 +83,8 @@ def _round_splats(conic, cov, opacity, rgb, factored, gauss, clamped):
         clamped[i] = n
 
 
-@numba.njit(cache=True)
-def _span(lo, hi, size, count):
-    """First and one-past-last block of `size` pixels with a pixel centre in [lo, hi], clipped to [0, count)."""
-    low = np.ceil(max(lo, 0.0))
-    high = np.floor(min(hi, size * count - 1.0))
-    if not low <= high:
-        return 0, 0
-    return np.int64(low) // size, np.int64(high) // size + 1
-
-
-@numba.njit(cache=True)
-def _bin(mean, radii, cols, rows, width, height):
-    n = mean.shape[0]
-    box = np.empty((n, 4), np.int32)
-    count = np.zeros(cols * rows + 1, np.int64)
-    tile_pairs = 0
-    for i in range(n):
-        x0, x1 = _span(mean[i, 0] - radii[i, 0], min(mean[i, 0] + radii[i, 0], width - 1.0), SUBTILE, cols)
-        y0, y1 = _span(mean[i, 1] - radii[i, 1], min(mean[i, 1] + radii[i, 1], height - 1.0), SUBTILE, rows)
-        box[i] = x0, x1, y0, y1
-        if x1 > x0 and y1 > y0:
-            k = TILE // SUBTILE
-            tile_pairs += ((x1 - 1) // k - x0 // k + 1) * ((y1 - 1) // k - y0 // k + 1)
-        for y in range(y0, y1):
-            for x in range(x0, x1):
-                count[y * cols + x + 1] += 1
-    start = np.cumsum(count)
-    fill = start[:-1].copy()
-    entry = np.empty(start[-1], np.int32)
-    for i in range(n):
-        for y in range(box[i, 2], box[i, 3]):
-            for x in range(box[i, 0], box[i, 1]):
-                s = y * cols + x
-                entry[fill[s]] = i
-                fill[s] += 1
-    return start, entry, tile_pairs
-
-
 @numba.njit(parallel=True, cache=True)
-def _local_means(mean, start, entry, cols, absolute, out):
+def local_means(mean, start, entry, cols, absolute, out):
     for s in numba.prange(start.shape[0] - 1):
         ox = (s % cols) * SUBTILE
         oy = (s // cols) * SUBTILE
@@ -145,11 +108,13 @@ def build_lists(projected, camera, config: RenderConfig) -> SubtileLists:
     _round_splats(projected.conic, projected.cov2d, projected.opacity, projected.rgb, config.form == Form.FACTORED, gauss, clamped)
     cols = -(-camera.width // SUBTILE)
     rows = -(-camera.height // SUBTILE)
-    start, entry, tile_pairs = _bin(projected.mean, projected.radii, cols, rows, camera.width, camera.height)
+    size = camera.width, camera.height
+    start, entry = bin_boxes(pixel_boxes(projected.mean, projected.radii, SUBTILE, cols, rows, *size), cols, rows)
+    tile_pairs = pairs(pixel_boxes(projected.mean, projected.radii, TILE, -(-camera.width // TILE), -(-camera.height // TILE), *size))
     mean = np.empty((len(entry), 2), np.uint16)
-    _local_means(projected.mean, start, entry, cols, config.coords == Coords.ABSOLUTE, mean)
+    local_means(projected.mean, start, entry, cols, config.coords == Coords.ABSOLUTE, mean)
     adjusted = {"value beyond FP16 clamped": int((clamped > 0).sum())} if clamped.any() else {}
     return SubtileLists(
         camera.width, camera.height, config.form, gauss, np.asarray(projected.spiky, bool), start, entry, mean,
-        cols, rows, int(tile_pairs), adjusted,
+        cols, rows, tile_pairs, adjusted,
     )

@@ -15,34 +15,11 @@ import numpy as np
 
 from ..scene.camera import Camera
 from ..params import ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN
-from .projection import Projected, tile_range
+from .binning import bin_boxes, circle_boxes
+from .projection import Projected
 
 # Pixels this little outside the ellipse alpha = 1/255 are still evaluated, so that rounding never decides.
 _MARGIN = 1e-9
-
-
-@numba.njit(cache=True)
-def _bin(mean, circle, tiles_x, tiles_y):
-    """Lists of the tiles: entries of tile t are entry[start[t]:start[t + 1]], in the order of the Gaussians."""
-    count = np.zeros(tiles_x * tiles_y + 1, np.int64)
-    for i in range(len(circle)):
-        x0, x1 = tile_range(mean[i, 0], circle[i], tiles_x)
-        y0, y1 = tile_range(mean[i, 1], circle[i], tiles_y)
-        for y in range(y0, y1):
-            for x in range(x0, x1):
-                count[y * tiles_x + x + 1] += 1
-    start = np.cumsum(count)
-    fill = start[:-1].copy()
-    entry = np.empty(start[-1], np.int32)
-    for i in range(len(circle)):
-        x0, x1 = tile_range(mean[i, 0], circle[i], tiles_x)
-        y0, y1 = tile_range(mean[i, 1], circle[i], tiles_y)
-        for y in range(y0, y1):
-            for x in range(x0, x1):
-                t = y * tiles_x + x
-                entry[fill[t]] = i
-                fill[t] += 1
-    return start, entry
 
 
 @numba.njit(cache=True)
@@ -113,7 +90,7 @@ def render_with_transmittance(
     """Picture float64 (height, width, 3), neither clamped nor quantised, and the transmittance float64 (height, width) left."""
     tiles_x = -(-camera.width // TILE)
     tiles_y = -(-camera.height // TILE)
-    start, entry = _bin(projected.mean, projected.circle, tiles_x, tiles_y)
+    start, entry = bin_boxes(circle_boxes(projected.mean, projected.circle, tiles_x, tiles_y), tiles_x, tiles_y)
     image = np.zeros((camera.height, camera.width, 3))
     transmittance = np.ones((camera.height, camera.width))
     reach = np.log(projected.opacity / ALPHA_MIN)

@@ -126,7 +126,7 @@ def _energy(view: ViewResult, name: str, other: str) -> float:
 
 
 def _extra(view: ViewResult, name: str, key: str) -> float:
-    return float(view.extras[name][key])
+    return float(view.rows[name][key])
 
 
 def _interval(view: ViewResult, name: str) -> float:
@@ -208,7 +208,7 @@ def _no_ctu_reason(view: ViewResult) -> str:
 
 
 def _match_reason(view: ViewResult) -> str:
-    rows = view.extras[FAITHFUL]
+    rows = view.rows[FAITHFUL]
     return f"{_work_ratio(view, FAITHFUL, GSCORE)}, and half the VRUs need 2; channels are unequal ({rows['imbalance']:.2f}), CTU stalled " \
         f"{view.rows[FAITHFUL]['ctu_stall_rate']:.0%} of the cycles"
 

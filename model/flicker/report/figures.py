@@ -21,14 +21,14 @@ from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 from ..errors import FlickerError  # noqa: E402
-from ..explore.evaluate import CONFIGURATIONS  # noqa: E402
-from ..explore.methods import get_method  # noqa: E402
+from ..explore.configurations import CONFIGURATIONS  # noqa: E402
+from ..explore.facts import TILE_SIZES  # noqa: E402
 from ..explore.stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
     DENSE, FAITHFUL, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
     drop, test_loss,
 )
-from .collect import FIFO_SWEPT, TILE_SIZES, ViewResult  # noqa: E402
+from .collect import FIFO_SWEPT, ViewResult  # noqa: E402
 
 STYLE = {
     "font.size": 8, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.fonttype": "none", "svg.hashsalt": "flicker",
@@ -131,14 +131,14 @@ def sampling_modes(views: Sequence[ViewResult]) -> Figure | None:
     rows = []
     for v in views:
         for mode, name in MODES.items():
-            row, extra = v.rows[name], v.extras[name]
-            rows.append([v.target.scene, v.target.view, mode, name, row["psnr_db"], v.rows[NO_CTU]["psnr_db"], test_loss(v, name, NO_CTU, PAPER_VANILLA_PSNR),
+            row = extra = v.rows[name]
+            rows.append([v.target.scene.name, v.target.view, mode, name, row["psnr_db"], v.rows[NO_CTU]["psnr_db"], test_loss(v, name, NO_CTU, PAPER_VANILLA_PSNR),
                          extra["evaluations"], extra["leaders_per_element"]])
     figure, (a, b, c) = _axes(3, 3.8)
     _bars(a, _titles(views), {m: [_finite(v.rows[n]["psnr_db"]) for v in views] for m, n in MODES.items()}, "PSNR against float64, dB", "{:.1f}")
     _bars(b, _titles(views), {m: [test_loss(v, n, NO_CTU, PAPER_VANILLA_PSNR) for v in views] for m, n in MODES.items()},
           f"loss at {PAPER_VANILLA_PSNR} dB, dB", "{:.3f}", {"Uniform-Dense": 0.08})
-    _bars(c, _titles(views), {m: [v.extras[n]["leaders_per_element"] for v in views] for m, n in MODES.items()}, "leader pixels per stream element", "{:.1f}")
+    _bars(c, _titles(views), {m: [v.rows[n]["leaders_per_element"] for v in views] for m, n in MODES.items()}, "leader pixels per stream element", "{:.1f}")
     a.legend(fontsize=6, ncols=2, loc="lower center")
     return Figure(
         "fig3a_modes", "Sampling modes: PSNR and leader pixels", "3a",
@@ -156,14 +156,14 @@ def intersection(views: Sequence[ViewResult]) -> Figure | None:
     rows = []
     for v in views:
         for title, name in INTERSECTIONS.items():
-            extra = v.extras[name]
-            rows.append([v.target.scene, v.target.view, "gaussians_per_pixel", title, extra["visited_per_pixel"], extra["listed_per_pixel"],
-                         extra["visited_per_pixel"] / v.extras[VANILLA]["visited_per_pixel"]])
+            extra = v.rows[name]
+            rows.append([v.target.scene.name, v.target.view, "gaussians_per_pixel", title, extra["visited_per_pixel"], extra["listed_per_pixel"],
+                         extra["visited_per_pixel"] / v.rows[VANILLA]["visited_per_pixel"]])
         for size in TILE_SIZES:
             pairs = v.facts["duplicates"]
-            rows.append([v.target.scene, v.target.view, "duplicates", f"{size}x{size}", pairs[str(size)], None, pairs[str(size)] / pairs["16"]])
+            rows.append([v.target.scene.name, v.target.view, "duplicates", f"{size}x{size}", pairs[str(size)], None, pairs[str(size)] / pairs["16"]])
     figure, (a, b) = _axes(2, 5)
-    _bars(a, _titles(views), {t: [v.extras[n]["visited_per_pixel"] for v in views] for t, n in INTERSECTIONS.items()}, "Gaussians processed per pixel", "{:.0f}")
+    _bars(a, _titles(views), {t: [v.rows[n]["visited_per_pixel"] for v in views] for t, n in INTERSECTIONS.items()}, "Gaussians processed per pixel", "{:.0f}")
     for k, v in enumerate(views):
         pairs = v.facts["duplicates"]
         b.plot(TILE_SIZES, [pairs[str(s)] / pairs["16"] for s in TILE_SIZES], "o-", color=COLOURS[k % len(COLOURS)], label=v.target.title)
@@ -199,7 +199,7 @@ def precision(views: Sequence[ViewResult]) -> Figure | None:
     views = [v for v in _with(views, *PRECISIONS.values()) if all(n in v.pictures for n in PRECISIONS.values())]
     if not views:
         return None
-    rows = [[v.target.scene, v.target.view, t, n, *(v.rows[n][k] for k in ("psnr_db", "ssim", "flip"))] for v in views for t, n in PRECISIONS.items()]
+    rows = [[v.target.scene.name, v.target.view, t, n, *(v.rows[n][k] for k in ("psnr_db", "ssim", "flip"))] for v in views for t, n in PRECISIONS.items()]
     figure, axes = plt.subplots(len(views), 4, figsize=(8.8, 2.35 * len(views)), layout="constrained", squeeze=False)
     for line, v in zip(axes, views):
         left, top, side = _worst_crop(v)
@@ -225,7 +225,7 @@ def rendering_stage(views: Sequence[ViewResult]) -> Figure | None:
     for v in views:
         for title, name in BUILDS.items():
             row, base = v.rows[name], v.rows[NO_CTU]
-            rows.append([v.target.scene, v.target.view, title, name, row["cycles"], base["cycles"] / row["cycles"], row["energy_uj"],
+            rows.append([v.target.scene.name, v.target.view, title, name, row["cycles"], base["cycles"] / row["cycles"], row["energy_uj"],
                          _ratio(base["energy_uj"], row["energy_uj"]), row["area_ge"]])
     figure, (a, b) = _axes(2, 5.4)
     _bars(a, _titles(views), {t: [v.rows[NO_CTU]["cycles"] / v.rows[n]["cycles"] for v in views] for t, n in BUILDS.items()}, "speed, no CTU with 32 VRUs = 1", "{:.2f}",
@@ -254,7 +254,7 @@ def fifo_depth(views: Sequence[ViewResult]) -> Figure | None:
     for k, v in enumerate(views):
         fifo = v.facts["fifo"]
         speed = [fifo["cycles"][0] / c for c in fifo["cycles"]]
-        rows += [[v.target.scene, v.target.view, *values] for values in zip(fifo["depth"], fifo["cycles"], speed, fifo["stall_rate"], fifo["utilisation"])]
+        rows += [[v.target.scene.name, v.target.view, *values] for values in zip(fifo["depth"], fifo["cycles"], speed, fifo["stall_rate"], fifo["utilisation"])]
         a.plot(fifo["depth"], speed, "o-", color=COLOURS[k % len(COLOURS)], label=v.target.title)
         b.plot(fifo["depth"], [100 * r for r in fifo["stall_rate"]], "o-", color=COLOURS[k % len(COLOURS)])
     a.plot([1, 16, 128], [1, 0.96 * 1.36, 1.36], "k^", label="paper", markersize=5, fillstyle="none")
@@ -282,7 +282,7 @@ def whole_system(views: Sequence[ViewResult]) -> Figure | None:
     for v in views:
         base = v.facts["chip"][GSCORE]
         for name, fact in v.facts["chip"].items():
-            rows.append([v.target.scene, v.target.view, name, fact["render_cycles"], fact["interval_cycles"], fact["latency_cycles"], fact["bottleneck"], fact["dram_bytes"],
+            rows.append([v.target.scene.name, v.target.view, name, fact["render_cycles"], fact["interval_cycles"], fact["latency_cycles"], fact["bottleneck"], fact["dram_bytes"],
                          base["interval_cycles"] / fact["interval_cycles"], fact["energy_uj"], _ratio(base["energy_uj"], fact["energy_uj"])])
     figure, (a, b) = _axes(2, 5.4)
     chip = [v.facts["chip"] for v in views]
@@ -305,7 +305,7 @@ def contribution_test(views: Sequence[ViewResult]) -> Figure | None:
     views = _with(views, NO_CTU, FAITHFUL)
     if not views:
         return None
-    rows = [[v.target.scene, v.target.view, *(v.rows[n][k] for n in (NO_CTU, FAITHFUL) for k in ("psnr_db", "ssim", "flip")),
+    rows = [[v.target.scene.name, v.target.view, *(v.rows[n][k] for n in (NO_CTU, FAITHFUL) for k in ("psnr_db", "ssim", "flip")),
              test_loss(v, FAITHFUL, NO_CTU, PAPER_PRUNED_PSNR), drop(float(v.rows[NO_CTU]["psnr_db"]), PAPER_PRUNED_PSNR)] for v in views]
     return Figure(
         "table1_contribution_test", "Table 1, last step: the contribution test against the same model without it", "Table 1",
@@ -329,18 +329,18 @@ def area(areas: dict[tuple[str, str], float]) -> Figure:
 
 
 def stability_table(result: Stability) -> Figure:
-    """Where methods fail."""
+    """Where configurations fail."""
     rows = []
-    for method in result.methods:
+    for name in result.configurations:
         for family in result.families:
-            point = result.breaks(family, method)
-            lowest = min(p.psnr_db for p in result.sweep(family, method))
-            rows.append([family, method, None if point is None else point.value, None if point is None else point.psnr_db,
+            point = result.breaks(family, name)
+            lowest = min(p.psnr_db for p in result.sweep(family, name))
+            rows.append([family, name, None if point is None else point.value, None if point is None else point.psnr_db,
                          None if point is None else point.max_error, lowest])
     return Figure(
-        "stability", "Where methods fail", "", "Quick stability suite: first, middle and last step of each family (docs/stability.md). First step with a PSNR below 40 dB, an error above "
+        "stability", "Where configurations fail", "", "Quick stability suite: first, middle and last step of each family (docs/stability.md). First step with a PSNR below 40 dB, an error above "
         "0.25 or a NaN, PSNR there in brackets; `-`: never broken, lowest PSNR of the sweep.",
-        ["family", "method", "breaks_at", "psnr_db", "max_error", "lowest_psnr_db"], rows,
+        ["family", "config", "breaks_at", "psnr_db", "max_error", "lowest_psnr_db"], rows,
     )
 
 
@@ -374,10 +374,10 @@ def heat(view: ViewResult) -> Figure | None:
                 scale = LogNorm(max(high / 1000, 1.0), max(high, 2.0), clip=True) if key in LOGARITHMIC else Normalize(low, high)
                 drawn = a.imshow(values, cmap=colours, norm=scale, interpolation="nearest", aspect="auto")
                 figure.colorbar(drawn, ax=a, shrink=0.8)
-                rows.append([view.target.scene, view.target.view, name, key, float(np.nanmean(values)), float(np.nanpercentile(values, 99)), float(np.nanmax(values))])
+                rows.append([view.target.scene.name, view.target.view, name, key, float(np.nanmean(values)), float(np.nanpercentile(values, 99)), float(np.nanmax(values))])
             a.set_title(f"{name}: {title}")
     return Figure(
-        f"heat_{view.target.scene}_{view.target.view}", f"Heat maps, {view.target.title}", "", "Gaussians that VRUs visit before a pixel is finished; cycles from the end of a sub-tile to the "
+        f"heat_{view.target.scene.name}_{view.target.view}", f"Heat maps, {view.target.title}", "", "Gaussians that VRUs visit before a pixel is finished; cycles from the end of a sub-tile to the "
         "end of the next in the same core; pixels visited by the busiest channel over the mean of four; FLIP against float64. Common scale per column, cut at the 99.5 % quantile, the first two logarithmic.",
         ["scene", "view", "config", "map", "mean", "percentile_99", "max"], rows, figure, bitmap=True,
     )
@@ -420,7 +420,7 @@ def overall(views: Sequence[ViewResult]) -> list[dict]:
 def is_bound(name: str) -> bool:
     """Whether a configuration has its masks for free: what could be had at best, not a design; it is left out of Pareto fronts."""
     configuration = CONFIGURATIONS.get(name)
-    return configuration is not None and get_method(configuration.method).family == "oracle"
+    return configuration is not None and configuration.generator.free
 
 
 # What speed_accuracy draws: label, marker, colour, which points.

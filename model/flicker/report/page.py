@@ -75,13 +75,13 @@ def _figure(figure: Figure, verdicts: Sequence[Verdict] = ()) -> str:
 
 
 def _stability(result: Stability, figure: Figure) -> str:
-    header = "".join(f"<th>{_e(m)}</th>" for m in result.methods)
+    header = "".join(f"<th>{_e(m)}</th>" for m in result.configurations)
     rows = []
     for family in result.families:
         cells = []
-        for method in result.methods:
-            point = result.breaks(family, method)
-            lowest = min(p.psnr_db for p in result.sweep(family, method))
+        for name in result.configurations:
+            point = result.breaks(family, name)
+            lowest = min(p.psnr_db for p in result.sweep(family, name))
             cells.append(f"<td>- ({lowest:.0f})</td>" if point is None else
                          f'<td class="broken" title="error {point.max_error:.2f}">{point.value:g} ({point.psnr_db:.0f})</td>')
         rows.append(f"<tr><th>{_e(family)}</th>{''.join(cells)}</tr>")
@@ -108,7 +108,7 @@ def page(
         "<h1>FLICKER: speed, accuracy, area, energy</h1>",
         f"<p>Written by <code>flicker report</code>. Numbers in <a href='summary.csv'>summary.csv</a> and beside every figure.</p><dl>{facts}</dl>",
         "<nav><a href='#chart'>speed against accuracy</a> <a href='#claims'>claims of the paper</a> <a href='#paper'>figures of the paper</a> "
-        "<a href='#heat'>heat maps</a> <a href='#fail'>where methods fail</a></nav>",
+        "<a href='#heat'>heat maps</a> <a href='#fail'>where configurations fail</a></nav>",
         "<h2 id='chart'>Speed against accuracy</h2>",
         "<p>Every configuration is a point; the line is the Pareto front of the two axes shown. Point at one to read it, click to keep it. "
         f"FPS are those of the rendering stage at 1 GHz. {_e(chart.note)} {chart_links}</p>",
@@ -120,7 +120,7 @@ def page(
         *(_figure(f, of_figure[f.name]) for f in paper),
         "<h2 id='heat'>Heat maps</h2>",
         *(_figure(f) for f in heats),
-        "<h2 id='fail'>Where methods fail</h2>", _stability(*stability),
+        "<h2 id='fail'>Where configurations fail</h2>", _stability(*stability),
         f"<script>const DATA = {_points(views)};\n{(_FOLDER / 'page.js').read_text()}</script></body></html>\n",
     ]
     return "\n".join(parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,26 +12,30 @@ from pathlib import Path
 from ..cost.area import SYNTHESIS
 from ..scene.camera import Camera
 from ..errors import FlickerError
+from ..explore.configurations import group, matching
+from ..explore.digest import code_digest, key
+from ..explore.store import DEFAULT, Store
+from ..explore.points import SUFFIXES, SceneFile, Target
+from ..front.view import DEMO
 from ..explore.stability.run import Point, Stability, run_stability
 from ..explore.stability.write import check_folder
 from .claims import Verdict, all_verdicts, read_areas
-from .collect import Cache, Target, check_configurations, code_digest, collect, file_digest, known_configurations, parse_target
+from .collect import collect
 from .figures import own_figures, paper_figures, stability_table
 from .page import page
-
-__all__ = ["Job", "Written", "check", "known_configurations", "write_report"]
 
 SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only")
 
 
 @dataclass(frozen=True)
 class Job:
-    """A checked request."""
+    """A checked request. store: folder of results, shared with sweeps."""
 
     targets: tuple[Target, ...]
     configurations: tuple[str, ...]
     size: tuple[int, int]
     folder: Path
+    store: Path
 
 
 @dataclass(frozen=True)
@@ -42,55 +47,63 @@ class Written:
     verdicts: tuple[Verdict, ...]
 
 
-def check(scenes: Sequence[str], folder: Path, size: tuple[int, int], configurations: Sequence[str] | None = None) -> Job:
+def parse_target(text: str, size: tuple[int, int]) -> Target:
+    """`FILE` or `FILE:VIEW`; FlickerError when there is no such file or view."""
+    path, view = Path(text), 0
+    head, colon, tail = text.rpartition(":")
+    if colon and not path.exists() and tail.isdigit():
+        path, view = Path(head), int(tail)
+    if not path.exists():
+        raise FlickerError(f"{path}: no such scene")
+    if not path.is_file() or not os.access(path, os.R_OK):
+        raise FlickerError(f"{path}: not a readable file")
+    if path.suffix not in SUFFIXES:
+        raise FlickerError(f"{path}: not a scene file ({', '.join(SUFFIXES)})")
+    scene = SceneFile(str(path))
+    if view >= (count := scene.views()):
+        raise FlickerError(f"{path}: view {view}: there are {count} cameras, 0 to {count - 1}")
+    return Target(scene, view, size)
+
+
+def check(
+    scenes: Sequence[str], folder: Path, size: tuple[int, int], configurations: Sequence[str] | None = None, store: Path = DEFAULT,
+) -> Job:
     """All that can be wrong is found here, before any work; FlickerError. Without scenes the demo scene is taken."""
-    targets = [parse_target(text) for text in scenes]
+    targets = [parse_target(text, size) for text in scenes] or [Target(SceneFile(DEMO), 0, size)]
     for i, target in enumerate(targets):
         if any(t.title == target.title for t in targets[:i]):
-            raise FlickerError(f"{target.path}: scene {target.title} is there twice")
-    names = check_configurations(list(known_configurations()) if configurations is None else configurations)
+            raise FlickerError(f"{target.scene.path}: scene {target.title} is there twice")
+    try:
+        names = group("report") if configurations is None else matching(configurations)
+    except FlickerError as error:
+        raise FlickerError(f"--configs: {error}") from None
     Camera(size[0], size[1], 1.0, 1.0, (0, 0, 0), ((1, 0, 0), (0, 1, 0), (0, 0, 1)))  # raises for a size out of range
-    for part in (folder, folder / "cache", folder / "figures"):
+    for part in (folder, folder / "figures"):
         check_folder(part)
+    Store(store)
     for name in ("index.html", "summary.csv"):
         if (folder / name).is_dir():
             raise FlickerError(f"{folder / name}: is a folder")
-    return Job(tuple(targets), tuple(names), size, folder)
+    return Job(tuple(targets), tuple(names), size, folder, store)
 
 
-def _demo(folder: Path, cache: Cache) -> Target:
-    """The demo scene in a folder; made when it is not there as its makers in this state left it."""
-    from ..scene import demo as demo_scene
-
-    makers = sorted(Path(demo_scene.__file__).parent.glob("*.py"))
-    key = cache.key("demo scene", *(file_digest(path) for path in makers))
-    files = folder / "demo" / "demo.ply", folder / "demo" / "cameras.json"
-    stored = cache.load(key)
-    if stored is None or any(not f.exists() or file_digest(f) != stored[0][f.name] for f in files):
-        demo_scene.write_demo(folder / "demo")
-        cache.store(key, {f.name: file_digest(f) for f in files}, {})
-    return Target(files[0])
-
-
-def _stability(cache: Cache, seed: int) -> Stability:
-    """The quick suite, from the cache where it is there."""
-    key = cache.key(code_digest(), "stability", str(seed))
-    stored = cache.load(key)
+def _stability(store: Store, seed: int) -> Stability:
+    """The quick suite, from the store where it is there."""
+    name = key(code_digest(), "stability", seed)
+    stored = store.load(name)
     if stored is None:
         result = run_stability(quick=True, seed=seed)
-        cache.store(key, {"points": [p.__dict__ for p in result.points]}, {})
+        store.put(name, {"points": [p.__dict__ for p in result.points]})
         return result
-    return Stability(tuple(Point(**p) for p in stored[0]["points"]), seed)
+    return Stability(tuple(Point(**p) for p in stored["points"]), seed)
 
 
 def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], None] = lambda done, total, text: None) -> Written:
-    """Measure, draw, write. What is measured stays in the folder's cache, also after an interruption."""
-    cache = Cache(job.folder / "cache")
-    progress(0, 1, "scenes")
-    targets = job.targets or (_demo(job.folder, cache),)
-    views = collect(targets, job.configurations, job.size, job.folder / "cache", progress)
+    """Measure, draw, write. What is measured stays in the store, also after an interruption."""
+    store = Store(job.store)
+    views = collect(job.targets, job.configurations, store, progress)
     progress(1, 1, "stability suite")
-    stability = _stability(cache, seed)
+    stability = _stability(store, seed)
     progress(1, 1, "figures")
     areas = read_areas(SYNTHESIS)
     verdicts = all_verdicts(views, areas)

@@ -18,6 +18,7 @@ from ..errors import FlickerError
 from .files import Scene
 
 MAX_SIZE = 16384
+ORBIT_VIEWS = 8  # cameras of a scene without a file of them
 _MAX_NUMBER = 1e30  # squares and products of such numbers stay finite in the projection
 _KEYS = ("width", "height", "fx", "fy", "position", "rotation")
 
@@ -132,7 +133,7 @@ def _box(scene: Scene) -> np.ndarray:
     return np.stack([np.minimum(low, (low + high) / 2 - margin), np.maximum(high, (low + high) / 2 + margin)], axis=1)
 
 
-def orbit_camera(scene: Scene, view: int = 0, views: int = 8, width: int = 1280, height: int = 720) -> Camera:
+def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: int = 1280, height: int = 720) -> Camera:
     """Camera `view` of `views` on a circle around the scene, looking slightly down at its middle.
 
     The world's y axis is taken to point down (COLMAP, INRIA).
@@ -171,7 +172,7 @@ def find_cameras(scene: Scene, cameras: str | Path | None = None) -> list[Camera
         return load_cameras(cameras)
     if scene.path is not None and (beside := scene.path.parent / "cameras.json").exists():
         return load_cameras(beside)
-    return [orbit_camera(scene, view) for view in range(8)]
+    return [orbit_camera(scene, view) for view in range(ORBIT_VIEWS)]
 
 
 def select_view(cameras: list[Camera], n: int) -> Camera:

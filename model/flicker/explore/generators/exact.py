@@ -10,16 +10,22 @@ proof, and where the constants come from, is in docs/methods.md.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numba
 import numpy as np
 
 from ...arithmetic.fp import FP16_R, sub
 from ...front.records import SubtileLists
+from ...front.view import View
 from ...params import Form
 from ...front.projection import Projected
-from .numbers import DOWN, NEAREST, UP, Numbers, quantise
+from ...arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, Numbers, numbers, quantise
 from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
+from ..stages.channels import Channels
 from ...arithmetic.thresholds import EPSILON, radii, thresholds
 
 
@@ -218,3 +224,47 @@ def exact_operations(form: Form, fmt: str, bound: bool, scaled: bool) -> Operati
     if scaled:
         operations.append(Operation(Op.SHIFT, fmt, 4, note="exponent per Gaussian"))
     return Operations(tuple(operations), record_bits=2 * width, preprocessing=(Operation(Op.MUL, "FP16", 2, note="slopes b / a, b / c from the reciprocals"),))
+
+
+@dataclass(frozen=True)
+class ExactRectangle(MaskGenerator):
+    """One element a cycle. number_format: of `arithmetic.numbers.FORMATS`. bound: with the proved margin. scaled: an exponent per Gaussian."""
+
+    form: Form
+    number_format: str
+    bound: bool = False
+    scaled: bool = False
+
+    @property
+    def exact(self) -> bool:
+        return self.bound
+
+    @property
+    def precision(self) -> str:
+        return self.number_format
+
+    @property
+    def operations(self) -> Operations:
+        return exact_operations(self.form, self.number_format, self.bound, self.scaled)
+
+    def masks(self, view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray, stage: RenderingStage) -> Masks:
+        slopes = view.keep("edge slopes", lambda: edge_slopes(view.projected))
+        mask, evaluations = exact_masks(lists, slopes, numbers(self.number_format), self.bound, self.scaled)
+        return Masks(mask, np.ones(len(mask), np.uint8), evaluations)
+
+
+def configurations() -> Iterator[Configuration]:
+    """The recommended one first, then every format, scaled, with bound, in both forms."""
+    yield Configuration(
+        "exact", "exact rectangle per mini-tile, FP16 bound", "exact", ExactRectangle(Form.FACTORED, "fp16", bound=True), Channels(Form.FACTORED),
+    )
+    for form in (Form.FACTORED, Form.CONIC):
+        for fmt in FORMATS:
+            fixed_point = fmt.startswith("q")
+            for bound in (False,) if fixed_point else (False, True):
+                for scaled in (False,) if fmt == "fp16" or fixed_point else (False, True):
+                    words = ["conic"] * (form == Form.CONIC) + ["scaled"] * scaled + ["bound"] * bound
+                    yield Configuration(
+                        "-".join(["exact", fmt, *words]), ", ".join(["exact rectangle per mini-tile", fmt.upper(), *words]), "exact",
+                        ExactRectangle(form, fmt, bound, scaled), Channels(form),
+                    )

@@ -1,4 +1,4 @@
-"""Stability suite: named families of hard inputs, swept from harmless to extreme, for every method (docs/stability.md)."""
+"""Stability suite: named families of hard inputs, swept from harmless to extreme, for every configuration (docs/stability.md)."""
 
 from .families import FAMILIES, Case, Family, get_family
 from .run import BROKEN_ERROR, BROKEN_PSNR, Point, Stability, run_stability

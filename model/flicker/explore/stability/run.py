@@ -1,4 +1,4 @@
-"""Runs the suite: every method on every case, against the float64 reference."""
+"""Runs the suite: every configuration on every case, against the float64 reference."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ from zlib import crc32
 import numba
 import numpy as np
 
-from ..methods import Method, View, get_method, methods, run
+from ..configurations import get_configuration, group
+from ..machine import Configuration, run
+from ...front.view import View
 from ...scene.metrics import psnr
-from ...params import Coords, Form
+from ...params import Coords
 from ...front.reference import render_reference
 from .families import FAMILIES, get_family
 
 BROKEN_PSNR = 40.0  # dB
 BROKEN_ERROR = 0.25  # of a pixel's channel, relative where the reference exceeds 1
 
-ABSOLUTE = "@absolute"  # behind a method's name: means rounded to FP16 in screen coordinates
-QUICK_METHODS = (
-    "vanilla", "no_ctu", "no_ctu-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored",
-    "exact-e4m3-factored", "exact", "exact-fp16-conic-bound", "rows", "rows-f6a6", "oracle", "no_ctu" + ABSOLUTE,
-)
+ABSOLUTE = "@absolute"  # behind a configuration's name: means rounded to FP16 in screen coordinates
+_ABSOLUTE_TOO = ("no-ctu-32", "no-ctu-32-conic", "flicker-smooth-fixed-factored", "flicker-smooth-mixed-conic")
 
 
 @dataclass(frozen=True)
 class Point:
-    """One method on one case.
+    """One configuration on one case.
 
     psnr_db: against the float64 reference, pictures clamped to [0, 1]; inf when equal, -inf when the picture holds a NaN.
     max_error: largest difference of a channel before clamping, divided by the reference where that exceeds 1.
@@ -38,7 +37,7 @@ class Point:
     parameter: str
     step: int
     value: float
-    method: str
+    configuration: str
     form: str
     precision: str
     psnr_db: float
@@ -47,45 +46,44 @@ class Point:
 
     @property
     def broken(self) -> bool:
-        """Whether the method has failed here."""
+        """Whether the configuration has failed here."""
         return self.has_nan or not self.psnr_db >= BROKEN_PSNR or not self.max_error <= BROKEN_ERROR
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Results of a run, in the order of families, steps and methods."""
+    """Results of a run, in the order of families, steps and configurations."""
 
     points: tuple[Point, ...]
     seed: int
 
     @property
-    def methods(self) -> list[str]:
+    def configurations(self) -> list[str]:
         """Names in order of appearance."""
-        return list(dict.fromkeys(p.method for p in self.points))
+        return list(dict.fromkeys(p.configuration for p in self.points))
 
     @property
     def families(self) -> list[str]:
         """Names in order of appearance."""
         return list(dict.fromkeys(p.family for p in self.points))
 
-    def sweep(self, family: str, method: str) -> list[Point]:
-        """The points of one method in one family, by step."""
-        return [p for p in self.points if p.family == family and p.method == method]
+    def sweep(self, family: str, configuration: str) -> list[Point]:
+        """The points of one configuration in one family, by step."""
+        return [p for p in self.points if p.family == family and p.configuration == configuration]
 
-    def breaks(self, family: str, method: str) -> Point | None:
-        """The first step at which the method is broken."""
-        return next((p for p in self.sweep(family, method) if p.broken), None)
-
-
-def suite_methods() -> list[str]:
-    """All methods but those whose picture another one has by proof; then three with absolute coordinates."""
-    names = [m.name for m in methods().values() if m.family != "rows" or m.accumulator or m.lists == "subtile" and m.pixels]
-    return names + [name + ABSOLUTE for name in ("no_ctu-factored", "no_ctu-conic", "flicker-smooth-fixed-factored", "flicker-smooth-mixed-conic")]
+    def breaks(self, family: str, configuration: str) -> Point | None:
+        """The first step at which the configuration is broken."""
+        return next((p for p in self.sweep(family, configuration) if p.broken), None)
 
 
-def _split(name: str) -> tuple[Method, Coords]:
+def suite() -> list[str]:
+    """All configurations but those whose picture another one has by proof; then some with absolute coordinates."""
+    return group("stability") + [name + ABSOLUTE for name in _ABSOLUTE_TOO]
+
+
+def _split(name: str) -> tuple[Configuration, Coords]:
     base, absolute, _ = name.partition(ABSOLUTE)
-    return get_method(base), Coords.ABSOLUTE if absolute else Coords.LOCAL
+    return get_configuration(base), Coords.ABSOLUTE if absolute else Coords.LOCAL
 
 
 def _measure(image: np.ndarray, reference: np.ndarray) -> tuple[float, float, bool]:
@@ -107,14 +105,13 @@ def _points(steps: list, picked: list, seed: int, progress: Callable[[int, int],
         value = family.values[k]
         case = family.make(value, np.random.default_rng([seed, crc32(family.name.encode())]))
         reference = render_reference(case.truth or case.projected, case.camera)
-        views = {coords: View(case.projected, case.camera, coords, case.origin) for coords in Coords}
-        for name, method, coords in picked:
+        views = {coords: View(case.camera, projected=case.projected, coords=coords, origin=case.origin) for coords in Coords}
+        for name, configuration, coords in picked:
             with np.errstate(all="ignore"):
-                image = run(method, views[coords]).image
+                image = run(configuration, views[coords]).image
                 measured = _measure(image, reference)
             points.append(Point(
-                family.name, family.parameter, k, value, method.name + (ABSOLUTE if coords == Coords.ABSOLUTE else ""),
-                Form(method.form).name.lower(), method.precision, *measured,
+                family.name, family.parameter, k, value, name, configuration.form.name.lower(), configuration.generator.precision, *measured,
             ))
     return points
 
@@ -127,13 +124,13 @@ def run_stability(
     quick: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Stability:
-    """Run families (all) with methods (all, or those of the quick choice).
+    """Run families (all) with configurations (the suite, or those of the quick choice).
 
     quick: first, middle and last step only. progress: called with (cases done, cases in all). Raises FlickerError, before any
-    work, for an unknown family or method.
+    work, for an unknown family or configuration.
     """
     chosen = [get_family(name) for name in families or FAMILIES]
-    picked = [(name, *_split(name)) for name in names or (QUICK_METHODS if quick else suite_methods())]
+    picked = [(name, *_split(name)) for name in names or ([*group("stability, quick"), "no-ctu-32" + ABSOLUTE] if quick else suite())]
     steps = [(f, k) for f in chosen for k in (_quick(f.values) if quick else range(len(f.values)))]
     threads = numba.get_num_threads()
     numba.set_num_threads(1)  # the pictures are too small to share among threads

@@ -30,17 +30,17 @@ def _value(x: float) -> str:
 
 
 def break_table(result: Stability) -> Table:
-    """Where each method breaks: one row for all methods with the same list of families, value and PSNR there."""
+    """Where each configuration breaks: one row for all with the same list of families, value and PSNR there."""
     groups: dict[str, list[str]] = {}
-    for method in result.methods:
-        broken = [(f, result.breaks(f, method)) for f in result.families]
+    for name in result.configurations:
+        broken = [(f, result.breaks(f, name)) for f in result.families]
         text = ", ".join(f"{f} {_value(p.value)} ({p.psnr_db:.0f})" for f, p in broken if p is not None)
-        groups.setdefault(text or "nowhere", []).append(method)
+        groups.setdefault(text or "nowhere", []).append(name)
     table = Table(
         title=f"First step with PSNR < {BROKEN_PSNR:g} dB or an error > {BROKEN_ERROR:g}; seed {result.seed}",
         caption=f"family, value (PSNR in dB); {len(result.families)} families: {', '.join(result.families)}",
     )
-    table.add_column("methods", overflow="fold")
+    table.add_column("configurations", overflow="fold")
     table.add_column("break at")
     for text, names in groups.items():
         table.add_row("\n".join(names), text)
@@ -49,14 +49,14 @@ def break_table(result: Stability) -> Table:
 
 
 def write_markdown(result: Stability, path: Path) -> None:
-    """Table of chosen methods (LINES), families as rows: where each breaks, or its lowest PSNR. Raises FlickerError."""
-    shown = [m for m in LINES if m in result.methods] or result.methods
+    """Table of chosen configurations (LINES), families as rows: where each breaks, or its lowest PSNR. Raises FlickerError."""
+    shown = [m for m in LINES if m in result.configurations] or result.configurations
     lines = ["| family | " + " | ".join(f"`{m}`" for m in shown) + " |", "|---|" + "---|" * len(shown)]
     for family in result.families:
         cells = []
-        for method in shown:
-            point = result.breaks(family, method)
-            lowest = min(p.psnr_db for p in result.sweep(family, method))
+        for name in shown:
+            point = result.breaks(family, name)
+            lowest = min(p.psnr_db for p in result.sweep(family, name))
             cells.append(f"- ({lowest:.0f})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
         lines.append(f"| {family} | " + " | ".join(cells) + " |")
     try:
@@ -96,12 +96,12 @@ def write_pictures(result: Stability, folder: Path) -> list[Path]:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    lowest = np.array([[min(p.psnr_db for p in result.sweep(f, m)) for f in result.families] for m in result.methods])
+    lowest = np.array([[min(p.psnr_db for p in result.sweep(f, m)) for f in result.families] for m in result.configurations])
     lowest = np.clip(lowest, 0, 80)
-    figure, axes = plt.subplots(figsize=(2 + 0.55 * len(result.families), 1.5 + 0.19 * len(result.methods)), layout="constrained")
+    figure, axes = plt.subplots(figsize=(2 + 0.55 * len(result.families), 1.5 + 0.19 * len(result.configurations)), layout="constrained")
     image = axes.imshow(lowest, aspect="auto", cmap="RdYlGn", vmin=10, vmax=70)
     axes.set_xticks(range(len(result.families)), result.families, rotation=60, ha="right", fontsize=7)
-    axes.set_yticks(range(len(result.methods)), result.methods, fontsize=6)
+    axes.set_yticks(range(len(result.configurations)), result.configurations, fontsize=6)
     if lowest.size <= 2500:
         for y, row in enumerate(lowest):
             for x, v in enumerate(row):
@@ -116,11 +116,11 @@ def write_pictures(result: Stability, folder: Path) -> list[Path]:
     figure, grid = plt.subplots(count, columns, figsize=(4 * columns, 2.6 * count), layout="constrained", squeeze=False)
     for axes in grid.flat[len(result.families) :]:
         axes.axis("off")
-    shown = [m for m in LINES if m in result.methods] or result.methods[:8]
+    shown = [m for m in LINES if m in result.configurations] or result.configurations[:8]
     for axes, family in zip(grid.flat, result.families):
-        for method in shown:
-            sweep = result.sweep(family, method)
-            axes.plot([p.step for p in sweep], [min(max(p.psnr_db, 0.0), 100.0) for p in sweep], marker=".", label=method)
+        for name in shown:
+            sweep = result.sweep(family, name)
+            axes.plot([p.step for p in sweep], [min(max(p.psnr_db, 0.0), 100.0) for p in sweep], marker=".", label=name)
         sweep = result.sweep(family, shown[0])
         axes.set_xticks([p.step for p in sweep], [_value(p.value) for p in sweep], fontsize=6, rotation=45)
         axes.axhline(BROKEN_PSNR, color="grey", linewidth=0.6)
@@ -134,6 +134,6 @@ def write_pictures(result: Stability, folder: Path) -> list[Path]:
 
 
 LINES = (
-    "vanilla-factored", "no_ctu-factored", "no_ctu-conic", "seele-factored", "flicker-smooth-mixed-conic", "flicker-smooth-fixed-factored",
-    "flicker-dense-fp16-factored", "exact-e4m3-factored", "rows-f8a8", "rows-f8a8-ellipse-acc14", "no_ctu-factored@absolute",
+    "vanilla", "no-ctu-32", "no-ctu-32-conic", "seele", "flicker-smooth-mixed-conic", "flicker-smooth-fixed-factored", "flicker-dense-fp16-factored",
+    "exact-e4m3", "rows", "rows-ellipse-acc14", "no-ctu-32@absolute",
 )

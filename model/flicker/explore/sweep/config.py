@@ -3,76 +3,29 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
-import json
-from dataclasses import asdict, dataclass, field
-from fnmatch import fnmatchcase
-from functools import lru_cache
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, StrictStr, ValidationError, field_validator, model_validator
 
-from ...cost.area import SYNTHESIS
-from ...scene.camera import MAX_SIZE, load_cameras
 from ...errors import FlickerError
-from ..evaluate import CONFIGURATIONS, get_configuration
+from ...front.view import DEMO
+from ...scene.camera import MAX_SIZE
 from ...toolchain import BUILD
+from ..configurations import GROUPS, matching
+from ..digest import code_digest, key
+from ..points import SUFFIXES, Point, SceneFile, Target
 
-DEMO = "demo"
-ORBIT_VIEWS = 8  # flicker.camera.find_cameras
 MAX_WORKERS = 1024
-# Parts of the package that no result depends on.
-_NOT_IN_RESULTS = ("sweep", "stability", "sim", "synth", "cli.py", "pipeline.py", "report")
-
-KEYS = {
-    "scenes": "list of scene files, or of mappings with path, cameras, views",
-    "views": "list of camera numbers, for every scene without its own",
-    "size": "WxH such as 1280x720",
-    "configurations": "list of names or patterns (flicker.explore.evaluate.CONFIGURATIONS), or all",
-    "cluster": "mapping: workers, or address",
-    "out": "folder, relative to the current one",
-}
-SCENE_KEYS = ("path", "cameras", "views")
-CLUSTER_KEYS = ("workers", "address")
-
-
-@dataclass(frozen=True)
-class SceneViews:
-    """A scene and its views. path: a file, or `demo`. digest: of the contents of scene and cameras."""
-
-    path: str
-    cameras: str | None
-    views: tuple[int, ...]
-    digest: str
-
-    @property
-    def name(self) -> str:
-        """File name."""
-        return Path(self.path).name
-
-
-@dataclass(frozen=True)
-class Point:
-    """One configuration on one view."""
-
-    scene: SceneViews
-    view: int
-    configuration: str
-
-    @property
-    def key(self) -> str:
-        """Name of the point's file: of contents, not of places."""
-        return hashlib.sha256(json.dumps([self.scene.name, self.scene.digest, self.view, self.configuration]).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
 class Sweep:
     """A checked sweep. workers: local processes; None: as many as there are cores, two at most. address: of a Dask scheduler instead."""
 
-    scenes: tuple[SceneViews, ...]
-    width: int
-    height: int
+    targets: tuple[Target, ...]
     configurations: tuple[str, ...]
     workers: int | None = None
     address: str | None = None
@@ -81,171 +34,134 @@ class Sweep:
     @property
     def points(self) -> list[Point]:
         """All points, those of a view together."""
-        return [
-            Point(s, view, name)
-            for s in self.scenes for view in s.views for name in self.configurations
-        ]
+        return [Point(target, name) for target in self.targets for name in self.configurations]
 
     def description(self) -> dict[str, Any]:
-        """What the results depend on: scenes by content, views, size, configurations with all their fields, and the code."""
+        """What the results stand for: scenes by content, views, sizes, configurations, and the code."""
         return {
-            "scenes": [{"name": s.name, "digest": s.digest, "views": list(s.views)} for s in self.scenes],
-            "size": [self.width, self.height],
-            "configurations": {name: asdict(CONFIGURATIONS[name]) for name in self.configurations},
+            "views": [{"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size)} for t in self.targets],
+            "configurations": list(self.configurations),
             "code": code_digest(),
         }
 
     @property
     def hash(self) -> str:
-        """Of `description`."""
-        return hashlib.sha256(json.dumps(self.description(), sort_keys=True).encode()).hexdigest()[:16]
+        """Of all points."""
+        return key(*(p.key for p in self.points))[:16]
 
     @property
     def folder(self) -> Path:
-        """Where the results are."""
+        """Where the table of all results is."""
         return self.out / self.hash
 
-
-@lru_cache(maxsize=None)
-def code_digest() -> str:
-    """Hash of the package's code and tables that results depend on, and of the areas of `make synth`."""
-    package = Path(__file__).resolve().parents[1]
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*")):
-        inside = path.relative_to(package)
-        if path.suffix in (".py", ".csv") and inside.parts[0] not in _NOT_IN_RESULTS:
-            digest.update(str(inside).encode() + b"\0" + path.read_bytes())
-    if SYNTHESIS.exists():
-        digest.update(SYNTHESIS.read_bytes())
-    return digest.hexdigest()[:16]
+    @property
+    def store(self) -> Path:
+        """Where results of single points are kept, for other sweeps and reports too."""
+        return self.out / "points"
 
 
-def _file_digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+# ---- the file -----------------------------------------------------------------------------------
 
 
-# ---- reading ------------------------------------------------------------------------------------
+def _views(value: Any) -> Any:
+    for view in value if isinstance(value, list) else []:
+        if isinstance(view, bool) or not isinstance(view, int) or view < 0:
+            raise ValueError(f"expected camera numbers from 0 on, not '{view}'")
+    return value
 
 
-class _Reader:
-    """Takes values out of the parsed file; every message names the file and the key."""
+Views = Annotated[list[StrictInt], BeforeValidator(_views), Field(min_length=1)]
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
 
-    def fail(self, where: str, message: str) -> FlickerError:
-        return FlickerError(f"{self.path}: {where}: {message}")
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid")
 
-    def keys(self, value: dict, known, where: str) -> None:
-        for key in value:
-            if key not in known:
-                close = difflib.get_close_matches(str(key), known, 1)
-                hint = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(known)}"
-                raise FlickerError(f"{self.path}: {where}unknown key '{key}'; {hint}")
 
-    def items(self, value: Any, where: str) -> list:
-        if not isinstance(value, list) or not value:
-            raise self.fail(where, "expected a list with at least one entry")
+class SceneSection(_Section):
+    """A scene with settings of its own."""
+
+    path: Annotated[StrictStr, Field(min_length=1, description="scene file, relative to the YAML file, or demo")]
+    cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras.json instead of the one beside the scene")] = None
+    views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain_path(cls, value: Any) -> Any:
+        return {"path": value} if isinstance(value, str) else value
+
+
+class ClusterSection(_Section):
+    """Where the work is done."""
+
+    workers: Annotated[StrictInt | None, Field(description="processes of this machine")] = None
+    address: Annotated[StrictStr | None, Field(description="of a Dask scheduler, such as tcp://host:8786")] = None
+
+    @field_validator("workers")
+    @classmethod
+    def _some(cls, value: int | None) -> int | None:
+        if value is not None and not 1 <= value <= MAX_WORKERS:
+            raise ValueError(f"must be 1 to {MAX_WORKERS}, not '{value}'")
         return value
 
-    def views(self, value: Any, where: str) -> tuple[int, ...]:
-        views = self.items(value, where)
-        for view in views:
-            if isinstance(view, bool) or not isinstance(view, int) or view < 0:
-                raise self.fail(where, f"expected camera numbers from 0 on, not '{view}'")
-        return tuple(dict.fromkeys(views))
+    @model_validator(mode="after")
+    def _either(self) -> ClusterSection:
+        if self.workers is not None and self.address is not None:
+            raise ValueError("give either workers or address")
+        return self
 
-    def size(self, value: Any) -> tuple[int, int]:
-        parts = str(value).lower().split("x")
+
+class SweepFile(_Section):
+    """The YAML file as it is written."""
+
+    scenes: Annotated[list[SceneSection], Field(min_length=1, description="list of scene files, or of mappings with path, cameras, views")]
+    configurations: Annotated[
+        list[StrictStr] | Literal["all"], Field(description="list of names or patterns (flicker report --list), or all: those of the report"),
+    ]
+    views: Annotated[Views, Field(description="camera numbers of every scene without its own")] = [0]
+    size: Annotated[StrictStr, Field(description="WxH")] = "1280x720"
+    cluster: Annotated[ClusterSection | None, Field(description="workers, or address")] = None
+    out: Annotated[StrictStr | None, Field(min_length=1, description="folder, relative to the current one")] = None
+
+    @field_validator("size")
+    @classmethod
+    def _size(cls, value: str) -> str:
+        parts = value.lower().split("x")
         if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
-            raise self.fail("size", f"expected WxH such as 1280x720, not '{value}'")
-        width, height = int(parts[0]), int(parts[1])
-        if not (1 <= width <= MAX_SIZE and 1 <= height <= MAX_SIZE):
-            raise self.fail("size", f"width and height must be 1 to {MAX_SIZE}, not {width}x{height}")
-        return width, height
-
-    def file(self, value: Any, where: str) -> Path:
-        """A path, relative to the YAML file."""
-        if not isinstance(value, str) or not value:
-            raise self.fail(where, f"expected a path, not '{value}'")
-        path = (self.path.parent / Path(value).expanduser()).resolve()
-        if not path.is_file():
-            raise self.fail(where, f"{path}: no such file")
-        try:
-            path.open("rb").close()
-        except OSError as error:
-            raise self.fail(where, f"{path}: cannot be read ({error.strerror})") from None
-        return path
-
-    def scene(self, value: Any, default_views: tuple[int, ...], where: str) -> SceneViews:
-        if isinstance(value, str):
-            value = {"path": value}
-        if not isinstance(value, dict):
-            raise self.fail(where, f"expected a path or a mapping, not '{value}'")
-        self.keys(value, SCENE_KEYS, f"{where}: ")
-        if "path" not in value:
-            raise self.fail(where, "path is missing")
-        views = self.views(value["views"], f"{where}: views") if "views" in value else default_views
-        if value["path"] == DEMO:
-            if "cameras" in value:
-                raise self.fail(where, "the demo scene has its own cameras")
-            from ...scene.demo import demo_cameras
-
-            self._check_views(views, len(demo_cameras()), where)
-            return SceneViews(DEMO, None, views, "")
-        path = self.file(value["path"], where)
-        if not any(path.name.lower().endswith(ending) for ending in (".ply", ".spz", ".sog", ".splat")):
-            raise self.fail(where, f"{path}: expected .ply, .spz, .sog or .splat")
-        cameras = self.file(value["cameras"], f"{where}: cameras") if value.get("cameras") is not None else None
-        digest = _file_digest(path)
-        used = cameras if cameras is not None else path.parent / "cameras.json"
-        if used.exists():
-            self._check_views(views, len(load_cameras(used)), where)
-            digest += "-" + _file_digest(used)
-        else:
-            self._check_views(views, ORBIT_VIEWS, where)
-        return SceneViews(str(path), None if cameras is None else str(cameras), views, digest)
-
-    def _check_views(self, views: tuple[int, ...], count: int, where: str) -> None:
-        for view in views:
-            if view >= count:
-                raise self.fail(where, f"view {view}: there are {count} cameras, 0 to {count - 1}")
-
-    def configurations(self, value: Any) -> tuple[str, ...]:
-        if value == "all":
-            return tuple(CONFIGURATIONS)
-        found: list[str] = []
-        for name in self.items(value, "configurations"):
-            name = str(name)
-            matching = [c for c in CONFIGURATIONS if fnmatchcase(c, name)]
-            if not matching:
-                if any(sign in name for sign in "*?["):
-                    raise self.fail("configurations", f"no configuration matches '{name}'")
-                try:
-                    get_configuration(name)
-                except FlickerError as error:
-                    raise FlickerError(f"{self.path}: {error}") from None
-            found += matching
-        return tuple(dict.fromkeys(found))
-
-    def cluster(self, value: Any) -> tuple[int | None, str | None]:
-        if not isinstance(value, dict):
-            raise self.fail("cluster", f"expected a mapping with {' or '.join(CLUSTER_KEYS)}, not '{value}'")
-        self.keys(value, CLUSTER_KEYS, "cluster: ")
-        workers, address = value.get("workers"), value.get("address")
-        if workers is not None and address is not None:
-            raise self.fail("cluster", "give either workers or address")
-        if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MAX_WORKERS):
-            raise self.fail("cluster: workers", f"must be 1 to {MAX_WORKERS}, not '{workers}'")
-        if address is not None and not isinstance(address, str):
-            raise self.fail("cluster: address", f"expected an address such as tcp://host:8786, not '{address}'")
-        return workers, address
+            raise ValueError(f"expected WxH such as 1280x720, not '{value}'")
+        if not all(1 <= int(p) <= MAX_SIZE for p in parts):
+            raise ValueError(f"width and height must be 1 to {MAX_SIZE}, not {value}")
+        return value
 
 
-def load_sweep(path: str | Path) -> Sweep:
-    """Read and check a sweep. FlickerError, naming file and key, for anything that could not be run."""
-    path = Path(path)
+def _place(location: tuple) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f": {part}" if text else str(part)
+    return text
+
+
+def _first(path: Path, error: ValidationError) -> FlickerError:
+    """The first thing wrong, as one line that names file and key."""
+    found = error.errors()[0]
+    location = tuple(part for part in found["loc"] if not (isinstance(part, str) and ("[" in part or part == "list")))
+    if found["type"] == "extra_forbidden":
+        section = {"scenes": SceneSection, "cluster": ClusterSection}.get(str(location[0]) if len(location) > 1 else "", SweepFile)
+        close = difflib.get_close_matches(str(location[-1]), section.model_fields, 1)
+        hint = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(section.model_fields)}"
+        where = _place(location[:-1])
+        return FlickerError(f"{path}: {where + ': ' if where else ''}unknown key '{location[-1]}'; {hint}")
+    if found["type"] == "missing":
+        field_ = SweepFile.model_fields.get(str(location[-1])) or SceneSection.model_fields[str(location[-1])]
+        return FlickerError(f"{path}: {_place(location[:-1]) + ': ' if len(location) > 1 else ''}key '{location[-1]}' is missing: {field_.description}")
+    message = str(found["msg"]).removeprefix("Value error, ")
+    if found["type"] in ("too_short", "list_type"):
+        message = "expected a list with at least one entry"
+    elif found["type"] != "value_error":
+        message = f"{message[0].lower()}{message[1:]}, not '{found['input']}'"
+    return FlickerError(f"{path}: {_place(location)}: {message}")
+
+
+def _parse(path: Path) -> SweepFile:
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -257,24 +173,60 @@ def load_sweep(path: str | Path) -> Sweep:
         place = f"line {mark.line + 1}: " if mark else ""
         raise FlickerError(f"{path}: {place}not YAML ({getattr(error, 'problem', None) or 'damaged'})") from None
     if not isinstance(data, dict):
-        raise FlickerError(f"{path}: expected a mapping with the keys {', '.join(KEYS)}")
-    reader = _Reader(path)
-    reader.keys(data, KEYS, "")
-    for key in ("scenes", "configurations"):
-        if key not in data:
-            raise FlickerError(f"{path}: key '{key}' is missing: {KEYS[key]}")
-    width, height = reader.size(data.get("size", "1280x720"))
-    configurations = reader.configurations(data["configurations"])
-    workers, address = reader.cluster(data["cluster"]) if data.get("cluster") is not None else (None, None)
-    default_views = reader.views(data.get("views", [0]), "views")
-    scenes = tuple(reader.scene(s, default_views, f"scenes[{i}]") for i, s in enumerate(reader.items(data["scenes"], "scenes")))
+        raise FlickerError(f"{path}: expected a mapping with the keys {', '.join(SweepFile.model_fields)}")
+    try:
+        return SweepFile.model_validate(data)
+    except ValidationError as error:
+        raise _first(path, error) from None
+
+
+def _file(base: Path, text: str, where: str) -> Path:
+    """A file of the sweep, relative to the YAML file."""
+    path = (base.parent / Path(text).expanduser()).resolve()
+    if not path.is_file():
+        raise FlickerError(f"{base}: {where}: {path}: no such file")
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise FlickerError(f"{base}: {where}: {path}: cannot be read ({error.strerror})") from None
+    return path
+
+
+def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
+    if section.path == DEMO:
+        if section.cameras is not None:
+            raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
+        return SceneFile(DEMO)
+    path = _file(base, section.path, where)
+    if not path.name.lower().endswith(SUFFIXES):
+        raise FlickerError(f"{base}: {where}: {path}: expected {', '.join(SUFFIXES)}")
+    return SceneFile(str(path), None if section.cameras is None else str(_file(base, section.cameras, f"{where}: cameras")))
+
+
+def load_sweep(path: str | Path) -> Sweep:
+    """Read and check a sweep. FlickerError, naming file and key, for anything that could not be run."""
+    path = Path(path)
+    given = _parse(path)
+    size = tuple(int(p) for p in given.size.lower().split("x"))
+    try:
+        names = matching(GROUPS["report"] if given.configurations == "all" else given.configurations)
+    except FlickerError as error:
+        raise FlickerError(f"{path}: configurations: {error}") from None
+    if not names:
+        raise FlickerError(f"{path}: configurations: expected a list with at least one entry")
+    targets: list[Target] = []
     seen: set[tuple] = set()
-    for s in scenes:
-        for view in s.views:
-            if (s.name, s.digest, view) in seen:
-                raise FlickerError(f"{path}: scenes: view {view} of {s.path} is there twice")
-            seen.add((s.name, s.digest, view))
-    out = data.get("out")
-    if out is not None and (not isinstance(out, str) or not out):
-        raise reader.fail("out", f"expected a folder, not '{out}'")
-    return Sweep(scenes, width, height, configurations, workers, address, Path(out).expanduser() if out else BUILD / "sweep")
+    for i, section in enumerate(given.scenes):
+        where = f"scenes[{i}]"
+        scene = _scene(path, section, where)
+        count = scene.views()
+        for view in dict.fromkeys(section.views if section.views is not None else given.views):
+            if view >= count:
+                raise FlickerError(f"{path}: {where}: view {view}: there are {count} cameras, 0 to {count - 1}")
+            if (same := (scene.file, scene.digest, view)) in seen:
+                raise FlickerError(f"{path}: scenes: view {view} of {scene.path} is there twice")
+            seen.add(same)
+            targets.append(Target(scene, view, size))  # type: ignore[arg-type]
+    cluster = given.cluster or ClusterSection()
+    out = Path(given.out).expanduser() if given.out else BUILD / "sweep"
+    return Sweep(tuple(targets), tuple(names), cluster.workers, cluster.address, out)

@@ -17,8 +17,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...errors import FlickerError
-from .config import Point, Sweep, code_digest
-from .results import Store, plain
+from ..digest import code_digest
+from ..points import Point, Target
+from ..store import plain
+from .config import Sweep
+from .results import Rows
 
 CONNECT_SECONDS = 5
 MAX_LOST = 3  # workers lost by one view's task without a finished point
@@ -34,20 +37,19 @@ class SweepResult:
     lost: int
 
 
-def _compute(points: list[Point], width: int, height: int, topic: str, share: int) -> list[tuple[str, dict[str, Any]]]:
+def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dict[str, Any]]]:
     """On a worker: rows of the points of one view, each reported when it is finished. share: workers that divide the machine's cores."""
     import numba
     from distributed import get_worker
 
-    from ..evaluate import evaluate, load_view
+    from ..evaluate import evaluate
 
     numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))
     worker = get_worker()
-    scene = points[0].scene
-    data = load_view(scene.path, points[0].view, width, height, scene.cameras)
+    view = points[0].target.load()
     rows = []
     for point in points:
-        row = {name: plain(value) for name, value in evaluate(data, point.configuration).row.items()}
+        row = {name: plain(value) if hasattr(value, "dtype") else value for name, value in evaluate(view, point.configuration).row.items()}
         worker.log_event(topic, {"key": point.key, "row": row, "pid": os.getpid()})
         rows.append((point.key, row))
     return rows
@@ -97,7 +99,8 @@ def check_workers(client, sweep: Sweep) -> None:
         raise FlickerError(f"cluster {sweep.address}: has no workers") from None
     if sweep.address is None:
         return
-    paths = sorted({path for s in sweep.scenes for path in (s.path, s.cameras) if path is not None and os.path.isfile(path)})
+    scenes = {t.scene for t in sweep.targets}
+    paths = sorted({path for s in scenes for path in (s.path, s.cameras) if path is not None and os.path.isfile(path)})
     try:
         codes = client.run(code_digest)
         missing = client.run(_missing_files, paths)
@@ -120,7 +123,7 @@ def run_sweep(
     point, first with an empty event for what was there; an event has the worker's process in `pid`, the row in `row`.
     FlickerError for bad input, before any work starts; for views that failed, after the others are done.
     """
-    store = Store(sweep)
+    store = Rows(sweep)
     total, resumed = len(sweep.points), len(store.rows)
     report = on_point or (lambda done, total, event: None)
     report(resumed, total, {})
@@ -135,28 +138,28 @@ def run_sweep(
     return SweepResult(store.ordered(), resumed, total - resumed, lost)
 
 
-def _run(client, sweep: Sweep, store: Store, report: Callable[[dict[str, Any]], None]) -> int:
+def _run(client, sweep: Sweep, store: Rows, report: Callable[[dict[str, Any]], None]) -> int:
     """Submit every view, take events until all are done; returns how often a worker was lost."""
     from distributed.scheduler import KilledWorker
 
     events: queue.Queue = queue.Queue()
     topic = f"flicker-sweep-{uuid.uuid4().hex}"
     points = {p.key: p for p in sweep.points}
-    groups: dict[tuple, list[Point]] = {}
+    groups: dict[Target, list[Point]] = {}
     for point in store.missing():
-        groups.setdefault((point.scene, point.view), []).append(point)
+        groups.setdefault(point.target, []).append(point)
     futures: dict[str, tuple] = {}
-    attempts: dict[tuple, tuple[int, int]] = {}  # points left at the last submission, workers lost since one was finished
+    attempts: dict[Target, tuple[int, int]] = {}  # points left at the last submission, workers lost since one was finished
     failures: list[str] = []
     lost = 0
     hosts = [worker["host"] for worker in client.scheduler_info(n_workers=-1)["workers"].values()]
     share = max(hosts.count(host) for host in hosts)
 
-    def submit(view: tuple) -> None:
+    def submit(view: Target) -> None:
         left = [p for p in groups[view] if p.key not in store.rows]
         before, tries = attempts.get(view, (len(left) + 1, 0))
         attempts[view] = (len(left), 0 if len(left) < before else tries + 1)
-        future = client.submit(_compute, left, sweep.width, sweep.height, topic, share, pure=False, key=f"{topic}-{uuid.uuid4().hex}")
+        future = client.submit(_compute, left, topic, share, pure=False, key=f"{topic}-{uuid.uuid4().hex}")
         futures[future.key] = (future, view)
         future.add_done_callback(lambda f: events.put(("done", f.key)))
 
@@ -181,15 +184,15 @@ def _run(client, sweep: Sweep, store: Store, report: Callable[[dict[str, Any]], 
                 lost += 1
                 _drain(events, keep)
                 if attempts[view][1] >= MAX_LOST:
-                    failures.append(f"{view[0].path} view {view[1]}: lost {MAX_LOST + 1} workers without finishing a point")
+                    failures.append(f"{view.scene.path} view {view.view}: lost {MAX_LOST + 1} workers without finishing a point")
                 elif any(p.key not in store.rows for p in groups[view]):
                     submit(view)
             except FlickerError as error:
-                failures.append(f"{view[0].path} view {view[1]}: {error}")
+                failures.append(f"{view.scene.path} view {view.view}: {error}")
             except Exception as error:  # one view's failure must not take the others' results
                 if client.status != "running":
                     raise FlickerError(f"cluster {sweep.address or 'of this machine'}: connection lost") from None
-                failures.append(f"{view[0].path} view {view[1]}: {type(error).__name__}: {error}")
+                failures.append(f"{view.scene.path} view {view.view}: {type(error).__name__}: {error}")
     finally:
         with contextlib.suppress(Exception):
             client.cancel([future for future, _ in futures.values()], force=True)

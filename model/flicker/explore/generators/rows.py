@@ -16,6 +16,7 @@ M covers the roundings of the VRU and of this unit: no pixel whose alpha test wo
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -24,10 +25,15 @@ import numpy as np
 
 from ...errors import FlickerError
 from ...front.records import SubtileLists
+from ...front.view import View
 from ...params import Form
-from .numbers import NEAREST, quantise
+from ...arithmetic.numbers import NEAREST, quantise
 from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
+from ..stages.channels import Channels
+from ..stages.lanes import Lanes
+from ..stages.pixels import PixelChannels
 from ...arithmetic.thresholds import radii, thresholds
 
 SIGNIFICAND = 13  # bits of a, b, c, X, Y with the hidden bit
@@ -40,15 +46,19 @@ _SUM_MAX = 4096.0  # |P| + |Q| beyond which every pixel of the rows in reach is 
 
 
 @dataclass(frozen=True)
-class DiscFormat:
+class RowFormat:
     """fraction: bits of v, s and r behind the point. address: of these, bits of |v| that address the root table."""
 
     fraction: int = 8
     address: int = 8
 
+    @property
+    def name(self) -> str:
+        return f"f{self.fraction}a{self.address}"
+
     def __post_init__(self) -> None:
         if not 4 <= self.fraction <= 12 or not 3 <= self.address <= self.fraction:
-            raise FlickerError(f"disc: fraction must be 4 to 12 and address 3 to fraction, not {self.fraction} and {self.address}")
+            raise FlickerError(f"rows: fraction must be 4 to 12 and address 3 to fraction, not {self.fraction} and {self.address}")
 
 
 @lru_cache(maxsize=None)
@@ -64,7 +74,7 @@ def inverse_radius() -> np.ndarray:
     return np.where(t > 0, k, 0.0)
 
 
-def errors(fmt: DiscFormat) -> tuple[float, float]:
+def errors(fmt: RowFormat) -> tuple[float, float]:
     """Bounds on the errors of v_j and of s_j + (i - 3.5) a, in units of 2^-fraction, M's dynamic part not counted."""
     unit = 2.0**-EXTRA / 2  # half a unit of the sums
     step = 3.5 * unit + 0.5  # (j - 3.5) c, then the rounding to `fraction` bits
@@ -75,7 +85,7 @@ def errors(fmt: DiscFormat) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=None)
-def root_table(fmt: DiscFormat) -> np.ndarray:
+def root_table(fmt: RowFormat) -> np.ndarray:
     """int64: by |v| in units of 2^-address, r + the constant part of M in units of 2^-fraction, rounded up; ends where |v| > 1."""
     dv, du = errors(fmt)
     one = 1 << fmt.fraction
@@ -93,7 +103,7 @@ def _significand(x):
 
 
 @numba.njit(parallel=True, cache=True)
-def _disc(gauss, inverse, start, entry, mean, fraction, drop, root, mask, visit):
+def _rows(gauss, inverse, start, entry, mean, fraction, drop, root, mask, visit):
     unit = 2.0 ** (fraction + EXTRA)
     half = 1 << (EXTRA - 1)
     far = np.int64(64) << (fraction + EXTRA)
@@ -149,17 +159,17 @@ def _disc(gauss, inverse, start, entry, mean, fraction, drop, root, mask, visit)
                 mask[n] |= int(visit[n, m] != 0) << m
 
 
-def disc_masks(lists: SubtileLists, fmt: DiscFormat) -> tuple[np.ndarray, np.ndarray]:
+def row_masks(lists: SubtileLists, fmt: RowFormat) -> tuple[np.ndarray, np.ndarray]:
     """(mask uint8 (E,), visit uint16 (E, 4)) of the row intervals."""
     n = len(lists.entry)
     mask, visit = np.empty(n, np.uint8), np.empty((n, 4), np.uint16)
-    _disc(
+    _rows(
         lists.gauss, inverse_radius(), lists.start, lists.entry, lists.mean, fmt.fraction, fmt.fraction - fmt.address, root_table(fmt), mask, visit,
     )
     return mask, visit
 
 
-def disc_operations(fmt: DiscFormat) -> Operations:
+def row_operations(fmt: RowFormat) -> Operations:
     """One element per cycle: eight rows in parallel."""
     f = fmt.fraction
     sums = f"fixed {7 + f + EXTRA}"
@@ -181,3 +191,61 @@ def disc_operations(fmt: DiscFormat) -> Operations:
         Operation(Op.ADD, row, 8 * 3, note="r + M, and the two ends"),
         Operation(Op.CMP, row, 8 * 16, note="ends with the eight columns"),
     ))
+
+
+@dataclass(frozen=True)
+class Rows(MaskGenerator):
+    """One element a cycle; eight rows count as eight evaluations. pixels: 64 pixel masks, else mini-tile masks."""
+
+    fmt: RowFormat
+    pixels: bool = True
+    exact = True
+
+    @property
+    def precision(self) -> str:
+        return f"fixed {self.fmt.name}"
+
+    @property
+    def operations(self) -> Operations:
+        return row_operations(self.fmt)
+
+    def masks(self, view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray, stage: RenderingStage) -> Masks:
+        mask, visit = row_masks(lists, self.fmt)
+        n = len(mask)
+        return Masks(mask, np.ones(n, np.uint8), np.full(n, 8, np.uint16), visit if self.pixels else None)
+
+
+# The first is the recommended one.
+FORMATS = tuple(RowFormat(f, a) for f, a in ((8, 8), (6, 6), (7, 5), (7, 7), (8, 6), (9, 7), (10, 10)))
+ACCUMULATORS = (10, 12, 14, 16, 20)
+ACCUMULATOR = 14  # the recommended one
+_LISTS = {"subtile": "", "reach": ", lists by the box of the reach", "ellipse": ", lists by the ellipse"}
+
+
+def configurations() -> Iterator[Configuration]:
+    """Formats, lists and masks on channels whose VRUs visit single pixels; accumulators; lanes."""
+    form = Form.FACTORED
+    for fmt in FORMATS:
+        for pixels in (True, False):
+            for kind, title in _LISTS.items():
+                if kind != "subtile" and fmt is not FORMATS[0]:
+                    continue
+                words = ["rows"] + ["minitile"] * (not pixels) + [fmt.name] * (fmt is not FORMATS[0]) + [kind] * (kind != "subtile")
+                formats = "" if fmt is FORMATS[0] else f", {fmt.fraction} fraction bits, {fmt.address}-bit root table"
+                stage = PixelChannels(form) if pixels else Channels(form)
+                yield Configuration(
+                    "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), stage, lists=kind,
+                )
+    rows = Rows(FORMATS[0])
+    yield Configuration("rows-ellipse-64", "the same, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
+    for bits in ACCUMULATORS:
+        title = f"row intervals, pixel masks, lists by the ellipse, colour accumulators of {bits} fraction bits"
+        yield Configuration(f"rows-ellipse-acc{bits}", title, "rows", rows, PixelChannels(form, accumulator=bits), lists="ellipse")
+    for name, title, stage in (
+        ("lanes", "row intervals, independent lanes, fixed-point accumulators", Lanes(window=2, accumulator=ACCUMULATOR)),
+        ("lanes-deep", "lanes, FIFO depth 40, two elements a cycle", Lanes(fifo_depth=40, window=3, width=2, accumulator=ACCUMULATOR)),
+        ("lanes-64", "64 lanes, FIFO depth 4", Lanes(lanes=64, fifo_depth=4, window=2, accumulator=ACCUMULATOR)),
+        ("lanes-fp16", "lanes, FP16 accumulators and their loop", Lanes(window=2, loop=4)),
+        *((f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits)) for bits in ACCUMULATORS if bits != ACCUMULATOR),
+    ):
+        yield Configuration(name, title, "rows", rows, stage, lists="ellipse")

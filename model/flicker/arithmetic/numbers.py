@@ -14,8 +14,8 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from ...errors import FlickerError
-from ...arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
+from ..errors import FlickerError
+from .formats import E4M3, E5M2, FP16, FloatFormat
 
 DOWN, NEAREST, UP = -1, 0, 1
 

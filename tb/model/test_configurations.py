@@ -1,6 +1,6 @@
-"""Methods: equal to the golden model where it has the same mode, against plain restatements elsewhere, and proved masks without a miss.
+"""Configurations and their mask generators: equal to the golden model where it has the same mode, against plain restatements elsewhere, and proved masks without a miss.
 
-Rationale: a proof can have a hole, so every method that claims it never misses is run on splats made to break it: axis ratios up to
+Rationale: a proof can have a hole, so every generator that claims it never misses is run on splats made to break it: axis ratios up to
 10,000, means up to 5,000 pixels away, opacities at 1/255, records of random bits, the demo scene, and real scenes where
 FLICKER_SCENES names them. Not covered: cycles (they are not in this layer).
 """
@@ -8,11 +8,9 @@ FLICKER_SCENES names them. Not covered: cycles (they are not in this layer).
 from __future__ import annotations
 
 import math
-import os
 import random
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numba
 import numpy as np
@@ -20,35 +18,34 @@ import pytest
 from flicker_tb import splats
 from flicker_tb.runner import seed
 
-from flicker.scene.camera import load_cameras
 from flicker.scene.demo import demo_cameras, generate
 from flicker.errors import FlickerError
 from flicker.arithmetic.formats import E4M3, E5M2, FP16
 from flicker.front.records import SubtileLists
 from flicker.golden.render import render_golden
 from flicker.golden.vru import ALPHA_MIN, PAIR_FIELDS, alpha_of, pair
-from flicker.explore.methods import View, get_method, methods, run
-from flicker.explore.generators.disc import DiscFormat, disc_masks, inverse_radius, root_table
+from flicker.explore.configurations import CONFIGURATIONS, get_configuration, run
+from flicker.explore.generators.contribution import Untested
+from flicker.front.view import View, load_view
+from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.explore.generators.rows import RowFormat, inverse_radius, root_table, row_masks
 from flicker.explore.generators.exact import exact_masks, margins
-from flicker.explore.generators.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
+from flicker.arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
 from flicker.cost.operations import Op
 from flicker.golden.masked import ACCUMULATOR_INT_BITS, accumulate, missed_pixels, pixel_tests
 from flicker.arithmetic.thresholds import radii, thresholds
 from flicker.scene.metrics import psnr
 from flicker.params import Form
-from flicker.front.projection import project
 from flicker.front.reference import render_reference
-from flicker.scene.files import load_scene
 
-REAL = [("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1), ("stpeter", "st-peter.sog", 0)]
-PROVED = [m.name for m in methods().values() if m.exact and m.family != "oracle"]
+PROVED = [c.name for c in CONFIGURATIONS.values() if c.generator.exact and not c.generator.free]
 
 
 @pytest.fixture(scope="module")
 def demo() -> View:
     """The demo scene, small."""
     camera = demo_cameras()[0].resized(160, 88)
-    return View(project(generate(), camera), camera)
+    return View(camera, generate())
 
 
 def alive(work) -> np.ndarray:
@@ -109,11 +106,11 @@ def test_quantise():
 # ---- the registry and the work -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [m.name for m in methods().values() if m.config])
+@pytest.mark.parametrize("name", [c.name for c in CONFIGURATIONS.values() if c.render_config])
 def test_equals_golden(name, demo):
     """Methods that the RTL has: the golden model's pixels, counts and automatic mode."""
     result = run(name, demo)
-    frame = render_golden(result.lists, result.method.config)
+    frame = render_golden(result.lists, result.configuration.render_config)
     assert np.array_equal(result.image, frame.image())
     work = result.work
     assert int(work.test_cycles.sum()) == frame.total("test_cycles")
@@ -128,7 +125,7 @@ def test_equals_golden(name, demo):
 
 def test_work_is_consistent(demo):
     """Contributing pixels are visited and unfinished; finish positions are those of the last pixel; oracles visit what contributes."""
-    for name in ("vanilla", "gscore", "seele", "flicker", "faithful", "exact", "rows", "oracle", "oracle_minitile"):
+    for name in ("vanilla", "gscore", "seele", "flicker", "faithful", "exact", "rows", "oracle", "oracle-minitile"):
         result = run(name, demo)
         work = result.work
         assert np.array_equal(work.unfinished(), alive(work))
@@ -141,7 +138,7 @@ def test_work_is_consistent(demo):
         if work.visit is not None:
             assert np.array_equal((work.visit != 0) @ (1 << np.arange(4)), work.mask)
         assert totals["pixels_visited"] <= work.vru_slots("checkerboard") and work.vru_slots("halves") <= 16 * totals["minitiles_sent"]
-    off = run("no_ctu", demo)
+    off = run("no-ctu-32", demo)
     exact = run("oracle", demo)
     exact.work.visit[:], exact.work.pixel_finish[:] = 0, 1 << 30
     exact.work.visit[0, 0] = 0b0000_0000_0011_0111  # columns 0, 1, 2 of row 0 and 0, 1 of row 1: five in a half, three and two in the checkerboard
@@ -165,21 +162,21 @@ def test_until_finished(demo):
 
 
 def test_names():
-    """Every method runs under a name of its own; a wrong name is one line with close ones."""
-    assert all(name == m.name for name, m in methods().items())
-    assert get_method("faithful").name == "flicker-smooth-mixed-conic"
-    with pytest.raises(FlickerError, match="unknown method 'flicker-smoth-mixed-conic'; close names: flicker-smooth-mixed-conic"):
-        get_method("flicker-smoth-mixed-conic")
+    """Every configuration has a name of its own; a wrong name is one line with close ones."""
+    assert all(name == c.name for name, c in CONFIGURATIONS.items())
+    with pytest.raises(FlickerError, match="configuration 'flicker-smoth-mixed-conic' is unknown; close names: flicker-smooth-mixed-conic"):
+        get_configuration("flicker-smoth-mixed-conic")
 
 
 def test_operations():
     """Mask generators state their operations; the counts of the exact rectangle are those of the design brief."""
-    for m in methods().values():
-        if m.family in ("flicker", "exact", "rows"):
-            assert m.operations.per_element and all(o.count > 0 and o.format for o in m.operations.per_element)
-            assert {"per", "op", "format", "count"} <= set(next(iter(m.operations.rows())))
-    assert get_method("exact-fp16-factored").operations.count(Op.MUL) == 36
-    assert get_method("flicker-sparse-fp16-factored").operations.count(Op.MUL) == 24
+    for c in CONFIGURATIONS.values():
+        if c.family in ("flicker", "exact", "rows"):
+            operations = c.generator.operations
+            assert operations.per_element and all(o.count > 0 and o.format for o in operations.per_element)
+            assert {"per", "op", "format", "count"} <= set(next(iter(operations.rows())))
+    assert get_configuration("exact-fp16").generator.operations.count(Op.MUL) == 36
+    assert get_configuration("flicker-sparse-fp16-factored").generator.operations.count(Op.MUL) == 24
 
 
 @pytest.mark.parametrize("fraction", [10, 14, 20])
@@ -199,11 +196,11 @@ def test_accumulate(fraction):
 
 def test_accumulators(demo):
     """Colours alone change: the same pairs contribute, and pictures come nearer to the reference the more bits there are."""
-    plain = run("rows-f8a8-ellipse", demo)
+    plain = run("rows-ellipse", demo)
     reference = render_reference(demo.projected, demo.camera)
     found = {}
     for bits in (10, 14, 20):
-        result = run(f"rows-f8a8-ellipse-acc{bits}", demo)
+        result = run(f"rows-ellipse-acc{bits}", demo)
         assert np.array_equal(result.work.contributing, plain.work.contributing)
         assert np.array_equal(result.work.pixel_finish, plain.work.pixel_finish)
         found[bits] = psnr(result.image, reference)
@@ -264,10 +261,10 @@ def test_obb_lists(demo):
 
 def test_reach_lists(demo):
     """Lists by reach lose no pair: same picture, same contributing pixels in total, shorter lists."""
-    off = run("no_ctu", demo)
+    off = run("no-ctu-32", demo)
     length = off.work.elements
     for kind in ("reach", "ellipse"):
-        shorter = run(f"rows-f8a8-{kind}", demo)
+        shorter = run(f"rows-{kind}", demo)
         assert np.array_equal(shorter.image, off.image) and shorter.work.elements < length
         assert np.bitwise_count(shorter.work.contributing).sum() == np.bitwise_count(off.work.contributing).sum()
         length = shorter.work.elements
@@ -277,7 +274,7 @@ def test_reach_lists(demo):
 def test_seele_leaders(form, demo):
     """A group's four pixels are visited exactly when the VRU, asked on its own, would blend or finish at the top-left one."""
     lists = demo.lists(form)
-    work = run(f"seele-{form.name.lower()}", demo).work
+    work = run("seele" if form == Form.FACTORED else "seele-conic", demo).work
     rng = np.random.default_rng(seed())
     visited = 0
     for n in rng.permutation(work.elements)[:200]:
@@ -343,8 +340,8 @@ def proved_masks(lists: SubtileLists, conic: np.ndarray):
     with np.errstate(all="ignore"):
         slopes = np.clip(np.nan_to_num(conic[:, 1:2] / conic[:, 2::-2]), -65504, 65504).astype(np.float16).astype(np.float64)
     if lists.form == Form.FACTORED:
-        for fmt in (DiscFormat(8, 8), DiscFormat(5, 3), DiscFormat(6, 6), DiscFormat(7, 5), DiscFormat(10, 10), DiscFormat(12, 12)):
-            yield f"rows {fmt}", *disc_masks(lists, fmt)
+        for fmt in (RowFormat(8, 8), RowFormat(5, 3), RowFormat(6, 6), RowFormat(7, 5), RowFormat(10, 10), RowFormat(12, 12)):
+            yield f"rows {fmt}", *row_masks(lists, fmt)
     for name, system in FORMATS.items():
         if not name.startswith("q"):
             for scaled in (False, True):
@@ -379,24 +376,25 @@ def test_no_miss_on_odd_records(form):
     lists.mean[:] = features[:, :2]
     checked = [("pixels", *pixel_tests(lists))]
     if form == Form.FACTORED:
-        checked += [("rows", *disc_masks(lists, DiscFormat(f, f))) for f in (5, 8, 12)]
+        checked += [("rows", *row_masks(lists, RowFormat(f, f))) for f in (5, 8, 12)]
     for name, mask, visit in checked:
         assert not missed_pixels(lists, mask, visit).any(), name
 
 
 @pytest.mark.parametrize("name", PROVED)
 def test_no_miss_in_demo(name, demo):
-    """Proved methods give the picture of the test switched off on VRUs with the same accumulators."""
+    """Proved masks give the picture of the test switched off on VRUs with the same accumulators."""
     result = run(name, demo)
     assert not missed_pixels(result.lists, result.work.mask, result.work.visit).any()
-    untested = replace(get_method(f"no_ctu-{result.method.form.name.lower()}"), accumulator=result.method.accumulator)
+    tested = result.configuration
+    untested = replace(tested, lists="subtile", generator=Untested(tested.form))
     assert np.array_equal(result.image, run(untested, demo).image)
 
 
 def test_rows_are_tight(demo):
     """With 8 fraction bits the row intervals visit at most 6 % more pixels than contribute, and coarser ones more."""
     visited = []
-    for name in ("oracle", "rows-f10a10", "rows-f8a8", "rows-f7a5", "rows-f6a6"):
+    for name in ("oracle", "rows-f10a10", "rows", "rows-f7a5", "rows-f6a6"):
         work = run(name, demo).work
         visited.append(int(np.bitwise_count(work.visit & work.unfinished()).sum()))
     assert visited == sorted(visited)
@@ -407,27 +405,25 @@ def test_constants():
     """The table of k never exceeds 1 / rho; the root table is monotone and no lower than the root; margins grow as formats shrink."""
     k, rho = inverse_radius(), radii(Form.FACTORED)
     assert (k * rho <= 1).all() and (k[rho > 0.8] * rho[rho > 0.8] > 0.97).all()
-    for fmt in (DiscFormat(6, 6), DiscFormat(8, 6), DiscFormat(8, 8)):
+    for fmt in (RowFormat(6, 6), RowFormat(8, 6), RowFormat(8, 8)):
         table = root_table(fmt)
         v = (np.arange(len(table)) << (fmt.fraction - fmt.address)) / 2.0**fmt.fraction
         assert (np.diff(table) <= 0).all() and (table / 2.0**fmt.fraction >= np.sqrt(np.maximum(1 - v * v, 0))).all()
     assert margins(Form.FACTORED, FORMATS["fp16"])[0] <= 2.0**-7 < margins(Form.FACTORED, FORMATS["e4m3"])[0]
-    with pytest.raises(FlickerError, match="disc: fraction must be 4 to 12"):
-        DiscFormat(3, 3)
+    with pytest.raises(FlickerError, match="rows: fraction must be 4 to 12"):
+        RowFormat(3, 3)
 
 
-@pytest.mark.parametrize("scene,file,view", REAL)
-def test_real_scenes(scene, file, view):
+@pytest.mark.parametrize("real_view", REAL_VIEWS, ids=lambda v: v.folder)
+def test_real_scenes(real_view):
     """Real views at 480x270: no miss with the recommended masks, and the picture is at least as good as the goal says."""
-    folder = os.environ.get("FLICKER_SCENES")
-    if not folder:
+    scenes = real_scenes()
+    if scenes is None:
         pytest.skip("FLICKER_SCENES is not set")
-    base = Path(folder) / scene
-    camera = load_cameras(base / "cameras.json")[view].resized(480, 270)
-    real = View(project(load_scene(base / file), camera), camera)
-    off = run("no_ctu", real)
-    for name in ("rows-f8a8", "rows-f8a8-ellipse", "rows-f6a6", "exact-fp16-factored-bound"):
+    real = load_view(real_view.path(scenes), real_view.number, (480, 270))
+    off = run("no-ctu-32", real)
+    for name in ("rows", "rows-ellipse", "rows-f6a6", "exact-fp16-bound"):
         result = run(name, real)
         assert np.array_equal(result.image, off.image), name
         assert not missed_pixels(result.lists, result.work.mask, result.work.visit).any(), name
-    assert psnr(off.image, render_reference(real.projected, camera)) > 58
+    assert psnr(off.image, real.reference) > 58

@@ -1,0 +1,109 @@
+"""The table of configurations, and the groups that reports, tables and suites are made of.
+
+Every module of `GENERATORS` says which configurations its mask generator has part in. A new generator or stage is a module and one entry here
+(docs/extending.md).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+from ..errors import FlickerError
+from ..params import CatMode, RenderConfig
+from .generators import all_pixels, contribution, exact, oracle, rows, seele
+from ..front.view import View
+from . import machine
+from .machine import Configuration, Result
+
+GENERATORS = (contribution, seele, exact, rows, all_pixels, oracle)
+
+CONFIGURATIONS: dict[str, Configuration] = {c.name: c for module in GENERATORS for c in module.configurations()}
+
+# Names and patterns; order is that of tables. What one is for stands behind it.
+GROUPS: dict[str, tuple[str, ...]] = {
+    # flicker report and `all` of a sweep
+    "report": (
+        "vanilla", "no-ctu-32", "no-ctu-64", "gscore", "seele", "faithful", "faithful-barrier", "flicker", "flicker-barrier",
+        "flicker-*-*-factored", "flicker-*-*-conic", "flicker-stop", "flicker-16", "flicker-64", "flicker-fifo-64", "exact", "exact-e4m3", "exact-e5m2", "exact-e5m3",
+        "exact-e4m4", "exact-q8.8", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64", "lanes", "lanes-deep", "lanes-64", "lanes-fp16", "lanes-acc10",
+        "lanes-acc12", "lanes-acc16", "lanes-acc20", "oracle", "oracle-lanes", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic",
+    ),
+    # README, in few rows
+    "summary": ("gscore", "faithful", "flicker", "lanes", "lanes-64"),
+    # docs/exploration.md, by theme
+    "rivals and the RTL": ("gscore", "seele", "no-ctu-32", "faithful", "flicker"),
+    "barriers, finished sub-tiles, FIFOs, VRUs": ("flicker-barrier", "flicker-stop", "flicker-fifo-64", "flicker-16", "flicker-64"),
+    "exact rectangle, by format": ("exact", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e5m2", "exact-q8.8"),
+    "only pixels that contribute": ("rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64", "oracle"),
+    "lanes": ("lanes", "lanes-deep", "lanes-64", "oracle-lanes"),
+    "accumulators": ("lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20"),
+    # from the default to lanes, one step at a time
+    "ablation": ("flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-acc14", "lanes", "lanes-deep"),
+    # whole-frame estimates, figure 10
+    "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64"),
+    # docs/energy.md
+    "energy": ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64"),
+    # docs/methods.md
+    "pictures": (
+        "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-fp16", "exact-fp16-bound", "exact-e5m6",
+        "exact-e5m6-bound", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e4m3-scaled", "exact-e4m3-bound", "exact-e5m2", "exact-q8.8", "exact-fp16-conic",
+        "exact-fp16-conic-bound", "exact-e4m3-conic", "rows-minitile", "rows-f6a6", "rows-f7a5", "rows-f8a6", "rows", "rows-ellipse", "rows-ellipse-acc14",
+        "rows-f10a10", "pixels", "oracle",
+    ),
+    # flicker stability: every picture once (row intervals draw what no test draws, so one of them is enough)
+    "stability": (
+        "vanilla*", "no-ctu-32*", "gscore*", "seele*", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*", "rows", "rows-f*", "rows-ellipse-acc*",
+        "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
+    ),
+    "stability, quick": (
+        "vanilla", "no-ctu-32", "no-ctu-32-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-e4m3", "exact",
+        "exact-fp16-conic-bound", "rows", "rows-f6a6", "oracle",
+    ),
+}
+EXPLORED = (
+    "rivals and the RTL", "barriers, finished sub-tiles, FIFOs, VRUs", "exact rectangle, by format", "only pixels that contribute", "lanes", "accumulators",
+)
+
+
+def matching(patterns: Sequence[str]) -> list[str]:
+    """Names of configurations by names and patterns, each once, in the order of the patterns. FlickerError for one that nothing matches."""
+    found: list[str] = []
+    for pattern in patterns:
+        if any(sign in pattern for sign in "*?["):
+            names = [name for name in CONFIGURATIONS if fnmatchcase(name, pattern)]
+            if not names:
+                raise FlickerError(f"no configuration matches '{pattern}'")
+            found += names
+        else:
+            found.append(get_configuration(pattern).name)
+    return list(dict.fromkeys(found))
+
+
+def group(name: str) -> list[str]:
+    """Names of a group's configurations."""
+    return matching(GROUPS[name])
+
+
+def get_configuration(name: str) -> Configuration:
+    """A configuration by name; FlickerError, naming close ones, if there is none."""
+    if name not in CONFIGURATIONS:
+        close = difflib.get_close_matches(name, CONFIGURATIONS, 3, 0.3)
+        raise FlickerError(f"configuration '{name}' is unknown; close names: {', '.join(close) or 'none'}")
+    return CONFIGURATIONS[name]
+
+
+def run(configuration: Configuration | str, view: View, background=(0.0, 0.0, 0.0)) -> Result:
+    """`machine.run` of a configuration or of its name."""
+    return machine.run(get_configuration(configuration) if isinstance(configuration, str) else configuration, view, background)
+
+
+def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:
+    """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs."""
+    if config.cat == CatMode.OFF:
+        return Configuration(
+            name, "RTL, test off", "baseline", contribution.Untested(config.form),
+            contribution.Channels(config.form, config.fifo_depth, config.vrus_per_channel),
+        )
+    return contribution.flicker(config, name, "RTL", fifo_depth=config.fifo_depth, vrus_per_channel=config.vrus_per_channel)

@@ -1,0 +1,42 @@
+"""What results depend on, as hashes: the code, and the content of files."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+from ..cost.area import SYNTHESIS
+
+# Rooms of the package that no stored result depends on: they run results, show them, or belong to the RTL.
+_NOT_IN_RESULTS = ("cli", "report", "sim", "pipeline.py", "toolchain.py", "markdown.py")
+
+
+@lru_cache(maxsize=None)
+def code_digest() -> str:
+    """Of the package's code and tables, and of the areas of `make synth`."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*")):
+        inside = path.relative_to(package)
+        if path.suffix in (".py", ".csv") and inside.parts[0] not in _NOT_IN_RESULTS:
+            digest.update(str(inside).encode() + b"\0" + path.read_bytes())
+    if SYNTHESIS.exists():
+        digest.update(SYNTHESIS.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def file_digest(path: Path) -> str:
+    """Of a file's content, or of a folder's files with their names."""
+    if path.is_dir():
+        digest = hashlib.sha256()
+        for inside in sorted(p for p in path.rglob("*") if p.is_file()):
+            digest.update(str(inside.relative_to(path)).encode() + b"\0" + file_digest(inside).encode())
+        return digest.hexdigest()[:16]
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def key(*parts: object) -> str:
+    """Name of a result from all that it depends on."""
+    return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:24]

@@ -1,0 +1,95 @@
+"""A view: a camera in a scene, with what everything downstream shares, made on first use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from ..errors import FlickerError
+from ..params import Coords, Form
+from ..scene import Scene, load_scene
+from ..scene.camera import Camera, find_cameras, select_view
+from .lists import DERIVED, subtile_lists
+from .projection import Projected, project
+from .records import SubtileLists
+from .reference import render_reference
+
+DEMO = "demo"  # the project's own scene, by this name instead of a file
+T = TypeVar("T")
+
+
+class View:
+    """A view.
+
+    scene: of the view; None where only its projection is given. projected: splats near to far. name, number: of the scene and its camera, for
+    tables. coords: where means are rounded to FP16. origin: position of the picture's first pixel on the screen, when the picture is a window of a larger one;
+    matters for absolute coordinates only.
+    """
+
+    def __init__(
+        self, camera: Camera, scene: Scene | None = None, projected: Projected | None = None, *, name: str = "", number: int = 0,
+        coords: Coords = Coords.LOCAL, origin: tuple[int, int] = (0, 0),
+    ) -> None:
+        if scene is None and projected is None:
+            raise ValueError("a view needs a scene or its projection")
+        self.camera, self.scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
+        if projected is not None:
+            self.projected = projected
+        self._kept: dict = {}
+
+    @cached_property
+    def projected(self) -> Projected:
+        return project(self.scene, self.camera)
+
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """float64 (H, W, 3): the picture that everything is compared with."""
+        return render_reference(self.projected, self.camera)
+
+    def lists(self, form: Form, kind: str = "subtile") -> SubtileLists:
+        """Lists of a kind (`front.lists.LISTS`) with records of a form."""
+        return self.keep(("lists", form, kind), lambda: self._make_lists(form, kind))
+
+    def _make_lists(self, form: Form, kind: str) -> SubtileLists:
+        if kind == "subtile":
+            return subtile_lists(self.projected, self.camera, form, self.coords, self.origin)
+        if self.coords == Coords.ABSOLUTE:
+            raise FlickerError(f"lists '{kind}': absolute coordinates are there for sub-tile lists only")
+        return DERIVED[kind](self.lists(form), self.projected, self.camera)
+
+    def keep(self, key: object, make: Callable[[], T]) -> T:
+        """What was made for this key, made now if it was not; `drop` forgets it."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def drop(self) -> None:
+        """Forget lists and what was kept beside them."""
+        self._kept.clear()
+
+
+def load_view(
+    scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None,
+) -> View:
+    """The view of a scene from its camera `number`. size: (width, height), scales the focal lengths; None: as the camera has it.
+
+    scene: a file, `demo` for the project's own scene, or a loaded one. cameras: a file instead of what `find_cameras` finds.
+    FlickerError, naming file and field, for what cannot be read.
+    """
+    if isinstance(scene, Scene):
+        loaded, name = scene, "" if scene.path is None else scene.path.name.split(".")[0]
+        found = find_cameras(loaded, cameras)
+    elif str(scene) == DEMO:
+        from ..scene.demo import demo_cameras, generate
+
+        loaded, found, name = generate(), demo_cameras(), DEMO
+    else:
+        loaded = load_scene(scene)
+        found = find_cameras(loaded, cameras)
+        name = Path(scene).name.split(".")[0]
+    camera = select_view(found, number)
+    return View(camera if size is None else camera.resized(*size), loaded, name=name, number=number)
