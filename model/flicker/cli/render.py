@@ -33,7 +33,9 @@ def _number(value) -> str:
 
 def summary(stats: dict, picture: Path | None) -> Table:
     """What a run prints at its end."""
-    table = Table(show_header=False, title=f"{Path(stats['scene']).name}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    from ..scene.files import scene_title
+
+    table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
     table.add_column(style="bold")
     table.add_column(justify="right")
     if picture is not None:
@@ -59,9 +61,10 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .splat")],
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat; a SOG folder or its meta.json")],
     cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    up: Annotated[Optional[str], typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
     cat: Annotated[Optional[CatChoice], typer.Option(help="contribution test [default: smooth]")] = None,
@@ -97,10 +100,10 @@ def render(
         from ..scene.camera import find_cameras, select_view
         from ..scene.image import save_png
         from ..pipeline import Engine, render_view
-        from ..scene.files import load_scene
-    with steps.step(f"loading {scene.name}"):
+        from ..scene.files import load_scene, scene_title
+    with steps.step(f"loading {scene_title(scene)}"):
         loaded = load_scene(scene)
-        camera = select_view(find_cameras(loaded, cameras), view)
+        camera = select_view(find_cameras(loaded, cameras, up), view)
         if wanted:
             camera = camera.resized(*wanted)
     result = render_view(loaded, camera, view=view, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
