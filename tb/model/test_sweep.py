@@ -134,7 +134,7 @@ def test_hash_follows_content(folder):
 
 @pytest.mark.parametrize(("changes", "message"), [
     ({"scenes": ["no.ply"]}, r"scenes\[0\]: .*no.ply: no such file"),
-    ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*expected .ply"),
+    ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*unknown format),
     ({"scenes": [{"path": "tiny.ply", "camera": "x"}]}, r"scenes\[0\]: unknown key 'camera'; did you mean 'cameras'"),
     ({"scenes": [{"path": "tiny.ply", "cameras": "x.json"}]}, r"scenes\[0\]: cameras: .*x.json: no such file"),
     ({"scenes": ["tiny.ply", "tiny.ply"]}, "is there twice"),

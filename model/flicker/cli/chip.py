@@ -55,6 +55,7 @@ def chip(
     scene: Annotated[Path, typer.Argument(help="scene file")],
     cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    up: Annotated[Optional[str], typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
     config: Annotated[str, typer.Option(help="configuration of the rendering stage (flicker report --list)")] = "flicker",
     render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
@@ -85,7 +86,7 @@ def chip(
         raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
     writable(out, "--out")
     configuration = get_configuration(config)
-    loaded = load_view(scene, view, parse_size(size), cameras)
+    loaded = load_view(scene, view, parse_size(size), cameras, up)
     setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
     prepared = prepare(loaded, setting.cluster_size)
     if render_cycles is None:

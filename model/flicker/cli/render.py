@@ -42,7 +42,9 @@ def _number(value) -> str:
 
 def summary(stats: dict, picture: Path | None) -> Table:
     """What a run prints at its end."""
-    table = Table(show_header=False, title=f"{Path(stats['scene']).name}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    from ..scene.files import scene_title
+
+    table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
     table.add_column(style="bold")
     table.add_column(justify="right")
     if picture is not None:
@@ -68,9 +70,10 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .splat")],
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat; a SOG folder or its meta.json")],
     cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    up: Annotated[Optional[str], typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
     cat: Annotated[Optional[CatChoice], typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
@@ -106,8 +109,9 @@ def render(
         from ..front.view import load_view
         from ..scene.image import save_png
         from ..pipeline import Engine, render_view
-    with steps.step(f"loading {scene.name}"):
-        loaded = load_view(scene, view, wanted, cameras)
+        from ..scene.files import scene_title
+    with steps.step(f"loading {scene_title(scene)}"):
+        loaded = load_view(scene, view, wanted, cameras, up)
     result = render_view(loaded, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
     if out is not None:
         write_atomically(out, lambda path: save_png(path, result.image))

@@ -27,12 +27,7 @@ def code_digest() -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Of a file's content, or of a folder's files with their names."""
-    if path.is_dir():
-        digest = hashlib.sha256()
-        for inside in sorted(p for p in path.rglob("*") if p.is_file()):
-            digest.update(str(inside.relative_to(path)).encode() + b"\0" + file_digest(inside).encode())
-        return digest.hexdigest()[:16]
+    """Of a file's content."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 

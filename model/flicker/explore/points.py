@@ -7,35 +7,30 @@ from functools import cached_property
 from pathlib import Path
 
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import ORBIT_VIEWS, load_cameras
+from ..scene.camera import camera_count, cameras_beside
+from ..scene.files import scene_digest, scene_name, scene_title
 from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
 
-SUFFIXES = (".ply", ".spz", ".sog", ".splat")
 
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene and its cameras. path: a file, or `demo`. cameras: a file; None: `cameras.json` beside the scene, else an orbit."""
+    """A scene and its cameras. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit."""
 
     path: str
     cameras: str | None = None
+    up: str | None = None
 
     @property
     def file(self) -> str:
-        """File name."""
-        return Path(self.path).name
+        """Name of file or folder."""
+        return self.path if self.path == DEMO else scene_title(self.path)
 
     @property
     def name(self) -> str:
-        """File name without its suffixes."""
-        return self.file.split(".")[0]
-
-    @property
-    def cameras_file(self) -> Path | None:
-        """The file that the cameras come from; None: there is none."""
-        used = Path(self.cameras) if self.cameras is not None else Path(self.path).parent / "cameras.json"
-        return used if self.path != DEMO and used.exists() else None
+        """The same without its suffixes."""
+        return self.path if self.path == DEMO else scene_name(self.path)
 
     def views(self) -> int:
         """Number of cameras."""
@@ -43,15 +38,15 @@ class SceneFile:
             from ..scene.demo import demo_cameras
 
             return len(demo_cameras())
-        return ORBIT_VIEWS if self.cameras_file is None else len(load_cameras(self.cameras_file))
+        return camera_count(self.path, self.cameras, self.up)
 
     @cached_property
     def digest(self) -> str:
         """Of the contents of scene and cameras; the demo scene is code."""
         if self.path == DEMO:
             return ""
-        digest = file_digest(Path(self.path))
-        return digest if self.cameras_file is None else f"{digest}-{file_digest(self.cameras_file)}"
+        cameras = Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
+        return "-".join((scene_digest(self.path)[:16], file_digest(cameras) if cameras else "orbit", self.up or ""))
 
 
 @dataclass(frozen=True)
@@ -67,7 +62,7 @@ class Target:
         return f"{self.scene.name} {self.view}"
 
     def load(self) -> View:
-        return load_view(self.scene.path, self.view, self.size, self.scene.cameras)
+        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up)
 
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""

@@ -13,6 +13,7 @@ from ..errors import FlickerError
 from ..params import Coords, Form
 from ..scene import Scene, load_scene
 from ..scene.camera import Camera, find_cameras, select_view
+from ..scene.files import scene_name
 from .lists import DERIVED, subtile_lists
 from .projection import Projected, project
 from .records import SubtileLists
@@ -73,23 +74,23 @@ class View:
 
 
 def load_view(
-    scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None,
+    scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None, up: str | None = None,
 ) -> View:
     """The view of a scene from its camera `number`. size: (width, height), scales the focal lengths; None: as the camera has it.
 
-    scene: a file, `demo` for the project's own scene, or a loaded one. cameras: a file instead of what `find_cameras` finds.
+    scene: a file, a folder, `demo` for the project's own scene, or a loaded one. cameras, up: as in `find_cameras`.
     FlickerError, naming file and field, for what cannot be read.
     """
     if isinstance(scene, Scene):
-        loaded, name = scene, "" if scene.path is None else scene.path.name.split(".")[0]
-        found = find_cameras(loaded, cameras)
+        loaded, name = scene, "" if scene.path is None else scene_name(scene.path)
+        found = find_cameras(loaded, cameras, up)
     elif str(scene) == DEMO:
         from ..scene.demo import demo_cameras, generate
 
         loaded, found, name = generate(), demo_cameras(), DEMO
     else:
         loaded = load_scene(scene)
-        found = find_cameras(loaded, cameras)
-        name = Path(scene).name.split(".")[0]
+        found = find_cameras(loaded, cameras, up)
+        name = scene_name(scene)
     camera = select_view(found, number)
     return View(camera if size is None else camera.resized(*size), loaded, name=name, number=number)

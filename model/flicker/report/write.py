@@ -11,11 +11,12 @@ from pathlib import Path
 
 from ..cost.area import SYNTHESIS
 from ..scene.camera import Camera
+from ..scene.files import scene_kind
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
 from ..explore.digest import code_digest, key
 from ..explore.store import DEFAULT, Store
-from ..explore.points import SUFFIXES, SceneFile, Target
+from ..explore.points import SceneFile, Target
 from ..front.view import DEMO
 from ..explore.stability.run import Point, Stability, run_stability
 from ..explore.stability.write import check_folder
@@ -55,10 +56,9 @@ def parse_target(text: str, size: tuple[int, int]) -> Target:
         path, view = Path(head), int(tail)
     if not path.exists():
         raise FlickerError(f"{path}: no such scene")
-    if not path.is_file() or not os.access(path, os.R_OK):
-        raise FlickerError(f"{path}: not a readable file")
-    if path.suffix not in SUFFIXES:
-        raise FlickerError(f"{path}: not a scene file ({', '.join(SUFFIXES)})")
+    if not os.access(path, os.R_OK):
+        raise FlickerError(f"{path}: not readable")
+    scene_kind(path)
     scene = SceneFile(str(path))
     if view >= (count := scene.views()):
         raise FlickerError(f"{path}: view {view}: there are {count} cameras, 0 to {count - 1}")

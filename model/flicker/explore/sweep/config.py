@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,10 +14,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, S
 from ...errors import FlickerError
 from ...front.view import DEMO
 from ...scene.camera import MAX_SIZE
+from ...scene.files import scene_kind
 from ...toolchain import BUILD
 from ..configurations import GROUPS, matching
 from ..digest import code_digest, key
-from ..points import SUFFIXES, Point, SceneFile, Target
+from ..points import Point, SceneFile, Target
 
 MAX_WORKERS = 1024
 
@@ -83,6 +85,7 @@ class SceneSection(_Section):
     path: Annotated[StrictStr, Field(min_length=1, description="scene file, relative to the YAML file, or demo")]
     cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras.json instead of the one beside the scene")] = None
     views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
+    up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -180,15 +183,13 @@ def _parse(path: Path) -> SweepFile:
         raise _first(path, error) from None
 
 
-def _file(base: Path, text: str, where: str) -> Path:
-    """A file of the sweep, relative to the YAML file."""
+def _path(base: Path, text: str, where: str) -> Path:
+    """A file or folder of the sweep, relative to the YAML file."""
     path = (base.parent / Path(text).expanduser()).resolve()
-    if not path.is_file():
+    if not path.exists():
         raise FlickerError(f"{base}: {where}: {path}: no such file")
-    try:
-        path.open("rb").close()
-    except OSError as error:
-        raise FlickerError(f"{base}: {where}: {path}: cannot be read ({error.strerror})") from None
+    if not os.access(path, os.R_OK):
+        raise FlickerError(f"{base}: {where}: {path}: cannot be read")
     return path
 
 
@@ -197,10 +198,13 @@ def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
         if section.cameras is not None:
             raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
         return SceneFile(DEMO)
-    path = _file(base, section.path, where)
-    if not path.name.lower().endswith(SUFFIXES):
-        raise FlickerError(f"{base}: {where}: {path}: expected {', '.join(SUFFIXES)}")
-    return SceneFile(str(path), None if section.cameras is None else str(_file(base, section.cameras, f"{where}: cameras")))
+    path = _path(base, section.path, where)
+    cameras = None if section.cameras is None else str(_path(base, section.cameras, f"{where}: cameras"))
+    try:
+        scene_kind(path)
+    except FlickerError as error:
+        raise FlickerError(f"{base}: {where}: {error}") from None
+    return SceneFile(str(path), cameras, section.up)
 
 
 def load_sweep(path: str | Path) -> Sweep:
@@ -219,7 +223,10 @@ def load_sweep(path: str | Path) -> Sweep:
     for i, section in enumerate(given.scenes):
         where = f"scenes[{i}]"
         scene = _scene(path, section, where)
-        count = scene.views()
+        try:
+            count = scene.views()
+        except FlickerError as error:
+            raise FlickerError(f"{path}: {where}: {error}") from None
         for view in dict.fromkeys(section.views if section.views is not None else given.views):
             if view >= count:
                 raise FlickerError(f"{path}: {where}: view {view}: there are {count} cameras, 0 to {count - 1}")

@@ -57,7 +57,7 @@ def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dic
 
 def _missing_files(paths: list[str]) -> list[str]:
     """On a worker: files that it cannot see."""
-    return [path for path in paths if not os.path.isfile(path)]
+    return [path for path in paths if not os.path.exists(path)]
 
 
 def _quiet() -> None:
@@ -100,7 +100,7 @@ def check_workers(client, sweep: Sweep) -> None:
     if sweep.address is None:
         return
     scenes = {t.scene for t in sweep.targets}
-    paths = sorted({path for s in scenes for path in (s.path, s.cameras) if path is not None and os.path.isfile(path)})
+    paths = sorted({path for s in scenes for path in (s.path, s.cameras) if path is not None and os.path.exists(path)})
     try:
         codes = client.run(code_digest)
         missing = client.run(_missing_files, paths)
