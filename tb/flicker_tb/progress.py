@@ -25,9 +25,9 @@ _POLL = 0.5
 class Progress:
     """The plugin. ``pause``: seconds between two lists."""
 
-    def __init__(self, config: pytest.Config, pause: float = PAUSE) -> None:
+    def __init__(self, config: pytest.Config, pause: float) -> None:
         self._pause = pause
-        self._reporter = config.pluginmanager.get_plugin("terminalreporter")
+        self._plugins = config.pluginmanager
         # Capture replaces file descriptor 1 while a test runs in this process.
         self._out = os.fdopen(os.dup(1), "w")
         self._folder = Path(tempfile.mkdtemp(prefix="flicker-progress-"))
@@ -82,12 +82,13 @@ class Progress:
 
     def _say(self, text: str) -> None:
         # Begin a line of one's own behind a row of dots.
-        width = getattr(getattr(self._reporter, "_tw", None), "width_of_current_line", 0)
+        reporter = self._plugins.get_plugin("terminalreporter")
+        width = getattr(getattr(reporter, "_tw", None), "width_of_current_line", 0)
         self._out.write(("\n" if width else "") + f"[{text}]\n")
         self._out.flush()
 
 
-def register(config: pytest.Config) -> None:
+def register(config: pytest.Config, pause: float = PAUSE) -> None:
     """Add the plugin in the process that reports."""
     if not hasattr(config, "workerinput") and not config.option.collectonly:
-        config.pluginmanager.register(Progress(config), "flicker-progress")
+        config.pluginmanager.register(Progress(config, pause), "flicker-progress")
