@@ -183,6 +183,48 @@ def test_vcd_is_written() -> None:
     assert set(signal_view.signals(trace, "flk_skid_buffer")) <= set(shown)
 
 
+# ---- front ends, as docs/integration.md says ----------------------------------------------------
+
+YOSYS = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in sys.argv[1:]]"
+
+
+def test_slang_reads_everything_and_the_template_fits() -> None:
+    """No errors in the sources; the instantiation template of the page elaborates and is that of the module's ports."""
+    page = (ROOT / "docs/integration.md").read_text()
+    template = page.split("<!-- scripts/instance_template.py -->\n```systemverilog\n")[1].split("```")[0]
+    sys.path.insert(0, str(ROOT / "scripts"))
+    from instance_template import elaborate
+
+    assert elaborate()[0] == []
+    errors, tops = elaborate(f"module outside; {template} endmodule")
+    assert errors == [] and {"outside"} <= tops.keys() and "flk_render_stage" not in tops
+    assert elaborate(f"module outside; {template.replace('.clk_i', '.clock_i')} endmodule")[0]
+    assert command(sys.executable, "scripts/instance_template.py", "--check").returncode == 0
+
+
+def test_verible_parses_everything() -> None:
+    done = command(BIN / "verible-verilog-syntax", *filelist())
+    assert done.returncode == 0, done.stdout
+
+
+def test_what_yosys_reads(tmp_path: Path) -> None:
+    """`read_slang` reads the structs; `read_verilog -sv` refuses our sources, and builds a wrong netlist of the page's example without a warning."""
+    page = (ROOT / "docs/integration.md").read_text()
+    source = tmp_path / "wrong.sv"
+    source.write_text(page.split("holds this text against Yosys -->\n```systemverilog\n")[1].split("```")[0])
+    shown = {}
+    for reader in ("read_verilog -sv", "read_slang"):
+        done = command(
+            sys.executable, "-c", YOSYS, f"{reader} {source}", "prep -top wrong", "check -assert",
+            *(f"eval -set in_i 16'h1234 -set k_i {k} -show sel_o wrong" for k in (0, 1)),
+        )
+        assert done.returncode == 0 and "Warning" not in done.stdout, done.stdout
+        shown[reader] = re.findall(r"sel_o = 8'([01]{8})", done.stdout)
+    assert shown == {"read_verilog -sv": ["00000000"] * 2, "read_slang": [f"{0x34:08b}", f"{0x12:08b}"]}
+    done = command(sys.executable, "-c", YOSYS, f"read_verilog -sv {' '.join(map(str, filelist()))}")
+    assert done.returncode and re.search(r"flk_param_pkg\.sv:\d+: ERROR: syntax error", done.stdout), done.stdout[-500:]
+
+
 # ---- manifests for other tools ------------------------------------------------------------------
 
 
