@@ -39,10 +39,10 @@ test: $(STAMP) lint ## lint, all tests, the fast proofs
 	@$(BIN)/python -m pytest -n $(JOBS) tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
-sim: $(STAMP) ## simulations of units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
+sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
 
-lint: $(STAMP) ## lint of the hardware: Verilator with every module as top, Verible style
+lint: $(STAMP) ## Verilator with every module as top, Verible style, ruff, mypy, generated files
 	@$(BIN)/python scripts/lint.py
 
 waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves UNIT=stream_cells

@@ -120,7 +120,8 @@ def draw(trace: Trace, rows: list[str], edges: list[int], path: Path, *, dark: b
             for edge, state in zip(edges, states(trace, top, marks[name], edges), strict=True):
                 if state != "idle":
                     colour = "#c8ebc8" if state == "transfer" else "#f6cccc"
-                    axes.axvspan(edge - PERIOD, edge, (low + len(rows) - 0.4) / len(rows), (high + 2 + len(rows) - 0.2) / len(rows), color=colour, zorder=0, lw=0)
+                    bottom, above = ((y + len(rows) - 0.4) / len(rows) for y in (low, high + 2.2))
+                    axes.axvspan(edge - PERIOD, edge, bottom, above, color=colour, zorder=0, lw=0)
         times = [begin, *(t for t in trace[full][0] if begin < t < end)]
         values = [trace.at(full, t) for t in times]
         ends = [*times[1:], end]

@@ -10,9 +10,10 @@ import pytest
 TB = Path(__file__).resolve().parent
 sys.path.insert(0, str(TB))
 
+from flicker_tb import progress, runner  # noqa: E402
+
 from flicker import toolchain  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
-from flicker_tb import progress, runner  # noqa: E402
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

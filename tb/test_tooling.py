@@ -78,7 +78,9 @@ def test_foreign_package_is_refused(copy: Path) -> None:
 # ---- choice of units ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("unit", "says"), [("camera", "unit 'camera' does not simulate; those that simulate"), ("vruu", "no unit 'vruu'; those that simulate")])
+@pytest.mark.parametrize(
+    ("unit", "says"), [("camera", "unit 'camera' does not simulate; those that simulate"), ("vruu", "no unit 'vruu'; those that simulate")]
+)
 def test_unit_that_does_not_simulate(unit: str, says: str) -> None:
     done = command(sys.executable, "-m", "pytest", "-m", "sim", "--unit", unit, "--collect-only", "-q", "tb")
     assert done.returncode and says in done.stdout, done.stdout

@@ -31,7 +31,6 @@ from arith_bench import (
     cross,
     fp16_pairs,
     nearest,
-    specials,
 )
 from flicker_tb.runner import seed
 

@@ -32,7 +32,6 @@ from flicker.projection import project
 from flicker.reference import render_reference
 from flicker.scene import save_ply
 
-
 # ---- constants ---------------------------------------------------------------------------------
 
 

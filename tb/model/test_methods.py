@@ -30,7 +30,7 @@ from flicker.golden.vru import ALPHA_MIN, PAIR_FIELDS, alpha_of, pair
 from flicker.methods import View, get_method, methods, missed_pixels, run
 from flicker.methods.disc import DiscFormat, disc_masks, inverse_radius, root_table
 from flicker.methods.exact import exact_masks, margins
-from flicker.methods.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
+from flicker.methods.numbers import DOWN, E4M4, E5M3, E5M6, FORMATS, NEAREST, UP, numbers, quantise
 from flicker.methods.operations import Op
 from flicker.methods.stage import ACCUMULATOR_INT_BITS, accumulate, pixel_tests
 from flicker.methods.thresholds import radii, thresholds

@@ -8,7 +8,19 @@ import numpy as np
 
 from flicker.demo_scene.light import window_mask
 from flicker.demo_scene.splats import (
-    Patch, Rand, Splats, dot, fbm, frame, mix, noise, sample, spread, srgb, step, unit,
+    Patch,
+    Rand,
+    Splats,
+    dot,
+    fbm,
+    frame,
+    mix,
+    noise,
+    sample,
+    spread,
+    srgb,
+    step,
+    unit,
 )
 from flicker.demo_scene.views import seen
 

@@ -15,8 +15,23 @@ import numpy as np
 from ..methods.work import SPLITS, Work
 from ..params import CORES, COUNTERS_PER_CORE, RenderConfig, vru_stages
 from .render_stage import (
-    BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
-    VRU_BUSY, StageCycles, sum_up,
+    BUSY,
+    DELIVERED,
+    DISCARDED,
+    FULL,
+    GAUSSIANS_IN,
+    IDLE,
+    N_CHANNEL,
+    N_CORE,
+    NEVER,
+    REJECTED,
+    SENT,
+    STALLED,
+    SUBTILES,
+    TOKEN,
+    VRU_BUSY,
+    StageCycles,
+    sum_up,
 )
 
 GENERATOR_LATENCY = 16
