@@ -25,11 +25,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from flicker import markdown, toolchain
-from flicker.errors import FlickerError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from flicker import markdown, toolchain
+from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 LISTS = ROOT / "tb" / "mutants"

@@ -12,10 +12,10 @@ import numpy as np
 
 from . import params
 from .front.records import build_lists
-from .golden.render import render_golden
-from .scene.metrics import psnr
-from .params import CHANNELS, CORES, RenderConfig
 from .front.view import View
+from .golden.render import render_golden
+from .params import CHANNELS, CORES, RenderConfig
+from .scene.metrics import psnr
 from .sim.render_stage import build, render_rtl
 
 

@@ -11,12 +11,21 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import (
-    DEFAULT_UP, ORBIT_VIEWS, UP_AXES, Camera, camera_count, cameras_beside, find_cameras, load_cameras, orbit_camera, select_view,
-)
 from flicker.errors import FlickerError
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
+from flicker.scene.camera import (
+    DEFAULT_UP,
+    ORBIT_VIEWS,
+    UP_AXES,
+    Camera,
+    camera_count,
+    cameras_beside,
+    find_cameras,
+    load_cameras,
+    orbit_camera,
+    select_view,
+)
 from flicker.scene.files import Scene, load_scene, save_ply
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))

@@ -18,8 +18,8 @@ import pytest
 import scene_samples as samples
 
 from flicker.scene.demo import write_demo
-from flicker.scene.image import load_png
 from flicker.scene.files import load_scene, save_ply
+from flicker.scene.image import load_png
 
 
 def flicker(*args: object) -> subprocess.CompletedProcess:

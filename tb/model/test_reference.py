@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import Camera, load_cameras
 from flicker.errors import FlickerError
-from flicker.scene.image import load_png, save_png
-from flicker.scene.metrics import psnr, ssim
 from flicker.front.projection import project
 from flicker.front.reference import render_reference, render_with_transmittance
+from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.files import Scene, load_scene
+from flicker.scene.image import load_png, save_png
+from flicker.scene.metrics import psnr, ssim
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 

@@ -22,14 +22,24 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import orbit_camera
 from flicker.errors import FlickerError, FlickerWarning
-from flicker.scene.metrics import psnr
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
+from flicker.scene.camera import orbit_camera
 from flicker.scene.files import (
-    KINDS, SCENE_SUFFIXES, Scene, is_scene_path, load_scene, save_ply, scene_digest, scene_files, scene_kind, scene_name, scene_title,
+    KINDS,
+    SCENE_SUFFIXES,
+    Scene,
+    is_scene_path,
+    load_scene,
+    save_ply,
+    scene_digest,
+    scene_files,
+    scene_kind,
+    scene_name,
+    scene_title,
 )
+from flicker.scene.metrics import psnr
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 # Largest error of positions, of the logarithm of scales, of rotation matrices, of opacities, of SH coefficients.

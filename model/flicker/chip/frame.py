@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..scene.camera import Camera
 from ..errors import FlickerError
 from ..front.records import SubtileLists
 from ..front.view import View
 from ..params import TILE, Form
+from ..scene.camera import Camera
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
 from .delivery import broadcast_cycles, consumed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.table import Table
@@ -13,6 +13,7 @@ from rich.table import Table
 from ..errors import FlickerError
 from ..params import FAITHFUL, MAX_FIFO_DEPTH, CatMode, Coords, Form, Precision, RenderConfig
 from .options import RichSteps, console, parse_size, writable, write_atomically
+
 
 def _choices(enum: type) -> type[Enum]:
     """Lower-case string choices of an integer enum."""
@@ -71,20 +72,20 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 def render(
     scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat; a SOG folder or its meta.json")],
-    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
-    up: Annotated[Optional[str], typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
-    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    cat: Annotated[Optional[CatChoice], typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
-    precision: Annotated[Optional[PrecisionChoice], typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
-    form: Annotated[Optional[FormChoice], typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
-    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
+    cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
+    precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
+    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
+    fifo_depth: Annotated[int | None, typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {', '.join(_word(getattr(FAITHFUL, n)) for n in ('form', 'precision', 'cat'))}, FIFO {FAITHFUL.fifo_depth}")] = False,
-    compare: Annotated[Optional[CompareChoice], typer.Option(help="report the PSNR against the float64 reference")] = None,
-    out: Annotated[Optional[Path], typer.Option(help="picture (.png)")] = None,
-    stats: Annotated[Optional[Path], typer.Option(help="statistics (.json)")] = None,
+    compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
+    out: Annotated[Path | None, typer.Option(help="picture (.png)")] = None,
+    stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
 ) -> None:
     """Render one view of a scene."""
     given = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
@@ -107,9 +108,9 @@ def render(
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import load_view
-        from ..scene.image import save_png
         from ..pipeline import Engine, render_view
         from ..scene.files import scene_title
+        from ..scene.image import save_png
     with steps.step(f"loading {scene_title(scene)}"):
         loaded = load_view(scene, view, wanted, cameras, up)
     result = render_view(loaded, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
@@ -121,7 +122,7 @@ def render(
 
 
 def demo(
-    size: Annotated[Optional[str], typer.Option(help="WxH [default: 640x360]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH [default: 640x360]")] = None,
     folder: Annotated[Path, typer.Option("--dir", help="where scene, picture and statistics go")] = Path("build/demo"),
     seed: Annotated[int, typer.Option(help="seed of the scene")] = 1,
 ) -> None:
@@ -130,9 +131,9 @@ def demo(
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import load_view
+        from ..pipeline import Engine, render_view
         from ..scene.demo import write_demo
         from ..scene.image import save_png
-        from ..pipeline import Engine, render_view
     with steps.step(f"making the demo scene (seed {seed})"):
         scene_path, cameras_path = write_demo(folder, seed)
     view = load_view(scene_path, 0, wanted, cameras_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -12,13 +12,12 @@ from ..errors import FlickerError
 from .options import parse_size
 
 
-
 def report(
-    scenes: Annotated[Optional[list[str]], typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
+    scenes: Annotated[list[str] | None, typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
     out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures")] = Path("build/report"),
     size: Annotated[str, typer.Option(help="WxH of every view")] = "1280x720",
-    configs: Annotated[Optional[str], typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
-    store: Annotated[Optional[Path], typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
+    configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
+    store: Annotated[Path | None, typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:

@@ -14,16 +14,16 @@ from __future__ import annotations
 import csv
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from ..errors import FlickerError
-from .operations import Op, Operation, Operations, ctu_operations
 from ..golden.masked import ACCUMULATOR_INT_BITS
 from ..params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
 from ..perf.lane_stage import LaneStage
-from .synth.units import channel_config, vru_config
 from ..toolchain import BUILD
+from .operations import Op, Operation, Operations, ctu_operations
+from .synth.units import channel_config, vru_config
 
 TABLE = Path(__file__).with_name("areas.csv")
 SYNTHESIS = BUILD / "synth" / "area.csv"
@@ -54,7 +54,7 @@ def _read(path: Path) -> dict[tuple[str, str], dict[str, str]]:
         return {(row["unit"], row["config"]): row for row in csv.DictReader(line for line in file if not line.startswith("#"))}
 
 
-@lru_cache(maxsize=None)
+@cache
 def parts() -> dict[tuple[str, str], Part]:
     """Synthesised parts by (unit, configuration): the table of this package, areas replaced by those of `make synth` where it has run."""
     found = {}
@@ -158,7 +158,7 @@ def operators_area(generator: Operations) -> float:
     return sum(math.ceil(o.count / generator.cycles) * operator(o).ge for o in generator.per_element)
 
 
-@lru_cache(maxsize=None)
+@cache
 def overhead() -> float:
     """What pipeline registers, the record's delay and control add to a generator's operators, as a factor: that of the synthesised CTU
     (factored, FP16) over its own operators."""

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import FlickerError
-from ..params import CatMode, RenderConfig
-from .generators import all_pixels, contribution, exact, oracle, rows, seele
 from ..front.view import View
+from ..params import CatMode, RenderConfig
 from . import machine
+from .generators import all_pixels, contribution, exact, oracle, rows, seele
 from .machine import Configuration, Result
 
 GENERATORS = (contribution, seele, exact, rows, all_pixels, oracle)

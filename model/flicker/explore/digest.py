@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from ..cost.area import SYNTHESIS
@@ -12,7 +12,7 @@ from ..cost.area import SYNTHESIS
 _NOT_IN_RESULTS = ("cli", "report", "sim", "pipeline.py", "toolchain.py", "markdown.py")
 
 
-@lru_cache(maxsize=None)
+@cache
 def code_digest() -> str:
     """Of the package's code and tables, and of the areas of `make synth`."""
     package = Path(__file__).resolve().parents[1]

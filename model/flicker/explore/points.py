@@ -13,7 +13,6 @@ from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
 
 
-
 @dataclass(frozen=True)
 class SceneFile:
     """A scene and its cameras. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit."""

@@ -25,8 +25,23 @@ from ..explore.configurations import CONFIGURATIONS  # noqa: E402
 from ..explore.facts import TILE_SIZES  # noqa: E402
 from ..explore.stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
-    DENSE, FAITHFUL, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
-    drop, test_loss,
+    DENSE,
+    FAITHFUL,
+    GSCORE,
+    NARROW,
+    NO_CTU,
+    NO_CTU_64,
+    PAPER_AREA,
+    PAPER_PRUNED_PSNR,
+    PAPER_VANILLA_PSNR,
+    SMOOTH,
+    SPARSE,
+    SPIKY,
+    UM2_PER_GE,
+    VANILLA,
+    WIDE,
+    drop,
+    test_loss,
 )
 from .collect import FIFO_SWEPT, ViewResult  # noqa: E402
 

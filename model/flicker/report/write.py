@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..cost.area import SYNTHESIS
-from ..scene.camera import Camera
-from ..scene.files import scene_kind
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
 from ..explore.digest import code_digest, key
-from ..explore.store import DEFAULT, Store
 from ..explore.points import SceneFile, Target
-from ..front.view import DEMO
 from ..explore.stability.run import Point, Stability, run_stability
 from ..explore.stability.write import check_folder
+from ..explore.store import DEFAULT, Store
+from ..front.view import DEMO
+from ..scene.camera import Camera
+from ..scene.files import scene_kind
 from .claims import Verdict, all_verdicts, read_areas
 from .collect import collect
 from .figures import own_figures, paper_figures, stability_table

@@ -17,16 +17,16 @@ import numba
 import numpy as np
 
 from ...arithmetic.fp import FP16_R, sub
+from ...arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, Numbers, numbers, quantise
+from ...arithmetic.thresholds import EPSILON, radii, thresholds
+from ...cost.operations import Op, Operation, Operations
+from ...front.projection import Projected
 from ...front.records import SubtileLists
 from ...front.view import View
-from ...params import Form
-from ...front.projection import Projected
-from ...arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, Numbers, numbers, quantise
-from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ...params import Form
 from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
 from ..stages.channels import Channels
-from ...arithmetic.thresholds import EPSILON, radii, thresholds
 
 
 def margins(form: Form, system: Numbers) -> tuple[float, float]:

@@ -18,23 +18,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numba
 import numpy as np
 
+from ...arithmetic.numbers import NEAREST, quantise
+from ...arithmetic.thresholds import radii, thresholds
+from ...cost.operations import Op, Operation, Operations
 from ...errors import FlickerError
 from ...front.records import SubtileLists
 from ...front.view import View
-from ...params import Form
-from ...arithmetic.numbers import NEAREST, quantise
-from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ...params import Form
 from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
 from ..stages.channels import Channels
 from ..stages.lanes import Lanes
 from ..stages.pixels import PixelChannels
-from ...arithmetic.thresholds import radii, thresholds
 
 SIGNIFICAND = 13  # bits of a, b, c, X, Y with the hidden bit
 EXTRA = 3  # fraction bits of sums beyond those of a comparison
@@ -61,7 +61,7 @@ class RowFormat:
             raise FlickerError(f"rows: fraction must be 4 to 12 and address 3 to fraction, not {self.fraction} and {self.address}")
 
 
-@lru_cache(maxsize=None)
+@cache
 def inverse_radius() -> np.ndarray:
     """float64 (65536,): k of every FP16 opacity, at most 1 / rho(o), a multiple of 2^-K_BITS; 0 where no pair can pass."""
     t = thresholds(Form.FACTORED)
@@ -84,7 +84,7 @@ def errors(fmt: RowFormat) -> tuple[float, float]:
     return v, u
 
 
-@lru_cache(maxsize=None)
+@cache
 def root_table(fmt: RowFormat) -> np.ndarray:
     """int64: by |v| in units of 2^-address, r + the constant part of M in units of 2^-fraction, rounded up; ends where |v| > 1."""
     dv, du = errors(fmt)

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...scene.camera import Camera
 from ...errors import FlickerError
 from ...front.projection import Projected, project
+from ...scene.camera import Camera
 from ...scene.files import Scene
 
 SIZE = 64
