@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lint: Verilator with every module as top, Verible style rules; ruff and mypy on the Python; generated files.
+"""Lint: Verilator with every module as top, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
 
 Exits 1 on any warning. Each module is linted with its default parameters and with those of
 VARIANTS, as simulated (with assertions) and as synthesised (SYNTHESIS defined).
@@ -50,6 +50,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
 CHECKS: list[list[object]] = [
     [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
     [sys.executable, "-m", "mypy"],
+    [Path(sys.executable).parent / "lint-imports"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
     [sys.executable, "scripts/instance_template.py", "--check"],
 ]

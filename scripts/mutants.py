@@ -261,7 +261,9 @@ def main() -> int:
     home = sum(o.at_home for o in found)
     wrong = [o for o in found if o.wrong]
     unexplained = [o for o in found if not o.killer and not o.wrong and not o.mutant.note]
-    console.print(f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; {len(unexplained)} survivors without a note; {len(wrong)} wrong")
+    console.print(
+        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; {len(unexplained)} survivors without a note; {len(wrong)} wrong",
+    )
     if args.docs:
         import pages
 

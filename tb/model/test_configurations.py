@@ -1,4 +1,5 @@
-"""Configurations and their mask generators: equal to the golden model where it has the same mode, against plain restatements elsewhere, and proved masks without a miss.
+"""Configurations and their mask generators: equal to the golden model where it has the same mode, against plain restatements elsewhere, and
+proved masks without a miss.
 
 Rationale: a proof can have a hole, so every generator that claims it never misses is run on splats made to break it: axis ratios up to
 10,000, means up to 5,000 pixels away, opacities at 1/255, records of random bits, the demo scene, and real scenes where

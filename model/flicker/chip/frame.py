@@ -57,6 +57,9 @@ class ChipConfig:
             raise FlickerError(f"chip: cull_shape must be box, sphere or none, not {self.cull_shape}")
 
 
+DEFAULT_CHIP = ChipConfig()
+
+
 @dataclass(eq=False)
 class Prepared:
     """A view with its scene in the order of memory: what does not depend on the chip but on the size of clusters; reused between estimates.
@@ -195,7 +198,7 @@ def _parameter_streams(prepared: Prepared, chip: ChipConfig) -> tuple[list[Strea
 
 
 def frame_estimate(
-    prepared: Prepared, render_cycles: int, chip: ChipConfig = ChipConfig(), scheme_result: SchemeResult | None = None,
+    prepared: Prepared, render_cycles: int, chip: ChipConfig = DEFAULT_CHIP, scheme_result: SchemeResult | None = None,
     subtile_cycles: np.ndarray | None = None,
 ) -> FrameEstimate:
     """Estimate a frame. render_cycles: of the rendering stage, from its model or the RTL.

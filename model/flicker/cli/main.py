@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from typing import Any
 
 import typer
 
@@ -23,7 +24,7 @@ for command in (render, demo, chip, report, stability, sweep):
 _show_others = warnings.showwarning
 
 
-def _show_warning(message, category, *rest) -> None:
+def _show_warning(message: Any, category: Any, *rest: Any) -> None:
     """Warnings of our own are one line on standard error."""
     if issubclass(category, FlickerWarning):
         print(f"flicker: warning: {message}", file=sys.stderr)
@@ -33,7 +34,7 @@ def _show_warning(message, category, *rest) -> None:
 
 def main() -> None:
     """Entry point: bad input is one line on standard error and exit code 2."""
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _show_warning  # type: ignore[assignment]  # the rest is handed on as it comes
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except FlickerError as error:

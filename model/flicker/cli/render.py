@@ -29,6 +29,11 @@ def _default(field: str) -> str:
     return _word(getattr(RenderConfig(), field))
 
 
+def _faithful() -> str:
+    words = [_word(getattr(FAITHFUL, name)) for name in ("form", "precision", "cat")]
+    return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
+
+
 CatChoice = _choices(CatMode)
 FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
@@ -82,7 +87,7 @@ def render(
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
     fifo_depth: Annotated[int | None, typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
-    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {', '.join(_word(getattr(FAITHFUL, n)) for n in ('form', 'precision', 'cat'))}, FIFO {FAITHFUL.fifo_depth}")] = False,
+    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
     out: Annotated[Path | None, typer.Option(help="picture (.png)")] = None,
     stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
@@ -138,7 +143,7 @@ def demo(
         scene_path, cameras_path = write_demo(folder, seed)
     view = load_view(scene_path, 0, wanted, cameras_path)
     with steps.step("rendering the float64 reference (compiling on the first run)"):
-        view.reference
+        _ = view.reference
     golden = render_view(view, engine=Engine.GOLDEN, compare=True, steps=steps)
     rtl = render_view(view, engine=Engine.RTL, compare=True, steps=steps)
     if not (golden.image == rtl.image).all():

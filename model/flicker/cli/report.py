@@ -31,7 +31,7 @@ def report(
         for c in CONFIGURATIONS.values():
             console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
         return
-    wanted = parse_size(size)
+    wanted = parse_size(size) or (1280, 720)
     names = None if configs is None else [n.strip() for n in configs.split(",")]
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
@@ -46,6 +46,6 @@ def report(
         written = write_report(job, seed, lambda done, total, text: bar.update(task, completed=done, total=total, description=text))
     for verdict in written.verdicts:
         colour = {"yes": "green", "no": "red", "partly": "yellow", "open": "dim"}[verdict.kind]
-        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{verdict.verdict.split(' (')[0].split(', because')[0]}[/{colour}]", soft_wrap=True,
-                      highlight=False)
+        outcome = verdict.verdict.split(" (")[0].split(", because")[0]
+        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{outcome}[/{colour}]", soft_wrap=True, highlight=False)
     console.print(f"{written.page}, {written.summary}; seed {seed}", soft_wrap=True)

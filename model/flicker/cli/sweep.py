@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -62,8 +62,11 @@ def sweep(
 def summary(rows: list[dict]) -> Table:
     """One row per point."""
     table = Table()
-    for name, justify in (("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"),
-                          ("SSIM", "right"), ("FLIP", "right"), ("GE", "right"), ("uJ", "right")):
+    columns: tuple[tuple[str, Literal["left", "right"]], ...] = (
+        ("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"), ("SSIM", "right"), ("FLIP", "right"),
+        ("GE", "right"), ("uJ", "right"),
+    )
+    for name, justify in columns:
         table.add_column(name, justify=justify, no_wrap=True)
 
     def text(value, form: str) -> str:

@@ -108,9 +108,9 @@ def operator(o: Operation) -> Part:
     return part("op", operator_name(o))
 
 
-def _word(value: Form | Precision | str, kind: type) -> str:
+def _word(value: Form | Precision | str, kind: type[Form] | type[Precision]) -> str:
     """Lower-case name of a form or a precision."""
-    name = value.name.lower() if isinstance(value, kind) else str(value).lower()
+    name = value.name.lower() if isinstance(value, (Form, Precision)) else str(value).lower()
     if name not in {m.name.lower() for m in kind}:
         raise FlickerError(f"area: unknown {kind.__name__.lower()} '{name}'; known are {', '.join(m.name.lower() for m in kind)}")
     return name
@@ -126,10 +126,7 @@ def fifo_area(depth: int, width: int = RECORD_BITS) -> float:
     if depth == 0:
         return 0.0
     known = sorted((int(config.split(" x ")[1]), p.ge) for (unit, config), p in parts().items() if unit == "fifo")
-    low, high = known[0], known[1]
-    for low, high in zip(known, known[1:]):
-        if depth <= high[0]:
-            break
+    low, high = next((pair for pair in zip(known, known[1:]) if depth <= pair[1][0]), known[-2:])
     ge = low[1] + (depth - low[0]) * (high[1] - low[1]) / (high[0] - low[0])
     return max(ge, RECORD_BITS * depth * 4.0) * width / RECORD_BITS  # never below its flip-flops
 

@@ -37,10 +37,16 @@ class View:
     ) -> None:
         if scene is None and projected is None:
             raise ValueError("a view needs a scene or its projection")
-        self.camera, self.scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
+        self.camera, self._scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
         if projected is not None:
             self.projected = projected
         self._kept: dict = {}
+
+    @property
+    def scene(self) -> Scene:
+        if self._scene is None:
+            raise ValueError("this view is only a projection")
+        return self._scene
 
     @cached_property
     def projected(self) -> Projected:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -45,7 +46,7 @@ from .claims import (  # noqa: E402
 )
 from .collect import FIFO_SWEPT, ViewResult  # noqa: E402
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 8, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.fonttype": "none", "svg.hashsalt": "flicker",
     "figure.dpi": 110,
 }
@@ -78,8 +79,10 @@ class Figure:
         writer.writerows([_cell(v) for v in row] for row in self.rows)
         files = {f"{self.name}.csv": text.getvalue().encode()}
         if self.canvas is not None:
-            with plt.rc_context(STYLE):
-                self.canvas.get_layout_engine().execute(self.canvas)
+            engine = self.canvas.get_layout_engine()
+            if engine is not None:
+                with plt.rc_context(STYLE):
+                    engine.execute(self.canvas)
             self.canvas.set_layout_engine("none")  # laid out once, not for each format
             for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
                 buffer = io.BytesIO()

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..cost.area import SYNTHESIS
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
@@ -77,7 +79,7 @@ def check(
         names = group("report") if configurations is None else matching(configurations)
     except FlickerError as error:
         raise FlickerError(f"--configs: {error}") from None
-    Camera(size[0], size[1], 1.0, 1.0, (0, 0, 0), ((1, 0, 0), (0, 1, 0), (0, 0, 1)))  # raises for a size out of range
+    Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
     for part in (folder, folder / "figures"):
         check_folder(part)
     Store(store)

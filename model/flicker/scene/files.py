@@ -111,10 +111,9 @@ def _checked(path: Path, means: Any, scales: Any, quats: Any, opacities: Any, sh
     if not good.any():
         reasons = ", ".join(f"{reason}: {n}" for reason, n in rejected.items())
         raise FlickerError(f"{path}: no usable Gaussian ({reasons})")
-    if good.all():
-        good = slice(None)
-    quats = np.asarray(quats, np.float64)[good] / norm[good, None]
-    return Scene(means[good], scales[good], quats, opacities[good], sh[good], path, rejected)
+    kept = slice(None) if good.all() else good
+    quats = np.asarray(quats, np.float64)[kept] / norm[kept, None]
+    return Scene(means[kept], scales[kept], quats, opacities[kept], sh[kept], path, rejected)
 
 
 def _activated(data: gsply.GSData) -> tuple[np.ndarray, ...]:

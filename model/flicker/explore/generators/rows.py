@@ -89,7 +89,7 @@ def root_table(fmt: RowFormat) -> np.ndarray:
     """int64: by |v| in units of 2^-address, r + the constant part of M in units of 2^-fraction, rounded up; ends where |v| > 1."""
     dv, du = errors(fmt)
     one = 1 << fmt.fraction
-    table = []
+    table: list[int] = []
     while True:
         low = (len(table) << (fmt.fraction - fmt.address)) - dv  # smallest |v| that has this address
         if low > one:
@@ -199,7 +199,10 @@ class Rows(MaskGenerator):
 
     fmt: RowFormat
     pixels: bool = True
-    exact = True
+
+    @property
+    def exact(self) -> bool:
+        return True
 
     @property
     def precision(self) -> str:
@@ -232,11 +235,13 @@ def configurations() -> Iterator[Configuration]:
                     continue
                 words = ["rows"] + ["minitile"] * (not pixels) + [fmt.name] * (fmt is not FORMATS[0]) + [kind] * (kind != "subtile")
                 formats = "" if fmt is FORMATS[0] else f", {fmt.fraction} fraction bits, {fmt.address}-bit root table"
-                stage = PixelChannels(form) if pixels else Channels(form)
+                channels = PixelChannels(form) if pixels else Channels(form)
                 yield Configuration(
-                    "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), stage, lists=kind,
+                    "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), channels,
+                    lists=kind,
                 )
     rows = Rows(FORMATS[0])
+    stage: RenderingStage
     yield Configuration("rows-ellipse-64", "the same, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
     for bits in ACCUMULATORS:
         title = f"row intervals, pixel masks, lists by the ellipse, colour accumulators of {bits} fraction bits"
@@ -246,6 +251,9 @@ def configurations() -> Iterator[Configuration]:
         ("lanes-deep", "lanes, FIFO depth 40, two elements a cycle", Lanes(fifo_depth=40, window=3, width=2, accumulator=ACCUMULATOR)),
         ("lanes-64", "64 lanes, FIFO depth 4", Lanes(lanes=64, fifo_depth=4, window=2, accumulator=ACCUMULATOR)),
         ("lanes-fp16", "lanes, FP16 accumulators and their loop", Lanes(window=2, loop=4)),
-        *((f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits)) for bits in ACCUMULATORS if bits != ACCUMULATOR),
+        *(
+            (f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits))
+            for bits in ACCUMULATORS if bits != ACCUMULATOR
+        ),
     ):
         yield Configuration(name, title, "rows", rows, stage, lists="ellipse")

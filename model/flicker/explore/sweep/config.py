@@ -148,7 +148,8 @@ def _first(path: Path, error: ValidationError) -> FlickerError:
     found = error.errors()[0]
     location = tuple(part for part in found["loc"] if not (isinstance(part, str) and ("[" in part or part == "list")))
     if found["type"] == "extra_forbidden":
-        section = {"scenes": SceneSection, "cluster": ClusterSection}.get(str(location[0]) if len(location) > 1 else "", SweepFile)
+        sections: dict[str, type[_Section]] = {"scenes": SceneSection, "cluster": ClusterSection}
+        section = sections.get(str(location[0]) if len(location) > 1 else "", SweepFile)
         close = difflib.get_close_matches(str(location[-1]), section.model_fields, 1)
         hint = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(section.model_fields)}"
         where = _place(location[:-1])

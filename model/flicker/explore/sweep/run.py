@@ -44,7 +44,7 @@ def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dic
 
     from ..evaluate import evaluate
 
-    numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))
+    numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))  # type: ignore[attr-defined]
     worker = get_worker()
     view = points[0].target.load()
     rows = []
