@@ -51,7 +51,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         else:
             shutil.copy(path, site / path.name)
     shutil.copy(BIN / "pytest", copy / ".venv" / "bin" / "pytest")
-    shutil.copy(ROOT / ".venv" / ".installed", copy / ".venv" / ".installed")
+    (copy / ".venv" / ".installed").write_text(f"{ROOT}\n")
     return copy
 
 
