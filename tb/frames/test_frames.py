@@ -1,4 +1,4 @@
-"""Whole frames: the verilated rendering stage (`flk_render_stage` in `flk_render_sim_top`) equals the golden model, pixel for pixel and count for count, and without stalls the cycle
+"""Whole frames: the verilated rendering stage (`flk_render_stage` in `flk_sim_top`) equals the golden model, pixel for pixel and count for count, and without stalls the cycle
 model, in cycles and every counter.
 
 State space: the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and back-pressure;
