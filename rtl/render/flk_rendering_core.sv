@@ -128,7 +128,7 @@ module flk_rendering_core
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       in_valid_i |-> in_masked.elem.eos ? (&in_masked.mask) : (|in_masked.mask))
-  else $error("flk_rendering_core: splat with an empty mask, or token that does not go to all channels");
+  else $error("flk_rendering_core: empty mask, or a token not for all channels");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
