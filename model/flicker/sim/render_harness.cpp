@@ -117,6 +117,7 @@ class Simulation {
     }
     top_->clear_i = 0;
     top_->in_valid_i = 0;
+    top_->mode_i = mode_;  // early enough for the first element not to wait
     std::vector<uint32_t> counters = read_counters();  // it checks that the stage stays empty, too
     for (int k = 0; k < CORES; ++k) {
       const uint32_t counted = counters[k * COUNTERS_PER_CORE + COUNTER_CYCLES];
