@@ -85,6 +85,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+        # Neither mode nor shape of a splat matters without a test.
+        "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
     # What a combinational operator does not use.
     if top in PIPES and parameters.get("Stages", 1) == 0:
