@@ -8,13 +8,14 @@ JOBS   ?= 2
 UNIT   ?=
 CONFIG ?=
 NETLIST ?=
+SLOW   ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test sim lint waves synth formal report clean FORCE
+.PHONY: help setup demo generate test sim lint waves synth formal report clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -35,8 +36,11 @@ FORCE:
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-test: $(STAMP) lint ## lint, all tests, the fast proofs
-	@$(BIN)/python -m pytest -n $(JOBS) tb
+generate: $(STAMP) ## write the generated sources of rtl/ (packages, mask generators, file list)
+	@$(BIN)/python scripts/gen_params.py
+
+test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
+	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]

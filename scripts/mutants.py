@@ -262,7 +262,8 @@ def main() -> int:
     wrong = [o for o in found if o.wrong]
     unexplained = [o for o in found if not o.killer and not o.wrong and not o.mutant.note]
     console.print(
-        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; {len(unexplained)} survivors without a note; {len(wrong)} wrong",
+        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; "
+        f"{len(unexplained)} survivors without a note; {len(wrong)} wrong",
     )
     if args.docs:
         import pages

@@ -75,10 +75,10 @@ def test_proof_without_teeth_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "proofs.toml"
     path.write_text(
         PROOF
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i || !(in_ready_o);")
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i ||;")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i || !(in_ready_o))")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i ||)")
         + MUTANT.format(find="no such text", replace="")
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i;")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i)")
     )
     done = drive("--proofs", path, "--jobs", 1)
     assert done.returncode == 1, done.stdout

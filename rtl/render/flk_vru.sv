@@ -39,6 +39,7 @@ module flk_vru
 ) (
   input  logic              clk_i,
   input  logic              rst_ni,
+  input  logic              clear_i,  // forgets all operations, pixels and what waits to leave
   // Place in the sub-tile, constant: pixel i lies in column 4 col_i + i % 4, row (Pixels / 4) row_i + i / 4.
   input  logic              col_i,
   input  logic [RowW-1:0]   row_i,
@@ -90,6 +91,9 @@ module flk_vru
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      valid_q <= '0;
+      eos_q   <= '0;
+    end else if (clear_i) begin
       valid_q <= '0;
       eos_q   <= '0;
     end else begin
@@ -361,7 +365,7 @@ module flk_vru
     if (!rst_ni) begin
       t_q        <= {Pixels{FP16_ONE[14:0]}};
       finished_q <= '0;
-    end else if (eos_q[BLEND]) begin
+    end else if (clear_i || eos_q[BLEND]) begin
       t_q        <= {Pixels{FP16_ONE[14:0]}};
       finished_q <= '0;
     end else begin
@@ -413,8 +417,8 @@ module flk_vru
       c_q     <= '0;
       blend_q <= '0;
     end else begin
-      blend_q <= {blend_q[LAST-1:BLEND+1], blend};
-      if (eos_q[LAST]) begin
+      blend_q <= clear_i ? '0 : {blend_q[LAST-1:BLEND+1], blend};
+      if (clear_i || eos_q[LAST]) begin
         c_q <= '0;
       end else if (blend_q[LAST]) begin
         for (int unsigned k = 0; k < 3; k++) begin
@@ -435,6 +439,10 @@ module flk_vru
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      busy_q      <= 1'b0;
+      full_q      <= 1'b0;
+      out_index_q <= '0;
+    end else if (clear_i) begin
       busy_q      <= 1'b0;
       full_q      <= 1'b0;
       out_index_q <= '0;

@@ -2,7 +2,7 @@
 
 Units (`arith_harness.sv`, against `flicker.arithmetic.formats` and `flicker.arithmetic.functions`, bit for bit):
   every pair of operands of all formats but FP16; FP16 by special, structured and random pairs
-  (all 2^32 with FLICKER_EXHAUSTIVE=1); conversions and functions: every input, between all formats.
+  (all 2^32 with SLOW=1); conversions and functions: every input, between all formats.
 Model: against numpy's and ml_dtypes' types and a rounding of its own (`arith_bench.nearest`); the float32 carriers of
   the golden model against it; error bounds of the functions against float64.
 Parameter space: the chip's formats and five that it does not use (`arith_bench.FORMATS`). Not covered: other formats,
@@ -11,7 +11,6 @@ Parameter space: the chip's formats and five that it does not use (`arith_bench.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -81,7 +80,7 @@ def test_fp16_pairs(harness: Harness) -> None:
         check_pairs(harness, FP16, kind, a, b)
 
 
-@pytest.mark.skipif(os.environ.get("FLICKER_EXHAUSTIVE") != "1", reason="FLICKER_EXHAUSTIVE=1 runs it: minutes")
+@pytest.mark.slow
 def test_fp16_all_pairs(harness: Harness) -> None:
     every = all_bits(FP16)
     for first in range(0, every.size, 8):

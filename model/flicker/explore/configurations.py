@@ -104,7 +104,7 @@ def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:
     """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs."""
     if config.cat == CatMode.OFF:
         return Configuration(
-            name, "RTL, test off", "baseline", contribution.Untested(config.form),
+            name, "RTL, test off", "baseline", contribution.Untested(config.form, config.mask_generator),
             contribution.Channels(config.form, config.fifo_depth, config.vrus_per_channel),
         )
     return contribution.flicker(config, name, "RTL", fifo_depth=config.fifo_depth, vrus_per_channel=config.vrus_per_channel)

@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ...params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, VRUS_PER_CHANNEL
+from ... import layout
+from ...params import (
+    CHANNELS,
+    FAITHFUL,
+    FIXED_FRAC_BITS,
+    FIXED_INT_BITS,
+    MASK_GENERATORS,
+    MINITILE,
+    PIXELS_PER_VRU,
+    SUBTILE_PIXELS,
+    VRU_COUNTS,
+    VRUS_PER_CHANNEL,
+    CatMode,
+    Form,
+    Precision,
+    RenderConfig,
+)
 
 FORMS = {"conic": 0, "factored": 1}
 PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
-FEATURE_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
+FEATURE_BITS = layout.bits("feature_elem")
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
@@ -17,7 +33,10 @@ COMPOSED: dict[str, list[str]] = {
     "flk_channel": ["flk_fifo", "flk_vru", "flk_stream_arbiter"],
     "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity_pipe"],
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
-    "flk_render_stage": ["flk_ctu", "flk_rendering_core", "flk_perf_counters"],
+    "flk_mask_all": ["flk_pipe_reg"],
+    "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
+    # The wrapper has no logic of its own.
+    "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
 
 
@@ -66,6 +85,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+        # Neither mode nor shape of a splat matters without a test.
+        "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
     # What a combinational operator does not use.
     if top in PIPES and parameters.get("Stages", 1) == 0:
@@ -125,14 +146,16 @@ def _cells() -> list[Unit]:
 
 
 def _stage() -> list[Unit]:
-    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_perf_counters")]
+    units += [unit("flk_fifo_monitor", MaskBits=CHANNELS), unit("flk_fifo_monitor", "masks of pixels", MaskBits=SUBTILE_PIXELS)]
+    units += [unit("flk_stage_control"), unit("flk_mask_all", MaskBits=CHANNELS)]
     for form, f in FORMS.items():
         for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
             pixels = MINITILE * MINITILE // vrus
             units += [
                 unit("flk_vru", vru_config(form, pixels), Form=f, Pixels=pixels),
                 unit("flk_channel", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MiniTile=0),
-                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus),
+                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MaskBits=CHANNELS),
             ]
         for precision, p in PRECISIONS.items():
             config = f"{form} {precision}"
@@ -140,10 +163,13 @@ def _stage() -> list[Unit]:
                 unit("flk_prtu", config, Form=f, Precision=p, Cols=2, Rows=2),
                 unit("flk_prtu", f"{config}, 1 pixel", Form=f, Precision=p, Cols=1, Rows=1),
                 unit("flk_ctu", config, **ctu_parameters(f, p)),
-                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0, VrusPerChannel=VRUS_PER_CHANNEL),
+                unit("flk_render_stage", config, **RenderConfig(Form(f), Precision(p)).rtl_parameters()),
             ]
     units.append(unit("flk_ctu", "faithful", **ctu_parameters(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth)))
     units.append(unit("flk_render_stage", "faithful", **FAITHFUL.rtl_parameters()))
+    for vrus, name in ((2, "no CTU"), (4, "no CTU, 64 VRUs")):
+        untested = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
+        units.append(unit("flk_render_stage", name, **untested.rtl_parameters()))
     return units
 
 
