@@ -4,10 +4,12 @@ common/flk_param_pkg.sv
 common/flk_pkg.sv
 common/flk_table_pkg.sv
 common/flk_delay.sv
+common/flk_lzc.sv
 common/flk_fp_add_pipe.sv
 common/flk_fp_add.sv
 common/flk_fp_mul_pipe.sv
 common/flk_fp_mul.sv
+common/flk_weight.sv
 common/flk_fp_convert.sv
 common/flk_fp_cmp.sv
 common/flk_fp_to_fixed.sv
@@ -24,6 +26,9 @@ ctu/flk_prtu.sv
 ctu/flk_mmu.sv
 ctu/flk_ctu_controller.sv
 ctu/flk_ctu.sv
+render/flk_blend_pipe.sv
+render/flk_pixel_state.sv
+render/flk_pixel_drain.sv
 render/flk_vru.sv
 render/flk_channel.sv
 render/flk_fifo_monitor.sv

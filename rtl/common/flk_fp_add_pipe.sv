@@ -111,17 +111,16 @@ module flk_fp_add_pipe #(
                              + {aligned_q.sub, aligned_q.addend, aligned_q.sub};
 
   if (Cancel) begin : gen_zeros
-    logic [SumBits-1:0] marked;
+    logic [AddBits-1:0] marked;
     // Normalisation ends where the leading bit has the smallest exponent: what remains is subnormal.
-    assign marked = sum | ({1'b1, AddBits'(0)} >> aligned_q.exp);
-    always_comb begin
-      zeros = ShiftBits'(AddBits);
-      for (int unsigned i = 0; i < SumBits; i++) begin
-        if (marked[i]) begin
-          zeros = ShiftBits'(AddBits - i);
-        end
-      end
-    end
+    // The lowest bit does not matter: where none above it is set, it is the leading one or the sum is zero.
+    assign marked = sum[SumBits-1:1] | ({1'b1, (AddBits - 1)'(0)} >> aligned_q.exp);
+    flk_lzc #(
+      .Width(AddBits)
+    ) i_zeros (
+      .value_i(marked),
+      .count_o(zeros)
+    );
   end else begin : gen_carry
     assign zeros = ShiftBits'(!sum[SumBits-1]);
   end

@@ -151,6 +151,7 @@ module flk_channel
     ) i_vru (
       .clk_i,
       .rst_ni,
+      .clear_i      (1'b0),
       .col_i        (1'(MiniTile % 2)),
       .row_i        ((5 - PixelW)'((MiniTile / 2) * VrusPerChannel + v)),
       .op_valid_i   (issue || issue_eos),

@@ -12,35 +12,29 @@ from minitile_model import lists, pixel_of
 
 from flicker.formats import FP16
 from flicker.golden.vru import PAIR_FIELDS, Pixels
-from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, FP16_SUM_STAGES, Form
+from flicker.params import ALPHA_MIN_BITS, EXP_STAGES, FP16_ADD_STAGES, FP16_MUL_STAGES, Form, weight_latency
 
 # Cycles after the operation at which a stage's registers are loaded (rtl/render/flk_vru.sv).
-ADD, SUM, MUL = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
+ADD, MUL = FP16_ADD_STAGES, FP16_MUL_STAGES
 
 
 def registers(form: Form) -> dict[str, tuple[str, int]]:
     """Register that holds a value of the model (PAIR_FIELDS), and the cycles after the operation at which it does."""
     diff = 1 + ADD
     product = diff + MUL
+    weight = diff + weight_latency(form, wide=True)
     if form == Form.CONIC:
         scaled = product + MUL
-        weight = scaled + 2 * ADD
-        own = {
-            "a0": ("gen_conic.sx_q", scaled), "a1": ("gen_conic.sy_q", scaled), "a2": ("gen_conic.xy_q", product),
-            "a3": ("gen_conic.t_q", scaled), "a4": ("gen_conic.h_q", scaled + ADD),
-        }
+        own = {"a0": ("sx_q", scaled), "a1": ("sy_q", scaled), "a2": ("xy_q", product), "a3": ("t_q", scaled), "a4": ("h_q", scaled + ADD)}
     else:
         u = product + ADD
-        weight = u + MUL + SUM
-        own = {
-            "a0": ("gen_factored.p_q", product), "a1": ("gen_factored.q_q", product), "a2": ("gen_factored.v_q", product),
-            "a3": ("gen_factored.u_q", u), "a4": ("gen_factored.uu_q", u + MUL),
-        }
+        own = {"a0": ("p_q", product), "a1": ("q_q", product), "a2": ("v_q", product), "a3": ("u_q", u), "a4": ("uu_q", u + MUL)}
+    own = {name: (f"i_weight.gen_{form.name.lower()}.{path}", delay) for name, (path, delay) in own.items()}
     power = weight + EXP_STAGES[form]
     alpha = power + MUL + 1
     return own | {
-        "dx": ("dx_q", diff), "dy": ("dy_q", diff), "weight": ("weight_q", weight), "g": ("g_q", power),
-        "alpha": ("alpha_q", alpha), "oma": ("oma_q", alpha + ADD), "w": ("w_q", alpha + ADD + MUL),
+        "dx": ("dx_q", diff), "dy": ("dy_q", diff), "weight": ("weight_q", weight), "g": ("i_blend.g_q", power),
+        "alpha": ("i_blend.alpha_q", alpha), "oma": ("i_blend.oma_q", alpha + ADD), "w": ("i_blend.w_q", alpha + ADD + MUL),
     }
 
 
@@ -68,6 +62,7 @@ async def every_stage(dut):
     downstream = Stream(dut, "out", ("index", "pixel"))
     StreamSink(downstream, bench.stall(settings["stall"]))
     dut.col_i.value, dut.row_i.value = COL, ROW
+    dut.clear_i.value = 0
     dut.op_valid_i.value = 0
     dut.op_eos_i.value = 0
     got: list[tuple] = []

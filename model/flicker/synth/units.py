@@ -60,6 +60,7 @@ def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, 
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
     factored = parameters.get("Form", 1) == 1
+    width = 1 + parameters.get("ExpBits", 5) + parameters.get("ManBits", 10)
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
         "flk_log_opacity_pipe": ["opacity_i[15]"],
@@ -72,7 +73,9 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         bits = [*bits, "clk_i[0]", "en_i[0]"]
     if factored:  # v is only squared: the sign of l2 does not matter
         quad = 16 if parameters.get("Precision", 1) == 0 else 8
-        bits = bits + {"flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_vru": ["op_feature_i[79]"]}.get(top, [])
+        bits = bits + {
+            "flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_weight": [f"shape_i[{3 * width - 1}]"], "flk_vru": ["op_feature_i[79]"],
+        }.get(top, [])
     return bits
 
 
