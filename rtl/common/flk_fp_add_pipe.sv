@@ -111,14 +111,16 @@ module flk_fp_add_pipe #(
                              + {aligned_q.sub, aligned_q.addend, aligned_q.sub};
 
   if (Cancel) begin : gen_zeros
-    logic [AddBits-1:0] marked;
+    logic [SumBits-1:0] marked;
+    logic unused_marked;
     // Normalisation ends where the leading bit has the smallest exponent: what remains is subnormal.
+    assign marked = sum | ({1'b1, AddBits'(0)} >> aligned_q.exp);
     // The lowest bit does not matter: where none above it is set, it is the leading one or the sum is zero.
-    assign marked = sum[SumBits-1:1] | ({1'b1, (AddBits - 1)'(0)} >> aligned_q.exp);
+    assign unused_marked = marked[0];
     flk_lzc #(
       .Width(AddBits)
     ) i_zeros (
-      .value_i(marked),
+      .value_i(marked[SumBits-1:1]),
       .count_o(zeros)
     );
   end else begin : gen_carry

@@ -248,7 +248,7 @@ async def aborts(dut):
     await bench.reset()
     model = model_of(settings)
     cut = {"pixels out": 0, "token inside": 0, "operations inside": 0}
-    for _ in range(24):
+    for _ in range(40):
         # Up to two sub-tiles and a part of one, then some cycles for the pipeline to empty, or not.
         tokens = rng.randrange(3)
         for _ in range(tokens):
@@ -261,6 +261,11 @@ async def aborts(dut):
             await driver.cycle(cover, pixel % size)
         for _ in range(rng.choice((0, 0, rng.randrange(40)))):
             await driver.cycle()
+        if tokens and rng.random() < 0.3:  # until the pixels begin to leave
+            for _ in range(60):
+                if int(dut.out_valid_o.value):
+                    break
+                await driver.cycle()
         cut["pixels out"] += int(dut.out_valid_o.value)
         cut["token inside"] += not int(dut.eos_ready_o.value)
         cut["operations inside"] += int(dut.blend_valid_o.value)

@@ -79,19 +79,22 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     return bits
 
 
+# Parameters of the arithmetic units by format.
+FORMATS = {
+    "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
+    "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
+    "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
+}
+
+
 def _arithmetic() -> list[Unit]:
-    formats = {
-        "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
-        "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
-        "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
-    }
     units = []
     for top in ("flk_fp_add", "flk_fp_mul"):
-        units += [unit(top, name, **parameters) for name, parameters in formats.items()]
-    for name, parameters in formats.items():
+        units += [unit(top, name, **parameters) for name, parameters in FORMATS.items()]
+    for name, parameters in FORMATS.items():
         units.append(unit("flk_fp_cmp", name, **{key: parameters[key] for key in ("ExpBits", "ManBits", "Fn")}))
     for source, target in (("fp16", "e4m3"), ("fp16", "e5m2"), ("e4m3", "fp16")):
-        src, dst = formats[source], formats[target]
+        src, dst = FORMATS[source], FORMATS[target]
         units.append(
             unit(
                 "flk_fp_convert", f"{source} to {target}", SrcExpBits=src["ExpBits"], SrcManBits=src["ManBits"],
@@ -107,7 +110,8 @@ def _arithmetic() -> list[Unit]:
         units.append(unit("flk_exp_neg", name, Base2=base))
     for base, name in ((1, "log2"), (0, "ln")):
         for fmt in ("fp16", "e4m3"):
-            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **FORMATS[fmt]))
+    units.append(unit("flk_lzc", "14 bit", Width=14))  # of the FP16 adder
     for top, stages in PIPES.items():
         units.append(unit(top, f"fp16, {stages} stages", Stages=stages))
     return units
@@ -129,7 +133,13 @@ def _cells() -> list[Unit]:
 
 def _stage() -> list[Unit]:
     units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    for pixels in (MINITILE * MINITILE // vrus for vrus in VRU_COUNTS):
+        units += [unit("flk_pixel_state", f"{pixels} pixels", Pixels=pixels), unit("flk_pixel_drain", f"{pixels} pixels", Pixels=pixels)]
     for form, f in FORMS.items():
+        for fmt, (columns, rows) in (("fp16", (1, 1)), ("fp16", (2, 2)), ("e4m3", (2, 2))):
+            size = "1 pixel" if columns == rows == 1 else f"{columns} x {rows}"
+            units.append(unit("flk_weight", f"{form} {fmt}, {size}", Form=f, Cols=columns, Rows=rows, **FORMATS[fmt]))
+        units.append(unit("flk_blend_pipe", form, Form=f))
         for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
             pixels = MINITILE * MINITILE // vrus
             units += [
