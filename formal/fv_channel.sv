@@ -209,7 +209,7 @@ module fv_channel
     return sum >= SlotBits'(Depth) ? sum - SlotBits'(Depth) : sum;
   endfunction
 
-  logic [63:0] eos;  // tokens in the VRUs, youngest stage first
+  logic [63:0] eos, other_eos;  // tokens in the VRUs, youngest stage first
   logic [1:0] busy, full;
   logic [1:0][2:0] index;
   logic outstanding;  // a token has left the FIFO, its pixels have not all left
@@ -218,10 +218,12 @@ module fv_channel
   logic early_token;  // one of them at or before the chosen element
   logic [1:0] view;  // data of the chosen token
 
-  assign eos          = 64'(dut.gen_vru[0].i_vru.eos_q);
-  assign busy         = {dut.gen_vru[1].i_vru.busy_q, dut.gen_vru[0].i_vru.busy_q};
-  assign full         = {dut.gen_vru[1].i_vru.full_q, dut.gen_vru[0].i_vru.full_q};
-  assign index        = {dut.gen_vru[1].i_vru.out_index_q, dut.gen_vru[0].i_vru.out_index_q};
+  assign eos          = 64'({dut.gen_vru[0].i_vru.i_state.eos_q, dut.gen_vru[0].i_vru.eos_q});
+  assign other_eos    = 64'({dut.gen_vru[1].i_vru.i_state.eos_q, dut.gen_vru[1].i_vru.eos_q});
+  assign busy         = {dut.gen_vru[1].i_vru.i_drain.busy_q, dut.gen_vru[0].i_vru.i_drain.busy_q};
+  assign full         = {dut.gen_vru[1].i_vru.i_drain.full_q, dut.gen_vru[0].i_vru.i_drain.full_q};
+  assign index        = {dut.gen_vru[1].i_vru.i_drain.out_index_q,
+                         dut.gen_vru[0].i_vru.i_drain.out_index_q};
   assign outstanding  = busy != '0;
   assign before_blend = (eos & ((64'd1 << dut.gen_vru[0].i_vru.BLEND) - 64'd1)) != '0;
 
@@ -296,7 +298,7 @@ module fv_channel
       l_fifo: assert (SlotBits'(dut.i_fifo.read_q) < SlotBits'(Depth)
                            && SlotBits'(dut.i_fifo.write_q) == slot(elems)
                            && CountBits'(dut.i_fifo.usage_q) == elems);
-      l_step: assert (eos == 64'(dut.gen_vru[1].i_vru.eos_q));
+      l_step: assert (eos == other_eos);
       l_one: assert ((eos & (eos - 1'b1)) == '0 && (eos == '0 || full == '0));
       l_blend: assert (dut.eos_in_vru_q == before_blend);
       l_tokens: assert (CountBits'(dut.tokens_q) == queued + CountBits'(before_blend));

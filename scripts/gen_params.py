@@ -72,6 +72,8 @@ def param_package() -> str:
     const("FIXED_INT_BITS", p.FIXED_INT_BITS, "of a mean in PRECISION_FIXED")
     const("FIXED_FRAC_BITS", p.FIXED_FRAC_BITS)
     table("EXP_STAGES", [p.EXP_STAGES[form] for form in p.Form], "by form")
+    for name, function in (("WEIGHT_SHAPE_DELAY", p.weight_shape_delay), ("WEIGHT_LATENCY", p.weight_latency)):
+        table(name, [[function(form, wide) for wide in (False, True)] for form in p.Form], "by form, and whether the format has more than 8 bits")
     table("PRTU_MEAN_DELAY", [p.prtu_mean_delay(precision) for precision in p.Precision], "by precision")
     table("PRTU_SHAPE_DELAY", [p.prtu_shape_delay(precision) for precision in p.Precision], "by precision")
     rows = [[p.prtu_latency(form, precision) for precision in p.Precision] for form in p.Form]

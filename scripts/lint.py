@@ -40,6 +40,10 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_ctu": [{"Form": 0, "Precision": 1, "CtuFifoDepth": 16}, {"Precision": 0}, {"Precision": 2}],
     "flk_fp_add_pipe": [{"Stages": 0}, {"Stages": 2, "Cancel": 0}],
     "flk_fp_mul_pipe": [{"Stages": 0}],
+    "flk_lzc": [{"Width": 1}, {"Width": 15}],
+    "flk_weight": [{"Form": 0}, {"Form": 0, "Cols": 2, "Rows": 2, "ExpBits": 4, "ManBits": 3, "Fn": 1, "Saturate": 1}],
+    "flk_blend_pipe": [{"Form": 0}],
+    "flk_pixel_state": [{"Pixels": 4}],
     "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
     "flk_bitonic_sorter": [
         {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},

@@ -77,6 +77,22 @@ LOG_STAGES = 3
 EXP_STAGES = {Form.CONIC: 3, Form.FACTORED: 2}
 
 
+def weight_stages(wide: bool) -> tuple[int, int, int]:
+    """Registers of the operators of `flk_weight` (addition, addition that cannot cancel, multiplication): formats of more than 8 bits (`wide`), or up to 8."""
+    return (FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES) if wide else (FP8_ADD_STAGES, FP8_SUM_STAGES, FP8_MUL_STAGES)
+
+
+def weight_shape_delay(form: Form, wide: bool) -> int:
+    """Cycles after the differences at which `flk_weight` takes the shape numbers: the conic form multiplies the differences first."""
+    return weight_stages(wide)[2] if form == Form.CONIC else 0
+
+
+def weight_latency(form: Form, wide: bool) -> int:
+    """Cycles from the differences to the weight (rtl/common/flk_weight.sv)."""
+    add, sum_, mul = weight_stages(wide)
+    return 2 * mul + 2 * add if form == Form.CONIC else 2 * mul + add + sum_
+
+
 def prtu_mean_delay(precision: Precision) -> int:
     """Cycles after the coordinates at which a PRTU takes the mean: an FP16 subtraction begins with a register for the coordinates."""
     return int(precision in (Precision.FP16, Precision.MIXED))
@@ -94,12 +110,7 @@ def prtu_shape_delay(precision: Precision) -> int:
 
 def prtu_latency(form: Form, precision: Precision) -> int:
     """Cycles from a PRTU's coordinates to its answer; the threshold is taken one cycle before the answer."""
-    wide = precision == Precision.FP16
-    add = FP16_ADD_STAGES if wide else FP8_ADD_STAGES
-    sum_ = FP16_SUM_STAGES if wide else FP8_SUM_STAGES
-    mul = FP16_MUL_STAGES if wide else FP8_MUL_STAGES
-    weight = 2 * mul + 2 * add if form == Form.CONIC else 2 * mul + add + sum_
-    return prtu_shape_delay(precision) + weight + 1
+    return prtu_shape_delay(precision) + weight_latency(form, precision == Precision.FP16) + 1
 
 ALPHA_MIN = 1.0 / 255.0
 ALPHA_MAX = 0.99
@@ -114,7 +125,7 @@ AUTO_DECAY_SHIFT = 2
 def vru_stages(form: Form) -> tuple[int, int]:
     """Cycles from a VRU's operation to the blend of transmittance and to that of colour (rtl/render/flk_vru.sv)."""
     add, sum_, mul = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
-    weight = 1 + add + mul + (mul + 2 * add if form == Form.CONIC else add + mul + sum_)
+    weight = 1 + add + weight_latency(form, True)
     blend = weight + EXP_STAGES[form] + mul + 1 + add + mul
     return blend, blend + mul + sum_
 

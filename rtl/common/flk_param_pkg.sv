@@ -50,6 +50,8 @@ package flk_param_pkg;
   localparam int unsigned FIXED_INT_BITS = 9;  // of a mean in PRECISION_FIXED
   localparam int unsigned FIXED_FRAC_BITS = 8;
   localparam logic [1:0][7:0] EXP_STAGES = {8'd2, 8'd3};  // by form
+  localparam logic [1:0][1:0][7:0] WEIGHT_SHAPE_DELAY = {{8'd0, 8'd0}, {8'd2, 8'd1}};  // by form, and whether the format has more than 8 bits
+  localparam logic [1:0][1:0][7:0] WEIGHT_LATENCY = {{8'd9, 8'd5}, {8'd10, 8'd6}};  // by form, and whether the format has more than 8 bits
   localparam logic [3:0][7:0] PRTU_MEAN_DELAY = {8'd0, 8'd0, 8'd1, 8'd1};  // by precision
   localparam logic [3:0][7:0] PRTU_SHAPE_DELAY = {8'd3, 8'd3, 8'd5, 8'd4};  // by precision
   localparam logic [1:0][3:0][7:0] PRTU_LATENCY = {{8'd9, 8'd9, 8'd11, 8'd14}, {8'd10, 8'd10, 8'd12, 8'd15}};  // by form and precision

@@ -151,7 +151,6 @@ module flk_ctu
   // Leader pixels of the two rectangles: columns and rows.
   logic [1:0][2:0] a_x, a_y, b_x, b_y;
   logic [3:0] pass_a, pass_b;
-  logic [3:0][QuadBits-1:0] unused_weight_a, unused_weight_b;
 
   if (MEAN_DELAY == 0) begin : gen_mean
     assign mean_x = in_elem_i.splat.feature.mean_x;
@@ -228,8 +227,7 @@ module flk_ctu
     .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
-    .pass_o     (pass_a),
-    .weight_o   (unused_weight_a)
+    .pass_o     (pass_a)
   );
 
   flk_prtu #(
@@ -244,8 +242,7 @@ module flk_ctu
     .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
-    .pass_o     (pass_b),
-    .weight_o   (unused_weight_b)
+    .pass_o     (pass_b)
   );
 
   flk_mmu i_mmu (

@@ -61,8 +61,11 @@ def random(stream: int) -> np.random.Generator:
 
 
 def check_pairs(harness: Harness, fmt: FloatFormat, kind: str, a: np.ndarray, b: np.ndarray) -> None:
-    """Adder, multiplier and comparator of a format against the model."""
+    """Adder, multiplier and comparator of a format against the model; the adder without cancellation where both signs are equal."""
     got = harness.pairs(fmt, a, b)
+    like = (a ^ b) & fmt.sign_bit == 0
+    x, y = a[like], b[like]
+    assert_same(f"{fmt.name} add, Cancel=0, {kind}", fmt, (x, y), got["like"][like], fp_add(fmt, x, y))
     for name, operation in OPERATIONS.items():
         assert_same(f"{fmt.name} {name}, {kind}", fmt, (a, b), got[name], operation(fmt, a, b))
 

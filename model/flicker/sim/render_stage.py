@@ -24,8 +24,9 @@ CHUNK_CYCLES = 5000  # cycles between two calls of the progress function
 
 class _Frame(ctypes.Structure):
     _fields_ = [
-        (name, ctypes.c_void_p) for name in ("element", "start", "order", "core_start")
-    ] + [("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p)]
+        ("element", ctypes.c_void_p), ("start", ctypes.c_void_p), ("order", ctypes.c_void_p), ("core_start", ctypes.c_void_p),
+        ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p),
+    ]
 
 
 @dataclass

@@ -79,6 +79,7 @@ def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, 
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
     factored = parameters.get("Form", 1) == 1
+    width = 1 + parameters.get("ExpBits", 5) + parameters.get("ManBits", 10)
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
         "flk_log_opacity_pipe": ["opacity_i[15]"],
@@ -93,23 +94,28 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         bits = [*bits, "clk_i[0]", "en_i[0]"]
     if factored:  # v is only squared: the sign of l2 does not matter
         quad = 16 if parameters.get("Precision", 1) == 0 else 8
-        bits = bits + {"flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_vru": ["op_feature_i[79]"]}.get(top, [])
+        bits = bits + {
+            "flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_weight": [f"shape_i[{3 * width - 1}]"], "flk_vru": ["op_feature_i[79]"],
+        }.get(top, [])
     return bits
 
 
+# Parameters of the arithmetic units by format.
+FORMATS = {
+    "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
+    "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
+    "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
+}
+
+
 def _arithmetic() -> list[Unit]:
-    formats = {
-        "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
-        "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
-        "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
-    }
     units = []
     for top in ("flk_fp_add", "flk_fp_mul"):
-        units += [unit(top, name, **parameters) for name, parameters in formats.items()]
-    for name, parameters in formats.items():
+        units += [unit(top, name, **parameters) for name, parameters in FORMATS.items()]
+    for name, parameters in FORMATS.items():
         units.append(unit("flk_fp_cmp", name, **{key: parameters[key] for key in ("ExpBits", "ManBits", "Fn")}))
     for source, target in (("fp16", "e4m3"), ("fp16", "e5m2"), ("e4m3", "fp16")):
-        src, dst = formats[source], formats[target]
+        src, dst = FORMATS[source], FORMATS[target]
         units.append(
             unit(
                 "flk_fp_convert", f"{source} to {target}", SrcExpBits=src["ExpBits"], SrcManBits=src["ManBits"],
@@ -125,7 +131,8 @@ def _arithmetic() -> list[Unit]:
         units.append(unit("flk_exp_neg", name, Base2=base))
     for base, name in ((1, "log2"), (0, "ln")):
         for fmt in ("fp16", "e4m3"):
-            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **FORMATS[fmt]))
+    units.append(unit("flk_lzc", "14 bit", Width=14))  # of the FP16 adder
     for top, stages in PIPES.items():
         units.append(unit(top, f"fp16, {stages} stages", Stages=stages))
     return units
@@ -149,7 +156,13 @@ def _stage() -> list[Unit]:
     units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_perf_counters")]
     units += [unit("flk_fifo_monitor", MaskBits=CHANNELS), unit("flk_fifo_monitor", "masks of pixels", MaskBits=SUBTILE_PIXELS)]
     units += [unit("flk_stage_control"), unit("flk_mask_all", MaskBits=CHANNELS)]
+    for pixels in (MINITILE * MINITILE // vrus for vrus in VRU_COUNTS):
+        units += [unit("flk_pixel_state", f"{pixels} pixels", Pixels=pixels), unit("flk_pixel_drain", f"{pixels} pixels", Pixels=pixels)]
     for form, f in FORMS.items():
+        for fmt, (columns, rows) in (("fp16", (1, 1)), ("fp16", (2, 2)), ("e4m3", (2, 2))):
+            size = "1 pixel" if columns == rows == 1 else f"{columns} x {rows}"
+            units.append(unit("flk_weight", f"{form} {fmt}, {size}", Form=f, Cols=columns, Rows=rows, **FORMATS[fmt]))
+        units.append(unit("flk_blend_pipe", form, Form=f))
         for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
             pixels = MINITILE * MINITILE // vrus
             units += [
