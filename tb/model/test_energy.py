@@ -6,7 +6,6 @@ That area and energy are right in silicon is not covered; one operator is held a
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,18 +21,6 @@ from flicker.explore.evaluate import evaluate
 from flicker.explore.machine import MaskGenerator
 from flicker.front.view import View
 from flicker.params import CORES
-
-
-@pytest.fixture(autouse=True)
-def committed_table(monkeypatch):
-    """The package's own table, whatever `make synth` has left."""
-    monkeypatch.setattr(area, "SYNTHESIS", Path("/nonexistent"))
-    for function in (area.parts, area.overhead):
-        function.cache_clear()
-    yield
-    monkeypatch.undo()
-    for function in (area.parts, area.overhead):
-        function.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -97,16 +84,6 @@ def test_bad_area_arguments():
     ):
         with pytest.raises(FlickerError, match=message):
             make()
-
-
-def test_synthesis_comes_first(tmp_path, monkeypatch):
-    path = tmp_path / "area.csv"
-    path.write_text("unit,config,ge,ge_seq,ge_comb,mem_bits,ff,fo4\nvru,conic,1000.0,1,1,0,7,50\n")
-    old = part("vru", "conic")
-    monkeypatch.setattr(area, "SYNTHESIS", path)
-    area.parts.cache_clear()
-    new = part("vru", "conic")
-    assert (new.ge, new.ff, new.load) == (1000.0, 7, old.load) and new.ge != old.ge
 
 
 # ---- energy -------------------------------------------------------------------------------------

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..cost.area import SYNTHESIS
+from ..cost.area import TABLE, parts
+from ..cost.stamp import stamp_of
 from ..scene.camera import Camera
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
@@ -19,7 +20,7 @@ from ..explore.points import SUFFIXES, SceneFile, Target
 from ..front.view import DEMO
 from ..explore.stability.run import Point, Stability, run_stability
 from ..explore.stability.write import check_folder
-from .claims import Verdict, all_verdicts, read_areas
+from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import own_figures, paper_figures, stability_table
 from .page import page
@@ -105,7 +106,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     progress(1, 1, "stability suite")
     stability = _stability(store, seed)
     progress(1, 1, "figures")
-    areas = read_areas(SYNTHESIS)
+    areas = {key: part.ge for key, part in parts().items()}
     verdicts = all_verdicts(views, areas)
     paper = paper_figures(views, areas)
     chart, heats = own_figures(views)
@@ -115,7 +116,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     about = {
         "views": ", ".join(v.target.title for v in views), "size": f"{job.size[0]}x{job.size[1]}", "configurations": str(len(job.configurations)),
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
-        "code": code_digest()[:16], "areas": "build/synth/area.csv" if areas else "the table of the package (make synth has not run)",
+        "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }
     text = page(views, verdicts, paper, chart, heats, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]
