@@ -14,6 +14,7 @@ from flicker.toolchain import ROOT
 
 END = "<!-- end -->"
 # Any comment that names the command is a mark; what does not read on as one is an error, not text.
+END_LINE = re.compile(f"^{END}$", re.M)
 MARK = re.compile(r"^<!-- make docs PART=(?P<rest>.*?) ?-->$", re.M)
 
 Place = tuple[str, str]  # part, place
@@ -34,11 +35,11 @@ def _pieces(text: str, page: Path) -> list[tuple[Place, int, int]]:
     found = []
     for match in MARK.finditer(text):
         words = match["rest"].split()
-        end = text.find(END, match.end())
+        end = END_LINE.search(text, match.end())
         following = MARK.search(text, match.end())
-        if not 1 <= len(words) <= 2 or end < 0 or (following is not None and following.start() < end):
+        if not 1 <= len(words) <= 2 or end is None or (following is not None and following.start() < end.start()):
             raise FlickerError(f"{page}: {match[0]}: must name a part and at most a place, and end with {END}")
-        found.append(((words[0], words[1] if len(words) == 2 else ""), match.end() + 1, end))
+        found.append(((words[0], words[1] if len(words) == 2 else ""), match.end() + 1, end.start()))
     return found
 
 

@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 
 from flicker import markdown
 from flicker.chip import constants
-import chip_tables as tables
 from flicker.chip.clusters import build_clusters, cull, morton_order
 from flicker.cli.main import app
 from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, simulate
@@ -252,9 +251,5 @@ def test_command(tmp_path):
         assert isinstance(failed.exception, FlickerError) and text in str(failed.exception)
 
 
-def test_tables_fill_their_places():
-    text = "a\n<!-- one -->\nold\n<!-- end -->\nb\n"
-    assert tables.fill(text, {"one": "new"}) == "a\n<!-- one -->\nnew\n<!-- end -->\nb\n"
-    with pytest.raises(FlickerError, match="two"):
-        tables.fill("<!-- two -->\n<!-- end -->", {})
+def test_tables():
     assert markdown.table(("a", "b"), [("1", "2")], numbers=True) == "| a | b |\n| --- | ---: |\n| 1 | 2 |"

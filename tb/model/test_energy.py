@@ -68,7 +68,7 @@ def test_stage_without_generator_and_with_more_vrus():
 
 
 def test_generators():
-    """Every method's generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
+    """Every generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
     for c in CONFIGURATIONS.values():
         assert (c.generator.area() > 0) == bool(c.generator.operations.per_element), c.name
     factored, conic = (generator_area(get_configuration(f"flicker-dense-fp16-{form}").generator.operations) for form in ("factored", "conic"))
