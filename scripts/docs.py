@@ -18,12 +18,26 @@ from dataclasses import dataclass
 
 import pages
 from doc_parts import (
-    areas, chip, configurations, energy, exploration, formal, frames, parameters, pictures, quality, speed, stability, subnormals, synthesis,
+    areas,
+    chip,
+    configurations,
+    energy,
+    exploration,
+    formal,
+    frames,
+    parameters,
+    pictures,
+    quality,
+    speed,
+    stability,
+    subnormals,
+    synthesis,
 )
 from doc_parts.common import Say, scenes_missing
+from rich.console import Console
+
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
-from rich.console import Console
 
 
 def nothing_missing() -> str | None:

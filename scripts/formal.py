@@ -28,11 +28,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from flicker import toolchain
-from flicker.errors import FlickerError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from flicker import toolchain
+from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 FORMAL = ROOT / "formal"

@@ -13,14 +13,16 @@ import sys
 import time
 from pathlib import Path
 
-from flicker.errors import FlickerError
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
 from flicker.cost.stamp import LIBERTY
 from flicker.cost.synth import report
 from flicker.cost.synth.run import FOLDER, Runner
 from flicker.cost.synth.units import all_units
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -12,6 +12,7 @@ import docs
 import pages
 import pytest
 from doc_parts import areas, frames
+
 from flicker.cost import stamp
 from flicker.cost.area import TABLE, parts
 from flicker.errors import FlickerError

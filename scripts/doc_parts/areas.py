@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flicker import markdown
-from flicker.cost.area import TABLE, ctu_area, format_bits, generator_area, operator_name, part, parts, stage_parts
+from flicker.cost.area import TABLE, ctu_area, format_bits, generator_area, operator_name, part, parts
 from flicker.cost.energy import clock_pj, constant_table, ctu_pj, dram_pj, fifo_pj, generator_pj, sram_pj, switching_pj, vru_pj
 from flicker.cost.operations import Op, Operation
 from flicker.cost.stamp import LIBERTY, rtl_stamp, stamp_of
@@ -286,9 +286,11 @@ def save(say: Say) -> str:
 
 # ---- tables -------------------------------------------------------------------------------------
 
-# Of the RTL, of stages without a test, and of what is estimated; title and parts.
-STAGES = ("flicker", "flicker-smooth-mixed-factored", "flicker-smooth-fp16-factored", "faithful", "no-ctu-32", "no-ctu-64", "exact", "exact-e4m3", "rows", "lanes",
-          "lanes-deep", "lanes-64")
+# Of the RTL, of stages without a test, and of what is estimated.
+STAGES = (
+    "flicker", "flicker-smooth-mixed-factored", "flicker-smooth-fp16-factored", "faithful", "no-ctu-32", "no-ctu-64", "exact", "exact-e4m3", "rows", "lanes",
+    "lanes-deep", "lanes-64",
+)
 
 
 def stage_table() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from fnmatch import fnmatchcase
 
 from flicker import markdown
 from flicker.explore.configurations import CONFIGURATIONS, GROUPS, group
@@ -19,10 +20,8 @@ def tables(say: Say) -> dict[str, str]:
 
 def configuration_table() -> str:
     """A row for every configuration but the modes and formats of the contribution test, which are one row a form."""
-    from fnmatch import fnmatchcase
-
     rows = []
-    seen = defaultdict(int)
+    seen: dict[str, int] = defaultdict(int)
     for name, configuration in CONFIGURATIONS.items():
         pattern = next((pattern for pattern in FAMILIES if fnmatchcase(name, pattern)), None)
         if pattern:
@@ -30,7 +29,8 @@ def configuration_table() -> str:
             if seen[pattern] > 1:
                 continue
             count = sum(fnmatchcase(other, pattern) for other in CONFIGURATIONS)
-            title, shown = f"FLICKER: {count} of every mode and format, {configuration.form.name.lower()}", pattern.replace("*", "MODE", 1).replace("*", "FORMAT", 1)
+            title = f"FLICKER: {count} of every mode and format, {configuration.form.name.lower()}"
+            shown = pattern.replace("*", "MODE", 1).replace("*", "FORMAT", 1)
         else:
             title, shown = configuration.title, name
         rows.append([

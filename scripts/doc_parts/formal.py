@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import formal
+
 from flicker import markdown
 
 from .common import Say
