@@ -10,8 +10,13 @@ from flicker.explore.configurations import CONFIGURATIONS, GROUPS, group
 
 from .common import Say
 
-# Told apart by names only: one row for all.
-FAMILIES = ("flicker-*-*-factored", "flicker-*-*-conic")
+# Told apart by words of their names only: one row for all. Pattern, name in the table, what they are.
+FAMILIES = {
+    "flicker-*-*-factored": ("flicker-MODE-FORMAT-factored", "FLICKER in every mode and format"),
+    "flicker-*-*-conic": ("flicker-MODE-FORMAT-conic", "the same in the conic form"),
+    "exact-*-conic*": ("exact-FORMAT-conic[-scaled][-bound]", "exact rectangle per mini-tile in every format, conic"),
+    "exact-*": ("exact-FORMAT[-scaled][-bound]", "exact rectangle per mini-tile in every format"),
+}
 
 
 def tables(say: Say) -> dict[str, str]:
@@ -19,18 +24,18 @@ def tables(say: Say) -> dict[str, str]:
 
 
 def configuration_table() -> str:
-    """A row for every configuration but the modes and formats of the contribution test, which are one row a form."""
+    """A row for every configuration; those of a family share one."""
     rows = []
-    seen: dict[str, int] = defaultdict(int)
+    members: dict[str, int] = defaultdict(int)
+    of = {name: next((pattern for pattern in FAMILIES if fnmatchcase(name, pattern)), None) for name in CONFIGURATIONS}
     for name, configuration in CONFIGURATIONS.items():
-        pattern = next((pattern for pattern in FAMILIES if fnmatchcase(name, pattern)), None)
-        if pattern:
-            seen[pattern] += 1
-            if seen[pattern] > 1:
+        pattern = of[name]
+        if pattern is not None:
+            members[pattern] += 1
+            if members[pattern] > 1:
                 continue
-            count = sum(fnmatchcase(other, pattern) for other in CONFIGURATIONS)
-            title = f"FLICKER: {count} of every mode and format, {configuration.form.name.lower()}"
-            shown = pattern.replace("*", "MODE", 1).replace("*", "FORMAT", 1)
+            shown, what = FAMILIES[pattern]
+            title = f"{what}: {sum(other == pattern for other in of.values())} configurations"
         else:
             title, shown = configuration.title, name
         rows.append([
