@@ -6,6 +6,7 @@ STAMP  := $(VENV)/.installed
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
+PART   ?=
 CONFIG ?=
 NETLIST ?=
 SLOW   ?=
@@ -15,7 +16,7 @@ LIBERTY ?=
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test sim lint waves synth formal report clean FORCE
+.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -61,6 +62,9 @@ formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 
 report: $(STAMP) ## build/report/index.html: make report [SCENES="a.ply b.sog"]
 	@$(BIN)/flicker report $(SCENES)
+
+docs: $(STAMP) ## tables and charts of README.md and docs/: make docs [PART=areas]
+	@$(BIN)/python scripts/docs.py $(PART)
 
 clean: ## remove build results (not .venv)
 	rm -rf build .pytest_cache

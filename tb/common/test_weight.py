@@ -9,10 +9,10 @@ Not covered: other formats, which the arithmetic units' test has.
 from __future__ import annotations
 
 import pytest
-from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
 from flicker_tb.runner import build_and_test
 from flicker_tb.splats import QUICK_BUILD
 
+from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
 from flicker.errors import FlickerError
 from flicker.params import Form
 
