@@ -54,6 +54,9 @@ waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves U
 	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
 	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
 
+mutants: $(STAMP) ## every mutant of the hardware must die in its unit's tests; long: make mutants [UNIT=vru]
+	@$(BIN)/python scripts/mutants.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))
+
 synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG="conic fp8"]] [LIBERTY=path]
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
