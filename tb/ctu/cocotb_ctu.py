@@ -39,6 +39,7 @@ class CtuTest(StreamTest):
         dut.mode_i.value = int(mode)
         dut.stall_i.value = 0
         self.counts: Counter[str] = Counter()
+        self.closed = False  # nothing is to be taken
         cocotb.start_soon(self._block(self.bench.stall(patterns[2])))
 
     def _model(self, element: int):
@@ -66,7 +67,7 @@ class CtuTest(StreamTest):
             for name, place in EVENTS.items():
                 self.counts[name] += events >> place.at & (1 << place.bits) - 1
             self.counts["cycles"] += 1
-            dut.stall_i.value = int(next(pattern))
+            dut.stall_i.value = int(next(pattern) or self.closed)
 
     async def check(self, items: list[int]) -> int:
         """Run and compare everything; returns the cycles."""
@@ -202,7 +203,8 @@ async def forgets(dut, how):
     if how == "reset":
         dut.rst_ni.value = 0
     else:
-        dut.stall_i.value = 1  # the stage takes nothing in this cycle
+        test.closed = True  # the stage takes nothing while it is cleared
+        await test.bench.cycles(2)
         dut.clear_i.value = 1
     await RisingEdge(dut.clk_i)
     rest = test.source.pending
@@ -212,6 +214,7 @@ async def forgets(dut, how):
         await test.bench.reset()
     else:
         dut.clear_i.value = 0
+        test.closed = False
         await ReadWrite()
         assert dut.idle_o.value == 1 and dut.out_valid_o.value == 0, "something is left after clear_i"
     done = lambda: not test.source.pending and not test.checker.outstanding  # noqa: E731

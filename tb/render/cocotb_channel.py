@@ -130,10 +130,10 @@ async def clear_forgets(dut):
         made = lists(rng, FORM, [3, 0, rng.randrange(20), 8, 0, 5])
         test.source.send(test.words(made))
         await test.bench.cycles(rng.randrange(1, 400))
+        test.aborted = True
         await test.bench.clear(rng.choice((1, 1, 3)))
         await FallingEdge(dut.clk_i)
         test.model.clear()
-        test.aborted = True
         test.got.clear()
         assert dut.idle_o.value == 1 and dut.out_valid_o.value == 0 and dut.in_ready_o.value == 1, "something is left after clear_i"
         # The rest of the lists goes through, too: it may begin with half a list.

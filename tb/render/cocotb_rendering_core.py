@@ -131,10 +131,10 @@ async def clear_forgets(dut):
     for _ in range(6):
         test.source.send(test.items(lists(rng, FORM, [3, 0, rng.randrange(20), 8, 0, 5])))
         await test.bench.cycles(rng.randrange(1, 500))
+        test.aborted = True
         await test.bench.clear(rng.choice((1, 1, 3)))
         await FallingEdge(dut.clk_i)
         test.model.clear()
-        test.aborted = True
         test.got.clear()
         assert dut.idle_o.value == 1 and dut.out_valid_o.value == 0 and dut.stall_o.value == 0, "something is left after clear_i"
         await test.bench.until(lambda: test.source.pending == 0, 50_000, "rest of the lists")

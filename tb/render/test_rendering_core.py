@@ -39,8 +39,8 @@ def test_pixel_masks() -> None:
     ("parameters", "message"),
     [
         ({"Form": 2}, "Form must be"),
-        ({"FifoDepth": 0}, "FifoDepth must be"),
-        ({"FifoDepth": 129}, "FifoDepth must be"),
+        ({"FifoDepth": 0}, "Depth must be 1 to 128"),
+        ({"FifoDepth": 129}, "Depth must be 1 to 128"),
         ({"VrusPerChannel": 3}, "VrusPerChannel must be"),
         ({"MaskBits": 16}, "MaskBits must be"),
     ],
