@@ -59,7 +59,6 @@ CHECKS: list[list[object]] = [
     [sys.executable, "-m", "mypy"],
     [Path(sys.executable).parent / "lint-imports"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
-    [sys.executable, "scripts/instance_template.py", "--check"],
 ]
 
 

@@ -222,7 +222,8 @@ def summary(outcomes: list[Outcome]) -> str:
     others = [o for o in outcomes if not o.at_home]
     if others:
         text += "\n" + markdown.table(
-            ["mutant", "killed by", "why"], [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.survives or o.wrong or o.mutant.note) for o in others],
+            ["mutant", "killed by", "why"],
+            [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.survives or o.wrong or o.mutant.note) for o in others],
         )
     return text
 
