@@ -27,6 +27,9 @@ from flicker.scene.camera import orbit_camera
 from flicker.toolchain import ROOT
 
 
+OWN_GATES = 10  # GE: what the rendering stage has beside its parts, a handful of gates, is in no part
+
+
 @pytest.fixture(scope="module")
 def view() -> View:
     scene = random_scene(7, 300, 0)
@@ -40,7 +43,7 @@ def view() -> View:
 @pytest.mark.parametrize("form", ["conic", "factored"])
 @pytest.mark.parametrize("precision", ["fixed", "fp16", "mixed", "fp8"])
 def test_rtl_stage_is_what_was_synthesised(form, precision):
-    assert sum(stage_parts(form, ctu_area(form, precision)).values()) == pytest.approx(part("render_stage", f"{form} {precision}").ge, abs=2)
+    assert sum(stage_parts(form, ctu_area(form, precision)).values()) == pytest.approx(part("render_stage", f"{form} {precision}").ge, abs=OWN_GATES)
 
 
 def test_faithful_stage():
@@ -60,21 +63,23 @@ def test_fifo_area():
 
 def test_stage_without_generator_and_with_more_vrus():
     none = sum(stage_parts("factored").values())
-    assert none == get_configuration("no-ctu-32").area()
     assert none == pytest.approx(get_configuration("flicker-dense-fp16-factored").area() - CORES * part("ctu", "factored fp16").ge)
+    untested = none + CORES * part("mask_all", "default").ge
+    assert untested == pytest.approx(get_configuration("no-ctu-32").area()) == pytest.approx(part("render_stage", "no CTU").ge, abs=OWN_GATES)
+    assert get_configuration("no-ctu-64").area() == pytest.approx(part("render_stage", "no CTU, 64 VRUs").ge, abs=OWN_GATES)
     more = stage_parts("factored", vrus=64)
     assert more["VRUs"] == 64 * vru_area("factored", 4) and none < sum(more.values()) < 2 * none
     assert vru_area("factored", 4) < vru_area("factored", 8) == part("vru", "factored").ge < vru_area("factored", 16)
     assert vru_area("factored", 2) < vru_area("factored", 4) == part("vru", "factored, 4 pixels").ge
     for vrus, core in ((16, "factored, 1 VRU"), (64, "factored, 4 VRUs")):
-        cores = sum(stage_parts("factored", vrus=vrus).values()) - CORES * part("perf_counters", "default").ge
+        cores = sum(stage_parts("factored", vrus=vrus).values()) - CORES * part("perf_counters", "default").ge - part("stage_control", "default").ge
         assert cores == pytest.approx(CORES * part("rendering_core", core).ge)
 
 
 def test_generators():
     """Every generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
     for c in CONFIGURATIONS.values():
-        assert (c.generator.area() > 0) == bool(c.generator.operations.per_element), c.name
+        assert (c.generator.area() > 0) == (bool(c.generator.operations.per_element) or c.family == "baseline"), c.name
     factored, conic = (generator_area(get_configuration(f"flicker-dense-fp16-{form}").generator.operations) for form in ("factored", "conic"))
     assert factored == pytest.approx(part("ctu", "factored fp16").ge)
     assert conic == pytest.approx(part("ctu", "conic fp16").ge, rel=0.15)
@@ -120,7 +125,7 @@ def test_integer_adders_beside_published_figures(bits):
 def test_float32_beside_published_figures():
     """Our multiplier and adder as float32, which nothing in the design uses: synthesised here, four times the energy of those ACTIVITY was chosen by."""
     sys.path.insert(0, str(ROOT / "scripts"))
-    from save_areas import loads
+    from doc_parts.areas import loads
 
     runner = run_synthesis.Runner(DEFAULT_LIBERTY)
     keys = {unit: runner.add(f"flk_fp_{unit}", {"ExpBits": 8, "ManBits": 23}) for unit in ("mul", "add")}
@@ -141,7 +146,10 @@ def test_stage_energy_counts(view):
     assert parts["mask generators"] == pytest.approx(2 * result.work.elements * energy.ctu_pj("factored", "fp16") * 1e-6)
     twice = result.configuration.energy(result.work, 2 * counters.cycles, counters)
     assert twice["VRUs"] == parts["VRUs"] and twice["ungated clock"] == pytest.approx(2 * parts["ungated clock"])
-    assert evaluate(view, "no-ctu-32").energy["mask generators"] == 0
+    register = part("mask_all", "default")
+    off = evaluate(view, "no-ctu-32")
+    per_element = energy.switching_pj(register.load) + energy.clock_pj(register.clock_gated)
+    assert off.energy["mask generators"] == pytest.approx(off.work.elements * per_element * 1e-6)
     # The estimate by operators reproduces the unit that it is scaled by.
     generator = result.configuration.generator
     tested = int(result.work.test_cycles.sum())

@@ -186,7 +186,7 @@ def stage_parts(
         "feature FIFOs": channels * fifo_area(fifo_depth, width),
         "mask generators": CORES * generator,
         "counters": CORES * part("perf_counters", "default").ge,
-        "arbiters, control": channels * control + CORES * (core - CHANNELS * channel),
+        "arbiters, control": channels * control + CORES * (core - CHANNELS * channel) + part("stage_control", "default").ge,
     }
 
 

@@ -140,7 +140,8 @@ def stage_energy(
     form = _name(form)
     vru_pixels = 64 * CORES // vrus
     counters, arbiters = part("perf_counters", "default"), (part("stream_arbiter", "2 x 67 bit"), part("stream_arbiter", "4 x 92 bit"))
-    free = vrus * vru_part(form, vru_pixels)[1].clock_free + CORES * (counters.clock_free + masks_clock_free) + fifos * _free_fifo(fifo_depth)
+    free = part("stage_control", "default").clock_free + CORES * (counters.clock_free + masks_clock_free)
+    free += vrus * vru_part(form, vru_pixels)[1].clock_free + fifos * _free_fifo(fifo_depth)
     control = CORES * cycles * (switching_pj(counters.load) + clock_pj(counters.clock_gated)) + 64 * subtiles * sum(switching_pj(a.load) for a in arbiters)
     picojoules = {
         "VRUs": pairs * vru_pj(form, vru_pixels),

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ...cost.area import RECORD_BITS, ctu_area
-from ...cost.energy import ctu, ctu_pj, fifo_pj
+from ...cost.area import RECORD_BITS, ctu_area, part
+from ...cost.energy import clock_pj, ctu, ctu_pj, fifo_pj, switching_pj
 from ...cost.operations import Operations, ctu_operations
 from ...front.records import SubtileLists
 from ...front.view import View
@@ -108,6 +108,16 @@ class Untested(MaskGenerator):
 
     def rtl(self) -> dict:
         return {"form": self.form, "cat": CatMode.OFF, "mask_generator": self.module}
+
+    def area(self) -> float:
+        return part("mask_all", "default").ge
+
+    def energy_pj(self, work: Work, tested: int) -> float:
+        unit = part("mask_all", "default")
+        return tested * (switching_pj(unit.load) + clock_pj(unit.clock_gated))
+
+    def clock_free(self) -> float:
+        return part("mask_all", "default").clock_free
 
 
 @dataclass(frozen=True)
