@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from flicker.scene.demo import write_demo
-from flicker.scene.image import load_png
+from flicker.scene.image import load_picture
 from flicker.scene.files import load_scene, save_ply
 
 
@@ -41,7 +41,7 @@ def test_engines_and_files(demo, tmp_path):
                       "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
         assert run.returncode == 0, run.stderr
         stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
-        pictures[engine] = load_png(tmp_path / f"{engine}.png")
+        pictures[engine] = load_picture(tmp_path / f"{engine}.png")
         assert pictures[engine].shape == (90, 160, 3)
     assert np.array_equal(pictures["golden"], pictures["rtl"])
     assert not np.array_equal(pictures["golden"], pictures["reference"])

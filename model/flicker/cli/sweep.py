@@ -63,7 +63,7 @@ def summary(rows: list[dict]) -> Table:
     """One row per point."""
     table = Table()
     for name, justify in (("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"),
-                          ("SSIM", "right"), ("FLIP", "right"), ("GE", "right"), ("uJ", "right")):
+                          ("SSIM", "right"), ("FLIP", "right"), ("photo dB", "right"), ("GE", "right"), ("uJ", "right")):
         table.add_column(name, justify=justify, no_wrap=True)
 
     def text(value, form: str) -> str:
@@ -72,6 +72,6 @@ def summary(rows: list[dict]) -> Table:
     for row in rows:
         table.add_row(
             row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), text(row["psnr_db"], ".2f"), text(row["ssim"], ".4f"),
-            text(row["flip"], ".4f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
+            text(row["flip"], ".4f"), text(row["photo_psnr_db"], ".2f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
         )
     return table
