@@ -40,10 +40,10 @@ def report(
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
     try:
-        colour = parse_background(background)
+        behind = parse_background(background)
     except FlickerError as error:
         raise FlickerError(f"--{error}") from None
-    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, colour)
+    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind)
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(

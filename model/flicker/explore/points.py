@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene import photos
 from ..scene.camera import ORBIT_VIEWS, Camera, load_cameras
+from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
 
@@ -25,7 +25,7 @@ class SceneFile:
     path: str
     cameras: str | None = None
     photos: str | None = None
-    background: tuple[float, float, float] = photos.BLACK
+    background: tuple[float, float, float] = BLACK
 
     @property
     def file(self) -> str:
@@ -58,7 +58,7 @@ class SceneFile:
 
     def photo(self, view: int) -> Path | None:
         """The photograph of a view; None: there is none. FlickerError when one was asked for, or when two are found."""
-        if self.photos == photos.NONE:
+        if self.photos == NONE:
             return None
         camera = None if self._cameras is None else self._cameras[view]
         if camera is None or camera.img_name is None or self.cameras_file is None:
@@ -66,8 +66,8 @@ class SceneFile:
                 return None
             raise FlickerError(f"photos: {self.path}: view {view} has no 'img_name' in a cameras.json, by which its photograph would be found")
         if self.photos is not None:
-            return photos.photo_in(Path(self.photos), camera.img_name)
-        return photos.photo_beside(self.cameras_file, camera.img_name)
+            return photo_in(Path(self.photos), camera.img_name)
+        return photo_beside(self.cameras_file, camera.img_name)
 
     def target(self, view: int, size: tuple[int, int] | None = None) -> Target:
         """A view of the scene, with its photograph checked. size: None: that of the camera where it has a photograph, else `SIZE`. FlickerError."""
@@ -77,7 +77,7 @@ class SceneFile:
         if photo is None or self._cameras is None:
             return Target(self, view, size or SIZE)
         size = size or (self._cameras[view].width, self._cameras[view].height)
-        photos.check_photo(photo, size)
+        check_photo(photo, size)
         return Target(self, view, size)
 
     @cached_property

@@ -13,11 +13,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, S
 from ...errors import FlickerError
 from ...front.view import DEMO
 from ...scene.camera import MAX_SIZE
+from ...scene.photos import NONE, parse_background
 from ...toolchain import BUILD
 from ..configurations import GROUPS, matching
 from ..digest import code_digest, key
-from ...scene.photos import NONE, parse_background
-from ..points import SUFFIXES, Point, SceneFile, Target
+from ..points import SIZE, SUFFIXES, Point, SceneFile, Target
 
 MAX_WORKERS = 1024
 
