@@ -14,7 +14,7 @@ LIBERTY ?=
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test sim lint waves synth formal report clean
+.PHONY: help setup demo test sim lint waves synth formal report clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -25,9 +25,12 @@ help: ## list the targets
 
 setup: $(STAMP) ## check the tools of the machine, create .venv with everything else
 
-$(STAMP): requirements.lock pyproject.toml scripts/setup.sh
+# The stamp says for which folder the environment was set up: a copied or moved checkout sets it up again.
+$(STAMP): requirements.lock pyproject.toml scripts/setup.sh $(if $(filter $(CURDIR),$(shell cat $(STAMP) 2> /dev/null)),,FORCE)
 	@PYTHON="$(PYTHON)" scripts/setup.sh "$(VENV)"
-	@touch $@
+	@echo '$(CURDIR)' > $@
+
+FORCE:
 
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
@@ -36,13 +39,13 @@ test: $(STAMP) lint ## lint, all tests, the fast proofs
 	@$(BIN)/python -m pytest -n $(JOBS) tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
-sim: $(STAMP) ## simulations of units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
+sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
 
-lint: $(STAMP) ## lint of the hardware: Verilator with every module as top, Verible style
+lint: $(STAMP) ## Verilator with every module as top, Verible style, ruff, mypy, generated files
 	@$(BIN)/python scripts/lint.py
 
-waves: $(STAMP) ## simulate a unit and keep its traces: make waves UNIT=stream_cells
+waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves UNIT=stream_cells
 	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
 	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
 

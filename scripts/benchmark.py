@@ -15,19 +15,20 @@ import sys
 import time
 from pathlib import Path
 
-from flicker.scene.camera import find_cameras, select_view
-from flicker.cli.options import parse_size
-from flicker.scene.demo import write_demo
-from flicker.errors import FlickerError
-from flicker.front.records import build_lists
-from flicker.golden.render import render_golden
 from flicker.explore.methods import View, method_name, run
-from flicker.scene.metrics import psnr
+
+from flicker.cli.options import parse_size
+from flicker.errors import FlickerError
+from flicker.front.projection import project
+from flicker.front.records import build_lists
+from flicker.front.reference import render_reference
+from flicker.golden.render import render_golden
 from flicker.params import CHANNELS, CORES, NAMED_CONFIGS, CatMode
 from flicker.perf.render_stage import simulate
-from flicker.front.projection import project
-from flicker.front.reference import render_reference
+from flicker.scene.camera import find_cameras, select_view
+from flicker.scene.demo import write_demo
 from flicker.scene.files import load_scene
+from flicker.scene.metrics import psnr
 from flicker.sim.render_stage import build, render_rtl
 
 ROOT = Path(__file__).resolve().parents[1]

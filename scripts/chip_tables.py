@@ -19,14 +19,6 @@ from pathlib import Path
 
 import numpy as np
 
-from flicker.scene.camera import Camera, load_cameras
-from flicker.cli.options import parse_size
-from flicker.scene.demo import demo_cameras, generate
-from flicker.errors import FlickerError
-from flicker.golden.render import render_golden
-from flicker.markdown import table
-from flicker.params import RenderConfig
-from flicker.scene.files import Scene, load_scene
 from flicker.chip.clusters import build_clusters, cull
 from flicker.chip.constants import constant_table
 from flicker.chip.delivery import broadcast_cycles
@@ -37,6 +29,14 @@ from flicker.chip.lists import collect
 from flicker.chip.memory import MemoryFormat
 from flicker.chip.quality import KEYS, format_quality, key_quality
 from flicker.chip.schemes import SCHEMES, Scheme
+from flicker.cli.options import parse_size
+from flicker.errors import FlickerError
+from flicker.golden.render import render_golden
+from flicker.markdown import table
+from flicker.params import RenderConfig
+from flicker.scene.camera import Camera, load_cameras
+from flicker.scene.demo import demo_cameras, generate
+from flicker.scene.files import Scene, load_scene
 
 VIEWS = (
     ("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1),

@@ -14,11 +14,12 @@ import sys
 from pathlib import Path
 
 import pages
+from flicker.explore.methods import get_method
+
 from flicker import markdown
 from flicker.cost.area import lane_stage_parts
 from flicker.errors import FlickerError
 from flicker.explore.evaluate import LANES_METHOD, get_configuration
-from flicker.explore.methods import get_method
 from flicker.perf.lane_stage import LaneStage
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,7 +60,8 @@ def explored(views: dict[str, dict[str, dict[str, str]]]) -> str:
                 if row is None:
                     cells.append("")
                     continue
-                cells.append(f"{float(row['psnr_db']):.1f} / {float(row['cycles']) / 1e6:.3f} / {float(row['bound_share']):.0%} / {float(row['energy_uj']):.0f}")
+                psnr, cycles, share, energy = (float(row[key]) for key in ("psnr_db", "cycles", "bound_share", "energy_uj"))
+                cells.append(f"{psnr:.1f} / {cycles / 1e6:.3f} / {share:.0%} / {energy:.0f}")
             area = next((float(rows[name]["area_ge"]) for rows in views.values() if name in rows), None)
             what = get_configuration(name).title
             lines.append(f"| `{name}` | {what} | {'' if area is None else f'{area / 1e6:.2f}'} | " + " | ".join(cells) + " |")

@@ -44,8 +44,9 @@ def measure(variant: tuple[str, ...], folder: Path) -> None:
     if "e4m3" in variant:
         fp.E4M3_R = flushed(fp.E4M3_R, 2.0**-6)
 
-    from flicker.explore.evaluate import load_view
     from flicker.explore.methods import run
+
+    from flicker.explore.evaluate import load_view
     from flicker.scene.metrics import psnr
 
     for file, view in SCENES:

@@ -29,12 +29,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pages
-from flicker import markdown
-from flicker import toolchain
-from flicker.errors import FlickerError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from flicker import markdown, toolchain
+from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 FORMAL = ROOT / "formal"

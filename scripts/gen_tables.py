@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write rtl/common/flk_table_pkg.sv from flicker.functions. `--check` only compares."""
+"""Write rtl/common/flk_table_pkg.sv from flicker.arithmetic.functions. `--check` only compares."""
 
 from __future__ import annotations
 

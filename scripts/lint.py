@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Lint of the hardware: Verilator with every module as top, Verible style rules.
+"""Lint: Verilator with every module as top, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
 
 Exits 1 on any warning. Each module is linted with its default parameters and with those of
 VARIANTS, as simulated (with assertions) and as synthesised (SYNTHESIS defined).
-Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules.
+Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules; rules of ruff and mypy: pyproject.toml.
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 RTL = ROOT / "rtl"
+VERSIONS = (ROOT / "requirements.lock").read_text()
 
 # Parameters, beside the defaults, under which a module takes another shape.
 VARIANTS: dict[str, list[dict[str, int]]] = {
@@ -44,6 +46,16 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
 }
 
 
+# Checks beside those of the hardware: programs of the environment, and scripts that compare what they have written.
+CHECKS: list[list[object]] = [
+    [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
+    [sys.executable, "-m", "mypy"],
+    [Path(sys.executable).parent / "lint-imports"],
+    [sys.executable, "scripts/gen_manifests.py", "--check"],
+    [sys.executable, "scripts/instance_template.py", "--check"],
+]
+
+
 def check_filelist(listed: list[Path]) -> list[str]:
     """Findings on the file list: unlisted sources, names that differ from the file's."""
     findings = []
@@ -59,12 +71,20 @@ def check_filelist(listed: list[Path]) -> list[str]:
 
 
 def run(command: list[object]) -> str:
-    """Output of a lint tool if it found anything, else an empty string."""
+    """Output of a lint tool if it found anything, else an empty string. What has passed is not run again on equal files."""
     words = [str(word) for word in command]
+    files = [ROOT / word for word in words if word.endswith((".sv", ".vlt", ".rules", ".waiver"))]
+    key = hashlib.sha256("\0".join([*words, VERSIONS, *(file.read_text() for file in files)]).encode()).hexdigest()
+    passed = toolchain.BUILD / "lint" / key
+    if files and passed.exists():
+        return ""
     done = subprocess.run(
         words, cwd=ROOT, env=toolchain.environment(), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )
+    if files and not done.returncode:
+        passed.parent.mkdir(parents=True, exist_ok=True)
+        passed.touch()
     return f"$ {' '.join(words)}\n{done.stdout}" if done.returncode else ""
 
 
@@ -84,7 +104,7 @@ def main() -> int:
     listed = toolchain.filelist()
     findings = check_filelist(listed)
 
-    commands: list[list[object]] = []
+    commands: list[list[object]] = [*CHECKS]  # the slow ones begin first
     for path in listed:
         top = path.stem
         if top.endswith("_pkg"):

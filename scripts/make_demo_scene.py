@@ -7,8 +7,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from flicker.scene.demo import write_demo
 from flicker.errors import FlickerError
+from flicker.scene.demo import write_demo
 
 
 def main() -> int:

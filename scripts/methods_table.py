@@ -12,17 +12,17 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from flicker.explore.methods import View, get_method, run
 
-from flicker.scene.camera import load_cameras
 from flicker.cli.options import parse_size
 from flicker.errors import FlickerError
-from flicker.scene.metrics import psnr
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
-from flicker.scene.files import load_scene
-from flicker.explore.methods import View, get_method, run
 from flicker.golden.masked import missed_pixels
 from flicker.perf.work import SPLITS
+from flicker.scene.camera import load_cameras
+from flicker.scene.files import load_scene
+from flicker.scene.metrics import psnr
 
 REAL = {
     "flowers": ("flowers.compressed.ply", 0), "playbot": ("playbot.sog", 1), "guitar": ("guitar.ply", 1), "stpeter": ("st-peter.sog", 0),

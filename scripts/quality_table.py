@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from flicker.scene.camera import Camera, load_cameras
 from flicker.cli.options import parse_size
-from flicker.scene.demo import demo_cameras, generate
-from flicker.params import CatMode, Coords, Form, Precision, RenderConfig
-from flicker.pipeline import Engine, render_view
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
+from flicker.params import CatMode, Coords, Form, Precision, RenderConfig
+from flicker.pipeline import Engine, render_view
+from flicker.scene.camera import Camera, load_cameras
+from flicker.scene.demo import demo_cameras, generate
 from flicker.scene.files import Scene, load_scene
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -23,16 +23,17 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-from flicker.cost.area import TABLE, format_bits, operator_name
-from flicker.errors import FlickerError
 from flicker.explore.generators.disc import DiscFormat, root_table
-from flicker.cost.operations import Op, Operation
 from flicker.explore.methods import methods
-from flicker.golden.masked import ACCUMULATOR_INT_BITS
-from flicker.params import Form, Precision
+
+from flicker.cost.area import TABLE, format_bits, operator_name
+from flicker.cost.operations import Op, Operation
 from flicker.cost.synth.liberty import CLOCK_GATE, Library
 from flicker.cost.synth.run import FOLDER, UNITS, Runner
 from flicker.cost.synth.units import PRECISIONS, Unit, all_units, ctu_parameters, unit
+from flicker.errors import FlickerError
+from flicker.golden.masked import ACCUMULATOR_INT_BITS
+from flicker.params import Form, Precision
 from flicker.toolchain import FILELIST, ROOT
 
 LIBERTY = ROOT / "scripts" / "cells" / "flicker.lib"
@@ -246,7 +247,7 @@ def synthesise(name: str, text: str, library: Library) -> dict:
         }
         (folder / "job.json").write_text(json.dumps(job))
         with (folder / "log").open("w") as log:
-            subprocess.run([sys.executable, "-m", "flicker.synth.flow", str(folder / "job.json")], stdout=log, stderr=subprocess.STDOUT)
+            subprocess.run([sys.executable, "-m", "flicker.cost.synth.flow", str(folder / "job.json")], stdout=log, stderr=subprocess.STDOUT)
         if not (folder / "result.json").exists():
             error = folder / "error"
             raise FlickerError(f"operator {name}: {error.read_text() if error.exists() else 'synthesis failed'} (see {folder / 'log'})")

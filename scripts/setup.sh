@@ -33,6 +33,23 @@ esac
 echo "setup: installing into $venv (a few minutes the first time)"
 [[ -x $venv/bin/python ]] || "$python" -m venv "$venv"
 pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off)
+# Scripts of a copied or moved environment name the old place.
+"$venv/bin/python" - "$PWD/$venv" << 'END'
+import pathlib, re, sys
+here = pathlib.Path(sys.argv[1])
+old = re.compile(rb"/[^\s'\":]*/" + re.escape(here.name.encode()) + rb"(?=['\"\s/])")
+for path in (here / "bin").iterdir():
+    text = b"\0" if path.is_symlink() else path.read_bytes()
+    if b"\0" not in text and (new := old.sub(str(here).encode(), text)) != text:
+        path.write_bytes(new)
+END
 "${pip[@]}" -r requirements.lock || fail "could not install the packages of requirements.lock"
 "${pip[@]}" --no-deps --no-build-isolation --editable . || fail "could not install the flicker package"
+# The package by a path relative to the environment: a copy of both finds its own, not the original's.
+"$venv/bin/python" - << 'END'
+import os, pathlib, sysconfig
+site = pathlib.Path(sysconfig.get_path("purelib"))
+for path in site.glob("__editable__.flicker-*.pth"):
+    path.write_text("".join(os.path.relpath(line, site) + "\n" for line in path.read_text().split()))
+END
 echo "setup: done"

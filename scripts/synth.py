@@ -13,13 +13,14 @@ import time
 from pathlib import Path
 
 import pages
-from flicker.errors import FlickerError
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
 from flicker.cost.synth import report
 from flicker.cost.synth.run import FOLDER, Runner
 from flicker.cost.synth.units import all_units
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 DEFAULT = ROOT / "scripts" / "cells" / "flicker.lib"
 
@@ -38,7 +39,8 @@ def main() -> int:
     parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
     parser.add_argument("--config", help="only this parameter set of the unit, such as 'factored fixed'")
-    parser.add_argument("--docs", action="store_true", help="write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md, a summary into README.md")
+    docs = "write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md, a summary into README.md"
+    parser.add_argument("--docs", action="store_true", help=docs)
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)

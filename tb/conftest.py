@@ -1,4 +1,4 @@
-"""pytest set-up: the shared test library on the path, seed in the header, choice of a unit."""
+"""pytest set-up: this checkout's model and test library on the path, seed in the header, choice of a unit, progress."""
 
 from __future__ import annotations
 
@@ -10,24 +10,40 @@ import pytest
 TB = Path(__file__).resolve().parent
 sys.path.insert(0, str(TB))
 
+from flicker_tb import progress, runner  # noqa: E402
+
+from flicker import toolchain  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
-from flicker_tb import runner  # noqa: E402
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py")
 
 
+def _simulates(path: Path) -> bool:
+    """Whether a test file simulates hardware: those in the folders of tb/ but tb/model do."""
+    return path.parent != TB and not path.is_relative_to(TB / "model")
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "sim: simulates hardware (everything outside tb/model)")
+    config.addinivalue_line("markers", "sim: simulates hardware (folders of tb/, tb/model excepted)")
+    if toolchain.ROOT != TB.parent:
+        raise pytest.UsageError(
+            f"{TB.parent}: the flicker package comes from another checkout, {toolchain.ROOT}, whose RTL would be tested; run 'make setup' here"
+        )
     try:
         runner.seed()
     except FlickerError as error:
         raise pytest.UsageError(str(error)) from None
     unit = config.getoption("--unit")
-    units = sorted(path.stem.removeprefix("test_") for path in TB.rglob("test_*.py"))
+    files = sorted(TB.rglob("test_*.py"))
+    sim = config.getoption("markexpr") == "sim"
+    units = [path.stem.removeprefix("test_") for path in files if not sim or _simulates(path)]
     if unit is not None and unit not in units:
-        raise pytest.UsageError(f"no unit {unit!r}; there are {', '.join(units)}")
+        exists = any(path.stem == f"test_{unit}" for path in files)
+        what = f"unit {unit!r} does not simulate" if exists else f"no unit {unit!r}"
+        raise pytest.UsageError(f"{what}; {'those that simulate' if sim else 'there are'}: {', '.join(sorted(units))}")
+    progress.register(config)
 
 
 def pytest_report_header() -> str:
@@ -44,5 +60,5 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if not item.path.is_relative_to(TB / "model"):
+        if _simulates(item.path):
             item.add_marker("sim")

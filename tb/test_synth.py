@@ -7,18 +7,20 @@ which are what `make synth` reports.
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import pyosys
 import pytest
 
-from flicker.errors import FlickerError
 from flicker.cost.synth import run
 from flicker.cost.synth.gates import DEFAULT_LIBERTY, cell_models
 from flicker.cost.synth.liberty import Library, to_verilog, truth
 from flicker.cost.synth.timing import Timing
 from flicker.cost.synth.units import all_units, unit
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT, filelist
 
 
@@ -92,6 +94,60 @@ def test_delays_by_hand(library: Library) -> None:
     assert path.delay == pytest.approx(60 + 10 * 1 + 10 + 10 * 2 + 50)
     assert (path.source, path.target) == ("n1", "n3")
     assert timing.driver_area == 0
+
+
+def test_page_example_by_hand(library: Library) -> None:
+    """The netlist that docs/synthesis.md works out: two registers, NAND2, inverter, XOR2, two registers."""
+    cells = {
+        "a": ("DFF", {"D": 10, "CK": 19, "Q": 1}), "b": ("DFF", {"D": 11, "CK": 19, "Q": 2}),
+        "g": ("NAND2_X1", {"A": 1, "B": 2, "Y": 3}), "i": ("INV_X1", {"A": 3, "Y": 4}), "h": ("XOR2_X1", {"A": 1, "B": 4, "Y": 5}),
+        "p": ("DFF", {"D": 3, "CK": 19, "Q": 6}), "q": ("DFF", {"D": 5, "CK": 19, "Q": 7}),
+    }
+    timing = Timing(module(cells, {"ck": ("input", 19)}), library, {})
+    found = {path.target: (path.source, path.delay) for path in timing.paths() if not path.port}
+    assert found == {"n7": ("n1", pytest.approx(298.33, abs=0.01)), "n6": ("n1", pytest.approx(193.33, abs=0.01))}
+    page = (ROOT / "docs/synthesis.md").read_text()
+    assert all(f"| {number} |" in page for number in ("103.33", "143.33", "183.33", "248.33", "298.33"))
+
+
+ABC = Path(pyosys.__file__).parent / "yosys-abc"
+
+
+@pytest.mark.parametrize("parameters", [dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1), {}], ids=["e4m3", "fp16"])
+@pytest.mark.parametrize("top", ["flk_fp_add", "flk_fp_mul"])
+def test_timing_equals_abc(top: str, parameters: dict, library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ABC's own static timing (`stime`) of the mapped netlist with the same Liberty file, port to port.
+
+    ABC prints hundredths of a picosecond. It drives each net directly, so our chains of inverters are off; with them a path is never longer.
+    """
+    runner = run.Runner(DEFAULT_LIBERTY)
+    key = runner.add(top, parameters)
+    runner.run_planned()
+    blif, netlist = tmp_path / "netlist.blif", tmp_path / "netlist.json"
+    commands = [
+        f"read_liberty -lib {DEFAULT_LIBERTY}", f"read_verilog {run.UNITS / key / 'netlist.v'}", f"hierarchy -top {top}", "opt_clean -purge",
+        "splitnets -ports", f"write_blif -gates {blif}", f"write_json {netlist}",
+    ]
+    code = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in sys.argv[1:]]"
+    subprocess.run([sys.executable, "-c", code, *commands], check=True, capture_output=True)
+    # Constants that nothing uses would make ABC take the netlist for unmapped logic.
+    blif.write_text(re.sub(r"^\.names \$\w+\n(1\n)?", "", blif.read_text(), flags=re.M))
+    done = subprocess.run([ABC, "-c", f"read_lib {DEFAULT_LIBERTY}; read -m {blif}; topo; stime"], capture_output=True, text=True)
+    theirs = re.search(r"Gates = *(\d+).*Delay = *([\d.]+) ps", done.stdout)
+    assert theirs, done.stdout
+
+    def longest() -> float:
+        timing = Timing(module, library, {})
+        at = timing.arrive({bit: (0.0, name) for name, port in inputs.items() for bit in port["bits"]})
+        return max(at[bit][0] for port in module["ports"].values() if port["direction"] == "output" for bit in port["bits"] if bit in at)
+
+    module = json.loads(netlist.read_text())["modules"][top]
+    inputs = {name: port for name, port in module["ports"].items() if port["direction"] == "input"}
+    with_chains = longest()
+    monkeypatch.setattr("flicker.cost.synth.timing.EFFORT_LIMIT", float("inf"))
+    assert len(module["cells"]) == int(theirs[1])
+    assert longest() == pytest.approx(float(theirs[2]), abs=0.006)
+    assert longest() >= with_chains
 
 
 def test_large_fanout_gets_drivers(library: Library) -> None:

@@ -1,4 +1,4 @@
-"""The one error type that reaches the user."""
+"""What reaches the user: the one error type, the one warning type."""
 
 
 class FlickerError(Exception):
@@ -7,3 +7,13 @@ class FlickerError(Exception):
     The message is one line that names the file and the field. The command line prints it
     and exits with code 2; library users can catch it.
     """
+
+
+class FlickerWarning(UserWarning):
+    """Input that is used, though not as its name says. The message is one line that names the file."""
+
+
+def one_line(text: object) -> str:
+    """An exception's or anyone's text as one printable line of at most 120 characters; the type's name for no text."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
+    return line[:120] or type(text).__name__

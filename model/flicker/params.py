@@ -181,7 +181,7 @@ class RenderConfig:
             "VrusPerChannel": self.vrus_per_channel,
         }
 
-    def with_(self, **changes) -> "RenderConfig":
+    def with_(self, **changes) -> RenderConfig:
         """A copy with some fields changed."""
         return replace(self, **changes)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -12,10 +10,11 @@ import numpy as np
 
 from . import params
 from .front.records import build_lists
-from .golden.render import render_golden
-from .scene.metrics import psnr
-from .params import CHANNELS, CORES, RenderConfig
 from .front.view import View
+from .golden.render import render_golden
+from .params import CHANNELS, CORES, RenderConfig
+from .progress import Steps
+from .scene.metrics import psnr
 from .sim.render_stage import build, render_rtl
 
 
@@ -25,18 +24,6 @@ class Engine(str, Enum):
     REFERENCE = "reference"  # float64, vanilla rules
     GOLDEN = "golden"  # bit-true model
     RTL = "rtl"  # verilated rendering stage
-
-
-class Steps:
-    """Hooks a front end gives to show progress; this one shows nothing."""
-
-    def step(self, text: str) -> AbstractContextManager[None]:
-        """Around a step of unknown length."""
-        return nullcontext()
-
-    def bar(self, text: str) -> AbstractContextManager[Callable[[int, int], None]]:
-        """Around a step that reports (done, total)."""
-        return nullcontext(lambda done, total: None)
 
 
 @dataclass
@@ -82,7 +69,6 @@ def render_view(
     """
     steps = steps or Steps()
     scene, camera = view.scene, view.camera
-    assert scene is not None, "statistics are of a scene"
     with steps.step("projecting"):
         projected = view.projected
     stats: dict[str, Any] = {

@@ -18,6 +18,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -29,6 +30,8 @@ BUILD = ROOT / "build"
 
 # The wheel's makefiles were configured without a compiler: what they lack.
 _MAKE_FIXES = ("CFG_CXXFLAGS_PCH_I=-include", "AR=ar")
+# Environment variable: folder of notes on what is under way, for whoever shows progress.
+PROGRESS = "FLICKER_PROGRESS"
 _FST_HEADERS = {"lz4.h": "liblz4-dev", "zlib.h": "zlib1g-dev"}
 
 
@@ -63,6 +66,12 @@ def _versions() -> str:
             raise FlickerError(f"{tool}: cannot be run ({error.strerror})") from None
         lines.append(out.stdout.splitlines()[0] if out.stdout else "")
     return "\n".join(lines)
+
+
+@functools.cache
+def trace_format() -> str:
+    """``fst`` where the compiler finds the headers for it, else ``vcd``, which needs none."""
+    return "vcd" if missing_fst_packages() else "fst"
 
 
 def missing_fst_packages() -> list[str]:
@@ -119,6 +128,24 @@ def locked(path: Path) -> Iterator[None]:
     with path.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
+
+
+@contextlib.contextmanager
+def under_way(text: str) -> Iterator[None]:
+    """Note for the time of a slow step, if a process that shows progress has named a folder for notes."""
+    folder = os.environ.get(PROGRESS, "")
+    if not os.path.isdir(folder):
+        yield
+        return
+    handle, unready = tempfile.mkstemp(dir=folder)
+    note = Path(unready).with_suffix(".note")
+    with os.fdopen(handle, "w") as out:
+        out.write(text)
+    os.replace(unready, note)  # seen only when complete
+    try:
+        yield
+    finally:
+        note.unlink(missing_ok=True)
 
 
 def _digest(*parts: object) -> str:
@@ -196,15 +223,16 @@ def verilate(
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         log = folder / "build.log"
-        _run(
-            ["verilator", "-cc", "--exe", "--prefix", "Vtop", "--top-module", top, "-Mdir", folder,
-             "-o", product.name, *options, *settings, *cpp, *sources],
-            log,
-        )
-        make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
-                f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
-        _share_runtime(folder, make, log, jobs)
-        _run([*make, f"-j{jobs}"], log)
+        with under_way(f"building {name} ({kind})"):
+            _run(
+                ["verilator", "-cc", "--exe", "--prefix", "Vtop", "--top-module", top, "-Mdir", folder,
+                 "-o", product.name, *options, *settings, *cpp, *sources],
+                log,
+            )
+            make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
+                    f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
+            _share_runtime(folder, make, log, jobs)
+            _run([*make, f"-j{jobs}"], log)
         stamp.touch()
     return product
 

@@ -9,8 +9,9 @@ Area: a row of transistor pairs. A cell with n pairs is n + 1 columns wide (one 
 one gate equivalent: area = (n + 1) / 3.
 Delay: a cell of size s has s times the drive of the unit inverter: delay = parasitic + load / s, and it has s times the pairs
 and the input loads of size 1. An input's load is its logical effort; an input that is also inverted inside loads one unit
-more, and its delay is the mean of the direct way and the way through that inverter. Flip-flops are not covered by logical effort: clock to output 6 and set-up 5 are assumptions (2 and
-1 FO4 at fan-out 4). The clock gate is a latch (7 pairs) and an AND2; its enable has the set-up of a flip-flop.
+more, and its delay is the mean of the direct way and the way through that inverter. Flip-flops are not covered by logical
+effort: clock to output 6 and set-up 5 are assumptions (2 and 1 FO4 at fan-out 4).
+The clock gate is a latch (7 pairs) and an AND2; its enable has the set-up of a flip-flop.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Arithmetic units and the model of their formats and functions (docs/arithmetic.md).
 
-Units (`arith_harness.sv`, against `flicker.formats` and `flicker.functions`, bit for bit):
+Units (`arith_harness.sv`, against `flicker.arithmetic.formats` and `flicker.arithmetic.functions`, bit for bit):
   every pair of operands of all formats but FP16; FP16 by special, structured and random pairs
   (all 2^32 with FLICKER_EXHAUSTIVE=1); conversions and functions: every input, between all formats.
 Model: against numpy's and ml_dtypes' types and a rounding of its own (`arith_bench.nearest`); the float32 carriers of
@@ -34,10 +34,9 @@ from arith_bench import (
 )
 from flicker_tb.runner import seed
 
-from flicker.arithmetic import functions
-from flicker.errors import FlickerError
+from flicker.arithmetic import fp, functions
 from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat, fp_add, fp_convert, fp_lt, fp_mul
-from flicker.arithmetic import fp
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT, verilate
 
 RANDOM_PAIRS = 1 << 22

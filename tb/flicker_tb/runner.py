@@ -1,7 +1,8 @@
 """Builds a top with Verilator (cached) and runs cocotb tests on it, under pytest.
 
 Environment: FLICKER_SEED (default 1) seeds everything random, stimulus and initial register
-values alike; WAVES=1 writes FST traces to build/waves.
+values alike; WAVES=1 writes traces to build/waves: FST, or VCD where the headers for FST are
+missing; WAVES_FORMAT=fst or vcd chooses.
 """
 
 from __future__ import annotations
@@ -37,9 +38,14 @@ def seed() -> int:
         raise FlickerError(f"FLICKER_SEED: not an integer: {text!r}") from None
 
 
-def waves() -> bool:
-    """Whether traces are wanted (WAVES=1)."""
-    return os.environ.get("WAVES", "") not in ("", "0")
+def waves() -> str:
+    """Format of the traces that are wanted (WAVES, WAVES_FORMAT), ``fst`` or ``vcd``; empty if none are."""
+    if os.environ.get("WAVES", "") in ("", "0"):
+        return ""
+    wanted = os.environ.get("WAVES_FORMAT") or toolchain.trace_format()
+    if wanted not in ("fst", "vcd"):
+        raise FlickerError(f"WAVES_FORMAT: fst or vcd, not {wanted!r}")
+    return wanted
 
 
 def build(
@@ -67,8 +73,8 @@ def build(
         parameters, args, visible = None, [*args, "-Wno-fatal"], []
     libs = cocotb_config.libs_dir
     main = cocotb_config.share_dir / "lib" / "verilator" / "verilator.cpp"
-    trace = ["--trace-fst", "--trace-structs"] if waves() else []
-    if trace and (missing := toolchain.missing_fst_packages()):
+    trace = [f"--trace-{waves()}", "--trace-structs"] if waves() else []
+    if waves() == "fst" and (missing := toolchain.missing_fst_packages()):
         raise FlickerError(f"WAVES: FST headers missing, install the packages {' '.join(missing)}")
     return toolchain.verilate(
         top,
@@ -118,8 +124,9 @@ def build_and_test(
     for number in range(seed(), seed() + seeds):
         folder = toolchain.BUILD / "sim-run" / unit / f"{label}-seed{number}"
         shutil.rmtree(folder, ignore_errors=True)
-        trace = toolchain.BUILD / "waves" / unit / view.stem / f"{label}-seed{number}.fst"
-        trace.parent.mkdir(parents=True, exist_ok=True)
+        trace = toolchain.BUILD / "waves" / unit / view.stem / f"{label}-seed{number}.{waves() or 'fst'}"
+        if waves():
+            trace.parent.mkdir(parents=True, exist_ok=True)
         print(f"{top} {dict(parameters or {})} FLICKER_SEED={number}", file=sys.stderr, flush=True)
         results = folder / "results.xml"
         try:
@@ -132,7 +139,7 @@ def build_and_test(
                 results_xml=str(results),
                 seed=number,
                 test_filter=rf"\.({'|'.join(tests)})(/.*)?$" if tests else None,
-                waves=waves(),
+                waves=bool(waves()),
                 test_args=["--trace-file", str(trace)] if waves() else [],
                 plusargs=["+verilator+rand+reset+2", f"+verilator+seed+{_verilator_seed(number)}"],
                 extra_env={

@@ -15,12 +15,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from flicker.scene.demo import demo_cameras, generate
-from flicker.front.records import build_lists
-from flicker.golden.render import render_golden
 from flicker.explore.configurations import rtl_configuration, run
+from flicker.front.projection import project
+from flicker.front.records import build_lists
 from flicker.front.view import View, load_view
-from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.golden.render import render_golden
 from flicker.params import (
     CHANNEL_COUNTERS,
     CHANNELS,
@@ -32,7 +31,8 @@ from flicker.params import (
     Precision,
     RenderConfig,
 )
-from flicker.front.projection import project
+from flicker.scene.demo import demo_cameras, generate
+from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.render_stage import render_rtl
 
 DEFAULT = RenderConfig()

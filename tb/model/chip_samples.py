@@ -6,9 +6,9 @@ import numpy as np
 from flicker_tb.runner import seed
 from scene_samples import random_scene
 
-from flicker.scene.camera import Camera
 from flicker.chip.frame import Prepared, prepare
 from flicker.front.view import View
+from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
 
 

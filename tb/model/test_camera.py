@@ -11,10 +11,21 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import Camera, find_cameras, load_cameras, orbit_camera, select_view
 from flicker.errors import FlickerError
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
+from flicker.scene.camera import (
+    DEFAULT_UP,
+    ORBIT_VIEWS,
+    UP_AXES,
+    Camera,
+    camera_count,
+    cameras_beside,
+    find_cameras,
+    load_cameras,
+    orbit_camera,
+    select_view,
+)
 from flicker.scene.files import Scene, load_scene, save_ply
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
@@ -142,10 +153,65 @@ def test_find_cameras(tmp_path: Path) -> None:
     save_ply(samples.random_scene(SEED), tmp_path / "a.ply")
     scene = load_scene(tmp_path / "a.ply")
     assert [c.name for c in find_cameras(scene)] == [f"orbit_{k}" for k in range(8)]
+    assert camera_count(scene.path) == camera_count(scene.path, up="z") == camera_count(None) == 8
     written(tmp_path, [entry(img_name="beside")])
-    assert [c.name for c in find_cameras(scene)] == ["beside"]
+    assert [c.name for c in find_cameras(scene)] == ["beside"] and camera_count(scene.path) == 1
     given = tmp_path / "given.json"
-    given.write_text(json.dumps([entry(img_name="given")]))
-    assert [c.name for c in find_cameras(scene, given)] == ["given"]
+    given.write_text(json.dumps([entry(img_name="given")] * 2))
+    assert [c.name for c in find_cameras(scene, given)] == ["given"] * 2 and camera_count(scene.path, given) == 2
     with pytest.raises(FlickerError, match="none.json"):
         find_cameras(scene, tmp_path / "none.json")
+
+
+def test_cameras_of_a_sog_folder(tmp_path: Path) -> None:
+    """Its own cameras.json comes before the one beside the folder, however the scene is given."""
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    for name, data in samples.sog_files(samples.random_scene(SEED, count=20)).items():
+        (folder / name).write_bytes(data)
+    given = (folder, folder / "meta.json")
+    for path in given:
+        assert cameras_beside(path) is None and len(find_cameras(load_scene(path))) == ORBIT_VIEWS
+    written(tmp_path, [entry(img_name="beside")])
+    for path in given:
+        assert [c.name for c in find_cameras(load_scene(path))] == ["beside"]
+    written(folder, [entry(img_name="inside")])
+    for path in given:
+        assert cameras_beside(path) == folder / "cameras.json"
+        assert [c.name for c in find_cameras(load_scene(path))] == ["inside"]
+
+
+@pytest.mark.parametrize("up", UP_AXES)
+def test_up(up: str) -> None:
+    """A scene turned so that another axis points up looks the same as before from the orbit, all around."""
+    axis = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+    right = np.eye(3)[1 if up[-1] == "x" else 0]
+    turn = np.stack([right, -axis, np.cross(right, -axis)], axis=1)  # from x right, y down, z forward
+    assert np.linalg.det(turn) == 1
+    count = 401  # its quantiles are the same samples from either end
+    means = np.random.default_rng(SEED).uniform(-1, 1, (count, 3)) * [2, 1, 0.5] + [3, -7, 11]
+    balls = (np.full((count, 3), 0.01), np.tile([1.0, 0, 0, 0], (count, 1)), np.full(count, 0.5), np.zeros((count, 1, 3)))
+    before, after = find_cameras(Scene(means, *balls)), find_cameras(Scene(means @ turn.T, *balls), up=up)
+    assert len(before) == len(after) == ORBIT_VIEWS
+    for a, b in zip(before, after, strict=True):
+        assert -b.rotation[:, 1] @ axis > 0.9 and b.position @ axis > (means @ turn.T @ axis).mean()  # upright, from above
+        seen, wanted = (project(Scene(m, *balls), c) for m, c in ((means @ turn.T, b), (means, a)))
+        assert len(seen.index) == len(wanted.index) == count
+        assert np.abs(seen.mean[np.argsort(seen.index)] - wanted.mean[np.argsort(wanted.index)]).max() < 1e-2
+
+
+def test_up_turns_only_the_orbit(tmp_path: Path) -> None:
+    scene = samples.random_scene(SEED)
+    default, same = find_cameras(scene), find_cameras(scene, up=DEFAULT_UP)
+    assert all(np.array_equal(a.rotation, b.rotation) and np.array_equal(a.position, b.position) for a, b in zip(default, same, strict=True))
+    for bad in ("q", "", "-", "+z", "Z", "zz", "y "):
+        with pytest.raises(FlickerError, match="up: .*is not one of x, y, z, -x, -y, -z"):
+            find_cameras(scene, up=bad)
+    save_ply(scene, tmp_path / "a.ply")
+    scene = load_scene(tmp_path / "a.ply")
+    path = written(tmp_path, [entry()])
+    for cameras in (None, path):
+        with pytest.raises(FlickerError, match="up: z: .*cameras.json"):
+            find_cameras(scene, cameras, up="z")
+        with pytest.raises(FlickerError, match="up: z: .*cameras.json"):
+            camera_count(scene.path, cameras, up="z")

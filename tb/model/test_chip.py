@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import chip_tables as tables
 import numpy as np
 import pytest
 from chip_samples import camera, turned_camera
@@ -16,24 +17,22 @@ from typer.testing import CliRunner
 
 from flicker import markdown
 from flicker.chip import constants
-import chip_tables as tables
 from flicker.chip.clusters import build_clusters, cull, morton_order
-from flicker.cli.main import app
+from flicker.chip.compare import chip_estimates, estimate
 from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, simulate
 from flicker.chip.execute import run_scheme
-from flicker.chip.compare import chip_estimates, estimate
 from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
 from flicker.chip.memory import MemoryFormat, layout, through_memory
 from flicker.chip.schemes import RECOMMENDED, SCHEMES, Grain
+from flicker.cli.main import app
 from flicker.errors import FlickerError
 from flicker.explore.configurations import get_configuration, run
 from flicker.explore.machine import subtile_cycles
-from flicker.front.view import View
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
+from flicker.front.view import View
 from flicker.scene.files import save_ply
-
 
 # ---- constants ---------------------------------------------------------------------------------
 

@@ -20,7 +20,6 @@ from flicker.errors import FlickerError
 from flicker.front.records import build_lists
 from flicker.params import RenderConfig
 
-
 # ---- sorting -----------------------------------------------------------------------------------
 
 

@@ -7,16 +7,19 @@ shows that the engines and the files fit together.
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scene_samples as samples
 
 from flicker.scene.demo import write_demo
-from flicker.scene.image import load_picture
 from flicker.scene.files import load_scene, save_ply
+from flicker.scene.image import load_picture
 
 
 def flicker(*args: object) -> subprocess.CompletedProcess:
@@ -89,6 +92,38 @@ def test_bad_gaussians_are_reported(demo, tmp_path):
     assert all(reason in run.stdout for reason in stats["gaussians_left_out"])
 
 
+def test_scenes_as_people_have_them(demo, tmp_path):
+    """A SOG folder, its meta.json and a zip give one picture; a wrong suffix one line of warning; --up another orbit."""
+    files = samples.sog_files(samples.random_scene(1))
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    with zipfile.ZipFile(tmp_path / "robot.zip", "w") as bundle:
+        for name, data in files.items():
+            bundle.writestr("robot/" + name, data)
+    shutil.copy(tmp_path / "robot.zip", tmp_path / "robot.ply")
+
+    def run(scene, *args) -> tuple[dict, str, str]:
+        path = tmp_path / "s.json"
+        done = flicker("render", scene, "--size", "64x48", "--out", tmp_path / "p.png", "--stats", path, *args)
+        assert done.returncode == 0, done.stderr
+        return json.loads(path.read_text()) | {"picture": load_picture(tmp_path / "p.png").tobytes()}, done.stdout, done.stderr
+
+    found = {name: run(tmp_path / name) for name in ("robot", "robot/meta.json", "robot.zip", "robot.ply")}
+    stats = [f[0] for f in found.values()]
+    for key in ("gaussians", "visible", "subtile_pairs", "minitiles_sent", "picture"):
+        assert all(s[key] == stats[0][key] for s in stats)
+    assert stats[0]["gaussians"] == 300
+    assert "robot, view 0" in found["robot"][1] and "robot, view 0" in found["robot/meta.json"][1]
+    assert all(found[name][2] == "" for name in ("robot", "robot/meta.json", "robot.zip"))
+    warning = found["robot.ply"][2]
+    assert warning.startswith("flicker: warning: ") and warning.count("\n") == 1 and "robot.ply" in warning
+
+    turned = {up: run(folder, "--up", up)[0]["picture"] for up in ("-y", "z", "-z")}
+    assert turned["-y"] == stats[0]["picture"] and len(set(turned.values())) == 3
+
+
 BAD = {
     "missing file": (["nowhere.ply"], "nowhere.ply"),
     "unknown format": (["{here}/test.txt"], "test.txt"),
@@ -96,6 +131,10 @@ BAD = {
     "no cameras file": (["{scene}", "--cameras", "nowhere.json"], "nowhere.json"),
     "view out of range": (["{scene}", "--view", "99"], "view"),
     "negative view": (["{scene}", "--view=-1"], "view"),
+    "streamed SOG": (["{here}/lod-meta.json"], "give"),
+    "folder": (["{here}"], "meta.json"),
+    "no axis": (["{scene}", "--up", "w"], "up: 'w'"),
+    "orbit with cameras": (["{scene}", "--up", "z"], "cameras.json"),
     "zero size": (["{scene}", "--size", "0x10"], "width"),
     "absurd size": (["{scene}", "--size", "64x1000000"], "height"),
     "no size": (["{scene}", "--size", "big"], "--size"),
@@ -113,6 +152,7 @@ BAD = {
 def test_bad_input(case, demo, tmp_path):
     """One line on standard error that names the culprit, exit code 2, nothing written."""
     (tmp_path / "test.txt").write_text("not a scene")
+    (tmp_path / "lod-meta.json").write_text('{"filenames": ["0_0/meta.json"]}')
     (tmp_path / "cut.ply").write_bytes((demo / "demo.ply").read_bytes()[:5000])
     before = sorted(tmp_path.iterdir())
     args, named = BAD[case]

@@ -1,4 +1,5 @@
-"""Configurations and their mask generators: equal to the golden model where it has the same mode, against plain restatements elsewhere, and proved masks without a miss.
+"""Configurations and their mask generators: equal to the golden model where it has the same mode, against plain restatements elsewhere, and
+proved masks without a miss.
 
 Rationale: a proof can have a hole, so every generator that claims it never misses is run on splats made to break it: axis ratios up to
 10,000, means up to 5,000 pixels away, opacities at 1/255, records of random bits, the demo scene, and real scenes where
@@ -18,25 +19,25 @@ import pytest
 from flicker_tb import splats
 from flicker_tb.runner import seed
 
-from flicker.scene.demo import demo_cameras, generate
-from flicker.errors import FlickerError
 from flicker.arithmetic.formats import E4M3, E5M2, FP16
-from flicker.front.records import SubtileLists
-from flicker.golden.render import render_golden
-from flicker.golden.vru import ALPHA_MIN, PAIR_FIELDS, alpha_of, pair
+from flicker.arithmetic.numbers import DOWN, E4M4, E5M3, E5M6, FORMATS, NEAREST, UP, numbers, quantise
+from flicker.arithmetic.thresholds import radii, thresholds
+from flicker.cost.operations import Op
+from flicker.errors import FlickerError
 from flicker.explore.configurations import CONFIGURATIONS, get_configuration, run
 from flicker.explore.generators.contribution import Untested
-from flicker.front.view import View, load_view
-from flicker.scene.real import REAL_VIEWS, real_scenes
-from flicker.explore.generators.rows import RowFormat, inverse_radius, root_table, row_masks
 from flicker.explore.generators.exact import exact_masks, margins
-from flicker.arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, E4M4, E5M3, E5M6, numbers, quantise
-from flicker.cost.operations import Op
-from flicker.golden.masked import ACCUMULATOR_INT_BITS, accumulate, missed_pixels, pixel_tests
-from flicker.arithmetic.thresholds import radii, thresholds
-from flicker.scene.metrics import psnr
-from flicker.params import Form
+from flicker.explore.generators.rows import RowFormat, inverse_radius, root_table, row_masks
+from flicker.front.records import SubtileLists
 from flicker.front.reference import render_reference
+from flicker.front.view import View, load_view
+from flicker.golden.masked import ACCUMULATOR_INT_BITS, accumulate, missed_pixels, pixel_tests
+from flicker.golden.render import render_golden
+from flicker.golden.vru import ALPHA_MIN, PAIR_FIELDS, alpha_of, pair
+from flicker.params import Form
+from flicker.scene.demo import demo_cameras, generate
+from flicker.scene.metrics import psnr
+from flicker.scene.real import REAL_VIEWS, real_scenes
 
 PROVED = [c.name for c in CONFIGURATIONS.values() if c.generator.exact and not c.generator.free]
 

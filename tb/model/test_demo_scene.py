@@ -11,11 +11,11 @@ import hashlib
 import numpy as np
 import pytest
 
-from flicker.scene.camera import load_cameras
-from flicker.scene.demo import demo_cameras, generate, write_demo
 from flicker.errors import FlickerError
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
+from flicker.scene.camera import load_cameras
+from flicker.scene.demo import demo_cameras, generate, write_demo
 from flicker.scene.files import load_scene
 
 ARRAYS = ("means", "scales", "quats", "opacities", "sh")

@@ -13,12 +13,12 @@ import pytest
 from flicker_tb import splats
 from flicker_tb.runner import seed
 
-from flicker.scene.camera import Camera
-from flicker.golden.cat import DENSE_RECTS, SCRATCH, SPARSE_RECTS, splat_mask, threshold, trace_rect
 from flicker.front.records import build_lists
+from flicker.golden.cat import DENSE_RECTS, SCRATCH, SPARSE_RECTS, splat_mask, threshold, trace_rect
 from flicker.golden.render import COUNTS, minitile, render_golden, stream_order
 from flicker.golden.vru import PAIR_FIELDS, pair
 from flicker.params import CatMode, Coords, Form, Precision, RenderConfig
+from flicker.scene.camera import Camera
 
 
 def floats(features) -> np.ndarray:

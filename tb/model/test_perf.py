@@ -10,18 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flicker.scene.demo import demo_cameras, generate
 from flicker.errors import FlickerError
 from flicker.explore.configurations import run
 from flicker.explore.stages.channels import barrier_cycles
 from flicker.explore.stages.subtile import gscore_cycles
+from flicker.front.projection import project
 from flicker.front.view import View
-from flicker.perf.work import Work
 from flicker.params import CatMode, RenderConfig, vru_stages
 from flicker.perf.lane_stage import LaneStage, lane_of_pixel, simulate_lanes
 from flicker.perf.pixel_stage import GENERATOR_LATENCY, simulate_pixels
 from flicker.perf.render_stage import simulate
-from flicker.front.projection import project
+from flicker.perf.work import Work
+from flicker.scene.demo import demo_cameras, generate
 
 OFF = RenderConfig(cat=CatMode.OFF)
 

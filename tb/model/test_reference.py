@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
@@ -16,13 +17,13 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import Camera, load_cameras
 from flicker.errors import FlickerError
-from flicker.scene.image import load_picture, save_png
-from flicker.scene.metrics import psnr, ssim
 from flicker.front.projection import project
 from flicker.front.reference import render_reference, render_with_transmittance
+from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.files import Scene, load_scene
+from flicker.scene.image import load_picture, save_png
+from flicker.scene.metrics import psnr, ssim
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 
@@ -244,13 +245,15 @@ def test_metrics_and_pictures(tmp_path: Path) -> None:
 SCENES = {"flowers": "flowers.compressed.ply", "guitar": "guitar.ply", "playbot": "playbot.sog", "stpeter": "st-peter.sog"}
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_real_scenes(name: str) -> None:
-    """Every stored reference picture (8 bits, so about 58 dB is what agreement guarantees)."""
+@pytest.mark.parametrize(("name", "unpacked"), [*((name, False) for name in SCENES), ("stpeter", True)])
+def test_real_scenes(name: str, unpacked: bool, tmp_path: Path) -> None:
+    """Every stored reference picture (8 bits, so about 58 dB is what agreement guarantees), of a SOG also unpacked."""
     if "FLICKER_SCENES" not in os.environ:
         pytest.skip("FLICKER_SCENES names no folder of real scenes")
     folder = Path(os.environ["FLICKER_SCENES"]) / name
-    scene = load_scene(folder / SCENES[name])
+    if unpacked:
+        zipfile.ZipFile(folder / SCENES[name]).extractall(tmp_path)
+    scene = load_scene(tmp_path if unpacked else folder / SCENES[name])
     assert scene.rejected == {}
     for k, camera in enumerate(load_cameras(folder / "cameras.json")):
         picture = render_reference(project(scene, camera), camera)

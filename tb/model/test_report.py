@@ -19,21 +19,18 @@ from scene_samples import random_scene
 from scipy.signal import convolve2d
 from typer.testing import CliRunner
 
-from flicker.scene import metrics
+from flicker.cli.main import app
 from flicker.errors import FlickerError
 from flicker.explore import facts
 from flicker.explore.evaluate import evaluate
 from flicker.explore.points import SceneFile, Target
 from flicker.explore.store import Store
+from flicker.explore.sweep import load_sweep, run_sweep
 from flicker.front.view import DEMO, load_view
 from flicker.params import Form
-from flicker.report import claims
-from flicker.report import collect
-from flicker.report import figures
-from flicker.report import page
-from flicker.cli.main import app
+from flicker.report import claims, collect, figures, page
 from flicker.report.write import SUMMARY, check, write_report
-from flicker.explore.sweep import load_sweep, run_sweep
+from flicker.scene import metrics
 from flicker.scene.files import save_ply
 
 SIZE = 160, 90
@@ -283,7 +280,10 @@ def _view(title: str, **values) -> collect.ViewResult:
 
 def test_bounds_stand_in_no_front():
     """Free masks beat everything here and are in no front; the RTL has its own; the page's points say which they are."""
-    made = {"oracle": (1.0, 90.0, True), "lanes": (2.0, 70.0, True), "flicker": (3.0, 40.0, False), "no-ctu-64": (4.0, 65.0, False), "faithful": (5.0, 30.0, False)}
+    made = {
+        "oracle": (1.0, 90.0, True), "lanes": (2.0, 70.0, True), "flicker": (3.0, 40.0, False), "no-ctu-64": (4.0, 65.0, False),
+        "faithful": (5.0, 30.0, False),
+    }
     view = _view("one")
     view.rows = {
         name: {"config": name, "title": name, "cycles": cycles, "psnr_db": db, "ssim": 1.0, "flip": 0.0, "area_ge": 1.0, "energy_uj": 1.0, "model_only": model}
@@ -304,7 +304,9 @@ def test_verdicts_are_computed():
     views = [_view("one", x=1.0), _view("two", x=3.0)]
 
     def claim(limit, **more):
-        return claims.Claim("3a", "text", "2", lambda v: v.rows["a"]["x"], lambda x: x >= limit, f"at least {limit}", "{:.1f}", lambda v: f"x is {v.rows['a']['x']}", **more)
+        return claims.Claim(
+            "3a", "text", "2", lambda v: v.rows["a"]["x"], lambda x: x >= limit, f"at least {limit}", "{:.1f}", lambda v: f"x is {v.rows['a']['x']}", **more
+        )
 
     assert claim(1).judge(views).verdict == "holds (at least 1)" and claim(1).judge(views).kind == "yes"
     none = claim(4).judge(views)
@@ -360,8 +362,8 @@ def test_few_configurations(scene, tmp_path):
     (["nothing.ply"], "nothing.ply: no such scene"),
     (["SCENE:8"], "view 8: there are"),
     (["SCENE", "SCENE"], "is there twice"),
-    (["FOLDER"], "not a readable file"),
-    (["NOTES"], "not a scene file"),
+    (["FOLDER"], "meta.json"),
+    (["NOTES"], "unknown format"),
     (["SCENE", "--configs", "faithfull"], "configuration 'faithfull' is unknown; close names: faithful"),
     (["SCENE", "--configs", "faithful,,"], "an empty name"),
     (["SCENE", "--size", "12"], "expected WxH"),

@@ -2,14 +2,19 @@
 
 Every format is written (by gsply, or here where gsply cannot), read back and compared value by value within its quantisation and
 as a picture; then damaged: named faults must give one line naming file and field, random damage must never give anything but a
-scene or a FlickerError. Not covered: files of other writers than gsply and
+scene or a FlickerError. SOG also as folders and zips, files also under wrong names. Not covered: files of other writers than gsply and
 these tests (real ones are in test_reference.py), higher harmonics in SOG version 1.
 """
 
 from __future__ import annotations
 
+import gzip
+import hashlib
 import json
 import os
+import tempfile
+import warnings
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,12 +22,24 @@ import numpy as np
 import pytest
 import scene_samples as samples
 
-from flicker.scene.camera import orbit_camera
-from flicker.errors import FlickerError
-from flicker.scene.metrics import psnr
+from flicker.errors import FlickerError, FlickerWarning
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
-from flicker.scene.files import Scene, load_scene, save_ply
+from flicker.scene.camera import orbit_camera
+from flicker.scene.files import (
+    KINDS,
+    SCENE_SUFFIXES,
+    Scene,
+    is_scene_path,
+    load_scene,
+    save_ply,
+    scene_digest,
+    scene_files,
+    scene_kind,
+    scene_name,
+    scene_title,
+)
+from flicker.scene.metrics import psnr
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 # Largest error of positions, of the logarithm of scales, of rotation matrices, of opacities, of SH coefficients.
@@ -276,10 +293,20 @@ def sog_meta(change: Callable[[dict], None], tmp_path: Path) -> Path:
     (lambda m: m.update(version=3), ("version",)),
     (lambda m: m["means"].update(mins=[0.0]), ("means.mins", "3 numbers")),
     (lambda m: m["means"].update(maxs=[0.0, float("nan"), 1.0]), ("means.maxs", "not finite")),
-    (lambda m: m["means"].update(files=[]), ("damaged",)),
+    (lambda m: m.update(count=None), ("count: not a number",)),
+    (lambda m: m.pop("quats"), ("'quats' is missing",)),
+    (lambda m: m["means"].update(mins=[0.0, [1], 2]), ("means.mins", "3 numbers")),
+    (lambda m: m["means"].update(files=[]), ("means.files", "2 names")),
+    (lambda m: m["sh0"].update(files=["../sh0.webp"]), ("sh0.files", "'../sh0.webp'")),
+    (lambda m: m["sh0"].update(files=["/sh0.webp"]), ("sh0.files", "'/sh0.webp'")),
+    (lambda m: m["sh0"].update(files=["meta.json"]), ("meta.json: not a WebP picture",)),
+    (lambda m: m.update(quats=3), ("quats.files", "a name")),
     (lambda m: m["scales"].update(codebook=[0.0] * 7), ("scales.codebook", "256 numbers")),
-    (lambda m: m["sh0"].update(codebook=["a"] * 256), ("damaged",)),
-    (lambda m: m["shN"].update(bands=4), ("damaged",)),
+    (lambda m: m["sh0"].update(codebook=["a"] * 256), ("sh0.codebook", "256 numbers")),
+    (lambda m: m["shN"].update(bands=4), ("shN.bands",)),
+    (lambda m: m["shN"].update(codebook=[0.5] * 255), ("shN.codebook", "256 numbers")),
+    (lambda m: m["shN"].pop("codebook"), ("shN: 'codebook' is missing",)),
+    (lambda m: m["shN"].pop("count"), ("shN.count",)),
     (lambda m: m["shN"].update(bands=2), ("width",)),
     (lambda m: m["sh0"].update(files=["gone.webp"]), ("gone.webp",)),
 ])
@@ -292,6 +319,238 @@ def test_sog_without_meta(tmp_path: Path) -> None:
     del files["meta.json"]
     (tmp_path / "a.sog").write_bytes(samples.sog_bundle(files))
     refused(tmp_path / "a.sog", "meta.json is missing")
+
+
+# ---------------------------------------------------------------------------------------------- folders, zips, other names
+
+
+def unpacked(folder: Path, files: dict[str, bytes]) -> Path:
+    folder.mkdir(parents=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    return folder
+
+
+def same(a: Scene, b: Scene) -> bool:
+    """Bit for bit."""
+    pairs = [(getattr(a, k), getattr(b, k)) for k in ("means", "scales", "quats", "opacities", "sh")]
+    return a.rejected == b.rejected and all(np.array_equal(x, y) for x, y in pairs)
+
+
+def forms_of_sog(tmp_path: Path, files: dict[str, bytes]) -> dict[str, Path]:
+    """Every form in which people have a SOG, but the bundle."""
+    folder = unpacked(tmp_path / "folder" / "robot.v2", files)
+    zips = {
+        "zip": files, "leading": {"robot/" + k: v for k, v in files.items()}, "deep": {"a/b c/" + k: v for k, v in files.items()},
+        "mac": {"robot/" + k: v for k, v in files.items()} | {"__MACOSX/robot/._" + k: b"x" for k in files} | {"__MACOSX/robot/meta.json": b"x"},
+        "windows": {"robot\\" + k: v for k, v in files.items()}, "bundle in zip": {"robot.sog": samples.sog_bundle(files), "readme.txt": b"x"},
+    }
+    paths = {}
+    for name, members in zips.items():
+        paths[name] = tmp_path / f"{name}.zip"
+        paths[name].write_bytes(samples.sog_bundle(members))
+    with zipfile.ZipFile(tmp_path / "deflated.zip", "w", zipfile.ZIP_DEFLATED) as bundle:
+        bundle.mkdir("robot")
+        for name, data in files.items():
+            bundle.writestr("robot/" + name, data)
+    leading = tmp_path / "leading.sog"
+    leading.write_bytes(paths["leading"].read_bytes())
+    return paths | {"folder": folder, "meta": folder / "meta.json", "deflated": tmp_path / "deflated.zip", "leading sog": leading}
+
+
+@pytest.fixture
+def no_leftovers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Temporary files go to a folder that must be empty at the end; warnings are errors, where a test does not expect them."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_forms_of_sog(version: int, tmp_path: Path, no_leftovers: None) -> None:
+    """Folder, meta.json and all zips give what the bundle gives, and leave nothing behind."""
+    files = (samples.sog_files_v1 if version == 1 else samples.sog_files)(samples.random_scene(SEED, degree=0 if version == 1 else 3))
+    bundle = tmp_path / "a.sog"
+    bundle.write_bytes(samples.sog_bundle(files))
+    wanted = load_scene(bundle)
+    assert len(wanted) == 300
+    for name, path in forms_of_sog(tmp_path, files).items():
+        scene = load_scene(path)
+        assert same(scene, wanted) and scene.path == path, name
+        assert is_scene_path(path) and scene_kind(path) == ("SOG" if name in ("folder", "meta") else "zip")
+
+
+@pytest.mark.parametrize("name", ["playbot/playbot.sog", "stpeter/st-peter.sog"])
+def test_forms_of_real_sog(name: str, tmp_path: Path, no_leftovers: None) -> None:
+    if "FLICKER_SCENES" not in os.environ:
+        pytest.skip("FLICKER_SCENES names no folder of real scenes")
+    path = Path(os.environ["FLICKER_SCENES"]) / name
+    with zipfile.ZipFile(path) as bundle:
+        files = {k: bundle.read(k) for k in bundle.namelist()}
+    wanted = load_scene(path)
+    forms = forms_of_sog(tmp_path, files)
+    for form in ("folder", "meta", "leading", "bundle in zip"):
+        assert same(load_scene(forms[form]), wanted), form
+
+
+@pytest.mark.parametrize("name", ["ply", "compressed", "spz3", "splat"])
+def test_zip_of_one_file(name: str, tmp_path: Path, no_leftovers: None) -> None:
+    path = samples.write(tmp_path, name, samples.random_scene(SEED, count=20, degree=0))
+    packed = tmp_path / "packed.zip"
+    packed.write_bytes(samples.sog_bundle({"data/" + path.name: path.read_bytes(), "data/cameras.json": b"[]"}))
+    assert same(load_scene(packed), load_scene(path))
+    packed.write_bytes(samples.sog_bundle({"data/" + path.name: path.read_bytes()[:-5]}))
+    refused(packed, "packed.zip")
+    packed.write_bytes(samples.sog_bundle({"data/" + path.name: path.read_bytes(), "b.ply": b"x"}))
+    refused(packed, "2 scene files", "b.ply")
+
+
+def test_faults_inside_a_zip_name_the_member(tmp_path: Path, no_leftovers: None) -> None:
+    path = samples.write(tmp_path, "ply", samples.random_scene(SEED, count=20))
+    edited(path, b"property float x\n", b"property float q\n")
+    packed = tmp_path / "packed.zip"
+    packed.write_bytes(samples.sog_bundle({"data/a.ply": path.read_bytes()}))
+    refused(packed, f"{packed}: data/a.ply: element 'vertex': property 'x' is missing")
+    packed.write_bytes(samples.sog_bundle({"data/a.sog": samples.sog_bundle({"data/a.ply": b"ply"})}))
+    refused(packed, f"{packed}: data/a.sog: meta.json is missing")  # nothing is unpacked twice
+    packed.write_bytes(samples.sog_bundle({"readme.txt": b"x"}))
+    refused(packed, "meta.json is missing", ".ply")
+
+
+@pytest.mark.parametrize("form", ["folder", "meta", "zip", "leading", "bundle in zip"])
+def test_bad_members_are_named(form: str, tmp_path: Path, no_leftovers: None) -> None:
+    """Damaged, missing, encrypted, of the wrong size."""
+    files = samples.sog_files(samples.random_scene(SEED, count=20, degree=1))
+    small = samples.sog_files(samples.random_scene(SEED, count=4, degree=1))
+
+    def path_of(changes: dict[str, bytes | None], into: str) -> Path:
+        changed = {k: v for k, v in (files | changes).items() if v is not None}
+        return forms_of_sog(tmp_path / into, changed)[form]
+
+    for name in files:
+        if name == "meta.json":
+            continue
+        refused(path_of({name: files[name][:40]}, "cut " + name), name, "not a WebP picture, or damaged")
+        refused(path_of({name: b""}, "empty " + name), name, "not a WebP picture, or damaged")
+        refused(path_of({name: None}, "no " + name), name)
+        if name != "shN_centroids.webp":
+            refused(path_of({name: small[name]}, "small " + name), name.split("_")[0].removesuffix(".webp"), "too small")
+    refused(path_of({"meta.json": b"{"}, "json"), "meta.json", "not JSON")
+    refused(path_of({"meta.json": b"[1]"}, "list"), "meta.json", "'means' is missing")
+    refused(path_of({"meta.json": b"\xff"}, "text"), "meta.json", "not JSON")
+
+
+def test_damaged_member_of_a_zip(tmp_path: Path) -> None:
+    """A checksum that does not fit, and a password."""
+    files = samples.sog_files(samples.random_scene(SEED, count=20))
+    data = samples.sog_bundle(files)
+    place = data.index(files["quats.webp"]) + 30
+    path = tmp_path / "a.zip"
+    path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    refused(path, "quats.webp", "CRC")
+    locked = bytearray(data)
+    entry = data.rindex(b"quats.webp") - 46  # of the central directory
+    locked[entry + 8] |= 1
+    path.write_bytes(locked)
+    refused(path, "quats.webp", "encrypted")
+
+
+def test_several_scenes_in_a_zip(tmp_path: Path) -> None:
+    files = samples.sog_files(samples.random_scene(SEED, count=20))
+    path = tmp_path / "a.zip"
+    path.write_bytes(samples.sog_bundle({f"{k}/{name}": data for k in "abc" for name, data in files.items()}))
+    refused(path, "3 SOG scenes (a/meta.json, b/meta.json, ...)")
+
+
+@pytest.mark.parametrize(("finest", "words"), [
+    ([0], ("give its finest level, 0_0/meta.json",)),
+    ([0, 1], ("one of the 2 parts of its finest level, such as 0_0/meta.json", ".ply or .sog it was made from")),
+    (None, (".ply or .sog it was made from",)),
+])
+def test_streamed_sog(finest: list[int] | None, words: tuple[str, ...], tmp_path: Path) -> None:
+    """Refused with what to give instead, as a file, as its folder and in a zip; its parts are scenes."""
+    index = {"version": 1, "lodLevels": 2, "filenames": ["0_0/meta.json", "0_1/meta.json", "1_0/meta.json"]}
+    if finest is not None:
+        index["tree"] = {"bound": {}, "children": [
+            {"bound": {}, "lods": {"0": {"file": k, "offset": 0, "count": 20}, "1": {"file": 2, "offset": 0, "count": 9}}} for k in finest
+        ]}
+    (tmp_path / "city").mkdir()
+    lod = tmp_path / "city" / "lod-meta.json"
+    lod.write_text(json.dumps(index))
+    files = samples.sog_files(samples.random_scene(SEED, count=20))
+    part = unpacked(tmp_path / "city" / "0_0", files)
+    packed = tmp_path / "city.zip"
+    packed.write_bytes(samples.sog_bundle({"city/lod-meta.json": lod.read_bytes()} | {"city/0_0/" + k: v for k, v in files.items()}))
+    for path in (lod, lod.parent, packed):
+        refused(path, "lod-meta.json", "streamed SOG", *words)
+        assert not is_scene_path(path) or path == packed
+    assert len(load_scene(part)) == 20
+
+
+@pytest.mark.parametrize("name", [n for n in samples.WRITERS if n != "splat"])
+@pytest.mark.parametrize("suffix", [".ply", ".spz", ".sog", ".zip", ".splat", ".dat", ""])
+def test_content_decides(name: str, suffix: str, tmp_path: Path) -> None:
+    """A wrong suffix is read by content with one warning; a right one without."""
+    path = samples.write(tmp_path, name, samples.random_scene(SEED, count=20, degree=0))
+    kind = scene_kind(path)
+    wanted = load_scene(path)
+    other = path.rename(tmp_path / ("b" + suffix))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        scene = load_scene(other)
+    assert same(scene, wanted) and scene_kind(other) == kind and is_scene_path(other)
+    if suffix in KINDS[kind].suffixes:
+        assert caught == []
+    else:
+        (warning,) = caught
+        text = str(warning.message)
+        assert warning.category is FlickerWarning and "\n" not in text and text.startswith(f"{other}: ") and KINDS[kind].title in text
+
+
+def test_splat_needs_its_suffix(tmp_path: Path) -> None:
+    """Nothing in it tells a .splat; and gzip of something else is no SPZ, whatever a .splat begins with."""
+    path = samples.write(tmp_path, "splat", samples.random_scene(SEED, count=20, degree=0))
+    data = bytearray(path.read_bytes())
+    (tmp_path / "a.bin").write_bytes(data)
+    refused(tmp_path / "a.bin", "unknown format '.bin'")
+    data[:4] = b"\x1f\x8b\x08\x3e"
+    path.write_bytes(data)
+    assert scene_kind(path) == "splat" and len(load_scene(path)) == 20
+    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(b"ply\n"))
+    refused(tmp_path / "a.ply.gz", "unknown format '.gz'")
+
+
+def test_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kinds, names, files and digests of scenes, and what is none."""
+    assert set(SCENE_SUFFIXES) == {".ply", ".spz", ".sog", ".zip", ".splat"}
+    files = samples.sog_files(samples.random_scene(SEED, count=20))
+    folder = unpacked(tmp_path / "St. Peter", files)
+    ply = samples.write(tmp_path, "compressed", samples.random_scene(SEED, count=20))
+    assert [scene_name(p) for p in (folder, folder / "meta.json", ply)] == ["St. Peter", "St. Peter", "a"]
+    assert [scene_title(p) for p in (folder, folder / "meta.json", ply)] == ["St. Peter", "St. Peter", "a.compressed.ply"]
+    assert scene_files(ply) == [ply] and scene_digest(ply) == hashlib.sha256(ply.read_bytes()).hexdigest()
+    for path in (folder, folder / "meta.json"):
+        assert sorted(scene_files(path)) == sorted(folder / name for name in files)
+    digest = scene_digest(folder)
+    assert digest == scene_digest(folder / "meta.json")
+    (folder / "more.txt").write_text("not of the scene")
+    assert scene_digest(folder) == digest
+    (folder / "quats.webp").write_bytes(files["quats.webp"] + b"x")
+    assert scene_digest(folder) != digest
+    (folder / "quats.webp").unlink()
+    with pytest.raises(FlickerError, match="quats.webp"):
+        scene_digest(folder)
+    monkeypatch.chdir(folder)
+    assert scene_name("meta.json") == scene_name(".") == "St. Peter"
+    (tmp_path / "cameras.json").write_text("[]")
+    for path in (tmp_path / "cameras.json", tmp_path, tmp_path / "none.ply", folder / "more.txt"):
+        assert not is_scene_path(path)
+    refused(tmp_path / "cameras.json", "not the meta.json of a SOG")
+    refused(tmp_path, "a folder without meta.json", "a.compressed.ply")
 
 
 def test_all_gaussians_bad(tmp_path: Path) -> None:

@@ -16,16 +16,16 @@ from flicker_tb.runner import seed
 from rich.console import Console
 from typer.testing import CliRunner
 
-from flicker.errors import FlickerError
-from flicker.front.records import build_lists
-from flicker.explore.configurations import run
-from flicker.front.view import View
-from flicker.params import Coords, RenderConfig
-from flicker.explore.stability import BROKEN_PSNR, FAMILIES, Stability, break_table, run_stability, write_csv, write_pictures
 from flicker.cli.main import app
+from flicker.errors import FlickerError
+from flicker.explore.configurations import run
+from flicker.explore.stability import BROKEN_PSNR, FAMILIES, Stability, break_table, run_stability, write_csv, write_pictures
 from flicker.explore.stability.families import SIZE, crop
 from flicker.explore.stability.run import ABSOLUTE, suite
 from flicker.explore.stability.write import check_folder
+from flicker.front.records import build_lists
+from flicker.front.view import View
+from flicker.params import Coords, RenderConfig
 
 
 @pytest.fixture(scope="module")
@@ -79,9 +79,9 @@ def test_repeatable():
 def test_window_of_a_large_screen():
     """A cropped window has the sub-tile lists of the whole screen, with local and with absolute coordinates."""
     family = FAMILIES["screen"]
-    from flicker.scene.camera import Camera
-    from flicker.front.projection import project
     from flicker.explore.stability.families import _scene
+    from flicker.front.projection import project
+    from flicker.scene.camera import Camera
 
     wide = Camera(1024, 1024, 1024.0, 1024.0, np.zeros(3), np.eye(3))
     rng = np.random.default_rng(seed())

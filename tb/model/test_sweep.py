@@ -19,11 +19,11 @@ from scene_samples import random_scene
 from flicker.errors import FlickerError
 from flicker.explore.evaluate import evaluate
 from flicker.explore.store import plain
-from flicker.front.view import load_view
-from flicker.scene.files import save_ply
 from flicker.explore.sweep import load_results, load_sweep, run_sweep
 from flicker.explore.sweep.results import KEY
 from flicker.explore.sweep.run import connect
+from flicker.front.view import load_view
+from flicker.scene.files import save_ply
 
 CONFIGURATIONS = ["no-ctu-32", "no-ctu-64", "gscore", "oracle", "flicker-*-fp16-factored", "flicker-*-mixed-factored"]
 
@@ -134,7 +134,7 @@ def test_hash_follows_content(folder):
 
 @pytest.mark.parametrize(("changes", "message"), [
     ({"scenes": ["no.ply"]}, r"scenes\[0\]: .*no.ply: no such file"),
-    ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*expected .ply"),
+    ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*unknown format"),
     ({"scenes": [{"path": "tiny.ply", "camera": "x"}]}, r"scenes\[0\]: unknown key 'camera'; did you mean 'cameras'"),
     ({"scenes": [{"path": "tiny.ply", "cameras": "x.json"}]}, r"scenes\[0\]: cameras: .*x.json: no such file"),
     ({"scenes": ["tiny.ply", "tiny.ply"]}, "is there twice"),

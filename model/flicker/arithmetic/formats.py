@@ -8,7 +8,7 @@ most 22 significant bits; a sum is a multiple of 2^-24 below 2^17, so 41 bits; f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -117,7 +117,7 @@ class FloatFormat:
         return self.decode(self.encode(x))
 
 
-@lru_cache(maxsize=None)
+@cache
 def _values(fmt: FloatFormat) -> np.ndarray:
     """Value of every bit pattern, float64."""
     bits = np.arange(1 << fmt.width)

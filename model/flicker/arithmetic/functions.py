@@ -21,7 +21,6 @@ from numba.extending import intrinsic
 from .formats import FP16, FloatFormat
 
 
-
 @intrinsic
 def _bits_of(typingctx, x):
     """float32 to its bit pattern, int32."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
+from ..params import Form
 from .formats import FP16
 from .functions import log_opacity
-from ..params import Form
 
 EPSILON = 2.0**-11  # unit roundoff of FP16
 
 
-@lru_cache(maxsize=None)
+@cache
 def thresholds(form: Form) -> np.ndarray:
     """float64 (65536,): log(255 o) of every FP16 opacity, rounded up to FP16, in the base of the form; what `flk_log_opacity` gives.
 
@@ -22,7 +22,7 @@ def thresholds(form: Form) -> np.ndarray:
     return FP16.decode(log_opacity(np.arange(1 << 16).astype(np.uint16), form == Form.FACTORED, FP16))
 
 
-@lru_cache(maxsize=None)
+@cache
 def radii(form: Form) -> np.ndarray:
     """float64 (65536,): rho(o), which bounds sqrt(u^2 + v^2) of every pair that passes the VRU's alpha test, roundings included.
 

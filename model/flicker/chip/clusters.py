@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..scene.camera import Camera
 from ..errors import FlickerError
-from ..params import TILE
 from ..front.projection import _CLAMP, DILATION, NEAR
+from ..params import TILE
+from ..scene.camera import Camera
 from ..scene.files import Scene
 from .constants import CLUSTER_SIZE
 

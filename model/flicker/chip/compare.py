@@ -10,15 +10,17 @@ from ..explore.machine import Configuration, subtile_cycles
 from ..explore.stages.lanes import Lanes
 from ..front.view import View
 from .execute import SchemeResult, run_scheme
-from .frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare
+from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare
 
 
-def estimate(prepared: Prepared, configuration: Configuration, chip: ChipConfig = ChipConfig(), scheme_result: SchemeResult | None = None) -> FrameEstimate:
+def estimate(prepared: Prepared, configuration: Configuration, chip: ChipConfig = DEFAULT_CHIP, scheme_result: SchemeResult | None = None) -> FrameEstimate:
     """A frame with a configuration's rendering stage, by its cycle model."""
     work = draw(prepared.view, configuration).work
     cycles, counters = configuration.simulate(work)
-    own_places = counters is not None and not isinstance(configuration.stage, Lanes)  # lanes deal sub-tiles out otherwise
-    return frame_estimate(prepared, cycles, chip, scheme_result, subtile_cycles(work, counters) if own_places else None)
+    own_places = None  # lanes deal sub-tiles out otherwise
+    if counters is not None and not isinstance(configuration.stage, Lanes):
+        own_places = subtile_cycles(work, counters)
+    return frame_estimate(prepared, cycles, chip, scheme_result, own_places)
 
 
 def chip_estimates(view: View, names: Sequence[str]) -> dict[str, dict]:

@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..scene.camera import Camera
 from ..errors import FlickerError
 from ..front.records import SubtileLists
 from ..front.view import View
 from ..params import TILE, Form
+from ..scene.camera import Camera
 from . import constants as c
 from .clusters import Clusters, build_clusters, cull
 from .delivery import broadcast_cycles, consumed
@@ -55,6 +55,9 @@ class ChipConfig:
             raise FlickerError(f"chip: cluster_size must be {CHUNK} with chunks, not {self.cluster_size}")
         if self.cull_shape not in ("box", "sphere", "none"):
             raise FlickerError(f"chip: cull_shape must be box, sphere or none, not {self.cull_shape}")
+
+
+DEFAULT_CHIP = ChipConfig()
 
 
 @dataclass(eq=False)
@@ -195,7 +198,7 @@ def _parameter_streams(prepared: Prepared, chip: ChipConfig) -> tuple[list[Strea
 
 
 def frame_estimate(
-    prepared: Prepared, render_cycles: int, chip: ChipConfig = ChipConfig(), scheme_result: SchemeResult | None = None,
+    prepared: Prepared, render_cycles: int, chip: ChipConfig = DEFAULT_CHIP, scheme_result: SchemeResult | None = None,
     subtile_cycles: np.ndarray | None = None,
 ) -> FrameEstimate:
     """Estimate a frame. render_cycles: of the rendering stage, from its model or the RTL.

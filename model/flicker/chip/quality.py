@@ -6,13 +6,13 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..scene.camera import Camera
-from ..scene.metrics import psnr
 from ..explore.configurations import get_configuration
 from ..explore.machine import run
 from ..front.projection import Projected
-from ..front.view import View
 from ..front.reference import render_reference
+from ..front.view import View
+from ..scene.camera import Camera
+from ..scene.metrics import psnr
 from .clusters import build_clusters
 from .constants import CLUSTER_SIZE
 from .memory import MemoryFormat, layout, through_memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -53,18 +53,19 @@ def _show_frame(estimate) -> None:
 
 def chip(
     scene: Annotated[Path, typer.Argument(help="scene file")],
-    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
-    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     config: Annotated[str, typer.Option(help="configuration of the rendering stage (flicker report --list)")] = "flicker",
-    render_cycles: Annotated[Optional[int], typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
+    render_cycles: Annotated[int | None, typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
     memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
-    scheme: Annotated[Optional[str], typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
+    scheme: Annotated[str | None, typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
     schemes: Annotated[bool, typer.Option("--schemes", help="compare all schemes")] = False,
     formats: Annotated[bool, typer.Option("--formats", help="picture quality and bytes of the memory formats")] = False,
     keys: Annotated[bool, typer.Option("--keys", help="picture quality of short depth keys")] = False,
     constants: Annotated[bool, typer.Option("--constants", help="list the constants with their sources")] = False,
-    out: Annotated[Optional[Path], typer.Option(help="the estimate as JSON")] = None,
+    out: Annotated[Path | None, typer.Option(help="the estimate as JSON")] = None,
 ) -> None:
     """Estimate a whole frame: culling, memory, lists, sorting, rendering."""
     from ..chip.compare import estimate
@@ -85,7 +86,7 @@ def chip(
         raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
     writable(out, "--out")
     configuration = get_configuration(config)
-    loaded = load_view(scene, view, parse_size(size), cameras)
+    loaded = load_view(scene, view, parse_size(size), cameras, up)
     setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
     prepared = prepare(loaded, setting.cluster_size)
     if render_cycles is None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from typing import Any
 
 import typer
 
-from ..errors import FlickerError
+from ..errors import FlickerError, FlickerWarning
 from .chip import chip
 from .render import demo, render
 from .report import report
@@ -19,8 +21,20 @@ for command in (render, demo, chip, report, stability, sweep):
     app.command()(command)
 
 
+_show_others = warnings.showwarning
+
+
+def _show_warning(message: Any, category: Any, *rest: Any) -> None:
+    """Warnings of our own are one line on standard error."""
+    if issubclass(category, FlickerWarning):
+        print(f"flicker: warning: {message}", file=sys.stderr)
+    else:
+        _show_others(message, category, *rest)
+
+
 def main() -> None:
     """Entry point: bad input is one line on standard error and exit code 2."""
+    warnings.showwarning = _show_warning  # type: ignore[assignment]  # the rest is handed on as it comes
     try:
         sys.exit(app(standalone_mode=False) or 0)
     except FlickerError as error:

@@ -11,12 +11,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ..errors import FlickerError
+from ..progress import Steps
 
 console = Console()
 
 
-class RichSteps:
-    """Progress of a run on the terminal (`pipeline.Steps`)."""
+class RichSteps(Steps):
+    """Progress of a run on the terminal (`progress.Steps`)."""
 
     @contextmanager
     def step(self, text: str) -> Iterator[None]:

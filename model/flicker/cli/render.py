@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.table import Table
@@ -13,6 +13,7 @@ from rich.table import Table
 from ..errors import FlickerError
 from ..params import FAITHFUL, MAX_FIFO_DEPTH, CatMode, Coords, Form, Precision, RenderConfig
 from .options import RichSteps, console, parse_size, writable, write_atomically
+
 
 def _choices(enum: type) -> type[Enum]:
     """Lower-case string choices of an integer enum."""
@@ -26,6 +27,11 @@ def _word(value: object) -> str:
 
 def _default(field: str) -> str:
     return _word(getattr(RenderConfig(), field))
+
+
+def _faithful() -> str:
+    words = [_word(getattr(FAITHFUL, name)) for name in ("form", "precision", "cat")]
+    return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
 
 
 CatChoice = _choices(CatMode)
@@ -42,7 +48,9 @@ def _number(value) -> str:
 
 def summary(stats: dict, picture: Path | None) -> Table:
     """What a run prints at its end."""
-    table = Table(show_header=False, title=f"{Path(stats['scene']).name}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    from ..scene.files import scene_title
+
+    table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
     table.add_column(style="bold")
     table.add_column(justify="right")
     if picture is not None:
@@ -68,20 +76,21 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .splat")],
-    cameras: Annotated[Optional[Path], typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat; a SOG folder or its meta.json")],
+    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
-    size: Annotated[Optional[str], typer.Option(help="WxH; scales the focal lengths")] = None,
+    up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    cat: Annotated[Optional[CatChoice], typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
-    precision: Annotated[Optional[PrecisionChoice], typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
-    form: Annotated[Optional[FormChoice], typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
-    fifo_depth: Annotated[Optional[int], typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
+    cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
+    precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
+    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
+    fifo_depth: Annotated[int | None, typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
-    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {', '.join(_word(getattr(FAITHFUL, n)) for n in ('form', 'precision', 'cat'))}, FIFO {FAITHFUL.fifo_depth}")] = False,
-    compare: Annotated[Optional[CompareChoice], typer.Option(help="report the PSNR against the float64 reference")] = None,
-    out: Annotated[Optional[Path], typer.Option(help="picture (.png)")] = None,
-    stats: Annotated[Optional[Path], typer.Option(help="statistics (.json)")] = None,
+    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
+    compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
+    out: Annotated[Path | None, typer.Option(help="picture (.png)")] = None,
+    stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
 ) -> None:
     """Render one view of a scene."""
     given = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
@@ -104,10 +113,11 @@ def render(
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import load_view
-        from ..scene.image import save_png
         from ..pipeline import Engine, render_view
-    with steps.step(f"loading {scene.name}"):
-        loaded = load_view(scene, view, wanted, cameras)
+        from ..scene.files import scene_title
+        from ..scene.image import save_png
+    with steps.step(f"loading {scene_title(scene)}"):
+        loaded = load_view(scene, view, wanted, cameras, up)
     result = render_view(loaded, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
     if out is not None:
         write_atomically(out, lambda path: save_png(path, result.image))
@@ -117,7 +127,7 @@ def render(
 
 
 def demo(
-    size: Annotated[Optional[str], typer.Option(help="WxH [default: 640x360]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH [default: 640x360]")] = None,
     folder: Annotated[Path, typer.Option("--dir", help="where scene, picture and statistics go")] = Path("build/demo"),
     seed: Annotated[int, typer.Option(help="seed of the scene")] = 1,
 ) -> None:
@@ -126,14 +136,14 @@ def demo(
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import load_view
+        from ..pipeline import Engine, render_view
         from ..scene.demo import write_demo
         from ..scene.image import save_png
-        from ..pipeline import Engine, render_view
     with steps.step(f"making the demo scene (seed {seed})"):
         scene_path, cameras_path = write_demo(folder, seed)
     view = load_view(scene_path, 0, wanted, cameras_path)
     with steps.step("rendering the float64 reference (compiling on the first run)"):
-        view.reference
+        _ = view.reference
     golden = render_view(view, engine=Engine.GOLDEN, compare=True, steps=steps)
     rtl = render_view(view, engine=Engine.RTL, compare=True, steps=steps)
     if not (golden.image == rtl.image).all():

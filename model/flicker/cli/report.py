@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -12,15 +12,14 @@ from ..errors import FlickerError
 from .options import parse_size
 
 
-
 def report(
-    scenes: Annotated[Optional[list[str]], typer.Argument(help="scene files: FILE, FILE:VIEW, FILE:FIRST-LAST or FILE:all [default: the demo scene]")] = None,
+    scenes: Annotated[list[str] | None, typer.Argument(help="scenes: FILE, FILE:VIEW, FILE:FIRST-LAST or FILE:all [default: the demo scene]")] = None,
     out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures")] = Path("build/report"),
-    size: Annotated[Optional[str], typer.Option(help="WxH of every view [default: the camera's where there is a photograph, else 1280x720]")] = None,
-    photos: Annotated[Optional[str], typer.Option(help="folder of photographs by img_name, or none [default: those found beside cameras.json]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH of every view [default: the camera's where there is a photograph, else 1280x720]")] = None,
+    photos: Annotated[str | None, typer.Option(help="folder of photographs by img_name, or none [default: those found beside cameras.json]")] = None,
     background: Annotated[str, typer.Option(help="black, white or r,g,b from 0 to 1: as the scene was fitted")] = "black",
-    configs: Annotated[Optional[str], typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
-    store: Annotated[Optional[Path], typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
+    configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
+    store: Annotated[Path | None, typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:
@@ -35,7 +34,7 @@ def report(
         for c in CONFIGURATIONS.values():
             console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
         return
-    wanted = parse_size(size)
+    wanted = parse_size(size) or (1280, 720)
     names = None if configs is None else [n.strip() for n in configs.split(",")]
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
@@ -54,6 +53,6 @@ def report(
         written = write_report(job, seed, lambda done, total, text: bar.update(task, completed=done, total=total, description=text))
     for verdict in written.verdicts:
         colour = {"yes": "green", "no": "red", "partly": "yellow", "open": "dim"}[verdict.kind]
-        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{verdict.verdict.split(' (')[0].split(', because')[0]}[/{colour}]", soft_wrap=True,
-                      highlight=False)
+        outcome = verdict.verdict.split(" (")[0].split(", because")[0]
+        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{outcome}[/{colour}]", soft_wrap=True, highlight=False)
     console.print(f"{written.page}, {written.summary}; seed {seed}", soft_wrap=True)

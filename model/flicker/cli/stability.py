@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -14,10 +14,9 @@ from ..explore.stability.run import run_stability, suite
 from ..explore.stability.write import break_table, check_folder, write_csv, write_markdown, write_pictures
 
 
-
 def stability(
-    family: Annotated[Optional[list[str]], typer.Option(help="family of inputs, repeatable [default: all]")] = None,
-    config: Annotated[Optional[list[str]], typer.Option(help="configuration, repeatable [default: the suite]")] = None,
+    family: Annotated[list[str] | None, typer.Option(help="family of inputs, repeatable [default: all]")] = None,
+    config: Annotated[list[str] | None, typer.Option(help="configuration, repeatable [default: the suite]")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen configurations")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
     out: Annotated[Path, typer.Option(help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),

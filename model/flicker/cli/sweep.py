@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -17,9 +17,9 @@ TABLE_ROWS = 60  # longer results are in the file only
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/sweep.md)")],
-    cluster: Annotated[Optional[str], typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
-    workers: Annotated[Optional[int], typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
-    out: Annotated[Optional[Path], typer.Option(help="folder for results [default: build/sweep]")] = None,
+    cluster: Annotated[str | None, typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
+    out: Annotated[Path | None, typer.Option(help="folder for results [default: build/sweep]")] = None,
 ) -> None:
     """Run scenes x views x configurations on Dask; results in Parquet, resumed where an earlier run has stopped."""
     from ..errors import FlickerError
@@ -62,8 +62,11 @@ def sweep(
 def summary(rows: list[dict]) -> Table:
     """One row per point."""
     table = Table()
-    for name, justify in (("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"),
-                          ("SSIM", "right"), ("FLIP", "right"), ("photo dB", "right"), ("GE", "right"), ("uJ", "right")):
+    columns: tuple[tuple[str, Literal["left", "right"]], ...] = (
+        ("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"), ("SSIM", "right"), ("FLIP", "right"),
+        ("photo dB", "right"), ("GE", "right"), ("uJ", "right"),
+    )
+    for name, justify in columns:
         table.add_column(name, justify=justify, no_wrap=True)
 
     def text(value, form: str) -> str:

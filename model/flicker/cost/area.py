@@ -14,16 +14,16 @@ from __future__ import annotations
 import csv
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from ..errors import FlickerError
-from .operations import Op, Operation, Operations, ctu_operations
 from ..golden.masked import ACCUMULATOR_INT_BITS
 from ..params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
 from ..perf.lane_stage import LaneStage
-from .synth.units import channel_config, vru_config
 from ..toolchain import BUILD
+from .operations import Op, Operation, Operations, ctu_operations
+from .synth.units import channel_config, vru_config
 
 TABLE = Path(__file__).with_name("areas.csv")
 SYNTHESIS = BUILD / "synth" / "area.csv"
@@ -54,7 +54,7 @@ def _read(path: Path) -> dict[tuple[str, str], dict[str, str]]:
         return {(row["unit"], row["config"]): row for row in csv.DictReader(line for line in file if not line.startswith("#"))}
 
 
-@lru_cache(maxsize=None)
+@cache
 def parts() -> dict[tuple[str, str], Part]:
     """Synthesised parts by (unit, configuration): the table of this package, areas replaced by those of `make synth` where it has run."""
     found = {}
@@ -108,9 +108,9 @@ def operator(o: Operation) -> Part:
     return part("op", operator_name(o))
 
 
-def _word(value: Form | Precision | str, kind: type) -> str:
+def _word(value: Form | Precision | str, kind: type[Form] | type[Precision]) -> str:
     """Lower-case name of a form or a precision."""
-    name = value.name.lower() if isinstance(value, kind) else str(value).lower()
+    name = value.name.lower() if isinstance(value, (Form, Precision)) else str(value).lower()
     if name not in {m.name.lower() for m in kind}:
         raise FlickerError(f"area: unknown {kind.__name__.lower()} '{name}'; known are {', '.join(m.name.lower() for m in kind)}")
     return name
@@ -126,10 +126,7 @@ def fifo_area(depth: int, width: int = RECORD_BITS) -> float:
     if depth == 0:
         return 0.0
     known = sorted((int(config.split(" x ")[1]), p.ge) for (unit, config), p in parts().items() if unit == "fifo")
-    low, high = known[0], known[1]
-    for low, high in zip(known, known[1:]):
-        if depth <= high[0]:
-            break
+    low, high = next((pair for pair in zip(known, known[1:]) if depth <= pair[1][0]), known[-2:])
     ge = low[1] + (depth - low[0]) * (high[1] - low[1]) / (high[0] - low[0])
     return max(ge, RECORD_BITS * depth * 4.0) * width / RECORD_BITS  # never below its flip-flops
 
@@ -158,7 +155,7 @@ def operators_area(generator: Operations) -> float:
     return sum(math.ceil(o.count / generator.cycles) * operator(o).ge for o in generator.per_element)
 
 
-@lru_cache(maxsize=None)
+@cache
 def overhead() -> float:
     """What pipeline registers, the record's delay and control add to a generator's operators, as a factor: that of the synthesised CTU
     (factored, FP16) over its own operators."""

@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
-from .area import RECORD_BITS, Part, operator, part, parts, vru_part
 from ..errors import FlickerError
-from .operations import Operations, ctu_operations
 from ..params import CORES, PIXELS_PER_VRU, CatMode, Form, Precision, RenderConfig
+from .area import RECORD_BITS, Part, operator, part, parts, vru_part
+from .operations import Operations, ctu_operations
 
 # ---- constants ----------------------------------------------------------------------------------
 

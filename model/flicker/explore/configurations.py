@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import FlickerError
-from ..params import CatMode, RenderConfig
-from .generators import all_pixels, contribution, exact, oracle, rows, seele
 from ..front.view import View
+from ..params import CatMode, RenderConfig
 from . import machine
+from .generators import all_pixels, contribution, exact, oracle, rows, seele
 from .machine import Configuration, Result
 
 GENERATORS = (contribution, seele, exact, rows, all_pixels, oracle)
@@ -26,9 +26,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
     # flicker report and `all` of a sweep
     "report": (
         "vanilla", "no-ctu-32", "no-ctu-64", "gscore", "seele", "faithful", "faithful-barrier", "flicker", "flicker-barrier",
-        "flicker-*-*-factored", "flicker-*-*-conic", "flicker-stop", "flicker-16", "flicker-64", "flicker-fifo-64", "exact", "exact-e4m3", "exact-e5m2", "exact-e5m3",
-        "exact-e4m4", "exact-q8.8", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64", "lanes", "lanes-deep", "lanes-64", "lanes-fp16", "lanes-acc10",
-        "lanes-acc12", "lanes-acc16", "lanes-acc20", "oracle", "oracle-lanes", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic",
+        "flicker-*-*-factored", "flicker-*-*-conic", "flicker-stop", "flicker-16", "flicker-64", "flicker-fifo-64",
+        "exact", "exact-e4m3", "exact-e5m2", "exact-e5m3", "exact-e4m4", "exact-q8.8", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64",
+        "lanes", "lanes-deep", "lanes-64", "lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20", "oracle", "oracle-lanes",
+        "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic",
     ),
     # README, in few rows
     "summary": ("gscore", "faithful", "flicker", "lanes", "lanes-64"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from ..cost.area import SYNTHESIS
@@ -12,7 +12,7 @@ from ..cost.area import SYNTHESIS
 _NOT_IN_RESULTS = ("cli", "report", "sim", "pipeline.py", "toolchain.py", "markdown.py")
 
 
-@lru_cache(maxsize=None)
+@cache
 def code_digest() -> str:
     """Of the package's code and tables, and of the areas of `make synth`."""
     package = Path(__file__).resolve().parents[1]
@@ -27,12 +27,7 @@ def code_digest() -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Of a file's content, or of a folder's files with their names."""
-    if path.is_dir():
-        digest = hashlib.sha256()
-        for inside in sorted(p for p in path.rglob("*") if p.is_file()):
-            digest.update(str(inside.relative_to(path)).encode() + b"\0" + file_digest(inside).encode())
-        return digest.hexdigest()[:16]
+    """Of a file's content."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 

@@ -63,7 +63,10 @@ def duplicates(projected: Projected, width: int, height: int) -> dict[str, int]:
 
 def fifo_sweep(work: Work, configuration: Configuration) -> dict[str, list]:
     """Cycles and CTU stall rate of one configuration's work for every FIFO depth, by the cycle model of the RTL."""
-    stages = [simulate(work, configuration.render_config.with_(fifo_depth=depth)) for depth in FIFO_DEPTHS]
+    config = configuration.render_config
+    if config is None:
+        raise ValueError(f"{configuration.name}: no RTL")
+    stages = [simulate(work, config.with_(fifo_depth=depth)) for depth in FIFO_DEPTHS]
     return {
         "depth": list(FIFO_DEPTHS), "cycles": [s.cycles for s in stages], "stall_rate": [s.stall_rate for s in stages],
         "utilisation": [s.utilisation for s in stages],

@@ -48,8 +48,11 @@ class MaskGenerator(ABC):
     """
 
     pixels: bool = False
-    exact: bool = False
     free: bool = False
+
+    @property
+    def exact(self) -> bool:
+        return False
 
     @property
     def precision(self) -> str:

@@ -8,40 +8,42 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import ORBIT_VIEWS, Camera, load_cameras
+from ..scene.camera import ORBIT_VIEWS, Camera, cameras_beside, stored_cameras
+from ..scene.files import scene_digest, scene_name, scene_title
 from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
 
-SUFFIXES = (".ply", ".spz", ".sog", ".splat")
 SIZE = (1280, 720)  # of views without a photograph when none is asked for
 
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene, its cameras, its photographs. path: a file, or `demo`. cameras: a file; None: `cameras.json` beside the scene, else an orbit.
+    """A scene, its cameras, its photographs. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit.
     photos: a folder with the photograph of every camera; None: those found beside the cameras; `none`: none. background: RGB in [0, 1]."""
 
     path: str
     cameras: str | None = None
+    up: str | None = None
     photos: str | None = None
     background: tuple[float, float, float] = BLACK
 
     @property
     def file(self) -> str:
-        """File name."""
-        return Path(self.path).name
+        """Name of file or folder."""
+        return self.path if self.path == DEMO else scene_title(self.path)
 
     @property
     def name(self) -> str:
-        """File name without its suffixes."""
-        return self.file.split(".")[0]
+        """The same without its suffixes."""
+        return self.path if self.path == DEMO else scene_name(self.path)
 
     @property
     def cameras_file(self) -> Path | None:
         """The file that the cameras come from; None: there is none."""
-        used = Path(self.cameras) if self.cameras is not None else Path(self.path).parent / "cameras.json"
-        return used if self.path != DEMO and used.exists() else None
+        if self.path == DEMO:
+            return None
+        return Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
 
     @cached_property
     def _cameras(self) -> list[Camera] | None:
@@ -50,7 +52,7 @@ class SceneFile:
             from ..scene.demo import demo_cameras
 
             return demo_cameras()
-        return None if self.cameras_file is None else load_cameras(self.cameras_file)
+        return stored_cameras(self.path, self.cameras, self.up)
 
     def views(self) -> int:
         """Number of cameras."""
@@ -85,8 +87,8 @@ class SceneFile:
         """Of the contents of scene and cameras; the demo scene is code."""
         if self.path == DEMO:
             return ""
-        digest = file_digest(Path(self.path))
-        return digest if self.cameras_file is None else f"{digest}-{file_digest(self.cameras_file)}"
+        cameras = self.cameras_file
+        return "-".join((scene_digest(self.path)[:16], file_digest(cameras) if cameras else "orbit", self.up or ""))
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class Target:
         return f"{self.scene.background} {'' if self.photo is None else file_digest(self.photo)}"
 
     def load(self) -> View:
-        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.background, self.photo)
+        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up, self.scene.background, self.photo)
 
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""

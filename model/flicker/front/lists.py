@@ -11,14 +11,14 @@ from dataclasses import replace
 import numba
 import numpy as np
 
-from ..scene.camera import Camera
-from ..errors import FlickerError
 from ..arithmetic.fp import fp16_value
-from .records import MAX_FP16, SubtileLists, build_lists, local_means
+from ..arithmetic.thresholds import EPSILON, radii
+from ..errors import FlickerError
 from ..params import SUBTILE, TILE, Coords, Form, RenderConfig
+from ..scene.camera import Camera
 from .binning import bin_boxes, circle_boxes, pairs
 from .projection import Projected
-from ..arithmetic.thresholds import EPSILON, radii
+from .records import MAX_FP16, SubtileLists, build_lists, local_means
 
 OBB_AXIS_RATIO = 2.0  # GSCore: the oriented box is tested for splats more elongated than this
 _SIGMAS = 3.0

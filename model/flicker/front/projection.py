@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..scene.camera import Camera
 from ..params import SPIKY_AXIS_RATIO, TILE
+from ..scene.camera import Camera
 from ..scene.files import Scene
 
 NEAR = 0.2

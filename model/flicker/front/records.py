@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
+from ..arithmetic.fp import FP16_R, fp16_bits, fp16_from_f64, sub
 from ..params import SUBTILE, TILE, Coords, Form, RenderConfig
 from .binning import bin_boxes, pairs, pixel_boxes
-from ..arithmetic.fp import FP16_R, fp16_bits, fp16_from_f64, sub
 
 LOG2E = 1.4426950408889634
 MAX_FP16 = 65504.0

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from ..scene.camera import Camera
 from ..params import ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN
+from ..scene.camera import Camera
 from .binning import bin_boxes, circle_boxes
 from .projection import Projected
 

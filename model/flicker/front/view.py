@@ -13,6 +13,7 @@ from ..errors import FlickerError
 from ..params import Coords, Form
 from ..scene import Scene, load_scene
 from ..scene.camera import Camera, find_cameras, select_view
+from ..scene.files import scene_name
 from ..scene.photos import BLACK, load_photo
 from .lists import DERIVED, subtile_lists
 from .projection import Projected, project
@@ -38,13 +39,19 @@ class View:
     ) -> None:
         if scene is None and projected is None:
             raise ValueError("a view needs a scene or its projection")
-        self.camera, self.scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
         if photo is not None and photo.shape != (camera.height, camera.width, 3):
             raise ValueError(f"a photograph of shape {photo.shape} is not of a camera of {camera.width}x{camera.height}")
+        self.camera, self._scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
         self.background, self.photo = background, photo
         if projected is not None:
             self.projected = projected
         self._kept: dict = {}
+
+    @property
+    def scene(self) -> Scene:
+        if self._scene is None:
+            raise ValueError("this view is only a projection")
+        return self._scene
 
     @cached_property
     def projected(self) -> Projected:
@@ -78,26 +85,26 @@ class View:
 
 
 def load_view(
-    scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None,
+    scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None, up: str | None = None,
     background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
 ) -> View:
     """The view of a scene from its camera `number`. size: (width, height), scales the focal lengths; None: as the camera has it.
 
-    scene: a file, `demo` for the project's own scene, or a loaded one. cameras: a file instead of what `find_cameras` finds.
+    scene: a file, a folder, `demo` for the project's own scene, or a loaded one. cameras, up: as in `find_cameras`.
     background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`).
     FlickerError, naming file and field, for what cannot be read.
     """
     if isinstance(scene, Scene):
-        loaded, name = scene, "" if scene.path is None else scene.path.name.split(".")[0]
-        found = find_cameras(loaded, cameras)
+        loaded, name = scene, "" if scene.path is None else scene_name(scene.path)
+        found = find_cameras(loaded, cameras, up)
     elif str(scene) == DEMO:
         from ..scene.demo import demo_cameras, generate
 
         loaded, found, name = generate(), demo_cameras(), DEMO
     else:
         loaded = load_scene(scene)
-        found = find_cameras(loaded, cameras)
-        name = Path(scene).name.split(".")[0]
+        found = find_cameras(loaded, cameras, up)
+        name = scene_name(scene)
     camera = select_view(found, number)
     if size is not None:
         camera = camera.resized(*size)

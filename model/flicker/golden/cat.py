@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from ..arithmetic.fp import E4M3_R, FP16_R, mul, rnd, sub
 from ..arithmetic.functions import log_opacity_f32
 from ..params import FIXED_FRAC_BITS, FIXED_INT_BITS, CatMode, Form, Precision
-from ..arithmetic.fp import E4M3_R, FP16_R, mul, rnd, sub
 from .weight import conic_axis, conic_pixel, factored_pixel, factored_row
 
 CONIC = int(Form.CONIC)

@@ -10,10 +10,10 @@ import numba
 import numpy as np
 
 from ..arithmetic.fp import FP16_R, fp16_bits, fp16_value, mul
+from ..arithmetic.thresholds import thresholds
 from ..front.records import SubtileLists
 from .render import CUT_BASE2, CUT_NATURAL, minitile_weights
 from .vru import ALPHA_MIN, CONIC, TRANSMITTANCE_MIN, alpha_of, blend, next_transmittance
-from ..arithmetic.thresholds import thresholds
 
 ACCUMULATOR_INT_BITS = 3  # of fixed-point colour accumulators: up to 8
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from ..arithmetic.fp import FP16_R, fp16_bits, fp16_value, mul, sub
+from ..front.records import SubtileLists
 from ..params import (
     AUTO_DECAY_SHIFT,
     AUTO_SENT_BITS,
@@ -18,8 +20,6 @@ from ..params import (
     RenderConfig,
 )
 from .cat import M_OFF, M_SPARSE, SCRATCH, is_dense, splat_mask
-from ..arithmetic.fp import FP16_R, fp16_bits, fp16_value, mul, sub
-from ..front.records import SubtileLists
 from .vru import ALPHA_MIN, CONIC, TRANSMITTANCE_MIN, alpha_of, blend, next_transmittance
 from .weight import conic_axis, conic_pixel, factored_pixel, factored_row
 

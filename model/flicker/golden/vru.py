@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
+from ..arithmetic.fp import FP16_R, add, mul, sub
 from ..arithmetic.functions import exp_neg_f32
 from ..params import ALPHA_MAX_BITS, ALPHA_MIN_BITS, TRANSMITTANCE_MIN_BITS, Form
-from ..arithmetic.fp import FP16_R, add, mul, sub
 from .weight import conic_axis, conic_pixel, factored_pixel, factored_row
 
 CONIC = int(Form.CONIC)

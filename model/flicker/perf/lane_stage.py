@@ -22,13 +22,28 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from .work import Work
 from ..params import CHANNELS, CORES, COUNTERS_PER_CORE, MINITILE, SUBTILE, RenderConfig, vru_stages
 from .pixel_stage import GENERATOR_LATENCY
 from .render_stage import (
-    BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
-    VRU_BUSY, StageCycles, sum_up,
+    BUSY,
+    DELIVERED,
+    DISCARDED,
+    FULL,
+    GAUSSIANS_IN,
+    IDLE,
+    N_CHANNEL,
+    N_CORE,
+    NEVER,
+    REJECTED,
+    SENT,
+    STALLED,
+    SUBTILES,
+    TOKEN,
+    VRU_BUSY,
+    StageCycles,
+    sum_up,
 )
+from .work import Work
 
 LANES = 8  # VRUs of a core
 
@@ -203,7 +218,7 @@ def _core(order, start, visit, pixel_finish, lane, place, pixel, latency, depth,
                 count[STALLED] += 1
             else:
                 count[BUSY] += 1
-                for i in range(width):
+                for _ in range(width):
                     if sub_in == n_sub:
                         break
                     s = order[sub_in]

@@ -12,12 +12,27 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .work import SPLITS, Work
 from ..params import CORES, COUNTERS_PER_CORE, RenderConfig, vru_stages
 from .render_stage import (
-    BUSY, DELIVERED, DISCARDED, FULL, GAUSSIANS_IN, IDLE, N_CHANNEL, N_CORE, NEVER, REJECTED, SENT, STALLED, SUBTILES, TOKEN,
-    VRU_BUSY, StageCycles, sum_up,
+    BUSY,
+    DELIVERED,
+    DISCARDED,
+    FULL,
+    GAUSSIANS_IN,
+    IDLE,
+    N_CHANNEL,
+    N_CORE,
+    NEVER,
+    REJECTED,
+    SENT,
+    STALLED,
+    SUBTILES,
+    TOKEN,
+    VRU_BUSY,
+    StageCycles,
+    sum_up,
 )
+from .work import SPLITS, Work
 
 GENERATOR_LATENCY = 16
 LOOP = 4  # rtl/render/flk_vru.sv

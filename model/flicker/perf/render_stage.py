@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from .work import Work
 from ..params import (
     CHANNEL_COUNTERS,
     CHANNELS,
@@ -26,6 +25,7 @@ from ..params import (
     prtu_latency,
     vru_stages,
 )
+from .work import Work
 
 _CORE = {name: i for i, (name, _) in enumerate(CORE_COUNTERS)}
 _CHANNEL = {name: i for i, (name, _) in enumerate(CHANNEL_COUNTERS)}

@@ -39,7 +39,7 @@ class ViewResult:
     facts: dict[str, dict] = field(default_factory=dict)
     maps: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     pictures: dict[str, np.ndarray] = field(default_factory=dict)
-    reference: np.ndarray | None = None
+    reference: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 3), np.uint8))
     count: int = 1
 
     @property

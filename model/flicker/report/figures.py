@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -25,12 +26,27 @@ from ..explore.configurations import CONFIGURATIONS  # noqa: E402
 from ..explore.facts import TILE_SIZES  # noqa: E402
 from ..explore.stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
-    DENSE, FAITHFUL, FLOAT64, GSCORE, NARROW, NO_CTU, NO_CTU_64, PAPER_AREA, PAPER_PRUNED_PSNR, PAPER_VANILLA_PSNR, SMOOTH, SPARSE, SPIKY, UM2_PER_GE, VANILLA, WIDE,
+    DENSE,
+    FAITHFUL,
+    FLOAT64,
+    GSCORE,
+    NARROW,
+    NO_CTU,
+    NO_CTU_64,
+    PAPER_AREA,
+    PAPER_PRUNED_PSNR,
+    PAPER_VANILLA_PSNR,
+    SMOOTH,
+    SPARSE,
+    SPIKY,
+    UM2_PER_GE,
+    VANILLA,
+    WIDE,
     test_loss,
 )
 from .collect import FIFO_SWEPT, ViewResult  # noqa: E402
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 8, "axes.titlesize": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.fonttype": "none", "svg.hashsalt": "flicker",
     "figure.dpi": 110,
 }
@@ -63,8 +79,10 @@ class Figure:
         writer.writerows([_cell(v) for v in row] for row in self.rows)
         files = {f"{self.name}.csv": text.getvalue().encode()}
         if self.canvas is not None:
-            with plt.rc_context(STYLE):
-                self.canvas.get_layout_engine().execute(self.canvas)
+            engine = self.canvas.get_layout_engine()
+            if engine is not None:
+                with plt.rc_context(STYLE):
+                    engine.execute(self.canvas)
             self.canvas.set_layout_engine("none")  # laid out once, not for each format
             for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
                 buffer = io.BytesIO()
@@ -418,7 +436,7 @@ def overall(views: Sequence[ViewResult]) -> list[dict]:
             "cycles": math.exp(sum(math.log(max(r["cycles"], 1)) for r in rows) / len(rows)),
             "psnr_db": sum(_finite(r["psnr_db"]) for r in rows) / len(rows),
             "ssim": sum(r["ssim"] for r in rows) / len(rows), "flip": sum(r["flip"] for r in rows) / len(rows),
-            **{key: None if None in (values := [r.get(key) for r in rows]) else sum(values) / len(values) for key in PHOTO},
+            **{key: sum(r[key] for r in rows) / len(rows) if all(r.get(key) is not None for r in rows) else None for key in PHOTO},
             "energy_uj": None if None in energies else math.exp(sum(math.log(max(e, 1e-9)) for e in energies) / len(rows)),
         })
     return points

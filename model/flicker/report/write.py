@@ -9,17 +9,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..cost.area import SYNTHESIS
-from ..scene.camera import Camera
-from ..scene.photos import BLACK
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
 from ..explore.digest import code_digest, key
-from ..explore.store import DEFAULT, Store
-from ..explore.points import SUFFIXES, SceneFile, Target
-from ..front.view import DEMO
+from ..explore.points import SceneFile, Target
 from ..explore.stability.run import Point, Stability, run_stability
 from ..explore.stability.write import check_folder
+from ..explore.store import DEFAULT, Store
+from ..front.view import DEMO
+from ..scene.camera import Camera
+from ..scene.files import scene_kind
+from ..scene.photos import BLACK
 from .claims import Verdict, all_verdicts, read_areas
 from .collect import collect
 from .figures import own_figures, paper_figures, stability_table
@@ -65,11 +68,10 @@ def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = 
         path, views = Path(head), tail
     if not path.exists():
         raise FlickerError(f"{path}: no such scene")
-    if not path.is_file() or not os.access(path, os.R_OK):
-        raise FlickerError(f"{path}: not a readable file")
-    if path.suffix not in SUFFIXES:
-        raise FlickerError(f"{path}: not a scene file ({', '.join(SUFFIXES)})")
-    scene = SceneFile(str(path), None, photos, background)
+    if not os.access(path, os.R_OK):
+        raise FlickerError(f"{path}: not readable")
+    scene_kind(path)
+    scene = SceneFile(str(path), photos=photos, background=background)
     numbers = _views(views, scene.views())
     if not numbers:
         raise FlickerError(f"{path}: views {views}: there are none")
@@ -88,9 +90,9 @@ def check(
     size: None: every camera's own where there is a photograph, else `explore.points.SIZE`. photos, background: as in `SceneFile`.
     """
     if size is not None:
-        Camera(size[0], size[1], 1.0, 1.0, (0, 0, 0), ((1, 0, 0), (0, 1, 0), (0, 0, 1)))  # raises for a size out of range
+        Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
     targets = [target for text in scenes for target in parse_targets(text, size, photos, background)]
-    targets = targets or [SceneFile(DEMO, None, photos, background).target(0, size)]
+    targets = targets or [SceneFile(DEMO, photos=photos, background=background).target(0, size)]
     for i, target in enumerate(targets):
         if any(t.title == target.title for t in targets[:i]):
             raise FlickerError(f"{target.scene.path}: scene {target.title} is there twice")

@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlickerError
-from .files import Scene
+from .files import Scene, scene_folders
 
 MAX_SIZE = 16384
-ORBIT_VIEWS = 8  # cameras of a scene without a file of them
 _MAX_NUMBER = 1e30  # squares and products of such numbers stay finite in the projection
 _KEYS = ("width", "height", "fx", "fy", "position", "rotation")
+ORBIT_VIEWS = 8  # of a scene without cameras of its own
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+DEFAULT_UP = "-y"  # of the INRIA code and COLMAP, for upright scenes
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +107,9 @@ def load_cameras(path: str | Path) -> list[Camera]:
         for key in _KEYS:
             if key not in entry:
                 raise FlickerError(f"{where}: '{key}' is missing")
-        img_name = entry.get("img_name")
+        img_name = None if entry.get("img_name") is None else str(entry["img_name"])
         try:
-            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=str(entry.get("img_name", i)), img_name=None if img_name is None else str(img_name)))
+            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name))
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
     return cameras
@@ -136,12 +138,26 @@ def _box(scene: Scene) -> np.ndarray:
     return np.stack([np.minimum(low, (low + high) / 2 - margin), np.maximum(high, (low + high) / 2 + margin)], axis=1)
 
 
-def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: int = 1280, height: int = 720) -> Camera:
+def _upright(up: str) -> np.ndarray:
+    """(3, 3) rotation from the world to axes right, down, forward of the first orbit camera's heading; rows are those axes.
+
+    Right is x, or y where x is up: so y up looks along -z and z up along y, as viewers for such scenes do from the front.
+    """
+    if up not in UP_AXES:
+        raise FlickerError(f"up: '{up}' is not one of {', '.join(UP_AXES)}")
+    down = np.eye(3)["xyz".index(up[-1])] * (1.0 if up[0] == "-" else -1.0)
+    right = np.eye(3)[1 if up[-1] == "x" else 0]
+    return np.stack([right, down, np.cross(right, down)])
+
+
+def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: int = 1280, height: int = 720,
+                 up: str = DEFAULT_UP) -> Camera:
     """Camera `view` of `views` on a circle around the scene, looking slightly down at its middle.
 
-    The world's y axis is taken to point down (COLMAP, INRIA).
+    up: the world's axis that points up, one of `UP_AXES`; FlickerError for another.
     """
-    low, high = _box(scene).T
+    upright = _upright(up)
+    low, high = np.sort(upright @ _box(scene), axis=1).T
     centre, half = (low + high) / 2, (high - low) / 2
     across = math.hypot(half[0], half[2])
     tangent = math.tan(math.radians(25.0)) / min(width, height)  # half the field of view across the shorter side
@@ -164,18 +180,45 @@ def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: i
     ])
     right = np.array([math.cos(azimuth), 0.0, math.sin(azimuth)])
     return Camera(
-        width, height, focal, focal, centre + distance * back,
-        np.stack([right, np.cross(-back, right), -back], axis=1), f"orbit_{view}",
+        width, height, focal, focal, upright.T @ (centre + distance * back),
+        upright.T @ np.stack([right, np.cross(-back, right), -back], axis=1), f"orbit_{view}",
     )
 
 
-def find_cameras(scene: Scene, cameras: str | Path | None = None) -> list[Camera]:
-    """The cameras of a scene: the file given, else `cameras.json` beside the scene, else eight orbit cameras."""
-    if cameras is not None:
-        return load_cameras(cameras)
-    if scene.path is not None and (beside := scene.path.parent / "cameras.json").exists():
-        return load_cameras(beside)
-    return [orbit_camera(scene, view) for view in range(ORBIT_VIEWS)]
+def cameras_beside(path: str | Path) -> Path | None:
+    """`cameras.json` that goes with a scene: beside the file; in an unpacked SOG's folder, else beside that folder. None: there is none."""
+    return next((file for folder in scene_folders(path) if (file := folder / "cameras.json").exists()), None)
+
+
+def stored_cameras(path: str | Path | None, cameras: str | Path | None = None, up: str | None = None) -> list[Camera] | None:
+    """The cameras that come from a file: the one given, else `cameras_beside` the scene. None: there is none, the orbit is used.
+
+    path: of the scene, which is not opened. up: as in `find_cameras`.
+    """
+    if up is not None:
+        _upright(up)
+    if cameras is None and path is not None:
+        cameras = cameras_beside(path)
+    if cameras is None:
+        return None
+    if up is not None:
+        raise FlickerError(f"up: {up}: only orbit cameras can be turned, but the cameras come from {cameras}")
+    return load_cameras(cameras)
+
+
+def camera_count(path: str | Path | None, cameras: str | Path | None = None, up: str | None = None) -> int:
+    """How many cameras `find_cameras` would give, without the scene; FlickerError as there."""
+    stored = stored_cameras(path, cameras, up)
+    return ORBIT_VIEWS if stored is None else len(stored)
+
+
+def find_cameras(scene: Scene, cameras: str | Path | None = None, up: str | None = None) -> list[Camera]:
+    """The cameras of a scene: the file given, else `cameras_beside` it, else `ORBIT_VIEWS` orbit cameras.
+
+    up: the world's axis that points up, for the orbit (None: `DEFAULT_UP`). FlickerError where there are cameras, which it could not turn.
+    """
+    stored = stored_cameras(scene.path, cameras, up)
+    return [orbit_camera(scene, view, up=up or DEFAULT_UP) for view in range(ORBIT_VIEWS)] if stored is None else stored
 
 
 def select_view(cameras: list[Camera], n: int) -> Camera:

@@ -1,10 +1,10 @@
 """Scenes: Gaussians with activated values, read from every common file format.
 
-| suffix | format | read by |
+| what | format | read by |
 |---|---|---|
 | `.ply` | INRIA layout (with or without normals, SH degree 0 to 3) and PlayCanvas compressed layout | gsply |
-| `.spz` | Niantic, gzip (versions 1 to 3) and zstd (version 4) container | gsply |
-| `.sog` | PlayCanvas bundle, versions 1 and 2 | gsply |
+| `.spz` | Niantic, gzip (versions 2 and 3) and zstd (version 4) container | gsply |
+| `.sog`, `.zip`, a folder, its `meta.json` | PlayCanvas SOG, versions 1 and 2, packed or not; a zip of one scene file | `flicker.scene.sog`, gsply |
 | `.splat` | 32-byte records | here |
 
 Coordinates are those of the INRIA code (x right, y down, z forward for an upright scene). An SPZ file holds x right, y up,
@@ -13,9 +13,10 @@ z back and is turned by half a turn about x; the other formats keep the coordina
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
+import hashlib
+import warnings
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ from typing import Any
 import gsply
 import numpy as np
 
-from ..errors import FlickerError
+from ..errors import FlickerError, FlickerWarning, one_line
+from . import sog
 
 _SH_C0 = 0.28209479177387814
 _SH_COUNTS = {1: 0, 4: 1, 9: 2, 16: 3}  # coefficients a channel: degree
@@ -37,7 +39,7 @@ class Scene:
 
     means: (N, 3). scales: (N, 3), standard deviations, > 0. quats: (N, 4), unit, w first. opacities: (N,), in (0, 1].
     sh: (N, K, 3), K = (degree + 1)^2 coefficients a colour, constant term first, order and signs of the INRIA code.
-    path: the file. rejected: Gaussians of the file that were left out, by reason.
+    path: the file or folder. rejected: Gaussians of the file that were left out, by reason.
     """
 
     means: np.ndarray
@@ -61,34 +63,27 @@ class Scene:
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Read a scene; the suffix says the format (table above).
+    """Read a scene: a file, an unpacked SOG folder or its `meta.json`; the content says the format (`SCENE_SUFFIXES`, table above).
 
     Gaussians that make no sense (a value that is not finite, a zero quaternion, a size or an opacity that is not positive) are
-    left out and counted in `Scene.rejected`. Raises FlickerError, naming the file and the field, for any file that holds no scene.
+    left out and counted in `Scene.rejected`. A file whose suffix says another format than its content is read with a FlickerWarning
+    (`warnings`). Raises FlickerError, naming the file and the field, for anything that holds no scene.
     """
     path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if path.is_dir():
-        raise FlickerError(f"{path}: a folder, not a scene file")
-    if reader is None:
-        known = ", ".join(_READERS)
-        raise FlickerError(f"{path}: unknown format '{path.suffix}'; known are {known}")
+    kind = "file"
     try:
-        if path.stat().st_size == 0:
-            raise FlickerError(f"{path}: empty file")
+        kind = scene_kind(path)
+        if (said := _said_kind(path)) != kind:
+            says = f"the suffix of {KINDS[said].title}" if said else f"the unknown suffix '{path.suffix}'"
+            warnings.warn(FlickerWarning(f"{path}: has {says}, but holds {KINDS[kind].title}; read as such"), stacklevel=2)
         with np.errstate(all="ignore"):  # bad values are counted, not warned about
-            return _checked(path, *reader(path))
+            return _checked(path, *KINDS[kind].read(path))
     except FlickerError:
         raise
     except OSError as error:
-        raise FlickerError(f"{path}: cannot be read ({error.strerror or _one_line(error)})") from None
+        raise FlickerError(f"{path}: cannot be read ({error.strerror or one_line(error)})") from None
     except Exception as error:  # the decoders raise anything at all for a damaged file
-        raise FlickerError(f"{path}: damaged {path.suffix.lower()} file ({_one_line(error)})") from None
-
-
-def _one_line(error: Exception) -> str:
-    text = " ".join("".join(c if c.isprintable() else " " for c in str(error)).split())
-    return text[:120] or type(error).__name__
+        raise FlickerError(f"{path}: damaged {kind} ({one_line(error)})") from None
 
 
 def _checked(path: Path, means: Any, scales: Any, quats: Any, opacities: Any, sh: Any) -> Scene:
@@ -116,10 +111,9 @@ def _checked(path: Path, means: Any, scales: Any, quats: Any, opacities: Any, sh
     if not good.any():
         reasons = ", ".join(f"{reason}: {n}" for reason, n in rejected.items())
         raise FlickerError(f"{path}: no usable Gaussian ({reasons})")
-    if good.all():
-        good = slice(None)
-    quats = np.asarray(quats, np.float64)[good] / norm[good, None]
-    return Scene(means[good], scales[good], quats, opacities[good], sh[good], path, rejected)
+    kept = slice(None) if good.all() else good
+    quats = np.asarray(quats, np.float64)[kept] / norm[kept, None]
+    return Scene(means[kept], scales[kept], quats, opacities[kept], sh[kept], path, rejected)
 
 
 def _activated(data: gsply.GSData) -> tuple[np.ndarray, ...]:
@@ -240,44 +234,19 @@ _TURN = np.array([1, -1, -1], np.float32)
 _TURN_SH = np.array([1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.float32)
 
 
-def _sog_numbers(path: Path, meta: Any, group: str, key: str, count: int) -> None:
-    """gsply's kernels index these without a check."""
-    value = meta[group][key]
-    if not isinstance(value, list) or len(value) != count:
-        raise FlickerError(f"{path}: meta.json: {group}.{key}: not {count} numbers")
-    if not np.isfinite(np.array(value, np.float64)).all():
-        raise FlickerError(f"{path}: meta.json: {group}.{key}: not finite")
+def _read_folder(path: Path) -> tuple[np.ndarray, ...]:
+    return _activated(sog.read_folder(path, _meta_of(path)))
 
 
-def _read_sog(path: Path) -> tuple[np.ndarray, ...]:
-    data = path.read_bytes()
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as bundle:
-            names = bundle.namelist()
-            text = bundle.read("meta.json") if "meta.json" in names else None
-    except Exception:  # of several libraries
-        raise FlickerError(f"{path}: not a SOG bundle (zip), or damaged") from None
-    if text is None:
-        raise FlickerError(f"{path}: meta.json is missing")
-    try:
-        meta = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise FlickerError(f"{path}: meta.json: not JSON ({_one_line(error)})") from None
-    first = meta.get("version") is None
-    try:
-        count = meta["means"]["shape"][0] if first else meta["count"]
-        _sog_numbers(path, meta, "means", "mins", 3)
-        _sog_numbers(path, meta, "means", "maxs", 3)
-        for group, channels in (("scales", 3), ("sh0", 4)):
-            for key in ("mins", "maxs") if first else ("codebook",):
-                _sog_numbers(path, meta, group, key, channels if first else 256)
-    except KeyError as error:
-        raise FlickerError(f"{path}: meta.json: {error} is missing") from None
-    if type(count) is not int or count < 0:
-        raise FlickerError(f"{path}: meta.json: count: not a number of Gaussians")
-    if count == 0:
-        raise FlickerError(f"{path}: no Gaussians")
-    return _activated(gsply.sogread(data))
+def _read_zip(path: Path) -> tuple[np.ndarray, ...]:
+    # A zip within the zip may be a SOG, but nothing that is unpacked once more.
+    return sog.read_zip(path, _activated, tuple(s for s in SCENE_SUFFIXES if s != ".zip"), _read_unpacked)
+
+
+def _read_unpacked(path: Path) -> tuple[np.ndarray, ...]:
+    """The scene file out of a zip."""
+    kind = scene_kind(path)
+    return sog.read_zip(path, _activated, (), _read_unpacked) if kind == "zip" else KINDS[kind].read(path)
 
 
 def _read_splat(path: Path) -> tuple[np.ndarray, ...]:
@@ -294,7 +263,155 @@ def _read_splat(path: Path) -> tuple[np.ndarray, ...]:
     )
 
 
-_READERS = {".ply": _read_ply, ".spz": _read_spz, ".sog": _read_sog, ".splat": _read_splat}
+# -- kinds of scenes ------------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of scene. title: for messages. suffixes: of its files. holds: whether a file's first bytes are its; None: nothing tells.
+
+    read: gives means, scales, quats, opacities, sh as in Scene, activated, unchecked.
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    holds: Callable[[bytes], bool] | None
+    read: Callable[[Path], tuple[np.ndarray, ...]]
+
+
+def _is_ply(head: bytes) -> bool:
+    return head[:16].split(b"\n")[0].strip() == b"ply"
+
+
+def _is_spz(head: bytes) -> bool:
+    """The zstd container; or gzip of SPZ, and not of anything else."""
+    if head[:4] == b"NGSP":
+        return True
+    if head[:3] != b"\x1f\x8b\x08":
+        return False
+    try:
+        return zlib.decompressobj(wbits=31).decompress(head, 4) == b"NGSP"
+    except zlib.error:
+        return False
+
+
+# In the order in which contents are asked.
+KINDS: dict[str, Kind] = {
+    "PLY": Kind("a PLY file", (".ply",), _is_ply, _read_ply),
+    "SPZ": Kind("an SPZ file", (".spz",), _is_spz, _read_spz),
+    "zip": Kind("a SOG bundle (zip)", (".sog", ".zip"), lambda head: head[:4] in (b"PK\x03\x04", b"PK\x05\x06"), _read_zip),
+    "SOG": Kind("an unpacked SOG (meta.json)", (), None, _read_folder),
+    "splat": Kind("a .splat file", (".splat",), None, _read_splat),
+}
+SCENE_SUFFIXES: tuple[str, ...] = tuple(s for kind in KINDS.values() for s in kind.suffixes)
+_HEAD = 4096  # bytes that tell a kind; a header of gzip may name a file
+
+
+def _meta_of(path: Path) -> Path:
+    """`meta.json` of an unpacked SOG, given the folder or the file."""
+    return path / sog.META if path.is_dir() else path
+
+
+def _said_kind(path: Path) -> str | None:
+    """Kind that the name says."""
+    if path.suffix.lower() == ".json" or path.is_dir():
+        return "SOG"
+    return next((name for name, kind in KINDS.items() if path.suffix.lower() in kind.suffixes), None)
+
+
+def scene_kind(path: str | Path) -> str:
+    """Name in `KINDS` of what a path holds: by the first bytes, else by the suffix.
+
+    Reads no more than it must; the rest of the file may yet be damaged. FlickerError, as of `load_scene`, for no scene.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            _check_folder(path)
+            return "SOG"
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+        if size == 0:
+            raise FlickerError(f"{path}: empty file")
+        said = _said_kind(path)
+        if said == "SOG":
+            sog.parse_meta(str(path), path.read_bytes())
+            return said
+    except OSError as error:
+        raise FlickerError(f"{path}: cannot be read ({error.strerror or one_line(error)})") from None
+    for name, kind in KINDS.items():
+        if kind.holds is not None and kind.holds(head):
+            return name
+    if said is None:
+        raise FlickerError(f"{path}: unknown format '{path.suffix}'; known are {', '.join(SCENE_SUFFIXES)}, a SOG folder and its {sog.META}")
+    return said
+
+
+def _check_folder(path: Path) -> None:
+    """A folder must be an unpacked SOG; else say what to give."""
+    if (path / sog.META).is_file():
+        return
+    if (path / sog.LOD_META).is_file():
+        sog.parse_meta(f"{path}: {sog.LOD_META}", (path / sog.LOD_META).read_bytes())
+    inside = sorted(p.name for p in path.iterdir() if p.suffix.lower() in SCENE_SUFFIXES)
+    hint = f"; a scene file in it: {one_line(inside[0])}" if inside else ""
+    raise FlickerError(f"{path}: a folder without {sog.META}, so not an unpacked SOG{hint}")
+
+
+def is_scene_path(path: str | Path) -> bool:
+    """Whether `load_scene` would try to read what is there."""
+    try:
+        scene_kind(path)
+    except FlickerError:
+        return False
+    return True
+
+
+def scene_folders(path: str | Path) -> list[Path]:
+    """Folders in which a scene's cameras may lie, nearest first: a file's folder; an unpacked SOG's own and the one around it."""
+    path = Path(path)
+    if _said_kind(path) != "SOG":
+        return [path.parent]
+    own = _meta_of(path).parent
+    return [own, own.absolute().parent]
+
+
+def scene_title(path: str | Path) -> str:
+    """What a scene is called: a file's name, an unpacked SOG's folder's."""
+    path = Path(path)
+    return _meta_of(path).resolve().parent.name if _said_kind(path) == "SOG" else path.name
+
+
+def scene_name(path: str | Path) -> str:
+    """Short name of a scene, for tables: a file's up to the first dot, an unpacked SOG's folder's."""
+    title = scene_title(path)
+    return title if _said_kind(Path(path)) == "SOG" else title.split(".")[0]
+
+
+def scene_files(path: str | Path) -> list[Path]:
+    """The files that make a scene, all that `load_scene` reads: one, or `meta.json` and its pictures. FlickerError for no scene."""
+    path = Path(path)
+    if scene_kind(path) != "SOG":
+        return [path]
+    meta = _meta_of(path)
+    try:
+        text = meta.read_bytes()
+    except OSError as error:
+        raise FlickerError(f"{meta}: cannot be read ({error.strerror})") from None
+    return [meta, *(meta.parent / name for name in sog.member_names(str(meta), sog.parse_meta(str(meta), text)))]
+
+
+def scene_digest(path: str | Path) -> str:
+    """SHA-256 of a scene's content, hexadecimal: of a file that of the file, whatever its name. FlickerError for what cannot be read."""
+    digests = []
+    for file in scene_files(path):
+        try:
+            with file.open("rb") as opened:
+                digests.append(hashlib.file_digest(opened, "sha256").hexdigest())
+        except OSError as error:
+            raise FlickerError(f"{file}: cannot be read ({error.strerror})") from None
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
 def save_ply(scene: Scene, path: str | Path) -> None:

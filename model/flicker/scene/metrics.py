@@ -20,7 +20,7 @@ def _remembered(keep: int):
     def digest(argument: np.ndarray | float) -> bytes | float:
         if not isinstance(argument, np.ndarray):
             return argument
-        return hashlib.blake2b(np.ascontiguousarray(argument), digest_size=16).digest() + f"{argument.shape}{argument.dtype}".encode()
+        return hashlib.blake2b(np.ascontiguousarray(argument).data, digest_size=16).digest() + f"{argument.shape}{argument.dtype}".encode()
 
     def decorate(function):
         results: dict[tuple, object] = {}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -204,20 +205,20 @@ class Comparison:
 
     def summary(self) -> Sheet:
         """For the README: area and longest path of the main units, default and as in the paper."""
-        units = [
-            ("FP16 adder, multiplier (combinational)", ("fp_add", "fp16"), ("fp_mul", "fp16")),
-            ("E4M3 adder, multiplier (combinational)", ("fp_add", "e4m3"), ("fp_mul", "e4m3")),
-            ("PRTU: four leader pixels a cycle, default", ("prtu", "factored fixed")),
-            ("CTU, default", ("ctu", "factored fixed")),
-            ("CTU, `faithful`", ("ctu", "faithful")),
-            ("VRU, default", ("vru", "factored")),
-            ("VRU, `faithful`", ("vru", "conic")),
-            ("rendering core: 8 VRUs, 4 FIFOs of 16, default", ("rendering_core", "factored")),
-            ("rendering stage: 4 cores with CTUs, default", ("render_stage", "factored fixed")),
-            ("rendering stage, `faithful`", ("render_stage", "faithful")),
+        units: list[tuple[str, list[tuple[str, str]]]] = [
+            ("FP16 adder, multiplier (combinational)", [("fp_add", "fp16"), ("fp_mul", "fp16")]),
+            ("E4M3 adder, multiplier (combinational)", [("fp_add", "e4m3"), ("fp_mul", "e4m3")]),
+            ("PRTU: four leader pixels a cycle, default", [("prtu", "factored fixed")]),
+            ("CTU, default", [("ctu", "factored fixed")]),
+            ("CTU, `faithful`", [("ctu", "faithful")]),
+            ("VRU, default", [("vru", "factored")]),
+            ("VRU, `faithful`", [("vru", "conic")]),
+            ("rendering core: 8 VRUs, 4 FIFOs of 16, default", [("rendering_core", "factored")]),
+            ("rendering stage: 4 cores with CTUs, default", [("render_stage", "factored fixed")]),
+            ("rendering stage, `faithful`", [("render_stage", "faithful")]),
         ]
         rows = []
-        for name, *keys in units:
+        for name, keys in units:
             results = [self.by_name[key] for key in keys]
             rows.append([
                 name, ", ".join(_ge(result["ge"]) for result in results), ", ".join(_ge(result["ff"]) for result in results) if results[0]["ff"] else "",
@@ -279,13 +280,13 @@ class Comparison:
             values = {name: sum(parts[module] for module in modules) for name, modules in groups.items()}
             values["feature FIFOs"] = parts["fifo"]
             values["arbiters, control"] = total - sum(values.values())
-            for name, value in values.items():
-                heights[name].append(value / 1e6)
+            for name, area in values.items():
+                heights[name].append(area / 1e6)
         figure, axes = pyplot.subplots(figsize=(8, 4.5), layout="constrained")
         base = [0.0] * len(configs)
-        for name, values in heights.items():
-            axes.bar([config.replace(" ", "\n") for config in configs], values, bottom=base, label=name, width=0.7)
-            base = [low + value for low, value in zip(base, values)]
+        for name, bars in heights.items():
+            axes.bar([config.replace(" ", "\n") for config in configs], bars, bottom=base, label=name, width=0.7)
+            base = [low + bar for low, bar in zip(base, bars)]
         axes.set_ylabel("million GE")
         axes.set_title(f"Rendering stage: 4 CTUs, 32 VRUs ({library})", fontsize=10)
         axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), frameon=False, reverse=True)
@@ -319,20 +320,24 @@ def _areas(folder: Path) -> Areas | None:
         return {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
 
 
+def _factored_over_conic(areas: dict, precision: str) -> float:
+    return areas["prtu", f"factored {precision}"] / areas["prtu", f"conic {precision}"]
+
+
 def against(folder: Path, other: Path, library: str) -> list[Sheet]:
     """A library's area.csv beside the default library's: ratios between units first, then every unit. Empty if the default has not been run."""
     here, there = _areas(folder), _areas(other)
     if here is None or there is None:
         return []
-    ratios = {}
+    ratios: dict[str, Callable[[dict], float]] = {}
     for form in FORMS:
         for precision in PRECISIONS:
             config = f"{form} {precision}"
-            ratios[f"PRTU / 4 ACUs, {config}"] = lambda areas, c=config: prtu_ratio(areas, c)
-            ratios[f"CTU / 8 VRUs, {config}"] = lambda areas, c=config: ctu_ratio(areas, c)
+            ratios[f"PRTU / 4 ACUs, {config}"] = partial(prtu_ratio, config=config)
+            ratios[f"CTU / 8 VRUs, {config}"] = partial(ctu_ratio, config=config)
     ratios["CTU / 8 VRUs, faithful"] = lambda areas: ctu_ratio(areas, "faithful")
     for precision in PRECISIONS:
-        ratios[f"factored / conic PRTU, {precision}"] = lambda ge, p=precision: ge["prtu", f"factored {p}"] / ge["prtu", f"conic {p}"]
+        ratios[f"factored / conic PRTU, {precision}"] = partial(_factored_over_conic, precision=precision)
     ratios["32 VRUs with CTUs / 4 cores of 16 VRUs, factored fixed"] = (
         lambda ge: ge["render_stage", "factored fixed"] / (4 * ge["rendering_core", "factored, 4 VRUs"])
     )

@@ -162,7 +162,7 @@ def _process(folder: Path, job: dict) -> None:
     path.write_text(json.dumps(job))
     with log.open("w") as out:
         done = subprocess.run(
-            [sys.executable, "-m", "flicker.synth.flow", str(path)], stdout=out, stderr=subprocess.STDOUT,
+            [sys.executable, "-m", "flicker.cost.synth.flow", str(path)], stdout=out, stderr=subprocess.STDOUT,
             env={**os.environ, "TMPDIR": str(folder)},
         )
     error = folder / "error"

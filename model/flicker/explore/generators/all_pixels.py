@@ -22,7 +22,10 @@ class AllPixels(MaskGenerator):
 
     form: Form
     pixels = True
-    exact = True
+
+    @property
+    def exact(self) -> bool:
+        return True
 
     @property
     def precision(self) -> str:

@@ -17,16 +17,16 @@ import numba
 import numpy as np
 
 from ...arithmetic.fp import FP16_R, sub
+from ...arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, Numbers, numbers, quantise
+from ...arithmetic.thresholds import EPSILON, radii, thresholds
+from ...cost.operations import Op, Operation, Operations
+from ...front.projection import Projected
 from ...front.records import SubtileLists
 from ...front.view import View
-from ...params import Form
-from ...front.projection import Projected
-from ...arithmetic.numbers import DOWN, FORMATS, NEAREST, UP, Numbers, numbers, quantise
-from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ...params import Form
 from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
 from ..stages.channels import Channels
-from ...arithmetic.thresholds import EPSILON, radii, thresholds
 
 
 def margins(form: Form, system: Numbers) -> tuple[float, float]:
@@ -208,7 +208,9 @@ def exact_operations(form: Form, fmt: str, bound: bool, scaled: bool) -> Operati
     """One element per cycle. Mini-tiles of a column share their vertical edge, those of a row their horizontal one."""
     width = {"fp16": 16, "e5m6": 12, "e4m4": 9, "e5m3": 9, "q8.8": 17, "q8.4": 13}.get(fmt, 8)
     fmt = fmt.upper()
-    operations = [Operation(Op.ADD, "FP16", 8, note="differences"), Operation(Op.CMP, fmt, 16, note="clamps"), Operation(Op.CMP, fmt, 8), Operation(Op.LOG, fmt, 1)]
+    operations = [
+        Operation(Op.ADD, "FP16", 8, note="differences"), Operation(Op.CMP, fmt, 16, note="clamps"), Operation(Op.CMP, fmt, 8), Operation(Op.LOG, fmt, 1),
+    ]
     if form == Form.FACTORED:
         # Column: p, optimum. Row: q, v, vv, optimum. Mini-tile: q, v, vv, uu (vertical), p, uu (horizontal).
         operations += [Operation(Op.MUL, fmt, 2 * 2 + 2 * 3 + 4 * 3), Operation(Op.MUL, fmt, 2 + 4 * 3, sqr=True), Operation(Op.ADD, fmt, 16)]
@@ -218,7 +220,10 @@ def exact_operations(form: Form, fmt: str, bound: bool, scaled: bool) -> Operati
         # Column: xx, sx, optimum. Row: yy, sy, optimum. Mini-tile, twice: square and product of the free side, xy, t.
         operations += [Operation(Op.MUL, fmt, 2 * 2 + 2 * 2 + 4 * 2 * 3), Operation(Op.MUL, fmt, 2 + 2 + 4 * 2, sqr=True), Operation(Op.ADD, fmt, 16)]
         if bound:
-            operations += [Operation(Op.MUL, fmt, 2 + 2 + 4 * 2, note="margin"), Operation(Op.MUL, fmt, 4, sqr=True, note="margin"), Operation(Op.ADD, fmt, 8 + 4 + 8, note="margin")]
+            operations += [
+                Operation(Op.MUL, fmt, 2 + 2 + 4 * 2, note="margin"), Operation(Op.MUL, fmt, 4, sqr=True, note="margin"),
+                Operation(Op.ADD, fmt, 8 + 4 + 8, note="margin"),
+            ]
     if fmt != "FP16":
         operations.append(Operation(Op.SHIFT, f"FP16 -> {fmt}", 8 + 3, note="conversion"))
     if scaled:

@@ -23,8 +23,11 @@ class Oracle(MaskGenerator):
 
     form: Form
     pixels: bool = True
-    exact = True
     free = True
+
+    @property
+    def exact(self) -> bool:
+        return True
 
     def masks(self, view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray, stage: RenderingStage) -> Masks:
         n = len(lists.entry)

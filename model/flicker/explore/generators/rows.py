@@ -18,23 +18,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numba
 import numpy as np
 
+from ...arithmetic.numbers import NEAREST, quantise
+from ...arithmetic.thresholds import radii, thresholds
+from ...cost.operations import Op, Operation, Operations
 from ...errors import FlickerError
 from ...front.records import SubtileLists
 from ...front.view import View
-from ...params import Form
-from ...arithmetic.numbers import NEAREST, quantise
-from ...cost.operations import Op, Operation, Operations
 from ...golden.masked import load_splat
+from ...params import Form
 from ..machine import Configuration, MaskGenerator, Masks, RenderingStage
 from ..stages.channels import Channels
 from ..stages.lanes import Lanes
 from ..stages.pixels import PixelChannels
-from ...arithmetic.thresholds import radii, thresholds
 
 SIGNIFICAND = 13  # bits of a, b, c, X, Y with the hidden bit
 EXTRA = 3  # fraction bits of sums beyond those of a comparison
@@ -61,7 +61,7 @@ class RowFormat:
             raise FlickerError(f"rows: fraction must be 4 to 12 and address 3 to fraction, not {self.fraction} and {self.address}")
 
 
-@lru_cache(maxsize=None)
+@cache
 def inverse_radius() -> np.ndarray:
     """float64 (65536,): k of every FP16 opacity, at most 1 / rho(o), a multiple of 2^-K_BITS; 0 where no pair can pass."""
     t = thresholds(Form.FACTORED)
@@ -84,12 +84,12 @@ def errors(fmt: RowFormat) -> tuple[float, float]:
     return v, u
 
 
-@lru_cache(maxsize=None)
+@cache
 def root_table(fmt: RowFormat) -> np.ndarray:
     """int64: by |v| in units of 2^-address, r + the constant part of M in units of 2^-fraction, rounded up; ends where |v| > 1."""
     dv, du = errors(fmt)
     one = 1 << fmt.fraction
-    table = []
+    table: list[int] = []
     while True:
         low = (len(table) << (fmt.fraction - fmt.address)) - dv  # smallest |v| that has this address
         if low > one:
@@ -199,7 +199,10 @@ class Rows(MaskGenerator):
 
     fmt: RowFormat
     pixels: bool = True
-    exact = True
+
+    @property
+    def exact(self) -> bool:
+        return True
 
     @property
     def precision(self) -> str:
@@ -232,11 +235,13 @@ def configurations() -> Iterator[Configuration]:
                     continue
                 words = ["rows"] + ["minitile"] * (not pixels) + [fmt.name] * (fmt is not FORMATS[0]) + [kind] * (kind != "subtile")
                 formats = "" if fmt is FORMATS[0] else f", {fmt.fraction} fraction bits, {fmt.address}-bit root table"
-                stage = PixelChannels(form) if pixels else Channels(form)
+                channels = PixelChannels(form) if pixels else Channels(form)
                 yield Configuration(
-                    "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), stage, lists=kind,
+                    "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), channels,
+                    lists=kind,
                 )
     rows = Rows(FORMATS[0])
+    stage: RenderingStage
     yield Configuration("rows-ellipse-64", "the same, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
     for bits in ACCUMULATORS:
         title = f"row intervals, pixel masks, lists by the ellipse, colour accumulators of {bits} fraction bits"
@@ -246,6 +251,9 @@ def configurations() -> Iterator[Configuration]:
         ("lanes-deep", "lanes, FIFO depth 40, two elements a cycle", Lanes(fifo_depth=40, window=3, width=2, accumulator=ACCUMULATOR)),
         ("lanes-64", "64 lanes, FIFO depth 4", Lanes(lanes=64, fifo_depth=4, window=2, accumulator=ACCUMULATOR)),
         ("lanes-fp16", "lanes, FP16 accumulators and their loop", Lanes(window=2, loop=4)),
-        *((f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits)) for bits in ACCUMULATORS if bits != ACCUMULATOR),
+        *(
+            (f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits))
+            for bits in ACCUMULATORS if bits != ACCUMULATOR
+        ),
     ):
         yield Configuration(name, title, "rows", rows, stage, lists="ellipse")

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...scene.camera import Camera
 from ...errors import FlickerError
 from ...front.projection import Projected, project
+from ...scene.camera import Camera
 from ...scene.files import Scene
 
 SIZE = 64
@@ -180,7 +180,10 @@ def _depth_range(far: float, rng: np.random.Generator) -> Case:
 def _stack(layers: float, rng: np.random.Generator) -> Case:
     n = int(layers)
     camera = _camera(16)
-    return _case(_scene(_inside(rng, n, 16), rng.uniform(0.6, 2.0, (n, 2)), rng.uniform(0, 3, n), _layers(rng, n), rng.uniform(0.005, 0.03, n), _colours(rng, n), camera), camera)
+    scene = _scene(
+        _inside(rng, n, 16), rng.uniform(0.6, 2.0, (n, 2)), rng.uniform(0, 3, n), _layers(rng, n), rng.uniform(0.005, 0.03, n), _colours(rng, n), camera,
+    )
+    return _case(scene, camera)
 
 
 def _singular(ratio: float, rng: np.random.Generator) -> Case:

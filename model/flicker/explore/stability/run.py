@@ -10,12 +10,12 @@ from zlib import crc32
 import numba
 import numpy as np
 
+from ...front.reference import render_reference
+from ...front.view import View
+from ...params import Coords
+from ...scene.metrics import psnr
 from ..configurations import get_configuration, group
 from ..machine import Configuration, run
-from ...front.view import View
-from ...scene.metrics import psnr
-from ...params import Coords
-from ...front.reference import render_reference
 from .families import FAMILIES, get_family
 
 BROKEN_PSNR = 40.0  # dB

@@ -19,6 +19,13 @@ def count(values: np.ndarray) -> int:
     return int(values.sum(dtype=np.int64))
 
 
+def modelled(counters: StageCycles | None) -> StageCycles:
+    """The counters of a stage that has a cycle model."""
+    if counters is None:
+        raise ValueError("this stage needs the counters of its cycle model")
+    return counters
+
+
 @dataclass(frozen=True)
 class Channels(RenderingStage):
     """The RTL's: four cores of four channels, each with a feature FIFO and `vrus_per_channel` VRUs; cycles of its cycle model."""
@@ -48,11 +55,11 @@ class Channels(RenderingStage):
 
     def pairs(self, work: Work, counters: StageCycles | None) -> int:
         """Pixel-Gaussian pairs that the VRUs work on: what the channels issued."""
-        return count(counters.channel("vru_busy")) * self.vrus_per_channel
+        return count(modelled(counters).channel("vru_busy")) * self.vrus_per_channel
 
     def pushed(self, work: Work, counters: StageCycles | None) -> int:
         """Records written into feature FIFOs."""
-        return count(counters.core("minitiles_delivered"))
+        return count(modelled(counters).core("minitiles_delivered"))
 
     def energy(self, work: Work, cycles: int, counters: StageCycles | None, generator: MaskGenerator) -> dict[str, float]:
         return stage_energy(

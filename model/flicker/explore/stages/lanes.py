@@ -11,7 +11,7 @@ from ...perf.lane_stage import LaneStage, simulate_lanes
 from ...perf.render_stage import StageCycles
 from ...perf.work import Work
 from ..machine import MaskGenerator, RenderingStage
-from .channels import count
+from .channels import count, modelled
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Lanes(RenderingStage):
         return lane_stage_parts(self.stage, generator.area(), self.lanes, self.fifo_depth, self.accumulator)
 
     def energy(self, work: Work, cycles: int, counters: StageCycles | None, generator: MaskGenerator) -> dict[str, float]:
+        counters = modelled(counters)
         return stage_energy(
             cycles=cycles, subtiles=work.subtiles, form=self.form, vrus=self.lanes, pairs=count(counters.channel("vru_busy")),
             pushed=count(counters.core("minitiles_delivered")), fifos=self.lanes, fifo_depth=self.fifo_depth,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,11 +14,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, S
 from ...errors import FlickerError
 from ...front.view import DEMO
 from ...scene.camera import MAX_SIZE
+from ...scene.files import scene_kind
 from ...scene.photos import NONE, parse_background
 from ...toolchain import BUILD
 from ..configurations import GROUPS, matching
 from ..digest import code_digest, key
-from ..points import SIZE, SUFFIXES, Point, SceneFile, Target
+from ..points import SIZE, Point, SceneFile, Target
 
 MAX_WORKERS = 1024
 
@@ -84,6 +86,7 @@ class SceneSection(_Section):
     path: Annotated[StrictStr, Field(min_length=1, description="scene file, relative to the YAML file, or demo")]
     cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras.json instead of the one beside the scene")] = None
     views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
+    up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
     photos: Annotated[StrictStr | None, Field(min_length=1, description="folder of photographs instead of those beside the cameras, or none")] = None
     background: Annotated[StrictStr, Field(description="black, white or r,g,b from 0 to 1")] = "black"
 
@@ -150,7 +153,8 @@ def _first(path: Path, error: ValidationError) -> FlickerError:
     found = error.errors()[0]
     location = tuple(part for part in found["loc"] if not (isinstance(part, str) and ("[" in part or part == "list")))
     if found["type"] == "extra_forbidden":
-        section = {"scenes": SceneSection, "cluster": ClusterSection}.get(str(location[0]) if len(location) > 1 else "", SweepFile)
+        sections: dict[str, type[_Section]] = {"scenes": SceneSection, "cluster": ClusterSection}
+        section = sections.get(str(location[0]) if len(location) > 1 else "", SweepFile)
         close = difflib.get_close_matches(str(location[-1]), section.model_fields, 1)
         hint = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(section.model_fields)}"
         where = _place(location[:-1])
@@ -185,15 +189,13 @@ def _parse(path: Path) -> SweepFile:
         raise _first(path, error) from None
 
 
-def _file(base: Path, text: str, where: str) -> Path:
-    """A file of the sweep, relative to the YAML file."""
+def _path(base: Path, text: str, where: str) -> Path:
+    """A file or folder of the sweep, relative to the YAML file."""
     path = (base.parent / Path(text).expanduser()).resolve()
-    if not path.is_file():
+    if not path.exists():
         raise FlickerError(f"{base}: {where}: {path}: no such file")
-    try:
-        path.open("rb").close()
-    except OSError as error:
-        raise FlickerError(f"{base}: {where}: {path}: cannot be read ({error.strerror})") from None
+    if not os.access(path, os.R_OK):
+        raise FlickerError(f"{base}: {where}: {path}: cannot be read")
     return path
 
 
@@ -205,13 +207,15 @@ def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
     if section.path == DEMO:
         if section.cameras is not None:
             raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
-        return SceneFile(DEMO, None, section.photos, background)
-    path = _file(base, section.path, where)
-    if not path.name.lower().endswith(SUFFIXES):
-        raise FlickerError(f"{base}: {where}: {path}: expected {', '.join(SUFFIXES)}")
-    cameras = None if section.cameras is None else str(_file(base, section.cameras, f"{where}: cameras"))
-    folder = section.photos if section.photos in (None, NONE) else str((base.parent / Path(section.photos).expanduser()).resolve())
-    return SceneFile(str(path), cameras, folder, background)
+        return SceneFile(DEMO, photos=section.photos, background=background)
+    path = _path(base, section.path, where)
+    cameras = None if section.cameras is None else str(_path(base, section.cameras, f"{where}: cameras"))
+    try:
+        scene_kind(path)
+    except FlickerError as error:
+        raise FlickerError(f"{base}: {where}: {error}") from None
+    photos = section.photos if section.photos in (None, NONE) else str((base.parent / Path(section.photos).expanduser()).resolve())
+    return SceneFile(str(path), cameras, section.up, photos, background)
 
 
 def load_sweep(path: str | Path) -> Sweep:

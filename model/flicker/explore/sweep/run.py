@@ -44,7 +44,7 @@ def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dic
 
     from ..evaluate import evaluate
 
-    numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))
+    numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))  # type: ignore[attr-defined]
     worker = get_worker()
     view = points[0].target.load()
     rows = []
@@ -57,7 +57,7 @@ def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dic
 
 def _missing_files(paths: list[str]) -> list[str]:
     """On a worker: files that it cannot see."""
-    return [path for path in paths if not os.path.isfile(path)]
+    return [path for path in paths if not os.path.exists(path)]
 
 
 def _quiet() -> None:
@@ -100,7 +100,7 @@ def check_workers(client, sweep: Sweep) -> None:
     if sweep.address is None:
         return
     files = {str(path) for t in sweep.targets for path in (t.scene.path, t.scene.cameras_file, t.photo) if path is not None}
-    paths = sorted(path for path in files if os.path.isfile(path))
+    paths = sorted(path for path in files if os.path.exists(path))
     try:
         codes = client.run(code_digest)
         missing = client.run(_missing_files, paths)

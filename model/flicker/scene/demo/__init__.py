@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from . import light
-from . import plants
-from . import still_life
-from . import table_things
+from flicker.errors import FlickerError
 from flicker.scene.demo.splats import Rand, Splats, dot, unit
 from flicker.scene.demo.views import EYES, demo_cameras, to_world
-from flicker.errors import FlickerError
 from flicker.scene.files import Scene, save_ply
+
+from . import light, plants, still_life, table_things
 
 __all__ = ["demo_cameras", "generate", "write_demo"]
 

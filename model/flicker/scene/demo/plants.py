@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from flicker.scene.demo.splats import (
-    Rand, Splats, bezier, dot, fbm, frame, mix, sample, spread, srgb, step, unit,
+    Rand,
+    Splats,
+    bezier,
+    dot,
+    fbm,
+    frame,
+    mix,
+    sample,
+    spread,
+    srgb,
+    step,
+    unit,
 )
 from flicker.scene.demo.still_life import TAU, UP, VASE, ellipsoid
 
@@ -175,7 +186,7 @@ def bouquet(out: Splats, rand: Rand) -> None:
                 ((0.2, 0.2, 1.0), (0.10, 0.25, 1.40), 8))
     for middle, end, pairs in branches:
         _eucalyptus(out, rand, MOUTH, HEART + np.array(middle), HEART + np.array(end), pairs)
-    for k in range(20):
+    for _ in range(20):
         turn = rand.uniform(1)[0] * TAU
         reach = 0.45 + 0.55 * rand.uniform(1)[0]
         out_of = np.array([np.cos(turn), 0.55 * np.sin(turn) + 0.12, 0.0])

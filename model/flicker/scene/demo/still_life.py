@@ -8,7 +8,19 @@ import numpy as np
 
 from flicker.scene.demo.light import window_mask
 from flicker.scene.demo.splats import (
-    Patch, Rand, Splats, dot, fbm, frame, mix, noise, sample, spread, srgb, step, unit,
+    Patch,
+    Rand,
+    Splats,
+    dot,
+    fbm,
+    frame,
+    mix,
+    noise,
+    sample,
+    spread,
+    srgb,
+    step,
+    unit,
 )
 from flicker.scene.demo.views import seen
 

@@ -1,0 +1,278 @@
+#!/usr/bin/env python3
+"""Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/mutants.md).
+
+    scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--docs]
+
+Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
+survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
+Prints a table, writes build/mutants/results.csv (finished mutants are not run again while sources and tests stay as they are); exits 1 when fewer than
+KILLED_AT_HOME die at home, when a survivor has no note, or when a mutant is wrong. --docs writes the table into docs/mutants.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import os
+import queue
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from flicker import markdown, toolchain
+from flicker.errors import FlickerError
+
+ROOT = toolchain.ROOT
+LISTS = ROOT / "tb" / "mutants"
+FOLDER = toolchain.BUILD / "mutants"
+RESULTS = FOLDER / "results.csv"
+COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint", "formal")
+LEVELS = (("rendering_core",), ("render_stage",), ("frames",))  # who may notice what a unit's own tests do not, from below
+KILLED_AT_HOME = 0.95
+TIMEOUT = 900  # seconds of a test run, on a busy machine
+KEYS = {"file", "find", "replace", "unit", "note"}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: why it survives, if it does."""
+
+    number: int
+    file: str
+    find: str
+    replace: str
+    unit: str
+    note: str = ""
+
+    @property
+    def title(self) -> str:
+        return f"{Path(self.file).stem.removeprefix('flk_')}: {_short(self.find)} -> {_short(self.replace)}"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """killer: unit whose tests failed, "" if none did. wrong: why the mutant is none."""
+
+    mutant: Mutant
+    killer: str = ""
+    wrong: str = ""
+
+    @property
+    def at_home(self) -> bool:
+        return self.killer == self.mutant.unit
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def load(folder: Path = LISTS) -> list[Mutant]:
+    """All mutants. FlickerError, naming file and entry, for one that could not be made."""
+    found: list[Mutant] = []
+    units = {path.stem.removeprefix("test_") for path in (ROOT / "tb").rglob("test_*.py")}
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            entries = tomllib.loads(path.read_text())["mutant"]
+        except (tomllib.TOMLDecodeError, KeyError) as error:
+            raise FlickerError(f"{path}: not a list of mutants ({error})") from None
+        for i, entry in enumerate(entries):
+            where = f"{path}: mutant {i + 1}"
+            if unknown := entry.keys() - KEYS:
+                raise FlickerError(f"{where}: unknown key '{sorted(unknown)[0]}'")
+            if missing := KEYS - {"note"} - entry.keys():
+                raise FlickerError(f"{where}: key '{sorted(missing)[0]}' is missing")
+            source = ROOT / entry["file"]
+            if not source.is_file():
+                raise FlickerError(f"{where}: {entry['file']}: no such file")
+            if (count := source.read_text().count(entry["find"])) != 1:
+                raise FlickerError(f"{where}: '{_short(entry['find'])}' occurs {count} times in {entry['file']}")
+            if entry["unit"] not in units:
+                raise FlickerError(f"{where}: no unit '{entry['unit']}'")
+            found.append(Mutant(len(found), **entry))
+    if not found:
+        raise FlickerError(f"{folder}: no mutants")
+    return found
+
+
+class Copies:
+    """Copies of the checkout, one for each job at a time."""
+
+    def __init__(self, count: int) -> None:
+        self.free: queue.Queue[Path] = queue.Queue()
+        for number in range(count):
+            folder = FOLDER / f"tree{number}"
+            for name in COPIED:
+                target = folder / name
+                if target.is_dir():
+                    shutil.rmtree(target)
+                if (ROOT / name).is_dir():
+                    shutil.copytree(ROOT / name, target, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+                else:
+                    folder.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(ROOT / name, target)
+            self.free.put(folder)
+
+    def run(self, mutant: Mutant, seed: int) -> Outcome:
+        """Apply, test from home upwards, restore."""
+        folder = self.free.get()
+        source = folder / mutant.file
+        text = source.read_text()
+        try:
+            source.write_text(text.replace(mutant.find, mutant.replace))
+            for units in ((mutant.unit,), *LEVELS):
+                for unit in units:
+                    died, wrong = _test(folder, unit, seed)
+                    if wrong:
+                        return Outcome(mutant, wrong=wrong)
+                    if died:
+                        return Outcome(mutant, unit)
+            return Outcome(mutant)
+        finally:
+            source.write_text(text)
+            self.free.put(folder)
+
+
+def _test(folder: Path, unit: str, seed: int) -> tuple[bool, str]:
+    """Whether the tests of a unit fail in a copy; and what is wrong if they could not run."""
+    environment = {**os.environ, "PYTHONPATH": f"{folder / 'model'}{os.pathsep}{folder / 'scripts'}", "FLICKER_SEED": str(seed)}
+    environment.pop("FLICKER_SCENES", None)
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "sim", "--unit", unit, "tb"]
+    try:
+        done = subprocess.run(command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT)
+    except subprocess.TimeoutExpired:
+        return True, ""  # a hang is noticed
+    (FOLDER / f"last-{unit}.log").write_text(done.stdout)
+    if done.returncode == 0:
+        return False, ""
+    if re.search(r"(verilator|make|g\+\+): (%Error|.*-USERERROR|.*error:)", done.stdout):
+        return False, "does not build"
+    if done.returncode != 1 or "no tests ran" in done.stdout:
+        return False, f"tests of {unit} did not run (exit code {done.returncode})"
+    return True, ""
+
+
+def stamp() -> str:
+    """Of all sources and tests: what results depend on."""
+    digest = hashlib.sha256()
+    for name in ("rtl", "tb", "model"):
+        for path in sorted((ROOT / name).rglob("*")):
+            if path.suffix in (".sv", ".f", ".py", ".cpp", ".vlt") and "__pycache__" not in path.parts:
+                digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _key(mutant: Mutant, code: str) -> str:
+    return hashlib.sha256("\0".join((code, mutant.file, mutant.find, mutant.replace, mutant.unit)).encode()).hexdigest()[:16]
+
+
+def _earlier(mutants: list[Mutant], code: str) -> dict[int, Outcome]:
+    if not RESULTS.exists():
+        return {}
+    with RESULTS.open(newline="") as file:
+        rows = {row["key"]: row for row in csv.DictReader(file)}
+    found = {}
+    for mutant in mutants:
+        if (row := rows.get(_key(mutant, code))) is not None and not row["wrong"]:
+            found[mutant.number] = Outcome(mutant, row["killer"])
+    return found
+
+
+def _write(outcomes: list[Outcome], code: str) -> None:
+    with RESULTS.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["key", "file", "find", "replace", "unit", "killer", "wrong", "note"])
+        for o in outcomes:
+            m = o.mutant
+            writer.writerow([_key(m, code), m.file, m.find, m.replace, m.unit, o.killer, o.wrong, m.note])
+
+
+def summary(outcomes: list[Outcome]) -> str:
+    """Markdown: how many die where, by unit, and every mutant that does not die at home."""
+    units = list(dict.fromkeys(o.mutant.unit for o in outcomes))
+    rows = []
+    for unit in units:
+        own = [o for o in outcomes if o.mutant.unit == unit]
+        rows.append((f"`{unit}`", str(len(own)), str(sum(o.at_home for o in own)), str(sum(bool(o.killer) and not o.at_home for o in own)),
+                     str(sum(not o.killer for o in own))))
+    home = sum(o.at_home for o in outcomes)
+    rows.append(("all", str(len(outcomes)), f"{home} ({home / len(outcomes):.0%})", str(sum(bool(o.killer) and not o.at_home for o in outcomes)),
+                 str(sum(not o.killer for o in outcomes))))
+    text = markdown.table(["unit", "mutants", "killed by its own tests", "killed above", "survived"], rows)
+    others = [o for o in outcomes if not o.at_home]
+    if others:
+        text += "\n" + markdown.table(
+            ["mutant", "killed by", "why"], [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.note or o.wrong) for o in others],
+        )
+    return text
+
+
+def main() -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--unit", action="append", help="only mutants of this unit, repeatable")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--docs", action="store_true", help="write the table into docs/mutants.md; all units only")
+    parser.add_argument("--check", action="store_true", help="only check that every mutant could be made")
+    args = parser.parse_args()
+    mutants = [m for m in load() if not args.unit or m.unit in args.unit]
+    if not mutants:
+        raise FlickerError(f"--unit: no mutants of {', '.join(args.unit)}")
+    if args.check:
+        print(f"mutants: {len(mutants)} can be made")
+        return 0
+    if args.docs and args.unit:
+        raise FlickerError("--docs: the table needs all units")
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    console = Console()
+    code = stamp()
+    outcomes = _earlier(mutants, code)
+    left = [m for m in mutants if m.number not in outcomes]
+    console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {args.seed}")
+    copies = Copies(args.jobs) if left else None
+    with Progress(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"), console=console, transient=True,
+                  disable=not console.is_terminal) as bar, ThreadPoolExecutor(args.jobs) as pool:
+        task = bar.add_task("", total=len(mutants), completed=len(outcomes))
+        for outcome in pool.map(lambda m: copies.run(m, args.seed), left):
+            outcomes[outcome.mutant.number] = outcome
+            bar.update(task, advance=1, description=outcome.mutant.title)
+            if not console.is_terminal:
+                print(f"{outcome.killer or outcome.wrong or 'SURVIVED':<16} {outcome.mutant.title}", flush=True)
+            _write([outcomes[m.number] for m in mutants if m.number in outcomes], code)
+    found = [outcomes[m.number] for m in mutants]
+    table = Table()
+    for column in ("unit", "mutant", "killed by", "note"):
+        table.add_column(column, overflow="fold")
+    for o in found:
+        style = "" if o.at_home else "yellow" if o.killer else "red"
+        table.add_row(o.mutant.unit, o.mutant.title, o.killer or o.wrong or "survived", o.mutant.note, style=style)
+    console.print(table)
+    home = sum(o.at_home for o in found)
+    wrong = [o for o in found if o.wrong]
+    unexplained = [o for o in found if not o.killer and not o.wrong and not o.mutant.note]
+    console.print(
+        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; {len(unexplained)} survivors without a note; {len(wrong)} wrong",
+    )
+    if args.docs:
+        import pages
+
+        pages.put(ROOT / "docs" / "mutants.md", "make mutants", summary(found))
+    return 1 if home < KILLED_AT_HOME * len(found) or unexplained or wrong else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except FlickerError as error:
+        sys.exit(f"mutants: {error}")

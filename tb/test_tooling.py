@@ -1,0 +1,264 @@
+"""Tools around the tests: which checkout is tested, choice of units, progress, traces, manifests for other tools.
+
+Not covered: GTKWave itself, Bender itself (its manifest is read as YAML and compared with rtl/flk.f), the hosted CI.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+import yaml
+from flicker_tb import runner, signal_view
+
+from flicker import toolchain
+from flicker.errors import FlickerError
+from flicker.toolchain import ROOT, filelist
+
+BIN = Path(sys.prefix) / "bin"
+
+
+def command(*words: object, cwd: Path = ROOT, **environment: str) -> subprocess.CompletedProcess:
+    """Run a command outside this run of pytest; both outputs in ``stdout``."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "FLICKER_PROGRESS", "MAKE"))}
+    return subprocess.run(
+        [str(word) for word in words], cwd=cwd, env={**own, **environment}, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+
+
+# ---- which checkout is tested -------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What ``cp -r`` makes of this checkout and its environment; packages but our own are links."""
+    copy = tmp_path_factory.mktemp("copied") / "checkout"
+    skip = shutil.ignore_patterns(".venv", "build", ".git", "__pycache__", "*.egg-info", ".*_cache")
+    shutil.copytree(ROOT, copy, ignore=skip)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", copy / ".venv"], check=True)
+    site = copy / ".venv" / Path(sysconfig.get_path("purelib")).relative_to(sys.prefix)
+    for path in Path(sysconfig.get_path("purelib")).iterdir():
+        if "flicker" not in path.name:
+            (site / path.name).symlink_to(path)
+        elif path.is_dir():
+            shutil.copytree(path, site / path.name)
+        else:
+            shutil.copy(path, site / path.name)
+    shutil.copy(BIN / "pytest", copy / ".venv" / "bin" / "pytest")
+    shutil.copy(ROOT / ".venv" / ".installed", copy / ".venv" / ".installed")
+    return copy
+
+
+def test_copied_checkout_tests_itself(copy: Path) -> None:
+    """Its interpreter finds its own package at once; its commands do after the set-up, which make runs by itself."""
+    found = command(copy / ".venv/bin/python", "-c", "from flicker.toolchain import ROOT; print(ROOT)", cwd=copy)
+    assert found.stdout.strip() == str(copy)
+    assert (copy / ".venv/bin/pytest").read_text().startswith(f"#!{BIN}/python")
+    done = command("make", "setup", cwd=copy)
+    assert done.returncode == 0 and "setup: done" in done.stdout, done.stdout
+    assert (copy / ".venv/bin/pytest").read_text().startswith(f"#!{copy}/.venv/bin/python")
+    found = command(copy / ".venv/bin/python", "-c", "from flicker.toolchain import ROOT; print(ROOT)", cwd=copy)
+    assert found.stdout.strip() == str(copy)
+    assert "Nothing to be done" in command("make", "setup", cwd=copy).stdout
+    assert command(BIN / "python", "-c", "from flicker.toolchain import ROOT; print(ROOT)").stdout.strip() == str(ROOT)
+
+
+def test_foreign_package_is_refused(copy: Path) -> None:
+    """The original's interpreter in the copy would test the original's RTL."""
+    done = command(sys.executable, "-m", "pytest", "--collect-only", "-q", "tb", cwd=copy)
+    assert done.returncode and "another checkout" in done.stdout and str(ROOT) in done.stdout and "make setup" in done.stdout
+
+
+# ---- choice of units ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("unit", "says"), [("camera", "unit 'camera' does not simulate; those that simulate"), ("vruu", "no unit 'vruu'; those that simulate")]
+)
+def test_unit_that_does_not_simulate(unit: str, says: str) -> None:
+    done = command(sys.executable, "-m", "pytest", "-m", "sim", "--unit", unit, "--collect-only", "-q", "tb")
+    assert done.returncode and says in done.stdout, done.stdout
+    named = re.search(r"simulate: (.*)", done.stdout)[1].split(", ")
+    assert {"vru", "stream_cells", "frames"} <= set(named) and not {"camera", "formal", "tooling"} & set(named)
+
+
+def test_every_named_unit_has_simulations() -> None:
+    """One collection of all: each test file outside tb/model gives tests under ``-m sim``, and only these."""
+    done = command(sys.executable, "-m", "pytest", "-m", "sim", "--collect-only", "-q", "tb")
+    files = {line.split("::")[0] for line in done.stdout.splitlines() if "::" in line}
+    assert files == {path.relative_to(ROOT).as_posix() for path in (ROOT / "tb").glob("*/test_*.py") if path.parent.name != "model"}
+
+
+# ---- progress -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_progress_is_shown(workers: int, tmp_path: Path) -> None:
+    """A build is announced while output is captured, and what lasts is listed with its time."""
+    (tmp_path / "conftest.py").write_text(
+        f"import sys\nsys.path.insert(0, {str(ROOT / 'tb')!r})\nfrom flicker_tb import progress\n"
+        "def pytest_configure(config):\n"
+        "    progress.register(config, pause=1.0)\n"
+    )
+    (tmp_path / "test_slow.py").write_text(
+        "import time\nfrom flicker.toolchain import under_way\n"
+        "def test_quick(): pass\n"
+        "def test_slow():\n    with under_way('building flk_x (sim)'):\n        time.sleep(2.6)\n"
+    )
+    done = command(sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", workers, tmp_path, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"^\[building flk_x \(sim\)\]$", done.stdout, re.M), done.stdout
+    assert re.search(r"^\[\d+ s, under way: test_slow.py::test_slow \(\d s\), building flk_x \(sim\) \(\d s\)\]$", done.stdout, re.M), done.stdout
+    assert "test_quick (" not in done.stdout
+
+
+# ---- traces -------------------------------------------------------------------------------------
+
+VCD = """$version Generated by VerilatedVcd $end
+$scope module $rootio $end
+ $var wire 1 ! clk_i $end
+$upscope $end
+$scope module flk_x $end
+ $var wire 32 a Depth [31:0] $end
+ $var wire 1 ! clk_i $end
+ $var wire 8 b data_q[0] [7:0] $end
+ $scope module pixel $end
+  $var wire 16 c red [15:0] $end
+ $upscope $end
+ $scope module gen_core[0] $end
+  $var wire 1 d inner $end
+ $upscope $end
+ $scope module i_fifo $end
+  $var wire 1 d push $end
+ $upscope $end
+$upscope $end
+$enddefinitions $end
+"""
+
+
+def test_view_of_a_vcd(tmp_path: Path) -> None:
+    """Signals of the top, structs by field; a view made for FST, with other widths, fits."""
+    trace, view, fitted = tmp_path / "x.vcd", tmp_path / "x.gtkw", tmp_path / "fitted.gtkw"
+    trace.write_text(VCD)
+    names = ["flk_x.clk_i", "flk_x.data_q[0][7:0]", "flk_x.pixel.red[15:0]"]
+    assert list(signal_view.signals(trace, "flk_x")) == names
+    view.write_text("[*] saved\nflk_x.clk_i\nflk_x.data_q.data_q[0][3:0]\nflk_x.pixel.red[7:0]\n")
+    signal_view.fit(view, trace, "flk_x", fitted)
+    assert fitted.read_text().splitlines() == ["[*] saved", *names]
+    trace.write_text(VCD.split("$enddefinitions")[0])
+    with pytest.raises(FlickerError, match="incomplete"):
+        list(signal_view.signals(trace, "flk_x"))
+
+
+def test_trace_format(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FST where its headers are, else VCD; none unless asked for."""
+    for missing, format in ((["liblz4-dev"], "vcd"), ([], "fst")):
+        monkeypatch.setattr(toolchain, "missing_fst_packages", lambda missing=missing: missing)
+        toolchain.trace_format.cache_clear()
+        monkeypatch.setenv("WAVES", "1")
+        assert runner.waves() == format
+    toolchain.trace_format.cache_clear()
+    monkeypatch.setenv("WAVES_FORMAT", "vcd")
+    assert runner.waves() == "vcd"
+    monkeypatch.setenv("WAVES_FORMAT", "lxt")
+    with pytest.raises(FlickerError, match="WAVES_FORMAT.*'lxt'"):
+        runner.waves()
+    monkeypatch.setenv("WAVES", "0")
+    assert runner.waves() == ""
+
+
+def test_vcd_is_written() -> None:
+    """A simulation with traces leaves a VCD and its view; needs no headers."""
+    done = command(
+        sys.executable, "-m", "pytest", "--unit", "stream_cells", "-k", "test_skid_buffer and 8", "tb", WAVES="1", WAVES_FORMAT="vcd"
+    )
+    assert done.returncode == 0, done.stdout
+    trace = ROOT / "build/waves/stream_cells/skid_buffer/test_skid_buffer_8-seed1.vcd"
+    assert "$enddefinitions" in trace.read_text()
+    shown = trace.with_suffix(".gtkw").read_text().splitlines()
+    assert set(signal_view.signals(trace, "flk_skid_buffer")) <= set(shown)
+
+
+# ---- front ends, as docs/integration.md says ----------------------------------------------------
+
+YOSYS = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in sys.argv[1:]]"
+
+
+def test_slang_reads_everything_and_the_template_fits() -> None:
+    """No errors in the sources; the instantiation template of the page elaborates and is that of the module's ports."""
+    page = (ROOT / "docs/integration.md").read_text()
+    template = page.split("<!-- scripts/instance_template.py -->\n```systemverilog\n")[1].split("```")[0]
+    sys.path.insert(0, str(ROOT / "scripts"))
+    from instance_template import elaborate
+
+    assert elaborate()[0] == []
+    errors, tops = elaborate(f"module outside; {template} endmodule")
+    assert errors == [] and {"outside"} <= tops.keys() and "flk_render_stage" not in tops
+    assert elaborate(f"module outside; {template.replace('.clk_i', '.clock_i')} endmodule")[0]
+    assert command(sys.executable, "scripts/instance_template.py", "--check").returncode == 0
+
+
+def test_verible_parses_everything() -> None:
+    done = command(BIN / "verible-verilog-syntax", *filelist())
+    assert done.returncode == 0, done.stdout
+
+
+def test_what_yosys_reads(tmp_path: Path) -> None:
+    """`read_slang` reads the structs; `read_verilog -sv` refuses our sources, and builds a wrong netlist of the page's example without a warning."""
+    page = (ROOT / "docs/integration.md").read_text()
+    source = tmp_path / "wrong.sv"
+    source.write_text(page.split("holds this text against Yosys -->\n```systemverilog\n")[1].split("```")[0])
+    shown = {}
+    for reader in ("read_verilog -sv", "read_slang"):
+        done = command(
+            sys.executable, "-c", YOSYS, f"{reader} {source}", "prep -top wrong", "check -assert",
+            *(f"eval -set in_i 16'h1234 -set k_i {k} -show sel_o wrong" for k in (0, 1)),
+        )
+        assert done.returncode == 0 and "Warning" not in done.stdout, done.stdout
+        shown[reader] = re.findall(r"sel_o = 8'([01]{8})", done.stdout)
+    assert shown == {"read_verilog -sv": ["00000000"] * 2, "read_slang": [f"{0x34:08b}", f"{0x12:08b}"]}
+    done = command(sys.executable, "-c", YOSYS, f"read_verilog -sv {' '.join(map(str, filelist()))}")
+    assert done.returncode and re.search(r"flk_param_pkg\.sv:\d+: ERROR: syntax error", done.stdout), done.stdout[-500:]
+
+
+# ---- manifests for other tools ------------------------------------------------------------------
+
+
+def test_manifests_follow_the_list() -> None:
+    done = command(sys.executable, "scripts/gen_manifests.py", "--check")
+    assert done.returncode == 0, done.stdout
+    files = [path.relative_to(ROOT).as_posix() for path in filelist()]
+    assert yaml.safe_load((ROOT / "Bender.yml").read_text()) == {"package": {"name": "flicker"}, "sources": files}
+    assert yaml.safe_load((ROOT / "flicker.core").read_text())["filesets"]["rtl"]["files"] == files
+
+
+def test_fusesoc_lint(tmp_path: Path) -> None:
+    """FuseSoC finds the core and lints it with the environment's Verilator; a wrong source fails."""
+    tree = tmp_path / "tree"
+    for name in ("rtl", "lint"):
+        shutil.copytree(ROOT / name, tree / name)
+    shutil.copy(ROOT / "flicker.core", tree)
+
+    def lint(folder: str) -> subprocess.CompletedProcess:
+        work = tmp_path / folder
+        work.mkdir()
+        path = toolchain.environment()
+        return command(
+            sys.executable, "-m", "fusesoc.main", "--cores-root", tree, "run", "--target", "lint", "--work-root", work, "flicker", cwd=work,
+            HOME=str(work), PATH=path["PATH"], VERILATOR_ROOT=path["VERILATOR_ROOT"],
+        )
+
+    done = lint("good")
+    assert done.returncode == 0 and "Error" not in done.stdout and "%Warning" not in done.stdout, done.stdout
+    options = next((tmp_path / "good").glob("*.vc")).read_text()
+    assert {"--lint-only", "-Wall"} <= set(options.split()) and all(path.name in options for path in filelist())
+    cell = tree / "rtl/common/flk_fifo.sv"
+    cell.write_text(cell.read_text().replace("endmodule", "logic [1:0] unread; assign unread = 3'd1;\nendmodule"))
+    done = lint("bad")
+    assert done.returncode and "%Warning-WIDTHTRUNC" in done.stdout, done.stdout
