@@ -60,7 +60,8 @@ def fitted(tmp_path_factory) -> Path:
     save_ply(scene, folder / "fit.ply")
     cameras = [orbit_camera(scene, k, VIEWS, WIDTH, HEIGHT) for k in range(VIEWS)]
     (folder / "cameras.json").write_text(json.dumps([
-        {"img_name": f"shot.{k}", "width": c.width, "height": c.height, "fx": c.fx, "fy": c.fy, "position": c.position.tolist(), "rotation": c.rotation.tolist()}
+        {"img_name": f"shot.{k}", "width": c.width, "height": c.height, "fx": c.fx, "fy": c.fy, "position": c.position.tolist(),
+         "rotation": c.rotation.tolist()}
         for k, c in enumerate(cameras)
     ]))
     for k in range(VIEWS - 1):
@@ -116,7 +117,8 @@ def test_photographs_are_found_by_name(tmp_path):
     (tmp_path / "images" / "c.txt").write_text("no picture")
     found = {name: photo_beside(cameras, name) for name in ("a", "a.JPG", "b.01", "b", "left/a", "c", "c.txt", "images")}
     assert {name: path and str(path.relative_to(tmp_path)) for name, path in found.items()} == {
-        "a": "images/a.JPG", "a.JPG": "images/a.JPG", "b.01": "images/b.01.png", "b": None, "left/a": "images/left/a.png", "c": None, "c.txt": None, "images": None,
+        "a": "images/a.JPG", "a.JPG": "images/a.JPG", "b.01": "images/b.01.png", "b": None, "left/a": "images/left/a.png", "c": None, "c.txt": None,
+        "images": None,
     }
     store(tmp_path / "train" / "d.png", picture)
     assert photo_beside(cameras, "d") == tmp_path / "train" / "d.png"
