@@ -6,15 +6,17 @@ STAMP  := $(VENV)/.installed
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
+PART   ?=
 CONFIG ?=
 NETLIST ?=
+SLOW   ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test sim lint waves synth formal report clean FORCE
+.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -35,8 +37,11 @@ FORCE:
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-test: $(STAMP) lint ## lint, all tests, the fast proofs
-	@$(BIN)/python -m pytest -n $(JOBS) tb
+generate: $(STAMP) ## write the generated sources of rtl/ (packages, mask generators, file list)
+	@$(BIN)/python scripts/gen_params.py
+
+test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
+	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
@@ -49,6 +54,9 @@ waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves U
 	@$(if $(UNIT),,echo 'waves: name a unit, for example make waves UNIT=stream_cells'; exit 2;) \
 	  PATH="$(abspath $(BIN)):$$PATH" scripts/waves.sh "$(UNIT)"
 
+mutants: $(STAMP) ## every mutant of the hardware must die in its unit's tests; long: make mutants [UNIT=vru]
+	@$(BIN)/python scripts/mutants.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))
+
 synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG="conic fp8"]] [LIBERTY=path]
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
@@ -57,6 +65,9 @@ formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 
 report: $(STAMP) ## build/report/index.html: make report [SCENES="a.ply b.sog"]
 	@$(BIN)/flicker report $(SCENES)
+
+docs: $(STAMP) ## tables and charts of README.md and docs/: make docs [PART=areas]
+	@$(BIN)/python scripts/docs.py $(PART)
 
 clean: ## remove build results (not .venv)
 	rm -rf build .pytest_cache

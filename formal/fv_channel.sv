@@ -13,6 +13,7 @@ module fv_channel
 ) (
   input logic       clk_i,
   input logic       again_i,
+  input logic       clear_i,
   input logic       pick_token_i,
   input logic       pick_elem_i,
   input logic       in_valid_i,
@@ -24,7 +25,7 @@ module fv_channel
   localparam int unsigned CountBits = $clog2(Depth + 2);
   localparam int unsigned SlotBits = CountBits + 1;
 
-  logic rst_n, in_ready, finished, out_valid, accept;
+  logic rst_n, in_ready, finished, out_valid, accept, idle;
   feature_elem_t elem;
   channel_pixel_t out_data;
   channel_events_t unused_events;
@@ -46,10 +47,12 @@ module fv_channel
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .in_valid_i,
     .in_ready_o (in_ready),
     .in_elem_i  (elem),
     .finished_o (finished),
+    .idle_o     (idle),
     .out_valid_o(out_valid),
     .out_ready_i,
     .out_data_o (out_data),
@@ -73,6 +76,10 @@ module fv_channel
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      given_q  <= '0;
+      pixels_q <= '0;
+      waited_q <= 1'b0;
+    end else if (clear_i) begin
       given_q  <= '0;
       pixels_q <= '0;
       waited_q <= 1'b0;
@@ -106,6 +113,7 @@ module fv_channel
   ) i_tokens (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i     (pick_token_i),
     .push_i     (accept && in_eos_i),
     .in_data_i,
@@ -124,6 +132,7 @@ module fv_channel
   ) i_elems (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i     (pick_elem_i),
     .push_i     (accept),
     .in_data_i  ({in_eos_i, in_data_i}),
@@ -150,6 +159,8 @@ module fv_channel
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
       next_q <= '0;
+    end else if (clear_i) begin
+      next_q <= '0;
     end else begin
       next_q <= dut.pop ? '0 : next_q + 3'(dut.issue);
     end
@@ -158,7 +169,7 @@ module fv_channel
   logic was_finished_q, was_token_q;
 
   always_ff @(posedge clk_i) begin
-    was_finished_q <= rst_n && finished;
+    was_finished_q <= rst_n && finished && !clear_i;
     was_token_q    <= accept && in_eos_i;
   end
 
@@ -170,6 +181,8 @@ module fv_channel
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
       accepted_q <= '0;
+    end else if (clear_i) begin
+      accepted_q <= '0;
     end else if (accept && accepted_q != '1) begin
       accepted_q <= accepted_q + 1'b1;
     end
@@ -177,7 +190,7 @@ module fv_channel
 
   always_comb begin
     if (Easy != 0) begin
-      assume (!again_i);
+      assume (!again_i && !clear_i);
       assume (dut.finish[0] == (dut.blend_valid[0] && !dut.finished[0][dut.blend_pixel[0]]));
       assume (dut.finish[1] == (dut.blend_valid[1] && !dut.finished[1][dut.blend_pixel[1]]));
     end
@@ -196,7 +209,7 @@ module fv_channel
     return sum >= SlotBits'(Depth) ? sum - SlotBits'(Depth) : sum;
   endfunction
 
-  logic [63:0] eos;  // tokens in the VRUs, youngest stage first
+  logic [63:0] eos, other_eos;  // tokens in the VRUs, youngest stage first
   logic [1:0] busy, full;
   logic [1:0][2:0] index;
   logic outstanding;  // a token has left the FIFO, its pixels have not all left
@@ -205,10 +218,12 @@ module fv_channel
   logic early_token;  // one of them at or before the chosen element
   logic [1:0] view;  // data of the chosen token
 
-  assign eos          = 64'(dut.gen_vru[0].i_vru.eos_q);
-  assign busy         = {dut.gen_vru[1].i_vru.busy_q, dut.gen_vru[0].i_vru.busy_q};
-  assign full         = {dut.gen_vru[1].i_vru.full_q, dut.gen_vru[0].i_vru.full_q};
-  assign index        = {dut.gen_vru[1].i_vru.out_index_q, dut.gen_vru[0].i_vru.out_index_q};
+  assign eos          = 64'({dut.gen_vru[0].i_vru.i_state.eos_q, dut.gen_vru[0].i_vru.eos_q});
+  assign other_eos    = 64'({dut.gen_vru[1].i_vru.i_state.eos_q, dut.gen_vru[1].i_vru.eos_q});
+  assign busy         = {dut.gen_vru[1].i_vru.i_drain.busy_q, dut.gen_vru[0].i_vru.i_drain.busy_q};
+  assign full         = {dut.gen_vru[1].i_vru.i_drain.full_q, dut.gen_vru[0].i_vru.i_drain.full_q};
+  assign index        = {dut.gen_vru[1].i_vru.i_drain.out_index_q,
+                         dut.gen_vru[0].i_vru.i_drain.out_index_q};
   assign outstanding  = busy != '0;
   assign before_blend = (eos & ((64'd1 << dut.gen_vru[0].i_vru.BLEND) - 64'd1)) != '0;
 
@@ -271,6 +286,7 @@ module fv_channel
       // are in the pipeline, which always moves, or at the output.
       a_moves: assert (!dut.head_valid || dut.issue || dut.pop || (dut.head.eos && outstanding));
       a_offered: assert (!outstanding || eos != '0 || out_valid);
+      a_idle: assert (idle == (elems == '0 && tokens == '0));
       a_ready: assert (in_ready == (elems < CountBits'(Depth)));
       // finished_o: stays until a token comes; what is written meanwhile is dropped.
       a_finished: assert (!was_finished_q || was_token_q || finished);
@@ -282,7 +298,7 @@ module fv_channel
       l_fifo: assert (SlotBits'(dut.i_fifo.read_q) < SlotBits'(Depth)
                            && SlotBits'(dut.i_fifo.write_q) == slot(elems)
                            && CountBits'(dut.i_fifo.usage_q) == elems);
-      l_step: assert (eos == 64'(dut.gen_vru[1].i_vru.eos_q));
+      l_step: assert (eos == other_eos);
       l_one: assert ((eos & (eos - 1'b1)) == '0 && (eos == '0 || full == '0));
       l_blend: assert (dut.eos_in_vru_q == before_blend);
       l_tokens: assert (CountBits'(dut.tokens_q) == queued + CountBits'(before_blend));

@@ -14,6 +14,7 @@ module fv_ctu
 ) (
   input logic        clk_i,
   input logic        again_i,
+  input logic        clear_i,
   input logic        pick_i,
   input logic [ 2:0] mode_i,
   input logic        stall_i,
@@ -34,12 +35,12 @@ module fv_ctu
   localparam int unsigned SlotBits = CountBits + 1;  // sum of two slot numbers
   localparam int unsigned DataBits = 4 + 1 + 1 + 1 + 16;
 
-  logic rst_n, in_ready, out_valid, accept, room;
+  logic rst_n, in_ready, out_valid, accept, room, idle;
   logic [2:0] mode_q;
   splat_elem_t elem, elem_q;
   feature_elem_t out_elem;
   logic [3:0] out_mask;
-  ctu_events_t events;
+  generator_events_t events;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -59,6 +60,7 @@ module fv_ctu
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .mode_i     (mode_q),
     .stall_i,
     .in_valid_i,
@@ -66,8 +68,8 @@ module fv_ctu
     .in_elem_i  (elem),
     .out_valid_o(out_valid),
     .out_ready_i,
-    .out_elem_o (out_elem),
-    .out_mask_o (out_mask),
+    .out_data_o ({out_mask, out_elem}),
+    .idle_o     (idle),
     .events_o   (events)
   );
 
@@ -80,7 +82,7 @@ module fv_ctu
   always_ff @(posedge clk_i) begin
     mode_q      <= mode_q;
     elem_q      <= elem;
-    in_waited_q <= rst_n && in_valid_i && !in_ready;
+    in_waited_q <= rst_n && in_valid_i && !in_ready && !clear_i;
   end
 
   always_comb begin
@@ -148,6 +150,7 @@ module fv_ctu
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i,
     .push_i     (accept && mask != '0),
     .in_data_i  (in_data),
@@ -170,6 +173,10 @@ module fv_ctu
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      token_q <= 1'b0;
+      empty_q <= '0;
+      wait_q  <= '0;
+    end else if (clear_i) begin
       token_q <= 1'b0;
       empty_q <= '0;
       wait_q  <= '0;
@@ -237,6 +244,8 @@ module fv_ctu
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      half_q <= 1'b0;
+    end else if (clear_i) begin
       half_q <= 1'b0;
     end else if (dut.tag_valid_q[Last] && dut.advance) begin
       half_q <= dut.tag_q[Last].dense && !dut.tag_q[Last].batch;
@@ -342,6 +351,8 @@ module fv_ctu
       // Each element with an empty mask is rejected once.
       a_rejected: assert (!events.rejected || empty_q != '0);
       a_counted: assert (empty_q <= 4'(Latency));
+      // Idle when nothing is inside.
+      a_idle: assert (!idle || (entries == '0 && empty_q == '0 && token == '0));
       // One token in the test at a time.
       a_token: assert ((token & (token - 1'b1)) == '0 && (!events.token || token == '0));
       // Counters.
@@ -357,11 +368,6 @@ module fv_ctu
       l_token: assert (dut.i_controller.eos_pending_q
                        == (token != '0 || dut.i_controller.update_q));
       l_update: assert (!dut.i_controller.update_q || (token_q && token == '0));
-      l_mode: assert ({dut.i_controller.dense_smooth_q, dut.i_controller.dense_spiky_q}
-                      == {mode_q inside {CAT_DENSE, CAT_SMOOTH, CAT_AUTO},
-                          mode_q inside {CAT_DENSE, CAT_SPIKY}}
-                      && dut.i_controller.auto_q == (mode_q == CAT_AUTO)
-                      && dut.i_controller.off_q == (mode_q == CAT_OFF));
       l_wait: assert (wait_q == '0 || stored != '0 || wait_q + oldest < 5'(Latency));
       l_taken: assert (taken_ok);
       if (watching) begin

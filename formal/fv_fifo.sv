@@ -8,6 +8,7 @@ module fv_fifo #(
 ) (
   input logic             clk_i,
   input logic             again_i,
+  input logic             clear_i,
   input logic             pick_i,
   input logic             in_valid_i,
   input logic [Width-1:0] in_data_i,
@@ -29,6 +30,7 @@ module fv_fifo #(
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .in_valid_i,
     .in_ready_o (in_ready),
     .in_data_i,
@@ -46,6 +48,7 @@ module fv_fifo #(
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i,
     .push_i     (in_valid_i && in_ready),
     .in_data_i,
@@ -72,6 +75,8 @@ module fv_fifo #(
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      was_full_q <= 1'b0;
+    end else if (clear_i) begin
       was_full_q <= 1'b0;
     end else begin
       was_full_q <= was_full_q || full;

@@ -12,6 +12,7 @@ module fv_fifo_monitor
 ) (
   input logic                clk_i,
   input logic                again_i,
+  input logic                clear_i,
   input logic                pick_i,
   input logic [         1:0] which_i,
   input logic                in_valid_i,
@@ -54,6 +55,8 @@ module fv_fifo_monitor
     ) i_fifo (
       .clk_i,
       .rst_ni     (rst_n),
+      .clear_i,
+    .clear_i,
       .in_valid_i (write[c]),
       .in_ready_o (ready[c]),
       .in_data_i  ({in_eos_i, in_data_i}),
@@ -90,6 +93,7 @@ module fv_fifo_monitor
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i,
     .push_i     (transfer && wanted),
     .in_data_i  ({in_eos_i, in_data_i}),

@@ -5,6 +5,7 @@ module fv_skid_buffer #(
 ) (
   input logic             clk_i,
   input logic             again_i,
+  input logic             clear_i,
   input logic             pick_i,
   input logic             in_valid_i,
   input logic [Width-1:0] in_data_i,
@@ -22,6 +23,7 @@ module fv_skid_buffer #(
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .in_valid_i,
     .in_ready_o (in_ready),
     .in_data_i,
@@ -36,6 +38,7 @@ module fv_skid_buffer #(
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .pick_i,
     .push_i     (in_valid_i && in_ready),
     .in_data_i,

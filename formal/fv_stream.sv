@@ -3,6 +3,7 @@
 // Counts the elements inside and follows one of them, whichever pick_i (a free input of the proof)
 // chooses when it enters: `ahead` elements must leave before it, and then it, as it was. Since the
 // choice is free this holds for every element.
+// clear_i empties the unit, what enters in that cycle included.
 // valid_o and data must hold until the transfer. The unit is judged by its transfers alone; the
 // outputs tell the proof's top what to expect of valid and ready, and of the unit's registers.
 module fv_stream #(
@@ -12,6 +13,7 @@ module fv_stream #(
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
+  input  logic                 clear_i,
   input  logic                 pick_i,
   // Input side of the unit
   input  logic                 push_i,  // an element enters
@@ -46,6 +48,10 @@ module fv_stream #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      inside_q   <= '0;
+      watching_q <= 1'b0;
+      waited_q   <= 1'b0;
+    end else if (clear_i) begin
       inside_q   <= '0;
       watching_q <= 1'b0;
       waited_q   <= 1'b0;

@@ -10,6 +10,7 @@ module fv_stream_arbiter #(
 ) (
   input logic                         clk_i,
   input logic                         again_i,
+  input logic                         clear_i,
   input logic [IndexBits-1:0]         pick_i,
   input logic [Inputs-1:0]            in_valid_i,
   input logic [Inputs-1:0][Width-1:0] in_data_i,
@@ -33,6 +34,7 @@ module fv_stream_arbiter #(
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
+    .clear_i,
     .in_valid_i,
     .in_ready_o (in_ready),
     .in_data_i,
@@ -48,6 +50,10 @@ module fv_stream_arbiter #(
   // What waited in the last cycle, the choice then, and how often pick_q was passed over.
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
+      valid_q  <= '0;
+      waited_q <= 1'b0;
+      passed_q <= '0;
+    end else if (clear_i) begin
       valid_q  <= '0;
       waited_q <= 1'b0;
       passed_q <= '0;

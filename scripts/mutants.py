@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/mutants.md).
 
-    scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--docs]
+    scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--check]
 
 Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
 survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
 Prints a table, writes build/mutants/results.csv (finished mutants are not run again while sources and tests stay as they are); exits 1 when fewer than
-KILLED_AT_HOME die at home, when a survivor has no note, or when a mutant is wrong. --docs writes the table into docs/mutants.md.
+KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table into docs/mutants.md.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint",
 LEVELS = (("rendering_core",), ("render_stage",), ("frames",))  # who may notice what a unit's own tests do not, from below
 KILLED_AT_HOME = 0.95
 TIMEOUT = 900  # seconds of a test run, on a busy machine
-KEYS = {"file", "find", "replace", "unit", "note"}
+KEYS = {"file", "find", "replace", "unit", "note", "survives"}
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: why it survives, if it does."""
+    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none can notice."""
 
     number: int
     file: str
@@ -53,6 +53,7 @@ class Mutant:
     replace: str
     unit: str
     note: str = ""
+    survives: str = ""
 
     @property
     def title(self) -> str:
@@ -90,7 +91,7 @@ def load(folder: Path = LISTS) -> list[Mutant]:
             where = f"{path}: mutant {i + 1}"
             if unknown := entry.keys() - KEYS:
                 raise FlickerError(f"{where}: unknown key '{sorted(unknown)[0]}'")
-            if missing := KEYS - {"note"} - entry.keys():
+            if missing := KEYS - {"note", "survives"} - entry.keys():
                 raise FlickerError(f"{where}: key '{sorted(missing)[0]}' is missing")
             source = ROOT / entry["file"]
             if not source.is_file():
@@ -197,6 +198,15 @@ def _write(outcomes: list[Outcome], code: str) -> None:
             writer.writerow([_key(m, code), m.file, m.find, m.replace, m.unit, o.killer, o.wrong, m.note])
 
 
+def results() -> list[Outcome]:
+    """Outcomes of all mutants on sources and tests as they are. FlickerError when some have not been run."""
+    mutants, code = load(), stamp()
+    found = _earlier(mutants, code)
+    if len(found) < len(mutants):
+        raise FlickerError(f"build/mutants lacks {len(mutants) - len(found)} of {len(mutants)} results of this RTL and these tests; run make mutants first")
+    return [found[m.number] for m in mutants]
+
+
 def summary(outcomes: list[Outcome]) -> str:
     """Markdown: how many die where, by unit, and every mutant that does not die at home."""
     units = list(dict.fromkeys(o.mutant.unit for o in outcomes))
@@ -212,7 +222,8 @@ def summary(outcomes: list[Outcome]) -> str:
     others = [o for o in outcomes if not o.at_home]
     if others:
         text += "\n" + markdown.table(
-            ["mutant", "killed by", "why"], [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.note or o.wrong) for o in others],
+            ["mutant", "killed by", "why"],
+            [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.survives or o.wrong or o.mutant.note) for o in others],
         )
     return text
 
@@ -223,7 +234,6 @@ def main() -> int:
     parser.add_argument("--unit", action="append", help="only mutants of this unit, repeatable")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--docs", action="store_true", help="write the table into docs/mutants.md; all units only")
     parser.add_argument("--check", action="store_true", help="only check that every mutant could be made")
     args = parser.parse_args()
     mutants = [m for m in load() if not args.unit or m.unit in args.unit]
@@ -232,8 +242,6 @@ def main() -> int:
     if args.check:
         print(f"mutants: {len(mutants)} can be made")
         return 0
-    if args.docs and args.unit:
-        raise FlickerError("--docs: the table needs all units")
     FOLDER.mkdir(parents=True, exist_ok=True)
     console = Console()
     code = stamp()
@@ -260,14 +268,11 @@ def main() -> int:
     console.print(table)
     home = sum(o.at_home for o in found)
     wrong = [o for o in found if o.wrong]
-    unexplained = [o for o in found if not o.killer and not o.wrong and not o.mutant.note]
+    unexplained = [o for o in found if not o.killer and not o.wrong and not o.mutant.survives]
     console.print(
-        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; {len(unexplained)} survivors without a note; {len(wrong)} wrong",
+        f"{home} of {len(found)} ({home / len(found):.1%}) killed by the tests of their own unit; "
+        f"{len(unexplained)} survivors without a reason; {len(wrong)} wrong",
     )
-    if args.docs:
-        import pages
-
-        pages.put(ROOT / "docs" / "mutants.md", "make mutants", summary(found))
     return 1 if home < KILLED_AT_HOME * len(found) or unexplained or wrong else 0
 
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Area and timing of every unit, from a Yosys netlist (docs/synthesis.md).
 
-Prints tables and writes area.csv, report.md, area.png and area.svg to build/synth, or with another cell library to build/synth/<library>.
+Prints tables and writes area.csv, report.md, area.png and area.svg to build/synth, or with another cell library to build/synth/<library>;
+`make docs` takes its tables from these.
 Exits 1 if a unit cannot be synthesised or has a latch, an unintended memory or an unconnected port.
 """
 
@@ -12,41 +13,26 @@ import sys
 import time
 from pathlib import Path
 
-import pages
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from flicker.cost.stamp import LIBERTY
 from flicker.cost.synth import report
 from flicker.cost.synth.run import FOLDER, Runner
 from flicker.cost.synth.units import all_units
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
 
-DEFAULT = ROOT / "scripts" / "cells" / "flicker.lib"
-
-
-DOCS = ROOT / "docs" / "synthesis.md"
-README = ROOT / "README.md"
-
-
-def write_docs(sheets: list[report.Sheet], name: str) -> None:
-    """Put tables into a part of the docs page."""
-    pages.put(DOCS, name, "\n".join(sheet.markdown() for sheet in sheets))
-
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--liberty", type=Path, default=DEFAULT, help="cell library (default: our own)")
+    parser.add_argument("--liberty", type=Path, default=LIBERTY, help="cell library (default: our own)")
     parser.add_argument("--unit", help="only the rows of one unit, without comparisons")
     parser.add_argument("--config", help="only this parameter set of the unit, such as 'factored fixed'")
-    docs = "write the tables (with --liberty: the ratios in both libraries) into docs/synthesis.md, a summary into README.md"
-    parser.add_argument("--docs", action="store_true", help=docs)
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 180)
 
-    if arguments.docs and arguments.unit:
-        raise FlickerError("--docs needs all units")
     units = all_units()
     if arguments.unit:
         units = [unit for unit in units if unit.name == arguments.unit.removeprefix("flk_")]
@@ -75,24 +61,15 @@ def main() -> int:
 
     library = runner.liberty.stem
     sheets = [report.units_sheet(results, library)]
-    folder = FOLDER if runner.liberty == DEFAULT.resolve() else FOLDER / library
+    folder = FOLDER if runner.liberty == LIBERTY.resolve() else FOLDER / library
     if not arguments.unit:
         folder.mkdir(parents=True, exist_ok=True)
         comparison = report.Comparison(runner, results)
         sheets += comparison.sheets()
         report.write_csv(folder / "area.csv", results)
-        beside = report.against(folder, FOLDER, library) if folder != FOLDER else []
-        sheets += beside
+        sheets += report.against(folder, FOLDER, library) if folder != FOLDER else []
         report.write_markdown(folder / "report.md", sheets)
         comparison.chart(folder, library)
-        if arguments.docs:
-            if folder == FOLDER:
-                write_docs([*sheets[1:], sheets[0]], "scripts/synth.py --docs")  # the units' table last
-                pages.put(README, "scripts/synth.py --docs", comparison.summary().table())
-            elif beside:
-                write_docs(beside[:1], "scripts/synth.py --liberty FILE --docs")
-            else:
-                raise FlickerError(f"{FOLDER.relative_to(ROOT)}/area.csv: run the default library first")
     for sheet in sheets:
         sheet.print(console)
     console.print(f"synth: {len(units)} rows, {time.monotonic() - started:.0f} s" + (

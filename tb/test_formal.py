@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pages
 import pytest
 
 from flicker.toolchain import ROOT
@@ -39,7 +40,6 @@ def formal() -> ModuleType:
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    sys.path.append(str(SCRIPT.parent))  # its neighbour pages.py
     spec.loader.exec_module(module)
     return module
 
@@ -75,10 +75,10 @@ def test_proof_without_teeth_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "proofs.toml"
     path.write_text(
         PROOF
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i || !(in_ready_o);")
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i ||;")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i || !(in_ready_o))")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i ||)")
         + MUTANT.format(find="no such text", replace="")
-        + MUTANT.format(find="in_valid_i || !in_ready_o;", replace="in_valid_i;")
+        + MUTANT.format(find="in_valid_i || !in_ready_o)", replace="in_valid_i)")
     )
     done = drive("--proofs", path, "--jobs", 1)
     assert done.returncode == 1, done.stdout
@@ -111,7 +111,7 @@ def test_every_task_fits_the_sources(formal: ModuleType) -> None:
 
 
 def test_docs_table_is_complete(formal: ModuleType) -> None:
-    text = formal.pages.get(formal.DOCS, formal.PART)
+    text = pages.get(("formal", ""))
     listed = {cells[0]: cells for line in text.splitlines()[2:] if len(cells := line.strip("| ").split(" | ")) == 6}
     proofs = {proof.name: proof for proof in formal.read_proofs() if not proof.long}
     assert listed.keys() == proofs.keys()

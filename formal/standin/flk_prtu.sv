@@ -23,8 +23,7 @@ module flk_prtu
   input  fp16_t                            mean_y_i,
   input  logic [        2:0][QuadBits-1:0] shape_i,
   input  logic [QuadBits-1:0]              threshold_i,
-  output logic [Leaders-1:0]               pass_o,
-  output logic [Leaders-1:0][QuadBits-1:0] weight_o
+  output logic [Leaders-1:0]               pass_o
 );
 
   localparam int unsigned Latency = 32'(PRTU_LATENCY[Form][Precision]);
@@ -59,6 +58,5 @@ module flk_prtu
     end
   end
 
-  assign weight_o = '0;
 
 endmodule

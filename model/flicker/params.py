@@ -1,12 +1,13 @@
 """The parameter object of the rendering stage.
 
-Everything that RTL, model, tests and docs must agree on is defined here once:
-`scripts/gen_params.py` writes `rtl/common/flk_param_pkg.sv` from the constants,
-`RenderConfig.rtl_parameters()` gives the module parameters of a build.
+Everything that RTL, model, tests and docs must agree on is defined here once: `make generate` (scripts/gen_params.py) writes
+`rtl/common/flk_param_pkg.sv` from the constants and `rtl/render/flk_mask_generator.sv` from the table of mask generators;
+`RenderConfig.rtl_parameters()` gives the module parameters of a build. Records: `flicker.layout`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -76,6 +77,22 @@ LOG_STAGES = 3
 EXP_STAGES = {Form.CONIC: 3, Form.FACTORED: 2}
 
 
+def weight_stages(wide: bool) -> tuple[int, int, int]:
+    """Registers of the operators of `flk_weight` (addition, addition that cannot cancel, multiplication): formats of more than 8 bits (`wide`), or up to 8."""
+    return (FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES) if wide else (FP8_ADD_STAGES, FP8_SUM_STAGES, FP8_MUL_STAGES)
+
+
+def weight_shape_delay(form: Form, wide: bool) -> int:
+    """Cycles after the differences at which `flk_weight` takes the shape numbers: the conic form multiplies the differences first."""
+    return weight_stages(wide)[2] if form == Form.CONIC else 0
+
+
+def weight_latency(form: Form, wide: bool) -> int:
+    """Cycles from the differences to the weight (rtl/common/flk_weight.sv)."""
+    add, sum_, mul = weight_stages(wide)
+    return 2 * mul + 2 * add if form == Form.CONIC else 2 * mul + add + sum_
+
+
 def prtu_mean_delay(precision: Precision) -> int:
     """Cycles after the coordinates at which a PRTU takes the mean: an FP16 subtraction begins with a register for the coordinates."""
     return int(precision in (Precision.FP16, Precision.MIXED))
@@ -93,12 +110,7 @@ def prtu_shape_delay(precision: Precision) -> int:
 
 def prtu_latency(form: Form, precision: Precision) -> int:
     """Cycles from a PRTU's coordinates to its answer; the threshold is taken one cycle before the answer."""
-    wide = precision == Precision.FP16
-    add = FP16_ADD_STAGES if wide else FP8_ADD_STAGES
-    sum_ = FP16_SUM_STAGES if wide else FP8_SUM_STAGES
-    mul = FP16_MUL_STAGES if wide else FP8_MUL_STAGES
-    weight = 2 * mul + 2 * add if form == Form.CONIC else 2 * mul + add + sum_
-    return prtu_shape_delay(precision) + weight + 1
+    return prtu_shape_delay(precision) + weight_latency(form, precision == Precision.FP16) + 1
 
 ALPHA_MIN = 1.0 / 255.0
 ALPHA_MAX = 0.99
@@ -113,7 +125,7 @@ AUTO_DECAY_SHIFT = 2
 def vru_stages(form: Form) -> tuple[int, int]:
     """Cycles from a VRU's operation to the blend of transmittance and to that of colour (rtl/render/flk_vru.sv)."""
     add, sum_, mul = FP16_ADD_STAGES, FP16_SUM_STAGES, FP16_MUL_STAGES
-    weight = 1 + add + mul + (mul + 2 * add if form == Form.CONIC else add + mul + sum_)
+    weight = 1 + add + weight_latency(form, True)
     blend = weight + EXP_STAGES[form] + mul + 1 + add + mul
     return blend, blend + mul + sum_
 
@@ -148,6 +160,7 @@ class RenderConfig:
     which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
     is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
+    mask_generator, stage: keys of MASK_GENERATORS and STAGES.
     """
 
     form: Form = Form.FACTORED
@@ -157,8 +170,17 @@ class RenderConfig:
     ctu_fifo_depth: int = 0
     coords: Coords = Coords.LOCAL
     vrus_per_channel: int = VRUS_PER_CHANNEL
+    mask_generator: str = "ctu"
+    stage: str = "vru"
 
     def __post_init__(self) -> None:
+        for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES)):
+            if getattr(self, field) not in table:
+                raise FlickerError(f"configuration: {field} must be one of {', '.join(table)}, not {getattr(self, field)}")
+        if not self.generator.tests and self.cat != CatMode.OFF:
+            raise FlickerError(f"configuration: cat must be off with mask_generator {self.mask_generator}, which has no test, not {self.cat.name.lower()}")
+        if "CtuFifoDepth" not in self.generator.parameters and self.ctu_fifo_depth:
+            raise FlickerError(f"configuration: ctu_fifo_depth must be 0 with mask_generator {self.mask_generator}, which has no such FIFO")
         if not 1 <= self.fifo_depth <= MAX_FIFO_DEPTH:
             raise FlickerError(f"configuration: fifo_depth must be 1 to {MAX_FIFO_DEPTH}, not {self.fifo_depth}")
         if not 0 <= self.ctu_fifo_depth <= MAX_FIFO_DEPTH:
@@ -171,20 +193,91 @@ class RenderConfig:
         """Pixels of a VRU: the cycles that a splat takes in a channel."""
         return MINITILE * MINITILE // self.vrus_per_channel
 
+    @property
+    def generator(self) -> MaskGenerator:
+        """What makes the masks."""
+        return MASK_GENERATORS[self.mask_generator]
+
     def rtl_parameters(self) -> dict[str, int]:
-        """Module parameters of `flk_render_stage` (and of every unit that has them)."""
-        return {
+        """Module parameters of the rendering stage, those that it has."""
+        values = {
             "Form": int(self.form),
             "Precision": int(self.precision),
             "FifoDepth": self.fifo_depth,
             "CtuFifoDepth": self.ctu_fifo_depth,
             "VrusPerChannel": self.vrus_per_channel,
+            "MaskGenerator": list(MASK_GENERATORS).index(self.mask_generator),
         }
+        return {name: values[name] for name in STAGES[self.stage].parameters}
 
     def with_(self, **changes) -> RenderConfig:
         """A copy with some fields changed."""
         return replace(self, **changes)
 
+
+
+# ---- plug points (docs/mask_generators.md) -----------------------------------------------------
+
+SUBTILE_PIXELS = SUBTILE * SUBTILE
+
+
+@dataclass(frozen=True)
+class MaskGenerator:
+    """A module that gives each splat its mask: behind the ports of `flk_mask_generator`, which instantiates it.
+
+    mask_bits: CHANNELS (a bit for each mini-tile) or SUBTILE_PIXELS. parameters: of the module, each an expression in the parameters of
+    `flk_mask_generator` (GENERATOR_PARAMETERS). latency: cycles from acceptance to the output, of a configuration. one_token: a token waits
+    until the one before has left the test. tests: it looks at splats; without, its masks are those of CatMode.OFF.
+    """
+
+    module: str
+    mask_bits: int
+    parameters: dict[str, str]
+    latency: Callable[[RenderConfig], int]
+    one_token: bool
+    tests: bool
+    note: str
+
+
+# What a mask generator can be built from, with default values: parameters of `flk_mask_generator`, set by the stage.
+GENERATOR_PARAMETERS = {
+    "Form": "FORM_FACTORED", "Precision": "PRECISION_FIXED", "VruCycles": "PIXELS_PER_VRU", "CtuFifoDepth": "CTU_FIFO_DEPTH",
+}
+
+MASK_GENERATORS: dict[str, MaskGenerator] = {
+    "ctu": MaskGenerator(
+        "flk_ctu", CHANNELS, {name: name for name in GENERATOR_PARAMETERS}, lambda config: prtu_latency(config.form, config.precision),
+        one_token=True, tests=True, note="contribution-aware test (docs/ctu.md)",
+    ),
+    "all": MaskGenerator(
+        "flk_mask_all", CHANNELS, {"MaskBits": str(CHANNELS)}, lambda config: 1,
+        one_token=False, tests=False, note="no test: every splat to all four mini-tiles",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A rendering stage: a module with the ports that docs/render_stage.md lists.
+
+    element, pixel: records (flicker.layout) that it takes and gives, on one stream per core. A token of `element` is its bit `eos`, with the
+    sub-tile's place in the lowest bits; `pixel` names sub-tile, mini-tile, index and pixel. parameters: those of RenderConfig.rtl_parameters()
+    that the module has.
+    """
+
+    module: str
+    element: str
+    pixel: str
+    parameters: tuple[str, ...]
+    note: str
+
+
+STAGES: dict[str, Stage] = {
+    "vru": Stage(
+        "flk_render_stage", "splat_elem", "core_pixel",
+        ("Form", "Precision", "FifoDepth", "CtuFifoDepth", "VrusPerChannel", "MaskGenerator"), "mask generators and volume rendering units",
+    ),
+}
 
 # The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
 # the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
@@ -213,3 +306,7 @@ CHANNEL_COUNTERS = (
     ("pixels_finished", "pixels that ended before their list did"),
 )
 COUNTERS_PER_CORE = len(CORE_COUNTERS) + CHANNELS * len(CHANNEL_COUNTERS)
+# The read port: address {core, index}, data COUNTER_LATENCY cycles later.
+COUNTER_INDEX_BITS = (COUNTERS_PER_CORE - 1).bit_length()
+COUNTER_ADDR_BITS = (CORES - 1).bit_length() + COUNTER_INDEX_BITS
+COUNTER_LATENCY = 1

@@ -3,7 +3,8 @@
 // Latency 1 (no fall-through), throughput 1 per cycle for Depth >= 2, every second cycle for
 // Depth 1. in_ready_o and out_valid_o come from registers: a full queue takes nothing, even in the
 // cycle in which an element leaves. out_data_o is read combinationally from the storage by a
-// registered pointer. Storage is not reset; Depth need not be a power of two.
+// registered pointer. clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
+// Storage is not reset; Depth need not be a power of two.
 module flk_fifo #(
   parameter  int unsigned Width     = 8,
   parameter  int unsigned Depth     = 16,
@@ -11,6 +12,7 @@ module flk_fifo #(
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
+  input  logic                 clear_i,
   // Upstream
   input  logic                 in_valid_i,
   output logic                 in_ready_o,
@@ -61,6 +63,11 @@ module flk_fifo #(
     if (pop && !push) begin
       usage_d = usage_q - 1'b1;
     end
+    if (clear_i) begin
+      write_d = '0;
+      read_d  = '0;
+      usage_d = '0;
+    end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -99,7 +106,7 @@ module flk_fifo #(
   else $error("flk_fifo: fill level above Depth");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o && !out_ready_i |=> out_valid_o && $stable(out_data_o))
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
   else $error("flk_fifo: output changed before its transfer");
 `endif
 

@@ -42,14 +42,12 @@ module flk_fixed_to_fp #(
   logic [CodeBits:0] truncated, rounded;
   logic round_up;
 
-  always_comb begin
-    shift = ShiftBits'(MAX_SHIFT);
-    for (int unsigned i = MagBits - MAX_SHIFT; i < MagBits; i++) begin
-      if (mag_i[i]) begin
-        shift = ShiftBits'(MagBits - 1 - i);
-      end
-    end
-  end
+  flk_lzc #(
+    .Width(MAX_SHIFT)
+  ) i_shift (
+    .value_i(mag_i[MagBits-1-:MAX_SHIFT]),
+    .count_o(shift)
+  );
 
   assign normal = mag_i << shift;
   assign exp = normal[MagBits-1] ? (ExpBits + 1)'(TOP_EXP) - (ExpBits + 1)'(shift) : '0;

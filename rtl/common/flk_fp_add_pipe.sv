@@ -112,16 +112,17 @@ module flk_fp_add_pipe #(
 
   if (Cancel) begin : gen_zeros
     logic [SumBits-1:0] marked;
+    logic unused_marked;
     // Normalisation ends where the leading bit has the smallest exponent: what remains is subnormal.
     assign marked = sum | ({1'b1, AddBits'(0)} >> aligned_q.exp);
-    always_comb begin
-      zeros = ShiftBits'(AddBits);
-      for (int unsigned i = 0; i < SumBits; i++) begin
-        if (marked[i]) begin
-          zeros = ShiftBits'(AddBits - i);
-        end
-      end
-    end
+    // The lowest bit does not matter: where none above it is set, it is the leading one or the sum is zero.
+    assign unused_marked = marked[0];
+    flk_lzc #(
+      .Width(AddBits)
+    ) i_zeros (
+      .value_i(marked[SumBits-1:1]),
+      .count_o(zeros)
+    );
   end else begin : gen_carry
     assign zeros = ShiftBits'(!sum[SumBits-1]);
   end

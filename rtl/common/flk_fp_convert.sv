@@ -77,22 +77,15 @@ module flk_fp_convert #(
   if (Rebias > 0) begin : gen_wider_range
     // Subnormals of the source become normal as far as the exponent allows.
     localparam int unsigned LzBits = $clog2(SrcManBits + 1);
-    // Halves the vector, filled up to a power of two; the count of an empty one does not matter.
-    function automatic logic [LzBits-1:0] leading_zeros(input logic [SrcManBits:0] value);
-      logic [(1<<LzBits)-1:0] rest;
-      rest          = (1 << LzBits)'(value) << ((1 << LzBits) - SrcManBits - 1);
-      leading_zeros = '0;
-      for (int k = int'(LzBits) - 1; k >= 0; k--) begin
-        if ((rest >> ((1 << LzBits) - (1 << k))) == '0) begin
-          leading_zeros[k] = 1'b1;
-          rest             = rest << (1 << k);
-        end
-      end
-    endfunction
-
     logic [LzBits-1:0] zeros;
     signed_t           shift;
-    assign zeros    = leading_zeros({normal, src_man});
+    // The lowest bit does not matter: where none above it is set, it is the leading one or the number is zero.
+    flk_lzc #(
+      .Width(SrcManBits)
+    ) i_zeros (
+      .value_i(SrcManBits'({normal, src_man} >> 1)),
+      .count_o(zeros)
+    );
     assign shift    = (int'(zeros) > Rebias) ? signed_t'(Rebias) : signed_t'(zeros);
     assign sig      = src_sig << shift;
     assign exponent = sig[SigBits-1] ? base - shift : '0;

@@ -86,7 +86,7 @@ module flk_fp_mul_pipe #(
       normal_t normal;
 
       assign {exp, man} = (k == 0) ? {a_exp, a_man} : {b_exp, b_man};
-      // 0 becomes any number.
+      // 0 becomes any number. At most four places for the leading one: chosen directly, which is smaller than a count and a shift by it.
       always_comb begin
         normal = '{exp: room_t'({1'b0, exp}), man: man};
         if (exp == '0) begin
@@ -111,6 +111,7 @@ module flk_fp_mul_pipe #(
     assign left = (zero || room < LEFT_MIN) ? LEFT_MIN : (room < 0) ? room : '0;
   end else begin : gen_late
     logic [ManBits-1:0] small_man;
+    logic [ZeroBits-1:0] zeros;
 
     assign product = {a_exp != '0, a_man} * {b_exp != '0, b_man};
     // A subnormal number has the exponent of the smallest normal one.
@@ -118,17 +119,13 @@ module flk_fp_mul_pipe #(
                 + room_t'({1'b0, b_exp | ExpBits'(b_exp == '0)}) - room_t'(BIAS);
     // Leading zeros of a subnormal operand. If both are, the product is below half the smallest number and shifted right anyway.
     assign small_man = (a_exp == '0) ? a_man : b_man;
-    always_comb begin
-      want = room_t'(SigBits);
-      for (int unsigned i = 0; i < ManBits; i++) begin
-        if (small_man[i]) begin
-          want = room_t'(ManBits - i);
-        end
-      end
-      if (a_exp != '0 && b_exp != '0) begin
-        want = '0;
-      end
-    end
+    flk_lzc #(
+      .Width(SigBits)
+    ) i_zeros (
+      .value_i({a_exp != '0 && b_exp != '0, small_man}),
+      .count_o(zeros)
+    );
+    assign want = room_t'({1'b0, zeros});
     assign left = (room < LEFT_MIN) ? LEFT_MIN : (room < want) ? room : want;
   end
 

@@ -43,8 +43,8 @@ module flk_log_opacity_pipe #(
   // Biased exponent of the top bit of the magnitude, [8, 16).
   localparam int unsigned TopExp = Bias + 3;
   // Shift to normalise: limited by the exponent, which stays at least 1.
-  localparam int unsigned LzBits = $clog2(MagBits);
   localparam int unsigned MaxShift = (TopExp - 1 < MagBits - 1) ? TopExp - 1 : MagBits - 1;
+  localparam int unsigned ShiftBits = $clog2(MaxShift + 1);
   localparam int unsigned LineBits = LOG_VALUE_BITS - LOG_SLOPE_FRAC_BITS;
   // The magnitude below the result's last place.
   localparam int unsigned DropBits = MagBits - 1 - ManBits;
@@ -107,29 +107,16 @@ module flk_log_opacity_pipe #(
 
   // Normalise
 
-  // Halves the vector, filled up to a power of two; the count of an empty one does not matter.
-  function automatic logic [LzBits-1:0] leading_zeros(input logic [MagBits-1:0] value);
-    logic [(1<<LzBits)-1:0] rest;
-    rest          = (1 << LzBits)'(value) << ((1 << LzBits) - MagBits);
-    leading_zeros = '0;
-    for (int k = int'(LzBits) - 1; k >= 0; k--) begin
-      if ((rest >> ((1 << LzBits) - (1 << k))) == '0) begin
-        leading_zeros[k] = 1'b1;
-        rest             = rest << (1 << k);
-      end
-    end
-  endfunction
-
   logic [MagBits-1:0] norm;
-  logic [ LzBits-1:0] zeros, shift;
+  logic [ShiftBits-1:0] shift;
   logic [ExpBits-1:0] result_exp;
 
-  assign zeros      = leading_zeros(magnitude_q);
-  if (MaxShift < MagBits - 1) begin : gen_limit
-    assign shift = (zeros > LzBits'(MaxShift)) ? LzBits'(MaxShift) : zeros;
-  end else begin : gen_no_limit
-    assign shift = zeros;
-  end
+  flk_lzc #(
+    .Width(MaxShift)
+  ) i_shift (
+    .value_i(magnitude_q[MagBits-1-:MaxShift]),
+    .count_o(shift)
+  );
   assign norm       = magnitude_q << shift;
   assign result_exp = norm[MagBits-1] ? ExpBits'(TopExp) - ExpBits'(shift) : '0;
 

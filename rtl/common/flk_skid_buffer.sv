@@ -4,12 +4,14 @@
 // no input reaches an output combinationally. The second entry catches the element that was
 // accepted in the cycle in which the output stopped.
 // in_ready_o falls one cycle after a stall and rises one cycle after its end.
+// clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
 // Payload registers are not reset.
 module flk_skid_buffer #(
   parameter int unsigned Width = 8
 ) (
   input  logic             clk_i,
   input  logic             rst_ni,
+  input  logic             clear_i,
   // Upstream
   input  logic             in_valid_i,
   output logic             in_ready_o,
@@ -31,8 +33,8 @@ module flk_skid_buffer #(
   logic move;  // the output entry is free in the next cycle
 
   assign move         = !out_valid_q || out_ready_i;
-  assign out_valid_d  = in_valid_i || skid_valid_q || !move;
-  assign skid_valid_d = (in_valid_i || skid_valid_q) && !move;
+  assign out_valid_d  = (in_valid_i || skid_valid_q || !move) && !clear_i;
+  assign skid_valid_d = (in_valid_i || skid_valid_q) && !move && !clear_i;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -67,7 +69,7 @@ module flk_skid_buffer #(
   else $error("flk_skid_buffer: skid entry occupied before the output entry");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o && !out_ready_i |=> out_valid_o && $stable(out_data_o))
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
   else $error("flk_skid_buffer: output changed before its transfer");
 `endif
 

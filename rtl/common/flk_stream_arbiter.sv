@@ -4,6 +4,7 @@
 // out_ready_i and in_valid_i to in_ready_o. A waiting input is served after at most Inputs - 1
 // transfers of others. The search starts at a registered input: behind the one served last,
 // or at the one that is waiting for out_ready_i, so that the choice holds until its transfer.
+// clear_i (synchronous) lets the search start at input 0 again.
 module flk_stream_arbiter #(
   parameter  int unsigned Inputs    = 4,
   parameter  int unsigned Width     = 8,
@@ -11,6 +12,7 @@ module flk_stream_arbiter #(
 ) (
   input  logic                         clk_i,
   input  logic                         rst_ni,
+  input  logic                         clear_i,
   // Upstream
   input  logic [Inputs-1:0]            in_valid_i,
   output logic [Inputs-1:0]            in_ready_o,
@@ -58,6 +60,9 @@ module flk_stream_arbiter #(
         first_d = choice == LAST ? '0 : choice + 1'b1;
       end
     end
+    if (clear_i) begin
+      first_d = '0;
+    end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -81,7 +86,7 @@ module flk_stream_arbiter #(
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o && !out_ready_i |=> out_valid_o && $stable(out_index_o))
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_index_o))
   else $error("flk_stream_arbiter: choice changed before its transfer");
 `endif
 

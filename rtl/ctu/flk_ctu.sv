@@ -1,7 +1,7 @@
 // Contribution test unit (CTU): gives each splat of a sub-tile's sorted list the mask of mini-tiles it may contribute to.
 //
 // in  splat_elem_t, one list per sub-tile, each closed by a token (eos).
-// out the same elements in the same order with a 4-bit mask; splats with an empty mask are taken out and counted,
+// out the same elements in the same order, as feature_elem_t below a 4-bit mask; splats with an empty mask are taken out and counted,
 //     tokens pass with mask 1111.
 // Throughput one splat per cycle with sparse, one per two cycles with dense sampling.
 //
@@ -11,9 +11,10 @@
 // CtuFifoDepth > 0: the pipeline never stands still, its results go into an output FIFO (paper, Sec. IV-C), one cycle later; an element is
 //   accepted only if it has a place there.
 // `stall_i` (a feature FIFO is full) stops acceptance, not the output. in_ready_o depends combinationally on in_elem_i, stall_i and, without
-// FIFO, on out_ready_i; out_valid_o, out_elem_o and out_mask_o do not depend on inputs.
+// FIFO, on out_ready_i; out_valid_o, out_data_o and idle_o do not depend on inputs.
+// clear_i forgets everything, the sums of the automatic mode too: in the next cycle the unit is as after reset.
 //
-// This stream interface is all that the neighbours know of the test: another test with the same ports can take its place.
+// One of the mask generators of flk_mask_generator, whose ports these are (docs/mask_generators.md).
 module flk_ctu
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -21,24 +22,42 @@ module flk_ctu
   parameter int unsigned Form         = FORM_FACTORED,
   parameter int unsigned Precision    = PRECISION_FIXED,
   parameter int unsigned VruCycles    = PIXELS_PER_VRU,  // that a splat takes in a channel
-  parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH
+  parameter int unsigned CtuFifoDepth = CTU_FIFO_DEPTH,
+  localparam int unsigned MaskBits = CHANNELS,
+  localparam int unsigned MaskedElemBits = MaskBits + FEATURE_ELEM_BITS
 ) (
-  input  logic          clk_i,
-  input  logic          rst_ni,
-  input  logic [2:0]    mode_i,       // CAT_*; constant during a frame
-  input  logic          stall_i,
+  input  logic                      clk_i,
+  input  logic                      rst_ni,
+  input  logic                      clear_i,
+  output logic                      idle_o,       // nothing inside
+  input  logic [2:0]                mode_i,       // CAT_*; constant while something is inside
+  input  logic                      stall_i,
   // sorted list
-  input  logic          in_valid_i,
-  output logic          in_ready_o,
-  input  splat_elem_t   in_elem_i,
+  input  logic                      in_valid_i,
+  output logic                      in_ready_o,
+  input  splat_elem_t               in_elem_i,
   // to the rendering core
-  output logic          out_valid_o,
-  input  logic          out_ready_i,
-  output feature_elem_t out_elem_o,
-  output logic [3:0]    out_mask_o,
+  output logic                      out_valid_o,
+  input  logic                      out_ready_i,
+  output logic [MaskedElemBits-1:0] out_data_o,   // masked_elem_t
   // counters
-  output ctu_events_t   events_o
+  output generator_events_t         events_o
 );
+
+  if (Form > FORM_FACTORED) begin : gen_check_form
+    $error("flk_ctu: Form must be FORM_CONIC or FORM_FACTORED");
+  end
+  if (Precision > PRECISION_FIXED) begin : gen_check_precision
+    $error("flk_ctu: Precision must be one of PRECISION_*, 0 to 3");
+  end
+  if (CtuFifoDepth > 128) begin : gen_check_depth
+    $error("flk_ctu: CtuFifoDepth must be 0 (no output FIFO) to 128");
+  end
+
+  typedef struct packed {
+    logic [MaskBits-1:0] mask;
+    feature_elem_t       elem;
+  } masked_elem_t;
 
   // ---- Control ---------------------------------------------------------------------------------------
 
@@ -70,6 +89,7 @@ module flk_ctu
   ) i_controller (
     .clk_i,
     .rst_ni,
+    .clear_i,
     .mode_i,
     .valid_i            (in_valid_i),
     .ready_o            (in_ready_o),
@@ -105,6 +125,8 @@ module flk_ctu
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       tag_valid_q <= '0;
+    end else if (clear_i) begin
+      tag_valid_q <= '0;
     end else if (advance) begin
       tag_valid_q <= {tag_valid_q[LATENCY-2:0], issue};
     end
@@ -129,7 +151,6 @@ module flk_ctu
   // Leader pixels of the two rectangles: columns and rows.
   logic [1:0][2:0] a_x, a_y, b_x, b_y;
   logic [3:0] pass_a, pass_b;
-  logic [3:0][QuadBits-1:0] unused_weight_a, unused_weight_b;
 
   if (MEAN_DELAY == 0) begin : gen_mean
     assign mean_x = in_elem_i.splat.feature.mean_x;
@@ -206,8 +227,7 @@ module flk_ctu
     .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
-    .pass_o     (pass_a),
-    .weight_o   (unused_weight_a)
+    .pass_o     (pass_a)
   );
 
   flk_prtu #(
@@ -222,8 +242,7 @@ module flk_ctu
     .mean_y_i   (mean_y),
     .shape_i    (shape_q),
     .threshold_i(threshold_q),
-    .pass_o     (pass_b),
-    .weight_o   (unused_weight_b)
+    .pass_o     (pass_b)
   );
 
   flk_mmu i_mmu (
@@ -240,29 +259,33 @@ module flk_ctu
 
   // ---- Output --------------------------------------------------------------------------------------------
 
-  feature_elem_t elem;
+  masked_elem_t masked;
 
-  assign elem = '{eos: tag_out.eos, feature: feature_q[LATENCY-1]};
+  assign masked.mask = result_mask;
+  assign masked.elem = '{eos: tag_out.eos, feature: feature_q[LATENCY-1]};
   // A mask at the end of the pipeline, whether it moves or not.
   assign mask_valid = tag_valid_q[LATENCY-1] && (!tag_out.dense || tag_out.batch);
 
   if (CtuFifoDepth == 0) begin : gen_hold
     assign space       = 1'b1;
     assign out_valid_o = mask_valid && (result_mask != '0);
-    assign out_elem_o  = elem;
-    assign out_mask_o  = result_mask;
+    assign out_data_o  = masked;
     assign advance     = !out_valid_o || out_ready_i;
+    assign idle_o      = (tag_valid_q == '0);
   end else begin : gen_fifo
     // Places taken: elements accepted that have neither left the FIFO nor been rejected.
     localparam int unsigned UsageBits = $clog2(CtuFifoDepth + 1);
     logic [UsageBits-1:0] taken_d, taken_q, unused_usage;
     logic fifo_ready, unused_full, unused_empty, leaves, rejects;
 
+    assign idle_o  = (tag_valid_q == '0) && !out_valid_o;
+
     assign advance = 1'b1;
     assign space   = (taken_q != UsageBits'(CtuFifoDepth));
     assign leaves  = out_valid_o && out_ready_i;
     assign rejects = mask_valid && (result_mask == '0);
-    assign taken_d = taken_q + UsageBits'(accept) - UsageBits'(leaves) - UsageBits'(rejects);
+    assign taken_d = clear_i ? '0
+                   : taken_q + UsageBits'(accept) - UsageBits'(leaves) - UsageBits'(rejects);
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -273,17 +296,18 @@ module flk_ctu
     end
 
     flk_fifo #(
-      .Width(4 + FEATURE_ELEM_BITS),
+      .Width(MaskedElemBits),
       .Depth(CtuFifoDepth)
     ) i_fifo (
       .clk_i,
       .rst_ni,
+      .clear_i,
       .in_valid_i (mask_valid && (result_mask != '0)),
       .in_ready_o (fifo_ready),
-      .in_data_i  ({result_mask, elem}),
+      .in_data_i  (masked),
       .out_valid_o,
       .out_ready_i,
-      .out_data_o ({out_mask_o, out_elem_o}),
+      .out_data_o,
       .usage_o    (unused_usage),
       .full_o     (unused_full),
       .empty_o    (unused_empty)
@@ -298,6 +322,15 @@ module flk_ctu
     else $error("flk_ctu: a result has no place");
 `endif
   end
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
+  else $error("flk_ctu: element changed before its transfer");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) !idle_o && !clear_i |=> $stable(mode_i))
+  else $error("flk_ctu: mode_i changed while something is inside");
+`endif
 
   // ---- Counters ----------------------------------------------------------------------------------------
 

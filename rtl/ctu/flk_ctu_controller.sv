@@ -17,7 +17,8 @@ module flk_ctu_controller
 ) (
   input  logic       clk_i,
   input  logic       rst_ni,
-  input  logic [2:0] mode_i,
+  input  logic       clear_i,  // forgets everything, the sums too
+  input  logic [2:0] mode_i,   // constant while a splat is inside
   // element at the head
   input  logic       valid_i,
   output logic       ready_o,
@@ -41,8 +42,8 @@ module flk_ctu_controller
   output logic       fallen_o
 );
 
-  if (VruCycles != 2 ** $clog2(VruCycles)) begin : gen_check_vru_cycles
-    $error("flk_ctu_controller: VruCycles must be a power of two");
+  if (VruCycles < 2 || VruCycles != 2 ** $clog2(VruCycles)) begin : gen_check_vru_cycles
+    $error("flk_ctu_controller: VruCycles must be a power of two, 2 or more");
   end
 
   // ---- Sampling ------------------------------------------------------------------------------------
@@ -50,23 +51,20 @@ module flk_ctu_controller
   logic dense, batch_d, batch_q, fall_d, fall_q, eos_pending_d, eos_pending_q, go;
   logic update_d, update_q;
   // The mode, decoded: whether smooth and spiky splats are sampled densely, and the rest.
-  logic dense_smooth_q, dense_spiky_q, auto_q, off_q;
+  logic dense_smooth, dense_spiky, automatic_fall;
 
-  always_ff @(posedge clk_i) begin
-    dense_smooth_q <= (mode_i == CAT_DENSE) || (mode_i == CAT_SMOOTH) || (mode_i == CAT_AUTO);
-    dense_spiky_q  <= (mode_i == CAT_DENSE) || (mode_i == CAT_SPIKY);
-    auto_q         <= (mode_i == CAT_AUTO);
-    off_q          <= (mode_i == CAT_OFF);
-  end
+  assign dense_smooth   = (mode_i == CAT_DENSE) || (mode_i == CAT_SMOOTH) || (mode_i == CAT_AUTO);
+  assign dense_spiky    = (mode_i == CAT_DENSE) || (mode_i == CAT_SPIKY);
+  assign automatic_fall = (mode_i == CAT_AUTO);
 
-  assign dense = (spiky_i ? dense_spiky_q : dense_smooth_q && !(auto_q && fall_q)) && !eos_i;
+  assign dense = (spiky_i ? dense_spiky : dense_smooth && !(automatic_fall && fall_q)) && !eos_i;
 
   assign go = valid_i && space_i && !stall_i && !(eos_i && eos_pending_q);
 
   assign issue_o            = go;
   assign issue_batch_o      = batch_q;
   assign issue_dense_o      = dense;
-  assign issue_all_o        = eos_i || off_q;
+  assign issue_all_o        = eos_i || (mode_i == CAT_OFF);
   assign issue_base_dense_o = !spiky_i;
   assign ready_o            = go && (!dense || batch_q);
   assign batch_d            = go ? (dense && !batch_q) : batch_q;
@@ -140,10 +138,19 @@ module flk_ctu_controller
 
   // Sub-tiles change when a token is taken: no other token is in the pipeline then.
   assign fall_d   = (go && eos_i) ? (test_avg_q > sent_avg_q) : fall_q;
-  assign fallen_o = fall_q && auto_q;
+  assign fallen_o = fall_q && automatic_fall;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      batch_q       <= 1'b0;
+      fall_q        <= 1'b0;
+      eos_pending_q <= 1'b0;
+      update_q      <= 1'b0;
+      test_q        <= '0;
+      sent_q        <= '0;
+      test_avg_q    <= '0;
+      sent_avg_q    <= '0;
+    end else if (clear_i) begin
       batch_q       <= 1'b0;
       fall_q        <= 1'b0;
       eos_pending_q <= 1'b0;

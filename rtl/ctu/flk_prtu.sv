@@ -4,7 +4,7 @@
 //
 // Leader i lies in column i % Cols, row i / Cols: with two of each, 0 is top left, 1 top right, 2 bottom left, 3 bottom right.
 // A splat's numbers are taken when they are needed: coordinates first, mean PRTU_MEAN_DELAY[Precision] and shape
-// PRTU_SHAPE_DELAY[Precision] cycles later, threshold in the last cycle before the answer; pass_o and weight_o come
+// PRTU_SHAPE_DELAY[Precision] cycles later, threshold in the last cycle before the answer; pass_o comes
 // PRTU_LATENCY[Form][Precision] cycles after the coordinates. Throughput one rectangle per cycle. All registers load while en_i is high;
 // none is reset. No handshake: the CTU keeps track of what is inside.
 // pass_o[i] is high when threshold_i > weight i; a NaN weight does not pass.
@@ -30,8 +30,7 @@ module flk_prtu
   input  fp16_t                            mean_y_i,
   input  logic [        2:0][QuadBits-1:0] shape_i,
   input  logic [QuadBits-1:0]              threshold_i,
-  output logic [Leaders-1:0]               pass_o,
-  output logic [Leaders-1:0][QuadBits-1:0] weight_o
+  output logic [Leaders-1:0]               pass_o
 );
 
   if (Form > FORM_FACTORED) begin : gen_check_form
@@ -46,9 +45,6 @@ module flk_prtu
   localparam int unsigned ManBits = Wide ? 10 : 3;
   localparam bit Fn = !Wide;
   localparam bit Saturate = !Wide;
-  localparam int unsigned ADD = Wide ? FP16_ADD_STAGES : FP8_ADD_STAGES;
-  localparam int unsigned SUM = Wide ? FP16_SUM_STAGES : FP8_SUM_STAGES;
-  localparam int unsigned MUL = Wide ? FP16_MUL_STAGES : FP8_MUL_STAGES;
 
   typedef logic [QuadBits-1:0] quad_t;
 
@@ -188,124 +184,34 @@ module flk_prtu
   // ---- Weights -----------------------------------------------------------------------------------------
 
   quad_t [Leaders-1:0] weight_q;
+  quad_t [2:0] shape_late;
 
-  if (Form == FORM_CONIC) begin : gen_conic
-    // Squares and cross products, then times the conic, sum of the squares, weight.
-    quad_t [Cols-1:0] xx_q, sx_q;
-    quad_t [Rows-1:0] yy_q, sy_q;
-    quad_t [Leaders-1:0] xy_q, t_q, t_late_q, h_q;
-    quad_t [2:0] shape_q;
+  flk_delay #(
+    .Width($bits(shape_i)),
+    .Depth(32'(WEIGHT_SHAPE_DELAY[Form][Wide]))
+  ) i_shape (
+    .clk_i,
+    .en_i,
+    .d_i(shape_i),
+    .q_o(shape_late)
+  );
 
-    flk_delay #(
-      .Width(3 * QuadBits),
-      .Depth(MUL)
-    ) i_shape (
-      .clk_i,
-      .en_i,
-      .d_i(shape_i),
-      .q_o(shape_q)
-    );
-
-    for (genvar k = 0; k < Cols; k++) begin : gen_col
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_xx (
-        .clk_i, .en_i, .a_i(dx_q[k]), .b_i(dx_q[k]), .prod_o(xx_q[k])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_sx (
-        .clk_i, .en_i, .a_i(xx_q[k]), .b_i(shape_q[0]), .prod_o(sx_q[k])
-      );
-    end
-    for (genvar k = 0; k < Rows; k++) begin : gen_row
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_yy (
-        .clk_i, .en_i, .a_i(dy_q[k]), .b_i(dy_q[k]), .prod_o(yy_q[k])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_sy (
-        .clk_i, .en_i, .a_i(yy_q[k]), .b_i(shape_q[2]), .prod_o(sy_q[k])
-      );
-    end
-    for (genvar i = 0; i < Leaders; i++) begin : gen_leader
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_xy (
-        .clk_i, .en_i, .a_i(dx_q[i%Cols]), .b_i(dy_q[i/Cols]), .prod_o(xy_q[i])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_t (
-        .clk_i, .en_i, .a_i(xy_q[i]), .b_i(shape_q[1]), .prod_o(t_q[i])
-      );
-      flk_fp_add_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
-      ) i_h (
-        .clk_i, .en_i, .a_i(sx_q[i%Cols]), .b_i(sy_q[i/Cols]), .sum_o(h_q[i])
-      );
-      flk_delay #(.Width(QuadBits), .Depth(ADD)) i_t_late (
-        .clk_i, .en_i, .d_i(t_q[i]), .q_o(t_late_q[i])
-      );
-      flk_fp_add_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
-      ) i_e (
-        .clk_i, .en_i, .a_i(h_q[i]), .b_i(t_late_q[i]), .sum_o(weight_q[i])
-      );
-    end
-  end else begin : gen_factored
-    // Products with the factors, u = p + q, squares, weight.
-    quad_t [Cols-1:0] p_q;
-    quad_t [Rows-1:0] q_q, v_q, v_late_q, vv_q;
-    quad_t [Leaders-1:0] u_q, uu_q;
-
-    for (genvar k = 0; k < Cols; k++) begin : gen_col
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_p (
-        .clk_i, .en_i, .a_i(shape_i[0]), .b_i(dx_q[k]), .prod_o(p_q[k])
-      );
-    end
-    for (genvar k = 0; k < Rows; k++) begin : gen_row
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_q (
-        .clk_i, .en_i, .a_i(shape_i[1]), .b_i(dy_q[k]), .prod_o(q_q[k])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_v (
-        .clk_i, .en_i, .a_i(shape_i[2]), .b_i(dy_q[k]), .prod_o(v_q[k])
-      );
-      flk_delay #(.Width(QuadBits), .Depth(ADD)) i_v_late (
-        .clk_i, .en_i, .d_i(v_q[k]), .q_o(v_late_q[k])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_vv (
-        .clk_i, .en_i, .a_i(v_late_q[k]), .b_i(v_late_q[k]), .prod_o(vv_q[k])
-      );
-    end
-    for (genvar i = 0; i < Leaders; i++) begin : gen_leader
-      flk_fp_add_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(ADD)
-      ) i_u (
-        .clk_i, .en_i, .a_i(p_q[i%Cols]), .b_i(q_q[i/Cols]), .sum_o(u_q[i])
-      );
-      flk_fp_mul_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Stages(MUL)
-      ) i_uu (
-        .clk_i, .en_i, .a_i(u_q[i]), .b_i(u_q[i]), .prod_o(uu_q[i])
-      );
-      flk_fp_add_pipe #(
-        .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Cancel(0), .Stages(SUM)
-      ) i_e (
-        .clk_i, .en_i, .a_i(uu_q[i]), .b_i(vv_q[i/Cols]), .sum_o(weight_q[i])
-      );
-    end
-  end
+  flk_weight #(
+    .Form    (Form),
+    .Cols    (Cols),
+    .Rows    (Rows),
+    .ExpBits (ExpBits),
+    .ManBits (ManBits),
+    .Fn      (Fn),
+    .Saturate(Saturate)
+  ) i_weight (
+    .clk_i,
+    .en_i,
+    .dx_i    (dx_q),
+    .dy_i    (dy_q),
+    .shape_i (shape_late),
+    .weight_o(weight_q)
+  );
 
   // ---- Comparison (Alg. 1, line 7) -----------------------------------------------------------------------
 
@@ -325,8 +231,7 @@ module flk_prtu
 
   always_ff @(posedge clk_i) begin
     if (en_i) begin
-      pass_o   <= pass_d;
-      weight_o <= weight_q;
+      pass_o <= pass_d;
     end
   end
 

@@ -6,7 +6,9 @@
 //
 // `finished_o` says that all pixels are finished and no token lies between the FIFO's input and the pixels, so that what is
 // written now would be dropped: the dispatch need not write it.
-// in_ready_o comes from a register; finished_o from registers.
+// clear_i forgets everything: in the next cycle the channel is as after reset. idle_o: it holds no element and no pixel that waits to leave;
+// what the splats of an unfinished list have left in the pixels it does not know.
+// in_ready_o comes from a register; finished_o and idle_o from registers.
 module flk_channel
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -18,11 +20,13 @@ module flk_channel
 ) (
   input  logic            clk_i,
   input  logic            rst_ni,
+  input  logic            clear_i,
   // features
   input  logic            in_valid_i,
   output logic            in_ready_o,
   input  feature_elem_t   in_elem_i,
   output logic            finished_o,
+  output logic            idle_o,
   // finished pixels
   output logic            out_valid_o,
   input  logic            out_ready_i,
@@ -40,6 +44,8 @@ module flk_channel
 
   localparam int unsigned Pixels = MINITILE * MINITILE / VrusPerChannel;  // of a VRU
   localparam int unsigned PixelW = $clog2(Pixels);
+  // A sub-tile has 8 rows; a VRU has Pixels / 4 of them: blocks of rows 0 to 2^RowW - 1.
+  localparam int unsigned RowW = 5 - PixelW;
 
   // ---- Feature FIFO ------------------------------------------------------------------------------------
 
@@ -53,6 +59,7 @@ module flk_channel
   ) i_fifo (
     .clk_i,
     .rst_ni,
+    .clear_i,
     .in_valid_i,
     .in_ready_o,
     .in_data_i  (in_elem_i),
@@ -96,6 +103,10 @@ module flk_channel
     if (issue_eos) begin
       eos_in_vru_d = 1'b1;
     end
+    if (clear_i) begin
+      pixel_d      = '0;
+      eos_in_vru_d = 1'b0;
+    end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -117,12 +128,13 @@ module flk_channel
 
   // ---- Tokens on their way: written, not yet at the pixels -----------------------------------------------
 
-  localparam int unsigned TokenW = $clog2(FifoDepth + 2);  // FIFO and VRUs
+  // 0 to FifoDepth + 1: those in the FIFO, one in the VRUs.
+  localparam int unsigned TokenW = $clog2(FifoDepth + 2);
   logic [TokenW-1:0] tokens_d, tokens_q;
   logic token_in;
 
   assign token_in = in_valid_i && in_ready_o && in_elem_i.eos;
-  assign tokens_d = tokens_q + TokenW'(token_in) - TokenW'(blend_eos[0]);
+  assign tokens_d = clear_i ? '0 : tokens_q + TokenW'(token_in) - TokenW'(blend_eos[0]);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -133,6 +145,7 @@ module flk_channel
   end
 
   assign finished_o = (&finished) && (tokens_q == '0);
+  assign idle_o     = !head_valid && (&eos_ready);
 
   // ---- VRUs ------------------------------------------------------------------------------------------------
 
@@ -151,8 +164,10 @@ module flk_channel
     ) i_vru (
       .clk_i,
       .rst_ni,
+      .clear_i,
+      // Mini-tiles 0 and 1 lie above 2 and 3; a mini-tile is VrusPerChannel blocks of rows high.
       .col_i        (1'(MiniTile % 2)),
-      .row_i        ((5 - PixelW)'((MiniTile / 2) * VrusPerChannel + v)),
+      .row_i        (RowW'((MiniTile / 2) * VrusPerChannel + v)),
       .op_valid_i   (issue || issue_eos),
       .op_eos_i     (issue_eos),
       .op_pixel_i   (pixel_q),
@@ -184,6 +199,7 @@ module flk_channel
     ) i_arbiter (
       .clk_i,
       .rst_ni,
+      .clear_i,
       .in_valid_i (vru_valid),
       .in_ready_o (vru_ready),
       .in_data_i  (vru_data),
@@ -219,5 +235,12 @@ module flk_channel
   // The VRUs are in step: the copies of all but VRU 0 carry nothing new.
   logic unused_step;
   assign unused_step = ^{blend_valid, blend_pixel, blend_eos};
+
+`ifndef SYNTHESIS
+  // The stream of pixels; the arbiter holds its choice, the VRUs hold their pixels.
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
+  else $error("flk_channel: pixel changed before its transfer");
+`endif
 
 endmodule

@@ -1,18 +1,22 @@
-// FIFO monitor: watches the four feature FIFOs of a core, dispatches splats to them and stalls the CTU.
+// FIFO monitor: watches the four feature FIFOs of a core, dispatches splats to them and stalls the mask generator.
 //
+// Mask: one bit for each mini-tile (MaskBits 4) or for each pixel (64; bits 16 m to 16 m + 15 are the pixels of mini-tile m, which
+// gets the splat when any of them is set).
 // Dispatch: a splat is written to all channels of its mask at once, as soon as each of them has room; channels whose mini-tile is
 // finished for this sub-tile are left out. A token goes to all four channels.
-// Stall (paper, Sec. IV-B): while any feature FIFO is full the CTU takes no new splat; what it has in flight waits in its own FIFO.
+// Stall (paper, Sec. IV-B): while any feature FIFO is full the generator takes no new splat; what it has in flight waits there.
 // Combinational throughout: in_ready_o depends on mask, token and the FIFOs' ready_i.
 module flk_fifo_monitor
   import flk_pkg::*;
   import flk_param_pkg::*;
-(
-  // from the CTU
+#(
+  parameter int unsigned MaskBits = CHANNELS  // CHANNELS, or the pixels of a sub-tile
+) (
+  // from the mask generator
   input  logic                in_valid_i,
   output logic                in_ready_o,
   input  logic                in_eos_i,
-  input  logic [CHANNELS-1:0] in_mask_i,
+  input  logic [MaskBits-1:0] in_mask_i,
   output logic                stall_o,
   // feature FIFOs
   output logic [CHANNELS-1:0] write_o,
@@ -22,11 +26,21 @@ module flk_fifo_monitor
   output dispatch_events_t    events_o
 );
 
-  logic [CHANNELS-1:0] target, filtered;
+  if (MaskBits != CHANNELS && MaskBits != SUBTILE * SUBTILE) begin : gen_check_mask
+    $error("flk_fifo_monitor: MaskBits must be 4 (mini-tiles) or 64 (pixels)");
+  end
+
+  localparam int unsigned ChannelBits = MaskBits / CHANNELS;  // mask bits of a channel
+
+  logic [CHANNELS-1:0] mask, target, filtered;
   logic transfer;
 
-  assign filtered   = in_eos_i ? '0 : (in_mask_i & finished_i);
-  assign target     = in_mask_i & ~filtered;
+  for (genvar c = 0; c < CHANNELS; c++) begin : gen_mask
+    assign mask[c] = |in_mask_i[ChannelBits*c+:ChannelBits];
+  end
+
+  assign filtered   = in_eos_i ? '0 : (mask & finished_i);
+  assign target     = mask & ~filtered;
   assign in_ready_o = &(~target | ready_i);
   assign transfer   = in_valid_i && in_ready_o;
   assign write_o    = transfer ? target : '0;

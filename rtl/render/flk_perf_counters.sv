@@ -1,18 +1,23 @@
-// Performance counters of one CTU and rendering core.
+// Performance counters of one mask generator and rendering core, read one at a time.
 //
 // Index of each counter: flk_param_pkg::CNT_*; channel c's counters follow at CORE_COUNTERS + c * CHANNEL_COUNTERS.
-// Counters wrap. `clear_i` sets all to zero; otherwise each adds its events of the cycle. Both take effect one cycle late, behind a register.
+// Counters wrap. Each adds its events of the cycle, unless `hold_i` is high; `clear_i` sets all to zero. All of it takes effect one cycle
+// late, behind a register. data_o is the counter at addr_i, combinationally; 0 where there is none.
 module flk_perf_counters
   import flk_pkg::*;
   import flk_param_pkg::*;
 (
-  input  logic                                                clk_i,
-  input  logic                                                rst_ni,
-  input  logic                                                clear_i,
-  input  ctu_events_t                                         ctu_events_i,
-  input  dispatch_events_t                                    dispatch_events_i,
-  input  channel_events_t [CHANNELS-1:0]                      channel_events_i,
-  output logic [COUNTERS_PER_CORE-1:0][COUNTER_BITS-1:0]      counters_o
+  input  logic                                 clk_i,
+  input  logic                                 rst_ni,
+  input  logic                                 clear_i,
+  input  logic                                 hold_i,
+  // events
+  input  generator_events_t                    generator_events_i,
+  input  dispatch_events_t                     dispatch_events_i,
+  input  channel_events_t [CHANNELS-1:0]       channel_events_i,
+  // read port
+  input  logic        [COUNTER_INDEX_BITS-1:0] addr_i,
+  output logic              [COUNTER_BITS-1:0] data_o
 );
 
   // Place of a channel's counter.
@@ -28,13 +33,13 @@ module flk_perf_counters
   always_comb begin
     inc = '0;
     inc[CNT_CYCLES]              = 3'd1;
-    inc[CNT_SUBTILES]            = 3'(ctu_events_i.token);
-    inc[CNT_GAUSSIANS_IN]        = 3'(ctu_events_i.splat);
-    inc[CNT_GAUSSIANS_REJECTED]  = 3'(ctu_events_i.rejected);
-    inc[CNT_CTU_BUSY]            = 3'(ctu_events_i.busy);
-    inc[CNT_CTU_STALLED]         = 3'(ctu_events_i.stalled);
-    inc[CNT_CTU_IDLE]            = 3'(ctu_events_i.idle);
-    inc[CNT_MINITILES_TESTED]    = ctu_events_i.tested;
+    inc[CNT_SUBTILES]            = 3'(generator_events_i.token);
+    inc[CNT_GAUSSIANS_IN]        = 3'(generator_events_i.splat);
+    inc[CNT_GAUSSIANS_REJECTED]  = 3'(generator_events_i.rejected);
+    inc[CNT_CTU_BUSY]            = 3'(generator_events_i.busy);
+    inc[CNT_CTU_STALLED]         = 3'(generator_events_i.stalled);
+    inc[CNT_CTU_IDLE]            = 3'(generator_events_i.idle);
+    inc[CNT_MINITILES_TESTED]    = generator_events_i.tested;
     inc[CNT_MINITILES_DELIVERED] = dispatch_events_i.delivered;
     inc[CNT_MINITILES_FILTERED]  = dispatch_events_i.filtered;
     for (int unsigned c = 0; c < CHANNELS; c++) begin
@@ -52,7 +57,7 @@ module flk_perf_counters
       clear_q    <= 1'b0;
       counters_q <= '0;
     end else begin
-      inc_q   <= inc;
+      inc_q   <= hold_i ? '0 : inc;
       clear_q <= clear_i;
       for (int unsigned i = 0; i < COUNTERS_PER_CORE; i++) begin
         counters_q[i] <= clear_q ? '0 : counters_q[i] + COUNTER_BITS'(inc_q[i]);
@@ -60,6 +65,13 @@ module flk_perf_counters
     end
   end
 
-  assign counters_o = counters_q;
+  always_comb begin
+    data_o = '0;
+    for (int unsigned i = 0; i < COUNTERS_PER_CORE; i++) begin
+      if (addr_i == COUNTER_INDEX_BITS'(i)) begin
+        data_o = counters_q[i];
+      end
+    end
+  end
 
 endmodule

@@ -122,6 +122,7 @@ module flk_bitonic_sorter #(
       ) i_pipe_reg (
         .clk_i,
         .rst_ni,
+        .clear_i    (1'b0),
         .in_valid_i (valid),
         .in_ready_o (ready),
         .in_data_i  (exchanged),

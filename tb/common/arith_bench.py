@@ -48,8 +48,8 @@ class Harness:
         self._lib.arith_reset()
 
     def pairs(self, fmt: FloatFormat, a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
-        """Sum, product and less-than of operands (n,)."""
-        out = {name: np.zeros(a.size, np.uint16) for name in ("add", "mul", "cmp")}
+        """Sum, sum by the adder for operands of one sign (`Cancel` 0), product and less-than of operands (n,)."""
+        out = {name: np.zeros(a.size, np.uint16) for name in ("add", "like", "mul", "cmp")}
         self._call("arith_pairs", FORMATS.index(fmt), a, b, *out.values())
         return out
 

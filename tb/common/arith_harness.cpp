@@ -33,10 +33,11 @@ void arith_reset() {
 }
 
 void arith_pairs(int format, int64_t n, const uint16_t* a, const uint16_t* b, uint16_t* sum,
-                 uint16_t* product, uint16_t* less) {
+                 uint16_t* like, uint16_t* product, uint16_t* less) {
   for (int64_t i = 0; i < n; i++) {
     step(format, a[i], b[i]);
     sum[i] = top().sum_o[format];
+    like[i] = top().like_o[format];
     product[i] = top().prod_o[format];
     less[i] = top().lt_o[format];
   }

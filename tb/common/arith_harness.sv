@@ -12,6 +12,7 @@ module arith_harness #(
   input  logic [       15:0] a_i,
   input  logic [       15:0] b_i,
   output logic [       15:0] sum_o  [Formats],
+  output logic [       15:0] like_o [Formats],  // of the adder for operands of one sign
   output logic [       15:0] prod_o [Formats],
   output logic [       15:0] lt_o   [Formats],
   output logic [       15:0] conv_o [Formats][Formats],  // [source][target]
@@ -26,7 +27,7 @@ module arith_harness #(
     localparam bit Saturate = Table[f][0];
     localparam int unsigned Width = 1 + ExpBits + ManBits;
 
-    logic [Width-1:0] a_q, b_q, sum, prod, src_q;
+    logic [Width-1:0] a_q, b_q, sum, like, prod, src_q;
     logic lt;
 
     always_ff @(edge clk_i[f]) begin
@@ -42,6 +43,10 @@ module arith_harness #(
       .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)
     ) i_add (.a_i(a_q), .b_i(b_q), .sum_o(sum));
 
+    flk_fp_add_pipe #(
+      .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate), .Cancel(0), .Stages(0)
+    ) i_like (.clk_i(1'b0), .en_i(1'b0), .a_i(a_q), .b_i(b_q), .sum_o(like));
+
     flk_fp_mul #(
       .ExpBits(ExpBits), .ManBits(ManBits), .Fn(Fn), .Saturate(Saturate)
     ) i_mul (.a_i(a_q), .b_i(b_q), .prod_o(prod));
@@ -51,6 +56,7 @@ module arith_harness #(
     ) i_cmp (.a_i(a_q), .b_i(b_q), .lt_o(lt));
 
     assign sum_o[f]  = 16'(sum);
+    assign like_o[f] = 16'(like);
     assign prod_o[f] = 16'(prod);
     assign lt_o[f]   = 16'(lt);
 

@@ -108,6 +108,22 @@ async def single_input(dut, only):
 
 
 @cocotb.test()
+async def clear_starts_over(dut):
+    """After clear_i the search starts at input 0, wherever it was and whatever was waiting."""
+    bench = Bench(dut)
+    inputs = len(dut.in_valid_i)
+    dut.in_data_i.value = 0
+    await bench.reset()
+    for first in range(inputs):
+        dut.in_valid_i.value = 1 << first
+        dut.out_ready_i.value = int(first % 2 == 0)  # served, or still waiting
+        await bench.clear()
+        dut.in_valid_i.value = (1 << inputs) - 1
+        await FallingEdge(dut.clk_i)
+        assert int(dut.out_index_o.value) == 0, f"after input {first}"
+
+
+@cocotb.test()
 async def combinational_paths(dut):
     """Latency 0: valid and data reach the output, ready the chosen input, in the same cycle."""
     test = ArbiterTest(dut, "never", "never")

@@ -95,6 +95,26 @@ async def reset_empties(dut):
 
 
 @cocotb.test()
+@cocotb.parametrize(when=["idle", "busy"])
+async def clear_empties(dut, when):
+    """Clear in mid-traffic forgets what is held and what is taken in that cycle; the cell is empty in the next, and works on."""
+    test = StreamTest(dut, echo, stall="half" if when == "busy" else "never")
+    await test.bench.reset()
+    items = random_items(test)
+    for part in range(0, ITEMS, 20):
+        test.source.send(items[part : part + 20])
+        await test.bench.until(lambda: not test.source.pending if when == "idle" else test.input.count > part + 10, 1000, "traffic")
+        dut.clear_i.value = 1
+        await RisingEdge(dut.clk_i)  # in this cycle an element may still enter or leave
+        dut.clear_i.value = 0
+        await FallingEdge(dut.clk_i)
+        test.checker.drop()
+        assert dut.out_valid_o.value == 0 and dut.in_ready_o.value == 1, "not empty after clear_i"
+        await test.bench.until(lambda: not test.source.pending and not test.checker.outstanding, 1000, "rest")
+    assert test.checker.checked > ITEMS // 4
+
+
+@cocotb.test()
 async def combinational_paths(dut):
     """Within a cycle, outputs react to inputs on the documented paths and on no other."""
     inputs = ("in_valid_i", "in_data_i", "out_ready_i")

@@ -2,7 +2,7 @@
 
 Units (`arith_harness.sv`, against `flicker.arithmetic.formats` and `flicker.arithmetic.functions`, bit for bit):
   every pair of operands of all formats but FP16; FP16 by special, structured and random pairs
-  (all 2^32 with FLICKER_EXHAUSTIVE=1); conversions and functions: every input, between all formats.
+  (all 2^32 with SLOW=1); conversions and functions: every input, between all formats.
 Model: against numpy's and ml_dtypes' types and a rounding of its own (`arith_bench.nearest`); the float32 carriers of
   the golden model against it; error bounds of the functions against float64.
 Parameter space: the chip's formats and five that it does not use (`arith_bench.FORMATS`). Not covered: other formats,
@@ -11,7 +11,6 @@ Parameter space: the chip's formats and five that it does not use (`arith_bench.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -62,8 +61,11 @@ def random(stream: int) -> np.random.Generator:
 
 
 def check_pairs(harness: Harness, fmt: FloatFormat, kind: str, a: np.ndarray, b: np.ndarray) -> None:
-    """Adder, multiplier and comparator of a format against the model."""
+    """Adder, multiplier and comparator of a format against the model; the adder without cancellation where both signs are equal."""
     got = harness.pairs(fmt, a, b)
+    like = (a ^ b) & fmt.sign_bit == 0
+    x, y = a[like], b[like]
+    assert_same(f"{fmt.name} add, Cancel=0, {kind}", fmt, (x, y), got["like"][like], fp_add(fmt, x, y))
     for name, operation in OPERATIONS.items():
         assert_same(f"{fmt.name} {name}, {kind}", fmt, (a, b), got[name], operation(fmt, a, b))
 
@@ -81,7 +83,7 @@ def test_fp16_pairs(harness: Harness) -> None:
         check_pairs(harness, FP16, kind, a, b)
 
 
-@pytest.mark.skipif(os.environ.get("FLICKER_EXHAUSTIVE") != "1", reason="FLICKER_EXHAUSTIVE=1 runs it: minutes")
+@pytest.mark.slow
 def test_fp16_all_pairs(harness: Harness) -> None:
     every = all_bits(FP16)
     for first in range(0, every.size, 8):

@@ -11,13 +11,14 @@ from flicker_tb.bench import StreamTest, config, netlist
 from flicker_tb.models import CtuModel
 from flicker_tb.streams import Stream
 
-from flicker.params import AUTO_SENT_BITS, AUTO_TEST_BITS, CatMode, Form, Precision, prtu_latency
+from flicker import layout
+from flicker.params import AUTO_SENT_BITS, AUTO_TEST_BITS, PIXELS_PER_VRU, CatMode, Form, Precision, prtu_latency
 
 FORM, PRECISION = Form(config()["Form"]), Precision(config()["Precision"])
 # From acceptance to the output.
 LATENCY = prtu_latency(FORM, PRECISION) + (config()["CtuFifoDepth"] > 0)
-# Fields of ctu_events_t, least significant first.
-EVENTS = (("tested", 3), ("rejected", 1), ("splats", 1), ("tokens", 1), ("idle", 1), ("stalled", 1), ("busy", 1))
+EVENTS = layout.fields("generator_events")
+ELEM_BITS = layout.bits("feature_elem")  # the mask lies above
 # Patterns of idle input, blocked output, blocked acceptance.
 FREE = ("never", "never", "never")
 PATTERNS = {
@@ -32,19 +33,26 @@ class CtuTest(StreamTest):
     """Bench with the golden model, counters, and a generator on stall_i."""
 
     def __init__(self, dut, mode: CatMode, patterns: tuple[str, str, str] = FREE) -> None:
-        self.model = CtuModel(FORM, PRECISION, mode)
-        source, sink = Stream(dut, "in", ("elem",)), Stream(dut, "out", ("elem", "mask"))
+        self.model = self.fresh(mode)
+        source, sink = Stream(dut, "in", ("elem",)), Stream(dut, "out")
         super().__init__(dut, self._model, source=source, sink=sink, idle=patterns[0], stall=patterns[1])
         dut.mode_i.value = int(mode)
         dut.stall_i.value = 0
         self.counts: Counter[str] = Counter()
+        self.closed = False  # nothing is to be taken
         cocotb.start_soon(self._block(self.bench.stall(patterns[2])))
 
     def _model(self, element: int):
         if not netlist():
             fallen = int(self.bench.dut.i_controller.fallen_o.value)
             assert fallen == self.model.fallen, f"sub-tile {len(self.model.decisions)}: fallen is {fallen}"
-        return self.model.take(element)
+        assert not int(self.bench.dut.idle_o.value) or not self.checker.outstanding, "idle_o is high, but something is inside"
+        return [mask << ELEM_BITS | word for word, mask in self.model.take(element)]
+
+    @staticmethod
+    def fresh(mode: CatMode) -> CtuModel:
+        """The model at its start."""
+        return CtuModel(FORM, PRECISION, mode, config().get("VruCycles", PIXELS_PER_VRU))
 
     async def _block(self, pattern) -> None:
         """Drive stall_i, count the events."""
@@ -56,18 +64,18 @@ class CtuTest(StreamTest):
                 continue
             assert not (dut.stall_i.value == 1 and dut.in_ready_o.value == 1), "element taken while stalled"
             events = int(dut.events_o.value)
-            for name, width in EVENTS:
-                self.counts[name] += events & (1 << width) - 1
-                events >>= width
+            for name, place in EVENTS.items():
+                self.counts[name] += events >> place.at & (1 << place.bits) - 1
             self.counts["cycles"] += 1
-            dut.stall_i.value = int(next(pattern))
+            dut.stall_i.value = int(next(pattern) or self.closed)
 
     async def check(self, items: list[int]) -> int:
         """Run and compare everything; returns the cycles."""
         taken = await self.run(items, limit=2000 + 400 * len(items))
         want, got = self.model.counts, self.counts
-        for name in ("splats", "tokens", "rejected", "tested"):
-            assert got[name] == want[name], f"counted {got[name]} {name}, the model {want[name]}"
+        for event, name in (("splat", "splats"), ("token", "tokens"), ("rejected", "rejected"), ("tested", "tested")):
+            assert got[event] == want[name], f"counted {got[event]} {name}, the model {want[name]}"
+        assert self.bench.dut.idle_o.value == 1, "idle_o is low after the last element"
         assert got["busy"] == want["batches"] + want["tokens"]
         assert got["busy"] + got["stalled"] + got["idle"] == got["cycles"]
         assert self.input.count == self.output.count + got["rejected"]
@@ -184,19 +192,31 @@ async def saturation(dut):
 
 
 @cocotb.test()
-async def reset_forgets(dut):
-    """Reset in mid-traffic empties the pipeline; what follows comes out as from a fresh unit."""
+@cocotb.parametrize(how=["reset", "clear"])
+async def forgets(dut, how):
+    """Reset or clear in mid-traffic empties the unit; what follows comes out as from a fresh unit, the automatic decisions too."""
     test = CtuTest(dut, CatMode.AUTO, ("never", "half", "never"))
     items = items_of(random_lists(test.bench.rng, 12))
     await test.bench.reset()
     test.source.send(items)
     await test.bench.until(lambda: test.input.count > len(items) // 2, 40 * len(items), "traffic")
-    dut.rst_ni.value = 0
+    if how == "reset":
+        dut.rst_ni.value = 0
+    else:
+        test.closed = True  # the stage takes nothing while it is cleared
+        await test.bench.cycles(2)
+        dut.clear_i.value = 1
     await RisingEdge(dut.clk_i)
     rest = test.source.pending
     test.checker.drop()
-    test.model = CtuModel(FORM, PRECISION, CatMode.AUTO)
-    await test.bench.reset()
+    test.model = test.fresh(CatMode.AUTO)
+    if how == "reset":
+        await test.bench.reset()
+    else:
+        dut.clear_i.value = 0
+        test.closed = False
+        await ReadWrite()
+        assert dut.idle_o.value == 1 and dut.out_valid_o.value == 0, "something is left after clear_i"
     done = lambda: not test.source.pending and not test.checker.outstanding  # noqa: E731
     await test.bench.until(done, 1000 + 40 * len(items), "last answer")
     await test.bench.cycles(50)

@@ -41,19 +41,12 @@ def registers(form: Form, precision: Precision):
     product = diff + mul
     if form == Form.CONIC:
         scaled = product + mul
-        own = [
-            (product, "xx", "gen_conic.xx_q"), (product, "yy", "gen_conic.yy_q"), (product, "xy", "gen_conic.xy_q"),
-            (scaled, "sx", "gen_conic.sx_q"), (scaled, "sy", "gen_conic.sy_q"), (scaled, "t", "gen_conic.t_q"),
-            (scaled + add, "h", "gen_conic.h_q"),
-        ]
+        own = [(product, "xx"), (product, "yy"), (product, "xy"), (scaled, "sx"), (scaled, "sy"), (scaled, "t"), (scaled + add, "h")]
     else:
         u = product + add
-        own = [
-            (product, "p", "gen_factored.p_q"), (product, "q", "gen_factored.q_q"), (product, "v", "gen_factored.v_q"),
-            (u, "u", "gen_factored.u_q"), (u + mul, "uu", "gen_factored.uu_q"), (u + mul, "vv", "gen_factored.vv_q"),
-        ]
-    ends = [(last - 1, "weight", "weight_q"), (last, "weight", "weight_o"), (last, "pass", "pass_o")]
-    return [(diff, "dx", "dx_q"), (diff, "dy", "dy_q"), *own, *ends]
+        own = [(product, "p"), (product, "q"), (product, "v"), (u, "u"), (u + mul, "uu"), (u + mul, "vv")]
+    own = [(delay, name, f"i_weight.gen_{form.name.lower()}.{name}_q") for delay, name in own]
+    return [(diff, "dx", "dx_q"), (diff, "dy", "dy_q"), *own, (last - 1, "weight", "weight_q"), (last, "pass", "pass_o")]
 
 
 def handle(dut, path: str):

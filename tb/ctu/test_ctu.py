@@ -2,8 +2,9 @@
 
 State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000
 splats; all modes; idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it
-fall and return, under different stalls. Parameter space: every form and precision without output FIFO; output FIFOs of 1 to 3 places
-and that of the faithful configuration. Not covered: a change of mode in mid-frame, which the contract excludes.
+fall and return, under different stalls; reset and clear in mid-traffic. Parameter space: every form and precision without output FIFO;
+output FIFOs of 1 to 3 places and that of the faithful configuration; VRU cycles of channels with 1, 2 and 4 VRUs; illegal parameters. Not
+covered: a change of mode in mid-frame, which the contract excludes (tb/render/test_stage_control.py: the mode is latched).
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from flicker_tb.bench import netlist
 from flicker_tb.runner import build_and_test
 from flicker_tb.splats import QUICK_BUILD
 
+from flicker.errors import FlickerError
 from flicker.params import FAITHFUL, Form, Precision, RenderConfig
 
 
-def run(form: Form, precision: Precision, depth: int, tests: list[str]) -> None:
-    parameters = {"Form": int(form), "Precision": int(precision), "CtuFifoDepth": depth}
+def run(form: Form, precision: Precision, depth: int, tests: list[str], **more: int) -> None:
+    parameters = {"Form": int(form), "Precision": int(precision), "CtuFifoDepth": depth, **more}
     build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters, config=parameters, tests=tests, **QUICK_BUILD)
 
 
@@ -26,7 +28,7 @@ def run(form: Form, precision: Precision, depth: int, tests: list[str]) -> None:
 def test_ctu(form: Form, precision: Precision) -> None:
     tests = ["lists", "rate", "automatic"]
     if RenderConfig(form=form, precision=precision) == RenderConfig():
-        tests += ["rejected_drain", "long_list", "reset_forgets"]
+        tests += ["rejected_drain", "long_list", "forgets"]
         if not netlist():
             tests.append("saturation")  # sets registers by name
     run(form, precision, 0, tests)
@@ -39,3 +41,23 @@ def test_fifo_depth(depth: int) -> None:
 
 def test_faithful() -> None:
     run(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth, ["lists", "rate", "automatic", "rejected_drain"])
+
+
+@pytest.mark.parametrize("cycles", [4, 16])
+def test_vru_cycles(cycles: int) -> None:
+    """Of a channel with four VRUs and with one: the fall compares with them."""
+    run(Form.FACTORED, Precision.FIXED, 0, ["automatic"], VruCycles=cycles)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"Form": 2}, "Form must be"),
+        ({"Precision": 4}, "Precision must be"),
+        ({"CtuFifoDepth": 129}, "CtuFifoDepth must be"),
+        ({"VruCycles": 6}, "VruCycles must be a power of two"),
+    ],
+)
+def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
+    with pytest.raises(FlickerError, match=message):
+        build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters)

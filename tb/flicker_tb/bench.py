@@ -30,7 +30,7 @@ def netlist() -> bool:
 
 
 class Bench:
-    """One test's view of a design with ``clk_i`` and ``rst_ni``.
+    """One test's view of a design with ``clk_i`` and ``rst_ni``, and perhaps ``clear_i``, which stays low until ``clear``.
 
     The clock runs from the constructor on. Make sources and sinks before ``reset``, so that
     no input is random when reset ends. ``rng`` is seeded by FLICKER_SEED and the test's name.
@@ -42,6 +42,8 @@ class Bench:
         # At once: the inputs' random start values must not make a clock edge out of reset.
         dut.rst_ni.value = Immediate(0)
         dut.clk_i.value = Immediate(0)
+        if hasattr(dut, "clear_i"):
+            dut.clear_i.value = 0
         cocotb.start_soon(Clock(dut.clk_i, PERIOD_NS, unit="ns").start())
 
     def stall(self, pattern: str) -> Any:
@@ -53,6 +55,12 @@ class Bench:
         self.dut.rst_ni.value = 0
         await ClockCycles(self.dut.clk_i, cycles)
         self.dut.rst_ni.value = 1
+
+    async def clear(self, cycles: int = 1) -> None:
+        """Hold clear_i for some cycles, from now on; returns after the edge that ends the last one."""
+        self.dut.clear_i.value = 1
+        await ClockCycles(self.dut.clk_i, cycles)
+        self.dut.clear_i.value = 0
 
     async def cycles(self, count: int) -> None:
         """Wait for ``count`` rising edges."""

@@ -28,11 +28,11 @@ class CtuModel:
     """Contribution test unit: stream elements in, elements with masks out.
 
     ``counts`` has splats, tokens, rejected, tested (mask bits) and batches; ``decisions`` whether each finished sub-tile fell to
-    sparse sampling, ``fallen`` the same for the one in progress.
+    sparse sampling, ``fallen`` the same for the one in progress. vru_cycles: that a splat takes in a channel.
     """
 
-    def __init__(self, form: Form, precision: Precision, mode: CatMode) -> None:
-        self.form, self.precision, self.mode = form, precision, mode
+    def __init__(self, form: Form, precision: Precision, mode: CatMode, vru_cycles: int = PIXELS_PER_VRU) -> None:
+        self.form, self.precision, self.mode, self.vru_cycles = form, precision, mode, vru_cycles
         self.counts: Counter[str] = Counter()
         self.decisions: list[bool] = []
         self.fallen = False
@@ -76,6 +76,6 @@ class CtuModel:
         if self.mode == CatMode.AUTO:
             self.fallen = self._next_fallen
         self.test_avg += self.test_cycles - (self.test_avg >> AUTO_DECAY_SHIFT)
-        self.sent_avg += PIXELS_PER_VRU * max(self.sent) - (self.sent_avg >> AUTO_DECAY_SHIFT)
+        self.sent_avg += self.vru_cycles * max(self.sent) - (self.sent_avg >> AUTO_DECAY_SHIFT)
         self._next_fallen = self.test_avg > self.sent_avg
         self.test_cycles, self.sent = 0, [0] * 4

@@ -32,6 +32,7 @@ class Progress:
         self._out = os.fdopen(os.dup(1), "w")
         self._folder = Path(tempfile.mkdtemp(prefix="flicker-progress-"))
         os.environ[toolchain.PROGRESS] = str(self._folder)  # workers inherit it
+        self._width = 0  # of the reporter's line when this last began a line
         self._tests: dict[str, float] = {}
         self._lock = threading.Lock()
         self._done = threading.Event()
@@ -84,8 +85,9 @@ class Progress:
         # Begin a line of one's own behind a row of dots.
         reporter = self._plugins.get_plugin("terminalreporter")
         width = getattr(getattr(reporter, "_tw", None), "width_of_current_line", 0)
-        self._out.write(("\n" if width else "") + f"[{text}]\n")
+        self._out.write(("\n" if width and width != self._width else "") + f"[{text}]\n")
         self._out.flush()
+        self._width = width
 
 
 def register(config: pytest.Config, pause: float = PAUSE) -> None:

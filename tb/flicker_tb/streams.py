@@ -28,6 +28,7 @@ class Stream:
         self.name = name
         self.clock = dut.clk_i
         self.reset_n = dut.rst_ni
+        self.clear = getattr(dut, "clear_i", None)
         self.fields = tuple(fields)
         self.valid = _port(dut, f"{name}_valid")
         self.ready = _port(dut, f"{name}_ready")
@@ -148,7 +149,7 @@ class StreamSink:
 
 
 class Monitor:
-    """Observes transfers; fails the test if valid or data change before their transfer.
+    """Observes transfers; fails the test if valid or data change before their transfer, unless by reset or clear_i.
 
     Each transferred item goes to the functions in ``callbacks``. ``count`` counts transfers,
     ``cycles`` the cycles out of reset; ``first`` and ``last`` are the cycles of the first and
@@ -193,7 +194,9 @@ class Monitor:
                 for callback in self.callbacks:
                     callback(item)
             else:
-                waiting = item
+                # What waits while clear_i is high may be withdrawn.
+                cleared = stream.clear is not None and stream.clear.value == 1
+                waiting = None if cleared else item
 
 
 class Checker:

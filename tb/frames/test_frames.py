@@ -1,10 +1,11 @@
-"""Whole frames: the verilated rendering stage (`flk_render_stage` in `flk_render_sim_top`) equals the golden model, pixel for pixel and count for count, and without stalls the cycle
-model, in cycles and every counter.
+"""Whole frames: the verilated rendering stage equals the golden model, pixel for pixel and count for count, and without stalls the cycle model, in
+cycles and every counter. The designs are built with their assertions; the harness also changes mode_i inside every frame and checks idle_o.
 
 State space: the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and back-pressure;
-channels of one and of four VRUs, each at another FIFO depth;
-one view of each real scene at 320x180 when FLICKER_SCENES names their folder. The other builds are covered by unit tests, and the
-remaining forms and precisions on a small frame here. Not covered: pictures above 1280x720.
+channels of one and of four VRUs, each at another FIFO depth; the stage without a contribution test (mask generator `all`); frames aborted at
+random times; an assertion broken on purpose; one view of each real scene at 320x180 when FLICKER_SCENES names their folder, and with SLOW=1 view 0
+of flowers at 1280x720. Builds of the remaining precisions, one of each form, on a small frame. Not covered: pictures above 1280x720; frames that
+follow each other without a pause.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from flicker.errors import FlickerError
 from flicker.explore.configurations import rtl_configuration, run
 from flicker.front.projection import project
 from flicker.front.records import build_lists
@@ -33,7 +35,8 @@ from flicker.params import (
 )
 from flicker.scene.demo import demo_cameras, generate
 from flicker.scene.real import REAL_VIEWS, real_scenes
-from flicker.sim.render_stage import render_rtl
+from flicker.sim.render_stage import build, render_rtl
+from flicker.toolchain import BUILD, ROOT
 
 DEFAULT = RenderConfig()
 
@@ -49,7 +52,7 @@ def compare(projected, camera, config: RenderConfig, **stalls):
     """Render with both engines and compare everything that does not depend on timing."""
     lists = build_lists(projected, camera, config)
     golden = render_golden(lists, config)
-    rtl = render_rtl(lists, config, **stalls)
+    rtl = render_rtl(lists, config, checks=True, **stalls)
     wrong = np.argwhere((golden.pixels != rtl.pixels).any(axis=2))
     assert not len(wrong), f"{len(wrong)} pixels differ, first: sub-tile {wrong[0][0]} pixel {wrong[0][1]}: " \
         f"golden {golden.pixels[tuple(wrong[0])]}, RTL {rtl.pixels[tuple(wrong[0])]}"
@@ -69,7 +72,7 @@ def compare(projected, camera, config: RenderConfig, **stalls):
     assert core["minitiles_delivered"] - channel["minitiles_discarded"] <= channel["vru_busy"] / config.pixels_per_vru <= core["minitiles_delivered"]
     assert golden.total("pairs_blended") > 0
     assert rtl.counters.shape[0] == CORES and (rtl.core_counter("cycles") == rtl.cycles).all()
-    if not stalls:
+    if not stalls or stalls.keys() == {"aborts"}:
         compare_cycles(projected, camera, config, rtl)
     return golden, rtl
 
@@ -140,6 +143,47 @@ def test_vrus_per_channel(vrus, fifo_depth):
     assert (golden.pixels == render_golden(golden.lists, DEFAULT).pixels).all()
 
 
+@pytest.mark.parametrize("vrus", [2, 4])
+def test_no_ctu(vrus):
+    """Mask generator `all`: the picture of the test switched off, cycles and counters of the model; other latencies than the CTU's."""
+    config = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
+    for scene in (demo(96, 54), random_splats(3, 200, 64), random_splats(17, 4000, 24)):
+        golden, rtl = compare(*scene, config)
+        assert (rtl.core_counter("minitiles_tested") == CHANNELS * rtl.core_counter("gaussians_in")).all()
+    compare(*demo(96, 54), config, idle=0.2, stall=0.3)
+    with pytest.raises(FlickerError, match="cat must be off with mask_generator all"):
+        config.with_(cat=CatMode.SMOOTH)
+
+
+@pytest.mark.parametrize("base", [DEFAULT.with_(cat=CatMode.AUTO), FAITHFUL, RenderConfig(cat=CatMode.OFF, mask_generator="all")],
+                         ids=["default", "faithful", "no ctu"])
+def test_aborted_frames(base):
+    """clear_i at random times and for random lengths; the frame after it is right in pixels, cycles and counters, as if it were the first."""
+    scene = random_splats(3, 400, 32)
+    end = compare(*scene, base)[1].cycles
+    for seed in range(1, 9):
+        rng = np.random.default_rng(seed)
+        # The first cycles, in which the pipelines fill, as often as the rest.
+        aborts = [(int(rng.integers(0, 60) if rng.random() < 0.5 else rng.integers(0, end)), int(rng.integers(1, 4))) for _ in range(3)]
+        stalls = {"idle": 0.2, "stall": 0.3} if seed % 2 else {}
+        compare(*scene, base, aborts=aborts, **({"seed": seed} | stalls if stalls else {}))
+
+
+def test_broken_assertion_is_reported():
+    """A design that breaks an assertion: the run ends with an error that names the place."""
+    path = ROOT / "rtl" / "ctu" / "flk_ctu.sv"
+    good = "assign space   = (taken_q != UsageBits'(CtuFifoDepth));"
+    assert path.read_text().count(good) == 1
+    mutant = BUILD / "mutants" / "frames" / path.name
+    mutant.parent.mkdir(parents=True, exist_ok=True)
+    mutant.write_text(path.read_text().replace(good, "assign space   = 1'b1;"))
+    config = DEFAULT.with_(ctu_fifo_depth=2, vrus_per_channel=1)
+    library = build(config, checks=True, replaced={"flk_ctu": mutant})
+    projected, camera = demo(96, 54)
+    with pytest.raises(FlickerError, match="assertion failed at .*flk_ctu.sv:[0-9]+"):
+        render_rtl(build_lists(projected, camera, config), config, library=library)
+
+
 def test_demo_full():
     """The demo picture at its own size."""
     projected, camera = demo(640, 360)
@@ -164,4 +208,14 @@ def test_real_scene(real_view):
     if scenes is None:
         pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
     view = load_view(real_view.path(scenes), real_view.number, (320, 180))
+    compare(view.projected, view.camera, DEFAULT)
+
+
+@pytest.mark.slow
+def test_full_size():
+    """View 0 of flowers at 1280x720."""
+    scenes = real_scenes()
+    if scenes is None:
+        pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
+    view = load_view(REAL_VIEWS[0].path(scenes), REAL_VIEWS[0].number, (1280, 720))
     compare(view.projected, view.camera, DEFAULT)

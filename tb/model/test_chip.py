@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import chip_tables as tables
 import numpy as np
 import pytest
 from chip_samples import camera, turned_camera
@@ -251,9 +250,5 @@ def test_command(tmp_path):
         assert isinstance(failed.exception, FlickerError) and text in str(failed.exception)
 
 
-def test_tables_fill_their_places():
-    text = "a\n<!-- one -->\nold\n<!-- end -->\nb\n"
-    assert tables.fill(text, {"one": "new"}) == "a\n<!-- one -->\nnew\n<!-- end -->\nb\n"
-    with pytest.raises(FlickerError, match="two"):
-        tables.fill("<!-- two -->\n<!-- end -->", {})
+def test_tables():
     assert markdown.table(("a", "b"), [("1", "2")], numbers=True) == "| a | b |\n| --- | ---: |\n| 1 | 2 |"

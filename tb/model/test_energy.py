@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,18 +25,6 @@ from flicker.front.view import View
 from flicker.params import CORES
 from flicker.scene.camera import orbit_camera
 from flicker.toolchain import ROOT
-
-
-@pytest.fixture(autouse=True)
-def committed_table(monkeypatch):
-    """The package's own table, whatever `make synth` has left."""
-    monkeypatch.setattr(area, "SYNTHESIS", Path("/nonexistent"))
-    for function in (area.parts, area.overhead):
-        function.cache_clear()
-    yield
-    monkeypatch.undo()
-    for function in (area.parts, area.overhead):
-        function.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +72,7 @@ def test_stage_without_generator_and_with_more_vrus():
 
 
 def test_generators():
-    """Every method's generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
+    """Every generator has an area; its estimate reproduces the CTU that it is scaled by, and is near the other FP16 CTU."""
     for c in CONFIGURATIONS.values():
         assert (c.generator.area() > 0) == bool(c.generator.operations.per_element), c.name
     factored, conic = (generator_area(get_configuration(f"flicker-dense-fp16-{form}").generator.operations) for form in ("factored", "conic"))
@@ -101,16 +88,6 @@ def test_bad_area_arguments():
     ):
         with pytest.raises(FlickerError, match=message):
             make()
-
-
-def test_synthesis_comes_first(tmp_path, monkeypatch):
-    path = tmp_path / "area.csv"
-    path.write_text("unit,config,ge,ge_seq,ge_comb,mem_bits,ff,fo4\nvru,conic,1000.0,1,1,0,7,50\n")
-    old = part("vru", "conic")
-    monkeypatch.setattr(area, "SYNTHESIS", path)
-    area.parts.cache_clear()
-    new = part("vru", "conic")
-    assert (new.ge, new.ff, new.load) == (1000.0, 7, old.load) and new.ge != old.ge
 
 
 # ---- energy -------------------------------------------------------------------------------------

@@ -9,10 +9,9 @@ import numpy as np
 from cocotb.triggers import RisingEdge
 from flicker_tb import splats
 
+from flicker import layout
 from flicker.golden.render import minitile
 from flicker.params import Form
-
-PIXEL_FIELDS = (("blue", 16), ("green", 16), ("red", 16), ("transmittance", 16))
 
 
 class SubtileModel:
@@ -46,7 +45,7 @@ class SubtileModel:
 
 def pixel_of(word: int) -> tuple[int, ...]:
     """(T, red, green, blue) in the low bits of an output element."""
-    return tuple(word >> shift & 0xFFFF for shift in (48, 32, 16, 0))
+    return tuple(word >> place.at & (1 << place.bits) - 1 for place in layout.fields("pixel").values())
 
 
 class EventCounter:
@@ -69,8 +68,12 @@ class EventCounter:
                 word >>= bits
 
 
-CHANNEL_EVENTS = (("fifo_full", 1), ("vru_busy", 1), ("sent", 1), ("discarded", 1), ("finished", 3))
-DISPATCH_EVENTS = (("delivered", 3), ("filtered", 3))
+def event_fields(record: str) -> tuple[tuple[str, int], ...]:
+    """Names and bits of an event struct's fields, most significant first."""
+    return tuple((name, place.bits) for name, place in layout.fields(record).items())
+
+
+CHANNEL_EVENTS, DISPATCH_EVENTS, GENERATOR_EVENTS = map(event_fields, ("channel_events", "dispatch_events", "generator_events"))
 
 
 def lists(rng, form: Form, lengths) -> list[list[splats.Splat]]:

@@ -1,8 +1,8 @@
 """Channel: pixels against the golden model, splats accounted for, under stalls.
 
 State space: random lists (as in real scenes, thin, special numbers, covering), empty and one-splat sub-tiles, lists whose pixels finish early, one of
-5,000 splats; idle input, blocked output. Parameter space: FIFO depths 1, 2, 3, 16, 128, both forms, all mini-tile positions (spread over the
-depths); 1, 2 and 4 VRUs. Not covered: more than a few dozen sub-tiles in one run.
+5,000 splats; idle input, blocked output; clear in mid-traffic; finished_o and idle_o in every cycle. Parameter space: FIFO depths 1, 2, 3, 16, 128,
+both forms, all mini-tile positions (spread over the depths); 1, 2 and 4 VRUs. Not covered: more than a few dozen sub-tiles in one run.
 """
 
 from __future__ import annotations
@@ -31,6 +31,6 @@ def test_channel(case: str) -> None:
     build_and_test(
         "flk_channel", "cocotb_channel",
         parameters={"Form": int(form), "FifoDepth": depth, "VrusPerChannel": vrus, "MiniTile": m},
-        config={"Form": int(form), "MiniTile": m, "VrusPerChannel": vrus, "lengths": lengths, "idle": idle, "stall": stall},
+        config={"Form": int(form), "FifoDepth": depth, "MiniTile": m, "VrusPerChannel": vrus, "lengths": lengths, "idle": idle, "stall": stall},
         **(QUICK_BUILD if vrus != 2 else {}),
     )

@@ -1,9 +1,21 @@
-"""FIFO monitor against its rule: exhaustive over all inputs that the CTU can produce (masks are not empty, tokens have mask 1111)."""
+"""FIFO monitor against its rule: exhaustive over all inputs that a mask generator can produce (masks are not empty, tokens go to all), with
+masks of mini-tiles; with masks of pixels over all sets of mini-tiles, by random pixels of each."""
 
 from __future__ import annotations
 
+import pytest
 from flicker_tb.runner import build_and_test
 
+from flicker.errors import FlickerError
+from flicker.params import CHANNELS, SUBTILE_PIXELS
 
-def test_fifo_monitor() -> None:
-    build_and_test("flk_fifo_monitor", "cocotb_fifo_monitor")
+
+@pytest.mark.parametrize("bits", [CHANNELS, SUBTILE_PIXELS])
+def test_fifo_monitor(bits: int) -> None:
+    settings = {"MaskBits": bits}
+    build_and_test("flk_fifo_monitor", "cocotb_fifo_monitor", parameters=settings, config=settings)
+
+
+def test_illegal_mask() -> None:
+    with pytest.raises(FlickerError, match="MaskBits must be 4 .* or 64"):
+        build_and_test("flk_fifo_monitor", "cocotb_fifo_monitor", parameters={"MaskBits": 8})

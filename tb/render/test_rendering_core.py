@@ -1,7 +1,8 @@
 """Rendering core: four channels behind one dispatch, against the golden model, under stalls.
 
-State space: random lists with random masks, empty sub-tiles, lists that finish early. Parameter space: FIFO depths 1 and 16, both forms; full
-rate, idle input, blocked output. Not covered: other depths (tb/render/test_channel.py).
+State space: random lists with random masks, empty sub-tiles, lists that finish early; clear in mid-traffic; idle_o in every cycle. Parameter space:
+FIFO depths 1 and 16, both forms; masks of mini-tiles, and of pixels; full rate, idle input, blocked output; illegal parameters. Not covered: other
+depths and numbers of VRUs (tb/render/test_channel.py).
 """
 
 from __future__ import annotations
@@ -9,9 +10,10 @@ from __future__ import annotations
 import pytest
 from flicker_tb.runner import build_and_test
 
-from flicker.params import Form
+from flicker.errors import FlickerError
+from flicker.params import SUBTILE_PIXELS, Form
 
-LENGTHS = [0, 1, 40, 0, 12, 70, 0, 0, 3, 30, 25, 50]
+LENGTHS = [0, 1, 40, 0, 12, 90, 0, 0, 3, 30, 25, 50]
 
 
 @pytest.mark.parametrize("idle,stall", [("never", "never"), ("half", "half"), ("never", "heavy")])
@@ -22,3 +24,27 @@ def test_rendering_core(form: Form, depth: int, idle: str, stall: str) -> None:
         parameters={"Form": int(form), "FifoDepth": depth},
         config={"Form": int(form), "lengths": LENGTHS, "idle": idle, "stall": stall},
     )
+
+
+def test_pixel_masks() -> None:
+    """A mini-tile gets a splat when any of its 16 mask bits is set."""
+    build_and_test(
+        "flk_rendering_core", "cocotb_rendering_core",
+        parameters={"Form": int(Form.FACTORED), "FifoDepth": 4, "MaskBits": SUBTILE_PIXELS, "VrusPerChannel": 1},
+        config={"Form": int(Form.FACTORED), "MaskBits": SUBTILE_PIXELS, "VrusPerChannel": 1, "lengths": LENGTHS, "idle": "rare", "stall": "rare"},
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"Form": 2}, "Form must be"),
+        ({"FifoDepth": 0}, "Depth must be 1 to 128"),
+        ({"FifoDepth": 129}, "Depth must be 1 to 128"),
+        ({"VrusPerChannel": 3}, "VrusPerChannel must be"),
+        ({"MaskBits": 16}, "MaskBits must be"),
+    ],
+)
+def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
+    with pytest.raises(FlickerError, match=message):
+        build_and_test("flk_rendering_core", "cocotb_rendering_core", parameters=parameters)

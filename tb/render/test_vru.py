@@ -1,8 +1,10 @@
 """Volume rendering unit against the golden model: every stage's registers, finished pixels, order and back-pressure of the output.
 
-State space: random splats (as in real scenes, thin, special numbers, covering), pixels in order and in random order with repeats in consecutive
-cycles, bubbles, empty sub-tiles, lists that finish pixels. Parameter space: both forms, 4, 8 and 16 pixels. Not covered: other positions than the second column
-and row of units (the channel's test has all of them).
+State space: random splats (as in real scenes, thin, special numbers, covering), pixels in order, bubbles between and within splats, splats
+broken off, empty sub-tiles, lists that finish pixels; opacity and transmittance exactly at their bounds; aborts (clear_i) at random times,
+registers beginning with random values. Parameter space: both forms, 4, 8 and 16 pixels. Not covered: other positions than the second
+column and row of units (the channel's test has all of them).
+The arithmetic of flk_blend_pipe is tested here; flk_weight, flk_pixel_state and flk_pixel_drain also on their own.
 """
 
 from __future__ import annotations

@@ -21,12 +21,10 @@ from ..errors import FlickerError
 from ..golden.masked import ACCUMULATOR_INT_BITS
 from ..params import CHANNELS, CORES, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, CatMode, Form, Precision, RenderConfig
 from ..perf.lane_stage import LaneStage
-from ..toolchain import BUILD
 from .operations import Op, Operation, Operations, ctu_operations
 from .synth.units import channel_config, vru_config
 
 TABLE = Path(__file__).with_name("areas.csv")
-SYNTHESIS = BUILD / "synth" / "area.csv"
 
 RECORD_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
 PIXEL_MASK_BITS = MINITILE * MINITILE
@@ -56,18 +54,13 @@ def _read(path: Path) -> dict[tuple[str, str], dict[str, str]]:
 
 @cache
 def parts() -> dict[tuple[str, str], Part]:
-    """Synthesised parts by (unit, configuration): the table of this package, areas replaced by those of `make synth` where it has run."""
-    found = {}
-    for key, row in _read(TABLE).items():
-        found[key] = Part(
-            float(row["ge"]), int(row["mem_bits"]), int(row["ff"]),
-            *(float(row.get(name) or 0) for name in ("load", "clock_free", "clock_gated")),
+    """Synthesised parts by (unit, configuration), of this package's table, which `make synth && make docs PART=areas` writes."""
+    return {
+        key: Part(
+            float(row["ge"]), int(row["mem_bits"]), int(row["ff"]), *(float(row.get(name) or 0) for name in ("load", "clock_free", "clock_gated")),
         )
-    if SYNTHESIS.exists():
-        for key, row in _read(SYNTHESIS).items():
-            old = found.get(key, Part(0.0))
-            found[key] = Part(float(row["ge"]), int(row["mem_bits"]), int(row["ff"]), old.load, old.clock_free, old.clock_gated)
-    return found
+        for key, row in _read(TABLE).items()
+    }
 
 
 def part(unit: str, config: str) -> Part:

@@ -40,13 +40,16 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "only pixels that contribute": ("rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64", "oracle"),
     "lanes": ("lanes", "lanes-deep", "lanes-64", "oracle-lanes"),
     "accumulators": ("lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20"),
-    # from the default to lanes, one step at a time
-    "ablation": ("flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-acc14", "lanes", "lanes-deep"),
+    # from the default to lanes and on to lanes-deep; each step changes one thing (tb/model/test_configurations.py)
+    "ablation": (
+        "flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "lanes-fp16-window-1", "lanes-fp16", "lanes", "lanes-fifo-40", "lanes-fifo-40-window-3",
+        "lanes-deep",
+    ),
     # whole-frame estimates, figure 10
     "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64"),
     # docs/energy.md
     "energy": ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64"),
-    # docs/methods.md
+    # docs/configurations.md
     "pictures": (
         "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-fp16", "exact-fp16-bound", "exact-e5m6",
         "exact-e5m6-bound", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e4m3-scaled", "exact-e4m3-bound", "exact-e5m2", "exact-q8.8", "exact-fp16-conic",
@@ -104,7 +107,7 @@ def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:
     """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs."""
     if config.cat == CatMode.OFF:
         return Configuration(
-            name, "RTL, test off", "baseline", contribution.Untested(config.form),
+            name, "RTL, test off", "baseline", contribution.Untested(config.form, config.mask_generator),
             contribution.Channels(config.form, config.fifo_depth, config.vrus_per_channel),
         )
     return contribution.flicker(config, name, "RTL", fifo_depth=config.fifo_depth, vrus_per_channel=config.vrus_per_channel)

@@ -6,23 +6,19 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-from ..cost.area import SYNTHESIS
-
 # Rooms of the package that no stored result depends on: they run results, show them, or belong to the RTL.
 _NOT_IN_RESULTS = ("cli", "report", "sim", "pipeline.py", "toolchain.py", "markdown.py")
 
 
 @cache
 def code_digest() -> str:
-    """Of the package's code and tables, and of the areas of `make synth`."""
+    """Of the package's code and tables."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*")):
         inside = path.relative_to(package)
         if path.suffix in (".py", ".csv") and inside.parts[0] not in _NOT_IN_RESULTS:
             digest.update(str(inside).encode() + b"\0" + path.read_bytes())
-    if SYNTHESIS.exists():
-        digest.update(SYNTHESIS.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -43,7 +43,7 @@ class Masks:
 class MaskGenerator(ABC):
     """Says which mini-tiles, or which pixels of them, a splat is sent to. Subclasses are frozen dataclasses: equal fields, equal masks.
 
-    pixels: the masks name single pixels. exact: never leaves out a pixel that the VRU would have blended, proved in docs/methods.md. free: masks
+    pixels: the masks name single pixels. exact: never leaves out a pixel that the VRU would have blended, proved in docs/configurations.md. free: masks
     for nothing, a bound and no design. precision: formats, for tables. operations: hardware operations per element.
     """
 
@@ -91,12 +91,13 @@ class RenderingStage(ABC):
     """Draws what the masks let through, and says how long it takes and what it costs. Subclasses are frozen dataclasses.
 
     form: of VRU and record. vrus: of the whole stage. accumulator: fraction bits of the colour accumulators, 0: FP16. idealised: its cycles are a
-    closed form.
+    closed form. assumed: what else its figures rest on, in few words, for tables.
     """
 
     form: Form
     accumulator: int = 0
     idealised: bool = False
+    assumed: tuple[str, ...] = ()
 
     @property
     @abstractmethod

@@ -1,7 +1,7 @@
 """The VRUs under masks: pictures, contributing pixels and the element that finishes each pixel.
 
 Same arithmetic as `golden.render` (its kernels), other book-keeping: whole mini-tiles or single pixels are visited as the masks
-say. With the masks of the contribution test the pixels equal the golden model's (tb/model/test_methods.py).
+say. With the masks of the contribution test the pixels equal the golden model's (tb/model/test_configurations.py).
 """
 
 from __future__ import annotations

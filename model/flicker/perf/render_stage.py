@@ -1,6 +1,7 @@
 """Cycle model of the rendering stage: cycles and every performance counter of the RTL, from the work of a frame.
 
-Modelled, cycle by cycle: acceptance and stall of the CTU, its pipeline (held, or with output FIFO), the wait of a token for the one before it,
+Modelled, cycle by cycle: acceptance and stall of the mask generator (called CTU below), its pipeline (held, or with output FIFO), the wait of a
+token for the one before it if the generator has that rule,
 dispatch with filter of finished mini-tiles, feature FIFOs, issue to the VRUs, the delay after which a finished mini-tile is known, dropping, the
 token's wait for the output buffers, both levels of pixel arbiters. Left out: numbers (masks and finished pixels are
 recorded events, `flicker.perf.work.Work`), stalls from outside, i.e. input is always there and pixels are always taken.
@@ -22,7 +23,6 @@ from ..params import (
     CORES,
     COUNTERS_PER_CORE,
     RenderConfig,
-    prtu_latency,
     vru_stages,
 )
 from .work import Work
@@ -97,7 +97,7 @@ def _ones(mask):
 
 
 @numba.njit(cache=True)
-def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, depth, blend, out_delay, per_vru, vrus, count, end):
+def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, one_token, depth, blend, out_delay, per_vru, vrus, count, end):
     """One core: fills its counters (all but `cycles`, idle cycles after its own end and `pixels_finished`) and the end of each
     sub-tile; returns the cycle after its last pixel.
 
@@ -111,7 +111,7 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
     head_slot = 0  # of the pipeline ring: the slot at the end of the pipeline
     in_flight = 0  # slots that are not bubbles
     batch = False
-    eos_free = np.int64(0)  # cycle from which a token may be taken
+    eos_free = np.int64(0)  # cycle from which a token may be taken, with one_token
     sub_in = 0
     at = start[order[0]] if n_sub else np.int64(0)
     last_at = start[order[0] + 1] if n_sub else np.int64(0)
@@ -291,7 +291,8 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                 in_flight -= 1
             if gone >= TOKEN:
                 if gone == TOKEN:
-                    eos_free = t + 2
+                    if one_token:
+                        eos_free = t + 2
                 else:
                     if gone_mask == 0:
                         rejected += 1
@@ -312,7 +313,8 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
                 if at == last_at:
                     entering = TOKEN
                     entering_mask = np.int64(15)
-                    eos_free = NEVER
+                    if one_token:
+                        eos_free = NEVER
                     sub_in += 1
                     if sub_in < n_sub:
                         at = start[order[sub_in]]
@@ -347,10 +349,11 @@ def _core(order, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_d
 
 
 @numba.njit(parallel=True, cache=True)
-def _cores(order, core_start, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, depth, blend, out_delay, per_vru, vrus, counters, end, ends):
+def _cores(order, core_start, start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, one_token, depth, blend, out_delay, per_vru, vrus,
+           counters, end, ends):
     for k in numba.prange(CORES):
         ends[k] = _core(
-            order[core_start[k] : core_start[k + 1]], start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, depth, blend,
+            order[core_start[k] : core_start[k + 1]], start, mask, test_cycles, finish, finish_op, ctu_latency, ctu_depth, one_token, depth, blend,
             out_delay, per_vru, vrus, counters[k], end,
         )
 
@@ -385,7 +388,7 @@ def simulate(work: Work, config: RenderConfig) -> StageCycles:
     blend, last = vru_stages(config.form)
     _cores(
         work.order, work.core_start, work.start, work.mask, work.test_cycles, finish, finish_op,
-        prtu_latency(config.form, config.precision), config.ctu_fifo_depth, config.fifo_depth, blend, last + 1, per_vru,
+        config.generator.latency(config), config.ctu_fifo_depth, config.generator.one_token, config.fifo_depth, blend, last + 1, per_vru,
         config.vrus_per_channel, counters, end, ends,
     )
     return sum_up(work, work.order, work.core_start, counters, end, ends)

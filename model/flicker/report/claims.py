@@ -8,11 +8,9 @@ that is already as far from its photograph as the paper's, if the two errors are
 from __future__ import annotations
 
 import contextlib
-import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from .collect import ViewResult, by_scene
 
@@ -353,15 +351,6 @@ def claims() -> list[Claim]:
     ]
 
 
-def read_areas(path: Path) -> dict[tuple[str, str], float]:
-    """GE by (unit, configuration) of `build/synth/area.csv`; empty when `make synth` has not run."""
-    try:
-        with path.open(newline="") as file:
-            return {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
-    except (OSError, KeyError, ValueError):
-        return {}
-
-
 def area_verdicts(areas: dict[tuple[str, str], float], rows: dict[str, dict]) -> list[Verdict]:
     """Table 2 and Sec. III-B, from the synthesised areas. rows: of any one view."""
     texts = [
@@ -370,7 +359,7 @@ def area_verdicts(areas: dict[tuple[str, str], float], rows: dict[str, dict]) ->
         ("Table 2b", "14 % less total area than 64 VRUs without CTU", "14 %"),
     ]
     if not areas:
-        return [Verdict(f, c, p, {}, "not evaluated: no build/synth/area.csv (run `make synth`)") for f, c, p in texts]
+        return [Verdict(f, c, p, {}, "not evaluated: no areas") for f, c, p in texts]
     verdicts = []
 
     def add(index: int, ours: dict[str, str], good: bool, rule: str, why: str) -> None:
@@ -385,7 +374,7 @@ def area_verdicts(areas: dict[tuple[str, str], float], rows: dict[str, dict]) ->
             f"our CTU has {ctu:,.0f} GE, of them {1 - 2 * areas['prtu', 'conic mixed'] / ctu:.0%} outside its PRTUs (registers for what is in flight), "
             f"a rendering core {core:,.0f} GE")
     except KeyError as error:
-        missing = Verdict("Table 2", "", "", {}, f"not evaluated: build/synth/area.csv has no {' '.join(error.args[0])}")
+        missing = Verdict("Table 2", "", "", {}, f"not evaluated: areas.csv has no {' '.join(error.args[0])}")
         return [Verdict(*texts[i], {}, missing.verdict) for i in range(2)] + [Verdict(*texts[2], {}, missing.verdict)]
     try:
         ours, other = (float(rows[name]["area_ge"]) for name in (FAITHFUL, NO_CTU_64))

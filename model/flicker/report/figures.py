@@ -343,7 +343,7 @@ def area(areas: dict[tuple[str, str], float]) -> Figure:
     note = "Square millimetres here: 0.5 um2 per GE, an estimate (docs/synthesis.md). Parts without RTL are left empty."
     units = {"contribution test units": ("ctu", "conic mixed"), "rendering cores": ("rendering_core", "conic")}
     if not areas:
-        note += " No build/synth/area.csv: run `make synth` for the columns of this repository."
+        note += " No areas of this repository."
     rows = []
     for part, published in PAPER_AREA.items():
         ge = areas.get(units[part]) if part in units else None

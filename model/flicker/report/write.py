@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cost.area import SYNTHESIS
+from ..cost.area import TABLE, parts
+from ..cost.stamp import stamp_of
 from ..errors import FlickerError
 from ..explore.configurations import group, matching
 from ..explore.digest import code_digest, key
@@ -23,7 +24,7 @@ from ..front.view import DEMO
 from ..scene.camera import Camera
 from ..scene.files import scene_kind
 from ..scene.photos import BLACK
-from .claims import Verdict, all_verdicts, read_areas
+from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import own_figures, paper_figures, stability_table
 from .page import page
@@ -127,7 +128,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     progress(1, 1, "stability suite")
     stability = _stability(store, seed)
     progress(1, 1, "figures")
-    areas = read_areas(SYNTHESIS)
+    areas = {key: part.ge for key, part in parts().items()}
     verdicts = all_verdicts(views, areas)
     paper = paper_figures(views, areas)
     chart, heats = own_figures(views)
@@ -139,7 +140,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
         "photographs": f"of {sum(t.photo is not None for t in job.targets)} of {len(views)} views, averaged to the picture's size",
         "background": ", ".join(dict.fromkeys(" ".join(f"{c:g}" for c in t.scene.background) for t in job.targets)), "configurations": str(len(job.configurations)),
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
-        "code": code_digest()[:16], "areas": "build/synth/area.csv" if areas else "the table of the package (make synth has not run)",
+        "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }
     text = page(views, verdicts, paper, chart, heats, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]

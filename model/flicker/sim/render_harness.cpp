@@ -1,8 +1,9 @@
 // Harness of whole frames: feeds the sorted lists of a frame to the verilated rendering stage, collects pixels and counters.
 //
-// Called from Python through ctypes (render_stage.py); works on the arrays of flicker.golden.records.SubtileLists in place.
-// Every pixel of every streamed sub-tile must arrive exactly once, from the core that has the sub-tile; anything else, a failed
-// assertion, or HANG_CYCLES without any transfer ends the run with an error.
+// Called from Python through ctypes (render_stage.py). What it knows of sizes and bits comes from a generated header (generate.py).
+// Every pixel of every streamed sub-tile must arrive exactly once, from the core that has the sub-tile; idle_o must be high when
+// nothing is in the stage or offered, and low when something is inside; mode_i has the frame's mode only while idle_o is high, another one from the first element on. Anything else, a
+// failed assertion (of a build that has them), or HANG_CYCLES without any transfer ends the run with an error.
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -11,28 +12,37 @@
 #include <vector>
 
 #include "Vtop.h"
+#include "flk_sim_layout.h"
 #include "verilated.h"
 
 namespace {
 
-constexpr int CORES = 4;
-constexpr int ELEM_WORDS = 5;
-constexpr int PIXEL_WORDS = 3;
+using namespace layout;
 constexpr uint64_t HANG_CYCLES = 100000;
 std::string g_fatal;  // message of a failed assertion
 
 struct Frame {
-  const uint16_t* gauss;      // (N, 9), feature_t order
-  const uint8_t* spiky;       // (N)
-  const int64_t* start;       // (S + 1)
-  const int32_t* entry;       // (E)
-  const uint16_t* mean;       // (E, 2)
+  const uint32_t* element;    // (E, ELEM_WORDS), packed, not tokens
+  const int64_t* start;       // (S + 1), of each sub-tile's list
   const int64_t* order;       // sub-tiles core by core
   const int64_t* core_start;  // (CORES + 1)
   int64_t cols;
   int64_t subtiles;
-  uint16_t* pixels;  // (S, 64, 4): transmittance, red, green, blue
+  uint16_t* pixels;  // (S, SUBTILE_PIXELS, 4): transmittance, red, green, blue
 };
+
+// A field of up to 32 bits.
+inline uint32_t get(const uint32_t* w, Place p) {
+  const int word = p.at / 32, shift = p.at % 32;
+  uint64_t value = w[word] >> shift;
+  if (shift + p.bits > 32) value |= static_cast<uint64_t>(w[word + 1]) << (32 - shift);
+  return static_cast<uint32_t>(value & ((uint64_t{1} << p.bits) - 1));
+}
+inline void put(uint32_t* w, Place p, uint32_t value) {
+  const int word = p.at / 32, shift = p.at % 32;
+  w[word] |= value << shift;
+  if (shift + p.bits > 32) w[word + 1] |= value >> (32 - shift);
+}
 
 struct Random {
   uint64_t s;
@@ -49,20 +59,22 @@ struct Random {
 class Simulation {
  public:
   Simulation(const Frame& frame, int mode, uint64_t seed, uint32_t idle, uint32_t stall)
-      : frame_(frame), idle_(idle), stall_(stall), random_{seed * 2654435761u + 88172645463325252ull},
-        seen_(frame.subtiles * 64, 0), owner_(frame.subtiles, -1) {
+      : frame_(frame), mode_(mode), idle_(idle), stall_(stall), random_{seed * 2654435761u + 88172645463325252ull},
+        owner_(frame.subtiles, -1) {
     g_fatal.clear();
     context_.randReset(2);
     context_.randSeed(static_cast<int>(seed & 0x7fffffff) + 1);
     top_ = std::make_unique<Vtop>(&context_);
     for (int k = 0; k < CORES; ++k) {
-      next_[k] = frame.core_start[k];
       for (int64_t i = frame.core_start[k]; i < frame.core_start[k + 1]; ++i) owner_[frame.order[i]] = k;
-      expected_ += 64 * (frame.core_start[k + 1] - frame.core_start[k]);
-      item_[k] = next_[k] < frame.core_start[k + 1] ? frame.start[frame.order[next_[k]]] : 0;
-      holding_[k] = false;
+      expected_ += SUBTILE_PIXELS * (frame.core_start[k + 1] - frame.core_start[k]);
     }
+    begin();
     top_->mode_i = mode;
+    top_->clear_i = 0;
+    top_->clear_counters_i = 0;
+    top_->hold_counters_i = 0;
+    top_->counter_addr_i = 0;
     top_->in_valid_i = 0;
     top_->out_ready_i = 0;
     top_->rst_ni = 1;
@@ -77,23 +89,68 @@ class Simulation {
   // Runs up to `cycles` cycles. 1: every pixel has arrived, 0: not yet, -1: error.
   int run(uint64_t cycles) {
     for (uint64_t n = 0; n < cycles && error_.empty(); ++n) {
-      if (received_ == expected_) return drain() ? 1 : -1;
+      if (received_ == expected_) return finish() ? 1 : -1;
       cycle();
       if (!g_fatal.empty()) error_ = g_fatal;
       if (cycles_ - last_transfer_ > HANG_CYCLES) error_ = "no transfer for " + std::to_string(HANG_CYCLES) + " cycles";
     }
     if (!error_.empty()) return -1;
-    return received_ == expected_ ? (drain() ? 1 : -1) : 0;
+    return received_ == expected_ ? (finish() ? 1 : -1) : 0;
+  }
+
+  // Runs `cycles` cycles or to the last pixel, then aborts the frame with clear_i for `length` cycles and begins it anew, counters cleared.
+  bool abort(uint64_t cycles, int length) {
+    for (uint64_t n = 0; n < cycles && error_.empty() && received_ < expected_; ++n) {
+      cycle();
+      if (!g_fatal.empty()) error_ = g_fatal;
+    }
+    const uint64_t before = cycles_;
+    top_->clear_i = 1;
+    for (int i = 0; i < length && error_.empty(); ++i) {
+      offer();
+      top_->clk_i = 0;
+      top_->eval();
+      if (top_->in_ready_o) error_ = "ready while clear_i is high";
+      if (i > 0) check_empty("after clear_i");
+      top_->clk_i = 1;
+      top_->eval();
+    }
+    top_->clear_i = 0;
+    top_->in_valid_i = 0;
+    top_->mode_i = mode_;  // early enough for the first element not to wait
+    std::vector<uint32_t> counters = read_counters();  // it checks that the stage stays empty, too
+    for (int k = 0; k < CORES; ++k) {
+      const uint32_t counted = counters[k * COUNTERS_PER_CORE + COUNTER_CYCLES];
+      if (counted != static_cast<uint32_t>(before + length)) error_ = "clear_i changed a counter";
+    }
+    top_->clear_counters_i = 1;
+    edge();
+    top_->clear_counters_i = 0;
+    if (!g_fatal.empty()) error_ = g_fatal;
+    begin();
+    return error_.empty();
   }
 
   uint64_t cycles_ = 0;
   uint64_t received_ = 0;
   uint64_t expected_ = 0;
   std::string error_;
-  const uint32_t* counters() { return counters_.data(); }
-  size_t counter_words() { return sizeof(top_->counters_o) / sizeof(uint32_t); }
+  std::vector<uint32_t> counters_;
 
  private:
+  // Start of the frame, the stage being empty.
+  void begin() {
+    seen_.assign(frame_.subtiles * SUBTILE_PIXELS, 0);
+    cycles_ = received_ = last_transfer_ = 0;
+    owed_ = 0;
+    for (int k = 0; k < CORES; ++k) {
+      next_[k] = frame_.core_start[k];
+      item_[k] = next_[k] < frame_.core_start[k + 1] ? frame_.start[frame_.order[next_[k]]] : 0;
+      holding_[k] = false;
+      open_[k] = false;
+    }
+  }
+
   void edge() {
     top_->clk_i = 0;
     top_->eval();
@@ -101,77 +158,90 @@ class Simulation {
     top_->eval();
   }
 
+  void check_empty(const char* when) {
+    if (top_->out_valid_o) error_ = std::string("pixels ") + when;
+    if (!top_->idle_o) error_ = std::string("idle_o is low ") + when;
+  }
+
+  bool at_token(int k) const { return item_[k] == frame_.start[frame_.order[next_[k]] + 1]; }
+
   // The element at the head of core k's list, into the input words.
   void load(int k) {
-    const int64_t s = frame_.order[next_[k]];
     uint32_t* w = &top_->in_elem_i[k * ELEM_WORDS];
-    std::memset(w, 0, ELEM_WORDS * sizeof(uint32_t));
-    if (item_[k] == frame_.start[s + 1]) {
-      w[0] = static_cast<uint32_t>((s / frame_.cols) << 12 | s % frame_.cols);
-      w[4] = 1u << 17;
+    if (!at_token(k)) {
+      std::memcpy(w, &frame_.element[item_[k] * ELEM_WORDS], ELEM_WORDS * sizeof(uint32_t));
       return;
     }
-    const int32_t i = frame_.entry[item_[k]];
-    uint16_t f[10];
-    std::memcpy(f, &frame_.gauss[i * 9], 18);
-    f[0] = frame_.mean[item_[k] * 2];
-    f[1] = frame_.mean[item_[k] * 2 + 1];
-    f[9] = frame_.spiky[i] ? 1 : 0;
-    for (int j = 0; j < ELEM_WORDS; ++j) w[j] = f[2 * j] | static_cast<uint32_t>(f[2 * j + 1]) << 16;
+    const int64_t s = frame_.order[next_[k]];
+    std::memset(w, 0, ELEM_WORDS * sizeof(uint32_t));
+    put(w, ELEM_COL, static_cast<uint32_t>(s % frame_.cols));
+    put(w, ELEM_ROW, static_cast<uint32_t>(s / frame_.cols));
+    put(w, ELEM_EOS, 1);
   }
 
   void accepted(int k) {
     holding_[k] = false;
-    const int64_t s = frame_.order[next_[k]];
-    if (item_[k] == frame_.start[s + 1]) {
-      ++next_[k];
-      if (next_[k] < frame_.core_start[k + 1]) item_[k] = frame_.start[frame_.order[next_[k]]];
-    } else {
+    open_[k] = !at_token(k);
+    if (open_[k]) {
       ++item_[k];
+      return;
     }
+    owed_ += SUBTILE_PIXELS;
+    ++next_[k];
+    if (next_[k] < frame_.core_start[k + 1]) item_[k] = frame_.start[frame_.order[next_[k]]];
   }
 
   void pixel(int k) {
     const uint32_t* w = &top_->out_data_o[k * PIXEL_WORDS];
-    const int64_t index = w[2] & 63;  // mini-tile and pixel
-    const int64_t col = w[2] >> 6 & 4095;
-    const int64_t row = w[2] >> 18 & 4095;
+    const int64_t index = get(w, PIXEL_MINITILE) * MINITILE_PIXELS + get(w, PIXEL_INDEX);
+    const int64_t col = get(w, PIXEL_COL), row = get(w, PIXEL_ROW);
     const int64_t s = row * frame_.cols + col;
     if (col >= frame_.cols || s >= frame_.subtiles || owner_[s] != k) {
       error_ = "core " + std::to_string(k) + " sent a pixel of sub-tile (" + std::to_string(col) + ", " + std::to_string(row) + ")";
       return;
     }
-    if (seen_[s * 64 + index]++) {
+    if (seen_[s * SUBTILE_PIXELS + index]++) {
       error_ = "pixel " + std::to_string(index) + " of sub-tile " + std::to_string(s) + " sent twice";
       return;
     }
-    uint16_t* p = &frame_.pixels[(s * 64 + index) * 4];
-    p[0] = w[1] >> 16;
-    p[1] = w[1] & 0xffff;
-    p[2] = w[0] >> 16;
-    p[3] = w[0] & 0xffff;
+    uint16_t* p = &frame_.pixels[(s * SUBTILE_PIXELS + index) * 4];
+    p[0] = get(w, PIXEL_TRANSMITTANCE);
+    p[1] = get(w, PIXEL_RED);
+    p[2] = get(w, PIXEL_GREEN);
+    p[3] = get(w, PIXEL_BLUE);
     ++received_;
+    --owed_;
   }
 
-  void cycle() {
-    // Once offered, an element stays until taken.
+  // Sets valid and ready of this cycle; once offered, an element stays until taken.
+  void offer() {
+    valid_ = ready_ = 0;
     for (int k = 0; k < CORES; ++k) {
       if (!holding_[k] && next_[k] < frame_.core_start[k + 1] && !random_(idle_)) {
         load(k);
         holding_[k] = true;
       }
+      valid_ |= holding_[k] << k;
+      ready_ |= !random_(stall_) << k;
     }
-    uint8_t valid = 0, ready = 0;
+    top_->in_valid_i = valid_;
+    top_->out_ready_i = ready_;
+  }
+
+  void cycle() {
+    bool empty = owed_ == 0, offered = false;  // an offered element may have begun its test
     for (int k = 0; k < CORES; ++k) {
-      valid |= holding_[k] << k;
-      ready |= !random_(stall_) << k;
+      empty &= !open_[k];
+      offered |= holding_[k];
     }
-    top_->in_valid_i = valid;
-    top_->out_ready_i = ready;
+    if (top_->idle_o && !empty) error_ = "idle_o is high, but something is inside";
+    if (!top_->idle_o && empty && !offered) error_ = "idle_o is low, but nothing is inside";
+    top_->mode_i = top_->idle_o ? mode_ : (mode_ + 1) % MODES;
+    offer();
     top_->clk_i = 0;
     top_->eval();
-    const uint8_t taken = valid & top_->in_ready_o;
-    const uint8_t given = ready & top_->out_valid_o;
+    const uint8_t taken = valid_ & top_->in_ready_o;
+    const uint8_t given = ready_ & top_->out_valid_o;
     for (int k = 0; k < CORES; ++k) {
       if (given >> k & 1) pixel(k);
     }
@@ -182,45 +252,50 @@ class Simulation {
       if (taken >> k & 1) accepted(k);
     }
     if (taken || given) last_transfer_ = cycles_;
-    if (received_ == expected_) {
-      // The counters are one cycle late.
-      top_->in_valid_i = 0;
-      edge();
-      save_counters();
-    }
   }
 
-  void save_counters() {
-    const uint32_t* first = reinterpret_cast<const uint32_t*>(&top_->counters_o);
-    counters_.assign(first, first + counter_words());
+  // All counters, one after the other; they stand still meanwhile. Nothing may be in the stage.
+  std::vector<uint32_t> read_counters() {
+    std::vector<uint32_t> counters(CORES * COUNTERS_PER_CORE);
+    top_->hold_counters_i = 1;
+    edge();  // the events of the cycle before are added
+    for (int k = 0; k < CORES; ++k) {
+      for (int i = 0; i < COUNTERS_PER_CORE; ++i) {
+        top_->counter_addr_i = k << COUNTER_INDEX_BITS | i;
+        for (int n = 0; n < COUNTER_LATENCY; ++n) edge();
+        counters[k * COUNTERS_PER_CORE + i] = top_->counter_data_o;
+        check_empty("while nothing is inside");
+      }
+    }
+    top_->hold_counters_i = 0;
+    return counters;
   }
 
   // After the last pixel: every list must be consumed, and nothing more may come.
-  bool drain() {
+  bool finish() {
     for (int k = 0; k < CORES; ++k) {
       if (next_[k] != frame_.core_start[k + 1]) error_ = "core " + std::to_string(k) + " did not take its whole list";
     }
     top_->in_valid_i = 0;
     top_->out_ready_i = (1 << CORES) - 1;
-    for (int i = 0; i < 64; ++i) {
-      edge();
-      if (top_->out_valid_o) error_ = "pixels after the last one";
-    }
-    if (counters_.empty()) save_counters();
+    if (counters_.empty()) counters_ = read_counters();
+    if (!g_fatal.empty()) error_ = g_fatal;
     return error_.empty();
   }
 
   Frame frame_;
+  int mode_;
   uint32_t idle_, stall_;
   Random random_;
   std::vector<uint8_t> seen_;
   std::vector<int> owner_;
   VerilatedContext context_;
   std::unique_ptr<Vtop> top_;
+  uint8_t valid_, ready_;
+  int64_t owed_;  // pixels of lists that were taken as a whole
   int64_t next_[CORES], item_[CORES];
-  bool holding_[CORES];
+  bool holding_[CORES], open_[CORES];
   uint64_t last_transfer_ = 0;
-  std::vector<uint32_t> counters_;
 };
 
 }  // namespace
@@ -238,12 +313,13 @@ void* flk_sim_new(const Frame* frame, int mode, uint64_t seed, uint32_t idle, ui
   return new Simulation(*frame, mode, seed, idle, stall);
 }
 int flk_sim_run(void* sim, uint64_t cycles) { return static_cast<Simulation*>(sim)->run(cycles); }
+int flk_sim_abort(void* sim, uint64_t cycles, int length) { return static_cast<Simulation*>(sim)->abort(cycles, length); }
 uint64_t flk_sim_cycles(void* sim) { return static_cast<Simulation*>(sim)->cycles_; }
 uint64_t flk_sim_received(void* sim) { return static_cast<Simulation*>(sim)->received_; }
 const char* flk_sim_error(void* sim) { return static_cast<Simulation*>(sim)->error_.c_str(); }
 void flk_sim_counters(void* sim, uint32_t* out) {
-  auto* s = static_cast<Simulation*>(sim);
-  std::memcpy(out, s->counters(), s->counter_words() * sizeof(uint32_t));
+  const auto& counters = static_cast<Simulation*>(sim)->counters_;
+  std::memcpy(out, counters.data(), counters.size() * sizeof(uint32_t));
 }
 void flk_sim_delete(void* sim) { delete static_cast<Simulation*>(sim); }
 }

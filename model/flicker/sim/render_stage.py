@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .. import params
+from .. import layout, params
 from ..errors import FlickerError
 from ..front.records import SubtileLists
 from ..golden.render import assemble, stream_order
-from ..params import CHANNELS, CORES, RenderConfig
-from ..toolchain import verilate
+from ..params import CHANNELS, CORES, STAGES, SUBTILE_PIXELS, RenderConfig
+from ..toolchain import sources_of, verilate
+from . import generate
 
 HERE = Path(__file__).parent
-TOP = "flk_render_sim_top"
 CHUNK_CYCLES = 5000  # cycles between two calls of the progress function
 
 
 class _Frame(ctypes.Structure):
     _fields_ = [
-        (name, ctypes.c_void_p) for name in ("gauss", "spiky", "start", "entry", "mean", "order", "core_start")
-    ] + [("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p)]
+        ("element", ctypes.c_void_p), ("start", ctypes.c_void_p), ("order", ctypes.c_void_p), ("core_start", ctypes.c_void_p),
+        ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p),
+    ]
 
 
 @dataclass
@@ -56,20 +57,27 @@ class RtlFrame:
         return self.counters[:, first : first + CHANNELS * step : step].astype(np.int64)
 
 
-def build(config: RenderConfig) -> Path:
-    """Shared library of the simulator for a configuration; cached by content."""
+def build(config: RenderConfig, *, checks: bool = False, replaced: Mapping[str, Path] | None = None) -> Path:
+    """Shared library of the simulator for a configuration; cached by content.
+
+    checks: with the design's assertions; without, it runs faster. replaced: files to take instead, by module.
+    """
+    stage = STAGES[config.stage]
+    top, header = generate.write(stage)
+    sources = [(replaced or {}).get(path.stem, path) for path in sources_of(generate.TOP, [top])]
     return verilate(
-        TOP,
-        extra=[HERE / f"{TOP}.sv"],
+        generate.TOP,
+        sources,
         parameters=config.rtl_parameters(),
-        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--no-assert"],
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--assert" if checks else "--no-assert"],
         cpp=[HERE / "render_harness.cpp"],
+        depends=[header],
         settings=[HERE / "render_stage.vlt"],
-        cflags="-DVL_USER_STOP -DVL_USER_FATAL -std=c++17",
+        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -std=c++17 -I{header.parent}",
         opt="-O2",
         shared=True,
         kind="sim",
-        name="render_stage",
+        name=stage.module.removeprefix("flk_"),
     )
 
 
@@ -78,6 +86,7 @@ def _library(path: Path) -> ctypes.CDLL:
     lib.flk_sim_new.restype = ctypes.c_void_p
     lib.flk_sim_new.argtypes = [ctypes.POINTER(_Frame), ctypes.c_int, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_uint32]
     lib.flk_sim_run.argtypes = [ctypes.c_void_p, ctypes.c_uint64]
+    lib.flk_sim_abort.argtypes = [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int]
     lib.flk_sim_cycles.argtypes = lib.flk_sim_received.argtypes = [ctypes.c_void_p]
     lib.flk_sim_cycles.restype = lib.flk_sim_received.restype = ctypes.c_uint64
     lib.flk_sim_error.argtypes = [ctypes.c_void_p]
@@ -87,6 +96,15 @@ def _library(path: Path) -> ctypes.CDLL:
     return lib
 
 
+def elements(lists: SubtileLists, record: str) -> np.ndarray:
+    """uint32 (E, words): the lists' elements as records of the layout."""
+    gauss = lists.gauss[lists.entry]
+    names = [path.rpartition(".")[2] for path in layout.leaves("feature")][::-1]  # least significant first, as in lists.gauss
+    columns = {name: gauss[:, i] for i, name in enumerate(names)}
+    columns |= {"mean_x": lists.mean[:, 0], "mean_y": lists.mean[:, 1], "spiky": (lists.spiky[lists.entry] != 0)}
+    return layout.pack(record, columns)
+
+
 def render_rtl(
     lists: SubtileLists,
     config: RenderConfig,
@@ -94,38 +112,42 @@ def render_rtl(
     seed: int = 1,
     idle: float = 0.0,
     stall: float = 0.0,
+    aborts: Sequence[tuple[int, int]] = (),
+    checks: bool = False,
+    library: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> RtlFrame:
     """Simulate a frame.
 
     idle, stall: share of cycles in which an input stream offers nothing, an output stream is not ready (random, by `seed`).
-    progress: called with (pixels received, pixels in all).
-    Raises FlickerError when the RTL hangs, breaks an assertion, loses, repeats or misplaces a pixel.
+    aborts: (cycles, length) each: before the frame that counts, begin it, clear it after so many cycles, for `length` cycles.
+    checks: use the build with assertions. library: one that `build` made, instead. progress: called with (pixels received, pixels in all).
+    Raises FlickerError when the RTL hangs, loses, repeats or misplaces a pixel, holds idle_o wrong, or, with checks, breaks an assertion.
     """
     if config.form != lists.form:
         raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
-    lib = _library(build(config))
+    lib = _library(library or build(config, checks=checks))
     order, core_start = stream_order(lists)
     subtiles = lists.cols * lists.rows
     arrays = {
-        "gauss": np.ascontiguousarray(lists.gauss, np.uint16),
-        "spiky": np.ascontiguousarray(lists.spiky, np.uint8),
+        "element": elements(lists, STAGES[config.stage].element),
         "start": np.ascontiguousarray(lists.start, np.int64),
-        "entry": np.ascontiguousarray(lists.entry, np.int32),
-        "mean": np.ascontiguousarray(lists.mean, np.uint16),
         "order": np.ascontiguousarray(order, np.int64),
         "core_start": np.ascontiguousarray(core_start, np.int64),
-        "pixels": np.zeros((subtiles, 64, 4), np.uint16),
+        "pixels": np.zeros((subtiles, SUBTILE_PIXELS, 4), np.uint16),
     }
     frame = _Frame(cols=lists.cols, subtiles=subtiles, **{k: a.ctypes.data for k, a in arrays.items()})
     sim = lib.flk_sim_new(ctypes.byref(frame), int(config.cat), seed, round(idle * 256), round(stall * 256))
     try:
         begin = time.perf_counter()
         state = 0
+        for cycles, length in aborts:
+            if not lib.flk_sim_abort(sim, cycles, length):
+                raise FlickerError(f"RTL simulation: aborted after {cycles} cycles: {lib.flk_sim_error(sim).decode()}")
         while state == 0:
             state = lib.flk_sim_run(sim, CHUNK_CYCLES)
             if progress is not None:
-                progress(lib.flk_sim_received(sim), subtiles * 64)
+                progress(lib.flk_sim_received(sim), subtiles * SUBTILE_PIXELS)
         seconds = time.perf_counter() - begin
         cycles = lib.flk_sim_cycles(sim)
         if state < 0:

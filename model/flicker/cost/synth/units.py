@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ...params import FAITHFUL, FIXED_FRAC_BITS, FIXED_INT_BITS, MINITILE, PIXELS_PER_VRU, VRU_COUNTS, VRUS_PER_CHANNEL
+from ... import layout
+from ...params import (
+    CHANNELS,
+    FAITHFUL,
+    FIXED_FRAC_BITS,
+    FIXED_INT_BITS,
+    MASK_GENERATORS,
+    MINITILE,
+    PIXELS_PER_VRU,
+    SUBTILE_PIXELS,
+    VRU_COUNTS,
+    VRUS_PER_CHANNEL,
+    CatMode,
+    Form,
+    Precision,
+    RenderConfig,
+)
 
 FORMS = {"conic": 0, "factored": 1}
 PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
-FEATURE_BITS = 145  # flk_pkg::FEATURE_ELEM_BITS
+FEATURE_BITS = layout.bits("feature_elem")
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
@@ -17,7 +33,10 @@ COMPOSED: dict[str, list[str]] = {
     "flk_channel": ["flk_fifo", "flk_vru", "flk_stream_arbiter"],
     "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity_pipe"],
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
-    "flk_render_stage": ["flk_ctu", "flk_rendering_core", "flk_perf_counters"],
+    "flk_mask_all": ["flk_pipe_reg"],
+    "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
+    # The wrapper has no logic of its own.
+    "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
 
 
@@ -60,35 +79,43 @@ def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, 
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
     factored = parameters.get("Form", 1) == 1
+    width = 1 + parameters.get("ExpBits", 5) + parameters.get("ManBits", 10)
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
         "flk_log_opacity_pipe": ["opacity_i[15]"],
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+        # Neither mode nor shape of a splat matters without a test.
+        "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
     # What a combinational operator does not use.
     if top in PIPES and parameters.get("Stages", 1) == 0:
         bits = [*bits, "clk_i[0]", "en_i[0]"]
     if factored:  # v is only squared: the sign of l2 does not matter
         quad = 16 if parameters.get("Precision", 1) == 0 else 8
-        bits = bits + {"flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_vru": ["op_feature_i[79]"]}.get(top, [])
+        bits = bits + {
+            "flk_prtu": [f"shape_i[{3 * quad - 1}]"], "flk_weight": [f"shape_i[{3 * width - 1}]"], "flk_vru": ["op_feature_i[79]"],
+        }.get(top, [])
     return bits
 
 
+# Parameters of the arithmetic units by format.
+FORMATS = {
+    "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
+    "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
+    "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
+}
+
+
 def _arithmetic() -> list[Unit]:
-    formats = {
-        "fp16": dict(ExpBits=5, ManBits=10, Fn=0, Saturate=0),
-        "e4m3": dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1),
-        "e5m2": dict(ExpBits=5, ManBits=2, Fn=0, Saturate=1),
-    }
     units = []
     for top in ("flk_fp_add", "flk_fp_mul"):
-        units += [unit(top, name, **parameters) for name, parameters in formats.items()]
-    for name, parameters in formats.items():
+        units += [unit(top, name, **parameters) for name, parameters in FORMATS.items()]
+    for name, parameters in FORMATS.items():
         units.append(unit("flk_fp_cmp", name, **{key: parameters[key] for key in ("ExpBits", "ManBits", "Fn")}))
     for source, target in (("fp16", "e4m3"), ("fp16", "e5m2"), ("e4m3", "fp16")):
-        src, dst = formats[source], formats[target]
+        src, dst = FORMATS[source], FORMATS[target]
         units.append(
             unit(
                 "flk_fp_convert", f"{source} to {target}", SrcExpBits=src["ExpBits"], SrcManBits=src["ManBits"],
@@ -104,7 +131,8 @@ def _arithmetic() -> list[Unit]:
         units.append(unit("flk_exp_neg", name, Base2=base))
     for base, name in ((1, "log2"), (0, "ln")):
         for fmt in ("fp16", "e4m3"):
-            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **formats[fmt]))
+            units.append(unit("flk_log_opacity", f"{name} {fmt}", Base2=base, **FORMATS[fmt]))
+    units.append(unit("flk_lzc", "14 bit", Width=14))  # of the FP16 adder
     for top, stages in PIPES.items():
         units.append(unit(top, f"fp16, {stages} stages", Stages=stages))
     return units
@@ -125,14 +153,22 @@ def _cells() -> list[Unit]:
 
 
 def _stage() -> list[Unit]:
-    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_fifo_monitor"), unit("flk_perf_counters")]
+    units = [unit("flk_mmu"), unit("flk_ctu_controller", VruCycles=PIXELS_PER_VRU), unit("flk_perf_counters")]
+    units += [unit("flk_fifo_monitor", MaskBits=CHANNELS), unit("flk_fifo_monitor", "masks of pixels", MaskBits=SUBTILE_PIXELS)]
+    units += [unit("flk_stage_control"), unit("flk_mask_all", MaskBits=CHANNELS)]
+    for pixels in (MINITILE * MINITILE // vrus for vrus in VRU_COUNTS):
+        units += [unit("flk_pixel_state", f"{pixels} pixels", Pixels=pixels), unit("flk_pixel_drain", f"{pixels} pixels", Pixels=pixels)]
     for form, f in FORMS.items():
+        for fmt, (columns, rows) in (("fp16", (1, 1)), ("fp16", (2, 2)), ("e4m3", (2, 2))):
+            size = "1 pixel" if columns == rows == 1 else f"{columns} x {rows}"
+            units.append(unit("flk_weight", f"{form} {fmt}, {size}", Form=f, Cols=columns, Rows=rows, **FORMATS[fmt]))
+        units.append(unit("flk_blend_pipe", form, Form=f))
         for vrus in (VRUS_PER_CHANNEL, *(count for count in VRU_COUNTS if count != VRUS_PER_CHANNEL)):
             pixels = MINITILE * MINITILE // vrus
             units += [
                 unit("flk_vru", vru_config(form, pixels), Form=f, Pixels=pixels),
                 unit("flk_channel", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MiniTile=0),
-                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus),
+                unit("flk_rendering_core", channel_config(form, vrus), Form=f, FifoDepth=16, VrusPerChannel=vrus, MaskBits=CHANNELS),
             ]
         for precision, p in PRECISIONS.items():
             config = f"{form} {precision}"
@@ -140,10 +176,13 @@ def _stage() -> list[Unit]:
                 unit("flk_prtu", config, Form=f, Precision=p, Cols=2, Rows=2),
                 unit("flk_prtu", f"{config}, 1 pixel", Form=f, Precision=p, Cols=1, Rows=1),
                 unit("flk_ctu", config, **ctu_parameters(f, p)),
-                unit("flk_render_stage", config, Form=f, Precision=p, FifoDepth=16, CtuFifoDepth=0, VrusPerChannel=VRUS_PER_CHANNEL),
+                unit("flk_render_stage", config, **RenderConfig(Form(f), Precision(p)).rtl_parameters()),
             ]
     units.append(unit("flk_ctu", "faithful", **ctu_parameters(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth)))
     units.append(unit("flk_render_stage", "faithful", **FAITHFUL.rtl_parameters()))
+    for vrus, name in ((2, "no CTU"), (4, "no CTU, 64 VRUs")):
+        untested = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
+        units.append(unit("flk_render_stage", name, **untested.rtl_parameters()))
     return units
 
 

@@ -3,7 +3,7 @@
 In the factored form a splat contributes where u^2 + v^2 <= rho^2, with u = l0 dx + l1 dy and v = l2 dy. Divided by rho(o) this is the unit
 disc, whatever the splat's size, shape and opacity, so a uniform absolute error d enlarges every splat's area by the same 2 d or so: fixed
 point is the right number system, and few bits do. In a row v is constant, so the pixels of a row are those with
--r - s <= (i - 3.5) a <= r - s, r = sqrt(1 - v^2) from a table of one argument. Steps (docs/methods.md has the widths and the proof):
+-r - s <= (i - 3.5) a <= r - s, r = sqrt(1 - v^2) from a table of one argument. Steps (docs/configurations.md has the widths and the proof):
 
     k = 1 / rho(o) from a table                          a, b, c = k (l0, l1, l2)
     X = 3.5 - mean_x, Y = 3.5 - mean_y                   P = a X, Q = b Y, z = c Y
@@ -251,6 +251,9 @@ def configurations() -> Iterator[Configuration]:
         ("lanes-deep", "lanes, FIFO depth 40, two elements a cycle", Lanes(fifo_depth=40, window=3, width=2, accumulator=ACCUMULATOR)),
         ("lanes-64", "64 lanes, FIFO depth 4", Lanes(lanes=64, fifo_depth=4, window=2, accumulator=ACCUMULATOR)),
         ("lanes-fp16", "lanes, FP16 accumulators and their loop", Lanes(window=2, loop=4)),
+        ("lanes-fp16-window-1", "lanes, FP16 accumulators, next pixel from the oldest entry only", Lanes(window=1, loop=4)),
+        ("lanes-fifo-40", "lanes, FIFO depth 40", Lanes(fifo_depth=40, window=2, accumulator=ACCUMULATOR)),
+        ("lanes-fifo-40-window-3", "lanes, FIFO depth 40, next pixel from three entries", Lanes(fifo_depth=40, window=3, accumulator=ACCUMULATOR)),
         *(
             (f"lanes-acc{bits}", f"lanes, accumulators of {bits} fraction bits", Lanes(window=2, accumulator=bits))
             for bits in ACCUMULATORS if bits != ACCUMULATOR

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from ... import markdown
 from ...errors import FlickerError
 from .families import FAMILIES
 from .run import BROKEN_ERROR, BROKEN_PSNR, Point, Stability
@@ -48,19 +49,24 @@ def break_table(result: Stability) -> Table:
     return table
 
 
-def write_markdown(result: Stability, path: Path) -> None:
-    """Table of chosen configurations (LINES), families as rows: where each breaks, or its lowest PSNR. Raises FlickerError."""
+def markdown_table(result: Stability) -> str:
+    """Chosen configurations (LINES), families as rows: where each breaks, or its lowest PSNR."""
     shown = [m for m in LINES if m in result.configurations] or result.configurations
-    lines = ["| family | " + " | ".join(f"`{m}`" for m in shown) + " |", "|---|" + "---|" * len(shown)]
+    rows = []
     for family in result.families:
         cells = []
         for name in shown:
             point = result.breaks(family, name)
             lowest = min(p.psnr_db for p in result.sweep(family, name))
             cells.append(f"- ({lowest:.0f})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
-        lines.append(f"| {family} | " + " | ".join(cells) + " |")
+        rows.append([family, *cells])
+    return markdown.table(["family", *(f"`{m}`" for m in shown)], rows)
+
+
+def write_markdown(result: Stability, path: Path) -> None:
+    """`markdown_table` into a file. Raises FlickerError when it cannot be written."""
     try:
-        path.write_text("\n".join(lines) + "\n")
+        path.write_text(markdown_table(result) + "\n")
     except OSError as error:
         raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
 

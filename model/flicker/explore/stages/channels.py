@@ -88,6 +88,7 @@ class Barrier(Channels):
     """All cores wait for each other after every tile."""
 
     idealised = True
+    assumed = ("perfect buffering inside a tile", "no latencies")
 
     def rtl(self) -> None:
         return None

@@ -25,6 +25,10 @@ class Lanes(RenderingStage):
     loop: int = 2
     accumulator: int = 0
     form = Form.FACTORED
+    assumed = (
+        "sub-tiles dealt out to the cores tile by tile, empty ones not streamed",
+        "the rest of a finished sub-tile's list is left (early exit), known as late as in the RTL",
+    )
 
     @property
     def vrus(self) -> int:

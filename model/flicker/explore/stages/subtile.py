@@ -29,6 +29,7 @@ class SubtileVrus(Channels):
     """The work unit is the sub-tile. Area and FIFOs as of our channels."""
 
     idealised = True
+    assumed = ("a finished sub-tile's list is left at once", "its own intersection test and sorting are not in the area")
 
     def rtl(self) -> None:
         return None

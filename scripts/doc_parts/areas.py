@@ -1,13 +1,11 @@
-#!/usr/bin/env python3
-"""Writes model/flicker/cost/areas.csv: area and switched load of every synthesised unit, for `flicker.cost.area` and `flicker.cost.energy`.
+"""`make docs PART=areas`: model/flicker/cost/areas.csv from the results of `make synth`, and the tables of docs/energy.md that follow from it.
 
-    make synth && python scripts/save_areas.py
-
-Units come from the cached results of `make synth` (build/synth); the operators of mask generators that have no RTL (integer products,
-tables, shifters; `flicker.cost.operations`) are synthesised here by the same flow, a second or two each, and cached in build/synth/operators.
+areas.csv has area and switched load of every synthesised unit, for `flicker.cost.area` and `flicker.cost.energy`. Units come from the cached results of
+`make synth` (build/synth) of the RTL as it is; the operators of mask generators that have no RTL (integer products, tables, shifters;
+`flicker.cost.operations`) are synthesised here by the same flow, a second or two each, and cached in build/synth/operators.
 Columns: unit, config; ge, ge_seq, ge_comb (gate equivalents); mem_bits, ff; load: capacitance of all input pins but clock pins, in inputs of
 the unit inverter; clock_free, clock_gated: capacitance of the clock pins that always toggle and of those behind clock gates; key: the cached
-result, whose hash covers the unit's sources. The first line says whether these are of the RTL beside it.
+result. The first line says of which RTL these are (`flicker.cost.stamp`).
 """
 
 from __future__ import annotations
@@ -19,68 +17,50 @@ import math
 import re
 import subprocess
 import sys
-from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-from flicker.explore.generators.disc import DiscFormat, root_table
-from flicker.explore.methods import methods
-
-from flicker.cost.area import TABLE, format_bits, operator_name
+from flicker import markdown
+from flicker.cost.area import TABLE, ctu_area, format_bits, generator_area, operator_name, part, parts
+from flicker.cost.energy import clock_pj, constant_table, ctu_pj, dram_pj, fifo_pj, generator_pj, sram_pj, switching_pj, vru_pj
 from flicker.cost.operations import Op, Operation
+from flicker.cost.stamp import LIBERTY, rtl_stamp, stamp_of
 from flicker.cost.synth.liberty import CLOCK_GATE, Library
 from flicker.cost.synth.run import FOLDER, UNITS, Runner
-from flicker.cost.synth.units import PRECISIONS, Unit, all_units, ctu_parameters, unit
+from flicker.cost.synth.units import all_units
 from flicker.errors import FlickerError
+from flicker.explore.configurations import CONFIGURATIONS, get_configuration
+from flicker.explore.generators.rows import RowFormat, root_table
 from flicker.golden.masked import ACCUMULATOR_INT_BITS
 from flicker.params import Form, Precision
-from flicker.toolchain import FILELIST, ROOT
+from flicker.toolchain import ROOT
 
-LIBERTY = ROOT / "scripts" / "cells" / "flicker.lib"
+from .common import Say, significant
+
 OPERATORS = FOLDER / "operators"
 COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "ff", "load", "clock_free", "clock_gated", "key")
 INSTANCE = re.compile(r"^\s*(\w+) (?:\\\S+ |\w+) \(\n(.*?)\n\s*\);", re.M | re.S)
 PIN = re.compile(r"\.(\w+)\((.*?)\)(?:,|$)", re.M)
 
 
-def units() -> list[Unit]:
-    """All units of `make synth`, and those of the precisions that its tables leave out."""
-    found = all_units()
-    have = {(u.name, u.config) for u in found}
-    for form in Form:
-        for precision in Precision:
-            if precision.name.lower() in PRECISIONS:
-                continue
-            config = f"{form.name.lower()} {precision.name.lower()}"
-            values = {"Form": int(form), "Precision": int(precision)}
-            found += [u for u in (unit("flk_prtu", config, **values, Cols=2, Rows=2), unit("flk_ctu", config, **ctu_parameters(form, precision)))
-                      if (u.name, u.config) not in have]
-    return found
-
-
 # ---- synthesised units --------------------------------------------------------------------------
 
 
-class Cached:
+class Synthesised:
     """Results in build/synth/units by key, with their loads."""
 
     def __init__(self, library: Library) -> None:
         self.library = library
         self.results: dict[str, dict] = {}
-        self.by_unit: dict[tuple, list[str]] = defaultdict(list)
-        for path in sorted(UNITS.glob("*/result.json"), key=lambda path: path.stat().st_mtime):
-            result = json.loads(path.read_text())
-            if "cells" not in result:
-                continue
-            key = path.parent.name
-            self.results[key] = result
-            self.by_unit[result["top"], tuple(sorted(result["parameters"].items()))].append(key)
 
     def total(self, key: str) -> dict[str, float]:
-        """Sums of a unit over itself and its parts."""
+        """Sums of a unit over itself and its parts. Raises KeyError for one that is not synthesised."""
+        if key not in self.results:
+            path = UNITS / key / "result.json"
+            if not path.exists():
+                raise KeyError(key)
+            self.results[key] = json.loads(path.read_text()) | loads(UNITS / key / "netlist.v", self.library)
         own = self.results[key]
-        if "load" not in own:
-            own |= loads(UNITS / key / "netlist.v", self.library)
         names = ("ge_seq", "ge_comb", "mem_bits", "ff", "load", "clock_free", "clock_gated")
         total = {name: own[name] for name in names}
         for child, count in own["children"].items():
@@ -89,16 +69,6 @@ class Cached:
                 total[name] += count * inside[name]
         total["ge"] = total["ge_seq"] + total["ge_comb"]
         return total
-
-    def find(self, u: Unit, ge: float | None, present: set[str]) -> str | None:
-        """A unit's result of the RTL as it is (its key is in `present`), else the newest, of the area that area.csv gives where it has the unit."""
-        for key in sorted(reversed(self.by_unit.get((u.top, u.parameters), [])), key=lambda key: key not in present):
-            try:
-                if ge is None or abs(self.total(key)["ge"] - ge) < 0.06:
-                    return key
-            except (KeyError, OSError):
-                continue
-        return None
 
 
 def loads(netlist: Path, library: Library) -> dict[str, float]:
@@ -127,14 +97,14 @@ def loads(netlist: Path, library: Library) -> dict[str, float]:
 
 
 def operations() -> Iterator[Operation]:
-    """Every different operation that a method has."""
+    """Every different operation that a configuration has."""
     seen = set()
-    for method in methods().values():
+    for configuration in CONFIGURATIONS.values():
         vru = []
-        if method.accumulator:
-            integer, fraction = ACCUMULATOR_INT_BITS, method.accumulator
+        if configuration.stage.accumulator:
+            integer, fraction = ACCUMULATOR_INT_BITS, configuration.stage.accumulator
             vru = [Operation(Op.SHIFT, f"FP16 -> q{integer}.{fraction}", 3), Operation(Op.ADD, f"fixed {integer + fraction}", 3)]
-        for o in (*method.operations.per_element, *method.operations.preprocessing, *vru):
+        for o in (*configuration.generator.operations.per_element, *configuration.generator.operations.preprocessing, *vru):
             name = operator_name(o)
             if name not in seen:
                 seen.add(name)
@@ -144,15 +114,14 @@ def operations() -> Iterator[Operation]:
 def _table(format: str) -> str | None:
     """Case items of a table of the row-interval generator."""
     address, data = (int(x) for x in format.split("->"))
-    found = [m for m in methods().values() if any(o.op == Op.TABLE and o.format == format for o in m.operations.per_element)]
-    note = next(o.note for o in found[0].operations.per_element if o.op == Op.TABLE and o.format == format)
+    note = next(o.note for o in operations() if o.op == Op.TABLE and o.format == format)
     if note == "k":
-        # Octaves of the threshold from 1/2 to 8, 64 steps each; k of the threshold that an address stands for (disc.inverse_radius).
+        # Octaves of the threshold from 1/2 to 8, 64 steps each; k of the threshold that an address stands for (rows.inverse_radius).
         steps = 1 << (address - 2)
         highs = [2.0 ** (octave - 1) * (1 + (step + 1) / steps) for octave in range(4) for step in range(steps)]
         values = [math.floor(2 ** (data - 1) / (math.sqrt(high) * (1 + 3.1 * 2.0**-11) + 2.0**-11)) for high in highs]
     else:
-        values = root_table(DiscFormat(data - 1, address))
+        values = root_table(RowFormat(data - 1, address))
         values = [min(int(v), (1 << data) - 1) for v in values][: 1 << address]
         values += [0] * ((1 << address) - len(values))
     rows = "\n".join(f"      {address}'d{i}: y_o = {data}'d{int(v)};" for i, v in enumerate(values))
@@ -262,54 +231,122 @@ def _open(text: str) -> list[str]:
     return [f"{name}[{bit}]" for name, high in widths.items() for bit in range(high + 1)]
 
 
-# ---- the table ----------------------------------------------------------------------------------
+# ---- areas.csv ----------------------------------------------------------------------------------
 
 
-def main() -> int:
+def unsynthesised() -> list[str]:
+    """Units of which build/synth has no result of the RTL as it is."""
+    runner = Runner(LIBERTY)
+    return [f"{u.name} {u.config}" for u in all_units() if not (UNITS / runner.add(u.top, dict(u.parameters)) / "result.json").exists()]
+
+
+def lacking() -> str | None:
+    """What build/synth has not of the RTL as it is, in few words; None when it has all."""
+    if not UNITS.exists():
+        return "make synth has not run"
+    found = unsynthesised()
+    return f"build/synth lacks {found[0]}" + f" and {len(found) - 1} more" * (len(found) > 1) if found else None
+
+
+def missing() -> str | None:
+    """Why areas.csv cannot be of the RTL beside it."""
+    what = lacking()
+    if what is None or stamp_of(TABLE.read_text()) == rtl_stamp():
+        return None
+    return f"{TABLE.relative_to(ROOT)} is not of the RTL beside it, and {what}: run make synth first"
+
+
+def save(say: Say) -> str:
+    """Write areas.csv from what is synthesised of the RTL as it is; without that it stays. Says what was done."""
+    if what := lacking():
+        return f"{TABLE.name} is of this RTL and stays ({what})"
     library = Library(LIBERTY)
-    cached = Cached(library)
-    areas = {}
-    if (FOLDER / "area.csv").exists():
-        with (FOLDER / "area.csv").open() as file:
-            areas = {(row["unit"], row["config"]): float(row["ge"]) for row in csv.DictReader(file)}
-    rows, missing = [], []
-    wanted = units()
-    present = None
-    try:
-        runner = Runner(LIBERTY)
-        present = {runner.add(u.top, dict(u.parameters)) for u in wanted}
-    except FlickerError as error:
-        print(f"save_areas: the RTL cannot be planned: {error}", file=sys.stderr)
-    for u in wanted:
-        key = cached.find(u, areas.get((u.name, u.config)), present or set())
-        if key is None:
-            missing.append(f"{u.name} {u.config}")
-            continue
-        rows.append({"unit": u.name, "config": u.config, **cached.total(key), "key": key})
-    if missing:
-        print(f"save_areas: no synthesis result of {', '.join(missing)}; run make synth", file=sys.stderr)
-    if not any(row["unit"] == "vru" for row in rows):
-        raise FlickerError("no synthesis results; run make synth first")
+    synthesised, runner = Synthesised(library), Runner(LIBERTY)
+    rows = []
+    for u in all_units():
+        key = runner.add(u.top, dict(u.parameters))
+        try:
+            rows.append({"unit": u.name, "config": u.config, **synthesised.total(key), "key": key})
+        except KeyError as error:
+            raise FlickerError(f"build/synth lacks {error}, a part of {u.name} {u.config}: run make synth first") from None
     for o in operations():
         if (text := source(o)) is not None:
+            say(operator_name(o))
             rows.append(synthesise(operator_name(o), text, library))
     rows.append(synthesise("select 8", SELECT, library))
-
-    stale = ["all"] if present is None else [row["unit"] for row in rows if row["unit"] != "op" and row["key"] not in present]
-    rtl = hashlib.sha256("".join(path.read_text() for path in sorted((FILELIST.parent).rglob("*.sv"))).encode()).hexdigest()[:12]
-    note = f"RTL {rtl}" if not stale else f"not of the RTL beside it ({rtl}): {', '.join(sorted(set(stale)))}"
     with TABLE.open("w", newline="") as file:
-        file.write(f"# written by scripts/save_areas.py; {note}\n")
+        file.write(f"# written by make docs PART=areas; RTL {rtl_stamp()}\n")
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n", extrasaction="ignore")
         writer.writeheader()
         for row in rows:
             writer.writerow({k: f"{v:.1f}" if isinstance(v, float) else v for k, v in row.items()})
-    print(f"save_areas: {len(rows)} rows in {TABLE.relative_to(ROOT)}; {note}")
-    return 0
+    parts.cache_clear()
+    return f"{len(rows)} rows in {TABLE.name}"
 
 
-if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except FlickerError as error:
-        sys.exit(f"save_areas: {error}")
+# ---- tables -------------------------------------------------------------------------------------
+
+# Of the RTL, of stages without a test, and of what is estimated.
+STAGES = (
+    "flicker", "flicker-smooth-mixed-factored", "flicker-smooth-fp16-factored", "faithful", "no-ctu-32", "no-ctu-64", "exact", "exact-e4m3", "rows", "lanes",
+    "lanes-deep", "lanes-64",
+)
+
+
+def stage_table() -> str:
+    """Millions of GE of rendering stages by part, to two figures behind the point."""
+    rows, heads = [], []
+    for name in STAGES:
+        configuration = get_configuration(name)
+        areas = configuration.area_parts()
+        heads = list(areas)
+        kind = "estimate" if configuration.model_only else "synthesised"
+        rows.append([f"`{name}`", configuration.title, kind, f"{sum(areas.values()) / 1e6:.2f}", *(f"{ge / 1e6:.2f}" for ge in areas.values())])
+    return markdown.table(["configuration", "what", "from", "MGE", *heads], rows)
+
+
+def event_table() -> str:
+    """pJ of what a frame is made of."""
+    rows = [
+        (f"{fmt.upper()} {what}", "", switching_pj(part(unit, fmt).load))
+        for fmt in ("fp16", "e4m3") for unit, what in (("fp_mul", "multiplication"), ("fp_add", "addition"))
+    ]
+    for form in Form:
+        word = form.name.lower()
+        rows.append(("pixel-Gaussian pair in a VRU", word, vru_pj(form)))
+        rows.append(("cycle of a VRU's ungated clock", word, clock_pj(part("vru", word).clock_free)))
+        rows += [("test cycle of a CTU", f"{word} {precision.name.lower()}", ctu_pj(form, precision)) for precision in Precision]
+    rows += [("element in a mask generator", f"`{name}`", generator_pj(get_configuration(name).generator.operations)) for name in ("exact", "rows", "pixels")]
+    rows += [("record through a feature FIFO", f"depth {depth}", fifo_pj(depth)) for depth in (4, 16, 64)]
+    rows += [("64 bits of SRAM", "288 KiB", sram_pj(64, 288 * 1024)), ("64 bits of LPDDR4", "", dram_pj(8))]
+    return markdown.table(["event", "configuration", "pJ"], [[event, which, significant(value, 2)] for event, which, value in rows])
+
+
+def tables(say: Say) -> dict[str, str]:
+    return {
+        "stages": stage_table(),
+        "generators": generator_error_table(),
+        "events": event_table(),
+        "constants": markdown.table(["name", "value", "source"], [[f"`{name}`", f"{value:.6g}", source] for name, value, source in constant_table()]),
+    }
+
+
+def generator_errors() -> dict[str, float]:
+    """Relative error of the estimate by operators, on the CTUs that are synthesised, by form and precision."""
+    errors = {}
+    for form in Form:
+        for precision in Precision:
+            words = form.name.lower(), precision.name.lower()
+            generator = get_configuration("-".join(("flicker-smooth", words[1], words[0]))).generator
+            errors[" ".join(words)] = generator_area(generator.operations) / ctu_area(form, precision) - 1
+    return errors
+
+
+def generator_error_table() -> str:
+    """The rule for generators without RTL, tried on those with RTL."""
+    rows = []
+    for name, error in generator_errors().items():
+        form, precision = name.split()
+        synthesised = ctu_area(form, precision)
+        rows.append([f"CTU, {form}, {precision}", f"{synthesised / 1e3:.1f}", f"{(1 + error) * synthesised / 1e3:.1f}", f"{error:+.1%}"])
+    return markdown.table(["generator", "synthesised, kGE", "by the rule, kGE", "error"], rows)

@@ -1,21 +1,17 @@
-#!/usr/bin/env python3
-"""Writes the instantiation template of the rendering stage into docs/integration.md from the module's own ports; ``--check`` only compares."""
+"""`make docs PART=instance`: the instantiation template of the rendering stage, from the module's own ports."""
 
 from __future__ import annotations
 
-import argparse
 import re
-import sys
 
 import pyslang
-from pages import get, put
 
 from flicker.errors import FlickerError
-from flicker.toolchain import ROOT, filelist
+from flicker.toolchain import filelist
+
+from .common import Say
 
 TOP = "flk_render_stage"
-PAGE = ROOT / "docs" / "integration.md"
-PART = "scripts/instance_template.py"
 
 
 def elaborate(extra: str = "") -> tuple[list[str], dict[str, pyslang.ast.InstanceSymbol]]:
@@ -61,20 +57,5 @@ def template() -> str:
     ])
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="exit with 1 if the page has another template")
-    text = f"```systemverilog\n{template()}\n```\n"
-    if not parser.parse_args().check:
-        put(PAGE, PART, text)
-    elif get(PAGE, PART) != text:
-        print(f"docs/integration.md: the template is not that of {TOP}: run scripts/instance_template.py")
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except FlickerError as error:
-        sys.exit(f"instance_template: {error}")
+def tables(say: Say) -> dict[str, str]:
+    return {"": f"```systemverilog\n{template()}\n```"}

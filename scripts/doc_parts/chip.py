@@ -1,71 +1,54 @@
-#!/usr/bin/env python3
-"""Writes the tables of docs/chip_model.md, docs/lists_and_sorting.md and docs/memory_formats.md.
+"""`make docs PART=chip`, `PART=constants` and `PART=dram`: tables of docs/chip_model.md, docs/lists_and_sorting.md and docs/memory_formats.md.
 
-    scripts/chip_tables.py FOLDER [--size WxH] [--docs docs]
-
-FOLDER holds the real scenes (docs/scenes.md); the demo scene is made. Tables stand between `<!-- NAME -->` and `<!--
-end -->`.
+`chip`: the demo scene and the real ones, one view each. The others need no view.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import re
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from flicker.chip.clusters import build_clusters, cull
+from flicker.chip.compare import estimate
 from flicker.chip.constants import constant_table
 from flicker.chip.delivery import broadcast_cycles
 from flicker.chip.dram import DramConfig, simulate
 from flicker.chip.execute import run_scheme, scheme_rows
-from flicker.chip.frame import ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare, render_bound, subtile_bound
+from flicker.chip.frame import ChipConfig, FrameEstimate, Prepared, prepare
 from flicker.chip.lists import collect
 from flicker.chip.memory import MemoryFormat
 from flicker.chip.quality import KEYS, format_quality, key_quality
 from flicker.chip.schemes import SCHEMES, Scheme
-from flicker.cli.options import parse_size
-from flicker.errors import FlickerError
-from flicker.golden.render import render_golden
+from flicker.explore.configurations import get_configuration
+from flicker.explore.evaluate import draw
+from flicker.explore.machine import subtile_cycles
+from flicker.front.view import View
 from flicker.markdown import table
-from flicker.params import RenderConfig
-from flicker.scene.camera import Camera, load_cameras
-from flicker.scene.demo import demo_cameras, generate
-from flicker.scene.files import Scene, load_scene
 
-VIEWS = (
-    ("flowers", "flowers.compressed.ply", 0), ("playbot", "playbot.sog", 1), ("guitar", "guitar.ply", 1),
-    ("stpeter", "st-peter.sog", 0),
-)
+from .common import Say, titled_views
+
+CONFIGURATION = "flicker"  # whose rendering stage the frames have
+TRAFFIC_OF = "flowers"
 _table = partial(table, numbers=True)
 CLUSTER_SIZES = (32, 64, 128, 256, 512, 1024)
 
 Rows = list[tuple[str, ...]]
 
 
-def _views(folder: Path | None, size: tuple[int, int]) -> Iterator[tuple[str, Scene, Camera]]:
-    yield "demo 0", generate(), demo_cameras()[0].resized(*size)
-    for name, file, view in VIEWS if folder else ():
-        base = folder / name
-        yield f"{name} {view}", load_scene(base / file), load_cameras(base / "cameras.json")[view].resized(*size)
-
-
 def _decibel(x: float) -> str:
     return "equal" if math.isinf(x) else f"{x:.1f}"
 
 
-def _cull_rows(title: str, scene: Scene, camera: Camera, visible: int) -> Rows:
+def _cull_rows(title: str, view: View) -> Rows:
     rows = []
     for size in CLUSTER_SIZES:
-        _, clusters = build_clusters(scene, size)
-        kept = [cull(clusters, camera, shape) for shape in ("box", "sphere")]
+        _, clusters = build_clusters(view.scene, size)
+        kept = [cull(clusters, view.camera, shape) for shape in ("box", "sphere")]
         read = [len(clusters.members(k)) for k in kept]
-        rows.append((title, str(size), f"{len(clusters):,}", f"{kept[0].sum():,}", f"{read[0]:,}", f"{read[1]:,}", f"{visible:,}",
+        rows.append((title, str(size), f"{len(clusters):,}", f"{kept[0].sum():,}", f"{read[0]:,}", f"{read[1]:,}", f"{view.projected.n_visible:,}",
                      f"{len(clusters) * 32 / 1e3:.0f}"))
     return rows
 
@@ -91,9 +74,9 @@ def _count_rows(title: str, p: Prepared) -> tuple[str, ...]:
         return int(sub), int(tile)
 
     sub, tile = entries(p.splats)
-    tight = entries(collect(p.projected, p.camera, tight=True))
+    tight = entries(collect(p.view.projected, p.view.camera, tight=True))
     need = int(p.needed.sum())
-    return (title, f"{len(p.scene):,}", f"{p.projected.n_visible:,}", f"{len(p.splats):,}", f"{sub:,}", f"{tile:,}", f"{tight[0]:,}",
+    return (title, f"{len(p.view.scene):,}", f"{p.view.projected.n_visible:,}", f"{len(p.splats):,}", f"{sub:,}", f"{tile:,}", f"{tight[0]:,}",
             f"{tight[1]:,}", f"{need:,}", f"{1 - need / max(sub, 1):.0%}")
 
 
@@ -149,44 +132,48 @@ def _dram_rows() -> Rows:
     return [(name, f"{r.efficiency:.1%}", f"{r.activates / r.bursts:.3f}") for name, r in rows]
 
 
-def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
-    """Every table by name."""
+def tables(say: Say) -> dict[str, str]:
+    """Of every view."""
     culls, frames, purposes, counts, schemes, variations, formats, broadcasts = ([] for _ in range(8))
     keys: dict[tuple[str, int], list[str]] = {k: [] for k in KEYS}
     titles = []
-    config = RenderConfig()
-    for title, scene, camera in _views(folder, size):
-        print(title, flush=True)
+    configuration = get_configuration(CONFIGURATION)
+    for title, view in titled_views(say):
         titles.append(title)
-        p = prepare(scene, camera, config)
+        p = prepare(view)
         counts.append(_count_rows(title, p))
-        culls += _cull_rows(title, scene, camera, p.projected.n_visible)
-        golden = render_golden(p.lists, config)
-        bound = render_bound(p.lists, config, golden)
-        broadcasts.append(_broadcast_row(title, p, subtile_bound(p.lists, config, golden)))
+        culls += _cull_rows(title, view)
+        say(f"{title}: {CONFIGURATION}")
+        work = draw(p.view, configuration).work
+        _, counters = configuration.simulate(work)
+        assert counters is not None
+        broadcasts.append(_broadcast_row(title, p, subtile_cycles(work, counters)))
+        say(f"{title}: schemes")
         results = {name: run_scheme(p.splats, s, p.needed) for name, s in SCHEMES.items()}
         schemes += [(title, *row) for row in scheme_rows(list(results.values()))]
         base = ChipConfig()
         variations += _variation_rows(title, p, base.scheme)
+        say(f"{title}: frames")
         for label, chip in (
             ("chunk", base), ("fp16", ChipConfig(memory=MemoryFormat.FP16)),
             ("fp16, colour of all members", ChipConfig(memory=MemoryFormat.FP16, two_step=False)),
             ("fp16, counting-subtile", ChipConfig(memory=MemoryFormat.FP16, scheme=SCHEMES["counting-subtile"])),
         ):
-            e = frame_estimate(scene, camera, config, bound, chip, p, results[chip.scheme.name])
+            e = estimate(p, configuration, chip, results[chip.scheme.name])
             frames.append(_frame_row(title, label, e))
-            if label in ("chunk", "fp16") and (title.startswith("flowers") or folder is None):
+            if label in ("chunk", "fp16") and title.startswith(TRAFFIC_OF):
                 purposes += _purpose_rows(f"{title}, {label}", e)
+        say(f"{title}: formats and keys")
         formats += [(title, q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), _decibel(q.reference_db), _decibel(q.golden_db))
-                    for q in format_quality(scene, camera, config)]
-        for kind, bits, value in key_quality(p.projected, camera):
+                    for q in format_quality(view)]
+        for kind, bits, value in key_quality(view.projected, view.camera):
             keys[kind, bits].append(_decibel(value))
     return {
         "counts": _table(("view", "Gaussians", "visible", "records", "sub-tile entries", "tile entries", "sub-tile, tight boxes",
                           "tile, tight boxes", "sub-tile entries needed", "cut by early stop"), counts),
         "culling": _table(("view", "cluster", "clusters", "kept", "members read, box", "members read, sphere", "visible",
                            "headers KB"), culls),
-        "frames": _table(("view", "memory", "MB", "preprocess", "lists and sort", "render (bound)", "DRAM preprocess", "DRAM render",
+        "frames": _table(("view", "memory", "MB", "preprocess", "lists and sort", "render", "DRAM preprocess", "DRAM render",
                           "bottleneck", "FPS", "FPS, no overlap"), frames),
         "traffic": _table(("view", "purpose", "used MB", "moved MB", "DRAM cycles alone", "efficiency"), purposes),
         "schemes": _table(("view", *scheme_rows(None)[0]), schemes),
@@ -194,34 +181,12 @@ def make_tables(folder: Path | None, size: tuple[int, int]) -> dict[str, str]:
         "broadcast": _table(("view", "independent cores", "barrier after each tile", *(f"queues of {d}" for d in _DEPTHS)), broadcasts),
         "formats": _table(("view", "format", "MB", "bytes a Gaussian", "float64, dB", "golden, dB"), formats),
         "keys": _table(("key", "bits", *titles), [(kind, str(bits), *values) for (kind, bits), values in keys.items()]),
-        "dram": _table(("access", "efficiency", "activates a burst"), _dram_rows()),
-        "constants": _table(("constant", "value", "source"), [(f"`{n}`", f"{v:,}", s) for n, v, s in constant_table()]),
     }
 
 
-def fill(text: str, tables: dict[str, str]) -> str:
-    """Put the tables between their marks."""
-    def one(match: re.Match) -> str:
-        name = match.group(1)
-        if name not in tables:
-            raise FlickerError(f"no table '{name}'")
-        return f"<!-- {name} -->\n{tables[name]}\n<!-- end -->"
-
-    return re.sub(r"<!-- (\w+) -->\n.*?<!-- end -->", one, text, flags=re.S)
+def constant_tables(say: Say) -> dict[str, str]:
+    return {"": table(("constant", "value", "source"), [(f"`{n}`", f"{v:,}", s) for n, v, s in constant_table()])}
 
 
-def main() -> None:
-    """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=Path, help="real scenes; without it the demo scene only")
-    parser.add_argument("--size", default="1280x720")
-    parser.add_argument("--docs", type=Path, default=Path("docs"))
-    args = parser.parse_args()
-    tables = make_tables(args.folder, parse_size(args.size))
-    for name in ("chip_model.md", "lists_and_sorting.md", "memory_formats.md"):
-        page = args.docs / name
-        page.write_text(fill(page.read_text(), tables))
-
-
-if __name__ == "__main__":
-    main()
+def dram_tables(say: Say) -> dict[str, str]:
+    return {"": _table(("access", "efficiency", "activates a burst"), _dram_rows())}

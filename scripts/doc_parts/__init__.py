@@ -1,0 +1,1 @@
+"""Parts of the documentation, one module each; scripts/docs.py has the table of them."""

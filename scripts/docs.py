@@ -1,0 +1,151 @@
+#!/usr/bin/env python3
+"""Writes every generated table and chart of README.md and docs/: `make docs [PART=name]`.
+
+    scripts/docs.py [PART ...] [--list]
+
+PARTS is the list of parts. A page takes a table between `<!-- make docs PART=name place -->` and `<!-- end -->` (scripts/pages.py), so that each table
+says what writes it. Without PART all parts are written in the order of the list; those whose inputs are missing are skipped with a line that says what
+is missing. A part that is named must be possible: else exit 1, as for any error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pages
+from doc_parts import (
+    areas,
+    chip,
+    configurations,
+    energy,
+    exploration,
+    formal,
+    frames,
+    instance,
+    mutants,
+    parameters,
+    pictures,
+    quality,
+    speed,
+    stability,
+    subnormals,
+    synthesis,
+)
+from doc_parts.common import Say, scenes_missing
+from rich.console import Console
+
+from flicker.errors import FlickerError
+from flicker.toolchain import ROOT
+
+
+def nothing_missing() -> str | None:
+    return None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Places of pages that one command writes.
+
+    name: of PART. what: for --list. places: second words of the marks; ("",): the only place of the part. tables: text by place, called with a function
+    that shows what is being done. missing: why the part cannot be written now, in one line; None when it can. before: writes files that are not pages
+    and the tables rest on; returns what it did. cheap: made in seconds from files in the repository, so that tb/test_docs.py holds the pages against it.
+    """
+
+    name: str
+    what: str
+    places: tuple[str, ...]
+    tables: Callable[[Say], dict[str, str]]
+    missing: Callable[[], str | None] = nothing_missing
+    before: Callable[[Say], str] | None = None
+    cheap: bool = False
+
+
+PARTS = (
+    Part("parameters", "constants and counters of params.py", ("constants", "counters"), parameters.tables, cheap=True),
+    Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
+    Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
+         areas.missing, before=areas.save, cheap=True),
+    Part("instance", "instantiation template of the rendering stage", ("",), instance.tables, cheap=True),
+    Part("constants", "constants of the chip model", ("",), chip.constant_tables, cheap=True),
+    Part("dram", "access patterns on the DRAM model", ("",), chip.dram_tables),
+    Part("synthesis", "tables of make synth", ("units", "summary"), synthesis.tables, synthesis.missing),
+    Part("library", "another cell library beside our own", ("",), synthesis.library_tables, synthesis.library_missing),
+    Part("formal", "results of make formal", ("",), formal.tables, formal.missing),
+    Part("mutants", "who kills the mutants of the hardware", ("",), mutants.tables, mutants.missing),
+    Part("energy", "energy of a frame by part", ("",), energy.tables, scenes_missing),
+    Part("frames", "few configurations on real views; from the default to lanes, step by step", ("summary", "ablation"), frames.tables, scenes_missing),
+    Part("stability", "where configurations break", ("",), stability.tables),
+    Part("subnormals", "subnormal numbers flushed to zero", ("",), subnormals.tables, scenes_missing),
+    Part("pictures", "pictures, work and misses of mask generators", ("work", "slots"), pictures.tables, scenes_missing),
+    Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),
+    Part("chip", "whole frames: culling, memory, lists, sorting",
+         ("counts", "culling", "frames", "traffic", "schemes", "variations", "broadcast", "formats", "keys"), chip.tables, scenes_missing),
+    Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
+    Part("exploration", "all configurations of the report on real views, with the chart", ("explored", "halves"), exploration.tables, scenes_missing,
+         before=exploration.draw),
+)
+
+
+def texts(part: Part, say: Say) -> dict[pages.Place, str]:
+    """Text of every place of a part."""
+    found = part.tables(say)
+    if found.keys() != set(part.places):
+        raise FlickerError(f"docs: part {part.name} gave {', '.join(found)}, not {', '.join(part.places)}")
+    return {(part.name, place): text.strip() for place, text in found.items()}
+
+
+def write(part: Part, console: Console) -> None:
+    """Make a part and put it into its pages; a line on the terminal says what has changed and how long it took."""
+    began = time.monotonic()
+    with console.status(f"{part.name}: {part.what}") as status:
+        def say(text: str) -> None:
+            status.update(f"{part.name}: {text}")
+
+        done = [part.before(say)] if part.before is not None else []
+        changed = pages.put(texts(part, say))
+    done.append(", ".join(str(page.relative_to(ROOT)) for page in changed) or "no page changed")
+    console.print(f"docs: {part.name}: {'; '.join(done)} ({time.monotonic() - began:.0f} s)", highlight=False, soft_wrap=True)
+
+
+def chosen(names: list[str]) -> list[Part]:
+    """Parts by name, in the order of PARTS; all without a name. Raises FlickerError."""
+    known = {part.name for part in PARTS}
+    for name in names:
+        if name not in known:
+            raise FlickerError(f"PART: no part '{name}'; there are {', '.join(part.name for part in PARTS)}")
+    return [part for part in PARTS if not names or part.name in names]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("part", nargs="*")
+    parser.add_argument("--list", action="store_true", help="list the parts with what each lacks, write nothing")
+    options = parser.parse_args(arguments)
+    console = Console(width=None if sys.stdout.isatty() else 180)
+    wrong = 0
+    for part in chosen(options.part):
+        reason = part.missing()
+        if options.list:
+            console.print(f"{part.name:15} {part.what}" + (f" [missing: {reason}]" if reason else ""), highlight=False, soft_wrap=True, markup=False)
+        elif reason:
+            console.print(f"docs: {part.name}: {'not written' if options.part else 'skipped'}, {reason}", highlight=False, soft_wrap=True, markup=False)
+            wrong += bool(options.part)
+        else:
+            try:
+                write(part, console)
+            except FlickerError as error:
+                console.print(f"docs: {part.name}: {error}", highlight=False, soft_wrap=True, markup=False)
+                wrong += 1
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except FlickerError as error:
+        sys.exit(f"docs: {error}")

@@ -1,0 +1,18 @@
+"""Leading-zero counter: every input, in one bit, powers of two, one beside them, and the widths of the operators. Not covered: other widths."""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+
+from flicker.errors import FlickerError
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 8, 9, 11, 14])
+def test_lzc(width: int) -> None:
+    build_and_test("flk_lzc", "cocotb_lzc", parameters={"Width": width})
+
+
+def test_illegal_width() -> None:
+    with pytest.raises(FlickerError, match="Width must be at least 1"):
+        build_and_test("flk_lzc", "cocotb_lzc", parameters={"Width": 0})

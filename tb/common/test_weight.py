@@ -1,0 +1,37 @@
+"""Gaussian weight against the golden model, bit for bit: the weights, and every register on the way to them.
+
+State space: differences and shapes as in real scenes, thin slanted splats (terms that cancel), special numbers (zeros, subnormals, largest,
+infinities, NaN), any bits; random halts and bubbles with garbage on the inputs, the shape taken in its own cycle. Parameter space: both
+forms in FP16, E4M3 and E5M2 (IEEE-like with saturation); one pixel and 2 x 2, the two that the design has, and 3 x 1 for the numbering.
+Not covered: other formats, which the arithmetic units' test has.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+from flicker_tb.splats import QUICK_BUILD
+
+from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
+from flicker.errors import FlickerError
+from flicker.params import Form
+
+
+@pytest.mark.parametrize(
+    ("fmt", "cols", "rows"), [(FP16, 1, 1), (FP16, 2, 2), (E4M3, 2, 2), (E4M3, 3, 1), (E5M2, 1, 1)],
+    ids=lambda value: value.name if isinstance(value, FloatFormat) else str(value),
+)
+@pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
+def test_weight(form: Form, fmt: FloatFormat, cols: int, rows: int) -> None:
+    size = {"Cols": cols, "Rows": rows}
+    parameters = {"Form": int(form), **size, "ExpBits": fmt.exp_bits, "ManBits": fmt.man_bits, "Fn": int(fmt.fn), "Saturate": int(fmt.saturate)}
+    config = {"form": int(form), "format": fmt.name, **size}
+    build_and_test("flk_weight", "cocotb_weight", parameters=parameters, config=config, **QUICK_BUILD)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"), [({"Form": 2}, "Form must be"), ({"Cols": 0}, "Cols and Rows must be at least 1"), ({"Fn": 1}, "Saturate must be set")]
+)
+def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
+    with pytest.raises(FlickerError, match=message):
+        build_and_test("flk_weight", "cocotb_weight", parameters=parameters)

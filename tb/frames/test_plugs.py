@@ -1,0 +1,168 @@
+"""Plug points: a rendering stage and a mask generator that the project does not have, each one module and one line in a table, in a copy of the
+project; `make generate` does the rest.
+
+State space: a stage that takes its lists and gives background pixels, rendered by the harness; a generator with masks of pixels, all ones, which
+must give the picture and the cycles of `all`. Not covered: a stage with another record than the splat's (layout.RECORDS then has one more).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from flicker.toolchain import BUILD, ROOT
+
+STUB = """// Rendering stage that takes its lists and gives background pixels.
+module flk_stub_stage
+  import flk_pkg::*;
+  import flk_param_pkg::*;
+(
+  input  logic                         clk_i,
+  input  logic                         rst_ni,
+  input  logic                         clear_i,
+  output logic                         idle_o,
+  input  logic                   [2:0] mode_i,
+  input  logic             [CORES-1:0] in_valid_i,
+  output logic             [CORES-1:0] in_ready_o,
+  input  splat_elem_t      [CORES-1:0] in_elem_i,
+  output logic             [CORES-1:0] out_valid_o,
+  input  logic             [CORES-1:0] out_ready_i,
+  output core_pixel_t      [CORES-1:0] out_data_o,
+  input  logic                         clear_counters_i,
+  input  logic                         hold_counters_i,
+  input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
+  output logic      [COUNTER_BITS-1:0] counter_data_o
+);
+  logic [CORES-1:0] valid, ready, idle, in_eos, unused_clear;
+  logic [CORES-1:0][COUNTER_BITS-1:0] counter;
+  logic [2:0] unused_mode;
+
+  flk_stage_control i_control (
+    .clk_i, .rst_ni, .clear_i, .mode_i, .mode_o(unused_mode), .idle_o, .in_valid_i, .in_ready_o, .in_eos_i(in_eos), .valid_o(valid),
+    .ready_i(ready), .idle_i(idle), .counter_core_i(counter_addr_i[COUNTER_ADDR_BITS-1:COUNTER_INDEX_BITS]), .counter_i(counter),
+    .counter_data_o
+  );
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_core
+    logic busy_q;
+    logic [5:0] index_q;
+    subtile_t subtile_q;
+    generator_events_t events;
+    assign in_eos[k]      = in_elem_i[k].eos;
+    assign ready[k]       = !busy_q;
+    assign idle[k]        = !busy_q;
+    assign out_valid_o[k] = busy_q;
+    always_comb begin
+      out_data_o[k] = '0;
+      out_data_o[k].subtile = subtile_q;
+      {out_data_o[k].minitile, out_data_o[k].index} = index_q;
+      out_data_o[k].pixel.transmittance = FP16_ONE;
+      events = '0;
+      events.splat = valid[k] && ready[k] && !in_eos[k];
+      events.token = valid[k] && ready[k] && in_eos[k];
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        busy_q  <= 1'b0;
+        index_q <= '0;
+      end else if (clear_i) begin
+        busy_q  <= 1'b0;
+        index_q <= '0;
+      end else begin
+        if (events.token) busy_q <= 1'b1;
+        if (busy_q && out_ready_i[k]) begin
+          index_q <= index_q + 1'b1;
+          busy_q  <= index_q != '1;
+        end
+      end
+    end
+    always_ff @(posedge clk_i) if (events.token) subtile_q <= subtile_t'(in_elem_i[k].splat.feature[$bits(subtile_t)-1:0]);
+    flk_perf_counters i_counters (
+      .clk_i, .rst_ni, .clear_i(clear_counters_i), .hold_i(hold_counters_i), .generator_events_i(events), .dispatch_events_i('0),
+      .channel_events_i('0), .addr_i(counter_addr_i[COUNTER_INDEX_BITS-1:0]), .data_o(counter[k])
+    );
+  end
+endmodule
+"""
+STAGE_ENTRY = 'STAGES["stub"] = Stage("flk_stub_stage", "splat_elem", "core_pixel", (), "background")\n'
+GENERATOR_ENTRY = (
+    'MASK_GENERATORS["pixels"] = MaskGenerator("flk_mask_pixels", SUBTILE_PIXELS, {}, lambda config: 1, one_token=False, tests=False, note="ones")\n'
+)
+RENDER = """
+import json, sys
+import numpy as np
+from flicker import params
+from flicker.front.projection import project
+from flicker.front.records import build_lists
+from flicker.golden.render import render_golden
+from flicker.scene.demo import demo_cameras, generate
+from flicker.sim.render_stage import render_rtl
+
+camera = demo_cameras()[0].resized(64, 48)
+config = params.RenderConfig(cat=params.CatMode.OFF, mask_generator="all")
+lists = build_lists(project(generate(), camera), camera, config)
+found = {"file": params.__file__, "elements": len(lists.entry), "subtiles": lists.cols * lists.rows}
+for change in json.loads(sys.argv[1]):
+    frame = render_rtl(lists, config.with_(**change), checks=True, aborts=[(300, 2)])
+    background = (0.25, 0.5, 0.75)
+    found[json.dumps(change)] = {
+        "cycles": frame.cycles, "golden": bool((frame.pixels == render_golden(lists, config).pixels).all()),
+        "background": bool((frame.image(background) == np.array(background, np.float32)).all()), "counters": frame.counters.tolist(),
+    }
+print(json.dumps(found))
+"""
+
+
+def plug(name: str, files: dict[str, str], entry: str, changes: list[dict[str, str]]) -> dict:
+    """Copy the project, add files and a line of params.py, generate, render; asserts that nothing else was touched by hand."""
+    copy = BUILD / "plugs" / name
+    shutil.rmtree(copy, ignore_errors=True)
+    for folder in ("rtl", "model", "scripts"):
+        shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+    (copy / "build").symlink_to(BUILD)
+    for path, text in files.items():
+        (copy / path).write_text(text)
+    params = copy / "model" / "flicker" / "params.py"
+    params.write_text(params.read_text() + entry)
+    environment = {**os.environ, "PYTHONPATH": str(copy / "model"), "NUMBA_CACHE_DIR": str(BUILD / "plugs" / "numba")}
+    subprocess.run([sys.executable, copy / "scripts" / "gen_params.py"], env=environment, check=True)
+    done = subprocess.run([sys.executable, "-c", RENDER, json.dumps(changes)], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert Path(found["file"]).is_relative_to(copy), "the copy was not used"
+    return found
+
+
+def touched(name: str) -> set[str]:
+    """Files of the copy that differ from the project's, or are new."""
+    copy = BUILD / "plugs" / name
+    files = [path.relative_to(copy) for folder in ("rtl", "model", "scripts") for path in (copy / folder).rglob("*")
+             if path.is_file() and "__pycache__" not in path.parts]
+    return {str(path) for path in files if not (ROOT / path).is_file() or (ROOT / path).read_bytes() != (copy / path).read_bytes()}
+
+
+def test_stub_stage() -> None:
+    """A new rendering stage: its module, and one line by hand elsewhere."""
+    change = {"stage": "stub"}
+    found = plug("stage", {"rtl/render/flk_stub_stage.sv": STUB}, STAGE_ENTRY, [change])
+    assert found[json.dumps(change)]["background"] and not found[json.dumps(change)]["golden"]
+    counters = found[json.dumps(change)]["counters"]
+    assert sum(core[2] for core in counters) == found["elements"] and sum(core[1] for core in counters) == found["subtiles"]
+    assert touched("stage") == {"rtl/render/flk_stub_stage.sv", "model/flicker/params.py", "rtl/flk.f"}  # the last one is generated
+
+
+def test_pixel_mask_generator() -> None:
+    """A new mask generator, with 64-bit masks: all ones give picture, cycles and counters of four bits."""
+    source = (ROOT / "rtl" / "render" / "flk_mask_all.sv").read_text()
+    source = source.replace("flk_mask_all", "flk_mask_pixels").replace("MaskBits       = CHANNELS,", "MaskBits       = SUBTILE * SUBTILE,")
+    changes = [{"mask_generator": "all"}, {"mask_generator": "pixels"}]
+    found = plug("generator", {"rtl/render/flk_mask_pixels.sv": source}, GENERATOR_ENTRY, changes)
+    four, pixels = (found[json.dumps(change)] for change in changes)
+    assert pixels["golden"] and not pixels["background"]
+    assert pixels == four
+    generated = {"rtl/flk.f", "rtl/common/flk_param_pkg.sv", "rtl/render/flk_mask_generator.sv"}
+    assert touched("generator") == {"rtl/render/flk_mask_pixels.sv", "model/flicker/params.py"} | generated

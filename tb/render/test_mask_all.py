@@ -1,0 +1,24 @@
+"""Generator of full masks: every element comes out once, in order, with all bits set; acceptance stops at stall_i; counters, idle, clear.
+
+State space: random elements and tokens under idle input, blocked output and blocked acceptance; clear in mid-traffic. Parameter space: masks of
+mini-tiles and of pixels. Not covered: reset in mid-traffic (its register slice: tb/common/test_stream_cells.py).
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+
+from flicker.errors import FlickerError
+from flicker.params import CHANNELS, SUBTILE_PIXELS
+
+
+@pytest.mark.parametrize("bits", [CHANNELS, SUBTILE_PIXELS])
+def test_mask_all(bits: int) -> None:
+    settings = {"MaskBits": bits}
+    build_and_test("flk_mask_all", "cocotb_mask_all", parameters=settings, config=settings)
+
+
+def test_illegal_mask() -> None:
+    with pytest.raises(FlickerError, match="MaskBits must be 4 .* or 64"):
+        build_and_test("flk_mask_all", "cocotb_mask_all", parameters={"MaskBits": 5})
