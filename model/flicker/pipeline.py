@@ -96,13 +96,13 @@ def render_view(
             build(config)
         with steps.bar("simulating the RTL") as report:
             rtl = render_rtl(lists, config, progress=report)
-        image = rtl.image()
+        image = rtl.image(view.background)
         sent = int(rtl.channel_counter("minitiles_sent").sum())
         stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent} | rtl_stats(rtl, config)
     elif engine is Engine.GOLDEN:
         with steps.step("rendering with the golden model"):
             frame = render_golden(lists, config)
-        image = frame.image()
+        image = frame.image(view.background)
         sent = frame.total("minitiles_sent")
         stats |= {
             "minitiles_sent": sent,

@@ -19,7 +19,7 @@ import scene_samples as samples
 
 from flicker.scene.demo import write_demo
 from flicker.scene.files import load_scene, save_ply
-from flicker.scene.image import load_png
+from flicker.scene.image import load_picture
 
 
 def flicker(*args: object) -> subprocess.CompletedProcess:
@@ -44,7 +44,7 @@ def test_engines_and_files(demo, tmp_path):
                       "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
         assert run.returncode == 0, run.stderr
         stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
-        pictures[engine] = load_png(tmp_path / f"{engine}.png")
+        pictures[engine] = load_picture(tmp_path / f"{engine}.png")
         assert pictures[engine].shape == (90, 160, 3)
     assert np.array_equal(pictures["golden"], pictures["rtl"])
     assert not np.array_equal(pictures["golden"], pictures["reference"])
@@ -108,7 +108,7 @@ def test_scenes_as_people_have_them(demo, tmp_path):
         path = tmp_path / "s.json"
         done = flicker("render", scene, "--size", "64x48", "--out", tmp_path / "p.png", "--stats", path, *args)
         assert done.returncode == 0, done.stderr
-        return json.loads(path.read_text()) | {"picture": load_png(tmp_path / "p.png").tobytes()}, done.stdout, done.stderr
+        return json.loads(path.read_text()) | {"picture": load_picture(tmp_path / "p.png").tobytes()}, done.stdout, done.stderr
 
     found = {name: run(tmp_path / name) for name in ("robot", "robot/meta.json", "robot.zip", "robot.ply")}
     stats = [f[0] for f in found.values()]

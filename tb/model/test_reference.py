@@ -22,7 +22,7 @@ from flicker.front.projection import project
 from flicker.front.reference import render_reference, render_with_transmittance
 from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.files import Scene, load_scene
-from flicker.scene.image import load_png, save_png
+from flicker.scene.image import load_picture, save_png
 from flicker.scene.metrics import psnr, ssim
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
@@ -233,13 +233,13 @@ def test_metrics_and_pictures(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="shape"):
         psnr(a, a[1:])
     save_png(tmp_path / "a.png", a * 1.2 - 0.1)
-    back = load_png(tmp_path / "a.png")
+    back = load_picture(tmp_path / "a.png")
     assert back.shape == a.shape and np.abs(back - np.clip(a * 1.2 - 0.1, 0, 1)).max() <= 0.5 / 255 + 1e-12
     (tmp_path / "b.png").write_bytes(b"not a picture")
     with pytest.raises(FlickerError, match="b.png"):
-        load_png(tmp_path / "b.png")
+        load_picture(tmp_path / "b.png")
     with pytest.raises(FlickerError, match="none.png"):
-        load_png(tmp_path / "none.png")
+        load_picture(tmp_path / "none.png")
 
 
 SCENES = {"flowers": "flowers.compressed.ply", "guitar": "guitar.ply", "playbot": "playbot.sog", "stpeter": "st-peter.sog"}
@@ -257,6 +257,6 @@ def test_real_scenes(name: str, unpacked: bool, tmp_path: Path) -> None:
     assert scene.rejected == {}
     for k, camera in enumerate(load_cameras(folder / "cameras.json")):
         picture = render_reference(project(scene, camera), camera)
-        value = psnr(picture, load_png(folder / "reference" / f"{k:03d}.png"))
+        value = psnr(picture, load_picture(folder / "reference" / f"{k:03d}.png"))
         print(f"{name} {k}: {value:.2f} dB")
         assert value >= 55

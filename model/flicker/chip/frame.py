@@ -81,7 +81,7 @@ class Prepared:
 def prepare(view: View, cluster_size: int = c.CLUSTER_SIZE) -> Prepared:
     """Put the scene of a view into the order of memory."""
     scene, clusters = build_clusters(view.scene, cluster_size)
-    view = View(view.camera, scene, name=view.name, number=view.number)
+    view = View(view.camera, scene, name=view.name, number=view.number, background=view.background)
     return Prepared(view, clusters, collect(view.projected, view.camera), consumed(view.projected, view.lists(Form.FACTORED)))
 
 

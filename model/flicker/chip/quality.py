@@ -37,7 +37,7 @@ def format_quality(view: View, cluster_size: int = CLUSTER_SIZE) -> list[FormatQ
     """Every memory format, after a first row for the scene as loaded (float32)."""
     scene, clusters = build_clusters(view.scene, cluster_size)
     configuration = get_configuration("flicker")
-    base = View(view.camera, scene)
+    base = View(view.camera, scene, background=view.background)
 
     def golden(v: View) -> float:
         return psnr(run(configuration, v).image, base.reference)
@@ -45,7 +45,7 @@ def format_quality(view: View, cluster_size: int = CLUSTER_SIZE) -> list[FormatQ
     numbers = 11 + 3 * scene.sh.shape[1]
     rows = [FormatQuality("float32", 4 * numbers * len(scene), 4 * numbers, float("inf"), golden(base))]
     for form in MemoryFormat:
-        other = View(view.camera, through_memory(scene, form, cluster_size))
+        other = View(view.camera, through_memory(scene, form, cluster_size), background=view.background)
         size = layout(form, scene.sh.shape[1])
         rows.append(FormatQuality(
             form.value, size.total(len(scene), len(clusters)), size.geometry + size.colour, psnr(other.reference, base.reference), golden(other),

@@ -13,9 +13,11 @@ from .options import parse_size
 
 
 def report(
-    scenes: Annotated[list[str] | None, typer.Argument(help="scene files, FILE or FILE:VIEW [default: the demo scene]")] = None,
+    scenes: Annotated[list[str] | None, typer.Argument(help="scenes: FILE, FILE:VIEW, FILE:FIRST-LAST or FILE:all [default: the demo scene]")] = None,
     out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures")] = Path("build/report"),
-    size: Annotated[str, typer.Option(help="WxH of every view")] = "1280x720",
+    size: Annotated[str | None, typer.Option(help="WxH of every view [default: the camera's where there is a photograph, else 1280x720]")] = None,
+    photos: Annotated[str | None, typer.Option(help="folder of photographs by img_name, or none [default: those found beside cameras.json]")] = None,
+    background: Annotated[str, typer.Option(help="black, white or r,g,b from 0 to 1: as the scene was fitted")] = "black",
     configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
     store: Annotated[Path | None, typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
@@ -27,6 +29,7 @@ def report(
         from ..explore.configurations import CONFIGURATIONS
         from ..explore.store import DEFAULT
         from ..report.write import check, write_report
+        from ..scene.photos import parse_background
     if show:
         for c in CONFIGURATIONS.values():
             console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
@@ -35,7 +38,11 @@ def report(
     names = None if configs is None else [n.strip() for n in configs.split(",")]
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
-    job = check(scenes or [], out, wanted, names, store or DEFAULT)
+    try:
+        behind = parse_background(background)
+    except FlickerError as error:
+        raise FlickerError(f"--{error}") from None
+    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind)
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(

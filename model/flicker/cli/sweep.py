@@ -64,7 +64,7 @@ def summary(rows: list[dict]) -> Table:
     table = Table()
     columns: tuple[tuple[str, Literal["left", "right"]], ...] = (
         ("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"), ("SSIM", "right"), ("FLIP", "right"),
-        ("GE", "right"), ("uJ", "right"),
+        ("photo dB", "right"), ("GE", "right"), ("uJ", "right"),
     )
     for name, justify in columns:
         table.add_column(name, justify=justify, no_wrap=True)
@@ -75,6 +75,6 @@ def summary(rows: list[dict]) -> Table:
     for row in rows:
         table.add_row(
             row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), text(row["psnr_db"], ".2f"), text(row["ssim"], ".4f"),
-            text(row["flip"], ".4f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
+            text(row["flip"], ".4f"), text(row["photo_psnr_db"], ".2f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
         )
     return table

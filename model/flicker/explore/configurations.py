@@ -98,9 +98,9 @@ def get_configuration(name: str) -> Configuration:
     return CONFIGURATIONS[name]
 
 
-def run(configuration: Configuration | str, view: View, background=(0.0, 0.0, 0.0)) -> Result:
+def run(configuration: Configuration | str, view: View) -> Result:
     """`machine.run` of a configuration or of its name."""
-    return machine.run(get_configuration(configuration) if isinstance(configuration, str) else configuration, view, background)
+    return machine.run(get_configuration(configuration) if isinstance(configuration, str) else configuration, view)
 
 
 def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:

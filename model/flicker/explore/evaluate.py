@@ -25,7 +25,8 @@ CLOCK_HZ = 1e9
 
 @dataclass
 class Evaluation:
-    """row: numbers by column. counters: None where no cycle model of the stage applies (its cycles are a closed form).
+    """row: numbers by column; `photo_psnr_db`, `photo_ssim`, and the same of the float64 reference with `reference_` before, are against the view's
+    photograph, None where it has none. counters: None where no cycle model of the stage applies (its cycles are a closed form).
     energy: microjoules by part."""
 
     configuration: Configuration
@@ -68,6 +69,13 @@ def work_counts(work: Work, width: int, height: int) -> dict[str, float]:
     }
 
 
+def photo_quality(view: View, image: np.ndarray, prefix: str = "") -> dict[str, float | None]:
+    """A picture of the view against its photograph."""
+    if view.photo is None:
+        return {f"{prefix}photo_psnr_db": None, f"{prefix}photo_ssim": None}
+    return {f"{prefix}photo_psnr_db": metrics.psnr(image, view.photo), f"{prefix}photo_ssim": metrics.ssim(image, view.photo)}
+
+
 def evaluate(view: View, configuration: Configuration | str) -> Evaluation:
     """Run a configuration on a view."""
     if isinstance(configuration, str):
@@ -83,7 +91,8 @@ def evaluate(view: View, configuration: Configuration | str) -> Evaluation:
         "width": view.camera.width, "height": view.camera.height, "cycles": cycles, "fps": CLOCK_HZ / cycles if cycles else None,
         "bound_cycles": bound, "bound_share": bound / cycles if cycles else None,
         "psnr_db": metrics.psnr(result.image, view.reference), "ssim": metrics.ssim(result.image, view.reference),
-        "flip": metrics.flip(result.image, view.reference), "area_ge": configuration.area(), "energy_uj": sum(energy.values()),
+        "flip": metrics.flip(result.image, view.reference), **photo_quality(view, result.image), **photo_quality(view, view.reference, "reference_"),
+        "area_ge": configuration.area(), "energy_uj": sum(energy.values()),
         "vru_utilisation": configuration.stage.utilisation(counters) if counters else None, "ctu_stall_rate": counters.stall_rate if counters else None,
         "model_only": configuration.model_only, **counts, **{"energy_uj_" + re.sub(r"\W+", "_", part): value for part, value in energy.items()},
     }

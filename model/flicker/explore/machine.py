@@ -204,8 +204,8 @@ class Result:
     lists: SubtileLists
 
 
-def run(configuration: Configuration, view: View, background=(0.0, 0.0, 0.0)) -> Result:
-    """Masks, picture and work of a configuration in a view."""
+def run(configuration: Configuration, view: View) -> Result:
+    """Masks, picture (over the view's background) and work of a configuration in a view."""
     lists = view.lists(configuration.form, configuration.lists)
     order, core_start = stream_order(lists)
     masks = configuration.generator.masks(view, lists, order, core_start, configuration.stage)
@@ -215,7 +215,7 @@ def run(configuration: Configuration, view: View, background=(0.0, 0.0, 0.0)) ->
         lists.cols, lists.rows, order, core_start, lists.start, lists.entry, masks.test_cycles, masks.evaluations, masks.mask,
         masks.visit, contributing, pixel_finish, fallen,
     )
-    return Result(configuration, assemble(lists, pixels, background), work.until_finished() if configuration.stop else work, lists)
+    return Result(configuration, assemble(lists, pixels, view.background), work.until_finished() if configuration.stop else work, lists)
 
 
 def subtile_cycles(work: Work, counters: StageCycles) -> np.ndarray:

@@ -6,20 +6,27 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import camera_count, cameras_beside
+from ..scene.camera import ORBIT_VIEWS, Camera, cameras_beside, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
+from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
+
+SIZE = (1280, 720)  # of views without a photograph when none is asked for
 
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene and its cameras. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit."""
+    """A scene, its cameras, its photographs. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit.
+    photos: a folder with the photograph of every camera; None: those found beside the cameras; `none`: none. background: RGB in [0, 1]."""
 
     path: str
     cameras: str | None = None
     up: str | None = None
+    photos: str | None = None
+    background: tuple[float, float, float] = BLACK
 
     @property
     def file(self) -> str:
@@ -31,20 +38,56 @@ class SceneFile:
         """The same without its suffixes."""
         return self.path if self.path == DEMO else scene_name(self.path)
 
-    def views(self) -> int:
-        """Number of cameras."""
+    @property
+    def cameras_file(self) -> Path | None:
+        """The file that the cameras come from; None: there is none."""
+        if self.path == DEMO:
+            return None
+        return Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
+
+    @cached_property
+    def _cameras(self) -> list[Camera] | None:
+        """The cameras; None: an orbit, which needs the scene."""
         if self.path == DEMO:
             from ..scene.demo import demo_cameras
 
-            return len(demo_cameras())
-        return camera_count(self.path, self.cameras, self.up)
+            return demo_cameras()
+        return stored_cameras(self.path, self.cameras, self.up)
+
+    def views(self) -> int:
+        """Number of cameras."""
+        return ORBIT_VIEWS if self._cameras is None else len(self._cameras)
+
+    def photo(self, view: int) -> Path | None:
+        """The photograph of a view; None: there is none. FlickerError when one was asked for, or when two are found."""
+        if self.photos == NONE:
+            return None
+        camera = None if self._cameras is None else self._cameras[view]
+        if camera is None or camera.img_name is None or self.cameras_file is None:
+            if self.photos is None:
+                return None
+            raise FlickerError(f"photos: {self.path}: view {view} has no 'img_name' in a cameras.json, by which its photograph would be found")
+        if self.photos is not None:
+            return photo_in(Path(self.photos), camera.img_name)
+        return photo_beside(self.cameras_file, camera.img_name)
+
+    def target(self, view: int, size: tuple[int, int] | None = None) -> Target:
+        """A view of the scene, with its photograph checked. size: None: that of the camera where it has a photograph, else `SIZE`. FlickerError."""
+        if view >= (count := self.views()):
+            raise FlickerError(f"view {view}: there are {count} cameras, 0 to {count - 1}")
+        photo = self.photo(view)
+        if photo is None or self._cameras is None:
+            return Target(self, view, size or SIZE)
+        size = size or (self._cameras[view].width, self._cameras[view].height)
+        check_photo(photo, size)
+        return Target(self, view, size)
 
     @cached_property
     def digest(self) -> str:
         """Of the contents of scene and cameras; the demo scene is code."""
         if self.path == DEMO:
             return ""
-        cameras = Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
+        cameras = self.cameras_file
         return "-".join((scene_digest(self.path)[:16], file_digest(cameras) if cameras else "orbit", self.up or ""))
 
 
@@ -60,12 +103,22 @@ class Target:
     def title(self) -> str:
         return f"{self.scene.name} {self.view}"
 
+    @cached_property
+    def photo(self) -> Path | None:
+        """Its photograph."""
+        return self.scene.photo(self.view)
+
+    @cached_property
+    def looks(self) -> str:
+        """Background and content of the photograph: what results depend on beside scene, cameras, size."""
+        return f"{self.scene.background} {'' if self.photo is None else file_digest(self.photo)}"
+
     def load(self) -> View:
-        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up)
+        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up, self.scene.background, self.photo)
 
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""
-        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, *parts)
+        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, self.looks, *parts)
 
 
 @dataclass(frozen=True)

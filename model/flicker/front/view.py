@@ -14,6 +14,7 @@ from ..params import Coords, Form
 from ..scene import Scene, load_scene
 from ..scene.camera import Camera, find_cameras, select_view
 from ..scene.files import scene_name
+from ..scene.photos import BLACK, load_photo
 from .lists import DERIVED, subtile_lists
 from .projection import Projected, project
 from .records import SubtileLists
@@ -28,16 +29,20 @@ class View:
 
     scene: of the view; None where only its projection is given. projected: splats near to far. name, number: of the scene and its camera, for
     tables. coords: where means are rounded to FP16. origin: position of the picture's first pixel on the screen, when the picture is a window of a larger one;
-    matters for absolute coordinates only.
+    matters for absolute coordinates only. background: RGB in [0, 1] that every picture of the view is drawn over. photo: float64 (H, W, 3) in [0, 1], what a
+    camera saw of it; None where nobody knows.
     """
 
     def __init__(
         self, camera: Camera, scene: Scene | None = None, projected: Projected | None = None, *, name: str = "", number: int = 0,
-        coords: Coords = Coords.LOCAL, origin: tuple[int, int] = (0, 0),
+        coords: Coords = Coords.LOCAL, origin: tuple[int, int] = (0, 0), background: tuple[float, float, float] = BLACK, photo: np.ndarray | None = None,
     ) -> None:
         if scene is None and projected is None:
             raise ValueError("a view needs a scene or its projection")
+        if photo is not None and photo.shape != (camera.height, camera.width, 3):
+            raise ValueError(f"a photograph of shape {photo.shape} is not of a camera of {camera.width}x{camera.height}")
         self.camera, self._scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
+        self.background, self.photo = background, photo
         if projected is not None:
             self.projected = projected
         self._kept: dict = {}
@@ -55,7 +60,7 @@ class View:
     @cached_property
     def reference(self) -> np.ndarray:
         """float64 (H, W, 3): the picture that everything is compared with."""
-        return render_reference(self.projected, self.camera)
+        return render_reference(self.projected, self.camera, self.background)
 
     def lists(self, form: Form, kind: str = "subtile") -> SubtileLists:
         """Lists of a kind (`front.lists.LISTS`) with records of a form."""
@@ -81,10 +86,12 @@ class View:
 
 def load_view(
     scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None, up: str | None = None,
+    background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
 ) -> View:
     """The view of a scene from its camera `number`. size: (width, height), scales the focal lengths; None: as the camera has it.
 
     scene: a file, a folder, `demo` for the project's own scene, or a loaded one. cameras, up: as in `find_cameras`.
+    background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`).
     FlickerError, naming file and field, for what cannot be read.
     """
     if isinstance(scene, Scene):
@@ -99,4 +106,7 @@ def load_view(
         found = find_cameras(loaded, cameras, up)
         name = scene_name(scene)
     camera = select_view(found, number)
-    return View(camera if size is None else camera.resized(*size), loaded, name=name, number=number)
+    if size is not None:
+        camera = camera.resized(*size)
+    seen = None if photo is None else load_photo(Path(photo), (camera.width, camera.height), background)
+    return View(camera, loaded, name=name, number=number, background=background, photo=seen)

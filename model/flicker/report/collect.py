@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..cost.energy import memory_energy
 from ..explore.configurations import CONFIGURATIONS, get_configuration, group
 from ..explore.evaluate import evaluate
 from ..explore.facts import as_bytes, duplicates, fifo_sweep, heat_maps
-from ..explore.points import Point, Target
+from ..explore.points import Point, SceneFile, Target
 from ..explore.store import Store
 from ..front.view import View
 
@@ -30,7 +31,7 @@ class ViewResult:
     """One view. rows, maps, pictures: by name of the configuration.
 
     rows: as `Evaluation.row`. facts: `duplicates`, `fifo`, `chip`. maps: of the configurations in `MAPPED`, arrays by name
-    (`heat_maps`). pictures: uint8 (H, W, 3) of `PICTURED`. reference: uint8 (H, W, 3).
+    (`heat_maps`). pictures: uint8 (H, W, 3) of `PICTURED`. reference: uint8 (H, W, 3). count: of the views whose mean this is.
     """
 
     target: Target
@@ -39,6 +40,39 @@ class ViewResult:
     maps: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     pictures: dict[str, np.ndarray] = field(default_factory=dict)
     reference: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 3), np.uint8))
+    count: int = 1
+
+    @property
+    def title(self) -> str:
+        return self.target.title if self.count == 1 else f"{self.target.scene.name}, {self.count} views"
+
+    @property
+    def photographed(self) -> bool:
+        """Whether its configurations were measured against a photograph."""
+        return any(row.get("photo_psnr_db") is not None for row in self.rows.values())
+
+
+def _mean(values: list) -> Any:
+    """Mean of numbers, by item of lists and dictionaries; of other things the most frequent one."""
+    first = values[0]
+    if isinstance(first, dict):
+        return {key: _mean([value[key] for value in values]) for key in first if all(key in value for value in values)}
+    if isinstance(first, list):
+        return [_mean(list(items)) for items in zip(*values)]
+    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
+        return sum(values) / len(values)
+    return max(values, key=values.count)
+
+
+def by_scene(views: Sequence[ViewResult]) -> list[ViewResult]:
+    """One result a scene: rows and facts are means over its views, without maps and pictures."""
+    groups: dict[SceneFile, list[ViewResult]] = {}
+    for view in views:
+        groups.setdefault(view.target.scene, []).append(view)
+    return [
+        group[0] if len(group) == 1 else ViewResult(group[0].target, _mean([v.rows for v in group]), _mean([v.facts for v in group]), count=len(group))
+        for group in groups.values()
+    ]
 
 
 class _Collector:

@@ -1,7 +1,8 @@
 "use strict";
 const AXES = {
   cycles: ["cycles of the rendering stage", false, true], fps: ["FPS at 1 GHz", true, true], psnr_db: ["PSNR, dB", true, false], ssim: ["SSIM", true, false],
-  flip: ["FLIP", false, false], area_ge: ["area, GE", false, false], energy_uj: ["energy, uJ a frame", false, true],
+  flip: ["FLIP", false, false], photo_psnr_db: ["PSNR against photographs, dB", true, false], photo_ssim: ["SSIM against photographs", true, false],
+  area_ge: ["area, GE", false, false], energy_uj: ["energy, uJ a frame", false, true],
 };
 const NS = "http://www.w3.org/2000/svg", svg = document.getElementById("scatter"), read = document.getElementById("read");
 const W = 900, H = 480, L = 70, R = 20, T = 15, B = 45;
@@ -33,7 +34,7 @@ function add(name, attributes, text) {
 function show(n, digits) { return n === null || n === undefined ? "-" : n.toLocaleString("en", { maximumFractionDigits: digits }); }
 function describe(p) {
   return `${p.config}\n${p.title || ""}\n${p.bound ? "masks for free: a bound, not a design" : p.model_only ? "model only, no RTL" : "RTL exists"}\n\ncycles   ${show(p.cycles, 0)}\nFPS      ${show(p.fps, 0)} at 1 GHz\n` +
-    `PSNR     ${p.psnr_db === null ? "equal" : show(p.psnr_db, 2) + " dB"}\nSSIM     ${show(p.ssim, 5)}\nFLIP     ${show(p.flip, 5)}\narea     ${show(p.area_ge, 0)} GE\nenergy   ${show(p.energy_uj, 1)} uJ`;
+    `PSNR     ${p.psnr_db === null ? "equal" : show(p.psnr_db, 2) + " dB"}\nSSIM     ${show(p.ssim, 5)}\nFLIP     ${show(p.flip, 5)}\nphoto    ${p.photo_psnr_db === null ? "none" : show(p.photo_psnr_db, 2) + " dB, SSIM " + show(p.photo_ssim, 4)}\narea     ${show(p.area_ge, 0)} GE\nenergy   ${show(p.energy_uj, 1)} uJ`;
 }
 function ticks(low, high, log) {
   const out = [];

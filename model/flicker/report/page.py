@@ -23,7 +23,7 @@ def _e(text: object) -> str:
 
 def _points(views: Sequence[ViewResult]) -> str:
     """The configurations as JSON for the chart: numbers that JSON has, inf as null."""
-    keys = ("config", "title", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only")
+    keys = ("config", "title", "cycles", "psnr_db", "ssim", "flip", "photo_psnr_db", "photo_ssim", "area_ge", "energy_uj", "model_only")
     groups = {v.target.title: list(v.rows.values()) for v in views}
     if len(views) > 1:
         groups["all views"] = overall(views)
@@ -32,7 +32,7 @@ def _points(views: Sequence[ViewResult]) -> str:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     data = {
-        title: [{k: plain(p[k]) for k in keys} | {"bound": is_bound(p["config"])} for p in points] for title, points in groups.items()
+        title: [{k: plain(p.get(k)) for k in keys} | {"bound": is_bound(p["config"])} for p in points] for title, points in groups.items()
     }
     return json.dumps(data, default=float).replace("</", "<\\/")
 

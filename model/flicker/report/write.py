@@ -23,12 +23,13 @@ from ..explore.store import DEFAULT, Store
 from ..front.view import DEMO
 from ..scene.camera import Camera
 from ..scene.files import scene_kind
+from ..scene.photos import BLACK
 from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import own_figures, paper_figures, stability_table
 from .page import page
 
-SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only")
+SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "photo_psnr_db", "photo_ssim", "area_ge", "energy_uj", "model_only")
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,6 @@ class Job:
 
     targets: tuple[Target, ...]
     configurations: tuple[str, ...]
-    size: tuple[int, int]
     folder: Path
     store: Path
 
@@ -51,28 +51,49 @@ class Written:
     verdicts: tuple[Verdict, ...]
 
 
-def parse_target(text: str, size: tuple[int, int]) -> Target:
-    """`FILE` or `FILE:VIEW`; FlickerError when there is no such file or view."""
-    path, view = Path(text), 0
+def _views(text: str, count: int) -> list[int] | None:
+    """What stands behind the colon of a scene: `3`, `0-12` or `all`; None: it is no such thing."""
+    first, dash, last = text.partition("-")
+    if text == "all":
+        return list(range(count))
+    if not first.isdigit() or (dash and not last.isdigit()):
+        return None
+    return list(range(int(first), int(last if dash else first) + 1))
+
+
+def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = None, background: tuple[float, float, float] = BLACK) -> list[Target]:
+    """`FILE` (its view 0), `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
+    path, views = Path(text), "0"
     head, colon, tail = text.rpartition(":")
-    if colon and not path.exists() and tail.isdigit():
-        path, view = Path(head), int(tail)
+    if colon and not path.exists() and _views(tail, 0) is not None:
+        path, views = Path(head), tail
     if not path.exists():
         raise FlickerError(f"{path}: no such scene")
     if not os.access(path, os.R_OK):
         raise FlickerError(f"{path}: not readable")
     scene_kind(path)
-    scene = SceneFile(str(path))
-    if view >= (count := scene.views()):
-        raise FlickerError(f"{path}: view {view}: there are {count} cameras, 0 to {count - 1}")
-    return Target(scene, view, size)
+    scene = SceneFile(str(path), photos=photos, background=background)
+    numbers = _views(views, scene.views())
+    if not numbers:
+        raise FlickerError(f"{path}: views {views}: there are none")
+    try:
+        return [scene.target(number, size) for number in numbers]
+    except FlickerError as error:
+        raise FlickerError(f"{path}: {error}" if str(error).startswith("view ") else str(error)) from None
 
 
 def check(
-    scenes: Sequence[str], folder: Path, size: tuple[int, int], configurations: Sequence[str] | None = None, store: Path = DEFAULT,
+    scenes: Sequence[str], folder: Path, size: tuple[int, int] | None = None, configurations: Sequence[str] | None = None, store: Path = DEFAULT,
+    photos: str | None = None, background: tuple[float, float, float] = BLACK,
 ) -> Job:
-    """All that can be wrong is found here, before any work; FlickerError. Without scenes the demo scene is taken."""
-    targets = [parse_target(text, size) for text in scenes] or [Target(SceneFile(DEMO), 0, size)]
+    """All that can be wrong is found here, before any work; FlickerError. Without scenes the demo scene is taken.
+
+    size: None: every camera's own where there is a photograph, else `explore.points.SIZE`. photos, background: as in `SceneFile`.
+    """
+    if size is not None:
+        Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
+    targets = [target for text in scenes for target in parse_targets(text, size, photos, background)]
+    targets = targets or [SceneFile(DEMO, photos=photos, background=background).target(0, size)]
     for i, target in enumerate(targets):
         if any(t.title == target.title for t in targets[:i]):
             raise FlickerError(f"{target.scene.path}: scene {target.title} is there twice")
@@ -80,14 +101,13 @@ def check(
         names = group("report") if configurations is None else matching(configurations)
     except FlickerError as error:
         raise FlickerError(f"--configs: {error}") from None
-    Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
     for part in (folder, folder / "figures"):
         check_folder(part)
     Store(store)
     for name in ("index.html", "summary.csv"):
         if (folder / name).is_dir():
             raise FlickerError(f"{folder / name}: is a folder")
-    return Job(tuple(targets), tuple(names), size, folder, store)
+    return Job(tuple(targets), tuple(names), folder, store)
 
 
 def _stability(store: Store, seed: int) -> Stability:
@@ -116,7 +136,9 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     for figure in (*paper, chart, *heats, table):
         figure.write(job.folder / "figures")
     about = {
-        "views": ", ".join(v.target.title for v in views), "size": f"{job.size[0]}x{job.size[1]}", "configurations": str(len(job.configurations)),
+        "views": ", ".join(v.target.title for v in views), "size": ", ".join(dict.fromkeys(f"{w}x{h}" for w, h in (t.size for t in job.targets))),
+        "photographs": f"of {sum(t.photo is not None for t in job.targets)} of {len(views)} views, averaged to the picture's size",
+        "background": ", ".join(dict.fromkeys(" ".join(f"{c:g}" for c in t.scene.background) for t in job.targets)), "configurations": str(len(job.configurations)),
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }

@@ -32,6 +32,7 @@ class Camera:
     width, height: pixels, 1 to 16384. fx, fy: focal lengths in pixels.
     position: float64 (3,), camera centre in the world.
     rotation: float64 (3, 3), camera to world, columns right, down, forward.
+    name: for people. img_name: name of its photograph; None: it has none.
     Raises FlickerError, naming the field, when a value makes no camera.
     """
 
@@ -42,6 +43,7 @@ class Camera:
     position: np.ndarray
     rotation: np.ndarray
     name: str = field(default="")
+    img_name: str | None = None
 
     def __post_init__(self) -> None:
         for key in ("width", "height"):
@@ -105,8 +107,9 @@ def load_cameras(path: str | Path) -> list[Camera]:
         for key in _KEYS:
             if key not in entry:
                 raise FlickerError(f"{where}: '{key}' is missing")
+        img_name = None if entry.get("img_name") is None else str(entry["img_name"])
         try:
-            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=str(entry.get("img_name", i))))
+            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name))
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
     return cameras

@@ -1,7 +1,9 @@
-"""Pictures in files: PNG, 8 bits a channel."""
+"""Pictures in files, 8 bits a channel: PNG is written, what Pillow knows is read."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +18,28 @@ def save_png(path: str | Path, image: np.ndarray) -> None:
     Image.fromarray(pixels).save(path, format="PNG")
 
 
-def load_png(path: str | Path) -> np.ndarray:
-    """float64 (H, W, 3) in [0, 1]."""
+@contextmanager
+def _opened(path: str | Path) -> Iterator[Image.Image]:
+    """A picture of a file; FlickerError, naming it, for whatever goes wrong in reading it."""
     try:
         with Image.open(path) as picture:
-            return np.asarray(picture.convert("RGB"), np.float64) / 255.0
+            yield picture
     except UnidentifiedImageError:
         raise FlickerError(f"{path}: not a picture") from None
-    except (OSError, SyntaxError, ValueError) as error:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise FlickerError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
+def picture_size(path: str | Path) -> tuple[int, int]:
+    """(width, height) of a picture, without its pixels."""
+    with _opened(path) as picture:
+        return picture.size
+
+
+def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """float64 (H, W, 3) in [0, 1]; what is transparent is composed over the background, as the values are stored (no gamma)."""
+    with _opened(path) as picture:
+        if picture.mode.startswith(("I", "F")):
+            raise FlickerError(f"{path}: pixels of more than 8 bits (mode {picture.mode}) are not read")
+        rgba = np.asarray(picture.convert("RGBA"), np.float64) / 255.0
+        return rgba[..., :3] * rgba[..., 3:] + np.asarray(background, np.float64) * (1.0 - rgba[..., 3:])

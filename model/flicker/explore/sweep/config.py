@@ -15,10 +15,11 @@ from ...errors import FlickerError
 from ...front.view import DEMO
 from ...scene.camera import MAX_SIZE
 from ...scene.files import scene_kind
+from ...scene.photos import NONE, parse_background
 from ...toolchain import BUILD
 from ..configurations import GROUPS, matching
 from ..digest import code_digest, key
-from ..points import Point, SceneFile, Target
+from ..points import SIZE, Point, SceneFile, Target
 
 MAX_WORKERS = 1024
 
@@ -41,7 +42,7 @@ class Sweep:
     def description(self) -> dict[str, Any]:
         """What the results stand for: scenes by content, views, sizes, configurations, and the code."""
         return {
-            "views": [{"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size)} for t in self.targets],
+            "views": [{"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size), "looks": t.looks} for t in self.targets],
             "configurations": list(self.configurations),
             "code": code_digest(),
         }
@@ -86,6 +87,8 @@ class SceneSection(_Section):
     cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras.json instead of the one beside the scene")] = None
     views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
     up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
+    photos: Annotated[StrictStr | None, Field(min_length=1, description="folder of photographs instead of those beside the cameras, or none")] = None
+    background: Annotated[StrictStr, Field(description="black, white or r,g,b from 0 to 1")] = "black"
 
     @model_validator(mode="before")
     @classmethod
@@ -121,13 +124,15 @@ class SweepFile(_Section):
         list[StrictStr] | Literal["all"], Field(description="list of names or patterns (flicker report --list), or all: those of the report"),
     ]
     views: Annotated[Views, Field(description="camera numbers of every scene without its own")] = [0]
-    size: Annotated[StrictStr, Field(description="WxH")] = "1280x720"
+    size: Annotated[StrictStr | None, Field(description="WxH")] = None
     cluster: Annotated[ClusterSection | None, Field(description="workers, or address")] = None
     out: Annotated[StrictStr | None, Field(min_length=1, description="folder, relative to the current one")] = None
 
     @field_validator("size")
     @classmethod
-    def _size(cls, value: str) -> str:
+    def _size(cls, value: str | None) -> str | None:
+        if value is None:
+            return None
         parts = value.lower().split("x")
         if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
             raise ValueError(f"expected WxH such as 1280x720, not '{value}'")
@@ -195,24 +200,30 @@ def _path(base: Path, text: str, where: str) -> Path:
 
 
 def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
+    try:
+        background = parse_background(section.background)
+    except FlickerError as error:
+        raise FlickerError(f"{base}: {where}: {error}") from None
     if section.path == DEMO:
         if section.cameras is not None:
             raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
-        return SceneFile(DEMO)
+        return SceneFile(DEMO, photos=section.photos, background=background)
     path = _path(base, section.path, where)
     cameras = None if section.cameras is None else str(_path(base, section.cameras, f"{where}: cameras"))
     try:
         scene_kind(path)
     except FlickerError as error:
         raise FlickerError(f"{base}: {where}: {error}") from None
-    return SceneFile(str(path), cameras, section.up)
+    photos = section.photos if section.photos in (None, NONE) else str((base.parent / Path(section.photos).expanduser()).resolve())
+    return SceneFile(str(path), cameras, section.up, photos, background)
 
 
 def load_sweep(path: str | Path) -> Sweep:
     """Read and check a sweep. FlickerError, naming file and key, for anything that could not be run."""
     path = Path(path)
     given = _parse(path)
-    size = tuple(int(p) for p in given.size.lower().split("x"))
+    width, height = (int(p) for p in given.size.lower().split("x")) if given.size else SIZE
+    size = (width, height) if given.size else None
     try:
         names = matching(GROUPS["report"] if given.configurations == "all" else given.configurations)
     except FlickerError as error:
@@ -224,17 +235,15 @@ def load_sweep(path: str | Path) -> Sweep:
     for i, section in enumerate(given.scenes):
         where = f"scenes[{i}]"
         scene = _scene(path, section, where)
-        try:
-            count = scene.views()
-        except FlickerError as error:
-            raise FlickerError(f"{path}: {where}: {error}") from None
         for view in dict.fromkeys(section.views if section.views is not None else given.views):
-            if view >= count:
-                raise FlickerError(f"{path}: {where}: view {view}: there are {count} cameras, 0 to {count - 1}")
+            try:
+                target = scene.target(view, size)
+            except FlickerError as error:
+                raise FlickerError(f"{path}: {where}: {error}") from None
             if (same := (scene.file, scene.digest, view)) in seen:
                 raise FlickerError(f"{path}: scenes: view {view} of {scene.path} is there twice")
             seen.add(same)
-            targets.append(Target(scene, view, size))  # type: ignore[arg-type]
+            targets.append(target)
     cluster = given.cluster or ClusterSection()
     out = Path(given.out).expanduser() if given.out else BUILD / "sweep"
     return Sweep(tuple(targets), tuple(names), cluster.workers, cluster.address, out)

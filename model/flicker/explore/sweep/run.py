@@ -99,8 +99,8 @@ def check_workers(client, sweep: Sweep) -> None:
         raise FlickerError(f"cluster {sweep.address}: has no workers") from None
     if sweep.address is None:
         return
-    scenes = {t.scene for t in sweep.targets}
-    paths = sorted({path for s in scenes for path in (s.path, s.cameras) if path is not None and os.path.exists(path)})
+    files = {str(path) for t in sweep.targets for path in (t.scene.path, t.scene.cameras_file, t.photo) if path is not None}
+    paths = sorted(path for path in files if os.path.exists(path))
     try:
         codes = client.run(code_digest)
         missing = client.run(_missing_files, paths)
