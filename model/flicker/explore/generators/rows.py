@@ -237,7 +237,10 @@ def configurations() -> Iterator[Configuration]:
                     "-".join(words), f"row intervals, {'pixel' if pixels else 'mini-tile'} masks{formats}{title}", "rows", Rows(fmt, pixels), stage, lists=kind,
                 )
     rows = Rows(FORMATS[0])
-    yield Configuration("rows-ellipse-64", "the same, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
+    yield Configuration("rows-ellipse-64", "row intervals, pixel masks, lists by the ellipse, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
+    yield Configuration(
+        "rows-ellipse-stop", "row intervals, pixel masks, lists by the ellipse, finished sub-tiles are left at once", "rows", rows, PixelChannels(form), lists="ellipse", stop=True,
+    )
     for bits in ACCUMULATORS:
         title = f"row intervals, pixel masks, lists by the ellipse, colour accumulators of {bits} fraction bits"
         yield Configuration(f"rows-ellipse-acc{bits}", title, "rows", rows, PixelChannels(form, accumulator=bits), lists="ellipse")
