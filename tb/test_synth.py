@@ -278,4 +278,3 @@ def test_one_parameter_set() -> None:
     done = drive("--unit", "fp_cmp", "--config", "e9m9")
     assert done.returncode == 1 and "no parameter set 'e9m9' of fp_cmp; there are fp16, e4m3, e5m2" in done.stderr
     assert "--config needs --unit" in drive("--config", "e4m3").stderr
-    assert "--docs needs all units" in drive("--docs", "--unit", "fp_cmp").stderr

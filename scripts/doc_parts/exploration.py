@@ -62,12 +62,14 @@ def halves(views: Rows) -> str:
             if get_configuration(name).area() <= area and row["psnr_db"] >= PLAIN and not get_configuration(name).generator.free
             and not (get_configuration(name).stage.idealised and get_configuration(name).family != "baseline")
         }
-        best = min(fitting, key=lambda name: fitting[name])
+        best = min(fitting, key=lambda name: fitting[name], default=None)
         lanes = rows["lanes-64"]
         visits = lanes["vru_utilisation"] * lanes["cycles"] * 64
         lines.append([
             view, f"{cycles / 1e6:.3f}", f"{half / 1e6:.3f}", f"{lanes['pixels_contributing'] / half:.1f}", f"{visits / half:.1f}", str(lanes_that_fit(area)),
-            f"`{best}`, {significant(get_configuration(best).area() / 1e6, 3)} MGE", f"{fitting[best] / 1e6:.3f}", "yes" if fitting[best] <= half else "no",
+            *(["none", "", "no"] if best is None else [
+                f"`{best}`, {significant(get_configuration(best).area() / 1e6, 3)} MGE", f"{fitting[best] / 1e6:.3f}", "yes" if fitting[best] <= half else "no",
+            ]),
         ])
     return markdown.table(heads, lines)
 

@@ -12,7 +12,7 @@ from .common import Rows, Say, measure, significant
 
 SUMMARY, ABLATION = "summary", "ablation"
 LISTS = {
-    "subtile": "3-sigma boxes, in the same order of sub-tiles for all", "tile": "boxes on 16x16 tiles", "obb": "oriented boxes",
+    "subtile": "3-sigma boxes", "tile": "boxes on 16x16 tiles", "obb": "oriented boxes",
     "reach": "the box of alpha = 1/255, made on the host in float64", "ellipse": "the ellipse of alpha = 1/255, made on the host in float64",
 }
 CHANGES = {
@@ -22,10 +22,15 @@ CHANGES = {
 }
 
 
+def percent(change: float) -> str:
+    """A relative change, 0 without sign."""
+    return f"{round(change * 100) or 0:+d}%".replace("+0%", "0%")
+
+
 def model_error() -> str:
     """How far the rule for mask generators without RTL is from those that are synthesised."""
     errors = generator_errors().values()
-    return f"{min(errors):+.0%} to {max(errors):+.0%}".replace("-0%", "0%").replace("+0%", "0%")
+    return f"{percent(min(errors))} to {percent(max(errors))}"
 
 
 def assumed(configuration: Configuration) -> list[str]:
@@ -41,7 +46,7 @@ def assumed(configuration: Configuration) -> list[str]:
             f"{model_error()} on those with RTL ([energy and area](docs/energy.md))"
         )
     words += [f"lists by {LISTS[configuration.lists]}", *configuration.stage.assumed]
-    return words + ["a finished sub-tile's list is left at once"] * configuration.stop
+    return words + ["a finished sub-tile's list is left at once (early exit)"] * configuration.stop
 
 
 def figures(row: dict | None) -> str:
@@ -70,13 +75,16 @@ def summary(views: Rows) -> str:
 def differences(a: Configuration, b: Configuration) -> list[str]:
     """What changes from one configuration to the other, keys of CHANGES: lists, generator, stop, the stage's kind, fields that both stages have.
 
-    Two pairs are one change: masks that name pixels need a stage that visits pixels (`masks`), accumulators bring the loop that they allow.
+    Three pairs are one change: masks that name pixels need a stage that visits pixels (`masks`), accumulators bring the loop that they allow, and lanes
+    leave a finished list of themselves, so that `stop` ends with them.
     """
     found = [name for name in ("lists", "generator", "stop") if getattr(a, name) != getattr(b, name)]
     before, after = a.stage, b.stage
     fields = [name for name in vars(after) if name in vars(before) and getattr(before, name) != getattr(after, name)]
     if {"accumulator", "loop"} <= set(fields):
         fields.remove("loop")
+    if isinstance(after, Lanes) and not isinstance(before, Lanes) and "stop" in found and a.stop:
+        found.remove("stop")
     if type(before) is not type(after):
         if a.generator.pixels == b.generator.pixels or "generator" not in found or isinstance(after, Lanes) or isinstance(before, Lanes):
             fields.append("stage")
@@ -94,7 +102,7 @@ def ablation(views: Rows) -> str:
         cells = []
         for found in views.values():
             row, old = found[name], found[before] if before else None
-            change = f" ({row['cycles'] / old['cycles'] - 1:+.0%})" if old else ""
+            change = f" ({percent(row['cycles'] / old['cycles'] - 1)})" if old else ""
             cells.append(f"{significant(row['cycles'] / 1e6, 3)}{change} / {row['psnr_db']:.1f} / {significant(row['energy_uj'], 2)}")
         changed = "" if before is None else ", ".join(CHANGES[key] for key in differences(get_configuration(before), configuration))
         rows.append([f"`{name}`", configuration.title, changed, _mge(configuration), *cells])

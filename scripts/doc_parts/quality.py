@@ -6,7 +6,6 @@ Golden model against the float64 reference, one view of each scene.
 from __future__ import annotations
 
 from flicker import markdown
-from flicker.front.projection import Projected
 from flicker.front.view import View
 from flicker.params import CatMode, Coords, Form, Precision, RenderConfig
 from flicker.pipeline import Engine, render_view
@@ -16,11 +15,9 @@ from .common import Say, titled_views
 TESTS = [(CatMode.OFF, Precision.FP16), *((cat, precision) for precision in Precision for cat in CatMode if cat != CatMode.OFF)]
 
 
-def cell(view: View, projected: Projected, config: RenderConfig) -> str:
+def cell(view: View, config: RenderConfig) -> str:
     """PSNR and thousands of mini-tiles sent."""
-    stats = render_view(
-        view.scene, view.camera, engine=Engine.GOLDEN, config=config, compare=True, projected=projected, reference=view.reference,
-    ).stats
+    stats = render_view(view, engine=Engine.GOLDEN, config=config, compare=True).stats
     return f"{'equal' if stats['psnr_db'] is None else format(stats['psnr_db'], '.1f')} / {stats['minitiles_sent'] / 1000:,.0f}"
 
 
@@ -32,8 +29,8 @@ def tables(say: Say) -> dict[str, str]:
         titles.append(title)
         for form, cat, precision in cells:
             say(f"{title}: {form.name.lower()}, {precision.name.lower()}, {cat.name.lower()}")
-            cells[form, cat, precision].append(cell(view, view.projected, RenderConfig(form=form, precision=precision, cat=cat)))
-        absolute.append(cell(view, view.projected, RenderConfig(cat=CatMode.OFF, coords=Coords.ABSOLUTE)))
+            cells[form, cat, precision].append(cell(view, RenderConfig(form=form, precision=precision, cat=cat)))
+        absolute.append(cell(view, RenderConfig(cat=CatMode.OFF, coords=Coords.ABSOLUTE)))
     found = {}
     for form in Form:
         rows = [

@@ -27,8 +27,8 @@ def missing() -> str | None:
 
 
 def stamp() -> str:
-    """First line of a place with results of synthesis: of which RTL they are (`flicker.cost.stamp`)."""
-    return f"<!-- RTL {rtl_stamp()} -->\n"
+    """Begin of a place with results of synthesis: of which RTL they are (`flicker.cost.stamp`)."""
+    return f"Synthesised from RTL {rtl_stamp()}.\n\n"
 
 
 def tables(say: Say) -> dict[str, str]:
@@ -37,7 +37,7 @@ def tables(say: Say) -> dict[str, str]:
     results = runner.run(all_units())  # of the cache
     comparison = report.Comparison(runner, results)
     sheets = [*comparison.sheets(), report.units_sheet(results, LIBERTY.stem)]
-    return {"units": stamp() + "\n".join(sheet.markdown() for sheet in sheets), "summary": stamp() + comparison.summary().table()}
+    return {"units": stamp() + "\n".join(sheet.markdown() for sheet in sheets), "summary": f"<!-- RTL {rtl_stamp()} -->\n" + comparison.summary().table()}
 
 
 def _libraries() -> list[Path]:

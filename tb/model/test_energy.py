@@ -26,7 +26,6 @@ from flicker.params import CORES
 from flicker.scene.camera import orbit_camera
 from flicker.toolchain import ROOT
 
-
 OWN_GATES = 10  # GE: what the rendering stage has beside its parts, a handful of gates, is in no part
 
 

@@ -42,8 +42,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "accumulators": ("lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20"),
     # from the default to lanes and on to lanes-deep; each step changes one thing (tb/model/test_configurations.py)
     "ablation": (
-        "flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "lanes-fp16-window-1", "lanes-fp16", "lanes", "lanes-fifo-40", "lanes-fifo-40-window-3",
-        "lanes-deep",
+        "flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-stop", "lanes-fp16-window-1", "lanes-fp16", "lanes", "lanes-fifo-40",
+        "lanes-fifo-40-window-3", "lanes-deep",
     ),
     # whole-frame estimates, figure 10
     "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64"),

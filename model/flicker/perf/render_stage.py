@@ -375,7 +375,7 @@ def sum_up(
 
 
 def simulate(work: Work, config: RenderConfig) -> StageCycles:
-    """Cycles and counters of a frame. work: of a method that sends whole mini-tiles (`work.visit` None)."""
+    """Cycles and counters of a frame. work: of masks that send whole mini-tiles (`work.visit` None)."""
     if work.visit is not None:
         raise ValueError("the RTL's VRUs visit whole mini-tiles")
     per_vru = config.pixels_per_vru

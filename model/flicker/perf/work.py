@@ -1,4 +1,4 @@
-"""What a method makes the hardware do: the stream of every sub-tile with its masks, and when pixels finish.
+"""What a configuration makes the hardware do: the stream of every sub-tile with its masks, and when pixels finish.
 
 The cycle models start from this; nothing in it depends on timing.
 """

@@ -242,7 +242,11 @@ def configurations() -> Iterator[Configuration]:
                 )
     rows = Rows(FORMATS[0])
     stage: RenderingStage
-    yield Configuration("rows-ellipse-64", "the same, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
+    ellipse = "row intervals, pixel masks, lists by the ellipse"
+    yield Configuration("rows-ellipse-64", f"{ellipse}, FIFO depth 64", "rows", rows, PixelChannels(form, fifo_depth=64), lists="ellipse")
+    yield Configuration(
+        "rows-ellipse-stop", f"{ellipse}, finished sub-tiles are left at once", "rows", rows, PixelChannels(form), lists="ellipse", stop=True,
+    )
     for bits in ACCUMULATORS:
         title = f"row intervals, pixel masks, lists by the ellipse, colour accumulators of {bits} fraction bits"
         yield Configuration(f"rows-ellipse-acc{bits}", title, "rows", rows, PixelChannels(form, accumulator=bits), lists="ellipse")

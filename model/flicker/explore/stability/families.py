@@ -23,9 +23,9 @@ _C0 = 0.28209479177387814
 
 @dataclass
 class Case:
-    """One input: what the methods get and what the reference renders.
+    """One input: what the configurations get and what the reference renders.
 
-    truth: projection that the reference renders when it is not the methods' own (the input means the same, written well).
+    truth: projection that the reference renders when it is not the configurations' own (the input means the same, written well).
     origin: window's first pixel on the screen.
     """
 

@@ -13,6 +13,8 @@ from ...perf.render_stage import StageCycles, simulate
 from ...perf.work import Work
 from ..machine import MaskGenerator, RenderingStage
 
+FIXED_PLACES = "core k takes sub-tile k of every tile, tiles row by row"  # `assumed`
+
 
 def count(values: np.ndarray) -> int:
     """Sum as a Python integer."""
@@ -33,6 +35,7 @@ class Channels(RenderingStage):
     form: Form = Form.FACTORED
     fifo_depth: int = 16
     vrus_per_channel: int = VRUS_PER_CHANNEL
+    assumed = (FIXED_PLACES,)
 
     @property
     def vrus(self) -> int:
@@ -88,7 +91,7 @@ class Barrier(Channels):
     """All cores wait for each other after every tile."""
 
     idealised = True
-    assumed = ("perfect buffering inside a tile", "no latencies")
+    assumed = (FIXED_PLACES, "perfect buffering inside a tile, no latencies")
 
     def rtl(self) -> None:
         return None

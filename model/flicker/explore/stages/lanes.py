@@ -26,7 +26,7 @@ class Lanes(RenderingStage):
     accumulator: int = 0
     form = Form.FACTORED
     assumed = (
-        "sub-tiles dealt out to the cores tile by tile, empty ones not streamed",
+        "sub-tiles of a tile dealt out to the cores in turn, so that none has a fixed place; empty ones not streamed",
         "the rest of a finished sub-tile's list is left (early exit), known as late as in the RTL",
     )
 

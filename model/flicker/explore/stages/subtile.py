@@ -10,7 +10,7 @@ from ...params import CORES
 from ...perf.render_stage import StageCycles
 from ...perf.work import Work
 from ..machine import MaskGenerator
-from .channels import Channels, count
+from .channels import FIXED_PLACES, Channels, count
 
 
 def taken_by_subtiles(work: Work) -> np.ndarray:
@@ -29,7 +29,7 @@ class SubtileVrus(Channels):
     """The work unit is the sub-tile. Area and FIFOs as of our channels."""
 
     idealised = True
-    assumed = ("a finished sub-tile's list is left at once", "its own intersection test and sorting are not in the area")
+    assumed = (FIXED_PLACES, "a finished sub-tile's list is left at once (early exit)", "its own intersection test and sorting are not in the area")
 
     def rtl(self) -> None:
         return None
