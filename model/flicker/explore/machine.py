@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -97,7 +98,7 @@ class RenderingStage(ABC):
     form: Form
     accumulator: int = 0
     idealised: bool = False
-    assumed: tuple[str, ...] = ()
+    assumed: ClassVar[tuple[str, ...]] = ()
 
     @property
     @abstractmethod

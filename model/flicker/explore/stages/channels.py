@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class Channels(RenderingStage):
     form: Form = Form.FACTORED
     fifo_depth: int = 16
     vrus_per_channel: int = VRUS_PER_CHANNEL
-    assumed = (FIXED_PLACES,)
+    assumed: ClassVar[tuple[str, ...]] = (FIXED_PLACES,)
 
     @property
     def vrus(self) -> int:
@@ -91,7 +92,7 @@ class Barrier(Channels):
     """All cores wait for each other after every tile."""
 
     idealised = True
-    assumed = (FIXED_PLACES, "perfect buffering inside a tile, no latencies")
+    assumed: ClassVar[tuple[str, ...]] = (FIXED_PLACES, "perfect buffering inside a tile, no latencies")
 
     def rtl(self) -> None:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ...cost.area import RECORD_BITS, lane_stage_parts
 from ...cost.energy import stage_energy
@@ -25,7 +26,7 @@ class Lanes(RenderingStage):
     loop: int = 2
     accumulator: int = 0
     form = Form.FACTORED
-    assumed = (
+    assumed: ClassVar[tuple[str, ...]] = (
         "sub-tiles of a tile dealt out to the cores in turn, so that none has a fixed place; empty ones not streamed",
         "the rest of a finished sub-tile's list is left (early exit), known as late as in the RTL",
     )

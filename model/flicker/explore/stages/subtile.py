@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class SubtileVrus(Channels):
     """The work unit is the sub-tile. Area and FIFOs as of our channels."""
 
     idealised = True
-    assumed = (FIXED_PLACES, "a finished sub-tile's list is left at once (early exit)", "its own intersection test and sorting are not in the area")
+    assumed: ClassVar[tuple[str, ...]] = (FIXED_PLACES, "a finished sub-tile's list is left at once (early exit)", "its own intersection test and sorting are not in the area")
 
     def rtl(self) -> None:
         return None
