@@ -55,7 +55,7 @@ def test_known_failures(quick):
     assert worst["thin", "no-ctu-32-conic"] < 30 and worst["thin", "no-ctu-32"] > worst["thin", "no-ctu-32-conic"] + 10
     assert worst["far_mean", "no-ctu-32-conic"] < 30 and worst["far_mean", "no-ctu-32"] > 50
     assert worst["screen", "no-ctu-32" + ABSOLUTE] < 35 and worst["screen", "no-ctu-32"] > 55
-    assert worst["thin", "flicker-smooth-fixed-factored"] < 35
+    assert worst["thin", "flicker"] < 35
     for family in quick.families:  # masks with a proof cost nothing, however hard the input
         assert worst[family, "rows"] == worst[family, "no-ctu-32"] == worst[family, "oracle"]
         assert worst[family, "exact-fp16-conic-bound"] == worst[family, "no-ctu-32-conic"]
@@ -156,7 +156,7 @@ def test_command(tmp_path):
     done = runner.invoke(app, ["stability", "--family", "faint", "--config", "faithful", "--quick", "--out", str(tmp_path / "o")])
     assert done.exit_code == 0, done.output
     table = (tmp_path / "o" / "stability.md").read_text()
-    assert "| `flicker-smooth-mixed-conic` |" in table and "| faint | " in table
+    assert "| `faithful` |" in table and "| faint | " in table
     assert len((tmp_path / "o" / "stability.csv").read_text().splitlines()) == 4
     bad = runner.invoke(app, ["stability", "--family", "nothing", "--out", str(tmp_path / "o")])
     assert isinstance(bad.exception, FlickerError)

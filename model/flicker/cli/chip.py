@@ -94,7 +94,7 @@ def chip(
     else:
         frame = frame_estimate(prepared, render_cycles, setting)
     console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, scheme {scheme}")
-    _show_frame(estimate)
+    _show_frame(frame)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])
         results = [run_scheme(prepared.splats, s, prepared.needed) for s in SCHEMES.values()]

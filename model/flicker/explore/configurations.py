@@ -56,10 +56,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "exact-fp16-conic-bound", "exact-e4m3-conic", "rows-minitile", "rows-f6a6", "rows-f7a5", "rows-f8a6", "rows", "rows-ellipse", "rows-ellipse-acc14",
         "rows-f10a10", "pixels", "oracle",
     ),
-    # flicker stability: every picture once (row intervals draw what no test draws, so one of them is enough)
+    # flicker stability: every picture once (row intervals draw what no test draws, so one of them is enough), and the two machines that have names
     "stability": (
-        "vanilla*", "no-ctu-32*", "gscore*", "seele*", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*", "rows", "rows-f*", "rows-ellipse-acc*",
-        "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
+        "vanilla*", "no-ctu-32*", "gscore*", "seele*", "faithful", "flicker", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*",
+        "rows", "rows-f*", "rows-ellipse-acc*", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
     ),
     "stability, quick": (
         "vanilla", "no-ctu-32", "no-ctu-32-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-e4m3", "exact",

@@ -22,7 +22,7 @@ BROKEN_PSNR = 40.0  # dB
 BROKEN_ERROR = 0.25  # of a pixel's channel, relative where the reference exceeds 1
 
 ABSOLUTE = "@absolute"  # behind a configuration's name: means rounded to FP16 in screen coordinates
-_ABSOLUTE_TOO = ("no-ctu-32", "no-ctu-32-conic", "flicker-smooth-fixed-factored", "flicker-smooth-mixed-conic")
+_ABSOLUTE_TOO = ("no-ctu-32", "no-ctu-32-conic", "flicker", "faithful")
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,6 @@ def write_pictures(result: Stability, folder: Path) -> list[Path]:
 
 
 LINES = (
-    "vanilla", "no-ctu-32", "no-ctu-32-conic", "seele", "flicker-smooth-mixed-conic", "flicker-smooth-fixed-factored", "flicker-dense-fp16-factored",
+    "vanilla", "no-ctu-32", "no-ctu-32-conic", "seele", "faithful", "flicker", "flicker-dense-fp16-factored",
     "exact-e4m3", "rows", "rows-ellipse-acc14", "no-ctu-32@absolute",
 )
