@@ -30,7 +30,9 @@ class SubtileVrus(Channels):
     """The work unit is the sub-tile. Area and FIFOs as of our channels."""
 
     idealised = True
-    assumed: ClassVar[tuple[str, ...]] = (FIXED_PLACES, "a finished sub-tile's list is left at once (early exit)", "its own intersection test and sorting are not in the area")
+    assumed: ClassVar[tuple[str, ...]] = (
+        FIXED_PLACES, "a finished sub-tile's list is left at once (early exit)", "its own intersection test and sorting are not in the area",
+    )
 
     def rtl(self) -> None:
         return None
