@@ -153,9 +153,10 @@ async def automatic(dut, patterns):
     test = CtuTest(dut, CatMode.AUTO, PATTERNS[patterns])
     rng = test.bench.rng
     subtiles = []
+    slower = max(test.model.vru_cycles // PIXELS_PER_VRU, 1)  # slower VRUs take more that the test rejects to be the faster ones
     for _ in range(3):
         # Seven short lists that the test rejects, seven that it passes; a fallen sub-tile shows by its sparse masks.
-        subtiles += [[distant(rng) for _ in range(rng.randrange(3, 9))] + [splats.tame(rng, FORM)] for _ in range(7)]
+        subtiles += [[distant(rng) for _ in range(slower * rng.randrange(3, 9))] + [splats.tame(rng, FORM)] for _ in range(7)]
         subtiles += [[covering(rng) for _ in range(rng.randrange(0, 6))] + [splats.tame(rng, FORM)] for _ in range(7)]
     await test.check(items_of([*subtiles, *random_lists(rng, 6)]))
     changes = [a != b for a, b in zip(test.model.decisions, test.model.decisions[1:])]

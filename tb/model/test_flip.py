@@ -17,7 +17,7 @@ from flicker_tb.runner import seed
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from flicker import metrics
+from flicker.scene import metrics
 from flicker.toolchain import ROOT
 
 UNIT = 2.0**-24  # relative error of a float32 operation

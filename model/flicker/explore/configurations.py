@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 
 from ..errors import FlickerError
 from ..front.view import View
-from ..params import CatMode, RenderConfig
+from ..params import RenderConfig
 from . import machine
 from .generators import all_pixels, contribution, exact, oracle, rows, seele
 from .machine import Configuration, Result
@@ -105,9 +105,9 @@ def run(configuration: Configuration | str, view: View) -> Result:
 
 def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:
     """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs."""
-    if config.cat == CatMode.OFF:
+    if config.mask_generator == "all":
         return Configuration(
-            name, "RTL, test off", "baseline", contribution.Untested(config.form, config.mask_generator),
+            name, "RTL, no test", "baseline", contribution.Untested(config.form),
             contribution.Channels(config.form, config.fifo_depth, config.vrus_per_channel),
         )
     return contribution.flicker(config, name, "RTL", fifo_depth=config.fifo_depth, vrus_per_channel=config.vrus_per_channel)

@@ -100,14 +100,13 @@ class Untested(MaskGenerator):
     """No test: every element goes to all four mini-tiles, one a cycle."""
 
     form: Form = Form.FACTORED
-    module: str = "all"  # of params.MASK_GENERATORS: the RTL without a contribution test, or `ctu` switched off
 
     def masks(self, view: View, lists: SubtileLists, order: np.ndarray, core_start: np.ndarray, stage: RenderingStage) -> Masks:
         n = len(lists.entry)
         return Masks(np.full(n, 15, np.uint8), np.ones(n, np.uint8), np.zeros(n, np.uint16))
 
     def rtl(self) -> dict:
-        return {"form": self.form, "cat": CatMode.OFF, "mask_generator": self.module}
+        return {"form": self.form, "cat": CatMode.OFF, "mask_generator": "all"}
 
     def area(self) -> float:
         return part("mask_all", "default").ge
