@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/mutants.md).
 
-    scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--check]
+    scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--match TEXT] [--check]
 
 Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
 survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
@@ -199,17 +199,18 @@ def _write(outcomes: list[Outcome], code: str) -> None:
 
 
 def results() -> list[Outcome]:
-    """Outcomes of all mutants on sources and tests as they are. FlickerError when some have not been run."""
+    """Outcomes of the mutants that have been run on sources and tests as they are. FlickerError when none has."""
     mutants, code = load(), stamp()
     found = _earlier(mutants, code)
-    if len(found) < len(mutants):
-        raise FlickerError(f"build/mutants lacks {len(mutants) - len(found)} of {len(mutants)} results of this RTL and these tests; run make mutants first")
-    return [found[m.number] for m in mutants]
+    if not found:
+        raise FlickerError("build/mutants holds no result of this RTL and these tests; run make mutants first")
+    return [found[m.number] for m in mutants if m.number in found]
 
 
 def summary(outcomes: list[Outcome]) -> str:
     """Markdown: how many die where, by unit, and every mutant that does not die at home."""
     units = list(dict.fromkeys(o.mutant.unit for o in outcomes))
+    left = len(load()) - len(outcomes)
     rows = []
     for unit in units:
         own = [o for o in outcomes if o.mutant.unit == unit]
@@ -218,7 +219,8 @@ def summary(outcomes: list[Outcome]) -> str:
     home = sum(o.at_home for o in outcomes)
     rows.append(("all", str(len(outcomes)), f"{home} ({home / len(outcomes):.0%})", str(sum(bool(o.killer) and not o.at_home for o in outcomes)),
                  str(sum(not o.killer for o in outcomes))))
-    text = markdown.table(["unit", "mutants", "killed by its own tests", "killed above", "survived"], rows)
+    text = f"{len(outcomes)} mutants run{f', {left} not yet' if left else ''}.\n\n"
+    text += markdown.table(["unit", "mutants", "killed by its own tests", "killed above", "survived"], rows)
     others = [o for o in outcomes if not o.at_home]
     if others:
         text += "\n" + markdown.table(
@@ -234,11 +236,12 @@ def main() -> int:
     parser.add_argument("--unit", action="append", help="only mutants of this unit, repeatable")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--match", default="", help="only mutants whose file or text contains this")
     parser.add_argument("--check", action="store_true", help="only check that every mutant could be made")
     args = parser.parse_args()
-    mutants = [m for m in load() if not args.unit or m.unit in args.unit]
+    mutants = [m for m in load() if (not args.unit or m.unit in args.unit) and args.match in f"{m.file} {m.find}"]
     if not mutants:
-        raise FlickerError(f"--unit: no mutants of {', '.join(args.unit)}")
+        raise FlickerError(f"no mutants of {', '.join(args.unit or ['any unit'])} that match '{args.match}'")
     if args.check:
         print(f"mutants: {len(mutants)} can be made")
         return 0
@@ -246,6 +249,8 @@ def main() -> int:
     console = Console()
     code = stamp()
     outcomes = _earlier(mutants, code)
+    chosen = {m.number for m in mutants}
+    kept = [o for o in _earlier(load(), code).values() if o.mutant.number not in chosen]
     left = [m for m in mutants if m.number not in outcomes]
     console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {args.seed}")
     copies = Copies(args.jobs) if left else None
@@ -257,7 +262,7 @@ def main() -> int:
             bar.update(task, advance=1, description=outcome.mutant.title)
             if not console.is_terminal:
                 print(f"{outcome.killer or outcome.wrong or 'SURVIVED':<16} {outcome.mutant.title}", flush=True)
-            _write([outcomes[m.number] for m in mutants if m.number in outcomes], code)
+            _write([*kept, *(outcomes[m.number] for m in mutants if m.number in outcomes)], code)
     found = [outcomes[m.number] for m in mutants]
     table = Table()
     for column in ("unit", "mutant", "killed by", "note"):
