@@ -56,7 +56,6 @@ module fv_fifo_monitor
       .clk_i,
       .rst_ni     (rst_n),
       .clear_i,
-    .clear_i,
       .in_valid_i (write[c]),
       .in_ready_o (ready[c]),
       .in_data_i  ({in_eos_i, in_data_i}),

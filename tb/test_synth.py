@@ -183,6 +183,7 @@ def test_interface_adds_up(library: Library) -> None:
 
 def test_units_cover_the_design() -> None:
     modules = {path.stem for path in filelist() if not path.stem.endswith("_pkg")}
+    modules -= {"flk_mask_generator"}  # a generated switch without logic; the modules behind it are units
     assert modules <= {unit.top for unit in all_units()}
 
 

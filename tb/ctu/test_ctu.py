@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.bench import netlist
-from flicker_tb.runner import build_and_test
+from flicker_tb.runner import build_and_test, refused
 from flicker_tb.splats import QUICK_BUILD
 
-from flicker.errors import FlickerError
 from flicker.params import FAITHFUL, Form, Precision, RenderConfig
 
 
@@ -54,10 +53,10 @@ def test_vru_cycles(cycles: int) -> None:
     [
         ({"Form": 2}, "Form must be"),
         ({"Precision": 4}, "Precision must be"),
-        ({"CtuFifoDepth": 129}, "Depth must be 1 to 128"),  # the FIFO inside says so first
+        ({"CtuFifoDepth": 129}, "CtuFifoDepth must be"),
         ({"VruCycles": 6}, "VruCycles must be a power of two"),
     ],
 )
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
-    with pytest.raises(FlickerError, match=message):
+    with refused(message):
         build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters)

@@ -7,12 +7,13 @@ missing; WAVES_FORMAT=fst or vcd chooses.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -88,6 +89,15 @@ def build(
         opt=opt,
         kind="sim",
     )
+
+
+@contextlib.contextmanager
+def refused(message: str) -> Iterator[None]:
+    """Expects a build that fails with ``message`` in its log; the units inside may have something to say first."""
+    with pytest.raises(FlickerError) as raised:
+        yield
+    log = re.search(r"\(see (.*)\)", str(raised.value))
+    assert log is not None and message in Path(log[1]).read_text(), str(raised.value)
 
 
 def build_and_test(
