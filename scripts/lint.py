@@ -58,6 +58,7 @@ CHECKS: list[list[object]] = [
     [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
     [sys.executable, "-m", "mypy"],
     [Path(sys.executable).parent / "lint-imports"],
+    [sys.executable, "scripts/mutants.py", "--check"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
 ]
 
