@@ -39,6 +39,7 @@ from flicker.sim.render_stage import build, render_rtl
 from flicker.toolchain import BUILD, ROOT
 
 DEFAULT = RenderConfig()
+SLOW = pytest.mark.slow  # each is a build of its own, a minute or more
 
 
 @cache
@@ -117,14 +118,16 @@ def test_cycle_model(base, cat):
     compare(*random_splats(10 + int(cat), 4000, 24), base.with_(cat=cat))
 
 
-@pytest.mark.parametrize("form,precision", [(Form.FACTORED, Precision.FP16), (Form.CONIC, Precision.FP8), (Form.FACTORED, Precision.MIXED)])
+@pytest.mark.parametrize("form,precision", [
+    (Form.CONIC, Precision.FP8), pytest.param(Form.FACTORED, Precision.FP16, marks=SLOW), pytest.param(Form.FACTORED, Precision.MIXED, marks=SLOW),
+])
 def test_demo_formats(form, precision):
     """Builds of the other precisions, one of each form."""
     projected, camera = demo(160, 90)
     compare(projected, camera, RenderConfig(form=form, precision=precision))
 
 
-@pytest.mark.parametrize("fifo_depth", [1, 128])
+@pytest.mark.parametrize("fifo_depth", [1, pytest.param(128, marks=SLOW)])
 def test_fifo_depth(fifo_depth):
     """Shallowest and deepest feature FIFO: the same picture, and the cycles of the model."""
     compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth))
@@ -132,7 +135,7 @@ def test_fifo_depth(fifo_depth):
     compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth), stall=0.1)
 
 
-@pytest.mark.parametrize("vrus,fifo_depth", [(1, 16), (4, 7)])
+@pytest.mark.parametrize("vrus,fifo_depth", [(4, 7), pytest.param(1, 16, marks=SLOW)])
 def test_vrus_per_channel(vrus, fifo_depth):
     """Other numbers of VRUs: cycles of the model, and the picture of two VRUs except where the automatic mode looks at them."""
     config = DEFAULT.with_(vrus_per_channel=vrus, fifo_depth=fifo_depth)
@@ -143,7 +146,7 @@ def test_vrus_per_channel(vrus, fifo_depth):
     assert (golden.pixels == render_golden(golden.lists, DEFAULT).pixels).all()
 
 
-@pytest.mark.parametrize("vrus", [2, 4])
+@pytest.mark.parametrize("vrus", [2, pytest.param(4, marks=SLOW)])
 def test_no_ctu(vrus):
     """Mask generator `all`: the picture of the test switched off, cycles and counters of the model; other latencies than the CTU's."""
     config = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
