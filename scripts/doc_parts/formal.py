@@ -17,6 +17,6 @@ def missing() -> str | None:
 
 def tables(say: Say) -> dict[str, str]:
     pairs = [(task, result) for task, result in formal.known() if result is not None]
-    proofs = [proof for proof in formal.read_proofs() if not proof.long]
+    proofs = list({task.proof.name: task.proof for task, _ in pairs}.values())
     total = sum(result.seconds for _, result in pairs)
     return {"": markdown.table(formal.COLUMNS, formal.rows(proofs, pairs)) + f"\n\n{len(pairs)} tasks, {total:.0f} s one after the other."}
