@@ -1,5 +1,6 @@
 """Whole frames: the verilated rendering stage equals the golden model, pixel for pixel and count for count, and without stalls the cycle model, in
-cycles and every counter. The designs are built with their assertions; the harness also changes mode_i inside every frame and checks idle_o.
+cycles and every counter. The three designs that matter most (default, faithful, without CTU) are built with their assertions; the harness also
+changes mode_i inside every frame and checks idle_o.
 
 State space: the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and back-pressure;
 channels of one and of four VRUs, each at another FIFO depth; the stage without a contribution test (mask generator `all`); frames aborted at
@@ -39,6 +40,9 @@ from flicker.sim.render_stage import build, render_rtl
 from flicker.toolchain import BUILD, ROOT
 
 DEFAULT = RenderConfig()
+NO_CTU = RenderConfig(cat=CatMode.OFF, mask_generator="all")
+# Builds that run with assertions; with them a build compiles three times as long, so the others, whose units run with them in tests of their own, do without.
+WITH_ASSERTIONS = [config.rtl_parameters() for config in (DEFAULT, FAITHFUL, NO_CTU)]
 SLOW = pytest.mark.slow  # each is a build of its own, a minute or more
 
 
@@ -53,7 +57,7 @@ def compare(projected, camera, config: RenderConfig, **stalls):
     """Render with both engines and compare everything that does not depend on timing."""
     lists = build_lists(projected, camera, config)
     golden = render_golden(lists, config)
-    rtl = render_rtl(lists, config, checks=True, **stalls)
+    rtl = render_rtl(lists, config, checks=config.rtl_parameters() in WITH_ASSERTIONS, **stalls)
     wrong = np.argwhere((golden.pixels != rtl.pixels).any(axis=2))
     assert not len(wrong), f"{len(wrong)} pixels differ, first: sub-tile {wrong[0][0]} pixel {wrong[0][1]}: " \
         f"golden {golden.pixels[tuple(wrong[0])]}, RTL {rtl.pixels[tuple(wrong[0])]}"
@@ -158,7 +162,7 @@ def test_no_ctu(vrus):
         config.with_(cat=CatMode.SMOOTH)
 
 
-@pytest.mark.parametrize("base", [DEFAULT.with_(cat=CatMode.AUTO), FAITHFUL, RenderConfig(cat=CatMode.OFF, mask_generator="all")],
+@pytest.mark.parametrize("base", [DEFAULT.with_(cat=CatMode.AUTO), FAITHFUL, NO_CTU],
                          ids=["default", "faithful", "no ctu"])
 def test_aborted_frames(base):
     """clear_i at random times and for random lengths; the frame after it is right in pixels, cycles and counters, as if it were the first."""
