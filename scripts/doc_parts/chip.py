@@ -11,15 +11,14 @@ from functools import partial
 
 import numpy as np
 
-from flicker.chip.clusters import build_clusters, cull
 from flicker.chip.compare import estimate
 from flicker.chip.constants import constant_table
+from flicker.chip.cull import cull
 from flicker.chip.delivery import broadcast_cycles
 from flicker.chip.dram import DramConfig, simulate
 from flicker.chip.execute import run_scheme, scheme_rows
 from flicker.chip.frame import ChipConfig, FrameEstimate, Prepared, prepare
 from flicker.chip.lists import collect
-from flicker.chip.memory import MemoryFormat
 from flicker.chip.quality import KEYS, format_quality, key_quality
 from flicker.chip.schemes import SCHEMES, Scheme
 from flicker.explore.configurations import get_configuration
@@ -27,6 +26,8 @@ from flicker.explore.evaluate import draw
 from flicker.explore.machine import subtile_cycles
 from flicker.front.view import View
 from flicker.markdown import table
+from flicker.scene.clusters import build_clusters
+from flicker.scene.memory import MemoryFormat
 
 from .common import Say, titled_views
 

@@ -16,13 +16,12 @@ from typer.testing import CliRunner
 
 from flicker import markdown
 from flicker.chip import constants
-from flicker.chip.clusters import build_clusters, cull, morton_order
 from flicker.chip.compare import chip_estimates, estimate
+from flicker.chip.cull import cull
 from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, simulate
 from flicker.chip.execute import run_scheme
 from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
-from flicker.chip.memory import MemoryFormat, layout, through_memory
 from flicker.chip.schemes import RECOMMENDED, SCHEMES, Grain
 from flicker.cli.main import app
 from flicker.errors import FlickerError
@@ -31,7 +30,9 @@ from flicker.explore.machine import subtile_cycles
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
 from flicker.front.view import View
+from flicker.scene.clusters import build_clusters, morton_order
 from flicker.scene.files import save_ply
+from flicker.scene.memory import MemoryFormat, layout, through_memory
 
 # ---- constants ---------------------------------------------------------------------------------
 

@@ -12,10 +12,10 @@ import pytest
 from flicker_tb.runner import seed
 from scene_samples import as_gsply, random_scene
 
-from flicker.chip.clusters import build_clusters
-from flicker.chip.memory import MemoryFormat, decode_chunks, decode_fp16, encode_chunks, encode_fp16, layout, load_chunks, save_chunks
 from flicker.errors import FlickerError
+from flicker.scene.clusters import build_clusters
 from flicker.scene.files import load_scene
+from flicker.scene.memory import MemoryFormat, decode_chunks, decode_fp16, encode_chunks, encode_fp16, layout, load_chunks, save_chunks
 
 
 def test_fp16_is_rounded_once():

@@ -3,6 +3,8 @@ publication."""
 
 from __future__ import annotations
 
+from ..scene import memory
+
 # ---- clock and memory interface ----------------------------------------------------------------
 
 CLOCK_HZ = 1_000_000_000
@@ -41,8 +43,8 @@ CLUSTER_TEST_CYCLES = 1
 GEOMETRY_CYCLES = 1
 SH_COEFFICIENTS_PER_CYCLE = 4
 ENTRIES_PER_CYCLE = 1
-CLUSTER_SIZE = 256
-CLUSTER_HEADER_BYTES = 32
+CLUSTER_SIZE = memory.CHUNK
+CLUSTER_HEADER_BYTES = memory.CLUSTER_HEADER_BYTES
 GEOMETRY_NUMBERS = 10
 
 # ---- records and lists -------------------------------------------------------------------------

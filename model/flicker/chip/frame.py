@@ -19,13 +19,14 @@ from ..front.records import SubtileLists
 from ..front.view import View
 from ..params import TILE, Form
 from ..scene.camera import Camera
+from ..scene.clusters import Clusters, build_clusters
+from ..scene.memory import CHUNK, MemoryFormat, layout
 from . import constants as c
-from .clusters import Clusters, build_clusters, cull
+from .cull import cull
 from .delivery import broadcast_cycles, consumed
 from .dram import READ, WRITE, DramConfig, Stream, interleave, simulate
 from .execute import Addresses, SchemeResult, run_scheme
 from .lists import Splats, collect
-from .memory import CHUNK, MemoryFormat, layout
 from .schemes import RECOMMENDED, SCHEMES, Scheme
 
 _GEOMETRY_BASE = 0

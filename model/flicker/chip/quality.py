@@ -12,10 +12,10 @@ from ..front.projection import Projected
 from ..front.reference import render_reference
 from ..front.view import View
 from ..scene.camera import Camera
+from ..scene.clusters import build_clusters
+from ..scene.memory import MemoryFormat, layout, through_memory
 from ..scene.metrics import psnr
-from .clusters import build_clusters
 from .constants import CLUSTER_SIZE
-from .memory import MemoryFormat, layout, through_memory
 from .sorting import quantised_key
 
 

@@ -72,10 +72,10 @@ def chip(
     from ..chip.constants import constant_table
     from ..chip.execute import run_scheme, scheme_rows
     from ..chip.frame import ChipConfig, frame_estimate, prepare
-    from ..chip.memory import MemoryFormat
     from ..chip.schemes import RECOMMENDED, SCHEMES
     from ..explore.configurations import get_configuration
     from ..front.view import load_view
+    from ..scene.memory import MemoryFormat
 
     scheme = scheme or RECOMMENDED
     if scheme not in SCHEMES:

@@ -1,4 +1,4 @@
-"""Scene files, cameras, pictures and their distance from each other, and the demo scene."""
+"""Scene files, cameras, scenes in memory, pictures and their distance from each other, and the demo scene."""
 
 from .files import Scene, load_scene
 

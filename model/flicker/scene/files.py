@@ -17,7 +17,7 @@ import hashlib
 import warnings
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,40 +26,10 @@ import numpy as np
 
 from ..errors import FlickerError, FlickerWarning, one_line
 from . import sog
+from .gaussians import SH_C0, SH_DEGREES, Scene
 
-_SH_C0 = 0.28209479177387814
-_SH_COUNTS = {1: 0, 4: 1, 9: 2, 16: 3}  # coefficients a channel: degree
 _REST_COUNTS = (0, 9, 24, 45)
 _CHUNK = 256
-
-
-@dataclass(eq=False)
-class Scene:
-    """N Gaussians, values activated; contiguous float32 arrays.
-
-    means: (N, 3). scales: (N, 3), standard deviations, > 0. quats: (N, 4), unit, w first. opacities: (N,), in (0, 1].
-    sh: (N, K, 3), K = (degree + 1)^2 coefficients a colour, constant term first, order and signs of the INRIA code.
-    path: the file or folder. rejected: Gaussians of the file that were left out, by reason.
-    """
-
-    means: np.ndarray
-    scales: np.ndarray
-    quats: np.ndarray
-    opacities: np.ndarray
-    sh: np.ndarray
-    path: Path | None = None
-    rejected: dict[str, int] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in ("means", "scales", "quats", "opacities", "sh"):
-            setattr(self, name, np.ascontiguousarray(getattr(self, name), np.float32))
-
-    def __len__(self) -> int:
-        return len(self.means)
-
-    @property
-    def sh_degree(self) -> int:
-        return _SH_COUNTS[self.sh.shape[1]]
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -121,7 +91,7 @@ def _activated(data: gsply.GSData) -> tuple[np.ndarray, ...]:
     rest = data.shN
     count = len(data.means)
     bands = 0 if rest is None else rest.shape[1]
-    if bands + 1 not in _SH_COUNTS:
+    if bands + 1 not in SH_DEGREES:
         raise ValueError(f"{bands} SH coefficients a colour")
     sh = np.empty((count, bands + 1, 3), np.float32)
     sh[:, 0] = data.sh0
@@ -259,7 +229,7 @@ def _read_splat(path: Path) -> tuple[np.ndarray, ...]:
     rgba = data["rgba"].astype(np.float64) / 255.0
     return (
         data["mean"], data["scale"], (data["quat"].astype(np.float64) - 128.0) / 128.0, rgba[:, 3],
-        (rgba[:, None, :3] - 0.5) / _SH_C0,
+        (rgba[:, None, :3] - 0.5) / SH_C0,
     )
 
 

@@ -24,10 +24,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FlickerError
-from ..scene.files import _SH_C0, Scene
-from .constants import CLUSTER_HEADER_BYTES
+from .gaussians import SH_C0, Scene
 
-CHUNK = 256
+CHUNK = 256  # Gaussians
+CLUSTER_HEADER_BYTES = 32  # of FP16: box of the means (6 float32), largest standard deviation, first Gaussian and count
 _MAX_FP16 = 65504.0
 _TINY_FP16 = 2.0**-24
 _SCALE_LOG_LIMIT = 20.0
@@ -156,6 +156,28 @@ def _pack_111011(unit: np.ndarray) -> np.ndarray:
     return x << 21 | y << 11 | z
 
 
+def rotation_word(quats: np.ndarray) -> np.ndarray:
+    """uint32 (N,), 2-10-10-10: number of the largest component of a quaternion (N, 4), codes of the other three in order."""
+    quats = quats / np.linalg.norm(quats.astype(np.float64), axis=1, keepdims=True)
+    largest = np.argmax(np.abs(quats), axis=1)
+    quats *= np.where(np.take_along_axis(quats, largest[:, None], axis=1) < 0, -1.0, 1.0)
+    others = quats[np.arange(4) != largest[:, None]].reshape(len(quats), 3)
+    word = largest.astype(np.uint32) << 30
+    for i in range(3):
+        word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10) << np.uint32(20 - 10 * i)
+    return word
+
+
+def rotation_of(word: np.ndarray) -> np.ndarray:
+    """float64 (N, 4): the quaternion of a rotation word; the largest component makes it a unit, or is 0 where the others are too long for that."""
+    three = ((word[:, None] >> np.array([20, 10, 0], np.uint32) & np.uint32(1023)) / 1023.0 - 0.5) * _SQRT2
+    largest = word >> 30
+    quats = np.empty((len(word), 4))
+    quats[np.arange(4) != largest[:, None]] = three.ravel()
+    quats[np.arange(len(word)), largest] = np.sqrt(np.maximum(0.0, 1.0 - (three**2).sum(axis=1)))
+    return quats
+
+
 def encode_chunks(scene: Scene, bounds: np.ndarray | None = None, scaled_sh: bool = False) -> ChunkScene:
     """Quantise in chunks of 256 in the order of the scene.
 
@@ -163,7 +185,7 @@ def encode_chunks(scene: Scene, bounds: np.ndarray | None = None, scaled_sh: boo
     """
     n = len(scene)
     logs = np.clip(np.log(scene.scales.astype(np.float64)), -_SCALE_LOG_LIMIT, _SCALE_LOG_LIMIT)
-    colours = 0.5 + _SH_C0 * scene.sh[:, 0].astype(np.float64)
+    colours = 0.5 + SH_C0 * scene.sh[:, 0].astype(np.float64)
     parts = (scene.means.astype(np.float64), logs, colours)
     if bounds is None:
         start = np.arange(0, n, CHUNK)
@@ -177,15 +199,7 @@ def encode_chunks(scene: Scene, bounds: np.ndarray | None = None, scaled_sh: boo
     opacity = np.clip(scene.opacities.astype(np.float64), 0.0, 1.0)
     rgba = [_code(units[2][:, i], 8) for i in range(3)] + [_code(opacity, 8)]
     packed[:, 3] = rgba[0] << 24 | rgba[1] << 16 | rgba[2] << 8 | rgba[3]
-    quats = scene.quats.astype(np.float64)
-    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    largest = np.argmax(np.abs(quats), axis=1)
-    quats *= np.where(np.take_along_axis(quats, largest[:, None], axis=1) < 0, -1.0, 1.0)
-    others = quats[np.arange(4) != largest[:, None]].reshape(n, 3)
-    word = largest.astype(np.uint32) << 30
-    for i in range(3):
-        word |= _code(np.clip(others[:, i] * (_SQRT2 / 2) + 0.5, 0.0, 1.0), 10) << np.uint32(20 - 10 * i)
-    packed[:, 1] = word
+    packed[:, 1] = rotation_word(scene.quats)
     rest = scene.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1).astype(np.float64)
     if not scaled_sh:
         return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))
@@ -215,13 +229,9 @@ def decode_chunks(data: ChunkScene, path: Path | None = None) -> Scene:
     scales = np.exp(_unpack_111011(packed[:, 2], b[:, 6:9], b[:, 9:12]))
     rgba = (packed[:, 3:4] >> np.array([24, 16, 8, 0], np.uint32) & np.uint32(255)) / 255.0
     opacities = np.maximum(rgba[:, 3], _TINY_FP16)
-    three = ((packed[:, 1:2] >> np.array([20, 10, 0], np.uint32) & np.uint32(1023)) / 1023.0 - 0.5) * _SQRT2
-    largest = packed[:, 1] >> 30
-    quats = np.empty((n, 4))
-    quats[np.arange(4) != largest[:, None]] = three.ravel()
-    quats[np.arange(n), largest] = np.sqrt(np.maximum(0.0, 1.0 - (three**2).sum(axis=1)))
+    quats = rotation_of(packed[:, 1])
     sh = np.empty((n, data.sh.shape[1] // 3 + 1, 3))
-    sh[:, 0] = (_between(rgba[:, :3], b[:, 12:15], b[:, 15:18]) - 0.5) / _SH_C0
+    sh[:, 0] = (_between(rgba[:, :3], b[:, 12:15], b[:, 15:18]) - 0.5) / SH_C0
     rest = (data.sh - 127.5) / 32.0
     if data.sh_scale is not None:
         rest = (data.sh - 128.0) / 127.0 * np.repeat(data.sh_scale.astype(np.float64), CHUNK)[:n, None]
