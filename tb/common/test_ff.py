@@ -5,7 +5,9 @@ Not covered: mantissas other than those named in the tests; the units have no ca
 
 from __future__ import annotations
 
+import ctypes
 from fractions import Fraction
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -14,7 +16,9 @@ from flicker_tb.runner import seed
 
 from flicker.arithmetic import ff
 from flicker.arithmetic import ff_tables as tables
+from flicker.toolchain import verilate
 
+HERE = Path(__file__).parent
 MAN_BITS = tuple(range(tables.MIN_MAN_BITS, tables.MAX_MAN_BITS + 1))
 OPERATIONS = ("add", "sub", "mul")
 TOP = 254 << 23 | (1 << 23) - 1  # code of the largest number, M = 23
@@ -235,3 +239,125 @@ def test_function_exponents(M: int) -> None:
     want = np.where(whole > 127, top, np.where(whole < -126, 0.0, want))
     for frac in (0, 12, 14):
         assert [ff.ff_exp2_fixed(int(w) << frac, frac, M) for w in whole] == want.tolist()
+
+
+# ---- units -------------------------------------------------------------------------------------
+
+FORMATS = (10, 11, 15, 19, 23)  # mantissas of ff_harness.sv: the ends of the range, and each group of tables
+UNITS = ("add", "mul", "recip", "rsqrt", "sqrt", "exp2", "exp2 wide", "from 24.8", "from 11.0", "floor to 14.6", "round to 7.14", "lt")
+
+
+@numba.njit
+def _model(a, b, M):
+    """What ff_harness.sv gives for operand patterns: (n, units), uint32."""
+    out = np.empty((a.size, 12), np.uint32)
+    for i in range(a.size):
+        x, y, word = ff.ff_value(a[i] & ((1 << (9 + M)) - 1), M), ff.ff_value(b[i] & ((1 << (9 + M)) - 1), M), np.int64(b[i])
+        out[i, 0] = ff.ff_bits(ff.ff_add(x, y, M), M)
+        out[i, 1] = ff.ff_bits(ff.ff_mul(x, y, M), M)
+        out[i, 2] = ff.ff_bits(ff.ff_recip(x, M), M)
+        out[i, 3] = ff.ff_bits(ff.ff_rsqrt(x, M), M)
+        out[i, 4] = ff.ff_bits(ff.ff_sqrt(x, M), M)
+        out[i, 5] = ff.ff_bits(ff.ff_exp2_fixed((word << 43) >> 43, 14, M), M)
+        out[i, 6] = ff.ff_bits(ff.ff_exp2_fixed((word << 49) >> 49, 5, M), M)
+        out[i, 7] = ff.ff_bits(ff.ff_from_fixed((word << 32) >> 32, 8, M), M)
+        out[i, 8] = ff.ff_bits(ff.ff_from_int((word << 53) >> 53, M), M)
+        out[i, 9] = np.uint32(ff.ff_to_fixed_floor(x, 6, 20) & 0xFFFFFFFF)
+        out[i, 10] = np.uint32(ff.ff_to_fixed_round(x, 14, 21) & 0xFFFFFFFF)
+        out[i, 11] = np.uint32(ff.ff_lt(x, y))
+    return out
+
+
+class Harness:
+    """All units with the mantissas of FORMATS, evaluated in batches."""
+
+    def __init__(self) -> None:
+        table = int.from_bytes(bytes(FORMATS), "little")
+        path = verilate(
+            "ff_harness", extra=[HERE / "ff_harness.sv"], args=[f"-GFormats={len(FORMATS)}", f"-GManBitsOf={8 * len(FORMATS)}'h{table:x}"],
+            cpp=[HERE / "ff_harness.cpp"], cflags="-std=c++17", shared=True, name="ff",
+        )
+        self._lib = ctypes.CDLL(str(path))
+        self._lib.ff_reset()
+
+    def batch(self, M: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Results (n, units) of the combinational units."""
+        out = np.zeros((a.size, len(UNITS)), np.uint32)
+        self._call("ff_batch", M, a, b, out)
+        return out
+
+    def pipes(self, M: int, a: np.ndarray, b: np.ndarray, enable: np.ndarray) -> np.ndarray:
+        """Wrong cycles (stages, units) of the pipelines."""
+        bad = np.zeros((3, len(UNITS)), np.int64)
+        self._call("ff_pipes", M, a, b, enable, bad)
+        return bad
+
+    def _call(self, name: str, M: int, *arrays: np.ndarray) -> None:
+        a, b = arrays[:2]
+        assert a.dtype == b.dtype == np.uint32 and a.size == b.size and all(x.flags.c_contiguous for x in arrays)
+        getattr(self._lib, name)(FORMATS.index(M), ctypes.c_int64(a.size), *(ctypes.c_void_p(x.ctypes.data) for x in arrays))
+
+
+@pytest.fixture(scope="module")
+def harness() -> Harness:
+    return Harness()
+
+
+def check(harness: Harness, M: int, kind: str, a: np.ndarray, b: np.ndarray) -> None:
+    """Every unit of a format against the model."""
+    got, want = harness.batch(M, a, b), _model(a, b, M)
+    wrong = np.flatnonzero((got != want).any(0))
+    if wrong.size:
+        lines = []
+        for unit in wrong:
+            rows = np.flatnonzero(got[:, unit] != want[:, unit])
+            lines.append(f"  {UNITS[unit]}: {rows.size} of {a.size} differ")
+            lines += [f"    {a[i]:#010x}, {b[i]:#010x}: got {got[i, unit]:#010x}, want {want[i, unit]:#010x}" for i in rows[:3]]
+        raise AssertionError("\n".join([f"M = {M}, {kind}", *lines]))
+
+
+def anything(rng: np.random.Generator, n: int, M: int) -> tuple[np.ndarray, np.ndarray]:
+    """A number, and 32 bits of any magnitude that are a number too."""
+    words = (rng.integers(-(1 << 31), 1 << 31, n) >> rng.integers(0, 32, n)).astype(np.uint32)
+    exponent = words >> np.uint32(M) & np.uint32(255)
+    return numbers(rng, n, M), np.where((exponent == 0) | (exponent == 255), words & np.uint32((1 << M) - 1) | np.uint32(127 << M), words)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("M", FORMATS)
+def test_units(harness: Harness, M: int) -> None:
+    rng = random(200 + M)
+    for kind, (a, b) in operand_kinds(rng, 100_000, M).items():
+        check(harness, M, kind, a, b)
+    for kind, low, high in (("near 1", 120, 134), ("of fixed point", 100, 142)):
+        a, b = (numbers(rng, 100_000, M, low, high) for _ in range(2))
+        check(harness, M, kind, a, b)
+    a, b = anything(rng, 300_000, M)
+    check(harness, M, "fixed point", a, b)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("M", FORMATS)
+def test_functions(harness: Harness, M: int) -> None:
+    """Every mantissa up to 15 bits, above it 2^17, for both parities of the exponent; every fraction of exp2."""
+    m = np.arange(1 << M) if M <= 15 else np.concatenate([np.arange(256), random(300 + M).integers(0, 1 << M, 1 << 17), (1 << M) - 1 - np.arange(256)])
+    for exponent in (1, 126, 127, 128, 252, 253, 254):
+        a = (m | exponent << M).astype(np.uint32)
+        check(harness, M, f"exponent {exponent}", a, np.full_like(a, 127 << M))
+    words = np.arange(1 << 21, dtype=np.uint32)
+    words = words[((words >> M) & 255 != 255) & ((words >> M != 0) | (words == 0))]
+    check(harness, M, "exp2", np.full_like(words, 127 << M), words)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("M", FORMATS)
+def test_pipelines(harness: Harness, M: int) -> None:
+    """Every number of stages against none, with pauses."""
+    rng = random(400 + M)
+    n = 20_000
+    pairs = [pair for kind, pair in operand_kinds(rng, n // 8, M).items()] + [anything(rng, n, M)]
+    a, b = (np.concatenate(side) for side in zip(*pairs))
+    order = rng.permutation(a.size)
+    for rate in (1.0, 0.5):
+        enable = (rng.random(a.size) < rate).astype(np.uint8)
+        assert not harness.pipes(M, a[order], b[order], enable).any()

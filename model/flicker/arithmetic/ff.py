@@ -132,11 +132,9 @@ _ALL = [[tables.table(function, group) for group in tables.GROUPS] for function 
 _FIELDS = ("index_bits", "arg_bits", "frac_bits", "drop", "square_drop", "c1_drop", "c2_drop")
 _PLACES = np.array([[[getattr(t, field) for field in _FIELDS] for t in row] for row in _ALL], np.int64)
 _STARTS = np.cumsum([0] + [t.c0.size for row in _ALL for t in row])[:-1].reshape(_F, _G)
-# c0, signed c1, signed c2 of every segment of every table.
-_COEFFICIENTS = np.concatenate([
-    np.stack([t.c0, *(-c if negative else c for c, negative in zip((t.c1, t.c2), tables.NEGATIVE[t.function]))], 1)
-    for row in _ALL for t in row
-])
+# c0, c1, c2 of every segment of every table.
+_COEFFICIENTS = np.concatenate([np.stack([t.c0, t.c1, t.c2], 1) for row in _ALL for t in row])
+_SIGNS = np.where(tables.NEGATIVE, -1, 1)
 
 
 @numba.njit(forceinline=True)
@@ -148,7 +146,8 @@ def _evaluate(function, group, odd, arg, result_bits):
     row = _STARTS[function, group] + ((odd << place[0]) | (arg >> delta))
     s = (dc ^ (dc >> 63)) >> place[3]
     q = (s * (s + 1)) >> place[4]
-    v = _COEFFICIENTS[row, 0] + ((_COEFFICIENTS[row, 1] * dc) >> place[5]) + ((_COEFFICIENTS[row, 2] * q) >> place[6])
+    v = _COEFFICIENTS[row, 0] + _SIGNS[function, 0] * ((_COEFFICIENTS[row, 1] * dc) >> place[5])
+    v += _SIGNS[function, 1] * ((_COEFFICIENTS[row, 2] * q) >> place[6])
     shift = place[2] - result_bits
     return (v + (1 << (shift - 1))) >> shift
 

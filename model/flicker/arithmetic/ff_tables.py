@@ -4,9 +4,9 @@ A function of the mantissa m in [0, 1) is cut into segments of equal width. With
 
     s = |dc + 1/2| >> drop                            (unsigned, `square_bits` bits)
     q = s (s + 1) >> square_drop
-    value = c0 + (c1 dc >> c1_drop) + (c2 q >> c2_drop)      in 2^-frac_bits, floors
+    value = c0 +- (c1 dc >> c1_drop) +- (c2 q >> c2_drop)    in 2^-frac_bits, floors
 
-`c1` and `c2` are kept as magnitudes; their signs are the function's. Tables are made for four lengths of the mantissa (`GROUPS`); a format
+`c1` and `c2` are magnitudes; the signs are the function's. Tables are made for four lengths of the mantissa (`GROUPS`); a format
 takes the shortest that holds it. `scripts/gen_tables.py` writes them into `flk_ff_table_pkg.sv`.
 
 Only additions, multiplications, divisions and square roots of float64 are used, so that the tables are the same everywhere.
@@ -90,7 +90,7 @@ class Table:
         s = (dc ^ (dc >> 63)) >> self.drop
         q = (s * (s + 1)) >> self.square_drop
         one, two = ((-1 if negative else 1) for negative in NEGATIVE[self.function])
-        return self.c0[segment] + ((one * self.c1[segment] * dc) >> self.c1_drop) + ((two * self.c2[segment] * q) >> self.c2_drop)
+        return self.c0[segment] + one * ((self.c1[segment] * dc) >> self.c1_drop) + two * ((self.c2[segment] * q) >> self.c2_drop)
 
 
 @cache
@@ -110,7 +110,7 @@ def table(function: int, group: int) -> Table:
     parts: list[list[np.ndarray]] = [[], [], []]
     for odd in (False, True) if function in (RSQRT, SQRT) else (False,):
         middle = (np.arange(1 << k) + 0.5) * width
-        node = float(np.sqrt(3.0)) / 4 * width  # of the third Chebyshev polynomial: +-node and 0
+        node = float(np.sqrt(3.0)) / 4 * width  # zeros of the third Chebyshev polynomial: +-node and 0
         low, mid, high = (f(middle + at, odd) for at in (-node, 0.0, node))
         a2 = (high + low - 2 * mid) / (2 * node * node)
         a1 = (high - low) / (2 * node) - a2 * 2.0**-arg  # the square is that of dc + 1/2
