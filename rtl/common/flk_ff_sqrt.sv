@@ -1,0 +1,77 @@
+// Square root of ff numbers, pipelined (docs/ff.md).
+//
+// Of 0 and of a negative number 0.
+// Exponent and sign beside flk_ff_poly; pack.
+//
+// Stages registers (= latency): 0 none, 1 at the output, 2 and 3 also inside of flk_ff_poly. Registers load while en_i is high and are not
+// reset.
+module flk_ff_sqrt
+  import flk_ff_table_pkg::*;
+#(
+  parameter  int unsigned ManBits = 19,
+  parameter  int unsigned Stages  = 3,
+  localparam int unsigned Width   = 9 + ManBits
+) (
+  input  logic             clk_i,
+  input  logic             en_i,
+  input  logic [Width-1:0] x_i,
+  output logic [Width-1:0] y_o
+);
+
+  localparam int unsigned Group = (ManBits <= 11) ? 0 : (ManBits - 8) / 4;
+  localparam int unsigned ArgBits = 32'(ARG_BITS[SQRT][Group]);
+
+  logic sign;
+  logic [7:0] exp;
+  logic [ManBits-1:0] man;
+  logic [ManBits+1:0] value;
+
+  assign {sign, exp, man} = x_i;
+
+  flk_ff_poly #(
+    .Function(SQRT),
+    .ManBits (ManBits),
+    .Stages  (Stages)
+  ) i_poly (
+    .clk_i,
+    .en_i,
+    .odd_i  (!exp[0]),
+    .arg_i  (ArgBits'(man) << (ArgBits - ManBits)),
+    .value_o(value)
+  );
+
+  // Of a value below 2, biased: 127 + floor((exp - 127) / 2) = 63 + floor((exp + 1) / 2).
+  logic zero_q;
+  logic [7:0] half_q;
+
+  flk_delay #(
+    .Width(9),
+    .Depth((Stages >= 2) ? Stages - 1 : 0)
+  ) i_side (
+    .clk_i,
+    .en_i,
+    .d_i({sign || exp == '0, 8'd63 + 8'((9'(exp) + 9'd1) >> 1)}),
+    .q_o({zero_q, half_q})
+  );
+
+  // value is in [1, 2]; 2 by rounding.
+  logic [7:0] result_exp;
+  logic [Width-1:0] result;
+
+  assign result_exp = half_q + 8'(value[ManBits+1]);
+  assign result = zero_q ? '0 : {1'b0, result_exp, value[ManBits-1:0]};
+
+  logic unused_value;
+  assign unused_value = value[ManBits];  // the leading bit
+
+  flk_delay #(
+    .Width(Width),
+    .Depth(32'(Stages >= 1))
+  ) i_y (
+    .clk_i,
+    .en_i,
+    .d_i(result),
+    .q_o(y_o)
+  );
+
+endmodule
