@@ -1,0 +1,89 @@
+"""Cluster test: which clusters can hold a visible Gaussian, and between which depths the kept ones lie.
+
+With e = corner - position, the corner of the box that lies farthest along a normal: normal . e + offset + reach sigma > 0 for all five half-spaces keeps the cluster.
+Depth: the third row of the view over the nearest and the farthest corner. ff numbers of 23 mantissa bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from ...arithmetic.ff import ff_add, ff_mul, ff_sub
+from ...front.projection import NEAR
+from ...scene.packed import PackedScene
+from .setup import CLUSTER_M, KEY_BITS, KEY_FIELD, FrameSetup, rounded
+
+
+@numba.njit
+def _dot(n0, n1, n2, e0, e1, e2):
+    M = CLUSTER_M
+    return ff_add(ff_add(ff_mul(n0, e0, M), ff_mul(n1, e1, M), M), ff_mul(n2, e2, M), M)
+
+
+@numba.njit
+def _far(n, low, high):
+    """The end of an axis that is farther along the normal."""
+    return low if n < 0.0 else high
+
+
+@numba.njit(cache=True)
+def _cull(low, high, sigma, position, normal, offset, reach, keep, depth):
+    M = CLUSTER_M
+    for i in range(low.shape[0]):
+        l0, l1, l2 = ff_sub(low[i, 0], position[0], M), ff_sub(low[i, 1], position[1], M), ff_sub(low[i, 2], position[2], M)
+        h0, h1, h2 = ff_sub(high[i, 0], position[0], M), ff_sub(high[i, 1], position[1], M), ff_sub(high[i, 2], position[2], M)
+        keep[i] = True
+        for k in range(5):
+            n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
+            most = _dot(n0, n1, n2, _far(n0, l0, h0), _far(n1, l1, h1), _far(n2, l2, h2))
+            sum_ = ff_add(ff_add(most, offset[k], M), ff_mul(reach[k], sigma[i], M), M)
+            if not sum_ > 0.0:
+                keep[i] = False
+            if k == 0:
+                depth[i, 0] = _dot(n0, n1, n2, _far(-n0, l0, h0), _far(-n1, l1, h1), _far(-n2, l2, h2))
+                depth[i, 1] = most
+
+
+@dataclass(frozen=True, eq=False)
+class Culled:
+    """keep: bool (C,). nearest, farthest: ff (23 bits), depths that bound the kept clusters; nearest is at least 0.2.
+
+    key_shift: a key step is 2^-key_shift. key_low: floor(nearest 2^key_shift), the depth of key 0.
+    """
+
+    keep: np.ndarray
+    nearest: float
+    farthest: float
+    key_shift: int
+    key_low: int
+
+
+NEAR_FF = float(rounded(NEAR, CLUSTER_M))
+
+
+def key_scale(nearest: float, farthest: float) -> tuple[int, int]:
+    """Key shift and lowest depth: the finest step 2^-shift with which all depths from nearest to farthest have keys of 24 bits and depths of 40.
+
+    The shift is 23 less the exponent of the distance, at most 39 less that of the farthest depth.
+    """
+    exponent = lambda v: int(np.frexp(v)[1]) - 1  # noqa: E731
+    span = float(ff_sub(farthest, nearest, CLUSTER_M))
+    shift = min(KEY_BITS - 1 - exponent(span) if span > 0.0 else KEY_FIELD, KEY_FIELD - 1 - exponent(farthest))
+    return shift, int(np.floor(np.ldexp(nearest, shift)))
+
+
+def cull(packed: PackedScene, setup: FrameSetup) -> Culled:
+    """Test the clusters of a scene."""
+    table = packed.table
+    low, high = table["low"].astype(np.float64), table["high"].astype(np.float64)
+    keep, depth = np.zeros(len(table), np.bool_), np.zeros((len(table), 2))
+    _cull(low, high, packed.sigma.astype(np.float64), setup.position, setup.normal, setup.offset, setup.reach, keep, depth)
+    if not keep.any():
+        return Culled(keep, NEAR_FF, NEAR_FF, *key_scale(NEAR_FF, NEAR_FF))
+    nearest = max(float(depth[keep, 0].min()), NEAR_FF)
+    farthest = max(float(depth[keep, 1].max()), nearest)
+    return Culled(keep, nearest, farthest, *key_scale(nearest, farthest))
+

@@ -1,0 +1,373 @@
+"""The front end of a frame: a packed scene and a camera to what lies in memory before rendering, bit for bit.
+
+    front = run_front(packed, camera)
+    lists = front.subtile_lists()          # for the golden rendering stage and the RTL
+    picture = front.render_float(...)      # the records blended in float64
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from dataclasses import dataclass
+from enum import Enum
+
+import numba
+import numpy as np
+
+from ...arithmetic.ff import ff_add, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round
+from ...errors import FlickerError
+from ...front.records import SubtileLists
+from ...params import SUBTILE, TILE
+from ...scene.camera import Camera
+from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
+from .cull import Culled, cull
+from .reach import reach_one, reach_tables, tiles_of
+from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
+from .setup import CLUSTER_M, FORMATS, KEY_BITS, KEY_FIELD, FrameSetup, FrontFormats
+from .splat import basis_functions, colour_constants, constants, largest_component, pixels, project_one, shade
+
+SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
+SCALE_FRACTION = 12  # of a log2 scale
+OPACITY_LIMIT = 255
+
+
+class ListKind(str, Enum):
+    """What lists a splat in a tile."""
+
+    ELLIPSE = "ellipse"  # alpha = 1/255, cut by 3 standard deviations an axis
+    BOX = "box"  # 3 standard deviations an axis
+
+
+class Outcome:
+    """What became of a Gaussian, in the order of the tests."""
+
+    CULLED, NEAR, OUTSIDE, FAINT, MISSED, RECORDED = range(6)
+
+
+OUTCOMES = {
+    Outcome.CULLED: "in a culled cluster", Outcome.NEAR: "nearer than 0.2", Outcome.OUTSIDE: "3-sigma box outside the picture",
+    Outcome.FAINT: "opacity below 1/510", Outcome.MISSED: "ellipse holds no pixel", Outcome.RECORDED: "recorded",
+}
+
+Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_RECORDED = range(1, 6)  # for numba
+
+# What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16 quaternion, or (largest, three codes).
+Lanes = namedtuple("Lanes", "chunked cluster q s quat opacity dc sh count")
+# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 fraction bits. dc_low, dc_step, sh_step: colour format.
+ClusterValues = namedtuple("ClusterValues", "low step scale_low scale_step dc_low dc_step sh_step")
+
+
+def lanes_of(packed: PackedScene) -> Lanes:
+    """The fields of a packed scene as the lanes decode them, all exact."""
+    count = (packed.degrees[packed.cluster] + 1) ** 2
+    if packed.format is PackedFormat.CHUNK:
+        c = chunk_codes(packed)
+        return Lanes(
+            True, packed.cluster, c.position.astype(np.float64), c.scale.astype(np.float64), c.rotation.astype(np.float64), c.opacity.astype(np.float64),
+            c.dc.astype(np.float64), c.sh.astype(np.float32), count,
+        )
+    b = fp16_bits(packed)
+    wide = lambda bits: np.ascontiguousarray(bits).view(np.float16).astype(np.float64)  # noqa: E731
+    sh = np.ascontiguousarray(b.sh).view(np.float16).astype(np.float32)
+    return Lanes(
+        False, packed.cluster, wide(b.mean), wide(b.scale), wide(b.quat), wide(b.opacity), sh[:, 0].astype(np.float64), np.ascontiguousarray(sh[:, 1:]), count,
+    )
+
+
+@numba.njit(cache=True)
+def _cluster_values(origin, step, position, dc, sh, M, P, C, out_low, out_step, out_dc, out_sh):
+    for i in range(origin.shape[0]):
+        for k in range(3):
+            out_low[i, k] = ff_round(ff_sub(origin[i, k], position[k], M), P)
+            out_step[i, k] = ff_round(step[i, k], P)
+            out_dc[i, k, 0] = ff_round(dc[i, k, 0], C)
+            out_dc[i, k, 1] = ff_round(dc[i, k, 1], C)
+            for d in range(3):
+                out_sh[i, d, k] = ff_round(sh[i, d, k], C)
+
+
+def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
+    """What the lanes need of each cluster's header."""
+    f, h = setup.formats, packed.headers
+    n = len(packed.table)
+    low, step, dc, sh = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 2)), np.empty((n, 3, 3))
+    fixed = np.zeros((2, n, 3), np.int64)
+    if packed.format is PackedFormat.CHUNK:
+        wide = {name: h[name].astype(np.float64) for name in ("position_low", "position_step", "scale_low", "scale_step", "dc_low", "dc_step", "sh_step")}
+        origin, given = wide["position_low"], wide["position_step"]
+        given_dc, given_sh = np.stack([wide["dc_low"], wide["dc_step"]], axis=2), wide["sh_step"]
+        for k, name in enumerate(("scale_low", "scale_step")):
+            fixed[k] = np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5).astype(np.int64)
+    else:
+        origin, given = h["origin"].astype(np.float64), np.ones((n, 3))
+        given_dc, given_sh = np.zeros((n, 3, 2)), np.ones((n, 3, 3))
+    _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, low, step, dc, sh)
+    return ClusterValues(low, step, fixed[0], fixed[1], np.ascontiguousarray(dc[:, :, 0]), np.ascontiguousarray(dc[:, :, 1]), sh)
+
+
+@numba.njit
+def _scale(chunked, code, low, step, M):
+    if chunked:
+        value = low + np.int64(code) * step
+        drop = SCALE_HEADER_FRACTION - SCALE_FRACTION
+        return ff_exp2_fixed((value + (1 << (drop - 1))) >> drop, SCALE_FRACTION, M)
+    return ff_round(code, M)
+
+
+@numba.njit
+def _quaternion(chunked, c, M):
+    if not chunked:
+        return ff_round(c[0], M), ff_round(c[1], M), ff_round(c[2], M), ff_round(c[3], M)
+    a, b, d = 2.0 * c[1] - 1023.0, 2.0 * c[2] - 1023.0, 2.0 * c[3] - 1023.0
+    most = largest_component(np.int64(a), np.int64(b), np.int64(d), M)
+    a, b, d = ff_round(a, M), ff_round(b, M), ff_round(d, M)
+    if c[0] == 0.0:
+        return most, a, b, d
+    if c[0] == 1.0:
+        return a, most, b, d
+    if c[0] == 2.0:
+        return a, b, most, d
+    return a, b, d, most
+
+
+@numba.njit
+def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S):
+    """Projection of Gaussian i."""
+    c = lanes.cluster[i]
+    s = np.empty(3)
+    for k in range(3):
+        s[k] = _scale(lanes.chunked, lanes.s[i, k], values.scale_low[c, k], values.scale_step[c, k], S)
+    w, x, y, z = _quaternion(lanes.chunked, lanes.quat[i], S)
+    return project_one(
+        values.low[c], values.step[c], lanes.q[i], s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S,
+    )
+
+
+@numba.njit
+def opacity_code(chunked, opacity, M):
+    """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself."""
+    if chunked:
+        return np.int64(opacity)
+    return min(ff_to_fixed_round(ff_mul(255.0, ff_round(opacity, M), M), 0, 16), OPACITY_LIMIT)
+
+
+@numba.njit
+def colour_lane(i, lanes, values, p, k, M, rgb):
+    """Colour of Gaussian i into rgb (3,), ff (M bits), not negative."""
+    c = lanes.cluster[i]
+    count = lanes.count[i]
+    basis, coefficient = np.zeros(16), np.zeros(16)
+    degree = 0 if count == 1 else (1 if count == 4 else (2 if count == 9 else 3))
+    if degree:
+        basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), k, degree, basis, M)
+    for channel in range(3):
+        if lanes.chunked:
+            dc = ff_add(values.dc_low[c, channel], ff_mul(values.dc_step[c, channel], lanes.dc[i, channel], M), M)
+        else:
+            dc = ff_add(0.5, ff_mul(k[0], ff_round(lanes.dc[i, channel], M), M), M)
+        for j in range(1, count):
+            step = values.sh_step[c, 0 if j < 4 else (1 if j < 9 else 2), channel]
+            coefficient[j] = ff_mul(step, ff_round(np.float64(lanes.sh[i, j - 1, channel]), M), M)
+        rgb[channel] = max(shade(dc, basis, coefficient, count, M), 0.0)
+
+
+@numba.njit(parallel=True, cache=True)
+def _splats(
+    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, colours, logs, sigmas, cut, inverse, box, conic,
+    shift, key_low, P, S, C, outcome, key, words, halves, entries, flags,
+):
+    """The Gaussians `index` (of kept clusters): their outcome, key, record and number of entries."""
+    cols = (width + TILE - 1) // TILE
+    none = np.empty(0, np.int32)
+    for j in numba.prange(len(index)):
+        i = index[j]
+        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S)
+        if p.near:
+            outcome[j] = Outcome_NEAR
+            continue
+        x0, x1 = pixels(p.x, p.radius_x, width)
+        y0, y1 = pixels(p.y, p.radius_y, height)
+        if x0 > x1 or y0 > y1:
+            outcome[j] = Outcome_OUTSIDE
+            continue
+        code = opacity_code(lanes.chunked, lanes.opacity[i], S)
+        if code == 0:
+            outcome[j] = Outcome_FAINT
+            continue
+        r = reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S)
+        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none)
+        if count == 0:
+            outcome[j] = Outcome_MISSED
+            continue
+        outcome[j] = Outcome_RECORDED
+        entries[j] = count
+        depth = ff_to_fixed_floor(math.ldexp(p.t2, shift), 0, KEY_FIELD + 1)
+        key[j] = min(max(depth - key_low, 0), (1 << KEY_BITS) - 1)
+        rgb = np.empty(3)
+        colour_lane(i, lanes, values, p, colours, C, rgb)
+        if conic:
+            a = ff_mul(p.rdet, p.rdet, S)
+            halves[j, 0], halves[j, 1], halves[j, 2] = 0.5 * ff_mul(p.yy, a, S), -ff_mul(p.xy, a, S), 0.5 * ff_mul(p.xx, a, S)
+            halves[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
+            halves[j, 4:7] = rgb
+            words[j, 0], words[j, 1] = p.x, p.y
+            flags[j, 2] = p.spiky
+            continue
+        x, far_x = encode_mean(p.x)
+        y, far_y = encode_mean(p.y)
+        flags[j, 0] = far_x or far_y
+        low = np.uint64(x) | np.uint64(y) << np.uint64(23)
+        l0, l1, l2 = encode_shape(p.l0), encode_shape(abs(p.l1)), encode_shape(p.l2)
+        low |= np.uint64(l0) << np.uint64(46)
+        low |= np.uint64(l1 & 15) << np.uint64(60)
+        high = np.uint64(l1 >> 4) | np.uint64(p.l1 < 0.0) << np.uint64(10) | np.uint64(l2) << np.uint64(11) | np.uint64(code) << np.uint64(25)
+        for k in range(3):
+            v = ff_to_fixed_round(rgb[k], COLOUR_FRACTION, 24)
+            if v > COLOUR_LIMIT:
+                v = COLOUR_LIMIT
+                flags[j, 1] = True
+            high |= np.uint64(v) << np.uint64(33 + 10 * k)
+        high |= np.uint64(p.spiky) << np.uint64(63)
+        words[j, 0], words[j, 1] = np.int64(low), np.int64(high)
+
+
+@numba.njit(parallel=True, cache=True)
+def _entries(
+    index, start, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, logs, sigmas, cut, inverse, box, P, S, tile, mask,
+):
+    """Entries of the recorded Gaussians `index`, those of the j-th from place start[j] on."""
+    cols = (width + TILE - 1) // TILE
+    for j in numba.prange(len(index)):
+        i = index[j]
+        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S)
+        code = opacity_code(lanes.chunked, lanes.opacity[i], S)
+        r = reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S)
+        tiles_of(box, p.x, p.y, p.l2, r, cols, S, start[j], tile, mask)
+
+
+@dataclass(eq=False)
+class FrontFrame:
+    """What the front end leaves, in record order (R records, E list entries).
+
+    gaussian: int64 (R,), Gaussians of the packed scene. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size. records: uint8 (R, bytes).
+    key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2 row + column of the sub-tiles.
+    culled: of the clusters. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
+    """
+
+    camera: Camera
+    packed: PackedScene
+    kind: RecordKind
+    culled: Culled
+    gaussian: np.ndarray
+    number: np.ndarray
+    records: np.ndarray
+    key: np.ndarray
+    entry_splat: np.ndarray
+    entry_tile: np.ndarray
+    entry_mask: np.ndarray
+    outcomes: dict[str, int]
+    adjusted: dict[str, int]
+
+    def splats(self) -> Splats:
+        """What the records mean."""
+        return decode_records(self.records, self.kind)
+
+    def sorted_subtiles(self) -> tuple[np.ndarray, np.ndarray]:
+        """start int64 (S + 1,), record int32: records of each sub-tile, row by row, by key, equal keys in record order."""
+        cols, rows = (-(-n // SUBTILE) for n in (self.camera.width, self.camera.height))
+        order = np.argsort(self.key, kind="stable")
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        by_rank = np.argsort(rank[self.entry_splat], kind="stable")
+        tile_cols = -(-self.camera.width // TILE)
+        return _subtiles(self.entry_splat[by_rank], self.entry_tile[by_rank], self.entry_mask[by_rank], tile_cols, cols, rows)
+
+    def subtile_lists(self) -> SubtileLists:
+        """Lists and splats as the rendering stage takes them."""
+        start, entry = self.sorted_subtiles()
+        splats = self.splats()
+        cols, rows = (-(-n // SUBTILE) for n in (self.camera.width, self.camera.height))
+        return SubtileLists(
+            self.camera.width, self.camera.height, self.kind.form, fp16_features(splats), splats.spiky, start, entry,
+            fp16_means(splats, start, entry, cols), cols, rows, len(self.entry_tile), dict(self.adjusted),
+        )
+
+
+@numba.njit(cache=True)
+def _subtiles(splat, tile, mask, tile_cols, cols, rows):
+    count = np.zeros(cols * rows + 1, np.int64)
+    for turn in range(2):
+        if turn == 1:
+            start = np.cumsum(count)
+            fill = start[:-1].copy()
+            entry = np.empty(start[-1], np.int32)
+        for e in range(len(tile)):
+            for k in range(4):
+                if mask[e] >> k & 1:
+                    s = (tile[e] // tile_cols * 2 + k // 2) * cols + tile[e] % tile_cols * 2 + k % 2
+                    if turn == 0:
+                        count[s + 1] += 1
+                    else:
+                        entry[fill[s]] = splat[e]
+                        fill[s] += 1
+    return start, entry
+
+
+def run_front(
+    packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, formats: FrontFormats = FORMATS,
+) -> FrontFrame:
+    """Cull, project, colour, record and list a packed scene. FlickerError for pictures beyond 4096x4096."""
+    setup = FrameSetup.of(camera, formats)
+    culled = cull(packed, setup)
+    lanes, values = lanes_of(packed), cluster_values(packed, setup)
+    index = np.flatnonzero(culled.keep[packed.cluster])
+    n = len(index)
+    outcome, key, words = np.zeros(n, np.int8), np.zeros(n, np.uint32), np.zeros((n, 2), np.int64)
+    conic = kind is RecordKind.CONIC32
+    halves, entries, flags = np.zeros((n, 7) if conic else (0, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
+    registers = (setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit, setup.width, setup.height, constants(formats))
+    tables, box = reach_tables(formats), lists is ListKind.BOX
+    P, S, C = formats.position, formats.shape, formats.colour
+    _splats(
+        index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, culled.key_low, P, S, C,
+        outcome, key, words, halves, entries, flags,
+    )
+    kept = np.flatnonzero(outcome == Outcome.RECORDED)
+    gaussian = index[kept]
+    start = np.concatenate([[0], np.cumsum(entries[kept])])
+    tile, mask = np.empty(start[-1], np.int32), np.empty(start[-1], np.uint8)
+    _entries(gaussian, start, lanes, values, *registers, *tables, box, P, S, tile, mask)
+    cluster = packed.cluster[gaussian]
+    before = np.searchsorted(cluster, np.arange(len(packed.table)))
+    number = packed.first[cluster] + np.arange(len(gaussian)) - before[cluster]
+    outcomes = {OUTCOMES[Outcome.CULLED]: len(packed) - n}
+    outcomes |= {OUTCOMES[k]: int((outcome == k).sum()) for k in range(1, 6)}
+    records, adjusted = _records(kind, words[kept], halves[kept] if conic else halves, flags[kept])
+    return FrontFrame(
+        camera, packed, kind, culled, gaussian, number, records, key[kept], np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask,
+        outcomes, adjusted,
+    )
+
+
+def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
+    """uint8 (R, bytes) and what did not fit."""
+    if kind is RecordKind.FACTORED16:
+        adjusted = {"mean beyond the record's field": int(flags[:, 0].sum()), "colour above 2 clipped": int(flags[:, 1].sum())}
+        return np.ascontiguousarray(words).view(np.uint8).reshape(-1, 16), {k: v for k, v in adjusted.items() if v}
+    records = np.zeros((len(words), 32), np.uint8)
+    top = 1 << 31
+    records[:, :8] = np.clip(words, -top, top - 1).astype("<i4").view(np.uint8)
+    beyond = (np.abs(halves) > 65504.0).any(axis=1)
+    numbers = np.clip(halves, -65504.0, 65504.0).astype(np.float16)
+    records[:, 8:22] = numbers.view(np.uint8)
+    records[:, 22] = flags[:, 2]
+    far = (words != np.clip(words, -top, top - 1)).any(axis=1)
+    adjusted = {"mean beyond the record's field": int(far.sum()), "value beyond FP16 clamped": int(beyond.sum())}
+    return records, {k: v for k, v in adjusted.items() if v}
+
+
+def check_supported(kind: RecordKind, form: object) -> None:
+    """FlickerError where a rendering stage of this form cannot take these records."""
+    if kind.form is not form:
+        raise FlickerError(f"records {kind.value} are for form {kind.form.name.lower()}")

@@ -1,0 +1,119 @@
+"""Where a splat reaches: the pixel box of its ellipse alpha = 1/255 cut by 3 standard deviations, and the tiles and sub-tiles in it.
+
+A band is a row of sub-tiles: up to 8 rows of pixels. The ellipse being convex, the part of it between the first and the last pixel row of a band lies over one interval
+of x, and a sub-tile of the band is entered exactly when a pixel column of it lies in that interval. Its right end is the ellipse's rightmost point if that lies
+between these rows, else on the nearer of them; the left end likewise. At distance dy from the mean: x = kappa dy +- i0 sqrt(log2 o' - (l2 dy)^2), o' = 255 o.
+
+"box" lists take the box of 3 standard deviations alone, as the paper does.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numba
+import numpy as np
+
+from ...arithmetic.ff import ff_add, ff_from_fixed, ff_mul, ff_sqrt, ff_sub, ff_to_fixed_round
+from ...params import SUBTILE, TILE
+from .setup import MEAN_FRACTION, FrontFormats, rounded
+from .splat import MEAN_BITS, SHAPE_SCALE, pixels
+
+SIGMAS = 3.0
+_BAND = SUBTILE - 1
+
+
+def reach_tables(formats: FrontFormats) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """By opacity code 0 to 255, ff numbers of the shape format: log2(code); sqrt(2 ln code), standard deviations to alpha = 1/255; the same, at most 3. And 1 / K.
+
+    Entry 0 is that of 1; such splats are never listed.
+    """
+    code = np.maximum(np.arange(256), 1)
+    sigmas = np.sqrt(2.0 * np.log(code))
+    inverse = rounded(1.0 / SHAPE_SCALE, formats.shape)
+    return rounded(np.log2(code), formats.shape), rounded(sigmas, formats.shape), rounded(np.minimum(sigmas, SIGMAS), formats.shape), float(inverse)
+
+
+# x0, x1, y0, y1: first and last pixel column and row; none where the first is past the last. i0, kappa, limit: as above. right: rows from the mean to the rightmost point, 1/128.
+Reach = namedtuple("Reach", "x0 x1 y0 y1 i0 kappa limit right")
+
+
+@numba.njit
+def reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S):
+    """Bounds of a splat. p: its Projection. code: 255 times the opacity."""
+    rx = p.radius_x if box else ff_to_fixed_round(ff_mul(cut[code], p.sx, S), MEAN_FRACTION, MEAN_BITS)
+    ry = p.radius_y if box else ff_to_fixed_round(ff_mul(cut[code], p.sy, S), MEAN_FRACTION, MEAN_BITS)
+    x0, x1 = pixels(p.x, rx, width)
+    y0, y1 = pixels(p.y, ry, height)
+    i0 = ff_mul(ff_mul(ff_mul(p.det, p.rdet, S), p.ryy, S), inverse, S)
+    kappa = ff_mul(p.xy, ff_mul(p.ryy, p.ryy, S), S)
+    right = ff_to_fixed_round(ff_mul(sigmas[code], ff_mul(p.xy, p.rxx, S), S), MEAN_FRACTION, MEAN_BITS)
+    return Reach(x0, x1, y0, y1, i0, kappa, logs[code], right)
+
+
+@numba.njit
+def half_chord(dy, l2, i0, kappa, limit, S):
+    """Where the ellipse is dy (1/128 pixel) below the mean: its middle and half its width there, ff."""
+    d = ff_from_fixed(dy, MEAN_FRACTION, S)
+    v = ff_mul(l2, d, S)
+    return ff_mul(kappa, d, S), ff_mul(i0, ff_sqrt(ff_sub(limit, ff_mul(v, v, S), S), S), S)
+
+
+@numba.njit
+def band_columns(band, x, y, l2, r, S):
+    """First and last pixel column that the splat's ellipse enters in a band, rows 8 band to 8 band + 7; the first is past the last where there is none. r: Reach."""
+    first = max(band * SUBTILE, r.y0)
+    last = min(band * SUBTILE + _BAND, r.y1)
+    if first > last:
+        return 1, 0
+    low, high = (first << MEAN_FRACTION) - y, (last << MEAN_FRACTION) - y
+    middle, half = half_chord(min(max(r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
+    right = x + ff_to_fixed_round(ff_add(middle, half, S), MEAN_FRACTION, MEAN_BITS)
+    middle, half = half_chord(min(max(-r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
+    left = x + ff_to_fixed_round(ff_sub(middle, half, S), MEAN_FRACTION, MEAN_BITS)
+    one = 1 << MEAN_FRACTION
+    return max((left + one - 1) >> MEAN_FRACTION, r.x0), min(right >> MEAN_FRACTION, r.x1)
+
+
+@numba.njit
+def band_subtiles(band, box, x, y, l2, r, S):
+    """First and last sub-tile column that is entered in a band; the first is past the last where there is none."""
+    if box:
+        if max(band * SUBTILE, r.y0) > min(band * SUBTILE + _BAND, r.y1):
+            return 1, 0
+        a, b = r.x0, r.x1
+    else:
+        a, b = band_columns(band, x, y, l2, r, S)
+    if a > b:
+        return 1, 0
+    return a // SUBTILE, b // SUBTILE
+
+
+@numba.njit
+def tiles_of(box, x, y, l2, r, cols, S, start, tile, mask):
+    """Write the entries of a splat, tile row by tile row, from place `start` of tile and mask (no writing where they are empty); their number.
+
+    mask: bit 2 (row of sub-tiles) + column.
+    """
+    n = 0
+    for row in range(r.y0 // TILE, r.y1 // TILE + 1):
+        a0, a1 = band_subtiles(2 * row, box, x, y, l2, r, S)
+        b0, b1 = band_subtiles(2 * row + 1, box, x, y, l2, r, S)
+        if a0 > a1:
+            low, high = b0, b1
+        elif b0 > b1:
+            low, high = a0, a1
+        else:
+            low, high = min(a0, b0), max(a1, b1)
+        for col in range(low // 2, high // 2 + 1):
+            bits = 0
+            for k in range(2):
+                s = 2 * col + k
+                bits |= (1 << k) if a0 <= s <= a1 else 0
+                bits |= (4 << k) if b0 <= s <= b1 else 0
+            if bits:
+                if tile.size:
+                    tile[start + n] = row * cols + col
+                    mask[start + n] = bits
+                n += 1
+    return n

@@ -1,0 +1,108 @@
+"""What the front end takes beside the scene: number formats, and the registers that a camera becomes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ...arithmetic.ff import ff_round
+from ...errors import FlickerError
+from ...front.projection import _CLAMP, DILATION, NEAR
+from ...params import TILE
+from ...scene.camera import Camera
+
+MAX_PICTURE = 4096
+CLUSTER_M = 23  # mantissa bits of the cluster test: those of the image's own float32
+MEAN_FRACTION = 7  # fraction bits of a mean in pixels
+KEY_BITS = 24
+KEY_FIELD = 40  # bits of a depth in units of a key step, before the nearest depth is taken off
+_RADIUS_MARGIN = 3.0 * np.sqrt(DILATION + np.sqrt(0.1)) + 2.0
+_SLACK = 1.0 + 2.0**-14
+
+
+@dataclass(frozen=True)
+class FrontFormats:
+    """Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape, lists. colour: SH."""
+
+    position: int = 21
+    shape: int = 13
+    colour: int = 13
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not 10 <= (bits := getattr(self, field.name)) <= CLUSTER_M:
+                raise FlickerError(f"front end: {field.name} must have 10 to {CLUSTER_M} mantissa bits, not {bits}")
+
+
+FORMATS = FrontFormats()
+
+
+def rounded(values: np.ndarray | float, bits: int) -> np.ndarray:
+    """float64 array of the nearest ff numbers."""
+    array = np.asarray(values, np.float64)
+    return np.array([ff_round(v, bits) for v in array.ravel().tolist()]).reshape(array.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSetup:
+    """The register bundle of a frame. ff numbers are held in float64; the number of mantissa bits stands behind each (C: cluster test, 23).
+
+    width, height: pixels, at most 4096.
+    position: (3,) C, of the camera. view: (3, 3) position, world to camera. focal: (2,) position.
+    row_x, row_x_z: (3,) shape, fx times the first and third row of `view`. row_y, row_y_z: fy times the second and third.
+    limit: (2,) shape, of tx and ty in the Jacobian.
+    normal: (5, 3) C, half-spaces of the cull: the near plane, left, right, top, bottom. offset: (5,) C, with the position taken off. reach: (5,) C, factor of sigma.
+    """
+
+    width: int
+    height: int
+    position: np.ndarray
+    view: np.ndarray
+    focal: np.ndarray
+    row_x: np.ndarray
+    row_x_z: np.ndarray
+    row_y: np.ndarray
+    row_y_z: np.ndarray
+    limit: np.ndarray
+    normal: np.ndarray
+    offset: np.ndarray
+    reach: np.ndarray
+    formats: FrontFormats
+
+    @staticmethod
+    def of(camera: Camera, formats: FrontFormats = FORMATS) -> FrameSetup:
+        """The registers of a camera. FlickerError for pictures that the lists cannot address."""
+        for side in ("width", "height"):
+            if getattr(camera, side) > MAX_PICTURE:
+                raise FlickerError(f"{side}: {getattr(camera, side)} is beyond the front end's {MAX_PICTURE}")
+        view = camera.rotation.T
+        limit = np.array([_CLAMP * 0.5 * n / f for n, f in ((camera.width, camera.fx), (camera.height, camera.fy))])
+        normal, offset, reach = _half_spaces(camera, limit)
+        p, s = formats.position, formats.shape
+        return FrameSetup(
+            camera.width, camera.height, rounded(camera.position, CLUSTER_M), rounded(view, p), rounded([camera.fx, camera.fy], p),
+            rounded(camera.fx * view[0], s), rounded(camera.fx * view[2], s), rounded(camera.fy * view[1], s), rounded(camera.fy * view[2], s),
+            rounded(limit, s), rounded(normal, CLUSTER_M), rounded(offset, CLUSTER_M), rounded(reach, CLUSTER_M), formats,
+        )
+
+
+def _half_spaces(camera: Camera, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals (5, 3) in world axes, offsets (5,), factors of sigma (5,): normal . (mean - position) + offset + factor sigma > 0 for every visible Gaussian.
+
+    As `chip.clusters.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose (docs/front_end.md).
+    """
+    reach = 3.0 * max(camera.fx, camera.fy) * np.sqrt(1.0 + (limit**2).sum())
+    normals = [(0.0, 0.0, 1.0)]
+    for axis, (f, n) in enumerate(((camera.fx, camera.width), (camera.fy, camera.height))):
+        middle = 0.5 * (n - 1)
+        beyond = TILE * -(-n // TILE)
+        for sign, depth in ((1.0, middle + _RADIUS_MARGIN), (-1.0, beyond - middle + _RADIUS_MARGIN)):
+            normal = [0.0, 0.0, depth]
+            normal[axis] = sign * f
+            normals.append(tuple(normal))
+    offset = np.array([-NEAR * (1.0 - 2.0**-14), 0.0, 0.0, 0.0, 0.0])
+    # The near plane's slack grows with sigma too: what is seen far off the axis has a large one.
+    factor = np.array([2.0**-14, reach, reach, reach, reach]) * _SLACK
+    return np.array(normals) @ camera.rotation.T, offset, factor
+

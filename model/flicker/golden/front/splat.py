@@ -1,0 +1,186 @@
+"""One Gaussian, from the numbers in the image to its splat: projection, covariance, shape, bounds, colour. Every intermediate value has a name.
+
+Source: as `flicker.front.projection` (Kerbl et al. 2023, Sec. 4). Differences that save hardware, none of which changes the result in exact arithmetic: focal lengths
+are in the rows of the view (`FrameSetup.row_x`), scales are divided by the depth, the determinant is that of the Gram matrix (a sum of squares of the cross
+product, so that nothing cancels), and the shape comes from two reciprocal square roots:
+
+    l2 = K / sqrt(yy)    l0 = K yy / sqrt(yy det)    l1 = -K xy / sqrt(yy det)    K^2 = log2(e) / 2
+
+so that (conic) / 2 log2(e) = L L^T with u = l0 dx + l1 dy, v = l2 dy. Sums of three are ((a + b) + c).
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numba
+import numpy as np
+
+from ...arithmetic.ff import ff_add, ff_from_int, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round
+from ...front.projection import _C0, _C1, _C2, _C3, DILATION, NEAR
+from ...params import SPIKY_AXIS_RATIO
+from .setup import MEAN_FRACTION, FrontFormats, rounded
+
+SHAPE_SCALE = np.sqrt(0.5 * np.log2(np.e))
+LARGEST_REST = 1023 * 1023 * 2  # what three rotation codes 2 code - 1023 leave for the square of the largest: (1023 sqrt(2))^2
+MEAN_BITS = 36  # of a mean in 1/128 pixel, saturated
+_TRACE_FACTOR = (SPIKY_AXIS_RATIO**2 + 1.0) ** 2 / SPIKY_AXIS_RATIO**2  # trace^2 / det where the axis ratio is that of the threshold
+COLOUR_GROUP = 4  # coefficients a cycle
+
+
+def constants(formats: FrontFormats) -> np.ndarray:
+    """float64: constants of `project_one`, as ff numbers of their formats."""
+    shape = rounded([SHAPE_SCALE, DILATION, DILATION**2, _TRACE_FACTOR], formats.shape)
+    return np.concatenate([rounded([NEAR], formats.position), shape])
+
+
+def colour_constants(formats: FrontFormats) -> np.ndarray:
+    """float64 (16,): factors of the spherical harmonics, ff numbers of the colour format; the first is that of the constant one."""
+    return rounded([_C0, _C1, _C1, _C1, *_C2, *_C3], formats.colour)
+
+
+@numba.njit
+def _sum3(a, b, c, M):
+    return ff_add(ff_add(a, b, M), c, M)
+
+
+@numba.njit
+def _dot3(a0, a1, a2, b0, b1, b2, M):
+    return _sum3(ff_mul(a0, b0, M), ff_mul(a1, b1, M), ff_mul(a2, b2, M), M)
+
+
+@numba.njit
+def largest_component(a, b, c, M):
+    """ff: the component that a chunk's rotation leaves out, in units of sqrt(2) / 2046, from the three integers 2 code - 1023."""
+    return ff_sqrt(ff_from_int(max(LARGEST_REST - (a * a + b * b + c * c), 0), M), M)
+
+
+# d: mean less the camera's position, world axes. t: the same in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
+# u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
+# xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel. rxx, ryy, rdet: reciprocal square roots.
+Projection = namedtuple(
+    "Projection",
+    "d0 d1 d2 t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
+    "xx xy yy det trace spiky rxx ryy rdet m l0 l1 l2 sx sy radius_x radius_y near",
+)
+
+
+@numba.njit
+def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S):
+    """Projection of a Gaussian. d0c: (3,) of the cluster, ff (P bits), stepc: (3,); q: (3,) ff numbers of the mean; s: (3,) ff (S bits); w to z: quaternion, any length.
+
+    Without `near` (nearer than 0.2) the other values mean nothing.
+    """
+    d0 = ff_add(d0c[0], ff_mul(stepc[0], q[0], P), P)
+    d1 = ff_add(d0c[1], ff_mul(stepc[1], q[1], P), P)
+    d2 = ff_add(d0c[2], ff_mul(stepc[2], q[2], P), P)
+    t0 = _dot3(view[0, 0], view[0, 1], view[0, 2], d0, d1, d2, P)
+    t1 = _dot3(view[1, 0], view[1, 1], view[1, 2], d0, d1, d2, P)
+    t2 = _dot3(view[2, 0], view[2, 1], view[2, 2], d0, d1, d2, P)
+    near = not t2 > const[0]
+    iz = ff_recip(t2, P)
+    tx = ff_mul(t0, iz, P)
+    ty = ff_mul(t1, iz, P)
+    half = 1 << (MEAN_FRACTION - 1)
+    screen_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), MEAN_FRACTION, MEAN_BITS) + (width - 1) * half
+    screen_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), MEAN_FRACTION, MEAN_BITS) + (height - 1) * half
+    ax = min(max(ff_round(tx, S), ff_neg(limit[0])), limit[0])
+    ay = min(max(ff_round(ty, S), ff_neg(limit[1])), limit[1])
+    u0 = ff_sub(row_x[0], ff_mul(ax, row_x_z[0], S), S)
+    u1 = ff_sub(row_x[1], ff_mul(ax, row_x_z[1], S), S)
+    u2 = ff_sub(row_x[2], ff_mul(ax, row_x_z[2], S), S)
+    v0 = ff_sub(row_y[0], ff_mul(ay, row_y_z[0], S), S)
+    v1 = ff_sub(row_y[1], ff_mul(ay, row_y_z[1], S), S)
+    v2 = ff_sub(row_y[2], ff_mul(ay, row_y_z[2], S), S)
+    norm = ff_add(ff_add(ff_mul(w, w, S), ff_mul(x, x, S), S), ff_add(ff_mul(y, y, S), ff_mul(z, z, S), S), S)
+    n = ff_round(2.0 * ff_recip(norm, S), S)
+    nx, ny, nz = ff_mul(n, x, S), ff_mul(n, y, S), ff_mul(n, z, S)
+    wx, wy, wz = ff_mul(w, nx, S), ff_mul(w, ny, S), ff_mul(w, nz, S)
+    qxx, qxy, qxz = ff_mul(x, nx, S), ff_mul(x, ny, S), ff_mul(x, nz, S)
+    qyy, qyz, qzz = ff_mul(y, ny, S), ff_mul(y, nz, S), ff_mul(z, nz, S)
+    r00, r01, r02 = ff_sub(1.0, ff_add(qyy, qzz, S), S), ff_sub(qxy, wz, S), ff_add(qxz, wy, S)
+    r10, r11, r12 = ff_add(qxy, wz, S), ff_sub(1.0, ff_add(qxx, qzz, S), S), ff_sub(qyz, wx, S)
+    r20, r21, r22 = ff_sub(qxz, wy, S), ff_add(qyz, wx, S), ff_sub(1.0, ff_add(qxx, qyy, S), S)
+    over = ff_round(iz, S)
+    s0, s1, s2 = ff_mul(s[0], over, S), ff_mul(s[1], over, S), ff_mul(s[2], over, S)
+    gu0 = ff_mul(_dot3(u0, u1, u2, r00, r10, r20, S), s0, S)
+    gu1 = ff_mul(_dot3(u0, u1, u2, r01, r11, r21, S), s1, S)
+    gu2 = ff_mul(_dot3(u0, u1, u2, r02, r12, r22, S), s2, S)
+    gv0 = ff_mul(_dot3(v0, v1, v2, r00, r10, r20, S), s0, S)
+    gv1 = ff_mul(_dot3(v0, v1, v2, r01, r11, r21, S), s1, S)
+    gv2 = ff_mul(_dot3(v0, v1, v2, r02, r12, r22, S), s2, S)
+    xx = _dot3(gu0, gu1, gu2, gu0, gu1, gu2, S)
+    yy = _dot3(gv0, gv1, gv2, gv0, gv1, gv2, S)
+    xy = _dot3(gu0, gu1, gu2, gv0, gv1, gv2, S)
+    cross0 = ff_sub(ff_mul(gu1, gv2, S), ff_mul(gu2, gv1, S), S)
+    cross1 = ff_sub(ff_mul(gu2, gv0, S), ff_mul(gu0, gv2, S), S)
+    cross2 = ff_sub(ff_mul(gu0, gv1, S), ff_mul(gu1, gv0, S), S)
+    gram = _dot3(cross0, cross1, cross2, cross0, cross1, cross2, S)
+    det = ff_add(gram, ff_add(ff_mul(const[2], ff_add(xx, yy, S), S), const[3], S), S)
+    xx = ff_add(xx, const[2], S)
+    yy = ff_add(yy, const[2], S)
+    trace = ff_add(xx, yy, S)
+    spiky = ff_mul(trace, trace, S) >= ff_mul(det, const[4], S)
+    rxx, ryy, rdet = ff_rsqrt(xx, S), ff_rsqrt(yy, S), ff_rsqrt(det, S)
+    m = ff_mul(const[1], ff_mul(ryy, rdet, S), S)
+    l2 = ff_mul(const[1], ryy, S)
+    l0 = ff_mul(yy, m, S)
+    l1 = ff_neg(ff_mul(xy, m, S))
+    sx, sy = ff_mul(xx, rxx, S), ff_mul(yy, ryy, S)
+    radius_x = ff_to_fixed_round(ff_mul(3.0, sx, S), MEAN_FRACTION, MEAN_BITS)
+    radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), MEAN_FRACTION, MEAN_BITS)
+    return Projection(
+        d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
+        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy, radius_x, radius_y,
+        near,
+    )
+
+
+@numba.njit
+def pixels(centre, reach, size):
+    """First and last pixel centre of 0..size - 1 within centre +- reach, both in 1/128 pixel; the first is past the last where there is none."""
+    one = 1 << MEAN_FRACTION
+    first = (centre - reach + one - 1) >> MEAN_FRACTION
+    last = (centre + reach) >> MEAN_FRACTION
+    return max(first, 0), min(last, size - 1)
+
+
+@numba.njit
+def basis_functions(d0, d1, d2, k, degree, out, M):
+    """Spherical harmonics 1 to (degree + 1)^2 - 1 in the direction d, ff (M bits), into out (16,). k: `colour_constants`."""
+    rn = ff_rsqrt(_dot3(d0, d1, d2, d0, d1, d2, M), M)
+    x, y, z = ff_mul(d0, rn, M), ff_mul(d1, rn, M), ff_mul(d2, rn, M)
+    out[1], out[2], out[3] = ff_neg(ff_mul(k[1], y, M)), ff_mul(k[2], z, M), ff_neg(ff_mul(k[3], x, M))
+    if degree < 2:
+        return
+    xx, yy, zz = ff_mul(x, x, M), ff_mul(y, y, M), ff_mul(z, z, M)
+    xy, yz, xz = ff_mul(x, y, M), ff_mul(y, z, M), ff_mul(x, z, M)
+    less = ff_sub(xx, yy, M)
+    out[4], out[5], out[7] = ff_mul(k[4], xy, M), ff_mul(k[5], yz, M), ff_mul(k[7], xz, M)
+    out[6] = ff_mul(k[6], ff_sub(ff_mul(3.0, zz, M), 1.0, M), M)  # 2 zz - xx - yy, the direction having length 1
+    out[8] = ff_mul(k[8], less, M)
+    if degree < 3:
+        return
+    five = ff_mul(5.0, zz, M)
+    out[9] = ff_mul(k[9], ff_mul(y, ff_sub(ff_mul(3.0, xx, M), yy, M), M), M)
+    out[10] = ff_mul(k[10], ff_mul(xy, z, M), M)
+    out[11] = ff_mul(k[11], ff_mul(y, ff_sub(five, 1.0, M), M), M)  # 4 zz - xx - yy
+    out[12] = ff_mul(k[12], ff_mul(z, ff_sub(five, 3.0, M), M), M)  # 2 zz - 3 xx - 3 yy
+    out[13] = ff_mul(k[13], ff_mul(x, ff_sub(five, 1.0, M), M), M)
+    out[14] = ff_mul(k[14], ff_mul(z, less, M), M)
+    out[15] = ff_mul(k[15], ff_mul(x, ff_sub(xx, ff_mul(3.0, yy, M), M), M), M)
+
+
+@numba.njit
+def shade(dc, basis, coefficient, count, M):
+    """A channel: dc and the products of basis and coefficient 1 to count - 1, four a cycle: acc + ((p0 + p1) + (p2 + p3)); what is missing is 0."""
+    acc = dc
+    k = 1
+    while k < count:
+        p0 = ff_mul(basis[k], coefficient[k], M)
+        p1 = ff_mul(basis[k + 1], coefficient[k + 1], M) if k + 1 < count else 0.0
+        p2 = ff_mul(basis[k + 2], coefficient[k + 2], M) if k + 2 < count else 0.0
+        p3 = ff_mul(basis[k + 3], coefficient[k + 3], M) if k + 3 < count else 0.0
+        acc = ff_add(acc, ff_add(ff_add(p0, p1, M), ff_add(p2, p3, M), M), M)
+        k += COLOUR_GROUP
+    return acc
