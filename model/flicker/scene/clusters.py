@@ -94,7 +94,7 @@ def cut_clusters(means: np.ndarray, start: np.ndarray, spare: int, codes: tuple[
     """
     means = means.astype(np.float64)
     away = np.linalg.norm(means - np.median(means, axis=0), axis=1)
-    weight = 1.0 / np.maximum(away, max(float(np.median(away)), np.finfo(np.float64).tiny)) ** 2
+    weight = 1.0 / np.maximum(away, float(np.median(away)) or float(away.max()) or 1.0) ** 2
     per_axis = 1.0 / np.array(codes, np.float64) ** 2
 
     def best(first: int, end: int) -> tuple[float, int, int, int, int] | None:
