@@ -288,7 +288,7 @@ class Harness:
 
     def pipes(self, M: int, a: np.ndarray, b: np.ndarray, enable: np.ndarray) -> np.ndarray:
         """Wrong cycles (stages, units) of the pipelines."""
-        bad = np.zeros((3, len(UNITS)), np.int64)
+        bad = np.zeros((4, len(UNITS)), np.int64)
         self._call("ff_pipes", M, a, b, enable, bad)
         return bad
 
