@@ -17,8 +17,8 @@ module flk_ff_mul #(
   output logic [Width-1:0] prod_o
 );
 
-  if (ExpBits < 2 || ManBits < 2) begin : gen_check_size
-    $error("flk_ff_mul: ExpBits and ManBits must be at least 2");
+  if (ExpBits < 2 || ManBits < 3) begin : gen_check_size
+    $error("flk_ff_mul: ExpBits must be at least 2, ManBits at least 3");
   end
   if (Stages > 4) begin : gen_check_stages
     $error("flk_ff_mul: Stages must be 0 to 4");
@@ -29,6 +29,11 @@ module flk_ff_mul #(
   localparam int unsigned BIAS = 2 ** (ExpBits - 1) - 1;
   // Sum of two exponents less the bias, signed.
   localparam int unsigned SumBits = ExpBits + 2;
+  // Parts of b; three where the product of a half would take too long.
+  localparam int unsigned Parts = (Stages < 3) ? 1 : (Stages == 4) ? 4 : (SigBits > 16) ? 3 : 2;
+  localparam int unsigned PartBits = (SigBits + Parts - 1) / Parts;
+  // Lowest bits of the product that are known before the last addition: only whether any is set matters.
+  localparam int unsigned RestBits = (Parts == 1) ? 1 : (Parts == 4) ? 2 * PartBits : PartBits;
 
   // ---- Multiply ----------------------------------------------------------------------------------------
 
@@ -37,6 +42,7 @@ module flk_ff_mul #(
   logic [ManBits-1:0] a_man, b_man;
   logic [SigBits-1:0] a_sig, b_sig;
   logic [ProdBits-1:0] product;
+  logic rest;  // is any of its lowest bits set?
   logic sign_q, zero_q;
   logic [SumBits-1:0] exp, exp_q;
 
@@ -48,9 +54,6 @@ module flk_ff_mul #(
   assign exp = SumBits'(a_exp) + SumBits'(b_exp) - SumBits'(BIAS);
 
   if (Stages >= 3) begin : gen_parts
-    // Of b; three where the product of a half would take too long.
-    localparam int unsigned Parts = (Stages == 4) ? 4 : (SigBits > 16) ? 3 : 2;
-    localparam int unsigned PartBits = (SigBits + Parts - 1) / Parts;
     logic [Parts-1:0][SigBits+PartBits-1:0] part, part_q;
     logic [Parts*PartBits-1:0] b_padded;
 
@@ -88,15 +91,19 @@ module flk_ff_mul #(
         .q_o(pair_q)
       );
 
+      assign rest = |pair_q[0][RestBits-1:0];
       assign product = ProdBits'(pair_q[0]) + (ProdBits'(pair_q[1]) << (2 * PartBits));
     end else if (Parts == 3) begin : gen_three
+      assign rest = |part_q[0][RestBits-1:0];
       assign product = ProdBits'(part_q[0]) + (ProdBits'(part_q[1]) << PartBits)
                      + (ProdBits'(part_q[2]) << (2 * PartBits));
     end else begin : gen_two
+      assign rest = |part_q[0][RestBits-1:0];
       assign product = ProdBits'(part_q[0]) + (ProdBits'(part_q[1]) << PartBits);
     end
   end else begin : gen_whole
     assign product = ProdBits'(a_sig) * ProdBits'(b_sig);
+    assign rest = |product[RestBits-1:0];
   end
 
   flk_delay #(
@@ -112,13 +119,17 @@ module flk_ff_mul #(
   // ---- Bar ---------------------------------------------------------------------------------------------
 
   typedef struct packed {
-    logic                sign;
-    logic                zero;
-    logic [SumBits-1:0]  exp;  // of the result if the product's top bit is clear
-    logic [ProdBits-1:0] sig;  // product of the significands
+    logic                       sign;
+    logic                       zero;
+    logic [SumBits-1:0]         exp;  // of the result if the product's top bit is clear
+    logic [ProdBits-1:RestBits] sig;  // product of the significands
+    logic                       rest;
   } product_t;
 
   product_t product_q;
+
+  logic unused_product;
+  assign unused_product = ^product[RestBits-1:0];
 
   flk_delay #(
     .Width($bits(product_t)),
@@ -126,7 +137,7 @@ module flk_ff_mul #(
   ) i_product (
     .clk_i,
     .en_i,
-    .d_i({sign_q, zero_q, exp_q, product}),
+    .d_i({sign_q, zero_q, exp_q, product[ProdBits-1:RestBits], rest}),
     .q_o(product_q)
   );
 
@@ -160,7 +171,7 @@ module flk_ff_mul #(
   assign top = product_q.sig[ProdBits-1];
   assign {man, guard} = top ? product_q.sig[ProdBits-2-:SigBits]
                             : product_q.sig[ProdBits-3-:SigBits];
-  assign sticky = (|product_q.sig[ProdBits-3-SigBits:0])
+  assign sticky = product_q.rest || (|product_q.sig[ProdBits-3-SigBits:RestBits])
                || (top && product_q.sig[ProdBits-2-SigBits]);
   // The top bit or a carry out of the mantissa raises the exponent, never both: no product comes within an ulp of 4.
   assign sig = {top, man} + SigBits'(guard && (sticky || man[0]));
