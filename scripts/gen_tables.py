@@ -28,7 +28,8 @@ def _literal(table: np.ndarray, width: int, indent: str) -> str:
         rows = [_literal(row, width, indent + "  ") for row in table[::-1]]
     else:
         words = [f"{width}'d{entry}" for entry in table[::-1]]
-        rows = [", ".join(words[i : i + 8]) for i in range(0, len(words), 8)]
+        count = 8 if max(map(len, words)) <= 10 else 6
+        rows = [", ".join(words[i : i + count]) for i in range(0, len(words), count)]
     return "{\n" + ",\n".join(f"{indent}  {row}" for row in rows) + f"\n{indent}}}"
 
 
@@ -144,8 +145,8 @@ module flk_ff_rom
   parameter  int unsigned Group     = 2,
   localparam int unsigned IndexBits = 32'(INDEX_BITS[Function][Group]) + 32'(PARITY[Function])
 ) (
-  input  logic [                      IndexBits-1:0] index_i,
-  input  logic [                      IndexBits-1:0] late_i,
+  input  logic [                     IndexBits-1:0] index_i,
+  input  logic [                     IndexBits-1:0] late_i,
   output logic [32'(C0_BITS[Function][Group])-1:0] c0_o,
   output logic [32'(C1_BITS[Function][Group])-1:0] c1_o,
   output logic [32'(C2_BITS[Function][Group])-1:0] c2_o

@@ -40,6 +40,15 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_ctu": [{"Form": 0, "Precision": 1, "CtuFifoDepth": 16}, {"Precision": 0}, {"Precision": 2}],
     "flk_fp_add_pipe": [{"Stages": 0}, {"Stages": 2, "Cancel": 0}],
     "flk_fp_mul_pipe": [{"Stages": 0}],
+    "flk_ff_add": [{"ManBits": 23}, {"ManBits": 11, "Stages": 2}, {"Stages": 0}],
+    "flk_ff_mul": [{"ManBits": 23, "Stages": 4}, {"ManBits": 11, "Stages": 2}, {"Stages": 0}],
+    "flk_ff_rom": [{"Function": f, "Group": group} for f in range(4) for group in (0, 1, 3)],
+    "flk_ff_poly": [
+        {"Function": f, "ManBits": m, "Stages": s} for f in range(4) for m, s in ((10, 3), (15, 2), (19, 0), (23, 4))
+    ],
+    **{f"flk_ff_{name}": [{"ManBits": 23, "Stages": 4}, {"ManBits": 10}, {"Stages": 0}] for name in ("recip", "rsqrt", "sqrt", "exp2")},
+    "flk_ff_from_fixed": [{"Bits": 11}, {"Bits": 48, "FracBits": 14, "ManBits": 23}, {"Stages": 0}],
+    "flk_ff_to_fixed": [{"Bits": 20, "Round": 1}, {"Bits": 48, "FracBits": 14, "ManBits": 11}, {"Stages": 0}],
     "flk_lzc": [{"Width": 1}, {"Width": 15}],
     "flk_weight": [{"Form": 0}, {"Form": 0, "Cols": 2, "Rows": 2, "ExpBits": 4, "ManBits": 3, "Fn": 1, "Saturate": 1}],
     "flk_blend_pipe": [{"Form": 0}],

@@ -3,7 +3,7 @@
 // l_i is in two's complement with FracBits fraction bits. Too large a result is the largest number, one below 2^-126 is 0.
 // Exponent beside flk_ff_poly; pack.
 //
-// Stages registers (= latency): 0 none, 1 at the output, 2 and 3 also inside of flk_ff_poly. Registers load while en_i is high and are not
+// Stages registers (= latency): 0 none, 1 at the output, more also inside of flk_ff_poly, 4 at most. Registers load while en_i is high and are not
 // reset.
 module flk_ff_exp2
   import flk_ff_table_pkg::*;

@@ -3,7 +3,7 @@
 // 1 / 0 is the largest number; a result below 2^-126 is 0.
 // Exponent and sign beside flk_ff_poly; pack.
 //
-// Stages registers (= latency): 0 none, 1 at the output, 2 and 3 also inside of flk_ff_poly. Registers load while en_i is high and are not
+// Stages registers (= latency): 0 none, 1 at the output, more also inside of flk_ff_poly, 4 at most. Registers load while en_i is high and are not
 // reset.
 module flk_ff_recip
   import flk_ff_table_pkg::*;
@@ -55,11 +55,12 @@ module flk_ff_recip
 
   // value is in [1/2, 1] of 2^(127 - exp); 1 only of a power of two.
   logic one;
-  logic [7:0] result_exp;
+  logic [7:0] exp_one, exp_less;
   logic [Width-1:0] result;
 
   assign one = value[ManBits+1];
-  assign result_exp = (one ? 8'd254 : 8'd253) - exp_q;
+  assign exp_one = 8'd254 - exp_q;
+  assign exp_less = 8'd253 - exp_q;
 
   always_comb begin
     if (zero_q) begin
@@ -67,7 +68,7 @@ module flk_ff_recip
     end else if (exp_q == 8'd254 || (exp_q == 8'd253 && !one)) begin
       result = '0;
     end else begin
-      result = {sign_q, result_exp, value[ManBits-1:0]};
+      result = {sign_q, one ? exp_one : exp_less, value[ManBits-1:0]};
     end
   end
 

@@ -8,8 +8,8 @@ module flk_ff_rom
   parameter  int unsigned Group     = 2,
   localparam int unsigned IndexBits = 32'(INDEX_BITS[Function][Group]) + 32'(PARITY[Function])
 ) (
-  input  logic [                      IndexBits-1:0] index_i,
-  input  logic [                      IndexBits-1:0] late_i,
+  input  logic [                     IndexBits-1:0] index_i,
+  input  logic [                     IndexBits-1:0] late_i,
   output logic [32'(C0_BITS[Function][Group])-1:0] c0_o,
   output logic [32'(C1_BITS[Function][Group])-1:0] c1_o,
   output logic [32'(C2_BITS[Function][Group])-1:0] c2_o

@@ -3,7 +3,7 @@
 // Of 0 and of a negative number 0.
 // Exponent and sign beside flk_ff_poly; pack.
 //
-// Stages registers (= latency): 0 none, 1 at the output, 2 and 3 also inside of flk_ff_poly. Registers load while en_i is high and are not
+// Stages registers (= latency): 0 none, 1 at the output, more also inside of flk_ff_poly, 4 at most. Registers load while en_i is high and are not
 // reset.
 module flk_ff_sqrt
   import flk_ff_table_pkg::*;
@@ -55,10 +55,11 @@ module flk_ff_sqrt
   );
 
   // value is in [1, 2]; 2 by rounding.
-  logic [7:0] result_exp;
+  logic [7:0] half_more, result_exp;
   logic [Width-1:0] result;
 
-  assign result_exp = half_q + 8'(value[ManBits+1]);
+  assign half_more = half_q + 8'd1;
+  assign result_exp = value[ManBits+1] ? half_more : half_q;
   assign result = zero_q ? '0 : {1'b0, result_exp, value[ManBits-1:0]};
 
   logic unused_value;

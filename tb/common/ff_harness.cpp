@@ -9,7 +9,7 @@
 
 namespace {
 
-constexpr int UNITS = 12, COMPARISON = 11, FIRST_CONVERSION = 7, STAGES = 3;
+constexpr int UNITS = 12, ADDER = 0, COMPARISON = 11, FIRST_CONVERSION = 7, STAGES = 4;
 
 VerilatedContext context;
 
@@ -63,7 +63,7 @@ void ff_pipes(int format, int64_t n, const uint32_t* a, const uint32_t* b, const
     model.eval();
     for (int s = 1; s <= STAGES; s++) {
       for (int u = 0; u < COMPARISON; u++) {
-        const int latency = u >= FIRST_CONVERSION ? std::min(s, 2) : s;
+        const int latency = std::min(s, u >= FIRST_CONVERSION ? 2 : u == ADDER ? 3 : 4);
         if (taken >= latency && model.y_o[format][s][u] != line[latency - 1][u]) bad[(s - 1) * UNITS + u]++;
       }
     }

@@ -1,7 +1,7 @@
 // All ff units for a list of mantissa bits, for a batch harness (ff_harness.cpp).
 //
 // An edge of load_i[f], either edge, registers the operands of format f; a rising edge of clk_i[f] clocks its pipelines.
-// y_o[f][s][u]: unit u with s stages (the conversions have two at most); s = 0: combinational.
+// y_o[f][s][u]: unit u with s stages (the adder has three at most, the conversions two); s = 0: combinational.
 module ff_harness #(
   parameter int unsigned Formats = 1,
   parameter logic [Formats-1:0][7:0] ManBitsOf = {8'd19}  // format 0 in the low bits
@@ -11,7 +11,7 @@ module ff_harness #(
   input  logic               en_i,
   input  logic [       31:0] a_i,
   input  logic [       31:0] b_i,
-  output logic [       31:0] y_o [Formats][4][12]
+  output logic [       31:0] y_o [Formats][5][12]
 );
 
   for (genvar f = 0; f < Formats; f++) begin : gen_format
@@ -30,13 +30,14 @@ module ff_harness #(
     assign a = a_q[Width-1:0];
     assign b = b_q[Width-1:0];
 
-    for (genvar s = 0; s < 4; s++) begin : gen_stages
+    for (genvar s = 0; s < 5; s++) begin : gen_stages
       localparam int unsigned Few = (s > 2) ? 2 : s;
+      localparam int unsigned Most3 = (s > 3) ? 3 : s;
       logic [Width-1:0] add, mul, recip, rsqrt, sqrt, exp2, exp2_wide, wide, narrow;
       logic [19:0] down;
       logic [20:0] near;
 
-      flk_ff_add #(.ManBits(ManBits), .Stages(s)) i_add (.clk_i(clk), .en_i, .a_i(a), .b_i(b), .sum_o(add));
+      flk_ff_add #(.ManBits(ManBits), .Stages(Most3)) i_add (.clk_i(clk), .en_i, .a_i(a), .b_i(b), .sum_o(add));
       flk_ff_mul #(.ManBits(ManBits), .Stages(s)) i_mul (.clk_i(clk), .en_i, .a_i(a), .b_i(b), .prod_o(mul));
       flk_ff_recip #(.ManBits(ManBits), .Stages(s)) i_recip (.clk_i(clk), .en_i, .x_i(a), .y_o(recip));
       flk_ff_rsqrt #(.ManBits(ManBits), .Stages(s)) i_rsqrt (.clk_i(clk), .en_i, .x_i(a), .y_o(rsqrt));
@@ -75,7 +76,7 @@ module ff_harness #(
 
     logic lt;
     flk_ff_cmp #(.ManBits(ManBits)) i_cmp (.a_i(a), .b_i(b), .lt_o(lt));
-    for (genvar s = 0; s < 4; s++) begin : gen_lt
+    for (genvar s = 0; s < 5; s++) begin : gen_lt
       assign y_o[f][s][11] = 32'(lt);
     end
   end

@@ -16,6 +16,7 @@ from flicker_tb.runner import seed
 
 from flicker.arithmetic import ff
 from flicker.arithmetic import ff_tables as tables
+from flicker.errors import FlickerError
 from flicker.toolchain import verilate
 
 HERE = Path(__file__).parent
@@ -75,6 +76,11 @@ def operand_kinds(rng: np.random.Generator, n: int, M: int) -> dict[str, tuple[n
 
     e = rng.integers(1, 255, n)
     a = at(e)
+    # Products near a power of two, at the ends of the range: 1 <= x < 2 and its reciprocal in [1, 2), with last places beside it.
+    x = 1 + rng.integers(0, 1 << M, n) * 2.0**-M
+    inverse = np.clip(np.rint((2 / x - 1) * 2**M).astype(np.int64) + rng.integers(-1, 2, n), 0, (1 << M) - 1)
+    place = rng.integers(1, 254, n)
+    edge = np.clip(rng.choice([126, 127, 128, 380, 381, 382], n) - place, 1, 254)
     cancel = (a.astype(np.int64) ^ 1 << (8 + M)) + rng.integers(-9, 10, n)
     magnitude = np.clip(cancel & (1 << (8 + M)) - 1, 1 << M, (255 << M) - 1)
     return {
@@ -85,6 +91,8 @@ def operand_kinds(rng: np.random.Generator, n: int, M: int) -> dict[str, tuple[n
         "largest": (at(rng.integers(252, 255, n)), at(rng.integers(252, 255, n))),
         "small products": (a, at(rng.integers(124, 131, n) - e)),
         "large products": (a, at(rng.integers(378, 385, n) - e)),
+        "near powers of two": (((x - 1) * 2.0**M).astype(np.uint32) | (place << M).astype(np.uint32), (inverse | edge << M).astype(np.uint32)),
+        "sums near the largest": (((255 << M) - 1 - rng.integers(0, 3, n)).astype(np.uint32), at(rng.integers(251, 255, n) - M)),
         "zeros": (np.where(rng.random(n) < 0.5, 0, a).astype(np.uint32), np.where(rng.random(n) < 0.5, 0, at(e)).astype(np.uint32)),
     }
 
@@ -132,6 +140,36 @@ def test_against_rationals(M: int) -> None:
             for name, exact, value in zip(OPERATIONS, (p + q, p - q, p * q), got):
                 assert Fraction(float(value)) == rounded(exact, M), (kind, name, float(p), float(q))
                 assert not (value == 0 and np.signbit(value)), (kind, name, float(p), float(q))
+
+
+@pytest.mark.parametrize("M", [11, 19, 23])
+def test_stimulus(M: int) -> None:
+    """The operand pairs reach what they are meant to reach."""
+    found: dict[str, int] = {}
+    for _, (a, b) in operand_kinds(random(20 + M), 4000, M).items():
+        for x, y in zip(_values(a, M), _values(b, M)):
+            for name, exact in (("add", Fraction(float(x)) + Fraction(float(y))), ("mul", Fraction(float(x)) * Fraction(float(y)))):
+                if exact == 0:
+                    continue
+                magnitude, value = abs(exact), abs(rounded(exact, M))
+                largest = min(abs(x), abs(y)) if name == "mul" else max(abs(x), abs(y))
+                least = Fraction(2) ** -126
+                cases = {
+                    "too small": value == 0, "smallest": value == least, "rounded to the smallest": value == least > magnitude,
+                    "largest": value == Fraction(ff.ff_max(M)), "just below the largest": value == Fraction(ff.ff_max(M)) > magnitude,
+                    "tie": magnitude != value and value != 0 and _is_tie(magnitude, M), "cancellation": value != 0 and magnitude < largest / 64,
+                }
+                for case, is_so in cases.items():
+                    found[f"{name} {case}"] = found.get(f"{name} {case}", 0) + is_so
+    impossible = {"add rounded to the smallest", "mul cancellation"}
+    assert {case: count for case, count in found.items() if count < 10 and case not in impossible} == {}
+
+
+def _is_tie(x: Fraction, M: int) -> bool:
+    """Does x have exactly M + 2 significant bits?"""
+    odd = x.numerator
+    odd //= odd & -odd
+    return odd.bit_length() == M + 2
 
 
 def test_largest_and_smallest() -> None:
@@ -288,7 +326,7 @@ class Harness:
 
     def pipes(self, M: int, a: np.ndarray, b: np.ndarray, enable: np.ndarray) -> np.ndarray:
         """Wrong cycles (stages, units) of the pipelines."""
-        bad = np.zeros((3, len(UNITS)), np.int64)
+        bad = np.zeros((4, len(UNITS)), np.int64)
         self._call("ff_pipes", M, a, b, enable, bad)
         return bad
 
@@ -323,7 +361,6 @@ def anything(rng: np.random.Generator, n: int, M: int) -> tuple[np.ndarray, np.n
     return numbers(rng, n, M), np.where((exponent == 0) | (exponent == 255), words & np.uint32((1 << M) - 1) | np.uint32(127 << M), words)
 
 
-@pytest.mark.sim
 @pytest.mark.parametrize("M", FORMATS)
 def test_units(harness: Harness, M: int) -> None:
     rng = random(200 + M)
@@ -336,7 +373,6 @@ def test_units(harness: Harness, M: int) -> None:
     check(harness, M, "fixed point", a, b)
 
 
-@pytest.mark.sim
 @pytest.mark.parametrize("M", FORMATS)
 def test_functions(harness: Harness, M: int) -> None:
     """Every mantissa up to 15 bits, above it 2^17, for both parities of the exponent; every fraction of exp2."""
@@ -349,7 +385,6 @@ def test_functions(harness: Harness, M: int) -> None:
     check(harness, M, "exp2", np.full_like(words, 127 << M), words)
 
 
-@pytest.mark.sim
 @pytest.mark.parametrize("M", FORMATS)
 def test_pipelines(harness: Harness, M: int) -> None:
     """Every number of stages against none, with pauses."""
@@ -361,3 +396,22 @@ def test_pipelines(harness: Harness, M: int) -> None:
     for rate in (1.0, 0.5):
         enable = (rng.random(a.size) < rate).astype(np.uint8)
         assert not harness.pipes(M, a[order], b[order], enable).any()
+
+
+@pytest.mark.parametrize(
+    ("unit", "parameters", "message"),
+    [
+        ("flk_ff_add", {"ExpBits": 1}, "ExpBits must be at least 2"),
+        ("flk_ff_add", {"Stages": 4}, "Stages must be 0 to 3"),
+        ("flk_ff_mul", {"ManBits": 2}, "ManBits at least 3"),
+        ("flk_ff_mul", {"Stages": 5}, "Stages must be 0 to 4"),
+        ("flk_ff_poly", {"Stages": 5}, "Stages must be 0 to 4"),
+        ("flk_ff_exp2", {"FracBits": 15}, "FracBits 1 to 14"),
+        ("flk_ff_from_fixed", {"Bits": 65}, "Bits must be 2 to 64"),
+        ("flk_ff_to_fixed", {"Bits": 49}, "Bits must be 2 to 48"),
+        ("flk_ff_to_fixed", {"Stages": 3}, "Stages must be 0 to 2"),
+    ],
+)
+def test_illegal_parameters(unit: str, parameters: dict[str, int], message: str) -> None:
+    with pytest.raises(FlickerError, match=message):
+        verilate(unit, parameters=parameters, shared=True)

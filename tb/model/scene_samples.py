@@ -15,6 +15,8 @@ import imagecodecs
 import numpy as np
 
 from flicker.scene.files import Scene, save_ply
+from flicker.scene.packed import PackedFormat
+from flicker.scene.packing import pack
 
 C0 = 0.28209479177387814
 
@@ -205,6 +207,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path, Scene], object]]] = {
     "sog": ("a.sog", lambda path, scene: path.write_bytes(sog_bundle(sog_files(scene)))),
     "sog1": ("a.sog", lambda path, scene: path.write_bytes(sog_bundle(sog_files_v1(scene)))),
     "splat": ("a.splat", write_splat),
+    "flk": ("a.flk", lambda path, scene: path.write_bytes(pack(scene).packed.image())),
+    "flk16": ("a.flk", lambda path, scene: path.write_bytes(pack(scene, PackedFormat.FP16_LOCAL).packed.image())),
 }
 
 

@@ -53,8 +53,10 @@ TOLERANCE = {
     "sog": (4e-5, 7e-3, 3e-2, 2.1e-3, 5e-3),
     "sog1": (4e-5, 7e-3, 3e-2, 6e-3, 5e-3),
     "splat": (0, 0, 3e-2, 2.1e-3, 7.1e-3),
+    "flk": (2e-3, 2e-3, 6e-3, 2.1e-3, 5e-3),
+    "flk16": (5e-4, 6e-4, 1.5e-3, 5e-4, 5e-4),
 }
-PICTURE_DB = {"ply": 100, "ply_normals": 100, "compressed": 40, "spz2": 35, "spz3": 40, "spz4": 40, "sog": 35, "sog1": 35, "splat": 40}
+PICTURE_DB = {"ply": 100, "ply_normals": 100, "compressed": 40, "spz2": 35, "spz3": 40, "spz4": 40, "sog": 35, "sog1": 35, "splat": 40, "flk": 50, "flk16": 60}
 
 
 def rotations(quats: np.ndarray) -> np.ndarray:
@@ -187,7 +189,7 @@ def test_not_files(tmp_path: Path) -> None:
     refused(tmp_path / "noextension", "unknown format")
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".compressed.ply", ".spz", ".sog", ".splat"])
+@pytest.mark.parametrize("suffix", [".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".flk"])
 def test_empty_and_foreign_files(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / ("a" + suffix)
     path.write_bytes(b"")
@@ -492,7 +494,7 @@ def test_streamed_sog(finest: list[int] | None, words: tuple[str, ...], tmp_path
 
 
 @pytest.mark.parametrize("name", [n for n in samples.WRITERS if n != "splat"])
-@pytest.mark.parametrize("suffix", [".ply", ".spz", ".sog", ".zip", ".splat", ".dat", ""])
+@pytest.mark.parametrize("suffix", [".ply", ".spz", ".sog", ".zip", ".splat", ".flk", ".dat", ""])
 def test_content_decides(name: str, suffix: str, tmp_path: Path) -> None:
     """A wrong suffix is read by content with one warning; a right one without."""
     path = samples.write(tmp_path, name, samples.random_scene(SEED, count=20, degree=0))
@@ -526,7 +528,7 @@ def test_splat_needs_its_suffix(tmp_path: Path) -> None:
 
 def test_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinds, names, files and digests of scenes, and what is none."""
-    assert set(SCENE_SUFFIXES) == {".ply", ".spz", ".sog", ".zip", ".splat"}
+    assert set(SCENE_SUFFIXES) == {".ply", ".spz", ".sog", ".zip", ".splat", ".flk"}
     files = samples.sog_files(samples.random_scene(SEED, count=20))
     folder = unpacked(tmp_path / "St. Peter", files)
     ply = samples.write(tmp_path, "compressed", samples.random_scene(SEED, count=20))

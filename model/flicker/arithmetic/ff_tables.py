@@ -27,11 +27,13 @@ MIN_MAN_BITS, MAX_MAN_BITS = 10, 23
 EXP2_ARG_BITS = 14  # most fraction bits of the argument of exp2
 
 # Bits of the mantissa that choose a segment, by function and group; the square roots have as many segments for either parity of the exponent.
-INDEX_BITS = ((4, 5, 6, 7), (3, 4, 6, 7), (2, 3, 5, 6), (2, 3, 5, 6))
+INDEX_BITS = ((6, 7, 7, 8), (5, 6, 7, 7), (4, 5, 6, 7), (5, 6, 6, 7))
 # Of the slopes and the curvatures: is it subtracted?
 NEGATIVE = ((True, False), (True, False), (False, True), (False, False))
 # Fraction bits of the result before rounding, beside those of the mantissa: results below 1 have one more.
 GUARD_BITS = (5, 5, 4, 4)
+# Curvatures are at most 1, 3/8, 1/8, 1/2: so many bits less are needed of the square.
+SMALLER_SQUARE = (0, 1, 3, 1)
 
 
 def _recip(m: np.ndarray, odd: bool) -> np.ndarray:
@@ -101,10 +103,11 @@ def table(function: int, group: int) -> Table:
     arg = EXP2_ARG_BITS if function == EXP2 else group
     frac = group + GUARD_BITS[function]
     delta = arg - k
-    square = min(delta - 1, frac - 2 * k - 2)
+    wanted = frac - 2 * k - SMALLER_SQUARE[function]
+    square = min(delta - 1, wanted - 2)
     drop = delta - 1 - square
-    square_drop = max(2 * square - (frac - 2 * k), 0)
-    c1_frac, c2_frac = frac - k, frac - 2 * k - 1
+    square_drop = max(2 * square - wanted, 0)
+    c1_frac, c2_frac = frac - k, frac - 2 * k - 2
     width = 2.0**-k
     dc = np.unique(np.linspace(-(1 << (delta - 1)), (1 << (delta - 1)) - 1, 129).astype(np.int64))
     parts: list[list[np.ndarray]] = [[], [], []]

@@ -76,7 +76,7 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat; a SOG folder or its meta.json")],
+    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat, .flk; a SOG folder or its meta.json")],
     cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,

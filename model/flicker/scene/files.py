@@ -6,6 +6,7 @@
 | `.spz` | Niantic, gzip (versions 2 and 3) and zstd (version 4) container | gsply |
 | `.sog`, `.zip`, a folder, its `meta.json` | PlayCanvas SOG, versions 1 and 2, packed or not; a zip of one scene file | `flicker.scene.sog`, gsply |
 | `.splat` | 32-byte records | here |
+| `.flk` | memory image of the chip | `flicker.scene.packed` |
 
 Coordinates are those of the INRIA code (x right, y down, z forward for an upright scene). An SPZ file holds x right, y up,
 z back and is turned by half a turn about x; the other formats keep the coordinates of the training.
@@ -27,6 +28,7 @@ import numpy as np
 from ..errors import FlickerError, FlickerWarning, one_line
 from . import sog
 from .gaussians import SH_C0, SH_DEGREES, Scene
+from .packed import decode, is_image, load_packed
 
 _REST_COUNTS = (0, 9, 24, 45)
 _CHUNK = 256
@@ -145,8 +147,8 @@ def _ply_properties(path: Path, element: str, kind: str, have: list[tuple[str, s
             raise FlickerError(f"{path}: element '{element}': property '{name}' is there twice")
 
 
-def _read_ply(path: Path) -> tuple[np.ndarray, ...]:
-    """INRIA or compressed PLY. The header is checked here: gsply takes every float property of the file for one of the vertex."""
+def check_ply(path: Path) -> bool:
+    """Check the header and size of a PLY file: INRIA, or compressed (True). gsply would take every float property of the file for one of the vertex."""
     layout, elements, offset = _ply_header(path)
     if layout != "binary_little_endian":
         raise FlickerError(f"{path}: format '{layout}', not binary_little_endian")
@@ -188,7 +190,17 @@ def _read_ply(path: Path) -> tuple[np.ndarray, ...]:
             raise FlickerError(f"{path}: truncated: element '{name}' ends at byte {offset}, the file has {size}")
     if size > offset:
         raise FlickerError(f"{path}: {size - offset} bytes after the last element of the header")
+    return compressed
+
+
+def _read_ply(path: Path) -> tuple[np.ndarray, ...]:
+    check_ply(path)
     return _activated(gsply.plyread(path))
+
+
+def _read_image(path: Path) -> tuple[np.ndarray, ...]:
+    scene = decode(load_packed(path))
+    return scene.means, scene.scales, scene.quats, scene.opacities, scene.sh
 
 
 def _read_spz(path: Path) -> tuple[np.ndarray, ...]:
@@ -267,6 +279,7 @@ def _is_spz(head: bytes) -> bool:
 
 # In the order in which contents are asked.
 KINDS: dict[str, Kind] = {
+    "image": Kind("a memory image", (".flk",), is_image, _read_image),
     "PLY": Kind("a PLY file", (".ply",), _is_ply, _read_ply),
     "SPZ": Kind("an SPZ file", (".spz",), _is_spz, _read_spz),
     "zip": Kind("a SOG bundle (zip)", (".sog", ".zip"), lambda head: head[:4] in (b"PK\x03\x04", b"PK\x05\x06"), _read_zip),

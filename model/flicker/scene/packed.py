@@ -36,6 +36,7 @@ SLOT_STEP = 16  # slots of a cluster begin at a multiple
 SLOT_LIMIT = 1 << 24  # a record's number has 24 bits
 POSITION_BITS = SCALE_BITS = (11, 10, 11)
 ROTATION_BITS = (2, 10, 10, 10)
+DC_BITS = (8, 8, 8)
 _TINY = 2.0**-24  # opacity of a code of 0, which is never seen, in a Scene, whose opacities are positive
 _SECTIONS = ("table", "headers", "geometry", "colour")
 
@@ -495,8 +496,11 @@ def _check_gaussians(packed: PackedScene, path: Path) -> None:
     _check_numbers(packed, path)
     with np.errstate(over="ignore"):
         low, high, sigma = bounds(packed)
+        _, scales = _means_and_scales(packed)
     _refuse(path, ~((low >= packed.table["low"]) & (high <= packed.table["high"])), "low, high", "a mean lies outside")
     _refuse(path, sigma > packed.table["sigma"], "sigma", "below a standard deviation")
+    if packed.format is PackedFormat.CHUNK and (small := (scales < 2.0**-126).any(axis=1)).any():
+        raise FlickerError(f"{path}: scale: slot {packed.slot[np.flatnonzero(small)[0]]}: below 2^-126")
 
 
 def _check_numbers(packed: PackedScene, path: Path) -> None:

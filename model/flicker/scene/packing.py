@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FlickerError
-from .clusters import morton_order, reorder
+from ..progress import Steps
+from .clusters import cut_clusters, morton_order, reorder
+from .files import check_ply, load_scene, scene_kind, scene_title
 from .gaussians import SH_C0, SH_DEGREES, Scene
-from .memory import ChunkScene, rotation_word
+from .memory import ChunkScene, load_chunks, rotation_word
 from .packed import (
     BEAT,
     CLUSTER_LIMIT,
+    DC_BITS,
     POSITION_BITS,
     ROTATION_BITS,
     SCALE_BITS,
@@ -24,21 +28,49 @@ from .packed import (
     PackedScene,
     bounds,
     coefficients,
+    load_packed,
     split,
     too_long,
 )
 
+VISIBLE = 1.0 / 255.0  # opacity below which a Gaussian never is: pixels skip alphas below
+CUTS = 0.015
 _LOG2_LIMIT = 30.0  # of scales in chunks
+_NORMAL = 126.0  # log2 of scales that are normal float32 numbers
 _MAX_FP16 = 65504.0
 _TINY_FP16 = 2.0**-24
 
 
+class ShSteps(str, Enum):
+    """What has a step of its SH codes of its own within a cluster."""
+
+    PLAYCANVAS = "1/32 everywhere, no zero"  # the codes of compressed PLY
+    CLUSTER = "cluster"
+    DEGREE = "degree"
+    CHANNEL = "degree and channel"
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Choices in making chunks. cuts: bytes that may be spent on cutting clusters further, as a share of the Gaussians' bytes. sh: steps of SH codes."""
+
+    cuts: float = CUTS
+    sh: ShSteps = ShSteps.CHANNEL
+
+
 @dataclass(eq=False)
 class Packing:
-    """A packed scene and what happened to it. clamped: values that were changed beyond rounding, by reason."""
+    """A packed scene and how it came about.
+
+    order: int64 (N,), number in the source of each Gaussian. clamped: values that were changed beyond rounding, by reason. left_out: Gaussians of the
+    source that are not in it, by reason. kept_chunks: codes and clusters are those of the source.
+    """
 
     packed: PackedScene
+    order: np.ndarray
     clamped: dict[str, int] = field(default_factory=dict)
+    left_out: dict[str, int] = field(default_factory=dict)
+    kept_chunks: bool = False
 
 
 def _merge(start: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -72,20 +104,25 @@ def _quantised(values: np.ndarray, start: np.ndarray, counts: np.ndarray, bits: 
     return low32, step, np.clip(np.floor(codes + 0.5), 0, most).astype(np.int64)
 
 
-def _sh_codes(rest: np.ndarray, start: np.ndarray, counts: np.ndarray, path: Path | None) -> tuple[np.ndarray, np.ndarray]:
+def _sh_codes(rest: np.ndarray, start: np.ndarray, counts: np.ndarray, steps: ShSteps, path: Path | None) -> tuple[np.ndarray, np.ndarray]:
     """step: float32 (C, 3, 3) of half a code, codes: uint8 (N, K - 1, 3), 128 for zero."""
     step = np.zeros((len(start), 3, 3), np.float32)
+    if steps is ShSteps.PLAYCANVAS:
+        step[:, : SH_DEGREES[rest.shape[1] + 1]] = 1 / 64
+        return step, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8)
     codes = np.full(rest.shape, 128, np.uint8)
-    for degree in range(1, 4):
-        of = slice(coefficients(degree - 1) - 1, coefficients(degree) - 1)
-        if of.start >= rest.shape[1]:
-            break
+    parts = [slice(coefficients(d - 1) - 1, coefficients(d) - 1) for d in range(1, SH_DEGREES[rest.shape[1] + 1] + 1)]
+    for degree, of in enumerate(parts):
+        largest = np.maximum.reduceat(np.abs(rest[:, of]).max(axis=1), start)
+        step[:, degree] = _float32(largest / 254, "sh_step", path)
+    if steps is not ShSteps.CHANNEL:
+        step[:] = step.max(axis=2 if steps is ShSteps.DEGREE else (1, 2), keepdims=True)
+    for degree, of in enumerate(parts):
+        wide = 2 * np.repeat(step[:, degree].astype(np.float64), counts, axis=0)[:, None]
         part = rest[:, of]
-        largest = np.maximum.reduceat(np.abs(part).max(axis=1), start)
-        step[:, degree - 1] = _float32(largest / 254, "sh_step", path)
-        wide = 2 * np.repeat(step[:, degree - 1].astype(np.float64), counts, axis=0)[:, None]
         scaled = np.divide(part, wide, out=np.zeros_like(part), where=wide > 0)
         codes[:, of] = np.clip(np.floor(scaled + 128.5), 1, 255)
+    step[:, len(parts) :] = 0
     return step, codes
 
 
@@ -129,34 +166,88 @@ def _assemble(
     return packed
 
 
-def pack(scene: Scene, form: PackedFormat = PackedFormat.CHUNK) -> Packing:
-    """Put a scene into Morton order and clusters, and those into a format."""
-    scene = reorder(scene, morton_order(scene.means))
-    start = np.arange(0, len(scene), CLUSTER_LIMIT)
-    counts = np.diff(np.append(start, len(scene)))
-    return (_pack_chunks if form is PackedFormat.CHUNK else _pack_fp16)(scene, form, start, counts)
+def pack(scene: Scene, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None) -> Packing:
+    """Put a scene into Morton order and clusters, and those into a format. Gaussians that no pixel can show (opacity below 1/255) are left out.
+
+    Raises FlickerError, naming the scene's file, where a field of the image is too narrow.
+    """
+    steps = steps or Steps()
+    where = scene.path or "scene"
+    left_out = dict(scene.rejected)
+    with steps.step("clusters"):
+        visible = scene.opacities.astype(np.float64) >= VISIBLE
+        if not visible.any():
+            raise FlickerError(f"{where}: no visible Gaussian: every opacity is below 1/255")
+        if unseen := int((~visible).sum()):
+            left_out["opacity below 1/255"] = unseen
+        if int(visible.sum()) > SLOT_LIMIT:
+            raise FlickerError(f"{where}: {int(visible.sum())} Gaussians, more than {SLOT_LIMIT}: a record's number has 24 bits")
+        order = np.flatnonzero(visible)
+        order = order[morton_order(scene.means[order])]
+        scene = reorder(scene, order)
+        start = np.arange(0, len(scene), CLUSTER_LIMIT)
+        if form is PackedFormat.CHUNK and recipe.cuts > 0:
+            gaussian = 12 + form.colour_stride(scene.sh_degree)
+            start = cut_clusters(
+                scene.means, start, int(recipe.cuts * gaussian * len(scene)), tuple((1 << bits) - 1 for bits in POSITION_BITS),
+                TABLE_ENTRY.itemsize + form.header.itemsize + BEAT // 2, 12, SLOT_STEP,
+            )
+        counts = np.diff(np.append(start, len(scene)))
+    with steps.step("codes"):
+        if form is PackedFormat.CHUNK:
+            packed, clamped = _chunks(scene, start, counts, recipe)
+        else:
+            packed, clamped = _fp16(scene, form, start, counts)
+    return Packing(packed, order, clamped, left_out)
 
 
-def _pack_chunks(scene: Scene, form: PackedFormat, start: np.ndarray, counts: np.ndarray) -> Packing:
+def pack_file(path: str | Path, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None) -> Packing:
+    """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is.
+
+    Raises FlickerError naming file and field.
+    """
+    path, steps = Path(path), steps or Steps()
+    title = scene_title(path)
+    kind = scene_kind(path)
+    if kind == "image":
+        with steps.step(f"loading {title}"):
+            packed = load_packed(path)
+        if packed.format is form:
+            return Packing(packed, np.arange(len(packed)))
+    if kind == "PLY" and form is PackedFormat.CHUNK:
+        with steps.step(f"loading {title}"):
+            chunks = load_chunks(path) if check_ply(path) else None
+        if chunks is not None:
+            with steps.step("codes"):
+                return pack_chunks(chunks, path)
+    with steps.step(f"loading {title}"):
+        scene = load_scene(path)
+    return pack(scene, form, recipe, steps)
+
+
+def _chunks(scene: Scene, start: np.ndarray, counts: np.ndarray, recipe: Recipe) -> tuple[PackedScene, dict[str, int]]:
     path = scene.path
-    headers = np.zeros(len(start), form.header)
+    headers = np.zeros(len(start), PackedFormat.CHUNK.header)
     logs = np.log2(scene.scales.astype(np.float64))
-    beyond = int((np.abs(logs) > _LOG2_LIMIT).any(axis=1).sum())
     parts = {
         "position": (scene.means.astype(np.float64), POSITION_BITS), "scale": (logs.clip(-_LOG2_LIMIT, _LOG2_LIMIT), SCALE_BITS),
-        "dc": (0.5 + SH_C0 * scene.sh[:, 0].astype(np.float64), (8, 8, 8)),
+        "dc": (0.5 + SH_C0 * scene.sh[:, 0].astype(np.float64), DC_BITS),
     }
     codes = {}
     for name, (values, bits) in parts.items():
         headers[f"{name}_low"], headers[f"{name}_step"], codes[name] = _quantised(values, start, counts, bits, name, path)
     geometry = np.stack([_join(codes["position"], POSITION_BITS), rotation_word(scene.quats), _join(codes["scale"], SCALE_BITS)], axis=1)
     opacity = np.floor(scene.opacities.astype(np.float64).clip(0, 1) * 255 + 0.5).astype(np.int64)
-    headers["sh_zero"] = 256
-    headers["sh_step"], sh = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, path)
-    rows = _colour_rows(_join(np.column_stack([codes["dc"], opacity]), (8, 8, 8, 8)), sh)
-    degrees = _degrees((sh != 128).any(axis=2), start)
-    clamped = {"scale beyond 2^-30 to 2^30": beyond} if beyond else {}
-    return Packing(_assemble(form, headers, geometry, rows, start, counts, degrees, path), clamped)
+    playcanvas = recipe.sh is ShSteps.PLAYCANVAS
+    headers["sh_zero"] = 255 if playcanvas else 256
+    headers["sh_step"], sh = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, recipe.sh, path)
+    rows = _colour_rows(_join(np.column_stack([codes["dc"], opacity]), (*DC_BITS, 8)), sh)
+    degrees = np.full(len(start), scene.sh_degree) if playcanvas else _degrees((sh != 128).any(axis=2), start)
+    clamped = {}
+    for reason, values in (("log2 of a scale beyond -30 to 30", np.abs(logs) > _LOG2_LIMIT), ("opacity above 1", scene.opacities > 1)):
+        if count := int(values.sum()):
+            clamped[reason] = count
+    return _assemble(PackedFormat.CHUNK, headers, geometry, rows, start, counts, degrees, path), clamped
 
 
 def _colour_rows(colour: np.ndarray, sh: np.ndarray) -> np.ndarray:
@@ -164,18 +255,25 @@ def _colour_rows(colour: np.ndarray, sh: np.ndarray) -> np.ndarray:
 
 
 def pack_chunks(data: ChunkScene, path: Path | None = None) -> Packing:
-    """Take over chunks with their codes: nothing is rounded but the bounds, to float32 low ends and steps."""
-    n = len(data.packed)
+    """Take over the chunks of a compressed PLY with their codes: nothing is rounded but the bounds, to low ends and steps in float32.
+
+    Rotations whose three components alone are longer than 1, which no writer makes, are made shorter. Raises FlickerError naming file, chunk and bounds.
+    """
+    where, n = path or "chunks", len(data.packed)
+    if n == 0:
+        raise FlickerError(f"{where}: no Gaussians")
     start = np.arange(0, n, CLUSTER_LIMIT)
     counts = np.diff(np.append(start, n))
     headers = np.zeros(len(start), PackedFormat.CHUNK.header)
     limits = data.bounds.astype(np.float64)
-    if not np.isfinite(limits).all():
-        raise FlickerError(f"{path or 'chunks'}: chunk {np.flatnonzero(~np.isfinite(limits).all(axis=1))[0]}: bounds not finite")
-    for i, (name, bits, unit) in enumerate((("position", POSITION_BITS, 1.0), ("scale", SCALE_BITS, np.log2(np.e)), ("dc", (8, 8, 8), 1.0))):
+    for i, (name, bits, unit) in enumerate((("position", POSITION_BITS, 1.0), ("scale", SCALE_BITS, np.log2(np.e)), ("dc", DC_BITS, 1.0))):
         low, high = (limits[:, 6 * i + 3 * k : 6 * i + 3 * k + 3] * unit for k in (0, 1))
-        if (low > high).any():
-            raise FlickerError(f"{path or 'chunks'}: chunk {np.flatnonzero((low > high).any(axis=1))[0]}: {name}: min above max")
+        faults = {"not finite": ~(np.isfinite(low) & np.isfinite(high)), "min above max": low > high}
+        if name == "scale":
+            faults["not a normal float32 number"] = (low < -_NORMAL) | (high > _NORMAL)
+        for reason, wrong in faults.items():
+            if wrong.any():
+                raise FlickerError(f"{where}: chunk {np.flatnonzero(wrong.any(axis=1))[0]}: bounds of {_BOUNDS_OF[name]}: {reason}")
         headers[f"{name}_low"] = _float32(low, f"{name} low", path)
         headers[f"{name}_step"] = _float32((high - low) / ((1 << np.array(bits)) - 1), f"{name} step", path)
     rotation = data.packed[:, 1].copy()
@@ -188,7 +286,10 @@ def pack_chunks(data: ChunkScene, path: Path | None = None) -> Packing:
     rows = _colour_rows(data.packed[:, 3], sh)
     geometry = np.column_stack([data.packed[:, 0], rotation, data.packed[:, 2]])
     packed = _assemble(PackedFormat.CHUNK, headers, geometry, rows, start, counts, np.full(len(start), degree), path)
-    return Packing(packed, {"rotation longer than 1": int(long.sum())} if long.any() else {})
+    return Packing(packed, np.arange(n), {"rotation longer than 1": int(long.sum())} if long.any() else {}, kept_chunks=True)
+
+
+_BOUNDS_OF = {"position": "position", "scale": "scale", "dc": "colour"}
 
 
 def _shortened(rotation: np.ndarray) -> np.ndarray:
@@ -200,13 +301,13 @@ def _shortened(rotation: np.ndarray) -> np.ndarray:
     return _join(codes, ROTATION_BITS)
 
 
-def _fp16(values: np.ndarray) -> tuple[np.ndarray, int]:
+def _bits(values: np.ndarray) -> tuple[np.ndarray, int]:
     """Bits of the nearest FP16 numbers, and how many were beyond the largest and became it."""
     beyond = np.abs(values) > _MAX_FP16
     return np.clip(values, -_MAX_FP16, _MAX_FP16).astype(np.float16).view(np.uint16), int(beyond.sum())
 
 
-def _pack_fp16(scene: Scene, form: PackedFormat, start: np.ndarray, counts: np.ndarray) -> Packing:
+def _fp16(scene: Scene, form: PackedFormat, start: np.ndarray, counts: np.ndarray) -> tuple[PackedScene, dict[str, int]]:
     headers = np.zeros(len(start), form.header)
     means = scene.means.astype(np.float64)
     if form is PackedFormat.FP16_LOCAL:
@@ -216,16 +317,17 @@ def _pack_fp16(scene: Scene, form: PackedFormat, start: np.ndarray, counts: np.n
     n = len(scene)
     fields = {
         "mean": means, "scale": np.maximum(scene.scales.astype(np.float64), _TINY_FP16), "quat": scene.quats.astype(np.float64),
-        "opacity": np.clip(scene.opacities.astype(np.float64), _TINY_FP16, 1)[:, None], "sh": scene.sh.reshape(n, -1).astype(np.float64),
+        "opacity": scene.opacities.astype(np.float64).clip(0, 1)[:, None], "sh": scene.sh.reshape(n, -1).astype(np.float64),
     }
     bits, clamped = {}, {}
     for name, values in fields.items():
-        bits[name], beyond = _fp16(values)
+        bits[name], beyond = _bits(values)
         if beyond:
             clamped[f"{name} beyond FP16"] = beyond
-    if small := int((scene.scales < _TINY_FP16).sum()):
-        clamped["scale below FP16"] = small
+    for reason, wrong in (("scale below FP16", scene.scales < _TINY_FP16), ("opacity above 1", scene.opacities > 1)):
+        if count := int(wrong.sum()):
+            clamped[reason] = count
     geometry = np.concatenate([bits["mean"], bits["scale"], bits["quat"]], axis=1)
     colour = np.concatenate([bits["opacity"], bits["sh"]], axis=1).astype("<u2")
-    degrees = _degrees((bits["sh"].reshape(n, -1, 3)[:, 1:] & 0x7FFF).any(axis=2), start)
-    return Packing(_assemble(form, headers, geometry, colour.view(np.uint8), start, counts, degrees, scene.path), clamped)
+    degrees = _degrees(np.any(bits["sh"].reshape(n, -1, 3)[:, 1:] & 0x7FFF, axis=2), start)
+    return _assemble(form, headers, geometry, colour.view(np.uint8), start, counts, degrees, scene.path), clamped

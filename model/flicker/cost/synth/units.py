@@ -138,6 +138,35 @@ def _arithmetic() -> list[Unit]:
     return units
 
 
+# Stages of the operators on ff numbers, by mantissa bits: the fewest with which no path is longer than CLOCK_FO4.
+FF_STAGES = {
+    "flk_ff_add": {11: 2, 15: 3, 19: 3, 23: 3},
+    "flk_ff_mul": {11: 2, 15: 3, 19: 3, 23: 4},
+    "flk_ff_recip": {11: 2, 15: 2, 19: 3, 23: 4},
+    "flk_ff_rsqrt": {11: 2, 15: 3, 19: 3, 23: 4},
+    "flk_ff_sqrt": {11: 2, 15: 3, 19: 3, 23: 4},
+    "flk_ff_exp2": {11: 2, 15: 2, 19: 3, 23: 4},
+}
+FF_MAN_BITS = (11, 15, 19, 23)
+
+
+def _ff() -> list[Unit]:
+    units = [
+        unit(top, f"{bits} bit, {count} stages", ManBits=bits, Stages=count)
+        for top, stages in FF_STAGES.items() for bits, count in stages.items()
+    ]
+    for bits in FF_MAN_BITS:
+        units += [
+            unit("flk_ff_cmp", f"{bits} bit", ManBits=bits),
+            unit("flk_ff_from_fixed", f"24.0 to {bits} bit, 2 stages", Bits=24, FracBits=0, ManBits=bits, Stages=2),
+            unit("flk_ff_to_fixed", f"{bits} bit to 14.6, 2 stages", Bits=20, FracBits=6, Round=0, ManBits=bits, Stages=2),
+            unit("flk_ff_to_fixed", f"{bits} bit to 7.14 nearest, 2 stages", Bits=21, FracBits=14, Round=1, ManBits=bits, Stages=2),
+        ]
+    units.append(unit("flk_ff_rom", "recip, 19 bit", Function=0, Group=2))
+    units.append(unit("flk_ff_poly", "rsqrt, 19 bit, 3 stages", Function=1, ManBits=19, Stages=3))
+    return units
+
+
 def _cells() -> list[Unit]:
     units = [unit(f"flk_{cell}", f"{FEATURE_BITS} bit", Width=FEATURE_BITS) for cell in ("pipe_reg", "skid_buffer")]
     units.append(unit("flk_delay", f"{FEATURE_BITS} bit x 4", Width=FEATURE_BITS, Depth=4))
@@ -187,4 +216,4 @@ def _stage() -> list[Unit]:
 
 
 def all_units() -> list[Unit]:
-    return _arithmetic() + _cells() + _stage()
+    return _arithmetic() + _ff() + _cells() + _stage()

@@ -1,0 +1,102 @@
+"""`flicker pack`: scenes into memory images, and what is in one."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from ..errors import FlickerError
+from .options import RichSteps, console, writable, write_atomically
+
+if TYPE_CHECKING:
+    from ..scene.packed import PackedScene
+    from ..scene.packing import Packing
+
+FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
+
+
+def _contents(packed: PackedScene, title: str) -> Table:
+    """Where the bytes are, and what is in the clusters."""
+    from ..scene.packed import HEADER_BYTES
+
+    table = Table(show_header=False, title=title)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column(justify="right")
+    sizes = {"image header": HEADER_BYTES, **{name: len(part) for name, part in packed.sections().items()}}
+    names = {"table": "cluster table", "headers": "cluster headers"}
+    total = sum(sizes.values())
+    for name, size in sizes.items():
+        table.add_row(names.get(name, name), f"{size:,} bytes", f"{size / total:.1%}")
+    table.add_row("image", f"{total:,} bytes", f"{total / len(packed):.1f} a Gaussian", end_section=True)
+    table.add_row("Gaussians", f"{len(packed):,}")
+    unused = len(packed.geometry) - len(packed)
+    table.add_row("slots", f"{len(packed.geometry):,}", f"{unused:,} unused")
+    table.add_row("clusters", f"{len(packed.table):,}")
+    table.add_row("Gaussians a cluster", f"{packed.counts.min()} to {packed.counts.max()}", f"{packed.counts.mean():.0f} in the mean")
+    for degree, count in enumerate(np.bincount(packed.degrees).tolist()):
+        if count:
+            inside = int(packed.counts[packed.degrees == degree].sum())
+            table.add_row(f"SH degree {degree}", f"{count:,} clusters", f"{inside:,} Gaussians")
+    for name, corner in (("lowest mean", packed.table["low"].min(axis=0)), ("highest mean", packed.table["high"].max(axis=0))):
+        table.add_row(name, " ".join(f"{x:.4g}" for x in corner))
+    table.add_row("largest deviation", f"{packed.sigma.max():.4g}")
+    return table
+
+
+def _history(table: Table, packing: Packing) -> None:
+    """What making the image did to the scene."""
+    if packing.kept_chunks:
+        table.add_row("chunks", "kept", "codes of the file")
+    for what, counts in (("left out", packing.left_out), ("changed", packing.clamped)):
+        for reason, count in counts.items():
+            table.add_row(f"[yellow]{reason}[/yellow]", f"{count:,}", what)
+
+
+def pack(
+    scene: Annotated[Path, typer.Argument(help="scene as for flicker render, or demo; with --info a .flk")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="memory image (.flk)")] = None,
+    form: Annotated[FormatChoice | None, typer.Option("--format", help="how Gaussians lie in memory [default: chunk]")] = None,
+    info: Annotated[bool, typer.Option("--info", help="check a memory image and say what is in it")] = False,
+) -> None:
+    """Pack a scene into the image that the chip's memory holds."""
+    steps = RichSteps()
+    if info:
+        for name, value in (("--out", out), ("--format", form)):
+            if value is not None:
+                raise FlickerError(f"--info: reads an image, so it cannot be combined with {name}")
+        from ..scene.packed import load_packed
+
+        with steps.step(f"checking {scene.name}"):
+            found = load_packed(scene)
+        console.print(_contents(found, f"{scene.name}, {found.format.value}"))
+        return
+    if out is None:
+        raise FlickerError("--out: name the image to write, such as -o scene.flk")
+    if out.suffix.lower() != ".flk":
+        raise FlickerError(f"--out: {out}: only .flk is written")
+    writable(out, "--out")
+    with steps.step("starting"):
+        from ..scene.demo import generate
+        from ..scene.files import scene_title
+        from ..scene.packed import PackedFormat
+        from ..scene.packing import pack as pack_scene
+        from ..scene.packing import pack_file
+    chosen = PackedFormat(form.value if form else "chunk")
+    if str(scene) == "demo":
+        with steps.step("making the demo scene"):
+            made = generate()
+        packing, title = pack_scene(made, chosen, steps=steps), "demo"
+    else:
+        packing, title = pack_file(scene, chosen, steps=steps), scene_title(scene)
+    with steps.step(f"writing {out.name}"):
+        image = packing.packed.image()
+        write_atomically(out, lambda path: path.write_bytes(image))
+    table = _contents(packing.packed, f"{title} in {out.name}, {chosen.value}")
+    _history(table, packing)
+    console.print(table)
