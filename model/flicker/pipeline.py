@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from . import params
-from .front.records import build_lists
+from .errors import FlickerError
+from .front.records import SubtileLists, build_lists
 from .front.view import View
+from .golden.front.blend import blend_records
+from .golden.front.frame import FrontFrame, ListKind, run_front
+from .golden.front.record import RecordKind
 from .golden.render import render_golden
-from .params import CHANNELS, CORES, RenderConfig
+from .params import CHANNELS, CORES, Coords, Form, RenderConfig
 from .progress import Steps
 from .scene.metrics import psnr
+from .scene.packed import PackedFormat, PackedScene, is_image, load_packed
+from .scene.packing import pack
 from .sim.render_stage import build, render_rtl
 
 
@@ -24,6 +31,24 @@ class Engine(str, Enum):
     REFERENCE = "reference"  # float64, vanilla rules
     GOLDEN = "golden"  # bit-true model
     RTL = "rtl"  # verilated rendering stage
+
+
+class Front(str, Enum):
+    """What makes records and lists of a scene."""
+
+    FLOAT = "float"  # float64 on the host
+    GOLDEN = "golden"  # bit-true model of the front end
+
+
+@dataclass(frozen=True)
+class FrontOptions:
+    """What the front end reads and writes; for `Front.GOLDEN` only.
+
+    format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile.
+    """
+
+    format: PackedFormat | None = None
+    lists: ListKind = ListKind.ELLIPSE
 
 
 @dataclass
@@ -55,28 +80,81 @@ def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
     }
 
 
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(64)
+
+
+def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
+    """The memory image of a view's scene: the file itself if it is one, else made now."""
+    path = view.scene.path
+    if path is not None and path.is_file() and is_image(_head(path)):
+        packed = load_packed(path)
+        if form not in (None, packed.format):
+            raise FlickerError(f"{path}: is packed as {packed.format.value}, not {form.value if form else ''}")
+        return packed
+    return pack(view.scene, form or PackedFormat.CHUNK).packed
+
+
+def golden_front(view: View, config: RenderConfig, options: FrontOptions, steps: Steps) -> FrontFrame:
+    """Records and lists of a view by the bit-true front end; 16-byte records for the factored form, 32-byte ones for the conic."""
+    if config.coords is Coords.ABSOLUTE:
+        raise FlickerError("coords absolute: for --front float only; records hold means in 1/128 pixel")
+    kind = RecordKind.FACTORED16 if config.form == Form.FACTORED else RecordKind.CONIC32
+    with steps.step("packing the scene"):
+        packed = packed_scene(view, options.format)
+    with steps.step("preprocessing with the golden model"):
+        return run_front(packed, view.camera, options.lists, kind)
+
+
+def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
+    """Lists of the float64 front end and its statistics."""
+    with steps.step("projecting"):
+        projected = view.projected
+    with steps.step("building sub-tile lists"):
+        lists = build_lists(projected, view.camera, config)
+    return lists, {"visible": len(projected.depth), "adjusted": lists.adjusted}
+
+
+def _golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
+    with steps.step("building sub-tile lists"):
+        lists = front.subtile_lists()
+    kept = front.culled.keep
+    return lists, {
+        "visible": len(front.gaussian), "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
+        "clusters": len(kept), "clusters_kept": int(kept.sum()), "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
+    }
+
+
 def render_view(
     view: View,
     *,
     engine: Engine = Engine.GOLDEN,
     config: RenderConfig = RenderConfig(),
+    front: Front = Front.FLOAT,
+    options: FrontOptions = FrontOptions(),
     compare: bool = False,
     steps: Steps | None = None,
 ) -> Rendered:
     """Render a view of a scene.
 
+    front, options: who preprocesses, and how. With the golden front end the engine `reference` blends its records in float64.
     compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
     """
     steps = steps or Steps()
     scene, camera = view.scene, view.camera
-    with steps.step("projecting"):
-        projected = view.projected
+    if front is Front.GOLDEN:
+        frame_in = golden_front(view, config, options, steps)
+        lists, more = _golden_lists(frame_in, steps)
+    else:
+        lists, more = _float_lists(view, config, steps)
     stats: dict[str, Any] = {
         "scene": str(scene.path),
         "view": view.number,
         "width": camera.width,
         "height": camera.height,
         "engine": engine.value,
+        "front": front.value,
         "form": config.form.name.lower(),
         "precision": config.precision.name.lower(),
         "cat": config.cat.name.lower(),
@@ -84,13 +162,9 @@ def render_view(
         "coords": config.coords.name.lower(),
         "gaussians": len(scene.means),
         "gaussians_left_out": dict(scene.rejected),
-        "visible": len(projected.depth),
-    }
-    with steps.step("building sub-tile lists"):
-        lists = build_lists(projected, camera, config)
-    stats["tile_pairs"] = lists.tile_pairs
-    stats["subtile_pairs"] = len(lists.entry)
-    stats["adjusted"] = lists.adjusted
+        "tile_pairs": lists.tile_pairs,
+        "subtile_pairs": len(lists.entry),
+    } | more
     if engine is Engine.RTL:
         with steps.step("building the simulator (once per configuration)"):
             build(config)
@@ -114,11 +188,15 @@ def render_view(
             "ctu_cycles": frame.total("test_cycles"),
             "subtiles_fallen": frame.total("fallen"),
         }
-    if engine is Engine.REFERENCE or compare:
+    if compare or (engine is Engine.REFERENCE and front is Front.FLOAT):
         with steps.step("rendering the float64 reference"):
             reference = view.reference
     if engine is Engine.REFERENCE:
-        image = reference
+        if front is Front.GOLDEN:
+            with steps.step("blending the records in float64"):
+                image = blend_records(frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height, view.background)
+        else:
+            image = reference
         stats |= {"minitiles_sent": None, "pixel_pairs": None}
     if compare:
         value = psnr(image, reference)

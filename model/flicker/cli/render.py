@@ -39,6 +39,9 @@ FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
 CoordsChoice = _choices(Coords)
 EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
+FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden"}, type=str)
+FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
+ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
@@ -59,9 +62,11 @@ def summary(stats: dict, picture: Path | None) -> Table:
     if engine != "reference":
         engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
     table.add_row("engine", engine)
+    if stats.get("front") == "golden":
+        table.add_row("front end", f"golden ({stats['format']}, records {stats['records']})")
     if "psnr_db" in stats:
         table.add_row("PSNR against float64", "equal" if stats["psnr_db"] is None else f"{stats['psnr_db']:.2f} dB")
-    for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("subtile_pairs", "sub-tile pairs"),
+    for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("list_entries", "list entries"), ("subtile_pairs", "sub-tile pairs"),
                        ("minitiles_sent", "mini-tiles sent"), ("cycles", "cycles")):
         if stats.get(key) is not None:
             table.add_row(label, _number(stats[key]))
@@ -82,6 +87,9 @@ def render(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
+    front: Annotated[FrontChoice, typer.Option(help="what makes records and lists: float64 on the host, or the bit-true front end")] = FrontChoice.FLOAT,
+    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, with --front golden [default: chunk, or as packed]")] = None,
+    lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, with --front golden [default: ellipse]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
@@ -93,7 +101,13 @@ def render(
     stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
 ) -> None:
     """Render one view of a scene."""
-    given = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
+    given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
+    chosen: dict[str, object] = {"format": memory, "lists": lists}
+    if front is FrontChoice.FLOAT:
+        if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
+            raise FlickerError(f"{names}: for --front golden only")
+    else:
+        given |= chosen
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
@@ -113,12 +127,19 @@ def render(
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import load_view
-        from ..pipeline import Engine, render_view
+        from ..golden.front.frame import ListKind
+        from ..pipeline import Engine, Front, FrontOptions, render_view
         from ..scene.files import scene_title
         from ..scene.image import save_png
+        from ..scene.packed import PackedFormat
+    options = FrontOptions(PackedFormat.FP16, ListKind.BOX) if faithful else FrontOptions(
+        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value),
+    )
     with steps.step(f"loading {scene_title(scene)}"):
         loaded = load_view(scene, view, wanted, cameras, up)
-    result = render_view(loaded, engine=Engine(engine.value), config=config, compare=compare is not None, steps=steps)
+    result = render_view(
+        loaded, engine=Engine(engine.value), config=config, front=Front(front.value), options=options, compare=compare is not None, steps=steps,
+    )
     if out is not None:
         write_atomically(out, lambda path: save_png(path, result.image))
     if stats is not None:

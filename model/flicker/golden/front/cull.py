@@ -1,6 +1,7 @@
 """Cluster test: which clusters can hold a visible Gaussian, and between which depths the kept ones lie.
 
-With e = corner - position, the corner of the box that lies farthest along a normal: normal . e + offset + reach sigma > 0 for all five half-spaces keeps the cluster.
+With e = corner - position, the corner of the box that lies farthest along a normal: normal . e + offset + reach sigma > 0 for all five half-spaces
+keeps the cluster.
 Depth: the third row of the view over the nearest and the farthest corner. ff numbers of 23 mantissa bits.
 """
 

@@ -22,7 +22,7 @@ from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .cull import Culled, cull
-from .reach import reach_one, reach_tables, tiles_of
+from .reach import Reach, reach_one, reach_tables, tiles_of
 from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, KEY_FIELD, FrameSetup, FrontFormats
 from .splat import basis_functions, colour_constants, constants, largest_component, pixels, project_one, shade
@@ -52,7 +52,8 @@ OUTCOMES = {
 
 Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_RECORDED = range(1, 6)  # for numba
 
-# What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16 quaternion, or (largest, three codes).
+# What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
+# quaternion, or (largest, three codes).
 Lanes = namedtuple("Lanes", "chunked cluster q s quat opacity dc sh count")
 # By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 fraction bits. dc_low, dc_step, sh_step: colour format.
 ClusterValues = namedtuple("ClusterValues", "low step scale_low scale_step dc_low dc_step sh_step")
@@ -175,9 +176,9 @@ def colour_lane(i, lanes, values, p, k, M, rgb):
 @numba.njit(parallel=True, cache=True)
 def _splats(
     index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, colours, logs, sigmas, cut, inverse, box, conic,
-    shift, key_low, P, S, C, outcome, key, words, halves, entries, flags,
+    shift, key_low, P, S, C, outcome, key, words, halves, entries, flags, places, numbers,
 ):
-    """The Gaussians `index` (of kept clusters): their outcome, key, record and number of entries."""
+    """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
     none = np.empty(0, np.int32)
     for j in numba.prange(len(index)):
@@ -202,6 +203,8 @@ def _splats(
             continue
         outcome[j] = Outcome_RECORDED
         entries[j] = count
+        places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
+        numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
         depth = ff_to_fixed_floor(math.ldexp(p.t2, shift), 0, KEY_FIELD + 1)
         key[j] = min(max(depth - key_low, 0), (1 << KEY_BITS) - 1)
         rgb = np.empty(3)
@@ -233,25 +236,21 @@ def _splats(
 
 
 @numba.njit(parallel=True, cache=True)
-def _entries(
-    index, start, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, logs, sigmas, cut, inverse, box, P, S, tile, mask,
-):
-    """Entries of the recorded Gaussians `index`, those of the j-th from place start[j] on."""
-    cols = (width + TILE - 1) // TILE
-    for j in numba.prange(len(index)):
-        i = index[j]
-        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S)
-        code = opacity_code(lanes.chunked, lanes.opacity[i], S)
-        r = reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S)
-        tiles_of(box, p.x, p.y, p.l2, r, cols, S, start[j], tile, mask)
+def _entries(start, places, numbers, box, cols, S, tile, mask):
+    """Entries of the splats that `_splats` left in places and numbers, those of the j-th from place start[j] on."""
+    for j in numba.prange(len(start) - 1):
+        a, b = places[j], numbers[j]
+        tiles_of(box, a[0], a[1], b[0], Reach(a[2], a[3], a[4], a[5], b[1], b[2], b[3], a[6]), cols, S, start[j], tile, mask)
 
 
 @dataclass(eq=False)
 class FrontFrame:
     """What the front end leaves, in record order (R records, E list entries).
 
-    gaussian: int64 (R,), Gaussians of the packed scene. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size. records: uint8 (R, bytes).
-    key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2 row + column of the sub-tiles.
+    gaussian: int64 (R,), Gaussians of the packed scene. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
+    records: uint8 (R, bytes).
+    key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
+    row + column of the sub-tiles.
     culled: of the clusters. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
     """
 
@@ -326,18 +325,19 @@ def run_front(
     outcome, key, words = np.zeros(n, np.int8), np.zeros(n, np.uint32), np.zeros((n, 2), np.int64)
     conic = kind is RecordKind.CONIC32
     halves, entries, flags = np.zeros((n, 7) if conic else (0, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
+    places, numbers = np.zeros((n, 7), np.int64), np.zeros((n, 4))
     registers = (setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit, setup.width, setup.height, constants(formats))
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
         index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, culled.key_low, P, S, C,
-        outcome, key, words, halves, entries, flags,
+        outcome, key, words, halves, entries, flags, places, numbers,
     )
     kept = np.flatnonzero(outcome == Outcome.RECORDED)
     gaussian = index[kept]
     start = np.concatenate([[0], np.cumsum(entries[kept])])
     tile, mask = np.empty(start[-1], np.int32), np.empty(start[-1], np.uint8)
-    _entries(gaussian, start, lanes, values, *registers, *tables, box, P, S, tile, mask)
+    _entries(start, places[kept], numbers[kept], box, -(-camera.width // TILE), S, tile, mask)
     cluster = packed.cluster[gaussian]
     before = np.searchsorted(cluster, np.arange(len(packed.table)))
     number = packed.first[cluster] + np.arange(len(gaussian)) - before[cluster]

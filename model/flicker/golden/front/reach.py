@@ -1,6 +1,7 @@
 """Where a splat reaches: the pixel box of its ellipse alpha = 1/255 cut by 3 standard deviations, and the tiles and sub-tiles in it.
 
-A band is a row of sub-tiles: up to 8 rows of pixels. The ellipse being convex, the part of it between the first and the last pixel row of a band lies over one interval
+A band is a row of sub-tiles: up to 8 rows of pixels. The ellipse being convex, the part of it between the first and the last pixel row of a band
+lies over one interval
 of x, and a sub-tile of the band is entered exactly when a pixel column of it lies in that interval. Its right end is the ellipse's rightmost point if that lies
 between these rows, else on the nearer of them; the left end likewise. At distance dy from the mean: x = kappa dy +- i0 sqrt(log2 o' - (l2 dy)^2), o' = 255 o.
 
@@ -24,7 +25,8 @@ _BAND = SUBTILE - 1
 
 
 def reach_tables(formats: FrontFormats) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """By opacity code 0 to 255, ff numbers of the shape format: log2(code); sqrt(2 ln code), standard deviations to alpha = 1/255; the same, at most 3. And 1 / K.
+    """By opacity code 0 to 255, ff numbers of the shape format: log2(code); sqrt(2 ln code), standard deviations to alpha = 1/255; the same, at most
+    3. And 1 / K.
 
     Entry 0 is that of 1; such splats are never listed.
     """
@@ -34,7 +36,8 @@ def reach_tables(formats: FrontFormats) -> tuple[np.ndarray, np.ndarray, np.ndar
     return rounded(np.log2(code), formats.shape), rounded(sigmas, formats.shape), rounded(np.minimum(sigmas, SIGMAS), formats.shape), float(inverse)
 
 
-# x0, x1, y0, y1: first and last pixel column and row; none where the first is past the last. i0, kappa, limit: as above. right: rows from the mean to the rightmost point, 1/128.
+# x0, x1, y0, y1: first and last pixel column and row; none where the first is past the last. i0, kappa, limit: as above. right: rows from the mean
+# to the rightmost point, 1/128.
 Reach = namedtuple("Reach", "x0 x1 y0 y1 i0 kappa limit right")
 
 
@@ -61,7 +64,8 @@ def half_chord(dy, l2, i0, kappa, limit, S):
 
 @numba.njit
 def band_columns(band, x, y, l2, r, S):
-    """First and last pixel column that the splat's ellipse enters in a band, rows 8 band to 8 band + 7; the first is past the last where there is none. r: Reach."""
+    """First and last pixel column that the splat's ellipse enters in a band, rows 8 band to 8 band + 7; the first is past the last where there is
+    none. r: Reach."""
     first = max(band * SUBTILE, r.y0)
     last = min(band * SUBTILE + _BAND, r.y1)
     if first > last:

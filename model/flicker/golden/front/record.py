@@ -1,4 +1,5 @@
-"""Records, bit for bit: 16 bytes with the factored shape, 32 bytes with the conic one (docs/front_end.md has the tables), and the splats that the stage makes of them."""
+"""Records, bit for bit: 16 bytes with the factored shape, 32 bytes with the conic one (docs/front_end.md has the tables), and the splats that the
+stage makes of them."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ class RecordKind(str, Enum):
 
 @numba.njit
 def encode_mean(x):
-    """(field of 23 bits, whether it was saturated) of a mean in 1/128 pixel: 20 bits in two's complement, times 4^e, the smallest of e = 0 to 7 that holds it."""
+    """(field of 23 bits, whether it was saturated) of a mean in 1/128 pixel: 20 bits in two's complement, times 4^e, the smallest of e = 0 to 7 that
+    holds it."""
     for e in range(MEAN_EXPONENTS):
         m = (x + ((1 << (2 * e)) >> 1)) >> (2 * e)
         if -(1 << (MEAN_FIELD - 1)) <= m < 1 << (MEAN_FIELD - 1):
@@ -74,7 +76,8 @@ def decode_shape(code: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Splats:
-    """What records mean, N of them. mean: int64 (N, 2) in 1/128 pixel. shape: float64 (N, 3): l0, l1, l2, or a / 2, b, c / 2. opacity: float64 (N,). rgb: float64 (N, 3).
+    """What records mean, N of them. mean: int64 (N, 2) in 1/128 pixel. shape: float64 (N, 3): l0, l1, l2, or a / 2, b, c / 2. opacity: float64 (N,).
+    rgb: float64 (N, 3).
 
     spiky: bool (N,).
     """

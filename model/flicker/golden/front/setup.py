@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...arithmetic.ff import ff_round
 from ...errors import FlickerError
@@ -23,7 +24,8 @@ _SLACK = 1.0 + 2.0**-14
 
 @dataclass(frozen=True)
 class FrontFormats:
-    """Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape, lists. colour: SH."""
+    """Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape,
+    lists. colour: SH."""
 
     position: int = 21
     shape: int = 13
@@ -38,7 +40,7 @@ class FrontFormats:
 FORMATS = FrontFormats()
 
 
-def rounded(values: np.ndarray | float, bits: int) -> np.ndarray:
+def rounded(values: ArrayLike, bits: int) -> np.ndarray:
     """float64 array of the nearest ff numbers."""
     array = np.asarray(values, np.float64)
     return np.array([ff_round(v, bits) for v in array.ravel().tolist()]).reshape(array.shape)
@@ -52,7 +54,8 @@ class FrameSetup:
     position: (3,) C, of the camera. view: (3, 3) position, world to camera. focal: (2,) position.
     row_x, row_x_z: (3,) shape, fx times the first and third row of `view`. row_y, row_y_z: fy times the second and third.
     limit: (2,) shape, of tx and ty in the Jacobian.
-    normal: (5, 3) C, half-spaces of the cull: the near plane, left, right, top, bottom. offset: (5,) C, with the position taken off. reach: (5,) C, factor of sigma.
+    normal: (5, 3) C, half-spaces of the cull: the near plane, left, right, top, bottom. offset: (5,) C, with the position taken off. reach: (5,) C,
+    factor of sigma.
     """
 
     width: int

@@ -1,6 +1,7 @@
 """One Gaussian, from the numbers in the image to its splat: projection, covariance, shape, bounds, colour. Every intermediate value has a name.
 
-Source: as `flicker.front.projection` (Kerbl et al. 2023, Sec. 4). Differences that save hardware, none of which changes the result in exact arithmetic: focal lengths
+Source: as `flicker.front.projection` (Kerbl et al. 2023, Sec. 4). Differences that save hardware, none of which changes the result in exact
+arithmetic: focal lengths
 are in the rows of the view (`FrameSetup.row_x`), scales are divided by the depth, the determinant is that of the Gram matrix (a sum of squares of the cross
 product, so that nothing cancels), and the shape comes from two reciprocal square roots:
 
@@ -11,6 +12,7 @@ so that (conic) / 2 log2(e) = L L^T with u = l0 dx + l1 dy, v = l2 dy. Sums of t
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 
 import numba
@@ -21,7 +23,7 @@ from ...front.projection import _C0, _C1, _C2, _C3, DILATION, NEAR
 from ...params import SPIKY_AXIS_RATIO
 from .setup import MEAN_FRACTION, FrontFormats, rounded
 
-SHAPE_SCALE = np.sqrt(0.5 * np.log2(np.e))
+SHAPE_SCALE = math.sqrt(0.5 * math.log2(math.e))
 LARGEST_REST = 1023 * 1023 * 2  # what three rotation codes 2 code - 1023 leave for the square of the largest: (1023 sqrt(2))^2
 MEAN_BITS = 36  # of a mean in 1/128 pixel, saturated
 _TRACE_FACTOR = (SPIKY_AXIS_RATIO**2 + 1.0) ** 2 / SPIKY_AXIS_RATIO**2  # trace^2 / det where the axis ratio is that of the threshold
@@ -67,7 +69,8 @@ Projection = namedtuple(
 
 @numba.njit
 def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S):
-    """Projection of a Gaussian. d0c: (3,) of the cluster, ff (P bits), stepc: (3,); q: (3,) ff numbers of the mean; s: (3,) ff (S bits); w to z: quaternion, any length.
+    """Projection of a Gaussian. d0c: (3,) of the cluster, ff (P bits), stepc: (3,); q: (3,) ff numbers of the mean; s: (3,) ff (S bits); w to z:
+    quaternion, any length.
 
     Without `near` (nearer than 0.2) the other values mean nothing.
     """
@@ -131,7 +134,8 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), MEAN_FRACTION, MEAN_BITS)
     return Projection(
         d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
-        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy, radius_x, radius_y,
+        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy,
+        radius_x, radius_y,
         near,
     )
 

@@ -1,0 +1,363 @@
+"""The bit-true front end: against float64, against lists found pixel by pixel, at its edges."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_samples import random_scene
+from typer.testing import CliRunner
+
+from flicker.cli.main import app
+from flicker.errors import FlickerError
+from flicker.front.projection import project
+from flicker.front.view import DEMO, View, load_view
+from flicker.golden.front.blend import blend_records
+from flicker.golden.front.cull import cull, key_scale
+from flicker.golden.front.frame import FrontFrame, ListKind, run_front
+from flicker.golden.front.record import MEAN_FIELD, RecordKind, decode_mean, decode_shape, encode_mean, encode_shape
+from flicker.golden.front.setup import FORMATS, FrameSetup, FrontFormats, rounded
+from flicker.golden.render import render_golden
+from flicker.params import SUBTILE, TILE, CatMode, Form, RenderConfig
+from flicker.pipeline import Engine, Front, FrontOptions, render_view
+from flicker.scene.camera import Camera
+from flicker.scene.files import Scene
+from flicker.scene.metrics import psnr
+from flicker.scene.packed import PackedFormat, decode
+from flicker.scene.packing import pack
+from flicker.scene.real import REAL_VIEWS, real_scenes
+
+SIZE = (320, 180)
+
+
+@pytest.fixture(scope="module")
+def demo() -> View:
+    return load_view(DEMO, 0, SIZE)
+
+
+def picture(frame: FrontFrame, background=(0.0, 0.0, 0.0)) -> np.ndarray:
+    start, entry = frame.sorted_subtiles()
+    return blend_records(frame.splats(), frame.kind.form, start, entry, frame.camera.width, frame.camera.height, background)
+
+
+def seen_from(scene: Scene, camera: Camera, form: PackedFormat = PackedFormat.FP16, **options) -> FrontFrame:
+    return run_front(pack(scene, form).packed, camera, **options)
+
+
+def plain_camera(width: int = 64, height: int = 64, focal: float = 64.0) -> Camera:
+    return Camera(width, height, focal, focal, np.zeros(3), np.eye(3))
+
+
+def some(count: int, **changes) -> Scene:
+    """Gaussians in front of `plain_camera`, round, grey, half opaque; fields as given, broadcast."""
+    rng = np.random.default_rng(5)
+    values = {
+        "means": np.stack([*rng.uniform(-1, 1, (2, count)), np.full(count, 4.0)], axis=1), "scales": np.full((count, 3), 0.1),
+        "quats": np.tile([1.0, 0, 0, 0], (count, 1)), "opacities": np.full(count, 0.5), "sh": np.zeros((count, 1, 3)),
+    }
+    for name, value in changes.items():
+        values[name] = np.broadcast_to(value, (count, *np.shape(values[name])[1:])).astype(np.float64)
+    return Scene(**values)
+
+
+def turned(seed: int, away: float = 3.0) -> Camera:
+    """A camera that looks somewhere near the origin from a distance."""
+    rng = np.random.default_rng(seed)
+    forward = rng.normal(size=3)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(rng.normal(size=3), forward)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward], axis=1)
+    return Camera(200, 120, 150.0, 160.0, -away * forward + rng.normal(scale=0.3, size=3), rotation)
+
+
+# ---- against float64 ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", PackedFormat)
+def test_values_are_those_of_float64(form: PackedFormat) -> None:
+    """Mean, shape, depth order, colour and what is left out, Gaussian by Gaussian, of the scene as its bits say it."""
+    scene, camera = random_scene(3, 3000), turned(1)
+    packed = pack(scene, form).packed
+    exact = project(decode(packed), camera)
+    frame = run_front(packed, camera)
+    place = np.full(len(packed), -1)
+    place[exact.index] = np.arange(len(exact.index))
+    j = place[frame.gaussian]
+    assert (j >= 0).all()  # nothing is recorded that float64 does not see
+    splats = frame.splats()
+    near = np.abs(exact.mean[j]).max(axis=1) < 4096
+    assert np.abs(splats.mean[near] / 128 - exact.mean[j][near]).max() <= 0.5 / 128 + 1e-3
+    k = 0.5 * np.log2(np.e)
+    a, b, c = exact.conic[j].T
+    l0 = np.sqrt(a * k)
+    want = np.stack([l0, b * k / l0, np.sqrt(k / exact.cov2d[j, 2])], axis=1)
+    size = np.stack([want[:, 0], np.hypot(want[:, 1], want[:, 2]), want[:, 2]], axis=1)  # l1's error goes with the row's length
+    assert (np.abs(splats.shape - want) <= size * 2.0**-8).all()
+    assert np.median(np.abs(splats.shape - want) / size) < 2.0**-10
+    colour = np.minimum(exact.rgb[j], 1023 / 512)
+    assert np.abs(splats.rgb - colour).max() <= 0.5 / 512 + 4e-3
+    assert np.abs(splats.opacity - exact.opacity[j]).max() <= 0.5 / 255 + 1e-6
+    assert (splats.spiky == exact.spiky[j]).mean() > 0.999
+    order = np.argsort(frame.key, kind="stable")
+    assert (np.diff(exact.depth[j][order].astype(np.float64)) > -2e-5 * 6).all()
+
+
+@pytest.mark.parametrize(("form", "least"), [(PackedFormat.FP16_LOCAL, 55.0), (PackedFormat.CHUNK, 50.0), (PackedFormat.FP16, 50.0)])
+def test_picture_of_the_demo_scene(demo: View, form: PackedFormat, least: float) -> None:
+    frame = run_front(pack(demo.scene, form).packed, demo.camera)
+    assert psnr(picture(frame), demo.reference) > least
+    golden = render_golden(frame.subtile_lists(), RenderConfig(cat=CatMode.OFF)).image()
+    assert psnr(golden, picture(frame)) > 55.0
+
+
+@pytest.mark.parametrize("form", [PackedFormat.FP16_LOCAL, PackedFormat.CHUNK])
+@pytest.mark.parametrize("real", REAL_VIEWS, ids=lambda r: r.folder)
+def test_real_scenes(real, form: PackedFormat) -> None:
+    """The front end's own loss: at least 60 dB with FP16 relative to the cluster, 56 with chunks."""
+    folder = real_scenes()
+    if folder is None:
+        pytest.skip("FLICKER_SCENES is not set")
+    view = load_view(real.path(folder), real.number, (640, 360))
+    frame = run_front(pack(view.scene, form).packed, view.camera)
+    assert psnr(picture(frame), view.reference) >= (60.0 if form is PackedFormat.FP16_LOCAL else 56.0)
+
+
+# ---- clusters ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_visible_gaussian_is_culled(seed: int) -> None:
+    """Cameras around, far away and within the clusters."""
+    packed = pack(random_scene(seed, 4000), PackedFormat.FP16_LOCAL).packed
+    camera = turned(seed, (0.0, 0.7, 3.0, 400.0)[seed % 4])
+    found = cull(packed, FrameSetup.of(camera))
+    exact = project(decode(packed), camera)
+    assert found.keep[packed.cluster[exact.index]].all()
+    if seed % 4 == 1:
+        assert not found.keep.all()
+    if exact.n_visible:
+        assert found.nearest <= exact.depth.min() * (1 + 1e-6) or found.nearest == pytest.approx(0.2)
+        assert found.farthest >= exact.depth.max() * (1 - 1e-6)
+
+
+@pytest.mark.parametrize(("nearest", "farthest"), [(0.2, 0.2), (0.2, 100.0), (3.0, 3.0 + 2.0**-20), (0.2, 3e30), (1e30, 1.0001e30)])
+def test_keys_span_the_depths(nearest: float, farthest: float) -> None:
+    near, far = (float(rounded(v, 23)) for v in (nearest, farthest))
+    shift, low = key_scale(near, far)
+    keys = [int(np.floor(np.ldexp(d, shift))) - low for d in (near, far)]
+    assert keys[0] == 0 and keys[1] < 1 << 24
+    assert np.ldexp(far, shift) < 2.0**40
+    finest = np.ldexp(far - near, shift) >= 2.0**22 or far == near
+    assert finest or np.ldexp(far, shift) >= 2.0**38
+
+
+# ---- lists -------------------------------------------------------------------------------------------
+
+
+def by_pixel(frame: FrontFrame, slack: float) -> set[tuple[int, int, int]]:
+    """(record, tile, sub-tile) whose pixel centres meet the ellipse, its limit changed by `slack`, and the 3-sigma box; from the records, in float64."""
+    camera, splats = frame.camera, frame.splats()
+    exact = project(decode(frame.packed), camera)
+    place = np.full(len(frame.packed), -1)
+    place[exact.index] = np.arange(len(exact.index))
+    found = set()
+    cols = -(-camera.width // TILE)
+    for i, j in enumerate(place[frame.gaussian]):
+        mean, radii = splats.mean[i] / 128, exact.radii[j] + slack
+        x0, y0 = np.maximum(np.ceil(mean - radii), 0).astype(int)
+        x1, y1 = np.minimum(np.floor(mean + radii), (camera.width - 1, camera.height - 1)).astype(int)
+        if x0 > x1 or y0 > y1:
+            continue
+        y, x = np.mgrid[y0 : y1 + 1, x0 : x1 + 1]
+        l0, l1, l2 = splats.shape[i]
+        energy = (l0 * (x - mean[0]) + l1 * (y - mean[1])) ** 2 + (l2 * (y - mean[1])) ** 2
+        inside = energy <= np.log2(255 * splats.opacity[i]) * (1 + slack) + slack
+        for ty, tx in set(zip(y[inside] // SUBTILE, x[inside] // SUBTILE)):
+            found.add((i, int(ty // 2 * cols + tx // 2), int(ty % 2 * 2 + tx % 2)))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lists_are_those_of_the_ellipse(seed: int) -> None:
+    """Every sub-tile in which a pixel centre is clearly inside is listed; what is listed beyond these is rare: an interval is of all rows of a band."""
+    scene, camera = random_scene(seed, 600), turned(seed + 40)
+    frame = run_front(pack(scene, PackedFormat.FP16_LOCAL).packed, camera)
+    listed = {
+        (int(i), int(t), k) for i, t, m in zip(frame.entry_splat, frame.entry_tile, frame.entry_mask) for k in range(4) if int(m) >> k & 1
+    }
+    assert len(listed) > 2000
+    assert by_pixel(frame, -0.02) <= listed
+    assert len(listed) <= 1.02 * len(by_pixel(frame, 0.02))
+
+
+def test_entries_are_in_scene_order_and_tiles_in_rows(demo: View) -> None:
+    frame = run_front(pack(demo.scene, PackedFormat.CHUNK).packed, demo.camera)
+    assert (np.diff(frame.entry_splat) >= 0).all()
+    same = np.diff(frame.entry_splat) == 0
+    assert (np.diff(frame.entry_tile)[same] > 0).all()
+    assert (frame.entry_mask > 0).all() and (frame.entry_mask < 16).all()
+    assert len(np.unique(frame.entry_splat)) == len(frame.gaussian)  # no record without an entry
+    assert (np.diff(frame.number) > 0).all() and (np.diff(frame.gaussian) > 0).all()
+    cluster = frame.packed.cluster[frame.gaussian]
+    first = np.searchsorted(cluster, np.unique(cluster))
+    assert (frame.number[first] == frame.packed.first[np.unique(cluster)]).all()
+    assert sum(frame.outcomes.values()) == len(frame.packed)
+
+
+def test_box_lists_hold_the_ellipse_lists(demo: View) -> None:
+    packed = pack(demo.scene, PackedFormat.FP16_LOCAL).packed
+    narrow, wide = run_front(packed, demo.camera), run_front(packed, demo.camera, ListKind.BOX)
+    tiles = lambda f: set(zip(f.gaussian[f.entry_splat].tolist(), f.entry_tile.tolist()))  # noqa: E731
+    assert tiles(narrow) < tiles(wide)
+    assert len(narrow.entry_tile) < 0.95 * len(wide.entry_tile)
+
+
+# ---- records -----------------------------------------------------------------------------------------
+
+
+def test_means_beyond_the_field_get_coarser() -> None:
+    for x in (0, 1, -1, 2**19 - 1, -(2**19), 2**19, 123456789, -987654321, 2**33 - 2**14, -(2**33)):
+        field, saturated = encode_mean(x)
+        step = 4 ** (field >> MEAN_FIELD)
+        assert not saturated and abs(decode_mean(field) - x) <= step // 2
+        assert step == 1 or abs(x) >= 2**19 * step // 4 - step
+    assert encode_mean(2**35)[1] and decode_mean(encode_mean(2**35)[0]) == (2**19 - 1) << 14
+    assert encode_mean(-(2**35))[1] and decode_mean(encode_mean(-(2**35))[0]) == -(2**33)
+
+
+def test_shapes_keep_nine_bits() -> None:
+    values = np.concatenate([np.geomspace(2.0**-29, 3.9, 5000), [1.0, 1.0 + 2.0**-10, 2.0 - 2.0**-12]])
+    back = decode_shape(np.array([encode_shape(v) for v in values]))
+    assert (np.abs(back - values) <= values * 2.0**-10).all()
+    assert decode_shape(np.array([encode_shape(v) for v in (0.0, 2.0**-40, 1e9)])).tolist() == [0.0, 0.0, (2.0 - 2.0**-9) * 2.0]
+
+
+def test_conic_records(demo: View) -> None:
+    packed = pack(demo.scene, PackedFormat.FP16_LOCAL).packed
+    frame = run_front(packed, demo.camera, ListKind.BOX, RecordKind.CONIC32)
+    assert frame.records.shape[1] == 32 and frame.subtile_lists().form is Form.CONIC
+    assert psnr(picture(frame), demo.reference) > 45.0
+
+
+# ---- edges -------------------------------------------------------------------------------------------
+
+
+def test_nothing_to_see() -> None:
+    camera = plain_camera()
+    frame = seen_from(some(20, means=[0, 0, -5.0]), camera)
+    assert len(frame.records) == len(frame.entry_tile) == 0 and not frame.culled.keep.any()
+    assert not picture(frame).any()
+    aside = seen_from(some(20, means=[300.0, 0, 4.0]), camera)
+    assert len(aside.records) == 0
+
+
+def test_one_gaussian_over_4096_x_4096() -> None:
+    camera = plain_camera(4096, 4096, 4096.0)
+    frame = seen_from(some(1, means=[0, 0, 4.0], scales=50.0, opacities=0.9), camera)
+    assert len(frame.entry_tile) == 256 * 256 and (frame.entry_mask == 15).all()
+    with pytest.raises(FlickerError, match="width: 4097"):
+        seen_from(some(1), plain_camera(4097))
+
+
+def test_all_in_one_tile_with_equal_depths() -> None:
+    """Keys are equal: the order is that of the scene."""
+    frame = seen_from(some(256, means=[0.02, 0.02, 4.0], scales=0.01, opacities=0.3), plain_camera(focal=64.0))
+    assert len(np.unique(frame.key)) == 1
+    start, entry = frame.sorted_subtiles()
+    one = entry[start[27] : start[28]] if start[28] > start[27] else entry[start[36] : start[37]]
+    assert one.tolist() == list(range(256))
+
+
+def test_opacity_at_1_over_255() -> None:
+    """Visible at its very centre only; below, not at all."""
+    centre = [(32 - 31.5) / 64 * 4.0, (32 - 31.5) / 64 * 4.0, 4.0]  # pixel (32, 32)
+    frame = seen_from(some(1, means=centre, opacities=1 / 255), plain_camera(), PackedFormat.CHUNK)
+    assert frame.splats().opacity.tolist() == [1 / 255] and len(frame.entry_tile) == 1
+    assert (picture(frame).sum(axis=2) > 0).sum() == 1
+    between = seen_from(some(1, means=[0.031, 0.0, 4.0], opacities=1 / 255), plain_camera(), PackedFormat.CHUNK)
+    assert between.outcomes["ellipse holds no pixel"] == 1
+    faint = seen_from(some(3, opacities=0.4 / 255), plain_camera(), PackedFormat.FP16)
+    assert faint.outcomes["opacity below 1/510"] == 3
+
+
+def test_quaternions_of_any_length() -> None:
+    scene = random_scene(9, 400)
+    packed = pack(scene, PackedFormat.FP16).packed
+    geometry = packed.geometry.copy()
+    geometry[:, 6:] = (geometry[:, 6:].view(np.float16) * np.float16(0.125)).view(np.uint16)
+    other = dataclasses.replace(packed, geometry=geometry)
+    camera = turned(4)
+    a, b = run_front(packed, camera), run_front(other, camera)
+    assert (a.gaussian == b.gaussian).mean() > 0.99
+    assert np.abs(a.splats().shape - b.splats().shape).max() < 2.0**-8
+
+
+def test_degenerate_scales() -> None:
+    for scales in ([1e-7, 1e-7, 1e-7], [3.0, 1e-7, 1e-7], [40.0, 1e-6, 1e-6]):
+        frame = seen_from(some(8, scales=scales, quats=[0.9, 0.1, 0.3, 0.2]), plain_camera())
+        assert len(frame.records) == 8 and np.isfinite(picture(frame)).all()
+        exact = View(plain_camera(), decode(frame.packed)).reference
+        assert psnr(picture(frame), exact) > 50.0
+
+
+def test_bright_colours_are_clipped_and_counted() -> None:
+    rng = np.random.default_rng(1)
+    sh = rng.normal(scale=3.0, size=(64, 16, 3))
+    frame = run_front(pack(Scene(**(vars_of(some(64)) | {"sh": sh})), PackedFormat.FP16).packed, plain_camera())
+    exact = project(decode(frame.packed), plain_camera())
+    place = np.argsort(exact.index)
+    too_bright = (exact.rgb[place] > 1023.5 / 512).any(axis=1)
+    assert frame.adjusted["colour above 2 clipped"] == too_bright.sum() > 0
+    assert np.abs(frame.splats().rgb - np.clip(exact.rgb[place], 0, 1023 / 512)).max() < 0.01
+
+
+def vars_of(scene: Scene) -> dict[str, np.ndarray]:
+    return {name: getattr(scene, name) for name in ("means", "scales", "quats", "opacities", "sh")}
+
+
+def test_formats_are_checked() -> None:
+    with pytest.raises(FlickerError, match="shape must have 10 to 23"):
+        FrontFormats(shape=9)
+    assert FORMATS.position <= 23
+
+
+# ---- pipeline and command line -----------------------------------------------------------------------
+
+
+def test_engines_take_the_golden_front_end(demo: View) -> None:
+    options = FrontOptions(PackedFormat.FP16_LOCAL)
+    config = RenderConfig(cat=CatMode.OFF)
+    floating = render_view(demo, engine=Engine.REFERENCE, front=Front.GOLDEN, options=options, config=config, compare=True)
+    golden = render_view(demo, engine=Engine.GOLDEN, front=Front.GOLDEN, options=options, config=config, compare=True)
+    assert 55 < golden.stats["psnr_db"] < floating.stats["psnr_db"]
+    assert golden.stats["outcomes"]["recorded"] == golden.stats["visible"] and golden.stats["format"] == "fp16-local"
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--format", "chunk"], "--format: for --front golden only"),
+    (["--lists", "box"], "--lists: for --front golden only"),
+    (["--front", "golden", "--faithful", "--lists", "box"], "--faithful: fixes the configuration, so it cannot be combined with --lists"),
+    (["--front", "golden", "--coords", "absolute"], "coords absolute: for --front float only"),
+])
+def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:
+    from flicker.scene.files import save_ply
+
+    save_ply(random_scene(1, 20), tmp_path / "scene.ply")
+    result = CliRunner().invoke(app, ["render", str(tmp_path / "scene.ply"), "--size", "32x32", *arguments])
+    assert result.exit_code != 0
+    assert message in str(result.exception) + result.output
+
+
+def test_packed_file_renders_as_its_scene(tmp_path: Path) -> None:
+    scene = random_scene(2, 500)
+    packed = pack(scene, PackedFormat.FP16_LOCAL).packed
+    path = tmp_path / "scene.flk"
+    path.write_bytes(packed.image())
+    view = load_view(path, 0, (64, 64))
+    shown = render_view(view, engine=Engine.REFERENCE, front=Front.GOLDEN)
+    assert (shown.image == picture(run_front(packed, view.camera))).all()
+    with pytest.raises(FlickerError, match="is packed as fp16-local, not chunk"):
+        render_view(view, front=Front.GOLDEN, options=FrontOptions(PackedFormat.CHUNK))
