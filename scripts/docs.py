@@ -85,7 +85,7 @@ PARTS = (
     Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),
     Part("chip", "whole frames: culling, memory, lists, sorting",
          ("counts", "culling", "frames", "traffic", "schemes", "variations", "broadcast", "formats", "keys"), chip.tables, scenes_missing),
-    Part("packing", "memory images in every format, and choices in making chunks", ("alternatives",), packing.tables, scenes_missing),
+    Part("packing", "memory images in every format, and choices in making chunks", ("alternatives", "alone"), packing.tables, scenes_missing),
     Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
     Part("exploration", "all configurations of the report on real views, with the chart", ("explored", "halves"), exploration.tables, scenes_missing,
          before=exploration.draw),

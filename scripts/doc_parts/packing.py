@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -25,7 +26,8 @@ def _packings(view: View) -> Iterator[tuple[str, Packing]]:
     scene = view.scene
     yield "fp16", pack(scene, PackedFormat.FP16)
     yield "fp16-local", pack(scene, PackedFormat.FP16_LOCAL)
-    if scene.path is not None and (kept := pack_file(scene.path)).kept_chunks:
+    keeps = scene.path is not None and (kept := pack_file(scene.path)).kept_chunks
+    if keeps:
         yield "**chunk**, the file's own", kept
     elif scene.sh_degree > 0:
         for sh in ShSteps:
@@ -33,7 +35,7 @@ def _packings(view: View) -> Iterator[tuple[str, Packing]]:
                 yield f"chunk, SH steps: {sh.value}", pack(scene, recipe=Recipe(sh=sh))
     for share in SHARES:
         name = f"chunk, {share:.1%} for cuts" if share else "chunk, no cuts"
-        yield f"**{name}**" if share == CUTS else name, pack(scene, recipe=Recipe(cuts=share))
+        yield f"**{name}**" if share == CUTS and not keeps else name, pack(scene, recipe=Recipe(cuts=share))
 
 
 def _row(title: str, name: str, packing: Packing, references: dict[bytes, np.ndarray], view: View) -> tuple[str, ...]:
@@ -44,15 +46,40 @@ def _row(title: str, name: str, packing: Packing, references: dict[bytes, np.nda
     db = psnr(View(view.camera, decode(packed)).reference, references[key])
     size = len(packed.image())
     return (title, name, f"{size / 1e6:.2f}", f"{size / len(packed):.1f}", f"{len(packed.table):,}", f"{len(packed.geometry) - len(packed):,}",
-            "equal" if math.isinf(db) else f"{db:.1f}")
+            _decibel(db))
+
+
+def _alone(view: View) -> list[str]:
+    """PSNR with all of what chunks round, then with one kind of value rounded at a time."""
+    packing = pack(view.scene)
+    source, rounded = reorder(view.scene, packing.order), decode(packing.packed)
+    reference = View(view.camera, source).reference
+    constant, rest = source.sh.copy(), source.sh.copy()
+    constant[:, 0] = rounded.sh[:, 0]
+    rest[:, 1:] = 0
+    rest[:, 1 : rounded.sh.shape[1]] = rounded.sh[:, 1:]
+    changes: list[dict[str, np.ndarray]] = [
+        {"means": rounded.means}, {"quats": rounded.quats}, {"scales": rounded.scales}, {"opacities": rounded.opacities}, {"sh": constant}, {"sh": rest},
+    ]
+    scenes = [rounded, *(replace(source, **change) for change in changes)]
+    return [_decibel(psnr(View(view.camera, scene).reference, reference)) for scene in scenes]
+
+
+def _decibel(value: float) -> str:
+    return "equal" if math.isinf(value) else f"{value:.1f}"
 
 
 def tables(say: Say) -> dict[str, str]:
-    rows = []
+    rows, alone = [], []
     for title, view in titled_views(say):
         references: dict[bytes, np.ndarray] = {}
         for name, packing in _packings(view):
             say(f"{title}: {name}")
             rows.append(_row(title, name, packing, references, view))
+        say(f"{title}: one kind of value at a time")
+        alone.append((title, *_alone(view)))
     numbered = partial(table, numbers=True)
-    return {"alternatives": numbered(["view", "image", "MB", "bytes a Gaussian", "clusters", "slots unused", "float64, dB"], rows)}
+    return {
+        "alternatives": numbered(["view", "image", "MB", "bytes a Gaussian", "clusters", "slots unused", "float64, dB"], rows),
+        "alone": numbered(["view", "all", "positions", "rotations", "scales", "opacities", "constant colours", "other coefficients"], alone),
+    }
