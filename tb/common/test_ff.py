@@ -222,14 +222,21 @@ def _function(function, x, M):
 
 
 def error_ulp(function: int, M: int, mantissas: np.ndarray) -> np.ndarray:
-    """|model - exact| in units in the last place of the exact result, for mantissas in [1, 4), of exp2 for exponents in [-2, 2)."""
+    """|model - exact| in units in the last place of the exact result, for numbers in [1, 4), of exp2 for exponents in [-2, 2).
+
+    Asserts that the model is monotone.
+    """
     one = 1 + mantissas * 2.0**-M
     x = np.concatenate([one, 2 * one])
     if function == tables.EXP2:
         x = np.arange(-(2 << 14), 2 << 14).astype(np.float64)
     exact = (lambda: 1 / x, lambda: 1 / np.sqrt(x), lambda: np.sqrt(x), lambda: np.exp2(x / 2.0**14))[function]()
     ulp = np.exp2(np.frexp(exact)[1] - 1.0 - M)
-    return np.abs(_function(function, x, M) - exact) / ulp
+    got = _function(function, x, M)
+    order = np.argsort(x, kind="stable")
+    steps = np.diff(got[order])
+    assert np.all(steps <= 0 if function in (tables.RECIP, tables.RSQRT) else steps >= 0), "not monotone"
+    return np.abs(got - exact) / ulp
 
 
 @pytest.mark.parametrize("function", range(4), ids=tables.NAMES)
