@@ -225,7 +225,10 @@ def test_dram_as_time_goes_on():
 
 def test_idle_latency():
     """The time of a lone read at a port is what the constants say."""
-    assert DramConfig().idle_cycles == -(-(29 + 28 + 8) * 10 // 16) and port_config().latency + DramConfig().idle_cycles == constants.DRAM_LATENCY_CYCLES
+    d = DramConfig()
+    assert d.idle_cycles(32) == -(-(29 + 28 + 8) * 10 // 16) and d.idle_cycles() == -(-(29 + 28 + 8 + 8) * 10 // 16)
+    assert port_config().latency + d.idle_cycles() == constants.DRAM_LATENCY_CYCLES
+    assert port_config(data_bits=128).latency + d.idle_cycles(16) == constants.DRAM_LATENCY_CYCLES
     assert port_config(latency=3, id_bits=2).latency == 3
 
 

@@ -85,15 +85,19 @@ class DramConfig:
             clock_hz=self.rate // 2, chip_hz=c.CLOCK_HZ,
         )
 
-    @property
-    def idle_cycles(self) -> int:
-        """Cycles of the chip's clock from a read's request to its data when the memory is idle and the row closed, rounded up."""
-        return -(-(self.trcd + self.rl + self.burst_clocks) * c.CLOCK_HZ // (self.rate // 2))
+    def idle_cycles(self, size: int = 64) -> int:
+        """Cycles of the chip's clock from the request of `size` bytes of a page to the last of them, memory idle and row closed; rounded up."""
+        bursts = -(-size // self.burst_bytes)
+        return -(-(self.trcd + self.rl + self.burst_clocks + (bursts - 1) * self.tccd) * c.CLOCK_HZ // (self.rate // 2))
 
 
 def port_config(config: DramConfig = DramConfig(), **options) -> PortConfig:
-    """Options of an AXI port whose latency makes the time of a lone read DRAM_LATENCY_CYCLES in all; `options`: further ones of `PortConfig`."""
-    return PortConfig(**{"latency": c.DRAM_LATENCY_CYCLES - config.idle_cycles} | options)
+    """Options of an AXI port at which a lone read of a beat takes DRAM_LATENCY_CYCLES in all, or one more: `latency` is what the DRAM does not take of them.
+
+    options: further fields of `PortConfig`.
+    """
+    width = options.get("data_bits", PortConfig.data_bits) // 8
+    return PortConfig(**{"latency": c.DRAM_LATENCY_CYCLES - config.idle_cycles(width)} | options)
 
 
 @dataclass(frozen=True)
