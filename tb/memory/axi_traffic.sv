@@ -1,7 +1,9 @@
-// AXI4 manager for the test of memory ports: writes Bursts bursts, reads them back when all writes are answered, compares.
+// AXI4 manager for the test of memory ports: writes Bursts bursts, reads them back when all
+// writes are answered, compares.
 //
-// Burst n begins at `base_i + n * Stride` and has (n mod MaxBeats) + 1 beats; word w of beat k is {n, k, w}. Identifiers count with the bursts. The upper half of
-// every beat of an odd burst is left out by its strobes and must read as it was, `fill_i` in every byte.
+// Burst n begins at `base_i + n * Stride` and has (n mod MaxBeats) + 1 beats; word w of beat k is
+// {n, k, w}. Identifiers count with the bursts. The upper half of every beat of an odd burst is
+// left out by its strobes and must read as it was, `fill_i` in every byte.
 module axi_traffic #(
   parameter  int unsigned Width    = 512,
   parameter  int unsigned IdBits   = 2,

@@ -221,6 +221,12 @@ def test_dram_as_time_goes_on():
         assert dram.counts().bursts == 1000
     with pytest.raises(ValueError, match="already"):
         dram.push(0, 0, READ)
+    for wait in (1, d.trp_all + d.trfc - 1, d.trp_all + d.trfc + 5):  # refresh goes on while nothing waits
+        dram = Dram(d.timing)
+        clock = 3 * d.trefi + wait
+        number = dram.push(clock, 0, READ)
+        dram.advance(1 << 40)
+        assert dram.done(number) == max(clock, 3 * d.trefi + d.trp_all + d.trfc) + first and dram.counts().refreshes == 3
 
 
 def test_idle_latency():
