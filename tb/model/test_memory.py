@@ -247,7 +247,8 @@ def test_dram_behind_a_port():
         rate = (1 << 20) / (m.cycle - start)
         assert 0.9 * 51.2 < rate <= 51.2
         counts = m.counts()
-        assert counts.bursts == (1 << 15) + 2 and counts.activates < counts.bursts / 30 and counts.refreshes > 0
+        assert counts.bursts == (1 << 15) + 2 and counts.row_hits > 29 / 30 * counts.bursts and counts.refreshes > 0
+        assert m.efficiency == pytest.approx(counts.bursts * 32 / (m.cycle * 51.2), rel=1e-3)
     assert results[0] == results[1]
     fewer = Manager(Port(m, port_config(max_reads=1)))
     start = m.cycle

@@ -53,6 +53,7 @@ int flk_memory_write(System* s, uint64_t address, uint64_t size, const uint8_t* 
   if (to) std::memcpy(to, from, size);
   return to != nullptr;
 }
+double flk_memory_efficiency(const System* s) { return s->memory.efficiency(); }
 void flk_memory_counts(const System* s, Counts* counts) { *counts = s->memory.engine.counts(); }
 
 AxiPort* flk_axi_new(System* s, const flk::AxiConfig* config) try {

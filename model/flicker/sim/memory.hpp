@@ -103,6 +103,13 @@ class Memory {
     if (!perfect) engine.advance(engine.clock_of(static_cast<int64_t>(cycle)));
   }
 
+  // Share of the peak rate that the DRAM has moved until now: a burst takes a channel's bus for `half` clocks.
+  double efficiency() const {
+    const dram::Timing& t = engine.timing();
+    const int64_t clocks = engine.clock_of(static_cast<int64_t>(cycle));
+    return clocks ? static_cast<double>(engine.counts().bursts * t.half) / static_cast<double>(t.channels * clocks) : 0.0;
+  }
+
   // Transactions that are on their way, for the check of hazards.
   struct Pending {
     uint64_t first, last;

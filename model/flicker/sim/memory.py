@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Mapping
-from ctypes import POINTER, c_char_p, c_int, c_int64, c_uint8, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int64, c_uint8, c_uint32, c_uint64, c_void_p
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from pathlib import Path
@@ -36,9 +36,13 @@ class Timing(ctypes.Structure):
 
 
 class Counts(ctypes.Structure):
-    """clocks: until the last data. Bursts that found their row open: bursts - activates."""
+    """Of the DRAM. clocks: until the last data. row_hits: bursts that found their row open."""
 
     _fields_ = [(name, c_int64) for name in ("clocks", "activates", "refreshes", "bursts")]
+
+    @property
+    def row_hits(self) -> int:
+        return self.bursts - self.activates
 
 
 class _Address(ctypes.Structure):
@@ -155,6 +159,7 @@ def library() -> ctypes.CDLL:
         ("memory_read", c_int, c_void_p, c_uint64, c_uint64, c_void_p),
         ("memory_write", c_int, c_void_p, c_uint64, c_uint64, c_void_p),
         ("memory_counts", None, c_void_p, POINTER(Counts)),
+        ("memory_efficiency", c_double, c_void_p),
         ("axi_new", c_void_p, c_void_p, POINTER(_Config)),
         ("axi_problem", c_char_p),
         ("axi_purpose", None, c_void_p, c_uint64, c_uint64, c_uint32),
@@ -257,6 +262,11 @@ class Memory:
         """Put bytes into an allocated range."""
         if not self._lib.flk_memory_write(self._at, base, len(data), ctypes.create_string_buffer(data, len(data))):
             raise FlickerError(f"memory: {len(data)} bytes at {base:#x} are not allocated")
+
+    @property
+    def efficiency(self) -> float:
+        """Share of the DRAM's peak rate that was moved, from cycle 0 until now."""
+        return self._lib.flk_memory_efficiency(self._at)
 
     def counts(self) -> Counts:
         """Of the DRAM."""
