@@ -4,6 +4,9 @@ common/flk_ff_table_pkg.sv
 common/flk_param_pkg.sv
 common/flk_pkg.sv
 common/flk_table_pkg.sv
+common/flk_axi_read.sv
+common/flk_axi_split.sv
+common/flk_axi_write.sv
 common/flk_delay.sv
 common/flk_exp_neg.sv
 common/flk_exp_neg_pipe.sv

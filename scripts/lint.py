@@ -54,6 +54,9 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_blend_pipe": [{"Form": 0}],
     "flk_pixel_state": [{"Pixels": 4}],
     "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
+    "flk_axi_split": [{"Bytes": 4, "MaxBeats": 256, "BeatBits": 4}, {"MaxBeats": 1}, {"Bytes": 128, "MaxBeats": 256}],
+    "flk_axi_read": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],
+    "flk_axi_write": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],
     "flk_bitonic_sorter": [
         {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},
         {"Lanes": 8, "StagesPerReg": 4},

@@ -55,17 +55,20 @@ def compiler() -> str:
     return os.environ.get("CXX", "g++")
 
 
+def _version(tool: str, env: Mapping[str, str] | None = None) -> str:
+    """Version line of a tool."""
+    try:
+        out = subprocess.run([tool, "--version"], env=env, capture_output=True, text=True)
+    except OSError as error:
+        raise FlickerError(f"{tool}: cannot be run ({error.strerror})") from None
+    return out.stdout.splitlines()[0] if out.stdout else ""
+
+
 @functools.cache
 def _versions() -> str:
     """Version lines of Verilator and the C++ compiler."""
-    env, lines = environment(), []
-    for tool in ("verilator", compiler()):
-        try:
-            out = subprocess.run([tool, "--version"], env=env, capture_output=True, text=True)
-        except OSError as error:
-            raise FlickerError(f"{tool}: cannot be run ({error.strerror})") from None
-        lines.append(out.stdout.splitlines()[0] if out.stdout else "")
-    return "\n".join(lines)
+    env = environment()
+    return "\n".join(_version(tool, env) for tool in ("verilator", compiler()))
 
 
 @functools.cache
@@ -237,14 +240,38 @@ def verilate(
     return product
 
 
-def _run(command: Sequence[object], log: Path) -> None:
-    """Run a build tool with its output appended to ``log``."""
+def compile_library(name: str, cpp: Sequence[Path], *, depends: Sequence[Path] = (), flags: Sequence[str] = ("-O2",)) -> Path:
+    """Build a shared library (for ctypes) of C++ alone and return it; Verilator is not needed.
+
+    cpp, depends: files compiled, and files they include (only hashed). The build goes to ``build/cpp/<name>-<hash>``.
+    Raises FlickerError with the first error and the log's path if the compiler fails.
+    """
+    cpp = [Path(path).resolve() for path in cpp]
+    options = ["-std=c++17", "-shared", "-fPIC", "-pthread", "-Wall", "-Wextra", *flags]
+    contents = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in (*cpp, *depends)]
+    folder = BUILD / "cpp" / f"{name}-{_digest(_version(compiler()), *options, '--', *contents)}"
+    product, stamp = folder / f"lib{name}.so", folder / "done"
+    if stamp.exists() and product.exists():
+        return product
+    with locked(folder.with_suffix(".lock")):
+        if stamp.exists() and product.exists():
+            return product
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        with under_way(f"building {name} (C++)"):
+            _run([compiler(), *options, "-o", product, *cpp], folder / "build.log", dict(os.environ))
+        stamp.touch()
+    return product
+
+
+def _run(command: Sequence[object], log: Path, env: Mapping[str, str] | None = None) -> None:
+    """Run a build tool with its output appended to ``log``; default environment: that of Verilator's builds."""
     with log.open("a") as out:
         out.write(" ".join(map(str, command)) + "\n")
         out.flush()
         try:
             code = subprocess.run(
-                [str(word) for word in command], env=_build_environment(), stdout=out,
+                [str(word) for word in command], env=_build_environment() if env is None else env, stdout=out,
                 stderr=subprocess.STDOUT,
             ).returncode
         except OSError as error:

@@ -18,7 +18,7 @@ from flicker import markdown
 from flicker.chip import constants
 from flicker.chip.compare import chip_estimates, estimate
 from flicker.chip.cull import cull
-from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, simulate
+from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, port_config, simulate
 from flicker.chip.execute import run_scheme
 from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
@@ -33,6 +33,7 @@ from flicker.front.view import View
 from flicker.scene.clusters import build_clusters, morton_order
 from flicker.scene.files import save_ply
 from flicker.scene.memory import MemoryFormat, layout, through_memory
+from flicker.sim.memory import Dram
 
 # ---- constants ---------------------------------------------------------------------------------
 
@@ -148,6 +149,94 @@ def test_dram_bounds():
         DramConfig(banks=6)
     with pytest.raises(FlickerError, match="negative"):
         simulate(np.array([-1]))
+
+
+def dram_streams() -> dict[str, tuple[np.ndarray, np.ndarray | int, DramConfig]]:
+    """Bursts, kinds and memory by name; always the same."""
+    rng = np.random.default_rng(2025)
+    runs = np.concatenate([first + np.arange(size) for first, size in zip(rng.integers(0, 1 << 20, 300), rng.integers(1, 40, 300))])
+    some = rng.integers(0, 1 << 12, 5000)
+    kinds = rng.integers(0, 3, 5000)
+    return {
+        "scattered reads": (rng.integers(0, 1 << 24, 5000), READ, DramConfig()),
+        "runs": (runs, np.repeat(rng.integers(0, 3, len(runs) // 50 + 1), 50)[: len(runs)], DramConfig()),
+        "all kinds": (some, kinds, DramConfig()),
+        "masked writes": (some, MASKED_WRITE, DramConfig(window=8)),
+        "one channel": (some, kinds, ONE),
+        "refresh": (rows_of_bank(400), READ, replace(ONE, refresh=True)),
+        "narrow window": (runs, READ, DramConfig(window=1)),
+        "four banks": (some, kinds, DramConfig(banks=4, interleave_bytes=256, tfaw=100)),
+    }
+
+
+# Clocks, activates, refreshes: what the model's first implementation (numba) gave, which the engine in C++ replaced.
+DRAM_RESULTS = {
+    "scattered reads": (12_163, 4_997, 8),
+    "runs": (8_419, 2_027, 8),
+    "all kinds": (5_581, 64, 0),
+    "masked writes": (5_323, 64, 0),
+    "one channel": (65_076, 3_417, 0),
+    "refresh": (41_486, 400, 6),
+    "narrow window": (20_129, 1_992, 24),
+    "four banks": (7_434, 666, 6),
+}
+
+
+def test_dram_results_are_kept():
+    for name, (burst, kind, config) in dram_streams().items():
+        r = simulate(burst, kind, config)
+        assert (r.clocks, r.activates, r.refreshes) == DRAM_RESULTS[name], name
+        assert r.row_hits == len(burst) - r.activates
+
+
+def test_dram_as_time_goes_on():
+    """Bursts that all come at clock 0 take as long as in a list; what comes later has its data in bounds, and the bus carries one burst at a time."""
+    for name, (burst, kind, config) in dram_streams().items():
+        kinds = np.broadcast_to(kind, burst.shape)
+        dram = Dram(config.timing)
+        numbers = [dram.push(0, int(b) * config.burst_bytes, int(k)) for b, k in zip(burst, kinds)]
+        for clock in range(0, 100_000, 997):
+            dram.advance(clock)
+            assert all(done is None or done < clock + config.rl + config.burst_clocks for done in map(dram.done, numbers[::100]))
+        dram.advance(1 << 40)
+        counts = dram.counts()
+        assert (counts.clocks, counts.activates, counts.refreshes) == DRAM_RESULTS[name], name
+        assert max(map(dram.done, numbers)) == counts.clocks
+
+    rng = np.random.default_rng(seed())
+    d = replace(ONE, refresh=True)
+    first = d.trcd + d.rl + d.burst_clocks
+    for gap in (4, 40, 400):
+        dram, clock, pushed = Dram(d.timing), 0, []
+        for address in rng.integers(0, 1 << 24, 1000):
+            clock += int(rng.integers(0, 2 * gap))
+            dram.advance(clock)
+            pushed.append((clock, dram.push(clock, int(address), READ)))
+        dram.advance(1 << 40)
+        took = np.array([dram.done(number) - clock for clock, number in pushed])
+        ends = np.sort([dram.done(number) for _, number in pushed])
+        assert (np.diff(ends) >= d.tccd).all()
+        assert took.min() >= d.rl + d.burst_clocks
+        if gap == 400:
+            assert np.median(took) <= first + d.trp and took.max() < first + d.trp_all + d.trfc + d.tras + 3 * d.trp
+        assert dram.counts().bursts == 1000
+    with pytest.raises(ValueError, match="already"):
+        dram.push(0, 0, READ)
+    for wait in (1, d.trp_all + d.trfc - 1, d.trp_all + d.trfc + 5):  # refresh goes on while nothing waits
+        dram = Dram(d.timing)
+        clock = 3 * d.trefi + wait
+        number = dram.push(clock, 0, READ)
+        dram.advance(1 << 40)
+        assert dram.done(number) == max(clock, 3 * d.trefi + d.trp_all + d.trfc) + first and dram.counts().refreshes == 3
+
+
+def test_idle_latency():
+    """The time of a lone read at a port is what the constants say."""
+    d = DramConfig()
+    assert d.idle_cycles(32) == -(-(29 + 28 + 8) * 10 // 16) and d.idle_cycles() == -(-(29 + 28 + 8 + 8) * 10 // 16)
+    assert port_config().latency + d.idle_cycles() == constants.DRAM_LATENCY_CYCLES
+    assert port_config(data_bits=128).latency + d.idle_cycles(16) == constants.DRAM_LATENCY_CYCLES
+    assert port_config(latency=3, id_bits=2).latency == 3
 
 
 def test_streams_and_interleaving():

@@ -1,11 +1,8 @@
 """LPDDR4 at the level of commands: how long a sequence of bursts takes.
 
-Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is
-served, the oldest among equals, so that row hits go first, activates overlap with the data of other banks and the bus
-turns as rarely as the window allows; a burst is passed over at most 4 x window times. All-bank refresh every tREFI.
-Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks
-in turn, the bank number exclusive-or'ed with the row. Left out: the command bus, latency of the controller,
-dependences between bursts (the streams of a phase touch different arrays), per-bank refresh.
+Rules and times of the DRAM are those of sim/dram.hpp (open page, one queue of `window` bursts a channel, row hits first, all-bank refresh), which is compiled
+once and also stands behind the AXI ports of simulations: docs/memory_model.md. Numbers come from constants.py. Left out: the command bus, latency of the
+controller, dependences between bursts (the streams of a phase touch different arrays), per-bank refresh.
 """
 
 from __future__ import annotations
@@ -13,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from ..errors import FlickerError
+from ..sim.memory import MASKED_WRITE, READ, WRITE, PortConfig, Timing, run_bursts
 from . import constants as c
 
-READ, WRITE, MASKED_WRITE = 0, 1, 2
+__all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Stream", "interleave", "port_config", "simulate"]
 
 
 @dataclass(frozen=True)
@@ -74,20 +71,38 @@ class DramConfig:
         return self.channels * self.width_bits * self.rate // 8
 
     @property
-    def _timing(self) -> np.ndarray:
+    def timing(self) -> Timing:
+        """What the engine (sim/dram.hpp) is told."""
         half = self.burst_clocks
-        return np.array([
-            self.trcd, self.trp, self.trp_all, self.tras, self.trrd, self.tfaw, self.tccd, self.tccd_masked, self.trtp,
-            self.wl + half + self.twr,  # write to precharge
-            self.wl + half + self.twtr + 1,  # write to read
-            self.rl + self.tdqsck + half + 1 - self.wl,  # read to write
-            self.trefi if self.refresh else 0, self.trfc, self.rl, self.wl, half,
-        ], np.int64)
+        return Timing(
+            channels=self.channels, banks=self.banks, interleave_bytes=self.interleave_bytes, page_bytes=self.page_bytes,
+            burst_bytes=self.burst_bytes, window=self.window,
+            rcd=self.trcd, rp=self.trp, rp_all=self.trp_all, ras=self.tras, rrd=self.trrd, faw=self.tfaw, ccd=self.tccd,
+            ccd_masked=self.tccd_masked, rtp=self.trtp,
+            write_pre=self.wl + half + self.twr, write_read=self.wl + half + self.twtr + 1,
+            read_write=self.rl + self.tdqsck + half + 1 - self.wl,
+            refi=self.trefi if self.refresh else 0, rfc=self.trfc, rl=self.rl, wl=self.wl, half=half,
+            clock_hz=self.rate // 2, chip_hz=c.CLOCK_HZ,
+        )
+
+    def idle_cycles(self, size: int = 64) -> int:
+        """Cycles of the chip's clock from the request of `size` bytes of a page to the last of them, memory idle and row closed; rounded up."""
+        bursts = -(-size // self.burst_bytes)
+        return -(-(self.trcd + self.rl + self.burst_clocks + (bursts - 1) * self.tccd) * c.CLOCK_HZ // (self.rate // 2))
+
+
+def port_config(config: DramConfig = DramConfig(), **options) -> PortConfig:
+    """Options of an AXI port at which a lone read of a beat takes DRAM_LATENCY_CYCLES in all, or one more: `latency` is what the DRAM does not take of them.
+
+    options: further fields of `PortConfig`.
+    """
+    width = options.get("data_bits", PortConfig.data_bits) // 8
+    return PortConfig(**{"latency": c.DRAM_LATENCY_CYCLES - config.idle_cycles(width)} | options)
 
 
 @dataclass(frozen=True)
 class DramResult:
-    """What a sequence of bursts cost. clocks: until the last data. efficiency: share of the peak rate."""
+    """What a sequence of bursts cost. clocks: until the last data. row_hits: bursts that found their row open. efficiency: share of the peak rate."""
 
     bursts: int
     bytes: int
@@ -95,6 +110,10 @@ class DramResult:
     activates: int
     refreshes: int
     config: DramConfig
+
+    @property
+    def row_hits(self) -> int:
+        return self.bursts - self.activates
 
     @property
     def seconds(self) -> float:
@@ -110,140 +129,13 @@ class DramResult:
         return self.bytes / (self.seconds * self.config.bytes_per_second) if self.clocks else 1.0
 
 
-@numba.njit(cache=True)
-def _channel(bank_of, row_of, kind, banks, window, t):
-    """One channel: (clocks, activates, refreshes). bank_of, row_of, kind: its bursts in order."""
-    (rcd, rp, rp_all, ras, rrd, faw, ccd, ccd_masked, rtp, write_pre, write_read, read_write, refi, rfc, rl, wl, half) = t
-    far = np.int64(-1) << 40
-    open_row = np.full(banks, -1, np.int64)
-    act_ok = np.zeros(banks, np.int64)  # earliest activate of a closed bank
-    pre_ok = np.zeros(banks, np.int64)
-    col_ok = np.zeros(banks, np.int64)
-    wrote = np.full(banks, far, np.int64)
-    acts = np.full(4, far, np.int64)
-    queue = np.empty(window, np.int64)
-    arrived = np.zeros(window, np.int64)
-    waiting = 0
-    taken = 0
-    passed_over = 0
-    last_col = far
-    last_kind = 0
-    next_ref = refi
-    activates = 0
-    refreshes = 0
-    end = np.int64(0)
-    for _ in range(len(bank_of)):
-        while waiting < window and taken < len(bank_of):
-            queue[waiting] = taken
-            arrived[waiting] = max(last_col, 0)
-            waiting += 1
-            taken += 1
-        while refi > 0 and last_col + ccd >= next_ref:
-            start = next_ref
-            for k in range(banks):
-                if open_row[k] >= 0:
-                    start = max(start, pre_ok[k])
-            for k in range(banks):
-                open_row[k] = -1
-                act_ok[k] = start + rp_all + rfc
-            next_ref += refi
-            refreshes += 1
-        best = 0
-        best_col = np.int64(1) << 60
-        best_act = np.int64(0)
-        for w in range(waiting):
-            i = queue[w]
-            b = bank_of[i]
-            act = np.int64(-1)
-            col = col_ok[b]
-            if open_row[b] != row_of[i]:
-                act = max(arrived[w], act_ok[b])
-                if open_row[b] >= 0:
-                    act = max(act, max(arrived[w], pre_ok[b]) + rp)
-                act = max(act, acts[3] + rrd, acts[0] + faw)
-                col = act + rcd
-            k = kind[i]
-            gap = ccd
-            if k == 0 and last_kind != 0:
-                gap = write_read
-            elif k != 0 and last_kind == 0:
-                gap = read_write
-            col = max(col, arrived[w], last_col + gap)
-            if k == 2:
-                col = max(col, wrote[b] + ccd_masked)
-            if col < best_col:
-                best = w
-                best_col = col
-                best_act = act
-                if col == last_col + ccd:
-                    break  # nothing can be earlier
-            if passed_over >= 4 * window:
-                break  # the oldest has waited long enough
-        passed_over = passed_over + 1 if best > 0 else 0
-        i = queue[best]
-        b = bank_of[i]
-        if best_act >= 0:
-            acts[0] = acts[1]
-            acts[1] = acts[2]
-            acts[2] = acts[3]
-            acts[3] = best_act
-            activates += 1
-            open_row[b] = row_of[i]
-            col_ok[b] = best_act + rcd
-            pre_ok[b] = best_act + ras
-        if kind[i] == 0:
-            pre_ok[b] = max(pre_ok[b], best_col + rtp)
-            end = max(end, best_col + rl + half)
-        else:
-            pre_ok[b] = max(pre_ok[b], best_col + write_pre)
-            wrote[b] = best_col
-            end = max(end, best_col + wl + half)
-        last_col = best_col
-        last_kind = kind[i]
-        waiting -= 1
-        for w in range(best, waiting):
-            queue[w] = queue[w + 1]
-            arrived[w] = arrived[w + 1]
-    return end, activates, refreshes
-
-
-@numba.njit(parallel=True, cache=True)
-def _run(burst, kind, channels, granule, banks, columns, window, t):
-    """Clocks, activates and refreshes of every channel, int64 (channels, 3)."""
-    count = np.zeros(channels + 1, np.int64)
-    for i in range(len(burst)):
-        count[(burst[i] // granule) % channels + 1] += 1
-    start = np.cumsum(count)
-    fill = start[:-1].copy()
-    bank_of = np.empty(len(burst), np.int64)
-    row_of = np.empty(len(burst), np.int64)
-    kind_of = np.empty(len(burst), np.int8)
-    for i in range(len(burst)):
-        b = burst[i]
-        ch = (b // granule) % channels
-        page = ((b // granule // channels) * granule + b % granule) // columns
-        k = fill[ch]
-        fill[ch] += 1
-        row_of[k] = page // banks
-        bank_of[k] = (page % banks) ^ (row_of[k] % banks)
-        kind_of[k] = kind[i]
-    out = np.zeros((channels, 3), np.int64)
-    for ch in numba.prange(channels):
-        part = slice(start[ch], start[ch + 1])
-        out[ch] = _channel(bank_of[part], row_of[part], kind_of[part], banks, window, t)
-    return out
-
-
 def simulate(burst: np.ndarray, kind: np.ndarray | int = READ, config: DramConfig = DramConfig()) -> DramResult:
     """Time of the bursts (int (B,), address / burst_bytes) in this order. kind: READ, WRITE or MASKED_WRITE, one for all or (B,)."""
     burst = np.ascontiguousarray(burst, np.int64)
     kind = np.ascontiguousarray(np.broadcast_to(np.asarray(kind, np.int8), burst.shape))
     if len(burst) and burst.min() < 0:
         raise FlickerError("DRAM: negative burst address")
-    counts = _run(
-        burst, kind, config.channels, config.interleave_bytes // config.burst_bytes, config.banks,
-        config.page_bytes // config.burst_bytes, config.window, tuple(int(x) for x in config._timing),
-    )
+    counts = run_bursts(config.timing, burst, kind)
     return DramResult(
         len(burst), len(burst) * config.burst_bytes, int(counts[:, 0].max()), int(counts[:, 1].sum()), int(counts[:, 2].sum()), config,
     )

@@ -89,6 +89,13 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
+    # Addresses are multiples of a beat, answers come under the one identifier there is, and no access is exclusive.
+    beat = parameters.get("Bytes", parameters.get("Width", 512) // 8).bit_length() - 1
+    axi: list[str] | None = {"flk_axi_split": [], "flk_axi_read": ["r_id_i", "r_resp_i"], "flk_axi_write": ["b_id_i", "b_resp_i"]}.get(top)
+    if axi is not None:
+        bits = [f"in_addr_i[{bit}]" for bit in range(beat)]
+        if axi:
+            bits += [*(f"{axi[0]}[{bit}]" for bit in range(parameters.get("IdBits", 4))), f"{axi[1]}[0]"]
     # What a combinational operator does not use.
     if top in PIPES and parameters.get("Stages", 1) == 0:
         bits = [*bits, "clk_i[0]", "en_i[0]"]
@@ -176,6 +183,9 @@ def _cells() -> list[Unit]:
         unit("flk_stream_arbiter", "4 x 66 bit", Inputs=4, Width=66),
         unit("flk_stream_arbiter", "4 x 92 bit", Inputs=4, Width=92),
         unit("flk_compare_exchange", "32+16 bit", KeyWidth=32, PayloadWidth=16),
+        unit("flk_axi_split"),
+        unit("flk_axi_read", "512 bit"),
+        unit("flk_axi_write", "512 bit"),
         unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
     ]
     return units

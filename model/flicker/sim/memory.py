@@ -1,0 +1,334 @@
+"""Memory for simulations: LPDDR4 timing, contents and AXI4 ports of `dram.hpp` and `memory.hpp` (docs/memory_model.md).
+
+Harnesses in C++ use the headers; here they are for Python: the chip model counts its DRAM cycles with `run_bursts`, tests drive
+ports cycle by cycle. Times of the DRAM are clocks of its command bus, times of ports cycles of the chip's clock.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Mapping
+from ctypes import POINTER, c_char_p, c_double, c_int, c_int64, c_uint8, c_uint32, c_uint64, c_void_p
+from dataclasses import dataclass, field, fields
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FlickerError
+from ..toolchain import compile_library
+
+FOLDER = Path(__file__).parent
+HEADERS = (FOLDER / "dram.hpp", FOLDER / "memory.hpp")
+READ, WRITE, MASKED_WRITE = 0, 1, 2
+MAX_WORDS = 16
+
+
+class Timing(ctypes.Structure):
+    """Organisation and timing of the DRAM: bytes, clocks of the command bus, hertz. `flicker.chip.dram.DramConfig.timing` makes one."""
+
+    _fields_ = [(name, c_int64) for name in (
+        "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window",
+        "rcd", "rp", "rp_all", "ras", "rrd", "faw", "ccd", "ccd_masked", "rtp", "write_pre", "write_read", "read_write",
+        "refi", "rfc", "rl", "wl", "half", "clock_hz", "chip_hz",
+    )]
+
+
+class Counts(ctypes.Structure):
+    """Of the DRAM. clocks: until the last data. row_hits: bursts that found their row open."""
+
+    _fields_ = [(name, c_int64) for name in ("clocks", "activates", "refreshes", "bursts")]
+
+    @property
+    def row_hits(self) -> int:
+        return self.bursts - self.activates
+
+
+class _Address(ctypes.Structure):
+    _fields_ = [("addr", c_uint64), ("id", c_uint32), ("valid", c_uint8), ("len", c_uint8), ("size", c_uint8), ("burst", c_uint8)]
+
+
+class Request(ctypes.Structure):
+    """What a design drives in a cycle; data in 32-bit words, lowest first."""
+
+    _fields_ = [
+        ("aw", _Address), ("ar", _Address), ("w_data", c_uint32 * MAX_WORDS), ("w_strb", c_uint64),
+        ("w_valid", c_uint8), ("w_last", c_uint8), ("b_ready", c_uint8), ("r_ready", c_uint8),
+    ]
+
+
+class Reply(ctypes.Structure):
+    """What a port drives in a cycle."""
+
+    _fields_ = [
+        ("r_data", c_uint32 * MAX_WORDS), ("b_id", c_uint32), ("r_id", c_uint32),
+        ("aw_ready", c_uint8), ("w_ready", c_uint8), ("ar_ready", c_uint8), ("b_valid", c_uint8), ("b_resp", c_uint8),
+        ("r_valid", c_uint8), ("r_resp", c_uint8), ("r_last", c_uint8),
+    ]
+
+
+class Resp(IntEnum):
+    OKAY, EXOKAY, SLVERR, DECERR = range(4)
+
+
+class Order(IntEnum):
+    """Answers in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn."""
+
+    IN_ORDER, BY_ID, INTERLEAVED = range(3)
+
+
+class WriteOrder(IntEnum):
+    """Data before, with or behind addresses; ready for data only behind addresses; ready for an address only once data are offered."""
+
+    ANY, ADDRESS_FIRST, DATA_FIRST = range(3)
+
+
+CHANNELS = ("AW", "W", "B", "AR", "R")
+
+
+@dataclass(frozen=True)
+class PortConfig:
+    """Options of a port.
+
+    latency: cycles that are added to the DRAM's, or, in a perfect memory, all there are. max_reads, max_writes: transactions that may be under way.
+    max_beats: longest burst that is legal. order, write_order: see there. hazards: a transaction that overlaps one under way, one of them a write, is an error
+    (writes of one id excepted). stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R). run: channel to mean length of such
+    a pause in cycles, default 1. stop_after: channel to transfers after which it is never ready or valid again. Random choices follow `seed`.
+    """
+
+    data_bits: int = 512
+    id_bits: int = 4
+    latency: int = 1
+    max_reads: int = 32
+    max_writes: int = 32
+    max_beats: int = 256
+    order: Order = Order.BY_ID
+    write_order: WriteOrder = WriteOrder.ANY
+    hazards: bool = True
+    seed: int = 1
+    stall: Mapping[str, float] = field(default_factory=dict)
+    run: Mapping[str, int] = field(default_factory=dict)
+    stop_after: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("stall", "run", "stop_after"):
+            if unknown := getattr(self, name).keys() - set(CHANNELS):
+                raise FlickerError(f"AXI port: {name}: no channel {min(unknown)}, they are {', '.join(CHANNELS)}")
+
+    def structure(self) -> ctypes.Structure:
+        """The same as `AxiConfig` of memory.hpp."""
+        values = {f.name: int(getattr(self, f.name)) for f in fields(self)[:10]}
+        lists = {
+            "stall": [round(256 * self.stall.get(k, 0)) for k in CHANNELS],
+            "run": [self.run.get(k, 1) for k in CHANNELS],
+            "stop_after": [self.stop_after.get(k, -1) for k in CHANNELS],
+        }
+        return _Config(**values, **{name: (c_int64 * len(CHANNELS))(*x) for name, x in lists.items()})
+
+
+class _Config(ctypes.Structure):
+    _fields_ = [(f.name, c_int64) for f in fields(PortConfig)[:10]] + [(f.name, c_int64 * len(CHANNELS)) for f in fields(PortConfig)[10:]]
+
+
+class PurposeCounts(ctypes.Structure):
+    """Traffic of one purpose. write_bytes: those with a strobe; dram_*: whole bursts, masked ones among the written; errors: bursts answered with one."""
+
+    _fields_ = [(name, c_uint64) for name in (
+        "read_bursts", "read_beats", "read_bytes", "write_bursts", "write_beats", "write_bytes",
+        "dram_read_bytes", "dram_write_bytes", "dram_masked_bytes", "errors",
+    )]
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """The compiled memory; built once, cached by content below build/."""
+    lib = ctypes.CDLL(str(compile_library("flk_memory", [FOLDER / "memory.cpp"], depends=HEADERS)))
+    for name, result, *arguments in (
+        ("dram_run", None, POINTER(Timing), c_int64, c_void_p, c_void_p, c_void_p),
+        ("dram_new", c_void_p, POINTER(Timing)),
+        ("dram_delete", None, c_void_p),
+        ("dram_push", c_int64, c_void_p, c_int64, c_uint64, c_int),
+        ("dram_advance", None, c_void_p, c_int64),
+        ("dram_done", c_int64, c_void_p, c_int64),
+        ("dram_counts", None, c_void_p, POINTER(Counts)),
+        ("memory_new", c_void_p, POINTER(Timing), c_int),
+        ("memory_delete", None, c_void_p),
+        ("memory_tick", None, c_void_p),
+        ("memory_allocate", c_int, c_void_p, c_uint64, c_uint64, c_uint64),
+        ("memory_read", c_int, c_void_p, c_uint64, c_uint64, c_void_p),
+        ("memory_write", c_int, c_void_p, c_uint64, c_uint64, c_void_p),
+        ("memory_counts", None, c_void_p, POINTER(Counts)),
+        ("memory_efficiency", c_double, c_void_p),
+        ("axi_new", c_void_p, c_void_p, POINTER(_Config)),
+        ("axi_problem", c_char_p),
+        ("axi_purpose", None, c_void_p, c_uint64, c_uint64, c_uint32),
+        ("axi_fail_range", None, c_void_p, c_uint64, c_uint64, c_int, c_int, c_int),
+        ("axi_fail_read", None, c_void_p, c_uint64, c_int),
+        ("axi_fail_write", None, c_void_p, c_uint64, c_int),
+        ("axi_reply", POINTER(Reply), c_void_p),
+        ("axi_cycle", None, c_void_p, POINTER(Request)),
+        ("axi_reset", None, c_void_p, POINTER(Request)),
+        ("axi_idle", c_int, c_void_p),
+        ("axi_errors", c_int64, c_void_p),
+        ("axi_error", c_char_p, c_void_p, c_int64),
+        ("axi_channels", None, c_void_p, c_void_p, c_void_p),
+        ("axi_counts", c_int, c_void_p, c_uint32, POINTER(PurposeCounts)),
+    ):
+        function = getattr(lib, f"flk_{name}")
+        function.restype = result
+        function.argtypes = arguments
+    return lib
+
+
+def run_bursts(timing: Timing, burst: np.ndarray, kind: np.ndarray) -> np.ndarray:
+    """Clocks, activates, refreshes and bursts of every channel, int64 (channels, 4).
+
+    burst: int64 (B,), address / burst_bytes, not negative; kind: int8 (B,), READ, WRITE or MASKED_WRITE. All wait from clock 0 on, in this order.
+    """
+    burst, kind = np.ascontiguousarray(burst, np.int64), np.ascontiguousarray(kind, np.int8)
+    if burst.shape != kind.shape:
+        raise ValueError("burst and kind differ in shape")
+    counts = np.zeros((timing.channels, len(Counts._fields_)), np.int64)
+    library().flk_dram_run(ctypes.byref(timing), burst.size, burst.ctypes.data, kind.ctypes.data, counts.ctypes.data)
+    return counts
+
+
+class Dram:
+    """The channels, fed while time goes on."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._lib = library()
+        self._at = self._lib.flk_dram_new(ctypes.byref(timing))
+        self._now = 0
+
+    def __del__(self) -> None:
+        if hasattr(self, "_at"):
+            self._lib.flk_dram_delete(self._at)
+
+    def push(self, clock: int, address: int, kind: int) -> int:
+        """Add the burst at a byte address; clock: not before the last push or `advance`. Returns its number."""
+        if clock < self._now:
+            raise ValueError(f"burst at clock {clock}, time is {self._now} already")
+        self._now = clock
+        return self._lib.flk_dram_push(self._at, clock, address, kind)
+
+    def advance(self, clock: int) -> None:
+        """Issue all column commands before a clock."""
+        self._now = max(self._now, clock)
+        self._lib.flk_dram_advance(self._at, clock)
+
+    def done(self, number: int) -> int | None:
+        """Clock of the end of a burst's data; None: its command has not been issued."""
+        clock = self._lib.flk_dram_done(self._at, number)
+        return None if clock < 0 else clock
+
+    def counts(self) -> Counts:
+        out = Counts()
+        self._lib.flk_dram_counts(self._at, ctypes.byref(out))
+        return out
+
+
+class Memory:
+    """Contents and time behind the ports. perfect: no DRAM, every beat after its port's latency."""
+
+    def __init__(self, timing: Timing, perfect: bool = False) -> None:
+        self._lib = library()
+        self._at = self._lib.flk_memory_new(ctypes.byref(timing), perfect)
+        self.cycle = 0
+
+    def __del__(self) -> None:
+        if hasattr(self, "_at"):
+            self._lib.flk_memory_delete(self._at)
+
+    def tick(self) -> None:
+        """Begin a cycle: once, before the ports' `step`."""
+        self.cycle += 1
+        self._lib.flk_memory_tick(self._at)
+
+    def allocate(self, base: int, size: int, noise: int = 0) -> None:
+        """A range of bytes: zeros, or random ones by the seed `noise`. Raises FlickerError if it overlaps another."""
+        if not self._lib.flk_memory_allocate(self._at, base, size, noise):
+            raise FlickerError(f"memory: {size} bytes at {base:#x} are none, wrap around or overlap others")
+
+    def read(self, base: int, size: int) -> bytes:
+        """Bytes of an allocated range."""
+        out = ctypes.create_string_buffer(size)
+        if not self._lib.flk_memory_read(self._at, base, size, out):
+            raise FlickerError(f"memory: {size} bytes at {base:#x} are not allocated")
+        return out.raw
+
+    def write(self, base: int, data: bytes) -> None:
+        """Put bytes into an allocated range."""
+        if not self._lib.flk_memory_write(self._at, base, len(data), ctypes.create_string_buffer(data, len(data))):
+            raise FlickerError(f"memory: {len(data)} bytes at {base:#x} are not allocated")
+
+    @property
+    def efficiency(self) -> float:
+        """Share of the DRAM's peak rate that was moved, from cycle 0 until now."""
+        return self._lib.flk_memory_efficiency(self._at)
+
+    def counts(self) -> Counts:
+        """Of the DRAM."""
+        out = Counts()
+        self._lib.flk_memory_counts(self._at, ctypes.byref(out))
+        return out
+
+
+class Port:
+    """An AXI4 port of a memory. Fill `request`, call `step` once a cycle, read `reply` for the next one."""
+
+    def __init__(self, memory: Memory, config: PortConfig = PortConfig()) -> None:
+        self._lib = memory._lib
+        self.memory = memory  # owns what is behind this port
+        self.config = config
+        self._at = self._lib.flk_axi_new(memory._at, ctypes.byref(config.structure()))
+        if not self._at:
+            raise FlickerError(f"AXI port: {self._lib.flk_axi_problem().decode()}")
+        self.request = Request()
+        self.reply: Reply = self._lib.flk_axi_reply(self._at).contents  # follows the port
+
+    def step(self) -> None:
+        """The edge that ends a cycle: transfers by `request` and `reply`, then `reply` is that of the next cycle."""
+        self._lib.flk_axi_cycle(self._at, ctypes.byref(self.request))
+
+    def reset(self) -> None:
+        """A cycle in reset."""
+        self._lib.flk_axi_reset(self._at, ctypes.byref(self.request))
+
+    def purpose(self, base: int, size: int, number: int) -> None:
+        """Count transactions that begin in a range under `number`; all others under their id."""
+        self._lib.flk_axi_purpose(self._at, base, size, number)
+
+    def fail_range(self, base: int, size: int, *, reads: bool = True, writes: bool = True, resp: Resp = Resp.SLVERR) -> None:
+        """Answer bursts that touch a range with an error; a write that fails changes nothing."""
+        self._lib.flk_axi_fail_range(self._at, base, size, reads, writes, resp)
+
+    def fail_read(self, nth: int, resp: Resp = Resp.SLVERR) -> None:
+        """Answer the nth read burst (from 0) with an error."""
+        self._lib.flk_axi_fail_read(self._at, nth, resp)
+
+    def fail_write(self, nth: int, resp: Resp = Resp.SLVERR) -> None:
+        """Answer the nth write burst (from 0) with an error."""
+        self._lib.flk_axi_fail_write(self._at, nth, resp)
+
+    @property
+    def idle(self) -> bool:
+        """Nothing is under way, and no data without an address are left."""
+        return bool(self._lib.flk_axi_idle(self._at))
+
+    @property
+    def errors(self) -> list[str]:
+        """Rules of AXI that the design has broken, each with its cycle; at most 100."""
+        return [self._lib.flk_axi_error(self._at, i).decode() for i in range(self._lib.flk_axi_errors(self._at))]
+
+    def counts(self, purpose: int) -> PurposeCounts:
+        out = PurposeCounts()
+        self._lib.flk_axi_counts(self._at, purpose, ctypes.byref(out))
+        return out
+
+    def channels(self) -> dict[str, tuple[int, int]]:
+        """Transfers, and cycles of valid without ready, by channel."""
+        out = np.zeros((2, len(CHANNELS)), np.uint64)
+        self._lib.flk_axi_channels(self._at, out[0].ctypes.data, out[1].ctypes.data)
+        return {name: (int(a), int(b)) for name, a, b in zip(CHANNELS, *out)}

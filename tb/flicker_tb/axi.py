@@ -1,0 +1,109 @@
+"""AXI4 subordinates for cocotb benches: the memory of `flicker.sim.memory` (docs/memory_model.md), which checks the design's side, and that of cocotbext-axi.
+
+Ports are named as in docs/memory_model.md: ``<prefix>ar_valid_o``, ``<prefix>r_data_i``, ...
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import cocotb
+from cocotb.triggers import RisingEdge
+from cocotbext.axi import AxiRamRead, AxiRamWrite
+from cocotbext.axi.axi_channels import AxiARBus, AxiAWBus, AxiBBus, AxiRBus, AxiReadBus, AxiWBus, AxiWriteBus
+
+from flicker.sim.memory import MAX_WORDS, Memory, Port, PortConfig
+
+ADDRESS = ("valid", "id", "addr", "len", "size", "burst")
+
+
+class MemoryPort:
+    """A port of a memory on the pins of a design, from the first edge on; fails the test when the design breaks a rule.
+
+    reads, writes: which half there is. ``tick``: this port moves the memory's time; one port of a memory does.
+    """
+
+    def __init__(
+        self, dut: Any, memory: Memory, config: PortConfig, *, prefix: str = "", reads: bool = True, writes: bool = True, tick: bool = True,
+    ) -> None:
+        self.dut, self.memory, self.port, self.tick = dut, memory, Port(memory, config), tick
+        self.words = config.data_bits // 32
+        self._inputs: list[tuple[Any, str]] = []
+        self._address: list[tuple[Any, Any, list[tuple[Any, str]]]] = []
+        self._reads, self._writes = reads, writes
+        self._pins = lambda name: getattr(dut, prefix + name)
+        request = self.port.request
+        for channel, present in (("ar", reads), ("aw", writes)):
+            if present:
+                self._address.append((getattr(request, channel), self._pins(f"{channel}_valid_o"), [(self._pins(f"{channel}_{x}_o"), x) for x in ADDRESS[1:]]))
+        if reads:
+            self._inputs += [(self._pins(f"{x}_i"), x) for x in ("ar_ready", "r_valid", "r_id", "r_resp", "r_last")]
+        if writes:
+            self._inputs += [(self._pins(f"{x}_i"), x) for x in ("aw_ready", "w_ready", "b_valid", "b_id", "b_resp")]
+        self._last: dict[str, int] = {}
+        self._drive()
+        cocotb.start_soon(self._run())
+
+    def _sample(self) -> None:
+        q = self.port.request
+        for to, valid, fields in self._address:
+            to.valid = int(valid.value)
+            if to.valid:
+                for pin, name in fields:
+                    setattr(to, name, int(pin.value))
+        if self._reads:
+            q.r_ready = int(self._pins("r_ready_o").value)
+        if self._writes:
+            q.b_ready = int(self._pins("b_ready_o").value)
+            q.w_valid = int(self._pins("w_valid_o").value)
+            if q.w_valid:
+                data = int(self._pins("w_data_o").value).to_bytes(4 * MAX_WORDS, "little")
+                ctypes.memmove(q.w_data, data, len(data))
+                q.w_strb, q.w_last = int(self._pins("w_strb_o").value), int(self._pins("w_last_o").value)
+
+    def _drive(self) -> None:
+        p = self.port.reply
+        for pin, name in self._inputs:
+            value = getattr(p, name)
+            if self._last.get(name) != value:
+                pin.value = self._last[name] = value
+        if self._reads:
+            data = int.from_bytes(bytes(p.r_data)[: 4 * self.words], "little")
+            if self._last.get("r_data") != data:
+                self._pins("r_data_i").value = self._last["r_data"] = data
+
+    async def _run(self) -> None:
+        edge = RisingEdge(self.dut.clk_i)
+        await edge  # at the start of time, where reset has not reached the registers
+        while True:
+            await edge
+            if self.tick:
+                self.memory.tick()
+            self._sample()
+            if self.dut.rst_ni.value != 1:
+                self.port.reset()
+            else:
+                self.port.step()
+            assert not self.port.errors, self.port.errors[0]
+            self._drive()
+
+
+def _bus(base: type, channel: str) -> type:
+    """The bus class of cocotbext-axi with this project's names of pins."""
+    suffix = {"aw": ("o", "i"), "ar": ("o", "i"), "w": ("o", "i"), "b": ("i", "o"), "r": ("i", "o")}[channel]
+    names = [*base._signals, *(x for x in base._optional_signals if x in ("wstrb", "bresp", "rresp"))]
+    pins = {name: f"{channel}_{name.removeprefix(channel)}_{suffix[name.endswith('ready')]}" for name in names}
+    return type(base.__name__, (base,), {"_signals": pins, "_optional_signals": []})
+
+
+def ram_read(dut: Any, size: int) -> AxiRamRead:
+    """Memory of cocotbext-axi behind a design that reads, at address 0."""
+    bus = AxiReadBus(*(_bus(base, name).from_entity(dut) for base, name in ((AxiARBus, "ar"), (AxiRBus, "r"))))
+    return AxiRamRead(bus, dut.clk_i, dut.rst_ni, reset_active_level=False, size=size)
+
+
+def ram_write(dut: Any, size: int) -> AxiRamWrite:
+    """Memory of cocotbext-axi behind a design that writes, at address 0."""
+    bus = AxiWriteBus(*(_bus(base, name).from_entity(dut) for base, name in ((AxiAWBus, "aw"), (AxiWBus, "w"), (AxiBBus, "b"))))
+    return AxiRamWrite(bus, dut.clk_i, dut.rst_ni, reset_active_level=False, size=size)
