@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import grimp
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -164,8 +165,21 @@ def _test(folder: Path, unit: str, seed: int) -> tuple[bool, str]:
     return True, ""
 
 
-# What the tests of units use of the model: by folder, files directly in it.
-_MODEL = ("", "arithmetic", "front", "golden", "perf", "sim")
+@cache
+def _imports() -> grimp.ImportGraph:
+    return grimp.build_graph("flicker")
+
+
+def _modules(text: str) -> set[Path]:
+    """Files of the model that a test imports, and what these import."""
+    graph = _imports()
+    found: set[str] = set()
+    for module, names in re.findall(r"from (flicker[\w.]*) import ([\w, ]+)", text):
+        found |= {name for name in (module, *(f"{module}.{word}" for word in re.findall(r"\w+", names))) if name in graph.modules}
+    for module in list(found):
+        found |= graph.find_upstream_modules(module)
+    places = [ROOT / "model" / module.replace(".", "/") for module in found]
+    return {path for place in places for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()}
 
 
 @cache
@@ -186,9 +200,8 @@ def _used(unit: str) -> tuple[Path, ...]:
     named = set(re.findall(r"\bflk_\w+", " ".join(path.read_text() for path in own)))
     tops = [top for top in sorted(named) if any((ROOT / "rtl").rglob(f"{top}.sv"))]
     files = {*own, ROOT / "tb" / "conftest.py", *(ROOT / "tb" / "flicker_tb").glob("*.py"), *(source for top in tops for source in toolchain.sources_of(top))}
-    for folder in _MODEL:
-        files |= {path for path in (ROOT / "model" / "flicker" / folder).iterdir() if path.suffix in (".py", ".cpp", ".vlt")}
-    return tuple(sorted(files))
+    python = " ".join(path.read_text() for path in files if path.suffix == ".py")
+    return tuple(sorted(files | _modules(python)))
 
 
 @cache
