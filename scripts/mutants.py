@@ -5,7 +5,7 @@
 
 Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
 survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
-Prints a table, writes build/mutants/results.csv (finished mutants are not run again while sources and tests stay as they are); exits 1 when fewer than
+Prints a table, writes build/mutants/results.csv (finished mutants are not run again while what their unit's tests use stays as it is); exits 1 when fewer than
 KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table into docs/mutants.md.
 """
 
@@ -23,8 +23,10 @@ import sys
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+import grimp
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -163,45 +165,82 @@ def _test(folder: Path, unit: str, seed: int) -> tuple[bool, str]:
     return True, ""
 
 
-def stamp() -> str:
-    """Of all sources and tests: what results depend on."""
-    digest = hashlib.sha256()
-    for name in ("rtl", "tb", "model"):
-        for path in sorted((ROOT / name).rglob("*")):
-            if path.suffix in (".sv", ".f", ".py", ".cpp", ".vlt") and "__pycache__" not in path.parts:
-                digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
+@cache
+def _imports() -> grimp.ImportGraph:
+    return grimp.build_graph("flicker")
 
 
-def _key(mutant: Mutant, code: str) -> str:
-    return hashlib.sha256("\0".join((code, mutant.file, mutant.find, mutant.replace, mutant.unit)).encode()).hexdigest()[:16]
+def _modules(text: str) -> set[Path]:
+    """Files of the model that a test imports, and what these import."""
+    graph = _imports()
+    found: set[str] = set()
+    for module, names in re.findall(r"from (flicker[\w.]*) import ([\w, ]+)", text):
+        found |= {name for name in (module, *(f"{module}.{word}" for word in re.findall(r"\w+", names))) if name in graph.modules}
+    for module in list(found):
+        found |= graph.find_upstream_modules(module)
+    places = [ROOT / "model" / module.replace(".", "/") for module in found]
+    return {path for place in places for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()}
 
 
-def _earlier(mutants: list[Mutant], code: str) -> dict[int, Outcome]:
+@cache
+def _used(unit: str) -> tuple[Path, ...]:
+    """Files that the outcome of a unit's tests depends on: its tests, the modules that they name with all below these, the test library, the model."""
+    (test,) = (ROOT / "tb").rglob(f"test_{unit}.py")
+    beside: dict[str, list[Path]] = {}
+    for path in test.parent.iterdir():
+        if path.suffix in (".py", ".sv", ".cpp"):
+            beside.setdefault(path.stem, []).append(path)
+    own: set[Path] = set()
+    pending = [test]
+    while pending:
+        path = pending.pop()
+        if path not in own:
+            own.add(path)
+            pending += [other for word in set(re.findall(r"\w+", path.read_text())) & beside.keys() for other in beside[word]]
+    named = set(re.findall(r"\bflk_\w+", " ".join(path.read_text() for path in own)))
+    tops = [top for top in sorted(named) if any((ROOT / "rtl").rglob(f"{top}.sv"))]
+    files = {*own, ROOT / "tb" / "conftest.py", *(ROOT / "tb" / "flicker_tb").glob("*.py"), *(source for top in tops for source in toolchain.sources_of(top))}
+    python = " ".join(path.read_text() for path in files if path.suffix == ".py")
+    return tuple(sorted(files | _modules(python)))
+
+
+@cache
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _key(mutant: Mutant) -> str:
+    """Of a mutant and of all that its outcome depends on, as far as it is about its own unit's tests."""
+    files = {*_used(mutant.unit), ROOT / mutant.file}
+    parts = [part for path in sorted(files) for part in (str(path.relative_to(ROOT)), _digest(path))]
+    return hashlib.sha256("\0".join((*parts, mutant.file, mutant.find, mutant.replace, mutant.unit)).encode()).hexdigest()[:16]
+
+
+def _earlier(mutants: list[Mutant]) -> dict[int, Outcome]:
     if not RESULTS.exists():
         return {}
     with RESULTS.open(newline="") as file:
         rows = {row["key"]: row for row in csv.DictReader(file)}
     found = {}
     for mutant in mutants:
-        if (row := rows.get(_key(mutant, code))) is not None and not row["wrong"]:
+        if (row := rows.get(_key(mutant))) is not None and not row["wrong"]:
             found[mutant.number] = Outcome(mutant, row["killer"])
     return found
 
 
-def _write(outcomes: list[Outcome], code: str) -> None:
+def _write(outcomes: list[Outcome]) -> None:
     with RESULTS.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["key", "file", "find", "replace", "unit", "killer", "wrong", "note"])
         for o in outcomes:
             m = o.mutant
-            writer.writerow([_key(m, code), m.file, m.find, m.replace, m.unit, o.killer, o.wrong, m.note])
+            writer.writerow([_key(m), m.file, m.find, m.replace, m.unit, o.killer, o.wrong, m.note])
 
 
 def results() -> list[Outcome]:
     """Outcomes of the mutants that have been run on sources and tests as they are. FlickerError when none has."""
-    mutants, code = load(), stamp()
-    found = _earlier(mutants, code)
+    mutants = load()
+    found = _earlier(mutants)
     if not found:
         raise FlickerError("build/mutants holds no result of this RTL and these tests; run make mutants first")
     return [found[m.number] for m in mutants if m.number in found]
@@ -247,10 +286,9 @@ def main() -> int:
         return 0
     FOLDER.mkdir(parents=True, exist_ok=True)
     console = Console()
-    code = stamp()
-    outcomes = _earlier(mutants, code)
+    outcomes = _earlier(mutants)
     chosen = {m.number for m in mutants}
-    kept = [o for o in _earlier(load(), code).values() if o.mutant.number not in chosen]
+    kept = [o for o in _earlier(load()).values() if o.mutant.number not in chosen]
     left = [m for m in mutants if m.number not in outcomes]
     console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {args.seed}")
     copies = Copies(args.jobs) if left else None
@@ -262,7 +300,7 @@ def main() -> int:
             bar.update(task, advance=1, description=outcome.mutant.title)
             if not console.is_terminal:
                 print(f"{outcome.killer or outcome.wrong or 'SURVIVED':<16} {outcome.mutant.title}", flush=True)
-            _write([*kept, *(outcomes[m.number] for m in mutants if m.number in outcomes)], code)
+            _write([*kept, *(outcomes[m.number] for m in mutants if m.number in outcomes)])
     found = [outcomes[m.number] for m in mutants]
     table = Table()
     for column in ("unit", "mutant", "killed by", "note"):

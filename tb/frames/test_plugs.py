@@ -14,6 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from flicker.toolchain import BUILD, ROOT
 
 STUB = """// Rendering stage that takes its lists and gives background pixels.
@@ -155,6 +157,7 @@ def test_stub_stage() -> None:
     assert touched("stage") == {"rtl/render/flk_stub_stage.sv", "model/flicker/params.py", "rtl/flk.f"}  # the last one is generated
 
 
+@pytest.mark.slow
 def test_pixel_mask_generator() -> None:
     """A new mask generator, with 64-bit masks: all ones give picture, cycles and counters of four bits."""
     source = (ROOT / "rtl" / "render" / "flk_mask_all.sv").read_text()

@@ -74,7 +74,7 @@ def build(config: RenderConfig, *, checks: bool = False, replaced: Mapping[str, 
         depends=[header],
         settings=[HERE / "render_stage.vlt"],
         cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -std=c++17 -I{header.parent}",
-        opt="-O2",
+        opt="-O1" if checks else "-O2",  # assertions make three times as much to compile
         shared=True,
         kind="sim",
         name=stage.module.removeprefix("flk_"),
