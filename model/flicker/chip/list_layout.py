@@ -1,8 +1,8 @@
 """How tile lists may lie in DRAM: writers executed entry by entry, readers with the dependence of a chain on what has arrived.
 
-Four writers, one for each parity of tile column and row, take an entry a cycle each, collect entries in a combiner of 64-byte lines (nine entries of 52 bits and a header of
-44) and write every line once, to a pool of their own. A list is a chain of chunks of `lines` lines; a link lies in the headers of all lines of a chunk, so it is known when the
-first of them has arrived. docs/list_layout.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
+Four writers, one for each parity of tile column and row, take an entry a cycle each, collect entries in a combiner of 64-byte lines (nine entries of 52 bits
+and a header of 44) and write every line once, to a pool of their own. A list is a chain of chunks of `lines` lines; a link lies in the headers of all lines of
+a chunk, so it is known when the first of them has arrived. docs/list_layout.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from ..errors import FlickerError
 from ..front.entries import TileEntries, tile_entries
 from ..front.projection import NEAR
-from ..params import TILE
 from . import constants as c
 from .clusters import cull, planes
 from .dram import WRITE, DramConfig, simulate
@@ -53,19 +52,19 @@ class Replace(IntEnum):
 class ListLayout:
     """lines: of a chunk (the largest, where chunks grow). sets_x, sets_y, ways: combiner of one writer. bins: depth bins, a list each.
 
-    mixed: the pools lie chunk by chunk among each other, not one after the other. quantiles: bins hold equal shares of the Gaussians of the kept clusters, else equal ranges
-    of the key.
+    mixed: the pools lie chunk by chunk among each other, not one after the other. quantiles: bins hold equal shares of the Gaussians of the kept clusters,
+    else equal ranges of the key.
     """
 
-    lines: int = 4
+    lines: int = 8
     chain: Chain = Chain.NEWEST
     sets_x: int = 8
     sets_y: int = 8
     ways: int = 4
-    replace: Replace = Replace.LRU
+    replace: Replace = Replace.ROUND_ROBIN
     bins: int = 1
     quantiles: bool = False
-    mixed: bool = False
+    mixed: bool = True
 
     def __post_init__(self) -> None:
         for name in ("lines", "sets_x", "sets_y", "ways", "bins"):
@@ -78,7 +77,8 @@ class ListLayout:
         return WRITERS * self.sets_x * self.sets_y * self.ways * (LINE * 8 + 18 + self.bins.bit_length() - 1) // 8
 
     def pointer_bytes(self, tiles: int) -> int:
-        """28 bits a list: chunk number and lines used in it. A forward chain needs the oldest and the reserved chunk too; of a directory the open line is kept."""
+        """28 bits a list: chunk number and lines used in it. A forward chain needs the oldest and the reserved chunk too; of a directory the open line is
+        kept."""
         bits = {Chain.FORWARD: 28 + 48, Chain.DIRECTORY: 28 + LINE * 8, Chain.STREAM: 0}.get(self.chain, 28)
         return tiles * self.bins * bits // 8
 
@@ -87,8 +87,9 @@ class ListLayout:
 class Keyed:
     """Entries of a view with what layouts and readers need.
 
-    key: uint32 (S,) of each splat, fixed point of 24 bits between the depths that the kept clusters bound. needed: int64 (T,), entries of each tile's sorted list up to the one
-    that finishes its last pixel. quantiles: int64 (256,), key below which k / 256 of the Gaussians of kept clusters lie, each cluster taken to be spread evenly in depth.
+    key: uint32 (S,) of each splat, fixed point of 24 bits between the depths that the kept clusters bound. needed: int64 (T,), entries of each tile's sorted
+    list up to the one that finishes its last pixel. quantiles: int64 (256,), key below which k / 256 of the Gaussians of kept clusters lie, each cluster taken
+    to be spread evenly in depth.
     """
 
     entries: TileEntries
@@ -159,7 +160,7 @@ def _combine(splat, tile, bin_of, cols, bins, sets_x, sets_y, ways, replace, wri
         for k in range(s * ways, s * ways + ways):
             if held[k] == which:
                 w = k
-            elif held[k] < 0:
+            elif held[k] < 0 and free < 0:
                 free = k
         if w < 0:
             w = free
@@ -263,9 +264,9 @@ def _follow(newest, before, first, used, forward, links, directory, start, group
 class Written:
     """What the writers leave. Lists are numbered tile * bins + bin; addresses are in lines.
 
-    address: int64, lines in the order in which they are written. pool: lines taken. start: int64 (L + 1,): list t reads its lines in the groups start[t]:start[t + 1] of
-    (group_first, group_size); group_wait: the group of the list whose arrival makes it known, -1: known from the pointer. entries: int64 (L,). busiest: entries of the busiest
-    writer.
+    address: int64, lines in the order in which they are written. pool: lines taken. start: int64 (L + 1,): list t reads its lines in the groups
+    start[t]:start[t + 1] of (group_first, group_size); group_wait: the group of the list whose arrival makes it known, -1: known from the pointer. entries:
+    int64 (L,). busiest: entries of the busiest writer.
     """
 
     address: np.ndarray
@@ -334,7 +335,8 @@ def write(keyed: Keyed, layout: ListLayout) -> Written:
     place = np.argsort(owners, kind="stable")
     address = np.concatenate(addresses)[np.argsort(np.concatenate(times), kind="stable")]
     start = np.concatenate([[0], np.cumsum(np.bincount(owners, minlength=lists))])
-    return Written(address, pool, start, *found[:, place], entries, busiest)
+    first, size, wait = found[:, place]
+    return Written(address, pool, start, first, size, wait, entries, busiest)
 
 
 # ---- reading -----------------------------------------------------------------------------------
@@ -498,12 +500,13 @@ def _read(walk, start, group_first, group_size, group_wait, in_flight, room, del
         t += 1
 
 
-def read_cycles(written: Written, walk: np.ndarray, latency: int, in_flight: int, room: int = 64, config: DramConfig = DramConfig()) -> int:
+def read_cycles(written: Written, walk: np.ndarray, latency: int, in_flight: int, room: int = 64, config: DramConfig | None = None) -> int:
     """Cycles until the lists `walk` (int64, in this order) are read, nothing else using the memory.
 
-    in_flight lists are open at a time; of each at most `room` lines are on their way. latency: cycles from a request to its data where the memory is idle and the row closed. A
-    request a DRAM clock; a group of lines is asked for once the group it waits for has brought its first line.
+    in_flight lists are open at a time; of each at most `room` lines are on their way. latency: cycles from a request to its data where the memory is idle and
+    the row closed. A request a DRAM clock; a group of lines is asked for once the group it waits for has brought its first line.
     """
+    config = config or DramConfig()
     if config.interleave_bytes != LINE:
         raise FlickerError(f"list layout: channels must change every {LINE} bytes, not {config.interleave_bytes}")
     clocks_per_cycle = config.rate / 2 / c.CLOCK_HZ
@@ -523,7 +526,8 @@ def read_cycles(written: Written, walk: np.ndarray, latency: int, in_flight: int
 def visits(keyed: Keyed, written: Written, bins: int, early: bool, capacity: int = c.SORT_CAPACITY, ahead: int = c.QUEUE_REFERENCES) -> np.ndarray:
     """int64: lists in the order of reading, tiles row by row, bins near to far; a list longer than the sorter as often as depth chunks are asked for.
 
-    early: with what early termination leaves out (depth chunks of a long list, far bins), `ahead` entries beyond the last one needed. Without it every list is read once.
+    early: with what early termination leaves out (depth chunks of a long list, far bins), `ahead` entries beyond the last one needed. Without it every list is
+    read once.
     """
     count = written.entries.reshape(-1, bins)
     if not early:
@@ -536,10 +540,12 @@ def visits(keyed: Keyed, written: Written, bins: int, early: bool, capacity: int
 
 @dataclass(frozen=True)
 class LayoutResult:
-    """A layout on a view. Bytes: written (lines, each once), pool (taken), read once (every list once), read (with depth chunks and early termination), combiner, pointers.
+    """A layout on a view. Bytes: written (lines, each once), pool (taken), read once (every list once), read (with depth chunks and early termination),
+    combiner, pointers.
 
-    write_cycles: of the DRAM alone, efficiency of it. read_cycles: by (latency, lists in flight), of what is read with depth chunks and early termination; once_cycles: of every
-    list once. entries, longest: of lists. busiest: entries of the busiest writer. skipped: bytes of lists that are never read. fill: entries of a line, on average.
+    write_cycles: of the DRAM alone, efficiency of it. read_cycles: by (latency, lists in flight), of what is read with depth chunks and early termination;
+    once_cycles: of every list once. entries, longest: of lists. busiest: entries of the busiest writer. skipped: bytes of lists that are never read. fill:
+    entries of a line, on average.
     """
 
     layout: ListLayout
@@ -570,8 +576,9 @@ def evaluate_layout(keyed: Keyed, layout: ListLayout, points: tuple[tuple[int, i
     unread = np.ones(len(lines), bool)
     unread[again] = False
     return LayoutResult(
-        layout, len(keyed.entries), int(w.entries.max(initial=0)), w.busiest, len(keyed.entries) / max(int(lines.sum()), 1), len(w.address) * LINE, w.pool * LINE, dram.cycles,
-        dram.efficiency, int(lines[once].sum()) * LINE, int(lines[again].sum()) * LINE, int(lines[unread].sum()) * LINE,
+        layout, len(keyed.entries), int(w.entries.max(initial=0)), w.busiest, len(keyed.entries) / max(int(lines.sum()), 1),
+        len(w.address) * LINE, w.pool * LINE, dram.cycles, dram.efficiency,
+        int(lines[once].sum()) * LINE, int(lines[again].sum()) * LINE, int(lines[unread].sum()) * LINE,
         {p: read_cycles(w, once, *p) for p in points}, {p: read_cycles(w, again, *p) for p in points} if early else {},
         layout.combiner_bytes, layout.pointer_bytes(keyed.entries.cols * keyed.entries.rows),
     )

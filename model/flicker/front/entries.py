@@ -1,6 +1,7 @@
 """Entries of tile lists by the exact test, in float64: which 16x16 tiles a splat has pixels in, and in which of their four sub-tiles.
 
-A splat has a pixel where the pixel's centre lies in its 3-sigma box and in the ellipse alpha = 1/255. Per row of pixels both are intervals, so a row costs one square root.
+A splat has a pixel where the pixel's centre lies in its 3-sigma box and in the ellipse alpha = 1/255. Per row of pixels both are intervals, so a row costs one
+square root.
 """
 
 from __future__ import annotations
