@@ -52,7 +52,8 @@ def _entry_row(title: str, view: View, keyed: Keyed) -> tuple[str, ...]:
     count = np.bincount(e.tile, minlength=e.cols * e.rows)
     x, y = e.tile % e.cols, e.tile // e.cols
     writers = np.bincount(x % 2 + y % 2 * 2, minlength=WRITERS)
-    return (title, f"{boxes:,}", f"{len(e):,}", f"{np.bitwise_count(e.mask).sum():,}", f"{count.mean():.0f}", f"{count.max():,}", f"{keyed.needed.sum() / len(e):.0%}",
+    return (title, f"{boxes:,}", f"{len(e):,}", f"{np.bitwise_count(e.mask).sum():,}", f"{count.mean():.0f}", f"{count.max():,}",
+            f"{keyed.needed.sum() / len(e):.0%}",
             f"{writers.max() * WRITERS / len(e) - 1:.1%}")
 
 

@@ -1,8 +1,8 @@
 """How tile lists may lie in DRAM: writers executed entry by entry, readers with the dependence of a chain on what has arrived.
 
 Four writers, one for each parity of tile column and row, take an entry a cycle each, collect entries in a combiner of 64-byte lines (nine entries of 52 bits
-and a header of 44) and write every line once, to a pool of their own. A list is a chain of chunks of `lines` lines; a link lies in the headers of all lines of
-a chunk, so it is known when the first of them has arrived. docs/list_layout.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
+and a header of 44) and write every line once, to a pool of their own. A list is a chain of chunks of `lines` lines; the header of a chunk's first line has
+the link, so it is known when that line has arrived. docs/list_layout.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
 """
 
 from __future__ import annotations
@@ -386,7 +386,8 @@ def _read(walk, start, group_first, group_size, group_wait, in_flight, room, del
         r = coming[t % ring]
         coming[t % ring] = -1
         while r >= 0:
-            known[group_of[r]] = max(known[group_of[r]], serial[slot_of[r]])
+            if line[r] == group_first[group_of[r]]:
+                known[group_of[r]] = max(known[group_of[r]], serial[slot_of[r]])
             out[slot_of[r]] -= 1
             left -= 1
             end = t
@@ -504,7 +505,7 @@ def read_cycles(written: Written, walk: np.ndarray, latency: int, in_flight: int
     """Cycles until the lists `walk` (int64, in this order) are read, nothing else using the memory.
 
     in_flight lists are open at a time; of each at most `room` lines are on their way. latency: cycles from a request to its data where the memory is idle and
-    the row closed. A request a DRAM clock; a group of lines is asked for once the group it waits for has brought its first line.
+    the row closed. A request a DRAM clock; a group of lines is asked for once the first line of the group it waits for is there.
     """
     config = config or DramConfig()
     if config.interleave_bytes != LINE:

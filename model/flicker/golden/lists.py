@@ -26,7 +26,7 @@ COMBINER_WAYS = 4
 # An entry, least significant bit first, so that entries compare by key, then record.
 MASK_BITS, RECORD_BITS, KEY_BITS = 4, 24, 24
 ENTRY_BITS = MASK_BITS + RECORD_BITS + KEY_BITS
-# The header of a line, behind its entries: count, link, whether there is a link; zeros.
+# The header of a line, behind its entries: count; in the first line of a chunk the chunk before it and whether there is one; zeros.
 HEADER_AT = LINE_ENTRIES * ENTRY_BITS
 COUNT_BITS, LINK_BITS = 4, 24
 # A pointer.
@@ -146,7 +146,7 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, newest, link,
                             if at & 63 > 64 - ENTRY_BITS:
                                 words[(at >> 6) + 1] |= buffer[full, i] >> np.uint64(64 - (at & 63))
                         header = np.uint64(count[full])
-                        if link[t] >= 0:
+                        if used[t] == 0 and link[t] >= 0:
                             header |= np.uint64(link[t]) << np.uint64(COUNT_BITS) | np.uint64(1) << np.uint64(COUNT_BITS + LINK_BITS)
                         words[7] |= header << np.uint64(_HEADER_SHIFT)
                         address = (newest[t] * WRITERS + writer) * CHUNK_LINES + used[t]
@@ -233,7 +233,7 @@ class ReadLists:
 
 
 _FAULTS = ("", "pointer with {0} lines used", "chunk {0}, but there are {1}", "line {0} of its chunk holds {1} entries",
-           "lines of chunk {0} have different links", "chunk {0} belongs to another list too")
+           "chunk {0} has a header with wrong bits", "chunk {0} belongs to another list too")
 
 
 @numba.njit(cache=True)
@@ -266,7 +266,7 @@ def _walk(memory, pointers, place, cols, tiles, chunks, owner, start, word):
                 count = np.int64(header & np.uint64((1 << COUNT_BITS) - 1))
                 if not 1 <= count <= LINE_ENTRIES:
                     return 3, t, k, count
-                if np.int64(header >> np.uint64(COUNT_BITS)) != link:
+                if (np.int64(header >> np.uint64(COUNT_BITS)) if k else link >> LINK_BITS + 1) != 0:
                     return 4, t, chunk, 0
                 if filling:
                     for i in range(count):
