@@ -35,6 +35,7 @@ common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
 common/flk_pipe_reg.sv
 common/flk_skid_buffer.sv
+common/flk_sram.sv
 common/flk_stream_arbiter.sv
 common/flk_weight.sv
 ctu/flk_ctu.sv
@@ -54,4 +55,5 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+preproc/flk_list_writer.sv
 flk_render_stage.sv

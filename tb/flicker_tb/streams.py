@@ -86,6 +86,10 @@ class StreamSource:
         self._queue.extend(items)
         self._wake.set()
 
+    def drop(self) -> None:
+        """Forget what is queued; only in reset, where nothing is offered."""
+        self._queue.clear()
+
     @property
     def pending(self) -> int:
         """Items not yet transferred."""

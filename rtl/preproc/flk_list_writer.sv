@@ -1,0 +1,599 @@
+// List writer: entries of the tiles of one parity into lists in DRAM (docs/list_layout.md).
+//
+// A frame: start_i with the configuration while idle_o; entries; an element with in_end_i, which
+// carries no entry; then the lines still open are written, then the pointers; done_o for one cycle,
+// with failed_o and the counters, which stay until the next start. When a chunk more is needed than
+// chunks_i, failed_o rises and nothing more is written in the frame.
+// Throughput: an entry a cycle. A line is at the output five cycles after the entry that causes it.
+// At the end a cycle for each line of the combiner and each pointer of pointer_lines_i. After reset,
+// max(Pointers, sets) cycles until idle_o. One request a line, whole: address in lines, and data.
+// in_ready_o depends combinationally on out_ready_i; no other path.
+//
+// Pipeline, moving as a whole when the output register is free: A entry taken, number of its list;
+// B row of the set is read; C hit, free way or the way in turn, row written; D line and pointer are
+// read if a line has to go; E entry written to its line, pointer updated, line put together; F
+// output register. What stage E (C) writes while D (B) reads the same address is taken from
+// registers, not from the memory.
+module flk_list_writer #(
+  parameter  int unsigned SetBitsU    = 3,     // bits of the tile's column that choose a set
+  parameter  int unsigned SetBitsV    = 3,     // of its row
+  parameter  int unsigned Ways        = 4,
+  parameter  int unsigned Pointers    = 2048,  // lists at most, a multiple of a line's pointers
+  parameter  int unsigned CoordBits   = 7,     // of u and v
+  parameter  int unsigned ChunkLines  = 8,
+  parameter  int unsigned ChunkBits   = 24,
+  parameter  int unsigned EntryBits   = 52,
+  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned LineBits    = 512,
+  parameter  int unsigned PointerBits = 32,
+  parameter  int unsigned AddressBits = 34,
+  localparam int unsigned ListBits    = $clog2(Pointers),
+  localparam int unsigned LinesBits   = $clog2(Pointers * PointerBits / LineBits + 1)
+) (
+  input  logic                   clk_i,
+  input  logic                   rst_ni,
+  // Frame
+  input  logic                   start_i,
+  output logic                   idle_o,
+  input  logic [1:0]             writer_i,         // parity of the tiles: row, column
+  input  logic [CoordBits:0]     columns_i,        // tiles of this writer in a row
+  input  logic [LinesBits-1:0]   pointer_lines_i,  // lines of pointers of this writer
+  input  logic [ChunkBits:0]     chunks_i,         // it may take
+  input  logic [AddressBits-1:0] list_base_i,      // in lines
+  input  logic [AddressBits-1:0] pointer_base_i,
+  output logic                   done_o,
+  output logic                   failed_o,
+  output logic [31:0]            entries_o,
+  output logic [31:0]            lines_o,
+  output logic [31:0]            evicted_o,
+  output logic [ChunkBits:0]     taken_o,
+  // Entries
+  input  logic                   in_valid_i,
+  output logic                   in_ready_o,
+  input  logic                   in_end_i,
+  input  logic [CoordBits-1:0]   in_u_i,
+  input  logic [CoordBits-1:0]   in_v_i,
+  input  logic [EntryBits-1:0]   in_entry_i,
+  // Lines to memory
+  output logic                   out_valid_o,
+  input  logic                   out_ready_i,
+  output logic [AddressBits-1:0] out_address_o,
+  output logic [LineBits-1:0]    out_data_o
+);
+
+  localparam int unsigned Sets = 1 << (SetBitsU + SetBitsV);
+  localparam int unsigned SetBits = SetBitsU + SetBitsV > 0 ? SetBitsU + SetBitsV : 1;
+  localparam int unsigned WayBits = $clog2(Ways);
+  localparam int unsigned PlaceBits = SetBits + WayBits;
+  localparam int unsigned CountBits = $clog2(LineEntries + 1);
+  localparam int unsigned UsedBits = $clog2(ChunkLines + 1);
+  localparam int unsigned PerLine = LineBits / PointerBits;
+  localparam int unsigned PerLineBits = $clog2(PerLine);
+  localparam int unsigned HeaderAt = LineEntries * EntryBits;
+  localparam int unsigned HeaderCount = 4;
+  localparam int unsigned Clear = Pointers > Sets ? Pointers : Sets;
+  localparam int unsigned Steps = Clear > Sets * Ways ? Clear : Sets * Ways;
+  localparam int unsigned StepBits = $clog2(Steps + 1);
+
+  if (Ways < 2 || Ways != 1 << WayBits) begin : gen_check_ways
+    $error("flk_list_writer: Ways must be a power of two, at least 2");
+  end
+  if (PerLine < 2 || PerLine != 1 << PerLineBits || Pointers % PerLine != 0) begin : gen_check_table
+    $error("flk_list_writer: Pointers must be a multiple of a line's pointers (2, 4, 8, ...)");
+  end
+  if (ChunkLines < 2 || (ChunkLines & (ChunkLines - 1)) != 0) begin : gen_check_chunk
+    $error("flk_list_writer: ChunkLines must be a power of two, at least 2");
+  end
+  if (LineEntries < 2 || LineEntries > 15 || HeaderAt + HeaderCount + ChunkBits + 1 > LineBits ||
+      ChunkBits + UsedBits > PointerBits) begin : gen_check_line
+    $error("flk_list_writer: entries, count and link must fit a line, a chunk's use a pointer");
+  end
+
+  // ---- frame --------------------------------------------------------------------------------------
+
+  typedef enum logic [2:0] {CLEAR, IDLE, ENTRIES, OPEN_LINES, DRAIN, POINTERS, LAST} state_e;
+
+  state_e                 state_d, state_q;
+  logic [StepBits-1:0]    step_d, step_q;
+  logic                   advance, take, take_end, flushing, walking, busy;
+  logic                   start;
+
+  logic [1:0]             writer_q;
+  logic [CoordBits:0]     columns_q;
+  logic [LinesBits-1:0]   pointer_lines_q;
+  logic [ChunkBits:0]     chunks_q;
+  logic [AddressBits-1:0] list_base_q, pointer_base_q;
+
+  assign start    = state_q == IDLE && start_i;
+  assign take     = in_valid_i && in_ready_o && !in_end_i;
+  assign take_end = in_valid_i && in_ready_o && in_end_i;
+  assign flushing = state_q == OPEN_LINES;
+  assign walking  = state_q == POINTERS;
+
+  always_comb begin
+    state_d = state_q;
+    step_d  = step_q;
+    unique case (state_q)
+      CLEAR: begin
+        step_d = step_q + 1'b1;
+        if (step_q == StepBits'(Clear - 1)) begin
+          state_d = IDLE;
+        end
+      end
+      IDLE: begin
+        if (start_i) begin
+          state_d = ENTRIES;
+        end
+      end
+      ENTRIES: begin
+        step_d = '0;
+        if (take_end) begin
+          state_d = OPEN_LINES;
+        end
+      end
+      OPEN_LINES: begin
+        if (advance) begin
+          step_d = step_q + 1'b1;
+          if (step_q == StepBits'(Sets * Ways - 1)) begin
+            state_d = DRAIN;
+          end
+        end
+      end
+      DRAIN: begin
+        step_d = '0;
+        if (!busy) begin
+          state_d = pointer_lines_q == '0 ? LAST : POINTERS;
+        end
+      end
+      POINTERS: begin
+        if (advance) begin
+          step_d = step_q + 1'b1;
+          if (step_q == (StepBits'(pointer_lines_q) << PerLineBits) - 1'b1) begin
+            state_d = LAST;
+          end
+        end
+      end
+      LAST: begin
+        if (!busy) begin
+          state_d = IDLE;
+        end
+      end
+      default: state_d = CLEAR;
+    endcase
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q <= CLEAR;
+      step_q  <= '0;
+    end else begin
+      state_q <= state_d;
+      step_q  <= step_d;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (start) begin
+      writer_q        <= writer_i;
+      columns_q       <= columns_i;
+      pointer_lines_q <= pointer_lines_i;
+      chunks_q        <= chunks_i;
+      list_base_q     <= list_base_i;
+      pointer_base_q  <= pointer_base_i;
+    end
+  end
+
+  // ---- A: an entry, or a line to be closed ----------------------------------------------------------
+
+  logic                 a_valid_d, a_valid_q, a_flush_q;
+  logic [WayBits-1:0]   a_way_q;
+  logic [SetBits-1:0]   a_set_d, a_set_q;
+  logic [ListBits-1:0]  a_list_q;
+  logic [EntryBits-1:0] a_entry_q;
+
+  assign in_ready_o = advance && state_q == ENTRIES;
+  assign a_valid_d  = take || flushing;
+
+  if (SetBitsU + SetBitsV == 0) begin : gen_one_set
+    assign a_set_d = '0;
+  end else if (SetBitsV == 0) begin : gen_row_sets
+    assign a_set_d = in_u_i[SetBitsU-1:0];
+  end else if (SetBitsU == 0) begin : gen_column_sets
+    assign a_set_d = in_v_i[SetBitsV-1:0];
+  end else begin : gen_sets
+    assign a_set_d = {in_v_i[SetBitsV-1:0], in_u_i[SetBitsU-1:0]};
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      a_valid_q <= 1'b0;
+    end else if (advance) begin
+      a_valid_q <= a_valid_d;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && a_valid_d) begin
+      a_flush_q <= flushing;
+      a_way_q   <= WayBits'(step_q);
+      a_set_q   <= flushing ? SetBits'(step_q >> WayBits) : a_set_d;
+      a_list_q  <= ListBits'(in_v_i) * ListBits'(columns_q) + ListBits'(in_u_i);
+      a_entry_q <= in_entry_i;
+    end
+  end
+
+  // ---- B: row of the set ----------------------------------------------------------------------------
+
+  typedef struct packed {
+    logic [CountBits-1:0] count;  // 0: free
+    logic [ListBits-1:0]  list;
+  } way_t;
+
+  typedef struct packed {
+    logic [WayBits-1:0] turn;
+    way_t [Ways-1:0]    way;
+  } row_t;
+
+  logic                 b_valid_q, b_flush_q;
+  logic [WayBits-1:0]   b_way_q;
+  logic [SetBits-1:0]   b_set_q;
+  logic [ListBits-1:0]  b_list_q;
+  logic [EntryBits-1:0] b_entry_q;
+  row_t                 row_read, row, row_d, row_q;
+  logic                 row_kept_q;  // row_q is what the set held when it was read
+  logic                 row_write;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      b_valid_q <= 1'b0;
+    end else if (advance) begin
+      b_valid_q <= a_valid_q;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && a_valid_q) begin
+      b_flush_q <= a_flush_q;
+      b_way_q   <= a_way_q;
+      b_set_q   <= a_set_q;
+      b_list_q  <= a_list_q;
+      b_entry_q <= a_entry_q;
+      row_q      <= row_d;
+      row_kept_q <= row_write && b_set_q == a_set_q;
+    end
+  end
+
+  flk_sram #(
+    .Width($bits(row_t)),
+    .Depth(Sets)
+  ) i_rows (
+    .clk_i,
+    .wr_en_i  (row_write || (state_q == CLEAR && step_q < StepBits'(Sets))),
+    .wr_addr_i(state_q == CLEAR ? SetBits'(step_q) : b_set_q),
+    .wr_data_i(state_q == CLEAR ? '0 : row_d),
+    .rd_en_i  (advance && a_valid_q),
+    .rd_addr_i(a_set_q),
+    .rd_data_o(row_read)
+  );
+
+  // ---- C: the way -----------------------------------------------------------------------------------
+
+  logic [WayBits-1:0]   c_way;
+  logic                 c_hit, c_free, c_evict, c_full, c_event;
+  logic [CountBits-1:0] c_column;  // of the entry
+
+  assign row = row_kept_q ? row_q : row_read;
+
+  always_comb begin
+    c_hit  = 1'b0;
+    c_free = 1'b0;
+    c_way  = row.turn;
+    for (int unsigned w = Ways; w > 0; w--) begin
+      if (row.way[w-1].count == '0) begin
+        c_free = 1'b1;
+        c_way  = WayBits'(w - 1);
+      end
+    end
+    for (int unsigned w = 0; w < Ways; w++) begin
+      if (row.way[w].count != '0 && row.way[w].list == b_list_q) begin
+        c_hit = 1'b1;
+        c_way = WayBits'(w);
+      end
+    end
+    if (b_flush_q) begin
+      c_way = b_way_q;
+    end
+  end
+
+  assign c_evict   = !b_flush_q && !c_hit && !c_free;
+  assign c_column  = c_hit ? row.way[c_way].count : '0;
+  assign c_full    = !b_flush_q && c_column == CountBits'(LineEntries - 1);
+  assign c_event   = c_evict || c_full || (b_flush_q && row.way[c_way].count != '0);
+  assign row_write = advance && b_valid_q;
+
+  always_comb begin
+    row_d = row;
+    if (b_flush_q) begin
+      row_d.way[c_way].count = '0;
+      row_d.turn             = '0;
+    end else begin
+      row_d.way[c_way].count = c_full ? '0 : c_column + 1'b1;
+      row_d.way[c_way].list  = b_list_q;
+      if (c_evict) begin
+        row_d.turn = row.turn + 1'b1;
+      end
+    end
+  end
+
+  // ---- D: line and pointer are read -----------------------------------------------------------------
+
+  logic                 d_entry_q, d_event_q, d_full_q;
+  logic [PlaceBits-1:0] d_place_q;
+  logic [CountBits-1:0] d_column_q, d_count_q;  // d_count_q: entries of the line that goes
+  logic [ListBits-1:0]  d_list_q;               // its list
+  logic [EntryBits-1:0] d_word_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      d_entry_q <= 1'b0;
+      d_event_q <= 1'b0;
+    end else if (advance) begin
+      d_entry_q <= b_valid_q && !b_flush_q;
+      d_event_q <= b_valid_q && c_event;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && b_valid_q) begin
+      d_full_q   <= c_full;
+      d_place_q  <= PlaceBits'({b_set_q, c_way});
+      d_column_q <= c_column;
+      d_count_q  <= c_full ? CountBits'(LineEntries) : row.way[c_way].count;
+      d_list_q   <= c_full ? b_list_q : row.way[c_way].list;
+      d_word_q   <= b_entry_q;
+    end
+  end
+
+  // ---- E: line and pointer --------------------------------------------------------------------------
+
+  typedef struct packed {
+    logic [UsedBits-1:0]  used;  // 0: the list is empty
+    logic [ChunkBits-1:0] chunk;
+  } pointer_t;
+
+  logic                                  e_entry_q, e_event_q, e_full_q;
+  logic [PlaceBits-1:0]                  e_place_q;
+  logic [CountBits-1:0]                  e_column_q, e_count_q;
+  logic [ListBits-1:0]                   e_list_q;
+  logic [EntryBits-1:0]                  e_word_q;
+  logic [LineEntries-1:0][EntryBits-1:0] line_read;
+  // What stage E wrote when D read.
+  logic                                  was_entry_q, was_pointer_q;
+  logic [CountBits-1:0]                  was_column_q;
+  logic [EntryBits-1:0]                  was_word_q;
+  pointer_t                              was_q;
+
+  pointer_t                              pointer_read, pointer, pointer_d;
+  logic                                  pointer_write, begins, enough, sends;
+  logic [ChunkBits:0]                    taken_d, taken_q;
+  logic                                  failed_d, failed_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      e_entry_q <= 1'b0;
+      e_event_q <= 1'b0;
+    end else if (advance) begin
+      e_entry_q <= d_entry_q;
+      e_event_q <= d_event_q;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance) begin
+      e_full_q      <= d_full_q;
+      e_place_q     <= d_place_q;
+      e_column_q    <= d_column_q;
+      e_count_q     <= d_count_q;
+      e_list_q      <= d_list_q;
+      e_word_q      <= d_word_q;
+      was_entry_q   <= e_entry_q && e_place_q == d_place_q;
+      was_column_q  <= e_column_q;
+      was_word_q    <= e_word_q;
+      was_pointer_q <= pointer_write && e_list_q == d_list_q;
+      was_q         <= pointer_d;
+    end
+  end
+
+  for (genvar i = 0; i < LineEntries; i++) begin : gen_columns
+    flk_sram #(
+      .Width(EntryBits),
+      .Depth(Sets * Ways)
+    ) i_column (
+      .clk_i,
+      .wr_en_i  (advance && e_entry_q && e_column_q == CountBits'(i)),
+      .wr_addr_i(e_place_q),
+      .wr_data_i(e_word_q),
+      .rd_en_i  (advance && d_event_q),
+      .rd_addr_i(d_place_q),
+      .rd_data_o(line_read[i])
+    );
+  end
+
+  logic [LineBits-1:0]    line;
+  logic [AddressBits-1:0] chunk_number, address, walk_address;
+
+  // Pointers are read by the list of a line, and in turn at the end, when each is cleared behind its reading.
+  logic                walk_q, walk_last_q, walk_clear;
+  logic [ListBits-1:0] walk_list_q;
+
+  flk_sram #(
+    .Width($bits(pointer_t)),
+    .Depth(Pointers)
+  ) i_pointers (
+    .clk_i,
+    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear),
+    .wr_addr_i(state_q == CLEAR ? ListBits'(step_q) : walk_clear ? walk_list_q : e_list_q),
+    .wr_data_i(state_q == CLEAR || walk_clear ? '0 : pointer_d),
+    .rd_en_i  (advance && (d_event_q || walking)),
+    .rd_addr_i(walking ? ListBits'(step_q) : d_list_q),
+    .rd_data_o(pointer_read)
+  );
+
+  assign pointer       = was_pointer_q ? was_q : pointer_read;
+  assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
+  assign enough        = !begins || taken_q != chunks_q;
+  assign sends         = e_event_q && enough && !failed_q;
+  assign pointer_write = advance && sends;
+  assign failed_d      = failed_q || (e_event_q && !enough);
+  assign taken_d       = taken_q + (ChunkBits + 1)'(sends && begins);
+
+  always_comb begin
+    pointer_d.chunk = begins ? ChunkBits'(taken_q) : pointer.chunk;
+    pointer_d.used  = begins ? UsedBits'(1) : pointer.used + 1'b1;
+  end
+
+  always_comb begin
+    line = '0;
+    for (int unsigned i = 0; i < LineEntries; i++) begin
+      if (CountBits'(i) < e_count_q) begin
+        line[i*EntryBits+:EntryBits] = line_read[i];
+        if (was_entry_q && was_column_q == CountBits'(i)) begin
+          line[i*EntryBits+:EntryBits] = was_word_q;
+        end
+      end
+    end
+    if (e_full_q) begin
+      line[(LineEntries-1)*EntryBits+:EntryBits] = e_word_q;
+    end
+    line[HeaderAt+:HeaderCount] = HeaderCount'(e_count_q);
+    if (begins && pointer.used != '0) begin
+      line[HeaderAt+HeaderCount+:ChunkBits+1] = {1'b1, pointer.chunk};
+    end
+  end
+
+  assign chunk_number = (AddressBits'(pointer_d.chunk) << 2) + AddressBits'(writer_q);
+  assign address      = list_base_q + (chunk_number << $clog2(ChunkLines)) +
+                        AddressBits'(pointer_d.used - 1'b1);
+
+  // ---- pointers at the end --------------------------------------------------------------------------
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      walk_q      <= 1'b0;
+      walk_last_q <= 1'b0;
+    end else if (advance) begin
+      walk_q      <= walking;
+      walk_last_q <= walking && (&step_q[PerLineBits-1:0]);
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && walking) begin
+      walk_list_q <= ListBits'(step_q);
+    end
+  end
+
+  assign walk_clear   = advance && walk_q;
+  assign walk_address = pointer_base_q + (AddressBits'(walk_list_q >> PerLineBits) << 2) +
+                        AddressBits'(writer_q);
+
+  // ---- F: output register ---------------------------------------------------------------------------
+
+  logic                   out_valid_d, out_valid_q;
+  logic [AddressBits-1:0] address_q;
+  logic [LineBits-1:0]    data_q;
+
+  assign advance     = !out_valid_q || out_ready_i;
+  assign out_valid_d = sends || (walk_last_q && !failed_q);
+  assign busy        = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
+                       walk_q || out_valid_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      out_valid_q <= 1'b0;
+    end else if (advance) begin
+      out_valid_q <= out_valid_d;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && (e_event_q || walk_q)) begin
+      if (walk_q) begin
+        data_q    <= {PointerBits'(pointer), data_q[LineBits-1:PointerBits]};
+        address_q <= walk_address;
+      end else begin
+        data_q    <= line;
+        address_q <= address;
+      end
+    end
+  end
+
+  assign out_valid_o   = out_valid_q;
+  assign out_address_o = address_q;
+  assign out_data_o    = data_q;
+
+  // ---- counters -------------------------------------------------------------------------------------
+
+  logic        done_q;
+  logic [31:0] entries_q, lines_q, evicted_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      done_q    <= 1'b0;
+      failed_q  <= 1'b0;
+      taken_q   <= '0;
+      entries_q <= '0;
+      lines_q   <= '0;
+      evicted_q <= '0;
+    end else begin
+      done_q <= state_q == LAST && !busy;
+      if (start) begin
+        failed_q  <= 1'b0;
+        taken_q   <= '0;
+        entries_q <= '0;
+        lines_q   <= '0;
+        evicted_q <= '0;
+      end else if (advance) begin
+        failed_q  <= failed_d;
+        taken_q   <= taken_d;
+        entries_q <= entries_q + 32'(take);
+        lines_q   <= lines_q + 32'(sends);
+        evicted_q <= evicted_q + 32'(b_valid_q && c_evict);
+      end
+    end
+  end
+
+  assign idle_o    = state_q == IDLE;
+  assign done_o    = done_q;
+  assign failed_o  = failed_q;
+  assign entries_o = entries_q;
+  assign lines_o   = lines_q;
+  assign evicted_o = evicted_q;
+  assign taken_o   = taken_q;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> state_q == IDLE)
+  else $error("flk_list_writer: start while a frame is under way");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      start |-> 32'(pointer_lines_i) <= Pointers / PerLine)
+  else $error("flk_list_writer: more pointers than Pointers");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      take |-> (CoordBits + 1)'(in_u_i) < columns_q)
+  else $error("flk_list_writer: column of a tile outside the picture");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      a_valid_q && !a_flush_q |-> 32'(a_list_q) < 32'(pointer_lines_q) * PerLine)
+  else $error("flk_list_writer: row of a tile outside the picture");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i |=>
+      out_valid_o && $stable(out_address_o) && $stable(out_data_o))
+  else $error("flk_list_writer: output changed before its transfer");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) e_event_q |-> e_count_q != '0)
+  else $error("flk_list_writer: a line without entries");
+`endif
+
+endmodule

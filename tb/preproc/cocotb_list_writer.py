@@ -1,0 +1,187 @@
+"""cocotb tests of flk_list_writer; setting: pointers."""
+
+from __future__ import annotations
+
+import cocotb
+import numpy as np
+from cocotb.triggers import RisingEdge
+from flicker_tb.bench import Bench, config
+from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
+
+from flicker.golden.lists import entry_words, pointer_lines, write_lists
+
+LIST_BASE, POINTER_BASE = 0x2_1234_5600, 0x1_0000_0077
+PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "alternate")]
+
+
+class Frame:
+    """Entries of one writer and what it writes. cols, rows: tiles of the picture."""
+
+    def __init__(self, rng, writer: int, cols: int, rows: int, tiles: list[tuple[int, int]], chunks: int | None = None):
+        self.writer, self.cols, self.rows = writer, cols, rows
+        u, v = np.array(tiles, np.int64).reshape(-1, 2).T
+        tile = 2 * u + (writer & 1) + cols * (2 * v + (writer >> 1))
+        n = len(tile)
+        splat, mask = np.arange(n), np.array([rng.randrange(1, 16) for _ in range(n)], np.int64)
+        key, record = (np.array([rng.getrandbits(24) for _ in range(n)], np.int64) for _ in range(2))
+        image = write_lists(splat, tile, mask, key, record, cols, rows, chunks)
+        self.chunks, self.image = image.chunks, image
+        self.items = [(0, int(a), int(b), int(w)) for a, b, w in zip(u, v, entry_words(splat, mask, key, record))] + [(1, 0, 0, rng.getrandbits(52))]
+        self.written = [(LIST_BASE + int(line), int.from_bytes(image.memory[line].tobytes(), "little")) for line in image.writes[writer]]
+        self.pointer_lines = pointer_lines(cols, rows) // 4
+        if not image.failed[writer]:
+            for line in range(self.pointer_lines):
+                part = image.pointers[64 * line + 16 * writer :][:16]
+                self.written.append((POINTER_BASE + 4 * line + writer, int.from_bytes(part.tobytes(), "little")))
+
+
+class Writer:
+    """The design with its streams."""
+
+    def __init__(self, dut, idle: str = "never", stall: str = "never"):
+        self.dut, self.bench = dut, Bench(dut)
+        entries, lines = Stream(dut, "in", ("end", "u", "v", "entry")), Stream(dut, "out", ("address", "data"))
+        self.source = StreamSource(entries, self.bench.stall(idle))
+        self.sink = StreamSink(lines, self.bench.stall(stall))
+        self.out: list[tuple[int, int]] = []
+        self.output = Monitor(lines, self.out.append)
+        self.input = Monitor(entries)
+        dut.start_i.value = 0
+        for name, value in (("writer", 0), ("columns", 0), ("pointer_lines", 0), ("chunks", 0), ("list_base", LIST_BASE), ("pointer_base", POINTER_BASE)):
+            getattr(dut, f"{name}_i").value = value
+
+    async def start(self, frame: Frame) -> None:
+        """Begin a frame: the configuration is there for one cycle."""
+        dut = self.dut
+        await self.bench.until(lambda: int(dut.idle_o.value) == 1, 5000, "idle")
+        values = {"writer": frame.writer, "columns": -(-frame.cols // 2), "pointer_lines": frame.pointer_lines, "chunks": frame.chunks,
+                  "list_base": LIST_BASE, "pointer_base": POINTER_BASE}
+        for name, value in values.items():
+            getattr(dut, f"{name}_i").value = value
+        dut.start_i.value = 1
+        await RisingEdge(dut.clk_i)
+        dut.start_i.value = 0
+        for name, value in values.items():
+            port = getattr(dut, f"{name}_i")
+            port.value = value ^ (1 << len(port)) - 1
+        self.out.clear()
+        self.source.send(frame.items)
+
+    async def run(self, frame: Frame) -> None:
+        """A whole frame, and what it must have written."""
+        dut, image, w = self.dut, frame.image, frame.writer
+        await self.start(frame)
+        limit = 4000 + 40 * (len(frame.items) + 256 + 16 * frame.pointer_lines)
+        await self.bench.until(lambda: int(dut.done_o.value) == 1, limit, "done")
+        for i, (got, due) in enumerate(zip(self.out, frame.written)):
+            assert got == due, f"line {i}: address {got[0] - LIST_BASE:#x}, data {got[1]:#x}; due {due[0] - LIST_BASE:#x}, {due[1]:#x}"
+        assert len(self.out) == len(frame.written), f"{len(self.out)} lines, {len(frame.written)} due"
+        counters = {"entries": image.entries, "lines": image.lines, "evicted": image.evicted, "taken": image.taken, "failed": image.failed}
+        for name, value in counters.items():
+            assert int(getattr(dut, f"{name}_o").value) == value[w], f"{name}: {int(getattr(dut, f'{name}_o').value)}, due {value[w]}"
+
+
+def size(rng, pointers: int) -> tuple[int, int]:
+    """A picture whose pointers fit."""
+    while True:
+        cols, rows = rng.choice(((2, 2), (33, 6), (1, 3), (128, 1), (127, 2), (80, 6))) if rng.random() < 0.7 else (rng.randrange(1, 120), rng.randrange(1, 60))
+        if pointer_lines(cols, rows) * 4 <= pointers:
+            return cols, rows
+
+
+def random_frame(rng, pointers: int, entries: int, wide: bool = False) -> Frame:
+    """Entries in runs, of a few tiles, of tiles that share a set, of all tiles. wide: eight tiles in a set."""
+    writer = rng.randrange(4)
+    while True:
+        cols, rows = (128, 2) if wide else size(rng, pointers)
+        width, height = (cols - (writer & 1) + 1) // 2, (rows - (writer >> 1) + 1) // 2
+        if width > 0 and height > 0:
+            break
+    tiles: list[tuple[int, int]] = []
+    while len(tiles) < entries:
+        kind = rng.randrange(4)
+        u, v = rng.randrange(width), rng.randrange(height)
+        n = rng.randrange(1, 60)
+        if kind == 0:
+            tiles += [(u, v)] * n
+        elif kind == 1:  # two in turn
+            tiles += [rng.choice(((u, v), (width - 1, v))) for _ in range(n)]
+        elif kind == 2:  # one set
+            same = [(x, y) for x in range(u % 8, width, 8) for y in range(v % 8, height, 8)]
+            tiles += [rng.choice(same) for _ in range(n)]
+        else:
+            tiles += [(rng.randrange(width), rng.randrange(height)) for _ in range(n)]
+    return Frame(rng, writer, cols, rows, tiles[:entries])
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall"), PATTERNS))
+async def frames(dut, idle, stall):
+    """Frames one after the other: memory, pointers and counters are the model's."""
+    test = Writer(dut, idle, stall)
+    rng = test.bench.rng
+    await test.bench.reset()
+    evicted = 0
+    for entries in (0, 1, 300, 2000, 30, 9, 10, 1200):
+        frame = random_frame(rng, config()["pointers"], entries, wide=entries in (300, 1200))
+        await test.run(frame)
+        evicted += int(frame.image.evicted[frame.writer])
+    assert evicted > 100
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall"), PATTERNS[:3]))
+async def out_of_memory(dut, idle, stall):
+    """Chunks that just suffice, one too few, none: what was written before stays the model's, and the next frame begins anew."""
+    test = Writer(dut, idle, stall)
+    rng = test.bench.rng
+    await test.bench.reset()
+    for _ in range(3):
+        full = random_frame(rng, config()["pointers"], 800)
+        need = int(full.image.taken[full.writer])
+        for chunks in (need, need - 1, rng.randrange(need), 0, need + 5):
+            tiles = [(u, v) for end, u, v, _ in full.items if not end]
+            frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks)
+            assert frame.image.failed[frame.writer] == (chunks < need)
+            await test.run(frame)
+
+
+@cocotb.test()
+async def one_set(dut):
+    """Nine tiles of one set, one entry each in turn, and each line of one tile: the pipeline's registers stand in for the memories in every cycle."""
+    test = Writer(dut)
+    await test.bench.reset()
+    cols, rows = (256, 1) if config()["pointers"] == 2048 else (96, 1)
+    for turns in (9, 5, 4, 3, 2, 1):
+        tiles = [(8 * (i % turns) % (cols // 2), 0) for i in range(400)]
+        await test.run(Frame(test.bench.rng, 0, cols, rows, tiles))
+
+
+@cocotb.test()
+async def rate(dut):
+    """An entry a cycle; a line five cycles after the entry that fills it."""
+    test = Writer(dut)
+    await test.bench.reset()
+    frame = Frame(test.bench.rng, 3, 16, 4, [(i % 8, 0) for i in range(720)])
+    await test.run(frame)
+    assert test.input.last - test.input.first == 720
+    assert test.output.first - test.input.first == 64 + 5
+    assert test.output.count == 80 + 1
+
+
+@cocotb.test()
+async def reset_in_a_frame(dut):
+    """What a frame that reset ended has left is gone."""
+    test = Writer(dut, "rare", "rare")
+    rng = test.bench.rng
+    await test.bench.reset()
+    for _ in range(2):
+        frame = random_frame(rng, config()["pointers"], 400)
+        await test.start(frame)
+        sent = test.source.sent
+        await test.bench.until(lambda: test.source.sent - sent > rng.randrange(100, 350), 5000, "entries")
+        dut.rst_ni.value = 0
+        await test.bench.cycles(2)
+        test.source.drop()
+        await test.bench.reset()
+        await test.run(random_frame(rng, config()["pointers"], 500))
