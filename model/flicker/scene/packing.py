@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -266,7 +267,7 @@ def pack_chunks(data: ChunkScene, path: Path | None = None) -> Packing:
     counts = np.diff(np.append(start, n))
     headers = np.zeros(len(start), PackedFormat.CHUNK.header)
     limits = data.bounds.astype(np.float64)
-    for i, (name, bits, unit) in enumerate((("position", POSITION_BITS, 1.0), ("scale", SCALE_BITS, np.log2(np.e)), ("dc", DC_BITS, 1.0))):
+    for i, (name, bits, unit) in enumerate((("position", POSITION_BITS, 1.0), ("scale", SCALE_BITS, math.log2(math.e)), ("dc", DC_BITS, 1.0))):
         low, high = (limits[:, 6 * i + 3 * k : 6 * i + 3 * k + 3] * unit for k in (0, 1))
         faults = {"not finite": ~(np.isfinite(low) & np.isfinite(high)), "min above max": low > high}
         if name == "scale":

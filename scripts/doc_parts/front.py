@@ -1,0 +1,79 @@
+"""`make docs PART=front`: what the bit-true front end does to pictures of the demo scene and the real ones, and its number formats, in docs/front_end.md."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flicker.cost.area import parts
+from flicker.front.view import View
+from flicker.golden.front.blend import blend_records
+from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.front.setup import FORMATS, FrontFormats
+from flicker.golden.render import render_golden
+from flicker.markdown import table
+from flicker.params import CatMode, RenderConfig
+from flicker.scene.metrics import psnr
+from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packing import pack, pack_file
+
+from .common import Say, titled_views
+
+# One number of mantissa bits changed at a time.
+TRIED = [FORMATS, *(FrontFormats(position=b) for b in (15, 17, 19, 23)), *(FrontFormats(shape=b) for b in (10, 11, 15, 19)),
+         *(FrontFormats(colour=b) for b in (10, 11, 15))]
+
+
+def _packed(view: View, form: PackedFormat) -> PackedScene:
+    path = view.scene.path
+    return pack(view.scene, form).packed if path is None else pack_file(path, form).packed
+
+
+def _blended(frame: FrontFrame) -> np.ndarray:
+    start, entry = frame.sorted_subtiles()
+    return blend_records(frame.splats(), frame.kind.form, start, entry, frame.camera.width, frame.camera.height)
+
+
+def _decibel(value: float) -> str:
+    return "equal" if math.isinf(value) else f"{value:.1f}"
+
+
+def _cells() -> str:
+    """GE of the operators on ff numbers, as synthesised."""
+    names = ("add", "mul", "recip", "rsqrt", "sqrt", "exp2")
+    found: dict[tuple[str, str], float] = {(unit, config.split(",")[0]): part.ge for (unit, config), part in parts().items()}
+    rows = [(bits, *(f"{found[f'ff_{name}', bits]:,.0f}" for name in names)) for bits in ("11 bit", "15 bit", "19 bit", "23 bit")]
+    return table(["mantissa", *names], rows)
+
+
+def tables(say: Say) -> dict[str, str]:
+    pictures: list[tuple[str, ...]] = []
+    outcomes: list[tuple[str, ...]] = []
+    formats: dict[FrontFormats, list[str]] = {tried: [] for tried in TRIED}
+    titles: list[str] = []
+    kinds: list[str] = []
+    for title, view in titled_views(say):
+        titles.append(title)
+        for form in PackedFormat:
+            say(f"{title}: {form.value}")
+            packed = _packed(view, form)
+            frame = run_front(packed, view.camera)
+            golden = render_golden(frame.subtile_lists(), RenderConfig(cat=CatMode.OFF)).image(view.background)
+            default = render_golden(frame.subtile_lists(), RenderConfig()).image(view.background)
+            pictures.append((title, form.value, *(_decibel(psnr(image, view.reference)) for image in (_blended(frame), golden, default))))
+            if form is PackedFormat.CHUNK:
+                outcomes.append((title, f"{len(packed):,}", *(f"{n:,}" for n in frame.outcomes.values()), f"{len(frame.entry_tile):,}",
+                                 f"{frame.adjusted.get('colour above 2 clipped', 0):,}"))
+                kinds = list(frame.outcomes)
+            if form is PackedFormat.FP16_LOCAL:
+                for tried in TRIED:
+                    say(f"{title}: {tried}")
+                    formats[tried].append(_decibel(psnr(_blended(run_front(packed, view.camera, formats=tried)), view.reference)))
+    rows = [(str(f.position), str(f.shape), str(f.colour), *db) for f, db in formats.items()]
+    return {
+        "pictures": table(["view", "format", "records in float64", "golden stage, test off", "golden stage, default"], pictures),
+        "outcomes": table(["view", "Gaussians", *kinds, "list entries", "colours clipped"], outcomes),
+        "formats": table(["position", "shape", "colour", *titles], rows),
+        "cells": _cells(),
+    }
