@@ -133,7 +133,7 @@ class Copies:
         text = source.read_text()
         try:
             source.write_text(text.replace(mutant.find, mutant.replace))
-            for units in ((mutant.unit,), *LEVELS):
+            for units in ((mutant.unit,), *_above(mutant)):
                 for unit in units:
                     died, wrong = _test(folder, unit, seed)
                     if wrong:
@@ -144,6 +144,11 @@ class Copies:
         finally:
             source.write_text(text)
             self.free.put(folder)
+
+
+def _above(mutant: Mutant) -> tuple[tuple[str, ...], ...]:
+    """LEVELS for what is part of the rendering stage, nothing for the rest."""
+    return LEVELS if ROOT / mutant.file in toolchain.sources_of("flk_render_stage") else ()
 
 
 def _test(folder: Path, unit: str, seed: int) -> tuple[bool, str]:
