@@ -99,7 +99,7 @@ def test_values_are_those_of_float64(form: PackedFormat) -> None:
     assert np.median(np.abs(splats.shape - want) / size) < 2.0**-10
     colour = np.minimum(exact.rgb[j], 1023 / 512)
     assert np.abs(splats.rgb - colour).max() <= 0.5 / 512 + 4e-3
-    assert np.abs(splats.opacity - exact.opacity[j]).max() <= 0.5 / 255 + 1e-6
+    assert np.abs(splats.opacity - exact.opacity[j]).max() <= (0.5 + 2.0**-7) / 255  # the product of 13 bits is rounded before
     assert (splats.spiky == exact.spiky[j]).mean() > 0.999
     order = np.argsort(frame.key, kind="stable")
     assert (np.diff(exact.depth[j][order].astype(np.float64)) > -2e-5 * 6).all()
@@ -131,8 +131,9 @@ def test_real_scenes(real, form: PackedFormat) -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_no_visible_gaussian_is_culled(seed: int) -> None:
     """Cameras around, far away and within the clusters."""
-    packed = pack(random_scene(seed, 4000), PackedFormat.FP16_LOCAL).packed
-    camera = turned(seed, (0.0, 0.7, 3.0, 400.0)[seed % 4])
+    near = random_scene(seed, 20_000, 0)
+    packed = pack(dataclasses.replace(near, means=10 * near.means), PackedFormat.FP16_LOCAL).packed
+    camera = turned(seed, (0.0, 7.0, 30.0, 4000.0)[seed % 4])
     found = cull(packed, FrameSetup.of(camera))
     exact = project(decode(packed), camera)
     assert found.keep[packed.cluster[exact.index]].all()
@@ -212,7 +213,7 @@ def test_box_lists_hold_the_ellipse_lists(demo: View) -> None:
     narrow, wide = run_front(packed, demo.camera), run_front(packed, demo.camera, ListKind.BOX)
     tiles = lambda f: set(zip(f.gaussian[f.entry_splat].tolist(), f.entry_tile.tolist()))  # noqa: E731
     assert tiles(narrow) < tiles(wide)
-    assert len(narrow.entry_tile) < 0.95 * len(wide.entry_tile)
+    assert len(narrow.entry_tile) < 0.97 * len(wide.entry_tile)
 
 
 # ---- records -----------------------------------------------------------------------------------------
@@ -279,7 +280,10 @@ def test_opacity_at_1_over_255() -> None:
     assert (picture(frame).sum(axis=2) > 0).sum() == 1
     between = seen_from(some(1, means=[0.031, 0.0, 4.0], opacities=1 / 255), plain_camera(), PackedFormat.CHUNK)
     assert between.outcomes["ellipse holds no pixel"] == 1
-    faint = seen_from(some(3, opacities=0.4 / 255), plain_camera(), PackedFormat.FP16)
+    packed = pack(some(3), PackedFormat.FP16).packed
+    colour = packed.colour.copy()
+    colour.reshape(-1, packed.format.colour_stride(0))[:3, :2] = np.array([0.4 / 255], np.float16).view(np.uint8)
+    faint = run_front(dataclasses.replace(packed, colour=colour), plain_camera())
     assert faint.outcomes["opacity below 1/510"] == 3
 
 
