@@ -12,8 +12,9 @@
 // Pipeline, moving as a whole when the output register is free: A entry taken, number of its list;
 // B row of the set is read; C hit, free way or the way in turn, row written; D line and pointer are
 // read if a line has to go; E entry written to its line, pointer updated, line put together; F
-// output register. What stage E (C) writes while D (B) reads the same address is taken from
-// registers, not from the memory.
+// output register. What stage E (C) writes while D (B) reads the same line (row) is taken from
+// registers, not from the memory; pointers need none, since two lines of a list never follow each
+// other in neighbouring stages.
 module flk_list_writer #(
   parameter  int unsigned SetBitsU    = 3,     // bits of the tile's column that choose a set
   parameter  int unsigned SetBitsV    = 3,     // of its row
@@ -368,12 +369,11 @@ module flk_list_writer #(
   logic [EntryBits-1:0]                  e_word_q;
   logic [LineEntries-1:0][EntryBits-1:0] line_read;
   // What stage E wrote when D read.
-  logic                                  was_entry_q, was_pointer_q;
+  logic                                  was_entry_q;
   logic [CountBits-1:0]                  was_column_q;
   logic [EntryBits-1:0]                  was_word_q;
-  pointer_t                              was_q;
 
-  pointer_t                              pointer_read, pointer, pointer_d;
+  pointer_t                              pointer, pointer_d;
   logic                                  pointer_write, begins, enough, sends;
   logic [ChunkBits:0]                    taken_d, taken_q;
   logic                                  failed_d, failed_q;
@@ -390,17 +390,15 @@ module flk_list_writer #(
 
   always_ff @(posedge clk_i) begin
     if (advance) begin
-      e_full_q      <= d_full_q;
-      e_place_q     <= d_place_q;
-      e_column_q    <= d_column_q;
-      e_count_q     <= d_count_q;
-      e_list_q      <= d_list_q;
-      e_word_q      <= d_word_q;
-      was_entry_q   <= e_entry_q && e_place_q == d_place_q;
-      was_column_q  <= e_column_q;
-      was_word_q    <= e_word_q;
-      was_pointer_q <= pointer_write && e_list_q == d_list_q;
-      was_q         <= pointer_d;
+      e_full_q     <= d_full_q;
+      e_place_q    <= d_place_q;
+      e_column_q   <= d_column_q;
+      e_count_q    <= d_count_q;
+      e_list_q     <= d_list_q;
+      e_word_q     <= d_word_q;
+      was_entry_q  <= e_entry_q && e_place_q == d_place_q;
+      was_column_q <= e_column_q;
+      was_word_q   <= e_word_q;
     end
   end
 
@@ -436,10 +434,9 @@ module flk_list_writer #(
     .wr_data_i(state_q == CLEAR || walk_clear ? '0 : pointer_d),
     .rd_en_i  (advance && (d_event_q || walking)),
     .rd_addr_i(walking ? ListBits'(step_q) : d_list_q),
-    .rd_data_o(pointer_read)
+    .rd_data_o(pointer)
   );
 
-  assign pointer       = was_pointer_q ? was_q : pointer_read;
   assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
   assign enough        = !begins || taken_q != chunks_q;
   assign sends         = e_event_q && enough && !failed_q;
@@ -591,6 +588,11 @@ module flk_list_writer #(
       out_valid_o && !out_ready_i |=>
       out_valid_o && $stable(out_address_o) && $stable(out_data_o))
   else $error("flk_list_writer: output changed before its transfer");
+
+  // A list has one open line, so after a line of it another entry comes before the next line.
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      d_event_q && e_event_q |-> d_list_q != e_list_q)
+  else $error("flk_list_writer: two lines of a list in neighbouring stages");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) e_event_q |-> e_count_q != '0)
   else $error("flk_list_writer: a line without entries");
