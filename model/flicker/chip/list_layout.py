@@ -516,8 +516,8 @@ def read_cycles(written: Written, walk: np.ndarray, latency: int, in_flight: int
     if delay < 1:
         raise FlickerError(f"list layout: latency {latency} is less than the memory's own")
     t = config.timing
-    timing = (t.rcd, t.rp, t.rp_all, t.ras, t.rrd, t.faw, t.ccd, t.ccd_masked, t.rtp, t.write_pre, t.write_read, t.read_write, t.refi, t.rfc, t.rl, t.wl, t.half,
-              config.tdqsck)
+    timing = (t.rcd, t.rp, t.rp_all, t.ras, t.rrd, t.faw, t.ccd, t.ccd_masked, t.rtp, t.write_pre, t.write_read, t.read_write, t.refi, t.rfc, t.rl, t.wl,
+              t.half, config.tdqsck)
     walk = walk[np.diff(written.start)[walk] > 0]
     if len(walk) == 0:
         return 0
