@@ -67,7 +67,7 @@ async def sparse(dut):
 
 @cocotb.test()
 async def dense(dut):
-    """All results of two batches; what batch 0 left holds for every batch 1."""
+    """All results of two batches; what batch 0 left holds for every batch 1, and yields to the override."""
     driver = Driver(dut)
     for first in range(1 << 8):
         driver.set(1, 1, 0, 0)
@@ -78,7 +78,10 @@ async def dense(dut):
             rects = first & 15, first >> 4, second & 15, second >> 4
             await driver.cycle(*rects[2:])
             driver.expect(dense_mask(rects))
-    assert driver.checked == 1 << 16
+        driver.set(1, 1, 1, 1)
+        await driver.cycle(0, first & 15)
+        driver.expect(15)
+    assert driver.checked == (1 << 16) + (1 << 8)
 
 
 @cocotb.test()
