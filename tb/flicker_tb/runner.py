@@ -57,14 +57,16 @@ def build(
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
     opt: str = "-O1",
+    inner: bool = True,
 ) -> Path:
     """Program that runs cocotb on ``top``; built unless an equal build exists.
 
-    All signals are visible to cocotb; registers get random values at the start of a run. With NETLIST=1 in the environment
+    cocotb sees all signals, or with ``inner`` false the ports only, which for large designs is several times less C++; registers get random values at the start
+    of a run. With NETLIST=1 in the environment
     the design is its synthesised netlist instead of the RTL, of which only ports are visible and registers with a reset begin reset.
     Args as of ``flicker.toolchain.verilate``.
     """
-    visible = ["--public-flat-rw"]
+    visible = ["--public-flat-rw"] if inner or waves() else ["--public-depth", "1"]
     if netlist():
         if sources is not None or extra:
             pytest.skip(f"{top}: sources outside rtl/flk.f have no netlist")
@@ -110,13 +112,14 @@ def build_and_test(
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
     opt: str = "-O1",
+    inner: bool = True,
     tests: Sequence[str] = (),
     seeds: int = 1,
 ) -> None:
     """Build ``top`` and run the cocotb tests of the Python module ``module`` on it.
 
     Args:
-        top, parameters, extra, sources, args, opt: as of ``build``.
+        top, parameters, extra, sources, args, opt, inner: as of ``build``.
         module: importable name; the folder of the pytest file is on the path.
         config: JSON-able settings, which the tests read with ``flicker_tb.bench.config()``.
         tests: names of the cocotb tests to run, parametrized ones in all variants; default all.
@@ -125,7 +128,7 @@ def build_and_test(
     Fails the pytest test if a cocotb test fails, an assertion of the design fires, or no
     cocotb test ran.
     """
-    program = build(top, parameters=parameters, extra=extra, sources=sources, args=args, opt=opt)
+    program = build(top, parameters=parameters, extra=extra, sources=sources, args=args, opt=opt, inner=inner)
     test = os.environ.get("PYTEST_CURRENT_TEST", f"{module}::{top} ")
     file, _, name = test.rsplit(" ", 1)[0].partition("::")
     unit = Path(file).stem.removeprefix("test_")

@@ -32,5 +32,6 @@ def test_channel(case: str) -> None:
         "flk_channel", "cocotb_channel",
         parameters={"Form": int(form), "FifoDepth": depth, "VrusPerChannel": vrus, "MiniTile": m},
         config={"Form": int(form), "FifoDepth": depth, "MiniTile": m, "VrusPerChannel": vrus, "lengths": lengths, "idle": idle, "stall": stall},
+        inner=False,
         **(QUICK_BUILD if vrus != 2 else {}),
     )

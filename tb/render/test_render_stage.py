@@ -18,7 +18,7 @@ from flicker.params import MASK_GENERATORS
 @pytest.mark.parametrize("generator", [name if name == "ctu" else pytest.param(name, marks=pytest.mark.slow) for name in MASK_GENERATORS])
 def test_render_stage(generator: str) -> None:
     settings = {"FifoDepth": 4, "VrusPerChannel": 1, "MaskGenerator": list(MASK_GENERATORS).index(generator)}
-    build_and_test("flk_render_stage", "cocotb_render_stage", parameters=settings, config=settings, **QUICK_BUILD)
+    build_and_test("flk_render_stage", "cocotb_render_stage", parameters=settings, config=settings, inner=False, **QUICK_BUILD)
 
 
 @pytest.mark.parametrize(
