@@ -17,7 +17,7 @@ from ..errors import FlickerError
 from ..front.entries import TileEntries, tile_entries
 from ..front.projection import NEAR
 from . import constants as c
-from .clusters import cull, planes
+from .cull import cull, planes
 from .dram import WRITE, DramConfig, simulate
 from .frame import Prepared
 

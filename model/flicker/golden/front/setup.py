@@ -93,7 +93,7 @@ class FrameSetup:
 def _half_spaces(camera: Camera, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Normals (5, 3) in world axes, offsets (5,), factors of sigma (5,): normal . (mean - position) + offset + factor sigma > 0 for every visible Gaussian.
 
-    As `chip.clusters.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose (docs/front_end.md).
+    As `chip.cull.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose (docs/front_end.md).
     """
     reach = 3.0 * max(camera.fx, camera.fy) * np.sqrt(1.0 + (limit**2).sum())
     normals = [(0.0, 0.0, 1.0)]
