@@ -267,7 +267,7 @@ def summary(outcomes: list[Outcome]) -> str:
     text += markdown.table(["unit", "mutants", "killed by its own tests", "killed above", "survived"], rows)
     others = [o for o in outcomes if not o.at_home]
     if others:
-        text += "\n" + markdown.table(
+        text += "\n\n" + markdown.table(
             ["mutant", "killed by", "why"],
             [(f"`{o.mutant.title}`".replace("|", "\\|"), o.killer or "-", o.mutant.survives or o.wrong or o.mutant.note) for o in others],
         )
