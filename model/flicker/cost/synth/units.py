@@ -186,6 +186,9 @@ def _cells() -> list[Unit]:
         unit("flk_axi_split"),
         unit("flk_axi_read", "512 bit"),
         unit("flk_axi_write", "512 bit"),
+        # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/list_layout.md.
+        unit("flk_sram", "64 x 52 bit, flip-flops", Width=52, Depth=64),
+        unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, CoordBits=3),
         unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
     ]
     return units
