@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,10 @@ from .golden.front.record import RecordKind
 from .golden.render import render_golden
 from .params import CHANNELS, CORES, Coords, Form, RenderConfig
 from .progress import Steps
+from .scene.files import scene_kind
 from .scene.metrics import psnr
-from .scene.packed import PackedFormat, PackedScene, is_image, load_packed
-from .scene.packing import pack
+from .scene.packed import PackedFormat, PackedScene, load_packed
+from .scene.packing import pack, pack_file
 from .sim.render_stage import build, render_rtl
 
 
@@ -80,20 +80,17 @@ def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
     }
 
 
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(64)
-
-
 def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
-    """The memory image of a view's scene: the file itself if it is one, else made now."""
+    """The memory image of a view's scene: the file itself if it is one, else made now; a file that comes in chunks keeps them."""
     path = view.scene.path
-    if path is not None and path.is_file() and is_image(_head(path)):
+    if path is None:
+        return pack(view.scene, form or PackedFormat.CHUNK).packed
+    if scene_kind(path) == "image":
         packed = load_packed(path)
         if form not in (None, packed.format):
             raise FlickerError(f"{path}: is packed as {packed.format.value}, not {form.value if form else ''}")
         return packed
-    return pack(view.scene, form or PackedFormat.CHUNK).packed
+    return pack_file(path, form or PackedFormat.CHUNK).packed
 
 
 def golden_front(view: View, config: RenderConfig, options: FrontOptions, steps: Steps) -> FrontFrame:

@@ -7,27 +7,21 @@ import math
 import numpy as np
 
 from flicker.cost.area import parts
-from flicker.front.view import View
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.setup import FORMATS, FrontFormats
 from flicker.golden.render import render_golden
 from flicker.markdown import table
 from flicker.params import CatMode, RenderConfig
+from flicker.pipeline import packed_scene
 from flicker.scene.metrics import psnr
-from flicker.scene.packed import PackedFormat, PackedScene
-from flicker.scene.packing import pack, pack_file
+from flicker.scene.packed import PackedFormat
 
 from .common import Say, titled_views
 
 # One number of mantissa bits changed at a time.
 TRIED = [FORMATS, *(FrontFormats(position=b) for b in (15, 17, 19, 23)), *(FrontFormats(shape=b) for b in (10, 11, 15, 19)),
          *(FrontFormats(colour=b) for b in (10, 11, 15))]
-
-
-def _packed(view: View, form: PackedFormat) -> PackedScene:
-    path = view.scene.path
-    return pack(view.scene, form).packed if path is None else pack_file(path, form).packed
 
 
 def _blended(frame: FrontFrame) -> np.ndarray:
@@ -57,7 +51,7 @@ def tables(say: Say) -> dict[str, str]:
         titles.append(title)
         for form in PackedFormat:
             say(f"{title}: {form.value}")
-            packed = _packed(view, form)
+            packed = packed_scene(view, form)
             frame = run_front(packed, view.camera)
             golden = render_golden(frame.subtile_lists(), RenderConfig(cat=CatMode.OFF)).image(view.background)
             default = render_golden(frame.subtile_lists(), RenderConfig()).image(view.background)

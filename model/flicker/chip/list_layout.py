@@ -22,12 +22,10 @@ from .dram import WRITE, DramConfig, simulate
 from .frame import Prepared
 
 LINE = 64
-ENTRIES_PER_LINE = 9
 KEY_BITS = 24
 WRITERS = 4
 DIRECTORY_LINKS = 20  # chunk numbers in a line of a directory: 24 bits each and a link
 _REGION = 1 << 22  # lines from pool to pool
-_QUEUE = 4096  # requests that wait at a channel
 
 
 class Chain(IntEnum):
@@ -344,7 +342,8 @@ def write(keyed: Keyed, layout: ListLayout) -> Written:
 
 @numba.njit(cache=True)
 def _read(walk, start, group_first, group_size, group_wait, in_flight, room, delay, channels, banks, page_lines, window, timing):
-    """Clocks until the last line of the lists `walk` has arrived; see `read_cycles`."""
+    """Clocks until the last line of the lists `walk` has arrived; see `read_cycles`. The memory's rules are those of sim/dram.hpp, written a second time for
+    requests that wait for answers; the engine there takes such requests too and should replace them."""
     (rcd, rp, rp_all, ras, rrd, faw, ccd, _, rtp, _, _, _, refi, rfc, rl, _, half, dq) = timing
     far = np.int64(-1) << 40
     open_row = np.full((channels, banks), -1, np.int64)

@@ -16,7 +16,6 @@ import numba
 import numpy as np
 
 from ...arithmetic.ff import ff_add, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round
-from ...errors import FlickerError
 from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
@@ -365,9 +364,3 @@ def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.
     far = (words != np.clip(words, -top, top - 1)).any(axis=1)
     adjusted = {"mean beyond the record's field": int(far.sum()), "value beyond FP16 clamped": int(beyond.sum())}
     return records, {k: v for k, v in adjusted.items() if v}
-
-
-def check_supported(kind: RecordKind, form: object) -> None:
-    """FlickerError where a rendering stage of this form cannot take these records."""
-    if kind.form is not form:
-        raise FlickerError(f"records {kind.value} are for form {kind.form.name.lower()}")
