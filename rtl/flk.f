@@ -4,6 +4,8 @@ common/flk_ff_table_pkg.sv
 common/flk_param_pkg.sv
 common/flk_pkg.sv
 common/flk_table_pkg.sv
+preproc/flk_front_pkg.sv
+preproc/flk_preproc_pkg.sv
 common/flk_axi_read.sv
 common/flk_axi_split.sv
 common/flk_axi_write.sv
@@ -14,7 +16,10 @@ common/flk_ff_add.sv
 common/flk_ff_cmp.sv
 common/flk_ff_exp2.sv
 common/flk_ff_from_fixed.sv
+common/flk_ff_from_fp16.sv
+common/flk_ff_ldexp.sv
 common/flk_ff_mul.sv
+common/flk_ff_narrow.sv
 common/flk_ff_poly.sv
 common/flk_ff_recip.sv
 common/flk_ff_rom.sv
@@ -55,5 +60,14 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+preproc/flk_cluster_header.sv
+preproc/flk_cluster_test.sv
+preproc/flk_colour_basis.sv
+preproc/flk_colour_group.sv
+preproc/flk_colour_total.sv
+preproc/flk_geometry_decode.sv
 preproc/flk_list_writer.sv
+preproc/flk_projection.sv
+preproc/flk_splat_band.sv
+preproc/flk_splat_bounds.sv
 flk_render_stage.sv

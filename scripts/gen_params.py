@@ -4,11 +4,13 @@
 flk_param_pkg.sv  constants, from flicker.params
 flk_pkg.sv        records, from flicker.layout
 flk_mask_generator.sv  the choice of the mask generator, from flicker.params.MASK_GENERATORS
+preproc/flk_*.sv  pipelines of the front end, from flicker.datapath
 flk.f             every source: packages first, each after those it uses; then the modules, folder by folder
 """
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 from pathlib import Path
@@ -18,6 +20,7 @@ import numpy as np
 from flicker import layout
 from flicker import params as p
 from flicker.arithmetic.formats import E4M3, FP16
+from flicker.datapath.sources import sources as datapath_sources
 
 RTL = Path(__file__).resolve().parents[1] / "rtl"
 FOLDERS = ("common", "ctu", "render", "sort")  # of the modules, in the file list's order; others follow by name
@@ -206,7 +209,9 @@ def file_list() -> str:
 
 
 # Text by path below rtl/.
+PIPELINES = datapath_sources()
 SOURCES = {
+    **{name: functools.partial(PIPELINES.__getitem__, name) for name in PIPELINES},
     "common/flk_param_pkg.sv": param_package,
     "common/flk_pkg.sv": record_package,
     "render/flk_mask_generator.sv": mask_generator,

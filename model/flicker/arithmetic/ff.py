@@ -12,6 +12,8 @@ Numba's cache does not see a change of the tables in kernels of other modules: c
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -71,6 +73,18 @@ def ff_neg(a):
 def ff_lt(a, b):
     """a < b."""
     return a < b
+
+
+@numba.njit(forceinline=True)
+def pick(condition, a, b):
+    """a where the condition holds, else b: a choice that hardware makes with a multiplexer."""
+    return a if condition else b
+
+
+@numba.njit(forceinline=True)
+def ff_ldexp(x, shift, M):
+    """x 2^shift."""
+    return ff_round(math.ldexp(x, shift), M)
 
 
 # ---- conversions -------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ... import layout
+from ...arithmetic.ff_stages import STAGES
 from ...params import (
     CHANNELS,
     FAITHFUL,
@@ -146,21 +147,13 @@ def _arithmetic() -> list[Unit]:
 
 
 # Stages of the operators on ff numbers, by mantissa bits: the fewest with which no path is longer than CLOCK_FO4.
-FF_STAGES = {
-    "flk_ff_add": {11: 2, 15: 3, 19: 3, 23: 3},
-    "flk_ff_mul": {11: 2, 15: 3, 19: 3, 23: 4},
-    "flk_ff_recip": {11: 2, 15: 2, 19: 3, 23: 4},
-    "flk_ff_rsqrt": {11: 2, 15: 3, 19: 3, 23: 4},
-    "flk_ff_sqrt": {11: 2, 15: 3, 19: 3, 23: 4},
-    "flk_ff_exp2": {11: 2, 15: 2, 19: 3, 23: 4},
-}
 FF_MAN_BITS = (11, 15, 19, 23)
 
 
 def _ff() -> list[Unit]:
     units = [
         unit(top, f"{bits} bit, {count} stages", ManBits=bits, Stages=count)
-        for top, stages in FF_STAGES.items() for bits, count in stages.items()
+        for top, stages in STAGES.items() for bits, count in stages.items()
     ]
     for bits in FF_MAN_BITS:
         units += [

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_mul, ff_sub
+from ...arithmetic.ff import ff_add, ff_mul, ff_sub, pick
 from ...front.projection import NEAR
 from ...scene.packed import PackedScene
 from .setup import CLUSTER_M, KEY_BITS, KEY_FIELD, FrameSetup, rounded
@@ -25,27 +25,28 @@ def _dot(n0, n1, n2, e0, e1, e2):
 
 
 @numba.njit
-def _far(n, low, high):
-    """The end of an axis that is farther along the normal."""
-    return low if n < 0.0 else high
+def test_cluster(low, high, sigma, position, normal, offset, reach):
+    """(keep, nearest, farthest depth) of a cluster; all ff numbers of 23 bits."""
+    M = CLUSTER_M
+    l0, l1, l2 = ff_sub(low[0], position[0], M), ff_sub(low[1], position[1], M), ff_sub(low[2], position[2], M)
+    h0, h1, h2 = ff_sub(high[0], position[0], M), ff_sub(high[1], position[1], M), ff_sub(high[2], position[2], M)
+    outside = 0
+    nearest = farthest = l0
+    for k in range(5):
+        n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
+        most = _dot(n0, n1, n2, pick(n0 < 0.0, l0, h0), pick(n1 < 0.0, l1, h1), pick(n2 < 0.0, l2, h2))
+        sum_ = ff_add(ff_add(most, offset[k], M), ff_mul(reach[k], sigma, M), M)
+        outside = outside | (sum_ <= 0.0)
+        if k == 0:
+            nearest = _dot(n0, n1, n2, pick(n0 > 0.0, l0, h0), pick(n1 > 0.0, l1, h1), pick(n2 > 0.0, l2, h2))
+            farthest = most
+    return outside < 1, nearest, farthest
 
 
 @numba.njit(cache=True)
 def _cull(low, high, sigma, position, normal, offset, reach, keep, depth):
-    M = CLUSTER_M
     for i in range(low.shape[0]):
-        l0, l1, l2 = ff_sub(low[i, 0], position[0], M), ff_sub(low[i, 1], position[1], M), ff_sub(low[i, 2], position[2], M)
-        h0, h1, h2 = ff_sub(high[i, 0], position[0], M), ff_sub(high[i, 1], position[1], M), ff_sub(high[i, 2], position[2], M)
-        keep[i] = True
-        for k in range(5):
-            n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
-            most = _dot(n0, n1, n2, _far(n0, l0, h0), _far(n1, l1, h1), _far(n2, l2, h2))
-            sum_ = ff_add(ff_add(most, offset[k], M), ff_mul(reach[k], sigma[i], M), M)
-            if not sum_ > 0.0:
-                keep[i] = False
-            if k == 0:
-                depth[i, 0] = _dot(n0, n1, n2, _far(-n0, l0, h0), _far(-n1, l1, h1), _far(-n2, l2, h2))
-                depth[i, 1] = most
+        keep[i], depth[i, 0], depth[i, 1] = test_cluster(low[i], high[i], sigma[i], position, normal, offset, reach)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from dataclasses import dataclass
 from enum import Enum
@@ -15,19 +14,20 @@ from enum import Enum
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round
+from ...arithmetic.ff import ff_add, ff_exp2_fixed, ff_ldexp, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round, pick
 from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .cull import Culled, cull
-from .reach import Reach, reach_one, reach_tables, tiles_of
+from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, KEY_FIELD, FrameSetup, FrontFormats
-from .splat import basis_functions, colour_constants, constants, largest_component, pixels, project_one, shade
+from .splat import basis_functions, colour_constants, constants, largest_component, pixels, place_largest, project_one, shade
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
 SCALE_FRACTION = 12  # of a log2 scale
+SCALE_BITS = 20  # of a log2 scale, saturated
 OPACITY_LIMIT = 255
 
 
@@ -107,12 +107,16 @@ def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
 
 
 @numba.njit
+def chunk_scale(code, low, step, M):
+    """ff: a scale of a chunk from its code, and low end and step of log2 in fixed point of `SCALE_HEADER_FRACTION` bits."""
+    drop = SCALE_HEADER_FRACTION - SCALE_FRACTION
+    top = 1 << (SCALE_BITS - 1)
+    return ff_exp2_fixed(min(max((low + code * step + (1 << (drop - 1))) >> drop, -top), top - 1), SCALE_FRACTION, M)
+
+
+@numba.njit
 def _scale(chunked, code, low, step, M):
-    if chunked:
-        value = low + np.int64(code) * step
-        drop = SCALE_HEADER_FRACTION - SCALE_FRACTION
-        return ff_exp2_fixed((value + (1 << (drop - 1))) >> drop, SCALE_FRACTION, M)
-    return ff_round(code, M)
+    return chunk_scale(np.int64(code), low, step, M) if chunked else ff_round(code, M)
 
 
 @numba.njit
@@ -121,14 +125,7 @@ def _quaternion(chunked, c, M):
         return ff_round(c[0], M), ff_round(c[1], M), ff_round(c[2], M), ff_round(c[3], M)
     a, b, d = 2.0 * c[1] - 1023.0, 2.0 * c[2] - 1023.0, 2.0 * c[3] - 1023.0
     most = largest_component(np.int64(a), np.int64(b), np.int64(d), M)
-    a, b, d = ff_round(a, M), ff_round(b, M), ff_round(d, M)
-    if c[0] == 0.0:
-        return most, a, b, d
-    if c[0] == 1.0:
-        return a, most, b, d
-    if c[0] == 2.0:
-        return a, b, most, d
-    return a, b, d, most
+    return place_largest(np.int64(c[0]), most, ff_round(a, M), ff_round(b, M), ff_round(d, M))
 
 
 @numba.njit
@@ -145,6 +142,12 @@ def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, 
 
 
 @numba.njit
+def depth_key(depth, shift, low, M):
+    """Key of a depth: its steps of 2^-shift beyond the lowest, saturated."""
+    return min(max(ff_to_fixed_floor(ff_ldexp(depth, shift, M), 0, KEY_FIELD + 1) - low, 0), (1 << KEY_BITS) - 1)
+
+
+@numba.njit
 def opacity_code(chunked, opacity, M):
     """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself."""
     if chunked:
@@ -157,19 +160,17 @@ def colour_lane(i, lanes, values, p, k, M, rgb):
     """Colour of Gaussian i into rgb (3,), ff (M bits), not negative."""
     c = lanes.cluster[i]
     count = lanes.count[i]
-    basis, coefficient = np.zeros(16), np.zeros(16)
+    basis, coefficient = np.zeros(17), np.zeros(17)
     degree = 0 if count == 1 else (1 if count == 4 else (2 if count == 9 else 3))
     if degree:
         basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), k, degree, basis, M)
     for channel in range(3):
-        if lanes.chunked:
-            dc = ff_add(values.dc_low[c, channel], ff_mul(values.dc_step[c, channel], lanes.dc[i, channel], M), M)
-        else:
-            dc = ff_add(0.5, ff_mul(k[0], ff_round(lanes.dc[i, channel], M), M), M)
+        low, step = pick(lanes.chunked, values.dc_low[c, channel], 0.5), pick(lanes.chunked, values.dc_step[c, channel], k[0])
+        dc = ff_add(low, ff_mul(step, ff_round(lanes.dc[i, channel], M), M), M)
         for j in range(1, count):
             step = values.sh_step[c, 0 if j < 4 else (1 if j < 9 else 2), channel]
             coefficient[j] = ff_mul(step, ff_round(np.float64(lanes.sh[i, j - 1, channel]), M), M)
-        rgb[channel] = max(shade(dc, basis, coefficient, count, M), 0.0)
+        rgb[channel] = shade(dc, basis, coefficient, M)
 
 
 @numba.njit(parallel=True, cache=True)
@@ -195,7 +196,8 @@ def _splats(
         if code == 0:
             outcome[j] = Outcome_FAINT
             continue
-        r = reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S)
+        steady = steady_one(p, inverse, S)
+        r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S)
         count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none)
         if count == 0:
             outcome[j] = Outcome_MISSED
@@ -204,8 +206,7 @@ def _splats(
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
-        depth = ff_to_fixed_floor(math.ldexp(p.t2, shift), 0, KEY_FIELD + 1)
-        key[j] = min(max(depth - key_low, 0), (1 << KEY_BITS) - 1)
+        key[j] = depth_key(p.t2, shift, key_low, P)
         rgb = np.empty(3)
         colour_lane(i, lanes, values, p, colours, C, rgb)
         if conic:

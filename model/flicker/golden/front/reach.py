@@ -15,7 +15,7 @@ from collections import namedtuple
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_from_fixed, ff_mul, ff_sqrt, ff_sub, ff_to_fixed_round
+from ...arithmetic.ff import ff_add, ff_from_fixed, ff_mul, ff_sqrt, ff_sub, ff_to_fixed_round, pick
 from ...params import SUBTILE, TILE
 from .setup import MEAN_FRACTION, FrontFormats, rounded
 from .splat import MEAN_BITS, SHAPE_SCALE, pixels
@@ -36,22 +36,28 @@ def reach_tables(formats: FrontFormats) -> tuple[np.ndarray, np.ndarray, np.ndar
     return rounded(np.log2(code), formats.shape), rounded(sigmas, formats.shape), rounded(np.minimum(sigmas, SIGMAS), formats.shape), float(inverse)
 
 
-# x0, x1, y0, y1: first and last pixel column and row; none where the first is past the last. i0, kappa, limit: as above. right: rows from the mean
-# to the rightmost point, 1/128.
+# What does not depend on the opacity. i0, kappa: as above. lean: of the ellipse's rightmost point from the mean, in rows for each standard deviation.
+Steady = namedtuple("Steady", "i0 kappa lean")
+# x0, x1, y0, y1: first and last pixel column and row; none where the first is past the last. limit: log2 o'. right: rows from the mean to the
+# rightmost point, 1/128.
 Reach = namedtuple("Reach", "x0 x1 y0 y1 i0 kappa limit right")
 
 
 @numba.njit
-def reach_one(p, code, box, width, height, logs, sigmas, cut, inverse, S):
-    """Bounds of a splat. p: its Projection. code: 255 times the opacity."""
-    rx = p.radius_x if box else ff_to_fixed_round(ff_mul(cut[code], p.sx, S), MEAN_FRACTION, MEAN_BITS)
-    ry = p.radius_y if box else ff_to_fixed_round(ff_mul(cut[code], p.sy, S), MEAN_FRACTION, MEAN_BITS)
-    x0, x1 = pixels(p.x, rx, width)
-    y0, y1 = pixels(p.y, ry, height)
+def steady_one(p, inverse, S):
+    """p: Projection. inverse: 1 / K."""
     i0 = ff_mul(ff_mul(ff_mul(p.det, p.rdet, S), p.ryy, S), inverse, S)
-    kappa = ff_mul(p.xy, ff_mul(p.ryy, p.ryy, S), S)
-    right = ff_to_fixed_round(ff_mul(sigmas[code], ff_mul(p.xy, p.rxx, S), S), MEAN_FRACTION, MEAN_BITS)
-    return Reach(x0, x1, y0, y1, i0, kappa, logs[code], right)
+    return Steady(i0, ff_mul(p.xy, ff_mul(p.ryy, p.ryy, S), S), ff_mul(p.xy, p.rxx, S))
+
+
+@numba.njit
+def reach_one(x, y, sx, sy, steady, code, box, width, height, logs, sigmas, cut, S):
+    """Bounds of a splat. x, y: mean in 1/128 pixel. sx, sy: ff, standard deviations. code: 255 times the opacity."""
+    far = pick(box, SIGMAS, cut[code])
+    x0, x1 = pixels(x, ff_to_fixed_round(ff_mul(far, sx, S), MEAN_FRACTION, MEAN_BITS), width)
+    y0, y1 = pixels(y, ff_to_fixed_round(ff_mul(far, sy, S), MEAN_FRACTION, MEAN_BITS), height)
+    right = ff_to_fixed_round(ff_mul(sigmas[code], steady.lean, S), MEAN_FRACTION, MEAN_BITS)
+    return Reach(x0, x1, y0, y1, steady.i0, steady.kappa, logs[code], right)
 
 
 @numba.njit
@@ -63,31 +69,24 @@ def half_chord(dy, l2, i0, kappa, limit, S):
 
 
 @numba.njit
-def band_columns(band, x, y, l2, r, S):
-    """First and last pixel column that the splat's ellipse enters in a band, rows 8 band to 8 band + 7; the first is past the last where there is
-    none. r: Reach."""
-    first = max(band * SUBTILE, r.y0)
-    last = min(band * SUBTILE + _BAND, r.y1)
-    if first > last:
-        return 1, 0
-    low, high = (first << MEAN_FRACTION) - y, (last << MEAN_FRACTION) - y
+def band_columns(band, box, x, y, l2, r, S):
+    """First and last pixel column that the splat enters in a band with rows of its own, rows 8 band to 8 band + 7; the first is past the last where
+    there is none. r: Reach."""
+    low, high = (max(band * SUBTILE, r.y0) << MEAN_FRACTION) - y, (min(band * SUBTILE + _BAND, r.y1) << MEAN_FRACTION) - y
     middle, half = half_chord(min(max(r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
     right = x + ff_to_fixed_round(ff_add(middle, half, S), MEAN_FRACTION, MEAN_BITS)
     middle, half = half_chord(min(max(-r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
     left = x + ff_to_fixed_round(ff_sub(middle, half, S), MEAN_FRACTION, MEAN_BITS)
     one = 1 << MEAN_FRACTION
-    return max((left + one - 1) >> MEAN_FRACTION, r.x0), min(right >> MEAN_FRACTION, r.x1)
+    return pick(box, r.x0, max((left + one - 1) >> MEAN_FRACTION, r.x0)), pick(box, r.x1, min(right >> MEAN_FRACTION, r.x1))
 
 
 @numba.njit
 def band_subtiles(band, box, x, y, l2, r, S):
     """First and last sub-tile column that is entered in a band; the first is past the last where there is none."""
-    if box:
-        if max(band * SUBTILE, r.y0) > min(band * SUBTILE + _BAND, r.y1):
-            return 1, 0
-        a, b = r.x0, r.x1
-    else:
-        a, b = band_columns(band, x, y, l2, r, S)
+    if max(band * SUBTILE, r.y0) > min(band * SUBTILE + _BAND, r.y1):
+        return 1, 0
+    a, b = band_columns(band, box, x, y, l2, r, S)
     if a > b:
         return 1, 0
     return a // SUBTILE, b // SUBTILE

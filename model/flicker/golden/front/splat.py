@@ -18,7 +18,7 @@ from collections import namedtuple
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_from_int, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round
+from ...arithmetic.ff import ff_add, ff_from_int, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round, pick
 from ...front.projection import _C0, _C1, _C2, _C3, DILATION, NEAR
 from ...params import SPIKY_AXIS_RATIO
 from .setup import MEAN_FRACTION, FrontFormats, rounded
@@ -27,7 +27,6 @@ SHAPE_SCALE = math.sqrt(0.5 * math.log2(math.e))
 LARGEST_REST = 1023 * 1023 * 2  # what three rotation codes 2 code - 1023 leave for the square of the largest: (1023 sqrt(2))^2
 MEAN_BITS = 36  # of a mean in 1/128 pixel, saturated
 _TRACE_FACTOR = (SPIKY_AXIS_RATIO**2 + 1.0) ** 2 / SPIKY_AXIS_RATIO**2  # trace^2 / det where the axis ratio is that of the threshold
-COLOUR_GROUP = 4  # coefficients a cycle
 
 
 def constants(formats: FrontFormats) -> np.ndarray:
@@ -57,6 +56,15 @@ def largest_component(a, b, c, M):
     return ff_sqrt(ff_from_int(max(LARGEST_REST - (a * a + b * b + c * c), 0), M), M)
 
 
+@numba.njit
+def place_largest(number, most, a, b, d):
+    """w, x, y, z of a chunk's rotation: the largest is component `number`, the others follow in order."""
+    w = pick(number < 1, most, a)
+    x = pick(number < 1, a, pick(number < 2, most, b))
+    y = pick(number < 2, b, pick(number < 3, most, d))
+    return w, x, y, pick(number < 3, d, most)
+
+
 # d: mean less the camera's position, world axes. t: the same in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
 # u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
 # xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel. rxx, ryy, rdet: reciprocal square roots.
@@ -80,7 +88,7 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     t0 = _dot3(view[0, 0], view[0, 1], view[0, 2], d0, d1, d2, P)
     t1 = _dot3(view[1, 0], view[1, 1], view[1, 2], d0, d1, d2, P)
     t2 = _dot3(view[2, 0], view[2, 1], view[2, 2], d0, d1, d2, P)
-    near = not t2 > const[0]
+    near = t2 <= const[0]
     iz = ff_recip(t2, P)
     tx = ff_mul(t0, iz, P)
     ty = ff_mul(t1, iz, P)
@@ -176,15 +184,23 @@ def basis_functions(d0, d1, d2, k, degree, out, M):
 
 
 @numba.njit
-def shade(dc, basis, coefficient, count, M):
-    """A channel: dc and the products of basis and coefficient 1 to count - 1, four a cycle: acc + ((p0 + p1) + (p2 + p3)); what is missing is 0."""
-    acc = dc
-    k = 1
-    while k < count:
-        p0 = ff_mul(basis[k], coefficient[k], M)
-        p1 = ff_mul(basis[k + 1], coefficient[k + 1], M) if k + 1 < count else 0.0
-        p2 = ff_mul(basis[k + 2], coefficient[k + 2], M) if k + 2 < count else 0.0
-        p3 = ff_mul(basis[k + 3], coefficient[k + 3], M) if k + 3 < count else 0.0
-        acc = ff_add(acc, ff_add(ff_add(p0, p1, M), ff_add(p2, p3, M), M), M)
-        k += COLOUR_GROUP
-    return acc
+def group_sum(basis, coefficient, M):
+    """Products of four coefficients: (p0 + p1) + (p2 + p3)."""
+    p0, p1 = ff_mul(basis[0], coefficient[0], M), ff_mul(basis[1], coefficient[1], M)
+    p2, p3 = ff_mul(basis[2], coefficient[2], M), ff_mul(basis[3], coefficient[3], M)
+    return ff_add(ff_add(p0, p1, M), ff_add(p2, p3, M), M)
+
+
+@numba.njit
+def total(dc, s0, s1, s2, s3, M):
+    """A channel from the constant one and the sums of the groups, not negative."""
+    return max(ff_add(dc, ff_add(ff_add(s0, s1, M), ff_add(s2, s3, M), M), M), 0.0)
+
+
+@numba.njit
+def shade(dc, basis, coefficient, M):
+    """A channel: the constant one, and products of basis and coefficient 1 to 15, four a group: dc + ((s0 + s1) + (s2 + s3)); what is missing is 0."""
+    return total(
+        dc, group_sum(basis[1:5], coefficient[1:5], M), group_sum(basis[5:9], coefficient[5:9], M), group_sum(basis[9:13], coefficient[9:13], M),
+        group_sum(basis[13:17], coefficient[13:17], M), M,
+    )

@@ -1,0 +1,249 @@
+"""SystemVerilog of a schedule: units with the results that take turns in them, expressions, registers."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+
+from .graph import BOOL, Ff, Graph, Int, Value
+from .schedule import Schedule, schedule
+
+
+class _Writer:
+    def __init__(self, plan: Schedule) -> None:
+        self.plan, self.graph = plan, plan.graph
+        self.names: dict[Value, str] = {}
+        self.deepest: dict[Value, int] = {}
+        self._name()
+
+    def _name(self) -> None:
+        taken = set()
+        for i, v in enumerate(self.graph.values):
+            name = v.name or f"v{i}"
+            if v.operator is None:
+                name += "_i"
+            elif name in taken:
+                name += f"_{i}"
+            taken.add(name)
+            self.names[v] = name
+
+    def type_of(self, v: Value) -> str:
+        return _type(v.kind)
+
+    def operand(self, v: Value, cycle: int) -> str:
+        """A value as it stands in a cycle of its element."""
+        if v.constant is not None:
+            if isinstance(v.kind, Ff):
+                return f"{v.kind.bits}'h{v.constant:x}"
+            return _integer(v.constant, v.kind.bits, v.kind.signed)
+        k = self.plan.registers(v, cycle)
+        assert k >= 0, (self.names[v], cycle)
+        if k == 0:
+            return self.names[v]
+        self.deepest[v] = max(self.deepest.get(v, 0), k)
+        text = f"{self.names[v]}_q[{k - 1}]"
+        return f"$signed({text})" if isinstance(v.kind, Int) and v.kind.signed else text
+
+    def begin(self, v: Value) -> int:
+        return self.plan.begin.get(v, 0)
+
+
+def _type(kind: Ff | Int) -> str:
+    if kind == BOOL:
+        return "logic"
+    sign = "signed " if isinstance(kind, Int) and kind.signed else ""
+    return f"logic {sign}[{kind.bits - 1}:0]"
+
+
+def _integer(value: int, bits: int, signed: bool) -> str:
+    return f"{'-' if value < 0 else ''}{bits}'{'s' if signed else ''}d{abs(value)}"
+
+
+def _expression(w: _Writer, v: Value) -> str:
+    """Operands of integer arithmetic are widened to the result, or to the widest operand where a comparison is made."""
+    assert v.operator is not None
+    cycle = w.begin(v)
+    operands = [w.operand(o, cycle) for o in v.operands]
+    text = v.operator.text
+    integers = all(isinstance(o.kind, Int) for o in v.operands) and isinstance(v.kind, Int)
+    arithmetic = integers and re.search(r"[-+*<>=]", text) and "[" not in text
+    if arithmetic:
+        kinds = [o.kind for o in v.operands]
+        signed = any(k.signed for k in [*kinds, v.kind] if isinstance(k, Int))
+        wide = max([k.bits + (signed and not k.signed) for k in kinds if isinstance(k, Int)] + [v.kind.bits + (signed and not v.kind.signed)])
+        operands = [_widened(o, value, wide, signed) for o, value in zip(operands, v.operands)]
+        whole = text.format(*operands)
+        if v.kind == BOOL:
+            return whole
+        return f"{v.kind.bits}'({whole})"
+    if v.kind != BOOL and isinstance(v.kind, Int) and "?" in text:
+        signed = v.kind.signed
+        operands[1:] = [_widened(o, value, v.kind.bits, signed) for o, value in zip(operands[1:], v.operands[1:])]
+    return text.format(*operands)
+
+
+def _widened(text: str, value: Value, wide: int, signed: bool) -> str:
+    assert isinstance(value.kind, Int)
+    if value.constant is not None:
+        return _integer(value.constant, wide, signed)
+    if signed:
+        if not value.kind.signed:
+            return f"$signed({wide}'({text}))"
+        return f"{wide}'({text})" if value.kind.bits != wide else text
+    return f"{wide}'({text})" if value.kind.bits != wide else text
+
+
+def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Schedule]:
+    """Text of the module, and its schedule. `head` is the comment above it; how it works is added to it."""
+    plan = schedule(graph, interval)
+    w = _Writer(plan)
+    body: list[str] = []
+    turns = {v: unit for unit in plan.units for v in unit.turns.values()}
+    made: set[int] = set()
+    for v in graph.values:
+        if v.operator is None or (v not in plan.begin and not _needed(v, graph)):
+            continue
+        if v.operator.module and v in turns:
+            unit = turns[v]
+            if id(unit) not in made:
+                made.add(id(unit))
+                body += _unit(w, plan, unit)
+        elif v.operator.module:
+            body += [f"  {w.type_of(v)} {w.names[v]};", *_instance(w, v, w.names[v])]
+        else:
+            body += [f"  {w.type_of(v)} {w.names[v]};", f"  assign {w.names[v]} = {_expression(w, v)};"]
+    outputs = [f"  assign {n}_o = {w.operand(v, plan.latency)};" for n, v in graph.outputs.items()]
+    text = "\n".join([
+        *_comment(_head(head, name, plan)), f"module {name} (", *_ports(w, plan), ");", "", *_tables(graph), *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
+    ])
+    return text, plan
+
+
+def _head(head: str, name: str, plan: Schedule) -> str:
+    n = plan.interval
+    taken = "in each cycle with en_i" if n == 1 else f"in cycles with en_i and phase_i 0; phase_i counts cycles with en_i modulo {n}"
+    return (
+        f"{head}\n\nGenerated by `make generate` from flicker.datapath.units.{_builder(name)}: edit that, not this (docs/datapath.md).\n"
+        f"An element is taken {taken}. Its outputs stand {plan.latency} cycles with en_i later, for one of them. Registers load with en_i and are not reset.\n"
+        f"Units: {_census(plan) or 'none'}."
+    )
+
+
+def _builder(name: str) -> str:
+    return name.removeprefix("flk_").removeprefix("splat_")
+
+
+def _needed(v: Value, graph: Graph) -> bool:
+    pending, seen = list(graph.outputs.values()), set()
+    while pending:
+        o = pending.pop()
+        if o not in seen:
+            seen.add(o)
+            pending += o.operands
+    return v in seen
+
+
+def _comment(head: str) -> list[str]:
+    return [f"// {line}".rstrip() for paragraph in head.splitlines() for line in (textwrap.wrap(paragraph, 117) or [""])]
+
+
+def _census(plan: Schedule) -> str:
+    counts: dict[str, list[int]] = {}
+    for unit in plan.units:
+        size = dict(unit.operator.parameters).get("ManBits", 0)
+        entry = counts.setdefault(f"{unit.operator.module.removeprefix('flk_ff_')} of {size} bits", [0, 0])
+        entry[0] += len(unit.turns)
+        entry[1] += 1
+    return ", ".join(f"{operations} {name} in {units}" for name, (operations, units) in sorted(counts.items()))
+
+
+def _ports(w: _Writer, plan: Schedule) -> list[str]:
+    ports = [("input", "logic", "clk_i"), ("input", "logic", "en_i")]
+    if plan.interval > 1:
+        ports.append(("input", f"logic [{max((plan.interval - 1).bit_length(), 1) - 1}:0]", "phase_i"))
+    ports += [("input", w.type_of(v), w.names[v]) for v in w.graph.values if v.operator is None]
+    ports += [("output", _type(v.kind), f"{name}_o") for name, v in w.graph.outputs.items()]
+    wide = max(len(p[1]) for p in ports)
+    return [f"  {d:6} {t:{wide}} {n}{',' if i + 1 < len(ports) else ''}" for i, (d, t, n) in enumerate(ports)]
+
+
+def _tables(graph: Graph) -> list[str]:
+    out = []
+    for name, table in graph.tables.items():
+        codes = [f"{9 + table.M}'h{code:x}" for code in table.codes()]
+        rows = [f"    {', '.join(codes[i:i + 8])}" for i in range(0, len(codes), 8)]
+        out += [f"  localparam logic [{8 + table.M}:0] {name.upper()} [{len(codes)}] = '{{", ",\n".join(rows), "  };", ""]
+    return out
+
+
+def _instance(w: _Writer, v: Value, result: str) -> list[str]:
+    """An unclocked module."""
+    assert v.operator is not None
+    cycle = w.begin(v)
+    operands = [w.operand(o, cycle) for o in v.operands]
+    if v.operator.module == "flk_ff_ldexp":
+        operands[1] = _widened(operands[1], v.operands[1], 10, True)
+    return _text(v, [*operands, result], result)
+
+
+def _text(v: Value, wires: list[str], name: str, clocked: bool = False) -> list[str]:
+    assert v.operator is not None
+    parameters = ", ".join(f".{n}({x})" for n, x in v.operator.parameters)
+    ports = ", ".join([*([".clk_i", ".en_i"] if clocked else []), *(f".{p}({x})" for p, x in zip(v.operator.ports, wires))])
+    return [f"  {v.operator.module} #({parameters}) i_{name} ({ports});"]
+
+
+def _unit(w: _Writer, plan: Schedule, unit) -> list[str]:
+    """A unit, its operands by phase, and the results by name."""
+    turns = dict(sorted(unit.turns.items()))
+    first = next(iter(turns.values()))
+    name = f"u_{w.names[first]}"
+    wires, out = [], []
+    for k in range(len(first.operands)):
+        texts = []
+        for v in turns.values():
+            text = w.operand(v.operands[k], plan.begin[v])
+            if v.negated[k]:
+                top = v.operands[k].kind.bits - 1
+                inner = text
+                text = f"{{!{inner}[{top}], {inner}[{top - 1}:0]}}" if "'" not in inner else f"({inner} ^ {{1'b1, {top}'b0}})"
+            texts.append(text)
+        if len(set(texts)) == 1:
+            wires.append(texts[0])
+        else:
+            phases = list(turns)
+            text = texts[-1]
+            for p, other in list(zip(phases, texts))[-2::-1]:
+                text = f"phase_i == {max((plan.interval - 1).bit_length(), 1)}'d{p} ? {other} : {text}"
+            wires.append(text)
+    out.append(f"  {w.type_of(first)} {name};")
+    if first.operator.module == "flk_ff_exp2":
+        parameters = dict(first.operator.parameters)
+        wires[0] = f"{parameters['IntBits'] + parameters['FracBits']}'({wires[0]})"
+    out += _text(first, [*wires, name], name, True)
+    for v in turns.values():
+        cycles = f"cycle {plan.begin[v]} to {plan.ready(v)}"
+        out += [f"  {w.type_of(v)} {w.names[v]};  // {cycles}", f"  assign {w.names[v]} = {name};"]
+    return out
+
+
+def _registers(w: _Writer, plan: Schedule) -> list[str]:
+    """Registers of all values, by the phase in which they load. Depths are known only once all users have been written: a first pass collects them."""
+    users: list[tuple[Value, int]] = [(o, plan.begin[v]) for v in plan.begin for o in v.operands]
+    users += [(v, plan.latency) for v in w.graph.outputs.values()]
+    depth: dict[Value, int] = {}
+    for v, cycle in users:
+        if v.constant is None and (k := plan.registers(v, cycle)) > 0:
+            depth[v] = max(depth.get(v, 0), k)
+    out, loads = [], {}
+    for v in w.graph.values:
+        if v in depth:
+            n, bits, name = depth[v], v.kind.bits, w.names[v]
+            out.append(f"  logic [{n - 1}:0][{bits - 1}:0] {name}_q;")
+            value = f"{name}_q <= {name};" if n == 1 else f"{name}_q <= {{{name}_q[{n - 2}:0], {name}}};"
+            loads.setdefault(plan.ready(v) % plan.interval, []).append(f"      {value}")
+    out.append("")
+    for phase, lines in sorted(loads.items()):
+        when = "en_i" if plan.interval == 1 else f"en_i && phase_i == {max((plan.interval - 1).bit_length(), 1)}'d{phase}"
+        out += ["  always_ff @(posedge clk_i) begin", f"    if ({when}) begin", *lines, "    end", "  end", ""]
+    return out

@@ -1,0 +1,239 @@
+"""The pipelines of the front end: inputs, what the golden model does with them, outputs. Registers of a frame are inputs that all its elements share.
+
+Numbers are those of `FrontFormats`. Pixels are in 1/128 where nothing else is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arithmetic.ff import ff_add, ff_mul, ff_round, ff_sub
+from ..golden.front import cull, frame, reach, splat
+from ..golden.front.setup import CLUSTER_M, KEY_FIELD, MAX_PICTURE, FrontFormats
+from ..params import SUBTILE
+from .graph import BOOL, Ff, Graph, Int, Value, retrace
+
+MEAN = Int(-(1 << 36), (1 << 36) - 1)  # what `project_one` may give
+WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
+SCALE_HEADER = Int(-(1 << 26), (1 << 26) - 1)  # low end and step of log2 scales
+BANDS = MAX_PICTURE // SUBTILE
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """A pipeline. interval: cycles between two elements. head: what it does, for the comment of the module."""
+
+    module: str
+    interval: int
+    build: Callable[[FrontFormats], Graph]
+    head: str
+
+
+class _Matrix(list):
+    """Nested lists with the indices of an array."""
+
+    def __getitem__(self, index: Any) -> Any:
+        return super().__getitem__(index[0])[index[1]] if isinstance(index, tuple) else super().__getitem__(index)
+
+
+def _symbolic(function: Callable) -> Callable:
+    """A plain function of ff operations as retrace wants it."""
+    return retrace(type("Kernel", (), {"py_func": staticmethod(function)}))
+
+
+def _name(values: Any) -> None:
+    """Names from the fields of a tuple."""
+    for name, value in values._asdict().items():
+        if not value.name:
+            value.name = name
+
+
+def cluster_test(formats: FrontFormats) -> Graph:
+    g, kind = Graph(), Ff(CLUSTER_M)
+    low, high, sigma = g.inputs("low", kind, (3,)), g.inputs("high", kind, (3,)), g.input("sigma", kind)
+    position = g.inputs("position", kind, (3,), register=True)
+    normal = _Matrix(g.inputs("normal", kind, (5, 3), register=True))
+    offset, far = (g.inputs(n, kind, (5,), register=True) for n in ("offset", "reach"))
+    keep, nearest, farthest = retrace(cull.test_cluster)(low, high, sigma, position, normal, offset, far)
+    for name, value in (("keep", keep), ("nearest", nearest), ("farthest", farthest)):
+        g.output(name, value)
+    return g
+
+
+def cluster_header(formats: FrontFormats) -> Graph:
+    """What the lanes need of a cluster's header; `cluster_values` of the golden model."""
+    g, kind = Graph(), Ff(CLUSTER_M)
+    P, C = formats.position, formats.colour
+    origin, step, position = g.inputs("origin", kind, (3,)), g.inputs("step", kind, (3,)), g.inputs("position", kind, (3,), register=True)
+    scale = {n: g.inputs(n, kind, (3,)) for n in ("scale_low", "scale_step")}
+    colour = {n: g.inputs(n, kind, (3,)) for n in ("dc_low", "dc_step")}
+    sh = g.inputs("sh_step", kind, (3, 3))  # by degree and channel
+    for k in range(3):
+        g.output(f"low_{k}", _symbolic(lambda a, b: ff_round(ff_sub(a, b, CLUSTER_M), P))(origin[k], position[k]))
+        g.output(f"step_{k}", g.ff_round(step[k], P))
+        for name, values in scale.items():
+            g.output(f"{name}_{k}", g.to_fixed(values[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
+        for name, values in colour.items():
+            g.output(f"{name}_{k}", g.ff_round(values[k], C))
+        for degree in range(3):
+            g.output(f"sh_step_{degree}{k}", g.ff_round(sh[degree][k], C))
+    return g
+
+
+def geometry_decode(formats: FrontFormats) -> Graph:
+    """Geometry of a Gaussian as it lies in the image: three words of a chunk, or five of FP16."""
+    g = Graph()
+    P, S = formats.position, formats.shape
+    chunked, words = g.input("chunked", BOOL, register=True), g.inputs("word", WORD, (5,))
+    low, step = (g.inputs(n, SCALE_HEADER, (3,)) for n in ("scale_low", "scale_step"))
+    halves = [g.slice(words[k // 2], 16 * (k % 2), 16) for k in range(10)]
+    codes = [g.slice(words[0], at, bits) for at, bits in ((21, 11), (11, 10), (0, 11))]
+    for k in range(3):
+        g.output(f"q_{k}", g.pick(chunked, g.from_fixed(codes[k], 0, P), g.from_fp16(halves[k], P)))
+    scales = [g.slice(words[2], at, bits) for at, bits in ((21, 11), (11, 10), (0, 11))]
+    for k in range(3):
+        chunk = retrace(frame.chunk_scale)(scales[k], low[k], step[k], S)
+        g.output(f"s_{k}", g.pick(chunked, chunk, g.from_fp16(halves[3 + k], S)))
+    a, b, d = (2 * g.slice(words[1], at, 10) - 1023 for at in (20, 10, 0))
+    most = retrace(splat.largest_component)(a, b, d, S)
+    rest = [g.from_fixed(v, 0, S) for v in (a, b, d)]
+    quat = retrace(splat.place_largest)(g.slice(words[1], 30, 2), most, *rest)
+    for k, name in enumerate("wxyz"):
+        g.output(f"q{name}", g.pick(chunked, quat[k], g.from_fp16(halves[6 + k], S)))
+    return g
+
+
+def projection(formats: FrontFormats) -> Graph:
+    g = Graph()
+    P, S = formats.position, formats.shape
+    low, step = g.inputs("low", Ff(P), (3,)), g.inputs("step", Ff(P), (3,))
+    q, s = g.inputs("q", Ff(P), (3,)), g.inputs("s", Ff(S), (3,))
+    quat = [g.input(n, Ff(S)) for n in ("qw", "qx", "qy", "qz")]
+    view, focal = _Matrix(g.inputs("view", Ff(P), (3, 3), register=True)), g.inputs("focal", Ff(P), (2,), register=True)
+    rows = [g.inputs(n, Ff(S), (3,), register=True) for n in ("row_x", "row_x_z", "row_y", "row_y_z")]
+    limit = g.inputs("limit", Ff(S), (2,), register=True)
+    width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
+    shift, key_low = g.input("key_shift", Int(-128, KEY_FIELD), True), g.input("key_low", Int(0, (1 << KEY_FIELD) - 1), True)
+    const = splat.constants(formats).tolist()
+    p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S)
+    _name(p)
+    x0, x1 = retrace(splat.pixels)(p.x, p.radius_x, width)
+    y0, y1 = retrace(splat.pixels)(p.y, p.radius_y, height)
+    steady = retrace(reach.steady_one)(p, reach.reach_tables(formats)[3], S)
+    _name(steady)
+    g.output("near", p.near)
+    g.output("outside", (x0 > x1) | (y0 > y1))
+    for name in ("x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
+        g.output(name, getattr(p, name))
+    for name, value in steady._asdict().items():
+        g.output(name, value)
+    g.output("key", retrace(frame.depth_key)(p.t2, shift, key_low, P))
+    for k, value in enumerate((p.d0, p.d1, p.d2)):
+        g.output(f"direction_{k}", g.ff_round(value, formats.colour))
+    return g
+
+
+def bounds(formats: FrontFormats) -> Graph:
+    """Where a splat of a known opacity reaches."""
+    g, S = Graph(), formats.shape
+    x, y = g.input("x", MEAN), g.input("y", MEAN)
+    sx, sy, lean = (g.input(n, Ff(S)) for n in ("sx", "sy", "lean"))
+    code, box = g.input("code", Int(0, 255)), g.input("box", BOOL, register=True)
+    width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
+    logs, sigmas, cut, _ = reach.reach_tables(formats)
+    tables = [g.table(n, t, S) for n, t in (("log", logs), ("sigmas", sigmas), ("cut", cut))]
+    zero = g.number(0.0, S)
+    r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S)
+    g.output("empty", (r.x0 > r.x1) | (r.y0 > r.y1))
+    for name in ("x0", "x1", "y0", "y1"):  # in the picture, if it is not empty
+        g.output(name, _bits(g, getattr(r, name)))
+    g.output("limit", r.limit)
+    g.output("right", r.right)
+    return g
+
+
+def band(formats: FrontFormats) -> Graph:
+    """Sub-tiles of a band that a splat enters."""
+    g, S = Graph(), formats.shape
+    number, box = g.input("band", Int(0, BANDS - 1)), g.input("box", BOOL, register=True)
+    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", MEAN)
+    pixel = Int(0, MAX_PICTURE - 1)
+    x0, x1, y0, y1 = (g.input(n, pixel) for n in ("x0", "x1", "y0", "y1"))
+    l2, i0, kappa, limit = (g.input(n, Ff(S)) for n in ("l2", "i0", "kappa", "limit"))
+    r = reach.Reach(x0, x1, y0, y1, i0, kappa, limit, right)
+    a, b = retrace(reach.band_columns)(number, box, x, y, l2, r, S)
+    g.output("empty", a > b)
+    # A band that is not empty begins and ends in the picture.
+    g.output("first", g.slice(_bits(g, a), 3, 9))
+    g.output("last", g.slice(_bits(g, b), 3, 9))
+    return g
+
+
+def _bits(g: Graph, value: Value) -> Value:
+    """The low 12 bits of an integer, unsigned."""
+    return g.wire("12'({0})", Int(0, 4095), (value,))
+
+
+def colour_basis(formats: FrontFormats) -> Graph:
+    """Spherical harmonics in a direction, and the constant part of the colour."""
+    g, C = Graph(), formats.colour
+    chunked = g.input("chunked", BOOL, register=True)
+    d = g.inputs("direction", Ff(C), (3,))
+    dc, low, step = g.inputs("dc", HALF, (3,)), g.inputs("dc_low", Ff(C), (3,)), g.inputs("dc_step", Ff(C), (3,))
+    factors = splat.colour_constants(formats).tolist()
+    out: list[Any] = [None] * 16
+    retrace(splat.basis_functions)(*d, factors, 3, out, C)
+    for k in range(3):
+        code = g.pick(chunked, g.from_fixed(g.slice(dc[k], 0, 8), 0, C), g.from_fp16(dc[k], C))
+        a, b = g.pick(chunked, low[k], 0.5), g.pick(chunked, step[k], factors[0])
+        g.output(f"constant_{k}", _symbolic(lambda a, b, code: ff_add(a, ff_mul(b, code, C), C))(a, b, code))
+    for k in range(1, 16):
+        g.output(f"basis_{k}", out[k])
+    return g
+
+
+def colour_group(formats: FrontFormats) -> Graph:
+    """Four coefficients of three channels, with the sum of their products for each channel."""
+    g, C = Graph(), formats.colour
+    chunked = g.input("chunked", BOOL, register=True)
+    basis = g.inputs("basis", Ff(C), (4,))
+    raw = g.inputs("raw", HALF, (4, 3))  # code of a chunk, or FP16
+    step = g.inputs("step", Ff(C), (4, 3))
+    zero = g.input("zero", Int(0, 511))
+    used = g.inputs("used", BOOL, (4,))
+    for c in range(3):
+        coefficients = []
+        for k in range(4):
+            code = g.from_fixed((g.slice(raw[k][c], 0, 8) << 1) - zero, 0, C)
+            value = g.pick(used[k], g.pick(chunked, code, g.from_fp16(raw[k][c], C)), 0.0)
+            coefficients.append(_symbolic(lambda a, b: ff_mul(a, b, C))(g.pick(chunked, step[k][c], 1.0), value))
+        g.output(f"sum_{c}", retrace(splat.group_sum)(basis, coefficients, C))
+    return g
+
+
+def colour_total(formats: FrontFormats) -> Graph:
+    """A channel from the constant one and the sums of the groups, as a record's 10 bits."""
+    g, C = Graph(), formats.colour
+    dc, sums = g.input("constant", Ff(C)), g.inputs("sum", Ff(C), (4,))
+    colour = retrace(splat.total)(dc, *sums, C)
+    fixed = g.to_fixed(colour, frame.COLOUR_FRACTION, 24, True)
+    g.output("clipped", fixed > frame.COLOUR_LIMIT)
+    g.output("code", g.wire("10'({0})", Int(0, 1023), (g.extreme(fixed, frame.COLOUR_LIMIT, False),)))
+    return g
+
+
+PIPELINES = [
+    Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
+    Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
+    Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
+    Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, depth key, what its bounds need."),
+    Pipeline("flk_splat_bounds", 2, bounds, "Bounds of a splat of a known opacity."),
+    Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
+    Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction, and the constant part of the colour."),
+    Pipeline("flk_colour_group", 1, colour_group, "Sums of four products of basis and coefficient, for three channels."),
+    Pipeline("flk_colour_total", 1, colour_total, "A channel from its constant part and the sums of groups, in a record's 10 bits."),
+]

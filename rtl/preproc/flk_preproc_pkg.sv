@@ -1,0 +1,107 @@
+// Types of the preprocessing core: what its units hand to each other (docs/front_end.md).
+package flk_preproc_pkg;
+  import flk_front_pkg::*;
+
+  localparam int unsigned LANES = 4;
+  localparam int unsigned SEQ_BITS = 12;         // of a survivor's number in its frame, modulo
+  localparam int unsigned NUMBER_BITS = 24;      // of a record
+  localparam int unsigned BEAT_BITS = 34;        // address of 64 bytes
+  localparam int unsigned PLACE_BEAT_BITS = 5;   // of a beat of records that is being put together
+
+  // Registers of a frame that the cluster test takes: ff numbers of 23 bits.
+  typedef struct packed {
+    cluster_t [2:0]      position;
+    cluster_t [4:0][2:0] normal;
+    cluster_t [4:0]      offset;
+    cluster_t [4:0]      reach;
+  } cull_setup_t;
+
+  // Registers of a frame that the lanes take.
+  typedef struct packed {
+    logic                      chunked;  // the image's format
+    logic                      box;      // lists by boxes of 3 standard deviations
+    logic [12:0]               width;    // pixels
+    logic [12:0]               height;
+    position_t [2:0][2:0]      view;
+    position_t [1:0]           focal;
+    shape_t [2:0]              row_x;
+    shape_t [2:0]              row_x_z;
+    shape_t [2:0]              row_y;
+    shape_t [2:0]              row_y_z;
+    shape_t [1:0]              limit;
+  } lane_setup_t;
+
+  // A cluster that is kept.
+  typedef struct packed {
+    logic [23:0] index;   // in the table
+    logic [19:0] first;   // first slot / 16
+    logic [7:0]  last;    // Gaussians - 1
+    logic [1:0]  degree;  // of spherical harmonics
+  } kept_t;
+
+  // What the lanes take of a cluster's header, and where its colours lie.
+  typedef struct packed {
+    logic [31:0]               colour;      // first beat of its colours, from the colour array's first
+    logic [8:0]                sh_zero;
+    position_t [2:0]           low;         // of the means, less the camera's position
+    position_t [2:0]           step;
+    logic signed [2:0][26:0]   scale_low;   // fixed point, 20 fraction bits
+    logic signed [2:0][26:0]   scale_step;
+    colour_t [2:0]             dc_low;
+    colour_t [2:0]             dc_step;
+    colour_t [2:0][2:0]        sh_step;     // by degree, channel
+  } header_t;
+
+  // Four neighbouring Gaussians of a cluster, as they lie in the image.
+  typedef struct packed {
+    kept_t                cluster;
+    header_t              header;
+    logic                 first;  // of its cluster
+    logic                 last;
+    logic [5:0]           group;  // number in the cluster: Gaussians 4 group to 4 group + 3
+    logic [3:0]           used;   // which of them exist
+    logic [3:0][4:0][31:0] word;  // geometry: three words of a chunk (0 to 2), or five of FP16
+  } group_t;
+
+  // Where a survivor's record goes: beat and quarter of a ring of beats that are being put together.
+  typedef struct packed {
+    logic [PLACE_BEAT_BITS-1:0] beat;
+    logic [1:0]                 quarter;
+  } place_t;
+
+  // A splat to be listed.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;  // of its record
+    logic [23:0]            key;
+    logic                   empty;   // in no tile
+    logic signed [36:0]     x;       // mean, 1/128 pixel
+    logic signed [36:0]     y;
+    logic [11:0]            x0;      // bounds, pixels
+    logic [11:0]            x1;
+    logic [11:0]            y0;
+    logic [11:0]            y1;
+    logic signed [35:0]     right;   // see flk_splat_band
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+    shape_t                 limit;
+  } listed_t;
+
+  // An entry of a tile's list.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [7:0]             row;     // of the tile
+    logic [7:0]             column;
+    logic [23:0]            key;
+    logic [NUMBER_BITS-1:0] number;
+    logic [3:0]             mask;    // bit 2 y + x of its sub-tiles
+  } entry_t;
+
+  // A beat of records: where it goes and which quarters come.
+  typedef struct packed {
+    logic [BEAT_BITS-1:0] beat;
+    logic [3:0]           quarters;
+  } record_beat_t;
+
+endpackage
