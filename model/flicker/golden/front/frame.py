@@ -39,17 +39,17 @@ class ListKind(str, Enum):
 
 
 class Outcome:
-    """What became of a Gaussian, in the order of the tests."""
+    """What became of a Gaussian, in the order of the tests. The last three leave a record; faint ones and those that miss all pixels are in no list."""
 
-    CULLED, NEAR, OUTSIDE, FAINT, MISSED, RECORDED = range(6)
+    CULLED, NEAR, OUTSIDE, FAINT, MISSED, LISTED = range(6)
 
 
 OUTCOMES = {
     Outcome.CULLED: "in a culled cluster", Outcome.NEAR: "nearer than 0.2", Outcome.OUTSIDE: "3-sigma box outside the picture",
-    Outcome.FAINT: "opacity below 1/510", Outcome.MISSED: "ellipse holds no pixel", Outcome.RECORDED: "recorded",
+    Outcome.FAINT: "opacity below 1/510", Outcome.MISSED: "ellipse holds no pixel", Outcome.LISTED: "listed",
 }
 
-Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_RECORDED = range(1, 6)  # for numba
+Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_LISTED = range(1, 6)  # for numba
 
 # What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
 # quaternion, or (largest, three codes).
@@ -193,16 +193,10 @@ def _splats(
             outcome[j] = Outcome_OUTSIDE
             continue
         code = opacity_code(lanes.chunked, lanes.opacity[i], S)
-        if code == 0:
-            outcome[j] = Outcome_FAINT
-            continue
         steady = steady_one(p, inverse, S)
         r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S)
-        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none)
-        if count == 0:
-            outcome[j] = Outcome_MISSED
-            continue
-        outcome[j] = Outcome_RECORDED
+        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none) if code > 0 else 0
+        outcome[j] = Outcome_LISTED if count > 0 else (Outcome_MISSED if code > 0 else Outcome_FAINT)
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
@@ -247,7 +241,7 @@ def _entries(start, places, numbers, box, cols, S, tile, mask):
 class FrontFrame:
     """What the front end leaves, in record order (R records, E list entries).
 
-    gaussian: int64 (R,), Gaussians of the packed scene. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
+    gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
     records: uint8 (R, bytes).
     key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
@@ -333,7 +327,7 @@ def run_front(
         index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, culled.key_low, P, S, C,
         outcome, key, words, halves, entries, flags, places, numbers,
     )
-    kept = np.flatnonzero(outcome == Outcome.RECORDED)
+    kept = np.flatnonzero(outcome >= Outcome.FAINT)
     gaussian = index[kept]
     start = np.concatenate([[0], np.cumsum(entries[kept])])
     tile, mask = np.empty(start[-1], np.int32), np.empty(start[-1], np.uint8)
