@@ -158,6 +158,7 @@ def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_
         x0, x1 = splat.pixels(p.x, p.radius_x, width)
         y0, y1 = splat.pixels(p.y, p.radius_y, height)
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4] = p.near, x0 > x1 or y0 > y1, p.x, p.y, p.spiky
+        places[j, 6] = p.far
         places[j, 5] = frame.depth_key(p.t2, shift, key_low, M)
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
@@ -166,9 +167,9 @@ def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_
 
 def projected(s: Sample, low, step, q, scales, quat) -> tuple[np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
-    out, places = np.zeros((len(q), 11)), np.zeros((len(q), 6), np.int64)
+    out, places = np.zeros((len(q), 11)), np.zeros((len(q), 7), np.int64)
     _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.limit, t.width, t.height, splat.constants(FORMATS),
-               inverse, s.culled.key_shift, s.culled.key_low, P, S, C, out, places)
+               inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places)
     return out, places
 
 
@@ -192,12 +193,12 @@ def test_projection() -> None:
     for name in ("row_x", "row_x_z", "row_y", "row_y_z"):
         registers |= {f"{name}_{k}": getattr(t, name)[k] for k in range(3)}
     registers |= {f"limit_{k}": t.limit[k] for k in range(2)}
-    registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": s.culled.key_low}
+    registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": ff_round(s.culled.nearest, P)}
     low, step, q, scales, quat = inputs
     got = bench("flk_projection")(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},
     )
-    want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key"))}
+    want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key", "far"))}
     want |= {name: out[:, k] for k, name in enumerate(("sx", "sy", "l0", "l1", "l2", "i0", "kappa", "lean"))} | of("direction", out[:, 8:])
     near = places[:, 0] == 1
     assert near.any() and not near.all() and places[~near, 1].any() and not places[~near, 1].all()
@@ -235,7 +236,7 @@ def test_splat_bounds(box: bool) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(4)
     out, places = seen(s)
     n = 500
-    x, y = (np.concatenate([places[:, k], rng.integers(-(1 << 36), 1 << 36, n)]) for k in (2, 3))
+    x, y = (np.concatenate([places[:, k], rng.integers(-(1 << 29), 1 << 29, n)]) for k in (2, 3))
     sx, sy = (np.concatenate([out[:, k], np.abs(wild(rng, n, S))]) for k in (0, 1))
     lean = np.concatenate([out[:, 7], wild(rng, n, S)])
     code = rng.integers(1, 256, len(x))

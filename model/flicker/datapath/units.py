@@ -13,11 +13,12 @@ import numpy as np
 
 from ..arithmetic.ff import ff_add, ff_mul, ff_round, ff_sub
 from ..golden.front import cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, KEY_FIELD, MAX_PICTURE, FrontFormats
+from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
 from ..params import SUBTILE
 from .graph import BOOL, Ff, Graph, Int, Value, retrace
 
-MEAN = Int(-(1 << 36), (1 << 36) - 1)  # what `project_one` may give
+MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
+REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
 SCALE_HEADER = Int(-(1 << 26), (1 << 26) - 1)  # low end and step of log2 scales
 BANDS = MAX_PICTURE // SUBTILE
@@ -117,7 +118,7 @@ def projection(formats: FrontFormats) -> Graph:
     rows = [g.inputs(n, Ff(S), (3,), register=True) for n in ("row_x", "row_x_z", "row_y", "row_y_z")]
     limit = g.inputs("limit", Ff(S), (2,), register=True)
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
-    shift, key_low = g.input("key_shift", Int(-128, KEY_FIELD), True), g.input("key_low", Int(0, (1 << KEY_FIELD) - 1), True)
+    shift, key_low = g.input("key_shift", Int(-128, MAX_KEY_SHIFT), True), g.input("key_low", Ff(P), True)
     const = splat.constants(formats).tolist()
     p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S)
     _name(p)
@@ -127,7 +128,7 @@ def projection(formats: FrontFormats) -> Graph:
     _name(steady)
     g.output("near", p.near)
     g.output("outside", (x0 > x1) | (y0 > y1))
-    for name in ("x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
+    for name in ("far", "x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
         g.output(name, getattr(p, name))
     for name, value in steady._asdict().items():
         g.output(name, value)
@@ -160,7 +161,7 @@ def band(formats: FrontFormats) -> Graph:
     """Sub-tiles of a band that a splat enters."""
     g, S = Graph(), formats.shape
     number, box = g.input("band", Int(0, BANDS - 1)), g.input("box", BOOL, register=True)
-    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", MEAN)
+    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", REACH)
     pixel = Int(0, MAX_PICTURE - 1)
     x0, x1, y0, y1 = (g.input(n, pixel) for n in ("x0", "x1", "y0", "y1"))
     l2, i0, kappa, limit = (g.input(n, Ff(S)) for n in ("l2", "i0", "kappa", "limit"))
