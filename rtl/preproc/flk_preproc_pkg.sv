@@ -75,13 +75,13 @@ package flk_preproc_pkg;
     logic [NUMBER_BITS-1:0] number;  // of its record
     logic [23:0]            key;
     logic                   empty;   // in no tile
-    logic signed [36:0]     x;       // mean, 1/128 pixel
-    logic signed [36:0]     y;
+    logic signed [30:0]     x;       // mean, 1/128 pixel
+    logic signed [30:0]     y;
     logic [11:0]            x0;      // bounds, pixels
     logic [11:0]            x1;
     logic [11:0]            y0;
     logic [11:0]            y1;
-    logic signed [35:0]     right;   // see flk_splat_band
+    logic signed [29:0]     right;   // see flk_splat_band
     shape_t                 l2;
     shape_t                 i0;
     shape_t                 kappa;

@@ -239,13 +239,17 @@ def test_splat_bounds(box: bool) -> None:
     x, y = (np.concatenate([places[:, k], rng.integers(-(1 << 29), 1 << 29, n)]) for k in (2, 3))
     sx, sy = (np.concatenate([out[:, k], np.abs(wild(rng, n, S))]) for k in (0, 1))
     lean = np.concatenate([out[:, 7], wild(rng, n, S)])
-    code = rng.integers(1, 256, len(x))
+    chunked = not box
+    raw = rng.integers(1, 256, len(x)) if chunked else rng.uniform(0, 1, len(x)).astype(np.float16).view(np.uint16).astype(np.int64)
+    code = raw if chunked else np.array([frame.opacity_code(False, v, S) for v in raw.astype(np.uint16).view(np.float16).astype(np.float64)])
     want, limit = bounded(s, box, x, y, sx, sy, lean, code)
-    got = bench("flk_splat_bounds")({"box": box, "width": s.setup.width, "height": s.setup.height}, x=x, y=y, sx=sx, sy=sy, lean=lean, code=code)
+    registers = {"chunked": chunked, "box": box, "width": s.setup.width, "height": s.setup.height}
+    got = bench("flk_splat_bounds")(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, opacity=raw)
+    assert np.array_equal(got["code"], code)
     empty = want[:, 0] == 1
     assert empty.any() and not empty.all()
     assert np.array_equal(got["empty"], want[:, 0])
-    named = {name: want[:, 1 + k] for k, name in enumerate(("x0", "x1", "y0", "y1", "right"))} | {"limit": limit, "empty": want[:, 0]}
+    named = {name: want[:, 1 + k] for k, name in enumerate(("x0", "x1", "y0", "y1", "right"))} | {"limit": limit, "empty": want[:, 0], "code": code}
     same(got, named, ~empty)
 
 
@@ -282,28 +286,18 @@ def test_splat_band(box: bool) -> None:
 
 
 @numba.njit
-def _basis(d, dc, low, step, k, M, out):
+def _basis(d, k, M, out):
     for j in range(len(d)):
         splat.basis_functions(d[j, 0], d[j, 1], d[j, 2], k, 3, out[j], M)
-        for c in range(3):
-            out[j, 16 + c] = ff_add(low[j, c], ff_mul(step[j, c], ff_round(dc[j, c], M), M), M)
 
 
-@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16])
-def test_colour_basis(form: PackedFormat) -> None:
-    s, rng = demo(form), random(6)
+def test_colour_basis() -> None:
+    s, rng = demo(PackedFormat.CHUNK), random(6)
     d = np.concatenate([seen(s)[0][:, 8:], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
-    n = len(d)
-    factors = splat.colour_constants(FORMATS)
-    chunked = form is PackedFormat.CHUNK
-    rows = rng.integers(0, len(s.values.dc_low), n)
-    raw = rng.integers(0, 256, (n, 3)) if chunked else rng.normal(size=(n, 3)).astype(np.float16).view(np.uint16).astype(np.int64)
-    dc = raw.astype(np.float64) if chunked else raw.astype(np.uint16).view(np.float16).astype(np.float64)
-    low, step = s.values.dc_low[rows], s.values.dc_step[rows]
-    out = np.zeros((n, 19))
-    _basis(d, dc, low if chunked else np.full((n, 3), 0.5), step if chunked else np.full((n, 3), factors[0]), factors, C, out)
-    got = bench("flk_colour_basis")({"chunked": chunked}, **of("direction", d), **of("dc", raw), **of("dc_low", low), **of("dc_step", step))
-    same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)} | of("constant", out[:, 16:]))
+    out = np.zeros((len(d), 16))
+    _basis(d, splat.colour_constants(FORMATS), C, out)
+    got = bench("flk_colour_basis")({}, **of("direction", d))
+    same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)})
 
 
 @numba.njit
@@ -333,10 +327,22 @@ def test_colour_group(chunked: bool) -> None:
         coefficient[place] = (ff_mul(step[place], exact, C) if chunked else exact) if used[place[:2]] else 0.0
     want = np.zeros((n, 3))
     _groups(basis, coefficient, C, want)
+    factors = splat.colour_constants(FORMATS)
+    rows = rng.integers(0, len(demo(PackedFormat.CHUNK).values.dc_low), n)
+    dc_low, dc_step = demo(PackedFormat.CHUNK).values.dc_low[rows], demo(PackedFormat.CHUNK).values.dc_step[rows]
+    dc = rng.integers(0, 256, (n, 3)) if chunked else rng.normal(size=(n, 3)).astype(np.float16).view(np.uint16).astype(np.int64)
+    number = dc.astype(np.float64) if chunked else dc.astype(np.uint16).view(np.float16).astype(np.float64)
+    constant = np.zeros((n, 3))
+    for j, c in np.ndindex(n, 3):
+        a, b = (dc_low[j, c], dc_step[j, c]) if chunked else (0.5, factors[0])
+        constant[j, c] = ff_add(a, ff_mul(b, ff_round(float(number[j, c]), C), C), C)
     raws = {f"raw_{k}{c}": raw[:, k, c] for k in range(4) for c in range(3)}
     steps = {f"step_{k}{c}": step[:, k, c] for k in range(4) for c in range(3)}
-    got = bench("flk_colour_group")({"chunked": chunked}, **of("basis", basis), **raws, **steps, **of("used", used.astype(np.int64)), zero=zero)
-    same(got, of("sum", want))
+    got = bench("flk_colour_group")(
+        {"chunked": chunked}, **of("basis", basis), **raws, **steps, **of("used", used.astype(np.int64)), zero=zero, **of("dc", dc),
+        **of("dc_low", dc_low), **of("dc_step", dc_step),
+    )
+    same(got, of("sum", want) | of("constant", constant))
 
 
 def test_colour_total() -> None:

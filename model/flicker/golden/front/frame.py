@@ -148,11 +148,17 @@ def depth_key(depth, shift, low, M):
 
 
 @numba.njit
+def fp16_opacity(opacity, M):
+    """Code of an opacity, an ff number."""
+    return min(ff_to_fixed_round(ff_mul(255.0, opacity, M), 0, 16), OPACITY_LIMIT)
+
+
+@numba.njit
 def opacity_code(chunked, opacity, M):
     """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself."""
     if chunked:
         return np.int64(opacity)
-    return min(ff_to_fixed_round(ff_mul(255.0, ff_round(opacity, M), M), 0, 16), OPACITY_LIMIT)
+    return fp16_opacity(ff_round(opacity, M), M)
 
 
 @numba.njit
