@@ -645,7 +645,7 @@ module flk_colour_group (
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_sum_2 (.clk_i, .en_i, .a_i(v169), .b_i(v170), .sum_o(u_sum_2));
   assign sum_2 = u_sum_2;
   assign v172 = dc_0_i[7:0];
-  assign v173 = v172;
+  assign v173 = 9'(v172);
   flk_ff_from_fixed #(.Bits(9), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v174 (.clk_i, .en_i, .x_i(v173), .y_o(u_v174));
   assign v174 = u_v174;
   flk_ff_from_fp16 #(.ManBits(11)) i_v175 (.x_i(dc_0_i_q[0]), .y_o(v175));
@@ -657,7 +657,7 @@ module flk_colour_group (
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_constant_0 (.clk_i, .en_i, .a_i(v177_q[4]), .b_i(v179), .sum_o(u_constant_0));
   assign constant_0 = u_constant_0;
   assign v181 = dc_1_i[7:0];
-  assign v182 = v181;
+  assign v182 = 9'(v181);
   flk_ff_from_fixed #(.Bits(9), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v183 (.clk_i, .en_i, .x_i(v182), .y_o(u_v183));
   assign v183 = u_v183;
   flk_ff_from_fp16 #(.ManBits(11)) i_v184 (.x_i(dc_1_i_q[0]), .y_o(v184));
@@ -669,7 +669,7 @@ module flk_colour_group (
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_constant_1 (.clk_i, .en_i, .a_i(v186_q[4]), .b_i(v188), .sum_o(u_constant_1));
   assign constant_1 = u_constant_1;
   assign v190 = dc_2_i[7:0];
-  assign v191 = v190;
+  assign v191 = 9'(v190);
   flk_ff_from_fixed #(.Bits(9), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v192 (.clk_i, .en_i, .x_i(v191), .y_o(u_v192));
   assign v192 = u_v192;
   flk_ff_from_fp16 #(.ManBits(11)) i_v193 (.x_i(dc_2_i_q[0]), .y_o(v193));

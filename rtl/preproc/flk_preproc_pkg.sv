@@ -63,11 +63,65 @@ package flk_preproc_pkg;
     logic [3:0][4:0][31:0] word;  // geometry: three words of a chunk (0 to 2), or five of FP16
   } group_t;
 
+  // Clusters whose colours may be under way, and what the lanes take of their headers for colours.
+  localparam int unsigned CLUSTER_BITS = 4;  // of a running number, modulo
+  localparam int unsigned COLOUR_CLUSTERS = 8;
+  typedef logic [CLUSTER_BITS-1:0] cluster_index_t;
+
+  typedef struct packed {
+    logic [8:0]         sh_zero;
+    colour_t [2:0]      dc_low;
+    colour_t [2:0]      dc_step;
+    colour_t [2:0][2:0] sh_step;  // by degree, channel
+  } colour_header_t;
+
+  // Survivors of a group, for their colours.
+  typedef struct packed {
+    cluster_index_t cluster;
+    logic [31:0]    colour;  // first beat of the cluster's colours, from the colour array's first
+    logic [1:0]     degree;
+    logic [5:0]     group;
+    logic [3:0]     alive;
+  } survivors_t;
+
+  // Part of a Gaussian's colour: the constant part and opacity with the first, up to four coefficients. Codes of a chunk, or FP16.
+  typedef struct packed {
+    cluster_index_t          cluster;
+    logic                    first;
+    logic                    last;
+    logic [1:0]              part;
+    logic [3:0]              used;     // coefficients that exist
+    logic [15:0]             opacity;
+    logic [2:0][15:0]        dc;
+    logic [3:0][2:0][15:0]   raw;      // by coefficient, channel
+  } colour_part_t;
+
   // Where a survivor's record goes: beat and quarter of a ring of beats that are being put together.
   typedef struct packed {
     logic [PLACE_BEAT_BITS-1:0] beat;
     logic [1:0]                 quarter;
   } place_t;
+
+  // What waits for a survivor's colours.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;
+    place_t                 place;
+    logic [23:0]            key;
+    logic                   clipped;  // the mean was saturated
+    logic                   spiky;
+    logic signed [30:0]     x;
+    logic signed [30:0]     y;
+    shape_t                 sx;
+    shape_t                 sy;
+    shape_t                 l0;
+    shape_t                 l1;
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+    shape_t                 lean;
+    colour_t [2:0]          direction;
+  } waiting_t;
 
   // A splat to be listed.
   typedef struct packed {

@@ -86,10 +86,8 @@ module flk_splat_band (
   logic signed [23:0] v52;  // cycle 21
   logic signed [23:0] v53;  // cycle 22
   logic empty;  // cycle 25
-  logic [11:0] v55;  // cycle 25
   logic [8:0] first;  // cycle 25
-  logic [11:0] v57;  // cycle 23
-  logic [8:0] last;  // cycle 23
+  logic [8:0] last;  // cycle 25
   logic [19:0][30:0] x_i_q;
   logic [1:0][30:0] y_i_q;
   logic [1:0][29:0] right_i_q;
@@ -122,7 +120,7 @@ module flk_splat_band (
   logic [2:0][23:0] v53_q;
   logic [0:0][0:0] empty_q;
   logic [0:0][8:0] first_q;
-  logic [2:0][8:0] last_q;
+  logic [0:0][8:0] last_q;
 
   always_ff @(posedge clk_i) begin
     if (en_i) begin
@@ -158,7 +156,7 @@ module flk_splat_band (
       v53_q <= {v53_q[1:0], v53};
       empty_q <= empty;
       first_q <= first;
-      last_q <= {last_q[1:0], last};
+      last_q <= last;
     end
   end
 
@@ -222,13 +220,11 @@ module flk_splat_band (
   assign v52 = 24'($signed(25'(x1_i_q[20])) < v51 ? $signed(25'(x1_i_q[20])) : v51);
   assign v53 = box_i ? $signed(24'(x1_i_q[21])) : $signed(v52_q[0]);
   assign empty = $signed(25'(v50_q[0])) > 25'($signed(v53_q[2]));
-  assign v55 = 12'(v50_q[0]);
-  assign first = v55[11:3];
-  assign v57 = 12'($signed(v53_q[0]));
-  assign last = v57[11:3];
+  assign first = 9'(9'(v50_q[0] >>> 3));
+  assign last = 9'(9'($signed(v53_q[2]) >>> 3));
 
   assign empty_o = empty_q[0];
   assign first_o = first_q[0];
-  assign last_o = last_q[2];
+  assign last_o = last_q[0];
 
 endmodule

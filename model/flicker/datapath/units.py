@@ -150,16 +150,16 @@ def bounds(formats: FrontFormats) -> Graph:
     tables = [g.table(n, t, S) for n, t in (("log", logs), ("sigmas", sigmas), ("cut", cut))]
     zero = g.number(0.0, S)
     # The sign is that of an opacity: positive.
-    half = g.wire("32'({0}) & 32'h7fff", HALF, (opacity,))
+    half = g.wire("{0} & 16'h7fff", HALF, (opacity,))
     code = g.pick(chunked, g.slice(opacity, 0, 8), retrace(frame.fp16_opacity)(g.from_fp16(half, S), S))
-    code.name = "code"
+    code = g.wire("8'({0})", Int(0, 255), (code,))
     r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S)
     g.output("empty", (r.x0 > r.x1) | (r.y0 > r.y1))
     for name in ("x0", "x1", "y0", "y1"):  # in the picture, if it is not empty
         g.output(name, _bits(g, getattr(r, name)))
     g.output("limit", r.limit)
     g.output("right", r.right)
-    g.output("code", g.wire("8'({0})", Int(0, 255), (code,)))
+    g.output("code", code)
     return g
 
 
@@ -175,8 +175,8 @@ def band(formats: FrontFormats) -> Graph:
     a, b = retrace(reach.band_columns)(number, box, x, y, l2, r, S)
     g.output("empty", a > b)
     # A band that is not empty begins and ends in the picture.
-    g.output("first", g.slice(_bits(g, a), 3, 9))
-    g.output("last", g.slice(_bits(g, b), 3, 9))
+    for name, column in (("first", a), ("last", b)):
+        g.output(name, g.wire("9'({0} >>> 3)", Int(0, 511), (column,)))
     return g
 
 
