@@ -41,6 +41,7 @@ common/flk_lzc.sv
 common/flk_pipe_reg.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
+common/flk_sram_fifo.sv
 common/flk_stream_arbiter.sv
 common/flk_weight.sv
 ctu/flk_ctu.sv
@@ -65,9 +66,12 @@ preproc/flk_cluster_test.sv
 preproc/flk_colour_basis.sv
 preproc/flk_colour_group.sv
 preproc/flk_colour_total.sv
+preproc/flk_entry_merge.sv
 preproc/flk_geometry_decode.sv
 preproc/flk_list_writer.sv
 preproc/flk_projection.sv
+preproc/flk_record_writer.sv
 preproc/flk_splat_band.sv
 preproc/flk_splat_bounds.sv
+preproc/flk_tile_walker.sv
 flk_render_stage.sv
