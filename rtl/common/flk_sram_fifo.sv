@@ -27,7 +27,7 @@ module flk_sram_fifo #(
     $error("flk_sram_fifo: Width must be at least 1, Depth at least 2");
   end
 
-  localparam int unsigned AddrBits = $clog2(Depth);
+  localparam int unsigned AddrBits = Depth > 1 ? $clog2(Depth) : 1;
   localparam logic [AddrBits-1:0] LAST = AddrBits'(Depth - 1);
 
   logic [AddrBits-1:0]  write_q, read_q;

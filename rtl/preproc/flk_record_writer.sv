@@ -7,7 +7,7 @@
 // Who assigns places counts freed_o (a beat's place is free again, one a cycle) and keeps at most
 // 2^PLACE_BEAT_BITS beats assigned that were not freed: a record is never refused for its place.
 // Throughput: a record a cycle and quarter, lanes that want the same in turn; a line a cycle. A line
-// stands at the output two cycles after its last record was taken.
+// stands at the output two cycles after its last record was taken, three after its beat.
 // in_ready_o depends combinationally on in_valid_i and in_place_i; no other path.
 module flk_record_writer
   import flk_preproc_pkg::*;
