@@ -1,4 +1,4 @@
-"""Merge of the lanes' entries: every bank's entries in the order of the scene, whatever the lanes' and banks' timing; the end, once; frames one after the other.
+"""Merge of the lanes' entries: every bank's entries in the order of the scene, whatever the timing; the end, once; frames one after the other.
 
 State space: splats with and without entries, of any lane; sequence numbers that run around, half of their range apart; progress seen at once and late; idle
 and back-pressure patterns, different ones for each lane and bank; reset in a frame. Parameter space: queues of 2 and 4.
