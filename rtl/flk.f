@@ -68,12 +68,15 @@ preproc/flk_colour_basis.sv
 preproc/flk_colour_fetch.sv
 preproc/flk_colour_group.sv
 preproc/flk_colour_total.sv
+preproc/flk_entry_merge.sv
 preproc/flk_geometry_decode.sv
 preproc/flk_list_writer.sv
 preproc/flk_mean_field.sv
 preproc/flk_preprocessing_core.sv
 preproc/flk_projection.sv
+preproc/flk_record_writer.sv
 preproc/flk_shape_field.sv
 preproc/flk_splat_band.sv
 preproc/flk_splat_bounds.sv
+preproc/flk_tile_walker.sv
 flk_render_stage.sv

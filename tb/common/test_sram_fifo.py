@@ -1,0 +1,19 @@
+"""Queue in a memory: order, loss and duplication under idle and back-pressure patterns, capacity, latency and rate, reset in traffic.
+
+Parameter space: depths 2, one that is no power of two, 32; the memory inverts what is read beside a write of the same word.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test, refused
+
+
+@pytest.mark.parametrize(("width", "depth"), [(1, 2), (79, 5), (8, 32)])
+def test_sram_fifo(width: int, depth: int) -> None:
+    build_and_test("flk_sram_fifo", "cocotb_sram_fifo", parameters={"Width": width, "Depth": depth}, config={"width": width, "depth": depth}, inner=False)
+
+
+def test_illegal_parameters() -> None:
+    with refused("Depth at least 2"):
+        build_and_test("flk_sram_fifo", "cocotb_sram_fifo", parameters={"Depth": 1})
