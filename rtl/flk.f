@@ -62,6 +62,7 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv
 preproc/flk_colour_basis.sv
@@ -70,8 +71,10 @@ preproc/flk_colour_group.sv
 preproc/flk_colour_total.sv
 preproc/flk_entry_merge.sv
 preproc/flk_geometry_decode.sv
+preproc/flk_geometry_fetch.sv
 preproc/flk_list_writer.sv
 preproc/flk_mean_field.sv
+preproc/flk_preprocessing.sv
 preproc/flk_preprocessing_core.sv
 preproc/flk_projection.sv
 preproc/flk_record_writer.sv

@@ -158,4 +158,51 @@ package flk_preproc_pkg;
     logic [3:0]           quarters;
   } record_beat_t;
 
+  // Registers of a frame.
+  typedef struct packed {
+    cull_setup_t          cull;
+    lane_setup_t          lane;
+    logic [BEAT_BITS-1:0] table_beat;     // where the image's parts begin
+    logic [BEAT_BITS-1:0] headers_beat;
+    logic [BEAT_BITS-1:0] geometry_beat;
+    logic [BEAT_BITS-1:0] colours_beat;
+    logic [23:0]          clusters;
+    logic [BEAT_BITS-1:0] records_beat;   // where records go, and how many beats there are
+    logic [22:0]          record_beats;
+    logic [BEAT_BITS-1:0] lists_beat;     // where lists go, and the chunks of each writer
+    logic [24:0]          chunks;
+    logic [BEAT_BITS-1:0] pointers_beat;  // where pointers go, and lines of each writer
+    logic [10:0]          pointer_lines;
+    logic [7:0]           list_columns;   // of a writer
+  } front_registers_t;
+
+  // Why a frame failed: bits.
+  localparam int unsigned FRONT_ERROR_READ = 0;     // the memory answered a read with an error
+  localparam int unsigned FRONT_ERROR_WRITE = 1;    // or a write
+  localparam int unsigned FRONT_ERROR_RECORDS = 2;  // a cluster's slots lie beyond the records' region
+  localparam int unsigned FRONT_ERROR_LISTS = 3;    // a list writer needed a chunk more than it has
+
+  typedef struct packed {
+    logic [31:0]       cycles;
+    logic [31:0]       culled_clusters;
+    logic [31:0]       culled_gaussians;
+    logic [31:0]       too_near;        // Gaussians
+    logic [31:0]       outside;
+    logic [31:0]       survivors;
+    logic [31:0]       faint;           // of the survivors
+    logic [31:0]       unlisted;
+    logic [31:0]       saturated;
+    logic [31:0]       clipped;
+    logic [31:0]       header_beats;
+    logic [31:0]       geometry_beats;
+    logic [31:0]       colour_beats;
+    logic [31:0]       record_beats;
+    logic [3:0][31:0]  entries;         // by list writer
+    logic [3:0][31:0]  lines;
+    logic [3:0][31:0]  evicted;
+    logic [3:0][24:0]  taken;           // chunks
+    logic signed [7:0] key_shift;
+    position_t         key_low;
+  } front_counters_t;
+
 endpackage

@@ -23,6 +23,7 @@ from flicker.arithmetic.ff import ff_bits, ff_round
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import frame, reach
 from flicker.golden.front.setup import FORMATS
+from flicker.golden.front.splat import MEAN_BITS
 from flicker.scene.camera import Camera
 from flicker.scene.packed import PackedFormat, PackedScene
 from flicker.scene.packing import pack
@@ -31,8 +32,9 @@ from flicker.toolchain import verilate
 HERE = Path(__file__).parent
 S = FORMATS.shape
 # listed_t and entry_t of flk_preproc_pkg, first field highest.
-LISTED = (("seq", 12), ("number", 24), ("key", 24), ("empty", 1), ("x", 37), ("y", 37), ("x0", 12), ("x1", 12), ("y0", 12), ("y1", 12), ("right", 36),
-          ("l2", 22), ("i0", 22), ("kappa", 22), ("limit", 22))
+MEAN = MEAN_BITS + 1
+LISTED = (("seq", 12), ("number", 24), ("key", 24), ("empty", 1), ("x", MEAN), ("y", MEAN), ("x0", 12), ("x1", 12), ("y0", 12), ("y1", 12),
+          ("right", MEAN_BITS), ("l2", 9 + S), ("i0", 9 + S), ("kappa", 9 + S), ("limit", 9 + S))
 ENTRY = (("seq", 12), ("row", 8), ("column", 8), ("key", 24), ("number", 24), ("mask", 4))
 BITS = sum(b for _, b in LISTED)
 IN_WORDS, OUT_WORDS = -(-BITS // 32), 3
