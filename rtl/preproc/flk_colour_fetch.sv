@@ -250,53 +250,39 @@ module flk_colour_fetch
 
   assign beat_move = beat_valid && beat_ready;
 
-  // ---- window ---------------------------------------------------------------------------------------
+  // ---- the beat that all lanes see --------------------------------------------------------------------
 
-  logic                  w0_valid_d, w0_valid_q, w1_valid_d, w1_valid_q, advance, stale;
-  mark_t                 w0_q, w1_q;
-  logic [1:0][Width-1:0] window_q;
-  logic [LANES-1:0]      lane_empty, lane_past;  // nothing known; needs nothing of the first beat
+  // It goes on when the next one is there and no lane needs it (any more). The next one is asked for
+  // only after all Gaussians that begin in this one have been told to their lanes.
+  logic             seen_valid_d, seen_valid_q, advance, stale;
+  mark_t            seen_q;
+  logic [Width-1:0] seen_data_q;
+  logic [LANES-1:0] lane_empty, lane_served;  // no Gaussian waits; the beat is taken or not needed
 
-  // A cluster's last beats go when all has been taken of them and another cluster's groups come.
-  assign stale      = w0_valid_q && w0_q.cluster != exit_i && (&lane_empty) && !a_valid_q;
-  assign advance    = w0_valid_q && w1_valid_q && (&lane_past);
-  assign beat_ready = !stale && (!w0_valid_q || !w1_valid_q || advance);
+  // A cluster's last beat goes when all has been taken of it and another cluster's groups come.
+  assign stale      = seen_valid_q && seen_q.cluster != exit_i && (&lane_empty) && !a_valid_q;
+  assign advance    = seen_valid_q && beat_valid && (&lane_served);
+  assign beat_ready = !stale && (!seen_valid_q || advance);
 
   always_comb begin
-    w0_valid_d = w0_valid_q;
-    w1_valid_d = w1_valid_q;
-    if (!w0_valid_q) begin
-      w0_valid_d = beat_valid;
-    end else if (!w1_valid_q || advance) begin
-      w1_valid_d = beat_valid;
-    end
+    seen_valid_d = seen_valid_q || beat_valid;
     if (start_i || stale) begin
-      w0_valid_d = 1'b0;
-      w1_valid_d = 1'b0;
+      seen_valid_d = 1'b0;
     end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      w0_valid_q <= 1'b0;
-      w1_valid_q <= 1'b0;
+      seen_valid_q <= 1'b0;
     end else begin
-      w0_valid_q <= w0_valid_d;
-      w1_valid_q <= w1_valid_d;
+      seen_valid_q <= seen_valid_d;
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (!w0_valid_q) begin
-      w0_q        <= beat_mark;
-      window_q[0] <= beat_data;
-    end else if (advance) begin
-      w0_q        <= w1_q;
-      window_q[0] <= window_q[1];
-    end
-    if (w0_valid_q && (!w1_valid_q || advance)) begin
-      w1_q        <= beat_mark;
-      window_q[1] <= beat_data;
+    if (beat_move) begin
+      seen_q      <= beat_mark;
+      seen_data_q <= beat_data;
     end
   end
 
@@ -307,6 +293,9 @@ module flk_colour_fetch
     logic [1:0]           degree;
     logic [BYTE_BITS-1:0] start;
   } item_t;
+
+  logic           [LANES-1:0] lane_busy;
+  cluster_index_t [LANES-1:0] lane_cluster;  // of the oldest that is not given yet
 
   for (genvar k = 0; k < LANES; k++) begin : gen_lanes
     logic  item_valid, item_ready, item_empty;
@@ -334,7 +323,7 @@ module flk_colour_fetch
     cluster_index_t       cluster_d, cluster_q;
     logic [1:0]           degree_d, degree_q, part_d, part_q;
     logic [BYTE_BITS-1:0] from_d, from_q, end_d, end_q;  // first byte of the part, last of the Gaussian
-    logic                 more, fire, here, straddles, final_part;
+    logic                 more, fire, straddles, final_part;
     logic [BYTE_BITS-1:0] reach;
     logic [AT_BITS-1:0]   last_beat;
 
@@ -382,12 +371,93 @@ module flk_colour_fetch
     assign reach     = from_q + (chunked_i ? BYTE_BITS'(15) : BYTE_BITS'(31));
     assign last_beat = reach < end_q ? reach[BYTE_BITS-1:6] : end_q[BYTE_BITS-1:6];
     assign straddles = last_beat != from_q[BYTE_BITS-1:6];
-    assign here      = w0_valid_q && {cluster_q, from_q[BYTE_BITS-1:6]} == w0_q;
-    assign fire      = want_q && here && (!straddles || w1_valid_q) &&
-                       (!out_valid_o[k] || out_ready_i[k]);
+    assign fire      = want_q && l0_valid_q && l0_q == {cluster_q, from_q[BYTE_BITS-1:6]} &&
+                       (!straddles || l1_valid_q) && (!out_valid_o[k] || out_ready_i[k]);
 
-    assign lane_empty[k] = item_empty && !want_q;
-    assign lane_past[k]  = want_q ? !here : item_empty;
+    // Two beats of the lane's own: the one in which the part begins, and the next that is needed.
+
+    logic                  l0_valid_d, l0_valid_q, l1_valid_d, l1_valid_q;
+    mark_t                 l0_q, l1_q, wanted;
+    logic [1:0][Width-1:0] window_q;
+    logic                  needed, passed, shift, take, has, drop;
+    logic [AT_BITS-1:0]    item_last;
+
+    function automatic logic later(input cluster_index_t a, input cluster_index_t b);
+      return a != b && CLUSTER_BITS'(a - b) <= CLUSTER_BITS'(COLOUR_CLUSTERS);
+    endfunction
+
+    // Whether the beat that all see is needed by the Gaussian in work or the next, or by none that is known.
+    assign item_last = AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1) >> 6);
+
+    always_comb begin
+      needed = 1'b0;
+      passed = 1'b0;
+      if (!want_q) begin
+        passed = item_empty;
+      end else if (later(cluster_q, seen_q.cluster) ||
+                   (cluster_q == seen_q.cluster && seen_q.at < from_q[BYTE_BITS-1:6])) begin
+        passed = 1'b1;
+      end else if (cluster_q == seen_q.cluster && seen_q.at <= end_q[BYTE_BITS-1:6]) begin
+        needed = 1'b1;
+      end else if (!item_valid) begin
+        passed = item_empty;
+      end else if (later(item.cluster, seen_q.cluster) ||
+                   (item.cluster == seen_q.cluster && seen_q.at < item.start[BYTE_BITS-1:6])) begin
+        passed = 1'b1;
+      end else begin
+        needed = item.cluster == seen_q.cluster && seen_q.at <= item_last;
+      end
+    end
+
+    assign has            = (l0_valid_q && l0_q == seen_q) || (l1_valid_q && l1_q == seen_q);
+    assign take           = seen_valid_q && needed && !has && (!l0_valid_q || !l1_valid_q || shift);
+    assign lane_served[k] = passed || (needed && (has || take));
+    assign lane_empty[k]  = item_empty && !want_q;
+    // Beats of a cluster that is over for a lane without work must not be taken for a later one's.
+    assign drop           = lane_empty[k] && seen_valid_q && l0_q.cluster != seen_q.cluster;
+    assign wanted         = {cluster_d, from_d[BYTE_BITS-1:6]};
+    assign shift          = want_d && l0_valid_q && l0_q != wanted;
+
+    always_comb begin
+      l0_valid_d = l0_valid_q;
+      l1_valid_d = l1_valid_q;
+      if (shift) begin
+        l0_valid_d = l1_valid_q || take;
+        l1_valid_d = l1_valid_q && take;
+      end else if (!l0_valid_q) begin
+        l0_valid_d = take;
+      end else begin
+        l1_valid_d = l1_valid_q || take;
+      end
+      if (start_i || drop) begin
+        l0_valid_d = 1'b0;
+        l1_valid_d = 1'b0;
+      end
+    end
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        l0_valid_q <= 1'b0;
+        l1_valid_q <= 1'b0;
+      end else begin
+        l0_valid_q <= l0_valid_d;
+        l1_valid_q <= l1_valid_d;
+      end
+    end
+
+    always_ff @(posedge clk_i) begin
+      if (shift ? l1_valid_q || take : !l0_valid_q && take) begin
+        l0_q        <= shift && l1_valid_q ? l1_q : seen_q;
+        window_q[0] <= shift && l1_valid_q ? window_q[1] : seen_data_q;
+      end
+      if (take) begin
+        l1_q        <= seen_q;
+        window_q[1] <= seen_data_q;
+      end
+    end
+
+    assign lane_busy[k]    = want_q || out_valid_o[k];
+    assign lane_cluster[k] = out_valid_o[k] ? out_data_o[k].cluster : cluster_q;
 
     // The bytes from there on
 
@@ -449,16 +519,26 @@ module flk_colour_fetch
 
   // ---- state ----------------------------------------------------------------------------------------
 
-  cluster_index_t oldest_d, oldest_q;
+  cluster_index_t oldest_d, oldest_q, least;
   logic           error_q;
   logic [31:0]    beats_q;
 
+  // Of the clusters that lanes are working on, the oldest.
+  always_comb begin
+    least = seen_q.cluster;
+    for (int unsigned k = 0; k < LANES; k++) begin
+      if (lane_busy[k] && CLUSTER_BITS'(least - lane_cluster[k]) < CLUSTER_BITS'(COLOUR_CLUSTERS)) begin
+        least = lane_cluster[k];
+      end
+    end
+  end
+
   always_comb begin
     oldest_d = oldest_q;
-    if (&lane_empty && !a_valid_q) begin
+    if ((&lane_empty) && lane_busy == '0 && !a_valid_q) begin
       oldest_d = exit_i;
-    end else if (w0_valid_q) begin
-      oldest_d = w0_q.cluster;
+    end else if (seen_valid_q) begin
+      oldest_d = least;
     end
   end
 
