@@ -14,7 +14,7 @@ module flk_colour_fetch
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned BufferBeats = 64,
-  parameter  int unsigned Items       = 64,  // Gaussians of a lane that wait for colours
+  parameter  int unsigned Items       = 96,  // Gaussians of a lane that wait for colours
   parameter  int unsigned MaxBeats    = 16,
   parameter  int unsigned Bursts      = 64,  // under way
   parameter  int unsigned IdBits      = 4,

@@ -6,7 +6,7 @@ package flk_preproc_pkg;
   localparam int unsigned SEQ_BITS = 12;         // of a survivor's number in its frame, modulo
   localparam int unsigned NUMBER_BITS = 24;      // of a record
   localparam int unsigned BEAT_BITS = 34;        // address of 64 bytes
-  localparam int unsigned PLACE_BEAT_BITS = 5;   // of a beat of records that is being put together
+  localparam int unsigned PLACE_BEAT_BITS = 7;   // of a beat of records that is being put together
 
   // Registers of a frame that the cluster test takes: ff numbers of 23 bits.
   typedef struct packed {

@@ -625,12 +625,15 @@ module flk_preprocessing
 
   // ---- writes ---------------------------------------------------------------------------------------
 
-  logic       chosen_valid, chosen_ready, line_in_valid, line_in_ready, unused_line_full, unused_line_empty;
-  line_t      chosen, write;
-  logic [2:0] unused_index;
-  logic [1:0] unused_line_usage;
-  logic       write_valid, write_done, request_ready, data_ready, request_sent_q, data_sent_q;
-  logic       write_move, write_answer, write_failed, unused_tag;
+  logic                   chosen_valid, chosen_ready;
+  line_t                  chosen, write;
+  logic                   address_room, address_valid, address_ready, address_empty;
+  logic                   data_room, data_valid, data_ready, data_empty;
+  logic [BEAT_BITS-1:0]   write_beat;
+  logic                   write_answer, write_failed, unused_tag;
+  logic [2:0]             unused_index, unused_data_usage;
+  logic [1:0]             unused_address_usage;
+  logic                   unused_address_full, unused_data_full;
 
   flk_stream_arbiter #(
     .Inputs(5),
@@ -648,40 +651,45 @@ module flk_preprocessing
     .out_index_o(unused_index)
   );
 
-  assign line_in_valid = chosen_valid;
-  assign chosen_ready  = line_in_ready;
+  // A burst's data wait for its length: addresses and data go their own ways.
+  assign chosen_ready  = address_room && data_room;
+  assign arbiter_empty = !chosen_valid && address_empty && data_empty;
+
+  flk_fifo #(
+    .Width(BEAT_BITS),
+    .Depth(2)
+  ) i_addresses (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (chosen_valid && data_room),
+    .in_ready_o (address_room),
+    .in_data_i  (chosen.beat),
+    .out_valid_o(address_valid),
+    .out_ready_i(address_ready),
+    .out_data_o (write_beat),
+    .usage_o    (unused_address_usage),
+    .full_o     (unused_address_full),
+    .empty_o    (address_empty)
+  );
 
   flk_fifo #(
     .Width($bits(line_t)),
-    .Depth(2)
+    .Depth(6)
   ) i_lines (
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
-    .in_valid_i (line_in_valid),
-    .in_ready_o (line_in_ready),
+    .in_valid_i (chosen_valid && address_room),
+    .in_ready_o (data_room),
     .in_data_i  (chosen),
-    .out_valid_o(write_valid),
-    .out_ready_i(write_move),
+    .out_valid_o(data_valid),
+    .out_ready_i(data_ready),
     .out_data_o (write),
-    .usage_o    (unused_line_usage),
-    .full_o     (unused_line_full),
-    .empty_o    (unused_line_empty)
+    .usage_o    (unused_data_usage),
+    .full_o     (unused_data_full),
+    .empty_o    (data_empty)
   );
-
-  assign arbiter_empty = unused_line_empty && !chosen_valid;
-  assign write_move    = write_valid && (request_sent_q || request_ready) && (data_sent_q || data_ready);
-  assign write_done    = write_move;
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      request_sent_q <= 1'b0;
-      data_sent_q    <= 1'b0;
-    end else begin
-      request_sent_q <= write_valid && !write_move && (request_sent_q || request_ready);
-      data_sent_q    <= write_valid && !write_move && (data_sent_q || data_ready);
-    end
-  end
 
   logic [Bytes-1:0] strobes;
 
@@ -703,12 +711,12 @@ module flk_preprocessing
     .clk_i,
     .rst_ni,
     .idle_o      (write_idle),
-    .in_valid_i  (write_valid && !request_sent_q),
-    .in_ready_o  (request_ready),
-    .in_addr_i   ({write.beat, 6'b0}),
+    .in_valid_i  (address_valid),
+    .in_ready_o  (address_ready),
+    .in_addr_i   ({write_beat, 6'b0}),
     .in_beats_i  (1'b1),
     .in_tag_i    (1'b0),
-    .data_valid_i(write_valid && !data_sent_q),
+    .data_valid_i(data_valid),
     .data_ready_o(data_ready),
     .data_data_i (write.data),
     .data_strb_i (strobes),
@@ -804,9 +812,10 @@ module flk_preprocessing
   assign error_o = {|list_failed, beyond_q, write_error_q, cull_error || geometry_error || colour_error};
 
   logic unused;
-  assign unused = ^{cull_idle, geometry_idle, write_done, group.cluster.index, beat_ready,
+  assign unused = ^{cull_idle, geometry_idle, write.beat, group.cluster.index, beat_ready,
                     unused_bounds, unused_cull_done, unused_geometry_done, unused_done,
-                    unused_index, unused_line_full, unused_line_usage, unused_tag, fill[3]};
+                    unused_index, unused_address_usage, unused_address_full, unused_data_usage,
+                    unused_data_full, unused_tag, fill[3]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
