@@ -14,7 +14,7 @@ module flk_colour_fetch
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned BufferBeats = 64,
-  parameter  int unsigned Items       = 96,  // Gaussians of a lane that wait for colours
+  parameter  int unsigned Items       = 128, // Gaussians of a lane that wait for colours
   parameter  int unsigned MaxBeats    = 16,
   parameter  int unsigned Bursts      = 64,  // under way
   parameter  int unsigned IdBits      = 4,
@@ -378,7 +378,7 @@ module flk_colour_fetch
 
     logic                  l0_valid_d, l0_valid_q, l1_valid_d, l1_valid_q;
     mark_t                 l0_q, l1_q, wanted;
-    logic [1:0][Width-1:0] window_q;
+    logic [31:0][31:0]     window_q;  // words of both
     logic                  needed, passed, shift, take, has, drop;
     logic [AT_BITS-1:0]    item_last;
 
@@ -447,12 +447,12 @@ module flk_colour_fetch
 
     always_ff @(posedge clk_i) begin
       if (shift ? l1_valid_q || take : !l0_valid_q && take) begin
-        l0_q        <= shift && l1_valid_q ? l1_q : seen_q;
-        window_q[0] <= shift && l1_valid_q ? window_q[1] : seen_data_q;
+        l0_q           <= shift && l1_valid_q ? l1_q : seen_q;
+        window_q[15:0] <= shift && l1_valid_q ? window_q[31:16] : seen_data_q;
       end
       if (take) begin
-        l1_q        <= seen_q;
-        window_q[1] <= seen_data_q;
+        l1_q            <= seen_q;
+        window_q[31:16] <= seen_data_q;
       end
     end
 
@@ -464,7 +464,11 @@ module flk_colour_fetch
     logic [255:0]        words;
     colour_part_t        part;
 
-    assign words = 256'(window_q >> {from_q[5:2], 5'd0});
+    always_comb begin
+      for (int unsigned i = 0; i < 8; i++) begin
+        words[32*i+:32] = window_q[5'(from_q[5:2])+5'(i)];
+      end
+    end
 
     always_comb begin
       part         = '0;
@@ -515,6 +519,12 @@ module flk_colour_fetch
 
     assign out_valid_o[k] = out_valid_q;
     assign out_data_o[k]  = out_q;
+
+`ifndef SYNTHESIS
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        fire && straddles |-> l1_q == {cluster_q, last_beat})
+    else $error("flk_colour_fetch: a part that ends in another beat than the next one kept");
+`endif
   end
 
   // ---- state ----------------------------------------------------------------------------------------

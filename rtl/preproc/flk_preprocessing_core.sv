@@ -17,8 +17,8 @@ module flk_preprocessing_core
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned Waiting    = 96,   // survivors that wait for colours
-  parameter  int unsigned Unfinished = 160,  // survivors that are not listed yet
+  parameter  int unsigned Waiting    = 128,  // survivors that wait for colours
+  parameter  int unsigned Unfinished = 256,  // survivors that are not listed yet
   localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS)
 ) (
   input  logic                        clk_i,
