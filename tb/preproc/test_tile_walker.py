@@ -264,6 +264,9 @@ def test_rates() -> None:
     single = boxes([(16, 23, 8 * (k % 500), 8 * (k % 500) + 7) for k in range(1000)])  # one band, one entry
     run = check(single, True)
     assert run.first == 35 and run.cycles - run.first <= 1060  # 33 splats in 35 cycles: more are not kept
+    missed = boxes([(3000, 4000, 16 * (k % 100), 16 * (k % 100) + 15) for k in range(200)])  # two bands that hold nothing, far from the mean
+    run = check(missed, False)
+    assert run.count == 0 and run.cycles < 2 * 200 + 40
     mixed = boxes([(0, 16 * (1 + 7 * (k % 2)) - 1, 32, 32 + 16 * (1 + 2 * (k % 2)) - 1) for k in range(300)])  # 2 bands and entry; 6 and 24
     run = check(mixed, True)
     assert run.cycles - run.first <= 150 * 25 + 1
