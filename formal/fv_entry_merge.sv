@@ -11,7 +11,7 @@ module fv_entry_merge
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Depth     = 2,
-  parameter  int unsigned Bank      = 1,
+  parameter  int unsigned Bank      = 0,
   localparam int unsigned AbsBits   = NUMBER_BITS - 1,
   localparam int unsigned CountBits = $clog2(Depth + 2)
 ) (

@@ -4,7 +4,7 @@ package flk_preproc_pkg;
 
   localparam int unsigned LANES = 3;
   localparam int unsigned SEQ_BITS = 3;
-  localparam int unsigned NUMBER_BITS = 6;
+  localparam int unsigned NUMBER_BITS = 5;
   localparam int unsigned BEAT_BITS = 2;
   localparam int unsigned PLACE_BEAT_BITS = 2;
 
