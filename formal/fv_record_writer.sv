@@ -203,7 +203,7 @@ module fv_record_writer
   logic [PLACE_BEAT_BITS-1:0]                 follow_at;
 
   assign fetched   = dut.i_beats.out_valid_q;
-  assign waiting   = CountBits'(dut.i_beats.usage_q) + CountBits'(fetched);
+  assign waiting   = CountBits'(dut.i_beats.used_q) + CountBits'(fetched);
   assign items     = waiting + CountBits'(out_valid);
   assign follow_at = head + PLACE_BEAT_BITS'(ahead_q) - PLACE_BEAT_BITS'(out_valid);
 
@@ -239,9 +239,9 @@ module fv_record_writer
       l_head: assert (dut.head_q == head);
       l_waiting: assert (waiting == known_q - CountBits'(freed));
       l_items: assert (entries == items);
-      l_usage: assert (CountBits'(dut.i_beats.usage_q) <= CountBits'(Beats));
+      l_usage: assert (CountBits'(dut.i_beats.used_q) <= CountBits'(Beats));
       l_write: assert (dut.i_beats.write_q ==
-                       dut.i_beats.read_q + PLACE_BEAT_BITS'(dut.i_beats.usage_q));
+                       dut.i_beats.read_q + PLACE_BEAT_BITS'(dut.i_beats.used_q));
       if (watching) begin
         if (out_valid && beat_ahead == '0) begin
           l_shown: assert ({out_beat, out_strobe} == watched);

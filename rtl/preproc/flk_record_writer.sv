@@ -49,6 +49,7 @@ module flk_record_writer
   ) i_beats (
     .clk_i,
     .rst_ni,
+    .clear_i    (1'b0),
     .in_valid_i (beat_valid_i),
     .in_ready_o (beat_ready_o),
     .in_data_i  (beat_data_i),

@@ -86,6 +86,7 @@ module flk_tile_walker
   ) i_splats (
     .clk_i,
     .rst_ni,
+    .clear_i    (1'b0),
     .in_valid_i (send && !sending_q),
     .in_ready_o (store_ready),
     .in_data_i  (splat_in),
@@ -127,7 +128,7 @@ module flk_tile_walker
     .box_i,
     .x_i    (in_data_i.x),
     .y_i    (in_data_i.y),
-    .right_i(37'(in_data_i.right)),
+    .right_i(in_data_i.right),
     .x0_i   (in_data_i.x0),
     .x1_i   (in_data_i.x1),
     .y0_i   (in_data_i.y0),
