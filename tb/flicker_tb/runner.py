@@ -158,6 +158,8 @@ def build_and_test(
                 extra_env={
                     "FLICKER_TB_CONFIG": json.dumps(dict(config or {})),
                     "COCOTB_ANSI_OUTPUT": "0",
+                    # pytest's rewriting of every imported module, numba's too, takes seconds.
+                    "COCOTB_REWRITE_ASSERTION_FILES": "cocotb_*.py",
                 },
             )
             ran, failed = get_results(results)
