@@ -314,7 +314,7 @@ def _share_runtime(folder: Path, make: Sequence[object], log: Path, jobs: int) -
         shutil.copy(cache / name, folder / name)
 
 
-def _share_headers(folder: Path, make: Sequence[str], log: Path) -> list[str]:
+def _share_headers(folder: Path, make: Sequence[object], log: Path) -> list[str]:
     """What to tell make so that a small build reads the headers of Verilator's run-time library compiled, from the cache.
 
     A small model is one piece of C++ (a large one brings precompiled headers of its own), and reading those headers takes most of its time.
