@@ -6,6 +6,7 @@ common/flk_pkg.sv
 common/flk_table_pkg.sv
 preproc/flk_front_pkg.sv
 preproc/flk_preproc_pkg.sv
+common/flk_axi_fetch.sv
 common/flk_axi_read.sv
 common/flk_axi_split.sv
 common/flk_axi_write.sv
@@ -41,6 +42,7 @@ common/flk_lzc.sv
 common/flk_pipe_reg.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
+common/flk_sram_fifo.sv
 common/flk_stream_arbiter.sv
 common/flk_weight.sv
 ctu/flk_ctu.sv
@@ -60,12 +62,14 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv
 preproc/flk_colour_basis.sv
 preproc/flk_colour_group.sv
 preproc/flk_colour_total.sv
 preproc/flk_geometry_decode.sv
+preproc/flk_geometry_fetch.sv
 preproc/flk_list_writer.sv
 preproc/flk_projection.sv
 preproc/flk_splat_band.sv

@@ -1,0 +1,525 @@
+// Cluster cull: reads the cluster table twice (docs/memory_image.md). The first pass bounds the
+// depths of the kept clusters, which gives the key's shift and offset, the second hands the kept
+// clusters on, in the order of the table (docs/front_end.md).
+//
+// A frame: start_i while idle_o; setup_i, table_i (beat of the table) and clusters_i stay until
+// done_o, which is high for a cycle when the last element has been taken. The last element has
+// out_end_o and no cluster; there is one in every frame. Kept clusters come only while
+// bounds_valid_o, with which key_shift_o and key_low_o are valid until the next start; the counts
+// of what was culled stay too. An error of the memory: error_o rises and stays until the next
+// start, what is under way is read and dropped, no kept cluster is added, the end element follows;
+// bounds_valid_o remains low if it happened in the first pass, and the counts mean nothing.
+// Floats of the table with exponent code 0 count as 0; exponent code 255 must not occur.
+//
+// Throughput: a cluster every four cycles; a pass begins about the memory's latency and 40 cycles
+// before its end, the second pass' beats come while the first one's clusters are tested. Beats wait
+// in a buffer of BufferBeats, requests in its free places: the port never waits. Back-pressure of
+// the clusters stops the second pass. No combinational paths but r_*_i to the buffer and
+// ar_ready_i to the requests.
+module flk_cluster_cull
+  import flk_front_pkg::*;
+  import flk_preproc_pkg::*;
+#(
+  parameter  int unsigned BufferBeats = 32,  // less MaxBeats, times 8: cycles of latency it hides
+  parameter  int unsigned MaxBeats    = 8,   // of a burst
+  parameter  int unsigned Bursts      = 4,   // under way
+  parameter  int unsigned IdBits      = 4,
+  parameter  int unsigned Id          = 0,
+  localparam int unsigned Width       = 512,
+  localparam int unsigned AddrBits    = BEAT_BITS + 6
+) (
+  input  logic                 clk_i,
+  input  logic                 rst_ni,
+  // Frame
+  input  logic                 start_i,
+  output logic                 idle_o,
+  input  cull_setup_t          setup_i,
+  input  logic [BEAT_BITS-1:0] table_i,
+  input  logic [23:0]          clusters_i,
+  output logic                 done_o,
+  output logic                 error_o,
+  output logic                 bounds_valid_o,
+  output logic signed [7:0]    key_shift_o,
+  output logic [39:0]          key_low_o,
+  output logic [31:0]          culled_clusters_o,
+  output logic [31:0]          culled_gaussians_o,
+  // Kept clusters
+  output logic                 out_valid_o,
+  input  logic                 out_ready_i,
+  output logic                 out_end_o,
+  output kept_t                out_cluster_o,
+  // AXI4
+  output logic                 ar_valid_o,
+  input  logic                 ar_ready_i,
+  output logic [IdBits-1:0]    ar_id_o,
+  output logic [AddrBits-1:0]  ar_addr_o,
+  output logic [7:0]           ar_len_o,
+  output logic [2:0]           ar_size_o,
+  output logic [1:0]           ar_burst_o,
+  input  logic                 r_valid_i,
+  output logic                 r_ready_o,
+  input  logic [IdBits-1:0]    r_id_i,
+  input  logic [Width-1:0]     r_data_i,
+  input  logic [1:0]           r_resp_i,
+  input  logic                 r_last_i
+);
+
+  localparam int unsigned Interval = 4;  // of flk_cluster_test
+  localparam int unsigned Inside = (CLUSTER_TEST_LATENCY + Interval - 1) / Interval;
+  localparam logic [1:0] OUT_PHASE = 2'(CLUSTER_TEST_LATENCY % Interval);
+  localparam cluster_t NEAR = 32'h3E4C_CCCD;  // 0.2: no depth is nearer
+  localparam int unsigned KeyField = 40;
+  localparam int unsigned KeyBits = 24;
+
+  // ---- frame ----------------------------------------------------------------------------------------
+
+  typedef enum logic [2:0] {IDLE, FIRST, BOUNDS, SECOND, FAILED, LAST, LEAVE} state_e;
+
+  state_e      state_d, state_q;
+  logic [2:0]  step_q;  // of BOUNDS
+  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle;
+  logic [23:0] tested_q;  // clusters of the pass that have been tested
+
+  assign start      = state_q == IDLE && start_i;
+  assign testing    = state_q == FIRST || state_q == SECOND;
+  assign tested_all = tested_q == clusters_i;
+
+  always_comb begin
+    state_d = state_q;
+    unique case (state_q)
+      IDLE: begin
+        if (start_i) begin
+          state_d = FIRST;
+        end
+      end
+      FIRST: begin
+        if (tested_all) begin
+          state_d = BOUNDS;
+        end
+      end
+      BOUNDS: begin
+        if (step_q == 3'd5) begin
+          state_d = SECOND;
+        end
+      end
+      SECOND: begin
+        if (tested_all) begin
+          state_d = LAST;
+        end
+      end
+      FAILED: begin
+        if (fetch_idle) begin
+          state_d = LAST;
+        end
+      end
+      LAST: begin
+        if (out_room) begin
+          state_d = LEAVE;
+        end
+      end
+      LEAVE: begin
+        if (out_empty) begin
+          state_d = IDLE;
+        end
+      end
+      default: state_d = IDLE;
+    endcase
+    if (fails) begin
+      state_d = FAILED;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q <= IDLE;
+      step_q  <= '0;
+    end else begin
+      state_q <= state_d;
+      step_q  <= state_q == BOUNDS ? step_q + 1'b1 : '0;
+    end
+  end
+
+  // ---- table ----------------------------------------------------------------------------------------
+
+  logic [1:0]       passes_q;  // to be requested
+  logic             request_ready;
+  logic             beat_valid, beat_error, unused_tag;
+  logic [Width-1:0] beat_data;
+  logic             line_valid, line_pop, unused_room;
+  logic [1:0][Width/2-1:0] line;  // two entries
+
+  flk_axi_fetch #(
+    .Places  (BufferBeats),
+    .AddrBits(AddrBits),
+    .BeatBits(24),
+    .Width   (Width),
+    .MaxBeats(MaxBeats),
+    .Bursts  (Bursts),
+    .IdBits  (IdBits),
+    .Id      (Id)
+  ) i_fetch (
+    .clk_i,
+    .rst_ni,
+    .stop_i     (state_q == FAILED),
+    .idle_o     (fetch_idle),
+    .in_valid_i (passes_q != '0 && clusters_i != '0),
+    .in_ready_o (request_ready),
+    .in_beat_i  (table_i),
+    .in_beats_i (24'(clusters_i[23:1]) + 24'(clusters_i[0])),
+    .in_tag_i   (1'b0),
+    .in_placed_i(1'b0),
+    .freed_i    (line_valid && line_pop),
+    .out_valid_o(beat_valid),
+    .out_data_o (beat_data),
+    .out_tag_o  (unused_tag),
+    .out_error_o(beat_error),
+    .ar_valid_o,
+    .ar_ready_i,
+    .ar_id_o,
+    .ar_addr_o,
+    .ar_len_o,
+    .ar_size_o,
+    .ar_burst_o,
+    .r_valid_i,
+    .r_ready_o,
+    .r_id_i,
+    .r_data_i,
+    .r_resp_i,
+    .r_last_i
+  );
+
+  assign fails = beat_valid && beat_error;
+
+  flk_sram_fifo #(
+    .Width(Width),
+    .Depth(BufferBeats)
+  ) i_buffer (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (state_q == FAILED),
+    .in_valid_i (beat_valid),
+    .in_ready_o (unused_room),
+    .in_data_i  (beat_data),
+    .out_valid_o(line_valid),
+    .out_ready_i(line_pop),
+    .out_data_o (line)
+  );
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      passes_q <= '0;
+    end else if (start) begin
+      passes_q <= 2'd2;
+    end else if (state_q == FAILED) begin
+      passes_q <= '0;
+    end else if (passes_q != '0 && (request_ready || clusters_i == '0)) begin
+      passes_q <= passes_q - 1'b1;
+    end
+  end
+
+  // ---- an entry -------------------------------------------------------------------------------------
+
+  // As it lies in the table.
+  typedef struct packed {
+    logic [31:0]      first;
+    logic [5:0]       reserved;
+    logic [1:0]       degree;
+    logic [7:0]       last;
+    logic [15:0]      sigma;  // upper half of a float32
+    logic [2:0][31:0] high;
+    logic [2:0][31:0] low;
+  } entry_t;
+
+  typedef struct packed {
+    logic [19:0] first;
+    logic [7:0]  last;
+    logic [1:0]  degree;
+  } about_t;
+
+  function automatic cluster_t number(logic [31:0] float);
+    return float[30:23] == '0 ? '0 : float;
+  endfunction
+
+  entry_t         entry;
+  logic           entry_valid_d, entry_valid_q, half_q, load, take;
+  logic [23:0]    loads_q;  // entries of the pass still to be loaded
+  cluster_t [2:0] low_q, high_q;
+  cluster_t       sigma_q;
+  about_t         about_q;
+
+  assign entry         = line[half_q];
+  assign load          = testing && line_valid && loads_q != '0 && (!entry_valid_q || take);
+  assign line_pop      = load && (half_q || loads_q == 24'd1);
+  assign entry_valid_d = load || (entry_valid_q && !take);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      entry_valid_q <= 1'b0;
+      half_q        <= 1'b0;
+      loads_q       <= '0;
+    end else if (start || state_q == BOUNDS || state_q == FAILED) begin
+      entry_valid_q <= 1'b0;
+      half_q        <= 1'b0;
+      loads_q       <= clusters_i;
+    end else begin
+      entry_valid_q <= entry_valid_d;
+      if (load) begin
+        half_q  <= !half_q;
+        loads_q <= loads_q - 1'b1;
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (load) begin
+      for (int unsigned k = 0; k < 3; k++) begin
+        low_q[k]  <= number(entry.low[k]);
+        high_q[k] <= number(entry.high[k]);
+      end
+      sigma_q <= number({entry.sigma, 16'b0});
+      about_q <= '{first: entry.first[19:0], last: entry.last, degree: entry.degree};
+    end
+  end
+
+  logic unused_entry;
+  assign unused_entry = ^{entry.first[31:20], entry.reserved};
+
+  // ---- test -----------------------------------------------------------------------------------------
+
+  logic              move, at_output, kept;
+  logic [1:0]        phase_q;
+  logic [Inside-1:0] inside_q;  // there is a cluster, the youngest lowest
+  cluster_t          nearest, farthest;
+  about_t            about;
+
+  assign take      = entry_valid_q && move && phase_q == '0;
+  assign at_output = move && phase_q == OUT_PHASE && inside_q[Inside-1];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      phase_q  <= '0;
+      inside_q <= '0;
+    end else begin
+      if (move) begin
+        phase_q <= phase_q + 1'b1;
+      end
+      if (state_q == FAILED) begin
+        inside_q <= '0;
+      end else if (move && phase_q == '0) begin
+        inside_q <= {inside_q[Inside-2:0], take};
+      end
+    end
+  end
+
+  flk_delay #(
+    .Width($bits(about_t)),
+    .Depth(Inside)
+  ) i_about (
+    .clk_i,
+    .en_i(move && phase_q == '0),
+    .d_i (about_q),
+    .q_o (about)
+  );
+
+  flk_cluster_test i_test (
+    .clk_i,
+    .en_i        (move),
+    .phase_i     (phase_q),
+    .low_0_i     (low_q[0]),
+    .low_1_i     (low_q[1]),
+    .low_2_i     (low_q[2]),
+    .high_0_i    (high_q[0]),
+    .high_1_i    (high_q[1]),
+    .high_2_i    (high_q[2]),
+    .sigma_i     (sigma_q),
+    .position_0_i(setup_i.position[0]),
+    .position_1_i(setup_i.position[1]),
+    .position_2_i(setup_i.position[2]),
+    .normal_00_i (setup_i.normal[0][0]),
+    .normal_01_i (setup_i.normal[0][1]),
+    .normal_02_i (setup_i.normal[0][2]),
+    .normal_10_i (setup_i.normal[1][0]),
+    .normal_11_i (setup_i.normal[1][1]),
+    .normal_12_i (setup_i.normal[1][2]),
+    .normal_20_i (setup_i.normal[2][0]),
+    .normal_21_i (setup_i.normal[2][1]),
+    .normal_22_i (setup_i.normal[2][2]),
+    .normal_30_i (setup_i.normal[3][0]),
+    .normal_31_i (setup_i.normal[3][1]),
+    .normal_32_i (setup_i.normal[3][2]),
+    .normal_40_i (setup_i.normal[4][0]),
+    .normal_41_i (setup_i.normal[4][1]),
+    .normal_42_i (setup_i.normal[4][2]),
+    .offset_0_i  (setup_i.offset[0]),
+    .offset_1_i  (setup_i.offset[1]),
+    .offset_2_i  (setup_i.offset[2]),
+    .offset_3_i  (setup_i.offset[3]),
+    .offset_4_i  (setup_i.offset[4]),
+    .reach_0_i   (setup_i.reach[0]),
+    .reach_1_i   (setup_i.reach[1]),
+    .reach_2_i   (setup_i.reach[2]),
+    .reach_3_i   (setup_i.reach[3]),
+    .reach_4_i   (setup_i.reach[4]),
+    .keep_o      (kept),
+    .nearest_o   (nearest),
+    .farthest_o  (farthest)
+  );
+
+  always_ff @(posedge clk_i) begin
+    if (start || state_q == BOUNDS) begin
+      tested_q <= '0;
+    end else if (testing && at_output) begin
+      tested_q <= tested_q + 1'b1;
+    end
+  end
+
+  // ---- first pass: bounds and counts ----------------------------------------------------------------
+
+  logic               any_q, bounds_valid_q, error_q, done_q;
+  cluster_t           nearest_q, farthest_q, span;
+  logic signed [8:0]  shift_span, shift_far, shift;
+  logic signed [7:0]  shift_q;
+  logic [7:0]         drop;
+  logic [39:0]        low_bits_q;
+  logic [31:0]        clusters_q, gaussians_q;
+
+  // Depths here are at least NEAR, so that their codes compare as numbers do.
+  always_ff @(posedge clk_i) begin
+    if (start) begin
+      any_q       <= 1'b0;
+      nearest_q   <= NEAR;
+      farthest_q  <= NEAR;
+      clusters_q  <= '0;
+      gaussians_q <= '0;
+    end else if (state_q == FIRST && at_output) begin
+      if (kept) begin
+        any_q <= 1'b1;
+        if (nearest[31] || nearest < NEAR) begin
+          nearest_q <= NEAR;
+        end else if (!any_q || nearest < nearest_q) begin
+          nearest_q <= nearest;
+        end
+        if (!farthest[31] && farthest > farthest_q) begin
+          farthest_q <= farthest;
+        end
+      end else begin
+        clusters_q  <= clusters_q + 1'b1;
+        gaussians_q <= gaussians_q + 32'(about.last) + 1'b1;
+      end
+    end else if (state_q == BOUNDS && step_q == 3'd0 && farthest_q < nearest_q) begin
+      farthest_q <= nearest_q;
+    end
+  end
+
+  flk_ff_add #(
+    .ManBits(23),
+    .Stages (3)
+  ) i_span (
+    .clk_i,
+    .en_i (state_q == BOUNDS),
+    .a_i  (farthest_q),
+    .b_i  ({1'b1, nearest_q[30:0]}),
+    .sum_o(span)
+  );
+
+  // Keys of KeyBits for all depths of the span, depths of KeyField for the farthest.
+  assign shift_span = 9'(KeyBits - 1 + 127) - 9'(span[30:23]);
+  assign shift_far  = 9'(KeyField - 1 + 127) - 9'(farthest_q[30:23]);
+
+  always_comb begin
+    shift = span == '0 ? 9'(KeyField) : shift_span;
+    if (shift_far < shift) begin
+      shift = shift_far;
+    end
+  end
+
+  // Places that the nearest depth, its leading bit on top of KeyField bits, goes down.
+  assign drop = 8'(9'(KeyField - 1 + 127) - 9'(nearest_q[30:23]) - 9'(shift_q));
+
+  always_ff @(posedge clk_i) begin
+    if (state_q == BOUNDS && step_q == 3'd4) begin
+      shift_q <= 8'(shift);
+    end
+    if (state_q == BOUNDS && step_q == 3'd5) begin
+      low_bits_q <= {1'b1, nearest_q[22:0], 16'b0} >> drop;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      bounds_valid_q <= 1'b0;
+      error_q        <= 1'b0;
+      done_q         <= 1'b0;
+    end else begin
+      bounds_valid_q <= !start && (bounds_valid_q || (state_q == BOUNDS && step_q == 3'd5));
+      error_q        <= !start && (error_q || fails);
+      done_q         <= state_q == LEAVE && out_empty;
+    end
+  end
+
+  // ---- second pass: kept clusters -------------------------------------------------------------------
+
+  logic       unused_full;
+  logic [1:0] unused_usage;
+  kept_t      cluster;
+
+  assign move    = out_room;
+  assign cluster = '{index: tested_q, first: about.first, last: about.last, degree: about.degree};
+
+  flk_fifo #(
+    .Width(1 + $bits(kept_t)),
+    .Depth(2)
+  ) i_out (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i ((state_q == SECOND && at_output && kept) || state_q == LAST),
+    .in_ready_o (out_room),
+    .in_data_i  ({state_q == LAST, cluster}),
+    .out_valid_o,
+    .out_ready_i,
+    .out_data_o ({out_end_o, out_cluster_o}),
+    .usage_o    (unused_usage),
+    .full_o     (unused_full),
+    .empty_o    (out_empty)
+  );
+
+  assign idle_o             = state_q == IDLE;
+  assign done_o             = done_q;
+  assign error_o            = error_q;
+  assign bounds_valid_o     = bounds_valid_q;
+  assign key_shift_o        = shift_q;
+  assign key_low_o          = low_bits_q;
+  assign culled_clusters_o  = clusters_q;
+  assign culled_gaussians_o = gaussians_q;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> state_q == IDLE)
+  else $error("flk_cluster_cull: start while a frame is under way");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      state_q != IDLE |-> $stable({setup_i, table_i, clusters_i}))
+  else $error("flk_cluster_cull: registers changed in a frame");
+
+  for (genvar k = 0; k < 3; k++) begin : gen_finite
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        load |-> !(&entry.low[k][30:23]) && !(&entry.high[k][30:23]))
+    else $error("flk_cluster_cull: a box that is not finite");
+  end
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) load |-> !(&entry.sigma[14:7]))
+  else $error("flk_cluster_cull: a sigma that is not finite");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> unused_room)
+  else $error("flk_cluster_cull: a beat without a place");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_end_o |-> bounds_valid_o)
+  else $error("flk_cluster_cull: a kept cluster before the bounds");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      state_q == LAST |-> fetch_idle && !line_valid)
+  else $error("flk_cluster_cull: reads go on after the last cluster");
+`endif
+
+endmodule
