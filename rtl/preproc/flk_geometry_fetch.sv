@@ -21,10 +21,10 @@ module flk_geometry_fetch
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned BufferBeats = 64,
+  parameter  int unsigned BufferBeats = 96,
   parameter  int unsigned Clusters    = 8,   // under way
-  parameter  int unsigned MaxBeats    = 16,  // of a burst
-  parameter  int unsigned Bursts      = 16,  // under way
+  parameter  int unsigned MaxBeats    = 8,   // of a burst
+  parameter  int unsigned Bursts      = 32,  // under way
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
   localparam int unsigned Width       = 512,

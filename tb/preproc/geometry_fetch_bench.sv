@@ -2,7 +2,7 @@
 module geometry_fetch_bench
   import flk_preproc_pkg::*;
 #(
-  parameter int unsigned BufferBeats = 64,
+  parameter int unsigned BufferBeats = 96,
   parameter int unsigned Clusters    = 8
 ) (
   input  logic            clk_i,
