@@ -1,7 +1,7 @@
 """Reads of a consumer with a buffer: flk_axi_fetch.
 
-State space: random requests with and without places, one to 100 beats, under pauses of requests, memory and consumer; stops in mid-traffic, with bursts on offer,
-on their way and held back. Parameter space: pieces of 2 and 8 beats, places for one piece and more. Not covered: several managers at one port.
+State space: random requests with and without places, one to 100 beats, under pauses of requests, memory and consumer; stops in mid-traffic, with bursts
+on offer, on their way and held back. Parameter space: pieces of 2 and 8 beats, places for one piece and more. Not covered: several managers at one port.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ def test_axi_fetch(parameters: dict[str, int]) -> None:
 
 
 @pytest.mark.parametrize(("parameters", "message"), [
-    ({"MaxBeats": 6}, "MaxBeats must be a power of two"), ({"MaxBeats": 1}, "MaxBeats must be a power of two"), ({"Places": 15}, "Places must be at least MaxBeats"),
-    ({"BeatBits": 4}, "BeatBits must hold MaxBeats"),
+    ({"MaxBeats": 6}, "MaxBeats must be a power of two"), ({"MaxBeats": 1}, "MaxBeats must be a power of two"),
+    ({"Places": 15}, "Places must be at least MaxBeats"), ({"BeatBits": 4}, "BeatBits must hold MaxBeats"),
 ])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
     with refused(message):

@@ -22,7 +22,7 @@ PAUSES = {"never": (0, 1), "rare": (13, 1), "half": (128, 1), "bursts": (128, 20
 
 class _Frame(ctypes.Structure):
     _fields_ = [(n, ctypes.c_int64) for n in ("items", "limit", "room")] + [
-        (n, ctypes.c_int32) for n in ("idle", "idle_run", "stall", "stall_run", "reset_at", "skip")]
+        (n, ctypes.c_int32) for n in ("idle", "idle_run", "stall", "stall_run", "reset_at")]
 
 
 class _Result(ctypes.Structure):
@@ -82,10 +82,11 @@ class FetchBench:
         return self.library.bench_waits()
 
     def frame(
-        self, registers: int, items: Sequence[int] = (), idle: str = "never", stall: str = "never", room: int = 1 << 16, limit: int = 1_000_000, reset_at: int = -1,
+        self, registers: int, items: Sequence[int] = (), idle: str = "never", stall: str = "never", room: int = 1 << 16, limit: int = 200_000,
+        reset_at: int = -1,
     ) -> Outcome:
         """A frame. AssertionError for whatever harness, memory or the design's assertions find."""
-        frame = _Frame(len(items), limit, room, *PAUSES[idle], *PAUSES[stall], reset_at, 0)
+        frame = _Frame(len(items), limit, room, *PAUSES[idle], *PAUSES[stall], reset_at)
         fixed = np.frombuffer(registers.to_bytes(self.register_bits // 8, "little"), np.uint32)
         given = np.frombuffer(b"".join(item.to_bytes(12, "little") for item in items) or bytes(12), np.uint32)
         out, when, result = np.zeros((room, self.out_words), np.uint32), np.zeros(room, np.int64), _Result()

@@ -63,7 +63,7 @@ extern "C" {
 
 struct Frame {
   int64_t items, limit, room;
-  int32_t idle, idle_run, stall, stall_run, reset_at, skip;
+  int32_t idle, idle_run, stall, stall_run, reset_at;
 };
 
 struct Result {

@@ -1,7 +1,7 @@
 """Geometry fetch against the image and the golden model's header values: every group, header field, word and count, under pauses on all sides.
 
-Covered: the demo scene in chunks and in FP16, clusters of every size, headers of numbers from all over their range (subnormal ones too), no clusters, one of one
-Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, rates.
+Covered: the demo scene in chunks and in FP16, clusters of every size, headers of numbers from all over their range (subnormal ones too), none, one cluster
+of one Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, rates.
 Not covered: numbers that are not finite (assertions refuse them), counts of more than 2**16 beats.
 """
 
@@ -18,6 +18,7 @@ from flicker.front.view import DEMO, load_view
 from flicker.golden.front import cull
 from flicker.golden.front.frame import cluster_values
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
+from flicker.scene.demo import demo_cameras
 from flicker.scene.packed import TABLE_ENTRY, PackedFormat, PackedScene
 from flicker.scene.packing import pack
 
@@ -46,6 +47,11 @@ def demo(form: PackedFormat) -> tuple[PackedScene, FrameSetup, np.ndarray]:
     return packed, setup, np.flatnonzero(cull.cull(packed, setup).keep)
 
 
+@cache
+def some_setup() -> FrameSetup:
+    return FrameSetup.of(demo_cameras()[0])
+
+
 def wild(rng: np.random.Generator, form: PackedFormat, counts: np.ndarray) -> PackedScene:
     """Clusters of so many Gaussians, all else random: floats finite, some of them subnormal."""
     n, used = len(counts), -(-counts // 16)
@@ -55,11 +61,11 @@ def wild(rng: np.random.Generator, form: PackedFormat, counts: np.ndarray) -> Pa
     headers = raw.view(form.header)[:, 0]
     for name in headers.dtype.names or ():
         if headers.dtype[name].base.kind == "f":
-            bits = rng.integers(0, 2, headers[name].shape) << 31 | rng.integers(0, 255, headers[name].shape) << 23 | rng.integers(0, 1 << 23, headers[name].shape)
-            tiny = rng.random(headers[name].shape) < 0.1
-            middle = rng.random(headers[name].shape) < 0.5
-            exponent = np.where(tiny, 0, np.where(middle, rng.integers(100, 140, headers[name].shape), bits >> 23 & 255))
-            headers[name] = (bits & 0x807FFFFF | exponent << 23).astype(np.uint32).view(np.float32)
+            shape = headers[name].shape
+            exponent = np.where(rng.random(shape) < 0.5, rng.integers(100, 140, shape), rng.integers(0, 255, shape))
+            exponent[rng.random(shape) < 0.1] = 0
+            bits = rng.integers(0, 2, shape) << 31 | exponent << 23 | rng.integers(0, 1 << 23, shape)
+            headers[name] = bits.astype(np.uint32).view(np.float32)
     if form is PackedFormat.CHUNK:
         headers["sh_zero"] = rng.integers(255, 257, n)
     kind, words = form.geometry
@@ -109,11 +115,12 @@ def expected(packed: PackedScene, setup: FrameSetup, kept: np.ndarray) -> dict[s
     fixed = lambda a: a & (1 << 27) - 1  # noqa: E731
     column = lambda a: np.asarray(a, np.int64)[:, None]  # noqa: E731
     return {
-        "word": word.reshape(len(c), 20), "used": column((1 << np.minimum(left, 4)) - 1), "group": column(group), "last": column(left <= 4), "first": column(group == 0),
+        "word": word.reshape(len(c), 20), "used": column((1 << np.minimum(left, 4)) - 1), "group": column(group),
+        "last": column(left <= 4), "first": column(group == 0), "end": np.zeros((len(c), 1), np.int64),
         "sh_step": codes_of(v.sh_step, C).reshape(-1, 9)[c], "dc_step": codes_of(v.dc_step, C)[c], "dc_low": codes_of(v.dc_low, C)[c],
         "scale_step": fixed(v.scale_step)[c], "scale_low": fixed(v.scale_low)[c], "step": codes_of(v.step, P)[c], "low": codes_of(v.low, P)[c],
         "sh_zero": column(h["sh_zero"][c] if chunked else np.zeros(len(c))), "colour": column(h["colour"][c]),
-        "degree": column(t["flags"][c] & 3), "count": column(t["last"][c]), "slots": column(t["first"][c]), "index": column(c), "end": np.zeros((len(c), 1), np.int64),
+        "degree": column(t["flags"][c] & 3), "count": column(t["last"][c]), "slots": column(t["first"][c]), "index": column(c),
     }
 
 
@@ -133,23 +140,10 @@ def check(outcome: Outcome, packed: PackedScene, setup: FrameSetup, kept: np.nda
         assert outcome.status[1:3] == [len(kept) * packed.format.header.itemsize // BEAT, int(beats.sum())]
 
 
-@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
-def test_demo(form: PackedFormat) -> None:
-    packed, setup, kept = demo(form)
-    assert 0 < len(kept) < len(packed.table)
-    unit = bench()
-    for perfect in (True, False):
-        unit.open(contents(packed), perfect, **PORT)
-        check(unit.frame(registers(packed, setup), items(packed, kept), idle="rare", stall="half"), packed, setup, kept)
-        assert unit.waits == 0
-
-
-@pytest.mark.parametrize("places", [(96, 8), (8, 2)])
-@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
-def test_clusters(form: PackedFormat, places: tuple[int, int]) -> None:
+def clusters(form: PackedFormat, *places: int) -> None:
     """Clusters of every size and random headers, frames one after the other under all pauses."""
     rng = np.random.default_rng([seed(), 41])
-    _, setup, _ = demo(PackedFormat.CHUNK)
+    setup = some_setup()
     sizes = [np.arange(1, 257), np.ones(1, np.int64), np.ones(50, np.int64), rng.integers(1, 40, 100), rng.choice([1, 16, 17, 255, 256], 20)]
     unit = bench(*places)
     for turn, counts in enumerate(sizes):
@@ -163,10 +157,15 @@ def test_clusters(form: PackedFormat, places: tuple[int, int]) -> None:
         assert unit.waits == 0
 
 
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
+def test_clusters(form: PackedFormat) -> None:
+    clusters(form)
+
+
 def test_formats_in_turn() -> None:
     """A frame of each format, one after the other."""
     rng = np.random.default_rng([seed(), 42])
-    _, setup, _ = demo(PackedFormat.CHUNK)
+    setup = some_setup()
     scenes = [(wild(rng, form, rng.integers(1, 30, 20)), i << 32) for i, form in enumerate([PackedFormat.CHUNK, PackedFormat.FP16])]
     unit = bench()
     unit.open({a + base: data for packed, base in scenes for a, data in contents(packed).items()}, latency=9)
@@ -179,7 +178,7 @@ def test_formats_in_turn() -> None:
 def test_errors(form: PackedFormat) -> None:
     """An answer with an error at any beat that is read: the frame ends, what came before it is right, and the next frame is whole."""
     rng = np.random.default_rng([seed(), 43])
-    _, setup, _ = demo(PackedFormat.CHUNK)
+    setup = some_setup()
     packed = wild(rng, form, rng.integers(1, 60, 14))
     kept = np.delete(np.arange(14), [3, 8])
     parts = contents(packed)
@@ -199,7 +198,7 @@ def test_errors(form: PackedFormat) -> None:
 
 def test_reset_in_a_frame() -> None:
     rng = np.random.default_rng([seed(), 44])
-    _, setup, _ = demo(PackedFormat.CHUNK)
+    setup = some_setup()
     packed = wild(rng, PackedFormat.CHUNK, rng.integers(1, 200, 10))
     kept = np.arange(10)
     unit = bench()
@@ -212,7 +211,7 @@ def test_reset_in_a_frame() -> None:
 def rate(form: PackedFormat, size: int, latency: int) -> float:
     """Cycles from group to group over clusters of a size."""
     rng = np.random.default_rng([seed(), 45])
-    _, setup, _ = demo(PackedFormat.CHUNK)
+    setup = some_setup()
     packed = wild(rng, form, np.full(max(2560 // size, 20), size))
     kept = np.arange(len(packed.table))
     unit = bench()
@@ -233,3 +232,19 @@ def test_rate(form: PackedFormat, latency: int, limits: tuple[float, ...]) -> No
     rates = {size: rate(form, size, latency) for size in (256, 64, 16, 1)}
     print(f"{form.value}, latency {latency}: cycles a group " + ", ".join(f"{r:.2f} (clusters of {s})" for s, r in rates.items()))
     assert all(r <= limit for r, limit in zip(rates.values(), limits))
+
+
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
+def test_demo(form: PackedFormat) -> None:
+    packed, setup, kept = demo(form)
+    assert 0 < len(kept) < len(packed.table)
+    unit = bench()
+    for perfect in (True, False):
+        unit.open(contents(packed), perfect, **PORT)
+        check(unit.frame(registers(packed, setup), items(packed, kept), idle="rare", stall="half"), packed, setup, kept)
+        assert unit.waits == 0
+
+
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
+def test_small_buffers(form: PackedFormat) -> None:
+    clusters(form, 8, 2)
