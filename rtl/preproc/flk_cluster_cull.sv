@@ -77,7 +77,7 @@ module flk_cluster_cull
 
   state_e      state_d, state_q;
   logic [2:0]  step_q;  // of BOUNDS
-  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle;
+  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle, lines_empty;
   logic [23:0] tested_q;  // clusters of the pass that have been tested
 
   assign start      = state_q == IDLE && start_i;
@@ -108,7 +108,7 @@ module flk_cluster_cull
         end
       end
       FAILED: begin
-        if (fetch_idle) begin
+        if (fetch_idle && lines_empty) begin
           state_d = LAST;
         end
       end
@@ -196,13 +196,13 @@ module flk_cluster_cull
   ) i_buffer (
     .clk_i,
     .rst_ni,
-    .clear_i    (state_q == FAILED),
-    .in_valid_i (beat_valid),
+    .in_valid_i (beat_valid && state_q != FAILED),
     .in_ready_o (unused_room),
     .in_data_i  (beat_data),
     .out_valid_o(line_valid),
-    .out_ready_i(line_pop),
-    .out_data_o (line)
+    .out_ready_i(line_pop || state_q == FAILED),
+    .out_data_o (line),
+    .empty_o    (lines_empty)
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -510,7 +510,8 @@ module flk_cluster_cull
   assert property (@(posedge clk_i) disable iff (!rst_ni) load |-> !(&entry.sigma[14:7]))
   else $error("flk_cluster_cull: a sigma that is not finite");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> unused_room)
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      beat_valid && state_q != FAILED |-> unused_room)
   else $error("flk_cluster_cull: a beat without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
@@ -518,7 +519,7 @@ module flk_cluster_cull
   else $error("flk_cluster_cull: a kept cluster before the bounds");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      state_q == LAST |-> fetch_idle && !line_valid)
+      state_q == LAST |-> fetch_idle && lines_empty)
   else $error("flk_cluster_cull: reads go on after the last cluster");
 `endif
 

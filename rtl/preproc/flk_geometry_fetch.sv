@@ -77,9 +77,11 @@ module flk_geometry_fetch
 
   state_e state_d, state_q;
   logic   start, fails, end_taken_q, end_moves, fetch_idle, out_free;
+  logic   shapes_empty, colours_empty, lines_empty, drained;
   logic   out_valid_q, out_end_q, done_q, error_q;
 
-  assign start = state_q == IDLE && start_i;
+  assign start   = state_q == IDLE && start_i;
+  assign drained = fetch_idle && shapes_empty && colours_empty && lines_empty;
 
   always_comb begin
     state_d = state_q;
@@ -310,13 +312,13 @@ module flk_geometry_fetch
   ) i_shape_headers (
     .clk_i,
     .rst_ni,
-    .clear_i    (state_q == FAILED),
-    .in_valid_i (header_beat_comes && !later_q),
+    .in_valid_i (state_q != FAILED && header_beat_comes && !later_q),
     .in_ready_o (unused_shape_room),
     .in_data_i  (shape_in),
     .out_valid_o(shape_valid),
-    .out_ready_i(header_take),
-    .out_data_o (shape)
+    .out_ready_i(header_take || state_q == FAILED),
+    .out_data_o (shape),
+    .empty_o    (shapes_empty)
   );
 
   flk_sram_fifo #(
@@ -325,13 +327,13 @@ module flk_geometry_fetch
   ) i_colour_headers (
     .clk_i,
     .rst_ni,
-    .clear_i    (state_q == FAILED),
-    .in_valid_i (header_beat_comes && (later_q || !chunked_i)),
+    .in_valid_i (state_q != FAILED && header_beat_comes && (later_q || !chunked_i)),
     .in_ready_o (unused_colour_room),
     .in_data_i  (colour_in),
     .out_valid_o(colour_valid),
-    .out_ready_i(header_take),
-    .out_data_o (colour)
+    .out_ready_i(header_take || state_q == FAILED),
+    .out_data_o (colour),
+    .empty_o    (colours_empty)
   );
 
   // Headers go through while they can; one at the output stops all until it is used.
@@ -463,13 +465,13 @@ module flk_geometry_fetch
   ) i_geometry (
     .clk_i,
     .rst_ni,
-    .clear_i    (state_q == FAILED),
-    .in_valid_i (geometry_beat_comes),
+    .in_valid_i (state_q != FAILED && geometry_beat_comes),
     .in_ready_o (unused_line_room),
     .in_data_i  (beat_data),
     .out_valid_o(line_valid),
-    .out_ready_i(line_pop),
-    .out_data_o (line)
+    .out_ready_i(line_pop || state_q == FAILED),
+    .out_data_o (line),
+    .empty_o    (lines_empty)
   );
 
   assign groups = state_q == RUN && queue_valid && !queue_end;
@@ -495,7 +497,7 @@ module flk_geometry_fetch
   assign at_d      = emit && last ? 3'd4 : early ? 3'd0 : from_hold ? 3'(reach) : 3'(reach - 4'd4);
   assign header_use = emit && group_q == '0;
   assign end_moves  = out_free && ((state_q == RUN && queue_valid && queue_end) ||
-                                   (state_q == FAILED && end_taken_q && fetch_idle));
+                                   (state_q == FAILED && end_taken_q && drained));
   assign queue_pop  = (emit && last) || end_moves;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -612,12 +614,13 @@ module flk_geometry_fetch
   end
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      (header_beat_comes |-> unused_shape_room && unused_colour_room) and
-      (geometry_beat_comes |-> unused_line_room))
+      state_q != FAILED |->
+      (!header_beat_comes || (unused_shape_room && unused_colour_room)) &&
+      (!geometry_beat_comes || unused_line_room))
   else $error("flk_geometry_fetch: a beat without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      state_q == LEAVE |-> fetch_idle && !line_valid && !shape_valid && inside_q == '0)
+      state_q == LEAVE |-> drained && inside_q == '0)
   else $error("flk_geometry_fetch: something is left after the last group");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)

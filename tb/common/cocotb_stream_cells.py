@@ -1,7 +1,7 @@
 """cocotb tests of the cells with one stream in and one out: pipe register, skid buffer, FIFO.
 
 Settings: ``capacity`` (elements held while the output is blocked), ``period`` (cycles per element
-at full rate), ``paths`` (documented combinational paths, input to output), ``latency`` (1 unless given).
+at full rate), ``paths`` (documented combinational paths, input to output).
 """
 
 import cocotb
@@ -51,10 +51,10 @@ async def check_usage(dut, test):
 
 @cocotb.test()
 async def rate(dut):
-    """Unstalled: the promised latency and throughput."""
+    """Unstalled: latency 1 and the promised throughput."""
     test = StreamTest(dut, echo)
     await test.run(random_items(test), at_least=ITEMS)
-    assert test.output.first - test.input.first == config().get("latency", 1), "latency"
+    assert test.output.first - test.input.first == 1, "latency is not 1"
     for monitor in (test.input, test.output):
         taken = monitor.last - monitor.first
         assert taken == (ITEMS - 1) * config()["period"], f"{monitor.stream.name}: {taken} cycles"
