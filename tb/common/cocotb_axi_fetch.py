@@ -100,7 +100,7 @@ async def fetch(dut, idle, share, stall):
     await test.bench.reset()
     assert dut.idle_o.value == 1
     test.source.send(test.requests(20))
-    await test.bench.until(lambda: test.over, 100_000, "last beat")
+    await test.bench.until(lambda: test.over, 20_000, "last beat")
     await test.bench.cycles(5)
     assert dut.idle_o.value == 1 and test.come > 20 and test.port.port.idle
 
@@ -113,10 +113,7 @@ async def rate(dut):
     start = BASE // test.bytes // test.longest * test.longest
     beats = min(64 * test.longest, (1 << len(dut.in_beats_i)) - 1) // test.longest * test.longest
     test.source.send([(start, beats, 0, 0)])
-    cycles = 0
-    while test.come < beats:
-        await RisingEdge(dut.clk_i)
-        cycles += 1
+    cycles = await test.bench.until(lambda: test.come == beats, 20_000, "last beat")
     pieces = min(test.places // test.longest, int(dut.Bursts.value))
     trips = -(-beats // (pieces * test.longest))
     assert cycles <= trips * (100 + 8 + 2 * test.longest)
@@ -144,7 +141,7 @@ async def stop(dut, stall):
         dut.stop_i.value = 0
         await test.bench.cycles(1)
     test.share = 1.0
-    await test.bench.until(lambda: test.over and not test.held, 50_000, "the rest")
+    await test.bench.until(lambda: test.over and not test.held, 20_000, "the rest")
     await test.bench.cycles(3)
     assert test.under_way == 0
     test.share = 0.0
