@@ -106,6 +106,9 @@ def test_numbers() -> None:
         near = dataclasses.replace(setup, position=np.zeros(3), offset=np.array([-0.19998779296875, 0.0, 0.0, 0.0, 0.0]))
         cases.append((wild_table(rng, n), setup))
         cases.append((near_table(rng, n, setup), near))
+        turned = near_table(rng, n, setup)  # boxes whose farthest corner is nearer than the nearest
+        turned["low"], turned["high"] = turned["high"].copy(), turned["low"].copy()
+        cases.append((turned, near))
         if n == 300:
             # Where a subnormal number would matter: a camera next to nothing, and reaches of all sizes.
             small = dataclasses.replace(near, position=tiny(3), reach=np.full(5, 2.0**127), offset=tiny(5))
