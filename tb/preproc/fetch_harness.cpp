@@ -154,6 +154,7 @@ int bench_frame(const Frame* frame, const uint32_t* registers, const uint32_t* i
       done = true;
       if (!top.idle_o) fail("done but not idle");
       if (!b.port.idle()) fail("done, and reads are on their way");
+      if (taken != frame->items) fail("done, and items are left");
     }
     b.edge(false);
     if (b.context.gotError()) fail("an assertion of the design");
