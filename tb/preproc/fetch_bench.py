@@ -82,7 +82,7 @@ class FetchBench:
         return self.library.bench_waits()
 
     def frame(
-        self, registers: int, items: Sequence[int] = (), idle: str = "never", stall: str = "never", room: int = 1 << 16, limit: int = 200_000,
+        self, registers: int, items: Sequence[int] = (), idle: str = "never", stall: str = "never", room: int = 1 << 16, limit: int = 500_000,
         reset_at: int = -1,
     ) -> Outcome:
         """A frame. AssertionError for whatever harness, memory or the design's assertions find."""

@@ -199,7 +199,7 @@ def test_errors(form: PackedFormat) -> None:
 def test_reset_in_a_frame() -> None:
     rng = np.random.default_rng([seed(), 44])
     setup = some_setup()
-    packed = wild(rng, PackedFormat.CHUNK, rng.integers(1, 200, 10))
+    packed = wild(rng, PackedFormat.CHUNK, rng.integers(150, 257, 10))
     kept = np.arange(10)
     unit = bench()
     for cycle in (1, 4, 40, 45, 200, 300):
