@@ -118,7 +118,7 @@ def _golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[s
         lists = front.subtile_lists()
     kept = front.culled.keep
     return lists, {
-        "visible": len(front.gaussian), "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
+        "visible": front.outcomes["listed"], "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
         "clusters": len(kept), "clusters_kept": int(kept.sum()), "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
     }
 

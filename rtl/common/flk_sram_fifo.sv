@@ -1,16 +1,16 @@
 // First-in first-out queue of a stream, storage in a memory (flk_sram).
 //
-// Latency 2, throughput 1 per cycle. Holds Depth elements in the memory and one at the output, which
-// is the memory's read register. in_ready_o, out_valid_o and out_data_o come from registers. A full
-// memory takes nothing, even in the cycle in which an element leaves. Depth need not be a power of
-// two. Contents are not reset.
+// Latency 2, throughput 1 per cycle; holds Depth elements and one that stands at the output, which
+// is the memory's read register. in_ready_o and out_valid_o come from registers; out_ready_i
+// reaches the memory's read enable. clear_i (synchronous) empties it: what it holds, and what it
+// takes in that cycle, is gone in the next; empty_o from registers. Storage is not reset; Depth need not be a power of two.
 module flk_sram_fifo #(
-  parameter  int unsigned Width     = 8,
-  parameter  int unsigned Depth     = 32,
-  localparam int unsigned UsageBits = $clog2(Depth + 1)
+  parameter int unsigned Width = 8,
+  parameter int unsigned Depth = 16
 ) (
   input  logic             clk_i,
   input  logic             rst_ni,
+  input  logic             clear_i,
   // Upstream
   input  logic             in_valid_i,
   output logic             in_ready_o,
@@ -19,42 +19,65 @@ module flk_sram_fifo #(
   output logic             out_valid_o,
   input  logic             out_ready_i,
   output logic [Width-1:0] out_data_o,
-  // Nothing inside
-  output logic             empty_o
+  output logic             empty_o       // nothing inside
 );
 
   if (Width < 1 || Depth < 2) begin : gen_check
     $error("flk_sram_fifo: Width must be at least 1, Depth at least 2");
   end
 
-  localparam int unsigned AddrBits = Depth > 1 ? $clog2(Depth) : 1;
-  localparam logic [AddrBits-1:0] LAST = AddrBits'(Depth - 1);
+  // Pointers and number of words in the memory
 
-  logic [AddrBits-1:0]  write_q, read_q;
-  logic [UsageBits-1:0] usage_q;  // in the memory
-  logic                 out_valid_q;
-  logic                 push, fetch;
+  localparam int unsigned PtrBits = $clog2(Depth);
+  localparam int unsigned UsedBits = $clog2(Depth + 1);
+  localparam logic [PtrBits-1:0] LAST = PtrBits'(Depth - 1);
 
-  assign push  = in_valid_i && in_ready_o;
-  assign fetch = usage_q != '0 && (!out_valid_q || out_ready_i);
+  logic [PtrBits-1:0]  write_d, write_q;
+  logic [PtrBits-1:0]  read_d, read_q;
+  logic [UsedBits-1:0] used_d, used_q;
+  logic                out_valid_d, out_valid_q;
+  logic                push, fetch;
+
+  assign empty_o    = used_q == '0 && !out_valid_q;
+  assign in_ready_o = used_q != UsedBits'(Depth);
+  assign push       = in_valid_i && in_ready_o;
+  // A word that is written in this cycle is not counted yet: no word is read as it is written.
+  assign fetch      = used_q != '0 && (!out_valid_q || out_ready_i);
+
+  always_comb begin
+    write_d     = write_q;
+    read_d      = read_q;
+    used_d      = used_q + UsedBits'(push) - UsedBits'(fetch);
+    out_valid_d = fetch || (out_valid_q && !out_ready_i);
+    if (push) begin
+      write_d = write_q == LAST ? '0 : write_q + 1'b1;
+    end
+    if (fetch) begin
+      read_d = read_q == LAST ? '0 : read_q + 1'b1;
+    end
+    if (clear_i) begin
+      write_d     = '0;
+      read_d      = '0;
+      used_d      = '0;
+      out_valid_d = 1'b0;
+    end
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       write_q     <= '0;
       read_q      <= '0;
-      usage_q     <= '0;
+      used_q      <= '0;
       out_valid_q <= 1'b0;
     end else begin
-      if (push) begin
-        write_q <= write_q == LAST ? '0 : write_q + 1'b1;
-      end
-      if (fetch) begin
-        read_q <= read_q == LAST ? '0 : read_q + 1'b1;
-      end
-      usage_q     <= usage_q + UsageBits'(push) - UsageBits'(fetch);
-      out_valid_q <= fetch || (out_valid_q && !out_ready_i);
+      write_q     <= write_d;
+      read_q      <= read_d;
+      used_q      <= used_d;
+      out_valid_q <= out_valid_d;
     end
   end
+
+  // Storage
 
   flk_sram #(
     .Width(Width),
@@ -69,16 +92,14 @@ module flk_sram_fifo #(
     .rd_data_o(out_data_o)
   );
 
-  assign in_ready_o  = usage_q != UsageBits'(Depth);
   assign out_valid_o = out_valid_q;
-  assign empty_o     = usage_q == '0 && !out_valid_q;
 
 `ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) usage_q <= UsageBits'(Depth))
-  else $error("flk_sram_fifo: fill level above Depth");
+  assert property (@(posedge clk_i) disable iff (!rst_ni) used_q <= UsedBits'(Depth))
+  else $error("flk_sram_fifo: more words than Depth");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o && !out_ready_i |=> out_valid_o && $stable(out_data_o))
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
   else $error("flk_sram_fifo: output changed before its transfer");
 `endif
 

@@ -40,7 +40,7 @@ module flk_cluster_cull
   output logic                 error_o,
   output logic                 bounds_valid_o,
   output logic signed [7:0]    key_shift_o,
-  output logic [39:0]          key_low_o,
+  output position_t            key_low_o,
   output logic [31:0]          culled_clusters_o,
   output logic [31:0]          culled_gaussians_o,
   // Kept clusters
@@ -68,7 +68,7 @@ module flk_cluster_cull
   localparam int unsigned Inside = (CLUSTER_TEST_LATENCY + Interval - 1) / Interval;
   localparam logic [1:0] OUT_PHASE = 2'(CLUSTER_TEST_LATENCY % Interval);
   localparam cluster_t NEAR = 32'h3E4C_CCCD;  // 0.2: no depth is nearer
-  localparam int unsigned KeyField = 40;
+  localparam logic signed [8:0] MAX_SHIFT = 9'sd63;
   localparam int unsigned KeyBits = 24;
 
   // ---- frame ----------------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ module flk_cluster_cull
 
   state_e      state_d, state_q;
   logic [2:0]  step_q;  // of BOUNDS
-  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle, lines_empty;
+  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle;
   logic [23:0] tested_q;  // clusters of the pass that have been tested
 
   assign start      = state_q == IDLE && start_i;
@@ -108,7 +108,7 @@ module flk_cluster_cull
         end
       end
       FAILED: begin
-        if (fetch_idle && lines_empty) begin
+        if (fetch_idle) begin
           state_d = LAST;
         end
       end
@@ -190,19 +190,22 @@ module flk_cluster_cull
 
   assign fails = beat_valid && beat_error;
 
+  logic [0:0] unused_fifo_empty;
+
   flk_sram_fifo #(
     .Width(Width),
     .Depth(BufferBeats)
   ) i_buffer (
     .clk_i,
     .rst_ni,
-    .in_valid_i (beat_valid && state_q != FAILED),
+    .clear_i    (state_q == FAILED),
+    .in_valid_i (beat_valid),
     .in_ready_o (unused_room),
     .in_data_i  (beat_data),
     .out_valid_o(line_valid),
-    .out_ready_i(line_pop || state_q == FAILED),
+    .out_ready_i(line_pop),
     .out_data_o (line),
-    .empty_o    (lines_empty)
+    .empty_o    (unused_fifo_empty[0])
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -377,10 +380,9 @@ module flk_cluster_cull
 
   logic               any_q, bounds_valid_q, error_q, done_q;
   cluster_t           nearest_q, farthest_q, span;
-  logic signed [8:0]  shift_span, shift_far, shift;
+  logic signed [8:0]  shift_span;
+  logic signed [7:0]  shift;
   logic signed [7:0]  shift_q;
-  logic [7:0]         drop;
-  logic [39:0]        low_bits_q;
   logic [31:0]        clusters_q, gaussians_q;
 
   // Depths here are at least NEAR, so that their codes compare as numbers do.
@@ -422,28 +424,23 @@ module flk_cluster_cull
     .sum_o(span)
   );
 
-  // Keys of KeyBits for all depths of the span, depths of KeyField for the farthest.
+  // Keys of KeyBits for all depths of the span.
   assign shift_span = 9'(KeyBits - 1 + 127) - 9'(span[30:23]);
-  assign shift_far  = 9'(KeyField - 1 + 127) - 9'(farthest_q[30:23]);
-
-  always_comb begin
-    shift = span == '0 ? 9'(KeyField) : shift_span;
-    if (shift_far < shift) begin
-      shift = shift_far;
-    end
-  end
-
-  // Places that the nearest depth, its leading bit on top of KeyField bits, goes down.
-  assign drop = 8'(9'(KeyField - 1 + 127) - 9'(nearest_q[30:23]) - 9'(shift_q));
+  assign shift      = span == '0 || shift_span > MAX_SHIFT ? 8'(MAX_SHIFT) : 8'(shift_span);
 
   always_ff @(posedge clk_i) begin
     if (state_q == BOUNDS && step_q == 3'd4) begin
-      shift_q <= 8'(shift);
-    end
-    if (state_q == BOUNDS && step_q == 3'd5) begin
-      low_bits_q <= {1'b1, nearest_q[22:0], 16'b0} >> drop;
+      shift_q <= shift;
     end
   end
+
+  flk_ff_narrow #(
+    .FromBits(23),
+    .ManBits (POSITION_MAN_BITS)
+  ) i_low (
+    .x_i(nearest_q),
+    .y_o(key_low_o)
+  );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -489,7 +486,6 @@ module flk_cluster_cull
   assign error_o            = error_q;
   assign bounds_valid_o     = bounds_valid_q;
   assign key_shift_o        = shift_q;
-  assign key_low_o          = low_bits_q;
   assign culled_clusters_o  = clusters_q;
   assign culled_gaussians_o = gaussians_q;
 
@@ -510,8 +506,7 @@ module flk_cluster_cull
   assert property (@(posedge clk_i) disable iff (!rst_ni) load |-> !(&entry.sigma[14:7]))
   else $error("flk_cluster_cull: a sigma that is not finite");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni)
-      beat_valid && state_q != FAILED |-> unused_room)
+  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> unused_room)
   else $error("flk_cluster_cull: a beat without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
@@ -519,7 +514,7 @@ module flk_cluster_cull
   else $error("flk_cluster_cull: a kept cluster before the bounds");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      state_q == LAST |-> fetch_idle && lines_empty)
+      state_q == LAST |-> fetch_idle && !line_valid)
   else $error("flk_cluster_cull: reads go on after the last cluster");
 `endif
 

@@ -38,68 +38,101 @@ module flk_cluster_header (
   input  logic [31:0]        sh_step_20_i,
   input  logic [31:0]        sh_step_21_i,
   input  logic [31:0]        sh_step_22_i,
-  output logic [29:0]        low_0_o,
-  output logic [29:0]        step_0_o,
+  output logic [27:0]        low_0_o,
+  output logic [27:0]        step_0_o,
   output logic signed [26:0] scale_low_0_o,
   output logic signed [26:0] scale_step_0_o,
-  output logic [21:0]        dc_low_0_o,
-  output logic [21:0]        dc_step_0_o,
-  output logic [21:0]        sh_step_00_o,
-  output logic [21:0]        sh_step_10_o,
-  output logic [21:0]        sh_step_20_o,
-  output logic [29:0]        low_1_o,
-  output logic [29:0]        step_1_o,
+  output logic [19:0]        dc_low_0_o,
+  output logic [19:0]        dc_step_0_o,
+  output logic [19:0]        sh_step_00_o,
+  output logic [19:0]        sh_step_10_o,
+  output logic [19:0]        sh_step_20_o,
+  output logic [27:0]        low_1_o,
+  output logic [27:0]        step_1_o,
   output logic signed [26:0] scale_low_1_o,
   output logic signed [26:0] scale_step_1_o,
-  output logic [21:0]        dc_low_1_o,
-  output logic [21:0]        dc_step_1_o,
-  output logic [21:0]        sh_step_01_o,
-  output logic [21:0]        sh_step_11_o,
-  output logic [21:0]        sh_step_21_o,
-  output logic [29:0]        low_2_o,
-  output logic [29:0]        step_2_o,
+  output logic [19:0]        dc_low_1_o,
+  output logic [19:0]        dc_step_1_o,
+  output logic [19:0]        sh_step_01_o,
+  output logic [19:0]        sh_step_11_o,
+  output logic [19:0]        sh_step_21_o,
+  output logic [27:0]        low_2_o,
+  output logic [27:0]        step_2_o,
   output logic signed [26:0] scale_low_2_o,
   output logic signed [26:0] scale_step_2_o,
-  output logic [21:0]        dc_low_2_o,
-  output logic [21:0]        dc_step_2_o,
-  output logic [21:0]        sh_step_02_o,
-  output logic [21:0]        sh_step_12_o,
-  output logic [21:0]        sh_step_22_o
+  output logic [19:0]        dc_low_2_o,
+  output logic [19:0]        dc_step_2_o,
+  output logic [19:0]        sh_step_02_o,
+  output logic [19:0]        sh_step_12_o,
+  output logic [19:0]        sh_step_22_o
 );
 
+  logic [31:0] v30;  // cycle 3
+  logic [31:0] u_v30;
+  logic [27:0] low_0;  // cycle 3
+  logic [27:0] step_0;  // cycle 0
+  logic signed [26:0] scale_low_0;  // cycle 2
+  logic signed [26:0] u_scale_low_0;
+  logic signed [26:0] scale_step_0;  // cycle 2
+  logic signed [26:0] u_scale_step_0;
+  logic [19:0] dc_low_0;  // cycle 0
+  logic [19:0] dc_step_0;  // cycle 0
+  logic [19:0] sh_step_00;  // cycle 0
+  logic [19:0] sh_step_10;  // cycle 0
+  logic [19:0] sh_step_20;  // cycle 0
+  logic [31:0] v40;  // cycle 4
+  logic [27:0] low_1;  // cycle 4
+  logic [27:0] step_1;  // cycle 0
+  logic signed [26:0] scale_low_1;  // cycle 5
+  logic signed [26:0] scale_step_1;  // cycle 5
+  logic [19:0] dc_low_1;  // cycle 0
+  logic [19:0] dc_step_1;  // cycle 0
+  logic [19:0] sh_step_01;  // cycle 0
+  logic [19:0] sh_step_11;  // cycle 0
+  logic [19:0] sh_step_21;  // cycle 0
+  logic [31:0] v50;  // cycle 5
+  logic [27:0] low_2;  // cycle 5
+  logic [27:0] step_2;  // cycle 0
+  logic signed [26:0] scale_low_2;  // cycle 4
+  logic signed [26:0] scale_step_2;  // cycle 4
+  logic [19:0] dc_low_2;  // cycle 0
+  logic [19:0] dc_step_2;  // cycle 0
+  logic [19:0] sh_step_02;  // cycle 0
+  logic [19:0] sh_step_12;  // cycle 0
+  logic [19:0] sh_step_22;  // cycle 0
   logic [0:0][31:0] origin_1_i_q;
   logic [0:0][31:0] origin_2_i_q;
   logic [0:0][31:0] scale_low_1_i_q;
   logic [0:0][31:0] scale_low_2_i_q;
   logic [0:0][31:0] scale_step_1_i_q;
   logic [0:0][31:0] scale_step_2_i_q;
-  logic [1:0][29:0] low_0_q;
-  logic [1:0][29:0] step_0_q;
+  logic [1:0][27:0] low_0_q;
+  logic [1:0][27:0] step_0_q;
   logic [1:0][26:0] scale_low_0_q;
   logic [1:0][26:0] scale_step_0_q;
-  logic [1:0][21:0] dc_low_0_q;
-  logic [1:0][21:0] dc_step_0_q;
-  logic [1:0][21:0] sh_step_00_q;
-  logic [1:0][21:0] sh_step_10_q;
-  logic [1:0][21:0] sh_step_20_q;
-  logic [0:0][29:0] low_1_q;
-  logic [1:0][29:0] step_1_q;
+  logic [1:0][19:0] dc_low_0_q;
+  logic [1:0][19:0] dc_step_0_q;
+  logic [1:0][19:0] sh_step_00_q;
+  logic [1:0][19:0] sh_step_10_q;
+  logic [1:0][19:0] sh_step_20_q;
+  logic [0:0][27:0] low_1_q;
+  logic [1:0][27:0] step_1_q;
   logic [0:0][26:0] scale_low_1_q;
   logic [0:0][26:0] scale_step_1_q;
-  logic [1:0][21:0] dc_low_1_q;
-  logic [1:0][21:0] dc_step_1_q;
-  logic [1:0][21:0] sh_step_01_q;
-  logic [1:0][21:0] sh_step_11_q;
-  logic [1:0][21:0] sh_step_21_q;
-  logic [0:0][29:0] low_2_q;
-  logic [1:0][29:0] step_2_q;
+  logic [1:0][19:0] dc_low_1_q;
+  logic [1:0][19:0] dc_step_1_q;
+  logic [1:0][19:0] sh_step_01_q;
+  logic [1:0][19:0] sh_step_11_q;
+  logic [1:0][19:0] sh_step_21_q;
+  logic [0:0][27:0] low_2_q;
+  logic [1:0][27:0] step_2_q;
   logic [0:0][26:0] scale_low_2_q;
   logic [0:0][26:0] scale_step_2_q;
-  logic [1:0][21:0] dc_low_2_q;
-  logic [1:0][21:0] dc_step_2_q;
-  logic [1:0][21:0] sh_step_02_q;
-  logic [1:0][21:0] sh_step_12_q;
-  logic [1:0][21:0] sh_step_22_q;
+  logic [1:0][19:0] dc_low_2_q;
+  logic [1:0][19:0] dc_step_2_q;
+  logic [1:0][19:0] sh_step_02_q;
+  logic [1:0][19:0] sh_step_12_q;
+  logic [1:0][19:0] sh_step_22_q;
 
   always_ff @(posedge clk_i) begin
     if (en_i && phase_i == 2'd0) begin
@@ -154,72 +187,39 @@ module flk_cluster_header (
     end
   end
 
-  logic [31:0] u_v30;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v30 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? origin_0_i : phase_i == 2'd1 ? origin_1_i_q[0] : origin_2_i_q[0]), .b_i(phase_i == 2'd0 ? {!position_0_i[31], position_0_i[30:0]} : phase_i == 2'd1 ? {!position_1_i[31], position_1_i[30:0]} : {!position_2_i[31], position_2_i[30:0]}), .sum_o(u_v30));
-  logic [31:0] v30;  // cycle 0 to 3
   assign v30 = u_v30;
-  logic [31:0] v40;  // cycle 1 to 4
   assign v40 = u_v30;
-  logic [31:0] v50;  // cycle 2 to 5
   assign v50 = u_v30;
-  logic [29:0] low_0;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_low_0 (.x_i(v30), .y_o(low_0));
-  logic [29:0] step_0;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_step_0 (.x_i(step_0_i), .y_o(step_0));
-  logic signed [26:0] u_scale_low_0;
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_0 (.x_i(v30), .y_o(low_0));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_0 (.x_i(step_0_i), .y_o(step_0));
   flk_ff_to_fixed #(.Bits(27), .FracBits(20), .Round(1), .ManBits(23), .Stages(2)) i_u_scale_low_0 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? scale_low_0_i : phase_i == 2'd2 ? scale_low_2_i_q[0] : scale_low_1_i_q[0]), .y_o(u_scale_low_0));
-  logic signed [26:0] scale_low_0;  // cycle 0 to 2
   assign scale_low_0 = u_scale_low_0;
-  logic signed [26:0] scale_low_2;  // cycle 2 to 4
   assign scale_low_2 = u_scale_low_0;
-  logic signed [26:0] scale_low_1;  // cycle 3 to 5
   assign scale_low_1 = u_scale_low_0;
-  logic signed [26:0] u_scale_step_0;
   flk_ff_to_fixed #(.Bits(27), .FracBits(20), .Round(1), .ManBits(23), .Stages(2)) i_u_scale_step_0 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? scale_step_0_i : phase_i == 2'd2 ? scale_step_2_i_q[0] : scale_step_1_i_q[0]), .y_o(u_scale_step_0));
-  logic signed [26:0] scale_step_0;  // cycle 0 to 2
   assign scale_step_0 = u_scale_step_0;
-  logic signed [26:0] scale_step_2;  // cycle 2 to 4
   assign scale_step_2 = u_scale_step_0;
-  logic signed [26:0] scale_step_1;  // cycle 3 to 5
   assign scale_step_1 = u_scale_step_0;
-  logic [21:0] dc_low_0;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_low_0 (.x_i(dc_low_0_i), .y_o(dc_low_0));
-  logic [21:0] dc_step_0;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_step_0 (.x_i(dc_step_0_i), .y_o(dc_step_0));
-  logic [21:0] sh_step_00;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_00 (.x_i(sh_step_00_i), .y_o(sh_step_00));
-  logic [21:0] sh_step_10;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_10 (.x_i(sh_step_10_i), .y_o(sh_step_10));
-  logic [21:0] sh_step_20;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_20 (.x_i(sh_step_20_i), .y_o(sh_step_20));
-  logic [29:0] low_1;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_low_1 (.x_i(v40), .y_o(low_1));
-  logic [29:0] step_1;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_step_1 (.x_i(step_1_i), .y_o(step_1));
-  logic [21:0] dc_low_1;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_low_1 (.x_i(dc_low_1_i), .y_o(dc_low_1));
-  logic [21:0] dc_step_1;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_step_1 (.x_i(dc_step_1_i), .y_o(dc_step_1));
-  logic [21:0] sh_step_01;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_01 (.x_i(sh_step_01_i), .y_o(sh_step_01));
-  logic [21:0] sh_step_11;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_11 (.x_i(sh_step_11_i), .y_o(sh_step_11));
-  logic [21:0] sh_step_21;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_21 (.x_i(sh_step_21_i), .y_o(sh_step_21));
-  logic [29:0] low_2;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_low_2 (.x_i(v50), .y_o(low_2));
-  logic [29:0] step_2;
-  flk_ff_narrow #(.FromBits(23), .ManBits(21)) i_step_2 (.x_i(step_2_i), .y_o(step_2));
-  logic [21:0] dc_low_2;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_low_2 (.x_i(dc_low_2_i), .y_o(dc_low_2));
-  logic [21:0] dc_step_2;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_dc_step_2 (.x_i(dc_step_2_i), .y_o(dc_step_2));
-  logic [21:0] sh_step_02;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_02 (.x_i(sh_step_02_i), .y_o(sh_step_02));
-  logic [21:0] sh_step_12;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_12 (.x_i(sh_step_12_i), .y_o(sh_step_12));
-  logic [21:0] sh_step_22;
-  flk_ff_narrow #(.FromBits(23), .ManBits(13)) i_sh_step_22 (.x_i(sh_step_22_i), .y_o(sh_step_22));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_low_0 (.x_i(dc_low_0_i), .y_o(dc_low_0));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_step_0 (.x_i(dc_step_0_i), .y_o(dc_step_0));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_00 (.x_i(sh_step_00_i), .y_o(sh_step_00));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_10 (.x_i(sh_step_10_i), .y_o(sh_step_10));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_20 (.x_i(sh_step_20_i), .y_o(sh_step_20));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_1 (.x_i(v40), .y_o(low_1));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_1 (.x_i(step_1_i), .y_o(step_1));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_low_1 (.x_i(dc_low_1_i), .y_o(dc_low_1));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_step_1 (.x_i(dc_step_1_i), .y_o(dc_step_1));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_01 (.x_i(sh_step_01_i), .y_o(sh_step_01));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_11 (.x_i(sh_step_11_i), .y_o(sh_step_11));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_21 (.x_i(sh_step_21_i), .y_o(sh_step_21));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_2 (.x_i(v50), .y_o(low_2));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_2 (.x_i(step_2_i), .y_o(step_2));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_low_2 (.x_i(dc_low_2_i), .y_o(dc_low_2));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_step_2 (.x_i(dc_step_2_i), .y_o(dc_step_2));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_02 (.x_i(sh_step_02_i), .y_o(sh_step_02));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_12 (.x_i(sh_step_12_i), .y_o(sh_step_12));
+  flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_22 (.x_i(sh_step_22_i), .y_o(sh_step_22));
 
   assign low_0_o = low_0_q[1];
   assign step_0_o = step_0_q[1];

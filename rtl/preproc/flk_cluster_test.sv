@@ -48,6 +48,121 @@ module flk_cluster_test (
   output logic [31:0] farthest_o
 );
 
+  logic [31:0] v35;  // cycle 3
+  logic [31:0] u_v35;
+  logic [31:0] v36;  // cycle 3
+  logic [31:0] u_v36;
+  logic [31:0] v37;  // cycle 3
+  logic [31:0] u_v37;
+  logic [31:0] v38;  // cycle 3
+  logic [31:0] u_v38;
+  logic [31:0] v39;  // cycle 3
+  logic [31:0] u_v39;
+  logic [31:0] v40;  // cycle 3
+  logic [31:0] u_v40;
+  logic v41;
+  logic [31:0] v42;  // cycle 3
+  logic v43;
+  logic [31:0] v44;  // cycle 3
+  logic v45;
+  logic [31:0] v46;  // cycle 3
+  logic [31:0] v47;  // cycle 8
+  logic [31:0] u_v47;
+  logic [31:0] v48;  // cycle 9
+  logic [31:0] v49;  // cycle 12
+  logic [31:0] v50;  // cycle 10
+  logic [31:0] farthest;  // cycle 15
+  logic [31:0] u_farthest;
+  logic [31:0] v52;  // cycle 18
+  logic [31:0] v53;  // cycle 4
+  logic [31:0] u_v53;
+  logic [31:0] v54;  // cycle 22
+  logic v55;  // cycle 22
+  logic v56;  // cycle 23
+  logic v57;
+  logic [31:0] v58;  // cycle 3
+  logic v59;
+  logic [31:0] v60;  // cycle 3
+  logic v61;
+  logic [31:0] v62;  // cycle 3
+  logic [31:0] v63;  // cycle 11
+  logic [31:0] v64;  // cycle 11
+  logic [31:0] v65;  // cycle 14
+  logic [31:0] v66;  // cycle 11
+  logic [31:0] u_v80;
+  logic [31:0] nearest;  // cycle 17
+  logic v68;
+  logic [31:0] v69;  // cycle 3
+  logic v70;
+  logic [31:0] v71;  // cycle 3
+  logic v72;
+  logic [31:0] v73;  // cycle 3
+  logic [31:0] v74;  // cycle 9
+  logic [31:0] v75;  // cycle 9
+  logic [31:0] v76;  // cycle 12
+  logic [31:0] v77;  // cycle 10
+  logic [31:0] v78;  // cycle 16
+  logic [31:0] v79;  // cycle 21
+  logic [31:0] v80;  // cycle 4
+  logic [31:0] v81;  // cycle 26
+  logic v82;  // cycle 26
+  logic v83;  // cycle 27
+  logic v84;  // cycle 27
+  logic v85;
+  logic [31:0] v86;  // cycle 3
+  logic v87;
+  logic [31:0] v88;  // cycle 3
+  logic v89;
+  logic [31:0] v90;  // cycle 3
+  logic [31:0] v91;  // cycle 9
+  logic [31:0] u_v97;
+  logic [31:0] v92;  // cycle 9
+  logic [31:0] u_v114;
+  logic [31:0] v93;  // cycle 12
+  logic [31:0] v94;  // cycle 10
+  logic [31:0] v95;  // cycle 16
+  logic [31:0] v96;  // cycle 21
+  logic [31:0] v97;  // cycle 4
+  logic [31:0] v98;  // cycle 26
+  logic v99;  // cycle 26
+  logic v100;  // cycle 28
+  logic v101;  // cycle 28
+  logic v102;
+  logic [31:0] v103;  // cycle 3
+  logic v104;
+  logic [31:0] v105;  // cycle 3
+  logic v106;
+  logic [31:0] v107;  // cycle 3
+  logic [31:0] v108;  // cycle 9
+  logic [31:0] u_v131;
+  logic [31:0] v109;  // cycle 10
+  logic [31:0] v110;  // cycle 13
+  logic [31:0] v111;  // cycle 11
+  logic [31:0] v112;  // cycle 16
+  logic [31:0] v113;  // cycle 21
+  logic [31:0] v114;  // cycle 4
+  logic [31:0] v115;  // cycle 26
+  logic v116;  // cycle 26
+  logic v117;  // cycle 29
+  logic v118;  // cycle 29
+  logic v119;
+  logic [31:0] v120;  // cycle 3
+  logic v121;
+  logic [31:0] v122;  // cycle 3
+  logic v123;
+  logic [31:0] v124;  // cycle 3
+  logic [31:0] v125;  // cycle 10
+  logic [31:0] v126;  // cycle 10
+  logic [31:0] v127;  // cycle 13
+  logic [31:0] v128;  // cycle 11
+  logic [31:0] v129;  // cycle 16
+  logic [31:0] v130;  // cycle 21
+  logic [31:0] v131;  // cycle 4
+  logic [31:0] v132;  // cycle 26
+  logic v133;  // cycle 26
+  logic v134;  // cycle 30
+  logic v135;  // cycle 30
+  logic keep;  // cycle 31
   logic [0:0][31:0] v42_q;
   logic [0:0][31:0] v44_q;
   logic [0:0][31:0] v46_q;
@@ -179,235 +294,120 @@ module flk_cluster_test (
     end
   end
 
-  logic [31:0] u_v35;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v35 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? low_0_i : phase_i == 2'd1 ? v47_q[0] : phase_i == 2'd2 ? v65 : farthest), .b_i(phase_i == 2'd0 ? {!position_0_i[31], position_0_i[30:0]} : phase_i == 2'd1 ? v48 : phase_i == 2'd2 ? v66_q[0] : offset_0_i), .sum_o(u_v35));
-  logic [31:0] v35;  // cycle 0 to 3
   assign v35 = u_v35;
-  logic [31:0] v49;  // cycle 9 to 12
   assign v49 = u_v35;
-  logic [31:0] nearest;  // cycle 14 to 17
   assign nearest = u_v35;
-  logic [31:0] v52;  // cycle 15 to 18
   assign v52 = u_v35;
-  logic [31:0] u_v36;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v36 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? low_1_i : phase_i == 2'd1 ? v74 : phase_i == 2'd2 ? v78_q[0] : v52_q[0]), .b_i(phase_i == 2'd0 ? {!position_1_i[31], position_1_i[30:0]} : phase_i == 2'd1 ? v75 : phase_i == 2'd2 ? offset_1_i : v53_q[3]), .sum_o(u_v36));
-  logic [31:0] v36;  // cycle 0 to 3
   assign v36 = u_v36;
-  logic [31:0] v76;  // cycle 9 to 12
   assign v76 = u_v36;
-  logic [31:0] v79;  // cycle 18 to 21
   assign v79 = u_v36;
-  logic [31:0] v54;  // cycle 19 to 22
   assign v54 = u_v36;
-  logic [31:0] u_v37;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v37 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? low_2_i : phase_i == 2'd1 ? v76_q[0] : phase_i == 2'd2 ? v95_q[0] : v63), .b_i(phase_i == 2'd0 ? {!position_2_i[31], position_2_i[30:0]} : phase_i == 2'd1 ? v77_q[0] : phase_i == 2'd2 ? offset_2_i : v64), .sum_o(u_v37));
-  logic [31:0] v37;  // cycle 0 to 3
   assign v37 = u_v37;
-  logic [31:0] v78;  // cycle 13 to 16
   assign v78 = u_v37;
-  logic [31:0] v96;  // cycle 18 to 21
   assign v96 = u_v37;
-  logic [31:0] v65;  // cycle 11 to 14
   assign v65 = u_v37;
-  logic [31:0] u_v38;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v38 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? high_0_i : phase_i == 2'd1 ? v91 : phase_i == 2'd2 ? v108_q[0] : v79_q[0]), .b_i(phase_i == 2'd0 ? {!position_0_i[31], position_0_i[30:0]} : phase_i == 2'd1 ? v92 : phase_i == 2'd2 ? v109 : v80_q[4]), .sum_o(u_v38));
-  logic [31:0] v38;  // cycle 0 to 3
   assign v38 = u_v38;
-  logic [31:0] v93;  // cycle 9 to 12
   assign v93 = u_v38;
-  logic [31:0] v110;  // cycle 10 to 13
   assign v110 = u_v38;
-  logic [31:0] v81;  // cycle 23 to 26
   assign v81 = u_v38;
-  logic [31:0] u_v39;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v39 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? high_1_i : phase_i == 2'd1 ? v93_q[0] : phase_i == 2'd2 ? v112_q[0] : v96_q[0]), .b_i(phase_i == 2'd0 ? {!position_1_i[31], position_1_i[30:0]} : phase_i == 2'd1 ? v94_q[0] : phase_i == 2'd2 ? offset_3_i : v97_q[4]), .sum_o(u_v39));
-  logic [31:0] v39;  // cycle 0 to 3
   assign v39 = u_v39;
-  logic [31:0] v95;  // cycle 13 to 16
   assign v95 = u_v39;
-  logic [31:0] v113;  // cycle 18 to 21
   assign v113 = u_v39;
-  logic [31:0] v98;  // cycle 23 to 26
   assign v98 = u_v39;
-  logic [31:0] u_v40;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v40 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? high_2_i : phase_i == 2'd1 ? v110 : phase_i == 2'd2 ? v125 : v113_q[0]), .b_i(phase_i == 2'd0 ? {!position_2_i[31], position_2_i[30:0]} : phase_i == 2'd1 ? v111_q[0] : phase_i == 2'd2 ? v126 : v114_q[4]), .sum_o(u_v40));
-  logic [31:0] v40;  // cycle 0 to 3
   assign v40 = u_v40;
-  logic [31:0] v112;  // cycle 13 to 16
   assign v112 = u_v40;
-  logic [31:0] v127;  // cycle 10 to 13
   assign v127 = u_v40;
-  logic [31:0] v115;  // cycle 23 to 26
   assign v115 = u_v40;
-  logic v41;
   flk_ff_cmp #(.ManBits(23)) i_v41 (.a_i(normal_00_i), .b_i(32'h0), .lt_o(v41));
-  logic [31:0] v42;
   assign v42 = v41 ? v35 : v38;
-  logic v43;
   flk_ff_cmp #(.ManBits(23)) i_v43 (.a_i(normal_01_i), .b_i(32'h0), .lt_o(v43));
-  logic [31:0] v44;
   assign v44 = v43 ? v36 : v39;
-  logic v45;
   flk_ff_cmp #(.ManBits(23)) i_v45 (.a_i(normal_02_i), .b_i(32'h0), .lt_o(v45));
-  logic [31:0] v46;
   assign v46 = v45 ? v37 : v40;
-  logic [31:0] u_v47;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v47 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? normal_00_i : phase_i == 2'd1 ? normal_01_i : phase_i == 2'd2 ? normal_02_i : normal_00_i), .b_i(phase_i == 2'd0 ? v42_q[0] : phase_i == 2'd1 ? v44_q[0] : phase_i == 2'd2 ? v46_q[0] : v58_q[0]), .prod_o(u_v47));
-  logic [31:0] v47;  // cycle 4 to 8
   assign v47 = u_v47;
-  logic [31:0] v48;  // cycle 5 to 9
   assign v48 = u_v47;
-  logic [31:0] v50;  // cycle 6 to 10
   assign v50 = u_v47;
-  logic [31:0] v63;  // cycle 7 to 11
   assign v63 = u_v47;
-  logic [31:0] u_farthest;
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_farthest (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? v49 : phase_i == 2'd1 ? v127 : phase_i == 2'd2 ? v129_q[0] : v130_q[0]), .b_i(phase_i == 2'd0 ? v50_q[0] : phase_i == 2'd1 ? v128_q[0] : phase_i == 2'd2 ? offset_4_i : v131_q[4]), .sum_o(u_farthest));
-  logic [31:0] farthest;  // cycle 12 to 15
   assign farthest = u_farthest;
-  logic [31:0] v129;  // cycle 13 to 16
   assign v129 = u_farthest;
-  logic [31:0] v130;  // cycle 18 to 21
   assign v130 = u_farthest;
-  logic [31:0] v132;  // cycle 23 to 26
   assign v132 = u_farthest;
-  logic [31:0] u_v53;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v53 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? reach_0_i : phase_i == 2'd1 ? normal_10_i : phase_i == 2'd2 ? normal_12_i : normal_01_i), .b_i(phase_i == 2'd0 ? sigma_i : phase_i == 2'd1 ? v69_q[0] : phase_i == 2'd2 ? v73_q[0] : v60_q[0]), .prod_o(u_v53));
-  logic [31:0] v53;  // cycle 0 to 4
   assign v53 = u_v53;
-  logic [31:0] v74;  // cycle 5 to 9
   assign v74 = u_v53;
-  logic [31:0] v77;  // cycle 6 to 10
   assign v77 = u_v53;
-  logic [31:0] v64;  // cycle 7 to 11
   assign v64 = u_v53;
-  logic v55;
   flk_ff_cmp #(.ManBits(23)) i_v55 (.a_i(32'h0), .b_i(v54), .lt_o(v55));
-  logic v56;
   assign v56 = !v55_q[0];
-  logic v57;
   flk_ff_cmp #(.ManBits(23)) i_v57 (.a_i(32'h0), .b_i(normal_00_i), .lt_o(v57));
-  logic [31:0] v58;
   assign v58 = v57 ? v35 : v38;
-  logic v59;
   flk_ff_cmp #(.ManBits(23)) i_v59 (.a_i(32'h0), .b_i(normal_01_i), .lt_o(v59));
-  logic [31:0] v60;
   assign v60 = v59 ? v36 : v39;
-  logic v61;
   flk_ff_cmp #(.ManBits(23)) i_v61 (.a_i(32'h0), .b_i(normal_02_i), .lt_o(v61));
-  logic [31:0] v62;
   assign v62 = v61 ? v37 : v40;
-  logic [31:0] u_v80;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v80 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? reach_1_i : phase_i == 2'd1 ? normal_11_i : phase_i == 2'd2 ? normal_22_i : normal_02_i), .b_i(phase_i == 2'd0 ? sigma_i : phase_i == 2'd1 ? v71_q[0] : phase_i == 2'd2 ? v90_q[0] : v62_q[0]), .prod_o(u_v80));
-  logic [31:0] v80;  // cycle 0 to 4
   assign v80 = u_v80;
-  logic [31:0] v75;  // cycle 5 to 9
   assign v75 = u_v80;
-  logic [31:0] v94;  // cycle 6 to 10
   assign v94 = u_v80;
-  logic [31:0] v66;  // cycle 7 to 11
   assign v66 = u_v80;
-  logic v68;
   flk_ff_cmp #(.ManBits(23)) i_v68 (.a_i(normal_10_i), .b_i(32'h0), .lt_o(v68));
-  logic [31:0] v69;
   assign v69 = v68 ? v35 : v38;
-  logic v70;
   flk_ff_cmp #(.ManBits(23)) i_v70 (.a_i(normal_11_i), .b_i(32'h0), .lt_o(v70));
-  logic [31:0] v71;
   assign v71 = v70 ? v36 : v39;
-  logic v72;
   flk_ff_cmp #(.ManBits(23)) i_v72 (.a_i(normal_12_i), .b_i(32'h0), .lt_o(v72));
-  logic [31:0] v73;
   assign v73 = v72 ? v37 : v40;
-  logic v82;
   flk_ff_cmp #(.ManBits(23)) i_v82 (.a_i(32'h0), .b_i(v81), .lt_o(v82));
-  logic v83;
   assign v83 = !v82_q[0];
-  logic v84;
   assign v84 = v56_q[0] | v83;
-  logic v85;
   flk_ff_cmp #(.ManBits(23)) i_v85 (.a_i(normal_20_i), .b_i(32'h0), .lt_o(v85));
-  logic [31:0] v86;
   assign v86 = v85 ? v35 : v38;
-  logic v87;
   flk_ff_cmp #(.ManBits(23)) i_v87 (.a_i(normal_21_i), .b_i(32'h0), .lt_o(v87));
-  logic [31:0] v88;
   assign v88 = v87 ? v36 : v39;
-  logic v89;
   flk_ff_cmp #(.ManBits(23)) i_v89 (.a_i(normal_22_i), .b_i(32'h0), .lt_o(v89));
-  logic [31:0] v90;
   assign v90 = v89 ? v37 : v40;
-  logic [31:0] u_v97;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v97 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? reach_2_i : phase_i == 2'd1 ? normal_20_i : phase_i == 2'd2 ? normal_31_i : normal_32_i), .b_i(phase_i == 2'd0 ? sigma_i : phase_i == 2'd1 ? v86_q[0] : phase_i == 2'd2 ? v105_q[0] : v107_q[0]), .prod_o(u_v97));
-  logic [31:0] v97;  // cycle 0 to 4
   assign v97 = u_v97;
-  logic [31:0] v91;  // cycle 5 to 9
   assign v91 = u_v97;
-  logic [31:0] v109;  // cycle 6 to 10
   assign v109 = u_v97;
-  logic [31:0] v111;  // cycle 7 to 11
   assign v111 = u_v97;
-  logic [31:0] u_v114;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v114 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? reach_3_i : phase_i == 2'd1 ? normal_21_i : phase_i == 2'd2 ? normal_40_i : normal_42_i), .b_i(phase_i == 2'd0 ? sigma_i : phase_i == 2'd1 ? v88_q[0] : phase_i == 2'd2 ? v120_q[0] : v124_q[0]), .prod_o(u_v114));
-  logic [31:0] v114;  // cycle 0 to 4
   assign v114 = u_v114;
-  logic [31:0] v92;  // cycle 5 to 9
   assign v92 = u_v114;
-  logic [31:0] v125;  // cycle 6 to 10
   assign v125 = u_v114;
-  logic [31:0] v128;  // cycle 7 to 11
   assign v128 = u_v114;
-  logic v99;
   flk_ff_cmp #(.ManBits(23)) i_v99 (.a_i(32'h0), .b_i(v98), .lt_o(v99));
-  logic v100;
   assign v100 = !v99_q[0];
-  logic v101;
   assign v101 = v84_q[0] | v100;
-  logic v102;
   flk_ff_cmp #(.ManBits(23)) i_v102 (.a_i(normal_30_i), .b_i(32'h0), .lt_o(v102));
-  logic [31:0] v103;
   assign v103 = v102 ? v35 : v38;
-  logic v104;
   flk_ff_cmp #(.ManBits(23)) i_v104 (.a_i(normal_31_i), .b_i(32'h0), .lt_o(v104));
-  logic [31:0] v105;
   assign v105 = v104 ? v36 : v39;
-  logic v106;
   flk_ff_cmp #(.ManBits(23)) i_v106 (.a_i(normal_32_i), .b_i(32'h0), .lt_o(v106));
-  logic [31:0] v107;
   assign v107 = v106 ? v37 : v40;
-  logic [31:0] u_v131;
   flk_ff_mul #(.ManBits(23), .Stages(4)) i_u_v131 (.clk_i, .en_i, .a_i(phase_i == 2'd0 ? reach_4_i : phase_i == 2'd1 ? normal_30_i : normal_41_i), .b_i(phase_i == 2'd0 ? sigma_i : phase_i == 2'd1 ? v103_q[0] : v122_q[0]), .prod_o(u_v131));
-  logic [31:0] v131;  // cycle 0 to 4
   assign v131 = u_v131;
-  logic [31:0] v108;  // cycle 5 to 9
   assign v108 = u_v131;
-  logic [31:0] v126;  // cycle 6 to 10
   assign v126 = u_v131;
-  logic v116;
   flk_ff_cmp #(.ManBits(23)) i_v116 (.a_i(32'h0), .b_i(v115), .lt_o(v116));
-  logic v117;
   assign v117 = !v116_q[0];
-  logic v118;
   assign v118 = v101_q[0] | v117;
-  logic v119;
   flk_ff_cmp #(.ManBits(23)) i_v119 (.a_i(normal_40_i), .b_i(32'h0), .lt_o(v119));
-  logic [31:0] v120;
   assign v120 = v119 ? v35 : v38;
-  logic v121;
   flk_ff_cmp #(.ManBits(23)) i_v121 (.a_i(normal_41_i), .b_i(32'h0), .lt_o(v121));
-  logic [31:0] v122;
   assign v122 = v121 ? v36 : v39;
-  logic v123;
   flk_ff_cmp #(.ManBits(23)) i_v123 (.a_i(normal_42_i), .b_i(32'h0), .lt_o(v123));
-  logic [31:0] v124;
   assign v124 = v123 ? v37 : v40;
-  logic v133;
   flk_ff_cmp #(.ManBits(23)) i_v133 (.a_i(32'h0), .b_i(v132), .lt_o(v133));
-  logic v134;
   assign v134 = !v133_q[0];
-  logic v135;
   assign v135 = v118_q[0] | v134;
-  logic keep;
   assign keep = v135_q[0] < 1'd1;
 
   assign keep_o = keep_q[0];

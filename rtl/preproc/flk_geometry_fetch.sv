@@ -77,11 +77,9 @@ module flk_geometry_fetch
 
   state_e state_d, state_q;
   logic   start, fails, end_taken_q, end_moves, fetch_idle, out_free;
-  logic   shapes_empty, colours_empty, lines_empty, drained;
   logic   out_valid_q, out_end_q, done_q, error_q;
 
-  assign start   = state_q == IDLE && start_i;
-  assign drained = fetch_idle && shapes_empty && colours_empty && lines_empty;
+  assign start = state_q == IDLE && start_i;
 
   always_comb begin
     state_d = state_q;
@@ -306,19 +304,22 @@ module flk_geometry_fetch
     end
   end
 
+  logic [2:0] unused_fifo_empty;
+
   flk_sram_fifo #(
     .Width($bits(shape_header_t)),
     .Depth(Clusters)
   ) i_shape_headers (
     .clk_i,
     .rst_ni,
-    .in_valid_i (state_q != FAILED && header_beat_comes && !later_q),
+    .clear_i    (state_q == FAILED),
+    .in_valid_i (header_beat_comes && !later_q),
     .in_ready_o (unused_shape_room),
     .in_data_i  (shape_in),
     .out_valid_o(shape_valid),
-    .out_ready_i(header_take || state_q == FAILED),
+    .out_ready_i(header_take),
     .out_data_o (shape),
-    .empty_o    (shapes_empty)
+    .empty_o    (unused_fifo_empty[0])
   );
 
   flk_sram_fifo #(
@@ -327,13 +328,14 @@ module flk_geometry_fetch
   ) i_colour_headers (
     .clk_i,
     .rst_ni,
-    .in_valid_i (state_q != FAILED && header_beat_comes && (later_q || !chunked_i)),
+    .clear_i    (state_q == FAILED),
+    .in_valid_i (header_beat_comes && (later_q || !chunked_i)),
     .in_ready_o (unused_colour_room),
     .in_data_i  (colour_in),
     .out_valid_o(colour_valid),
-    .out_ready_i(header_take || state_q == FAILED),
+    .out_ready_i(header_take),
     .out_data_o (colour),
-    .empty_o    (colours_empty)
+    .empty_o    (unused_fifo_empty[1])
   );
 
   // Headers go through while they can; one at the output stops all until it is used.
@@ -465,13 +467,14 @@ module flk_geometry_fetch
   ) i_geometry (
     .clk_i,
     .rst_ni,
-    .in_valid_i (state_q != FAILED && geometry_beat_comes),
+    .clear_i    (state_q == FAILED),
+    .in_valid_i (geometry_beat_comes),
     .in_ready_o (unused_line_room),
     .in_data_i  (beat_data),
     .out_valid_o(line_valid),
-    .out_ready_i(line_pop || state_q == FAILED),
+    .out_ready_i(line_pop),
     .out_data_o (line),
-    .empty_o    (lines_empty)
+    .empty_o    (unused_fifo_empty[2])
   );
 
   assign groups = state_q == RUN && queue_valid && !queue_end;
@@ -497,7 +500,7 @@ module flk_geometry_fetch
   assign at_d      = emit && last ? 3'd4 : early ? 3'd0 : from_hold ? 3'(reach) : 3'(reach - 4'd4);
   assign header_use = emit && group_q == '0;
   assign end_moves  = out_free && ((state_q == RUN && queue_valid && queue_end) ||
-                                   (state_q == FAILED && end_taken_q && drained));
+                                   (state_q == FAILED && end_taken_q && fetch_idle));
   assign queue_pop  = (emit && last) || end_moves;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -614,13 +617,12 @@ module flk_geometry_fetch
   end
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      state_q != FAILED |->
-      (!header_beat_comes || (unused_shape_room && unused_colour_room)) &&
-      (!geometry_beat_comes || unused_line_room))
+      (header_beat_comes |-> unused_shape_room && unused_colour_room) and
+      (geometry_beat_comes |-> unused_line_room))
   else $error("flk_geometry_fetch: a beat without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      state_q == LEAVE |-> drained && inside_q == '0)
+      state_q == LEAVE |-> fetch_idle && !line_valid && !shape_valid && inside_q == '0)
   else $error("flk_geometry_fetch: something is left after the last group");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)

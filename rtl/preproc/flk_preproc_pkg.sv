@@ -6,7 +6,7 @@ package flk_preproc_pkg;
   localparam int unsigned SEQ_BITS = 12;         // of a survivor's number in its frame, modulo
   localparam int unsigned NUMBER_BITS = 24;      // of a record
   localparam int unsigned BEAT_BITS = 34;        // address of 64 bytes
-  localparam int unsigned PLACE_BEAT_BITS = 5;   // of a beat of records that is being put together
+  localparam int unsigned PLACE_BEAT_BITS = 7;   // of a beat of records that is being put together
 
   // Registers of a frame that the cluster test takes: ff numbers of 23 bits.
   typedef struct packed {
@@ -63,11 +63,65 @@ package flk_preproc_pkg;
     logic [3:0][4:0][31:0] word;  // geometry: three words of a chunk (0 to 2), or five of FP16
   } group_t;
 
+  // Clusters whose colours may be under way, and what the lanes take of their headers for colours.
+  localparam int unsigned CLUSTER_BITS = 4;  // of a running number, modulo
+  localparam int unsigned COLOUR_CLUSTERS = 8;
+  typedef logic [CLUSTER_BITS-1:0] cluster_index_t;
+
+  typedef struct packed {
+    logic [8:0]         sh_zero;
+    colour_t [2:0]      dc_low;
+    colour_t [2:0]      dc_step;
+    colour_t [2:0][2:0] sh_step;  // by degree, channel
+  } colour_header_t;
+
+  // Survivors of a group, for their colours.
+  typedef struct packed {
+    cluster_index_t cluster;
+    logic [31:0]    colour;  // first beat of the cluster's colours, from the colour array's first
+    logic [1:0]     degree;
+    logic [5:0]     group;
+    logic [3:0]     alive;
+  } survivors_t;
+
+  // Part of a Gaussian's colour: the constant part and opacity with the first, up to four coefficients. Codes of a chunk, or FP16.
+  typedef struct packed {
+    cluster_index_t          cluster;
+    logic                    first;
+    logic                    last;
+    logic [1:0]              part;
+    logic [3:0]              used;     // coefficients that exist
+    logic [15:0]             opacity;
+    logic [2:0][15:0]        dc;
+    logic [3:0][2:0][15:0]   raw;      // by coefficient, channel
+  } colour_part_t;
+
   // Where a survivor's record goes: beat and quarter of a ring of beats that are being put together.
   typedef struct packed {
     logic [PLACE_BEAT_BITS-1:0] beat;
     logic [1:0]                 quarter;
   } place_t;
+
+  // What waits for a survivor's colours.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;
+    place_t                 place;
+    logic [23:0]            key;
+    logic                   clipped;  // the mean was saturated
+    logic                   spiky;
+    logic signed [30:0]     x;
+    logic signed [30:0]     y;
+    shape_t                 sx;
+    shape_t                 sy;
+    shape_t                 l0;
+    shape_t                 l1;
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+    shape_t                 lean;
+    colour_t [2:0]          direction;
+  } waiting_t;
 
   // A splat to be listed.
   typedef struct packed {
@@ -75,13 +129,13 @@ package flk_preproc_pkg;
     logic [NUMBER_BITS-1:0] number;  // of its record
     logic [23:0]            key;
     logic                   empty;   // in no tile
-    logic signed [36:0]     x;       // mean, 1/128 pixel
-    logic signed [36:0]     y;
+    logic signed [30:0]     x;       // mean, 1/128 pixel
+    logic signed [30:0]     y;
     logic [11:0]            x0;      // bounds, pixels
     logic [11:0]            x1;
     logic [11:0]            y0;
     logic [11:0]            y1;
-    logic signed [35:0]     right;   // see flk_splat_band
+    logic signed [29:0]     right;   // see flk_splat_band
     shape_t                 l2;
     shape_t                 i0;
     shape_t                 kappa;
@@ -103,5 +157,52 @@ package flk_preproc_pkg;
     logic [BEAT_BITS-1:0] beat;
     logic [3:0]           quarters;
   } record_beat_t;
+
+  // Registers of a frame.
+  typedef struct packed {
+    cull_setup_t          cull;
+    lane_setup_t          lane;
+    logic [BEAT_BITS-1:0] table_beat;     // where the image's parts begin
+    logic [BEAT_BITS-1:0] headers_beat;
+    logic [BEAT_BITS-1:0] geometry_beat;
+    logic [BEAT_BITS-1:0] colours_beat;
+    logic [23:0]          clusters;
+    logic [BEAT_BITS-1:0] records_beat;   // where records go, and how many beats there are
+    logic [22:0]          record_beats;
+    logic [BEAT_BITS-1:0] lists_beat;     // where lists go, and the chunks of each writer
+    logic [24:0]          chunks;
+    logic [BEAT_BITS-1:0] pointers_beat;  // where pointers go, and lines of each writer
+    logic [10:0]          pointer_lines;
+    logic [7:0]           list_columns;   // of a writer
+  } front_registers_t;
+
+  // Why a frame failed: bits.
+  localparam int unsigned FRONT_ERROR_READ = 0;     // the memory answered a read with an error
+  localparam int unsigned FRONT_ERROR_WRITE = 1;    // or a write
+  localparam int unsigned FRONT_ERROR_RECORDS = 2;  // a cluster's slots lie beyond the records' region
+  localparam int unsigned FRONT_ERROR_LISTS = 3;    // a list writer needed a chunk more than it has
+
+  typedef struct packed {
+    logic [31:0]       cycles;
+    logic [31:0]       culled_clusters;
+    logic [31:0]       culled_gaussians;
+    logic [31:0]       too_near;        // Gaussians
+    logic [31:0]       outside;
+    logic [31:0]       survivors;
+    logic [31:0]       faint;           // of the survivors
+    logic [31:0]       unlisted;
+    logic [31:0]       saturated;
+    logic [31:0]       clipped;
+    logic [31:0]       header_beats;
+    logic [31:0]       geometry_beats;
+    logic [31:0]       colour_beats;
+    logic [31:0]       record_beats;
+    logic [3:0][31:0]  entries;         // by list writer
+    logic [3:0][31:0]  lines;
+    logic [3:0][31:0]  evicted;
+    logic [3:0][24:0]  taken;           // chunks
+    logic signed [7:0] key_shift;
+    position_t         key_low;
+  } front_counters_t;
 
 endpackage

@@ -57,3 +57,22 @@ async def reset_in_traffic(dut):
     test.checker.drop()
     test.checker.checked = test.input.count = 0
     await test.run(items(test, 50))
+
+
+@cocotb.test()
+async def clear(dut):
+    """What was inside is gone in the next cycle; then as after a reset."""
+    test = StreamTest(dut, lambda item: [item])
+    test.sink.stall = iter([True] * 40 + [False] * 10000)
+    await test.bench.reset()
+    for count in (1, 2):
+        test.source.send(items(test, count))
+        await test.bench.until(lambda: not test.source.pending, 20, "in")
+        await test.bench.cycles(3)
+        assert int(dut.out_valid_o.value) == 1
+        await test.bench.clear()
+        await test.bench.cycles(1)
+        assert int(dut.out_valid_o.value) == 0 and int(dut.empty_o.value) == 1
+        test.checker.drop()
+    test.source.send(items(test, 60))
+    await test.bench.until(lambda: test.checker.checked == 60, 500, "all")

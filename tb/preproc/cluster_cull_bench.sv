@@ -34,18 +34,17 @@ module cluster_cull_bench
 
   logic error, bounds_valid, out_end, unused;
   logic signed [7:0] key_shift;
-  logic [39:0] key_low;
+  flk_front_pkg::position_t key_low;
   logic [31:0] clusters, gaussians;
   kept_t cluster;
 
   assign in_ready_o = 1'b0;
   assign unused = ^{in_valid_i, in_data_i, registers_i[959:954]};
 
-  // Word by word: error, bounds valid, shift, low end (2), culled clusters and Gaussians.
-  assign status_o = {
-    gaussians, clusters, 32'(key_low[39:32]), key_low[31:0], 32'(key_shift), 30'b0, bounds_valid,
-    error
-  };
+  // Word by word: error and bounds valid, shift, lowest depth, culled clusters and Gaussians.
+  assign status_o = 192'({
+    gaussians, clusters, 32'(key_low), 32'(key_shift), 30'b0, bounds_valid, error
+  });
   assign out_data_o = 96'({out_end, cluster});
 
   flk_cluster_cull #(

@@ -15,9 +15,10 @@ import pytest
 from fetch_bench import BEAT, PAUSES, FetchBench, Outcome, codes, packed_bits
 from flicker_tb.runner import seed
 
+from flicker.arithmetic.ff import ff_bits, ff_round
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import cull
-from flicker.golden.front.setup import CLUSTER_M, FrameSetup
+from flicker.golden.front.setup import CLUSTER_M, FORMATS, MAX_KEY_SHIFT, FrameSetup
 from flicker.scene.demo import demo_cameras
 from flicker.scene.packed import CHUNK_HEADER, TABLE_ENTRY, PackedFormat, PackedScene
 from flicker.scene.packing import pack
@@ -91,8 +92,9 @@ def check(outcome: Outcome, packed: PackedScene, setup: FrameSetup) -> cull.Cull
         assert np.array_equal(got[:-1], expected[kept].astype(np.int64)), name
     error, shift = outcome.status[0], np.int32(np.uint32(outcome.status[1]))
     assert error == 2  # bounds valid, no error
-    assert (shift, outcome.status[2] | outcome.status[3] << 32) == (want.key_shift, want.key_low)
-    assert outcome.status[4:] == [int((~want.keep).sum()), int(packed.counts[~want.keep].sum())]
+    low = ff_bits(ff_round(want.nearest, FORMATS.position), FORMATS.position)
+    assert (shift, outcome.status[2]) == (want.key_shift, low)
+    assert outcome.status[3:5] == [int((~want.keep).sum()), int(packed.counts[~want.keep].sum())]
     return want
 
 
@@ -129,7 +131,7 @@ def test_numbers() -> None:
         kinds |= {(len(table) > 0, bool(want.keep.any()), bool(want.keep.all()))}
         shifts.add(want.key_shift)
     assert kinds >= {(False, False, True), (True, True, True), (True, True, False), (True, False, False)}
-    assert min(shifts) < -60 and max(shifts) >= 40 and len(shifts) > 20
+    assert min(shifts) < -60 and max(shifts) == MAX_KEY_SHIFT and len(shifts) > 20
 
 
 def test_errors() -> None:

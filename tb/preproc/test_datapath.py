@@ -158,6 +158,7 @@ def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_
         x0, x1 = splat.pixels(p.x, p.radius_x, width)
         y0, y1 = splat.pixels(p.y, p.radius_y, height)
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4] = p.near, x0 > x1 or y0 > y1, p.x, p.y, p.spiky
+        places[j, 6] = p.far
         places[j, 5] = frame.depth_key(p.t2, shift, key_low, M)
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
@@ -166,9 +167,9 @@ def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_
 
 def projected(s: Sample, low, step, q, scales, quat) -> tuple[np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
-    out, places = np.zeros((len(q), 11)), np.zeros((len(q), 6), np.int64)
+    out, places = np.zeros((len(q), 11)), np.zeros((len(q), 7), np.int64)
     _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.limit, t.width, t.height, splat.constants(FORMATS),
-               inverse, s.culled.key_shift, s.culled.key_low, P, S, C, out, places)
+               inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places)
     return out, places
 
 
@@ -192,12 +193,12 @@ def test_projection() -> None:
     for name in ("row_x", "row_x_z", "row_y", "row_y_z"):
         registers |= {f"{name}_{k}": getattr(t, name)[k] for k in range(3)}
     registers |= {f"limit_{k}": t.limit[k] for k in range(2)}
-    registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": s.culled.key_low}
+    registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": ff_round(s.culled.nearest, P)}
     low, step, q, scales, quat = inputs
     got = bench("flk_projection")(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},
     )
-    want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key"))}
+    want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key", "far"))}
     want |= {name: out[:, k] for k, name in enumerate(("sx", "sy", "l0", "l1", "l2", "i0", "kappa", "lean"))} | of("direction", out[:, 8:])
     near = places[:, 0] == 1
     assert near.any() and not near.all() and places[~near, 1].any() and not places[~near, 1].all()
@@ -235,16 +236,20 @@ def test_splat_bounds(box: bool) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(4)
     out, places = seen(s)
     n = 500
-    x, y = (np.concatenate([places[:, k], rng.integers(-(1 << 36), 1 << 36, n)]) for k in (2, 3))
+    x, y = (np.concatenate([places[:, k], rng.integers(-(1 << 29), 1 << 29, n)]) for k in (2, 3))
     sx, sy = (np.concatenate([out[:, k], np.abs(wild(rng, n, S))]) for k in (0, 1))
     lean = np.concatenate([out[:, 7], wild(rng, n, S)])
-    code = rng.integers(1, 256, len(x))
+    chunked = not box
+    raw = rng.integers(1, 256, len(x)) if chunked else rng.uniform(0, 1, len(x)).astype(np.float16).view(np.uint16).astype(np.int64)
+    code = raw if chunked else np.array([frame.opacity_code(False, v, S) for v in raw.astype(np.uint16).view(np.float16).astype(np.float64)])
     want, limit = bounded(s, box, x, y, sx, sy, lean, code)
-    got = bench("flk_splat_bounds")({"box": box, "width": s.setup.width, "height": s.setup.height}, x=x, y=y, sx=sx, sy=sy, lean=lean, code=code)
+    registers = {"chunked": chunked, "box": box, "width": s.setup.width, "height": s.setup.height}
+    got = bench("flk_splat_bounds")(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, opacity=raw)
+    assert np.array_equal(got["code"], code)
     empty = want[:, 0] == 1
     assert empty.any() and not empty.all()
     assert np.array_equal(got["empty"], want[:, 0])
-    named = {name: want[:, 1 + k] for k, name in enumerate(("x0", "x1", "y0", "y1", "right"))} | {"limit": limit, "empty": want[:, 0]}
+    named = {name: want[:, 1 + k] for k, name in enumerate(("x0", "x1", "y0", "y1", "right"))} | {"limit": limit, "empty": want[:, 0], "code": code}
     same(got, named, ~empty)
 
 
@@ -281,28 +286,18 @@ def test_splat_band(box: bool) -> None:
 
 
 @numba.njit
-def _basis(d, dc, low, step, k, M, out):
+def _basis(d, k, M, out):
     for j in range(len(d)):
         splat.basis_functions(d[j, 0], d[j, 1], d[j, 2], k, 3, out[j], M)
-        for c in range(3):
-            out[j, 16 + c] = ff_add(low[j, c], ff_mul(step[j, c], ff_round(dc[j, c], M), M), M)
 
 
-@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16])
-def test_colour_basis(form: PackedFormat) -> None:
-    s, rng = demo(form), random(6)
+def test_colour_basis() -> None:
+    s, rng = demo(PackedFormat.CHUNK), random(6)
     d = np.concatenate([seen(s)[0][:, 8:], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
-    n = len(d)
-    factors = splat.colour_constants(FORMATS)
-    chunked = form is PackedFormat.CHUNK
-    rows = rng.integers(0, len(s.values.dc_low), n)
-    raw = rng.integers(0, 256, (n, 3)) if chunked else rng.normal(size=(n, 3)).astype(np.float16).view(np.uint16).astype(np.int64)
-    dc = raw.astype(np.float64) if chunked else raw.astype(np.uint16).view(np.float16).astype(np.float64)
-    low, step = s.values.dc_low[rows], s.values.dc_step[rows]
-    out = np.zeros((n, 19))
-    _basis(d, dc, low if chunked else np.full((n, 3), 0.5), step if chunked else np.full((n, 3), factors[0]), factors, C, out)
-    got = bench("flk_colour_basis")({"chunked": chunked}, **of("direction", d), **of("dc", raw), **of("dc_low", low), **of("dc_step", step))
-    same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)} | of("constant", out[:, 16:]))
+    out = np.zeros((len(d), 16))
+    _basis(d, splat.colour_constants(FORMATS), C, out)
+    got = bench("flk_colour_basis")({}, **of("direction", d))
+    same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)})
 
 
 @numba.njit
@@ -332,10 +327,22 @@ def test_colour_group(chunked: bool) -> None:
         coefficient[place] = (ff_mul(step[place], exact, C) if chunked else exact) if used[place[:2]] else 0.0
     want = np.zeros((n, 3))
     _groups(basis, coefficient, C, want)
+    factors = splat.colour_constants(FORMATS)
+    rows = rng.integers(0, len(demo(PackedFormat.CHUNK).values.dc_low), n)
+    dc_low, dc_step = demo(PackedFormat.CHUNK).values.dc_low[rows], demo(PackedFormat.CHUNK).values.dc_step[rows]
+    dc = rng.integers(0, 256, (n, 3)) if chunked else rng.normal(size=(n, 3)).astype(np.float16).view(np.uint16).astype(np.int64)
+    number = dc.astype(np.float64) if chunked else dc.astype(np.uint16).view(np.float16).astype(np.float64)
+    constant = np.zeros((n, 3))
+    for j, c in np.ndindex(n, 3):
+        a, b = (dc_low[j, c], dc_step[j, c]) if chunked else (0.5, factors[0])
+        constant[j, c] = ff_add(a, ff_mul(b, ff_round(float(number[j, c]), C), C), C)
     raws = {f"raw_{k}{c}": raw[:, k, c] for k in range(4) for c in range(3)}
     steps = {f"step_{k}{c}": step[:, k, c] for k in range(4) for c in range(3)}
-    got = bench("flk_colour_group")({"chunked": chunked}, **of("basis", basis), **raws, **steps, **of("used", used.astype(np.int64)), zero=zero)
-    same(got, of("sum", want))
+    got = bench("flk_colour_group")(
+        {"chunked": chunked}, **of("basis", basis), **raws, **steps, **of("used", used.astype(np.int64)), zero=zero, **of("dc", dc),
+        **of("dc_low", dc_low), **of("dc_step", dc_step),
+    )
+    same(got, of("sum", want) | of("constant", constant))
 
 
 def test_colour_total() -> None:

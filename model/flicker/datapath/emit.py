@@ -6,7 +6,7 @@ import re
 import textwrap
 
 from .graph import BOOL, Ff, Graph, Int, Value
-from .schedule import Schedule, schedule
+from .schedule import Schedule, Unit, schedule
 
 
 class _Writer:
@@ -97,24 +97,28 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
     """Text of the module, and its schedule. `head` is the comment above it; how it works is added to it."""
     plan = schedule(graph, interval)
     w = _Writer(plan)
+    wires: list[str] = []
     body: list[str] = []
     turns = {v: unit for unit in plan.units for v in unit.turns.values()}
     made: set[int] = set()
     for v in graph.values:
         if v.operator is None or (v not in plan.begin and not _needed(v, graph)):
             continue
+        note = f"  // cycle {plan.ready(v)}" if v in plan.begin else ""
+        wires.append(f"  {w.type_of(v)} {w.names[v]};{note}")
         if v.operator.module and v in turns:
             unit = turns[v]
             if id(unit) not in made:
                 made.add(id(unit))
+                wires.append(f"  {w.type_of(v)} {_unit_name(w, unit)};")
                 body += _unit(w, plan, unit)
         elif v.operator.module:
-            body += [f"  {w.type_of(v)} {w.names[v]};", *_instance(w, v, w.names[v])]
+            body += _instance(w, v, w.names[v])
         else:
-            body += [f"  {w.type_of(v)} {w.names[v]};", f"  assign {w.names[v]} = {_expression(w, v)};"]
+            body.append(f"  assign {w.names[v]} = {_expression(w, v)};")
     outputs = [f"  assign {n}_o = {w.operand(v, plan.latency)};" for n, v in graph.outputs.items()]
     text = "\n".join([
-        *_comment(_head(head, name, plan)), f"module {name} (", *_ports(w, plan), ");", "", *_tables(graph), *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
+        *_comment(_head(head, name, plan)), f"module {name} (", *_ports(w, plan), ");", "", *_tables(graph), *wires, *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
     ])
     return text, plan
 
@@ -193,11 +197,15 @@ def _text(v: Value, wires: list[str], name: str, clocked: bool = False) -> list[
     return [f"  {v.operator.module} #({parameters}) i_{name} ({ports});"]
 
 
-def _unit(w: _Writer, plan: Schedule, unit) -> list[str]:
+def _unit_name(w: _Writer, unit: Unit) -> str:
+    return f"u_{w.names[unit.turns[min(unit.turns)]]}"
+
+
+def _unit(w: _Writer, plan: Schedule, unit: Unit) -> list[str]:
     """A unit, its operands by phase, and the results by name."""
     turns = dict(sorted(unit.turns.items()))
     first = next(iter(turns.values()))
-    name = f"u_{w.names[first]}"
+    name = _unit_name(w, unit)
     wires, out = [], []
     for k in range(len(first.operands)):
         texts = []
@@ -216,14 +224,12 @@ def _unit(w: _Writer, plan: Schedule, unit) -> list[str]:
             for p, other in list(zip(phases, texts))[-2::-1]:
                 text = f"phase_i == {max((plan.interval - 1).bit_length(), 1)}'d{p} ? {other} : {text}"
             wires.append(text)
-    out.append(f"  {w.type_of(first)} {name};")
     if first.operator.module == "flk_ff_exp2":
         parameters = dict(first.operator.parameters)
         wires[0] = f"{parameters['IntBits'] + parameters['FracBits']}'({wires[0]})"
     out += _text(first, [*wires, name], name, True)
     for v in turns.values():
-        cycles = f"cycle {plan.begin[v]} to {plan.ready(v)}"
-        out += [f"  {w.type_of(v)} {w.names[v]};  // {cycles}", f"  assign {w.names[v]} = {name};"]
+        out.append(f"  assign {w.names[v]} = {name};")
     return out
 
 

@@ -285,7 +285,8 @@ class Graph:
     def from_fixed(self, i: Any, frac_bits: int, M: int) -> Value:
         i = self.integer(i)
         if not i.kind.signed:  # a sign bit
-            i = self.wire("{0}", Int(-1 - i.kind.high, i.kind.high), (i,))
+            kind = Int(-1 - i.kind.high, i.kind.high)
+            i = self.wire(f"{kind.bits}'({{0}})", kind, (i,))
         parameters = (("Bits", i.kind.bits), ("FracBits", frac_bits), ("ManBits", M), ("Stages", 2))
         return self.make(Ff(M), Operator("flk_ff_from_fixed", parameters, ("x_i", "y_o"), 2, True), (i,))
 

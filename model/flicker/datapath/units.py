@@ -13,11 +13,12 @@ import numpy as np
 
 from ..arithmetic.ff import ff_add, ff_mul, ff_round, ff_sub
 from ..golden.front import cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, KEY_FIELD, MAX_PICTURE, FrontFormats
+from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
 from ..params import SUBTILE
 from .graph import BOOL, Ff, Graph, Int, Value, retrace
 
-MEAN = Int(-(1 << 36), (1 << 36) - 1)  # what `project_one` may give
+MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
+REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
 SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end and step of log2 scales
 BANDS = MAX_PICTURE // SUBTILE
@@ -117,7 +118,7 @@ def projection(formats: FrontFormats) -> Graph:
     rows = [g.inputs(n, Ff(S), (3,), register=True) for n in ("row_x", "row_x_z", "row_y", "row_y_z")]
     limit = g.inputs("limit", Ff(S), (2,), register=True)
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
-    shift, key_low = g.input("key_shift", Int(-128, KEY_FIELD), True), g.input("key_low", Int(0, (1 << KEY_FIELD) - 1), True)
+    shift, key_low = g.input("key_shift", Int(-128, MAX_KEY_SHIFT), True), g.input("key_low", Ff(P), True)
     const = splat.constants(formats).tolist()
     p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S)
     _name(p)
@@ -127,7 +128,7 @@ def projection(formats: FrontFormats) -> Graph:
     _name(steady)
     g.output("near", p.near)
     g.output("outside", (x0 > x1) | (y0 > y1))
-    for name in ("x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
+    for name in ("far", "x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
         g.output(name, getattr(p, name))
     for name, value in steady._asdict().items():
         g.output(name, value)
@@ -142,17 +143,23 @@ def bounds(formats: FrontFormats) -> Graph:
     g, S = Graph(), formats.shape
     x, y = g.input("x", MEAN), g.input("y", MEAN)
     sx, sy, lean = (g.input(n, Ff(S)) for n in ("sx", "sy", "lean"))
-    code, box = g.input("code", Int(0, 255)), g.input("box", BOOL, register=True)
+    chunked, box = (g.input(n, BOOL, register=True) for n in ("chunked", "box"))
+    opacity = g.input("opacity", HALF)  # code of a chunk, or FP16
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
     logs, sigmas, cut, _ = reach.reach_tables(formats)
     tables = [g.table(n, t, S) for n, t in (("log", logs), ("sigmas", sigmas), ("cut", cut))]
     zero = g.number(0.0, S)
+    # The sign is that of an opacity: positive.
+    half = g.wire("{0} & 16'h7fff", HALF, (opacity,))
+    code = g.pick(chunked, g.slice(opacity, 0, 8), retrace(frame.fp16_opacity)(g.from_fp16(half, S), S))
+    code = g.wire("8'({0})", Int(0, 255), (code,))
     r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S)
     g.output("empty", (r.x0 > r.x1) | (r.y0 > r.y1))
     for name in ("x0", "x1", "y0", "y1"):  # in the picture, if it is not empty
         g.output(name, _bits(g, getattr(r, name)))
     g.output("limit", r.limit)
     g.output("right", r.right)
+    g.output("code", code)
     return g
 
 
@@ -160,7 +167,7 @@ def band(formats: FrontFormats) -> Graph:
     """Sub-tiles of a band that a splat enters."""
     g, S = Graph(), formats.shape
     number, box = g.input("band", Int(0, BANDS - 1)), g.input("box", BOOL, register=True)
-    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", MEAN)
+    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", REACH)
     pixel = Int(0, MAX_PICTURE - 1)
     x0, x1, y0, y1 = (g.input(n, pixel) for n in ("x0", "x1", "y0", "y1"))
     l2, i0, kappa, limit = (g.input(n, Ff(S)) for n in ("l2", "i0", "kappa", "limit"))
@@ -168,8 +175,8 @@ def band(formats: FrontFormats) -> Graph:
     a, b = retrace(reach.band_columns)(number, box, x, y, l2, r, S)
     g.output("empty", a > b)
     # A band that is not empty begins and ends in the picture.
-    g.output("first", g.slice(_bits(g, a), 3, 9))
-    g.output("last", g.slice(_bits(g, b), 3, 9))
+    for name, column in (("first", a), ("last", b)):
+        g.output(name, g.wire("9'({0} >>> 3)", Int(0, 511), (column,)))
     return g
 
 
@@ -179,27 +186,23 @@ def _bits(g: Graph, value: Value) -> Value:
 
 
 def colour_basis(formats: FrontFormats) -> Graph:
-    """Spherical harmonics in a direction, and the constant part of the colour."""
+    """Spherical harmonics in a direction."""
     g, C = Graph(), formats.colour
-    chunked = g.input("chunked", BOOL, register=True)
     d = g.inputs("direction", Ff(C), (3,))
-    dc, low, step = g.inputs("dc", HALF, (3,)), g.inputs("dc_low", Ff(C), (3,)), g.inputs("dc_step", Ff(C), (3,))
     factors = splat.colour_constants(formats).tolist()
     out: list[Any] = [None] * 16
     retrace(splat.basis_functions)(*d, factors, 3, out, C)
-    for k in range(3):
-        code = g.pick(chunked, g.from_fixed(g.slice(dc[k], 0, 8), 0, C), g.from_fp16(dc[k], C))
-        a, b = g.pick(chunked, low[k], 0.5), g.pick(chunked, step[k], factors[0])
-        g.output(f"constant_{k}", _symbolic(lambda a, b, code: ff_add(a, ff_mul(b, code, C), C))(a, b, code))
     for k in range(1, 16):
         g.output(f"basis_{k}", out[k])
     return g
 
 
 def colour_group(formats: FrontFormats) -> Graph:
-    """Four coefficients of three channels, with the sum of their products for each channel."""
+    """Four coefficients of three channels, with the sum of their products for each channel; and the constant part of the colour."""
     g, C = Graph(), formats.colour
     chunked = g.input("chunked", BOOL, register=True)
+    dc, low, step_0 = g.inputs("dc", HALF, (3,)), g.inputs("dc_low", Ff(C), (3,)), g.inputs("dc_step", Ff(C), (3,))
+    factors = splat.colour_constants(formats).tolist()
     basis = g.inputs("basis", Ff(C), (4,))
     raw = g.inputs("raw", HALF, (4, 3))  # code of a chunk, or FP16
     step = g.inputs("step", Ff(C), (4, 3))
@@ -212,6 +215,10 @@ def colour_group(formats: FrontFormats) -> Graph:
             value = g.pick(used[k], g.pick(chunked, code, g.from_fp16(raw[k][c], C)), 0.0)
             coefficients.append(_symbolic(lambda a, b: ff_mul(a, b, C))(g.pick(chunked, step[k][c], 1.0), value))
         g.output(f"sum_{c}", retrace(splat.group_sum)(basis, coefficients, C))
+    for k in range(3):
+        code = g.pick(chunked, g.from_fixed(g.slice(dc[k], 0, 8), 0, C), g.from_fp16(dc[k], C))
+        a, b = g.pick(chunked, low[k], 0.5), g.pick(chunked, step_0[k], factors[0])
+        g.output(f"constant_{k}", _symbolic(lambda a, b, code: ff_add(a, ff_mul(b, code, C), C))(a, b, code))
     return g
 
 
@@ -231,9 +238,9 @@ PIPELINES = [
     Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
     Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, depth key, what its bounds need."),
-    Pipeline("flk_splat_bounds", 2, bounds, "Bounds of a splat of a known opacity."),
+    Pipeline("flk_splat_bounds", 2, bounds, "Opacity code and bounds of a splat."),
     Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
-    Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction, and the constant part of the colour."),
-    Pipeline("flk_colour_group", 1, colour_group, "Sums of four products of basis and coefficient, for three channels."),
+    Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction."),
+    Pipeline("flk_colour_group", 1, colour_group, "Sums of four products of basis and coefficient for three channels, and the constant part of the colour."),
     Pipeline("flk_colour_total", 1, colour_total, "A channel from its constant part and the sums of groups, in a record's 10 bits."),
 ]

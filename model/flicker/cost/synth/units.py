@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ... import layout
 from ...arithmetic.ff_stages import STAGES
+from ...datapath.units import PIPELINES
 from ...params import (
     CHANNELS,
     FAITHFUL,
@@ -28,6 +29,9 @@ PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
 FEATURE_BITS = layout.bits("feature_elem")
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
+# Operators that the pipelines of the front end are put together from.
+FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed"]
+
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
 COMPOSED: dict[str, list[str]] = {
     "flk_bitonic_sorter": ["flk_compare_exchange", "flk_pipe_reg"],
@@ -36,6 +40,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
     "flk_mask_all": ["flk_pipe_reg"],
     "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
+    **{p.module: list(FF_OPERATORS) for p in PIPELINES},
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
@@ -87,6 +92,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+        # The last pixel of 4096 has number 4095.
+        **{f"flk_{name}": ["width_i[12]", "height_i[12]"] for name in ("splat_bounds", "projection")},
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
@@ -162,6 +169,9 @@ def _ff() -> list[Unit]:
             unit("flk_ff_to_fixed", f"{bits} bit to 14.6, 2 stages", Bits=20, FracBits=6, Round=0, ManBits=bits, Stages=2),
             unit("flk_ff_to_fixed", f"{bits} bit to 7.14 nearest, 2 stages", Bits=21, FracBits=14, Round=1, ManBits=bits, Stages=2),
         ]
+        if bits > min(FF_MAN_BITS):
+            units.append(unit("flk_ff_narrow", f"{bits} to {bits - 4} bit", FromBits=bits, ManBits=bits - 4))
+        units += [unit("flk_ff_ldexp", f"{bits} bit", ManBits=bits), unit("flk_ff_from_fp16", f"{bits} bit", ManBits=bits)]
     units.append(unit("flk_ff_rom", "recip, 19 bit", Function=0, Group=2))
     units.append(unit("flk_ff_poly", "rsqrt, 19 bit, 3 stages", Function=1, ManBits=19, Stages=3))
     return units
@@ -221,5 +231,10 @@ def _stage() -> list[Unit]:
     return units
 
 
+def _front() -> list[Unit]:
+    """Pipelines of the front end, in its number formats."""
+    return [unit(p.module) for p in PIPELINES]
+
+
 def all_units() -> list[Unit]:
-    return _arithmetic() + _ff() + _cells() + _stage()
+    return _arithmetic() + _ff() + _cells() + _stage() + _front()

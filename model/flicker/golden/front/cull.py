@@ -15,7 +15,7 @@ import numpy as np
 from ...arithmetic.ff import ff_add, ff_mul, ff_sub, pick
 from ...front.projection import NEAR
 from ...scene.packed import PackedScene
-from .setup import CLUSTER_M, KEY_BITS, KEY_FIELD, FrameSetup, image_floats, rounded
+from .setup import CLUSTER_M, KEY_BITS, MAX_KEY_SHIFT, FrameSetup, image_floats, rounded
 
 
 @numba.njit
@@ -53,28 +53,25 @@ def _cull(low, high, sigma, position, normal, offset, reach, keep, depth):
 class Culled:
     """keep: bool (C,). nearest, farthest: ff (23 bits), depths that bound the kept clusters; nearest is at least 0.2.
 
-    key_shift: a key step is 2^-key_shift. key_low: floor(nearest 2^key_shift), the depth of key 0.
+    key_shift: a key step is 2^-key_shift. Key 0 is the depth `nearest`.
     """
 
     keep: np.ndarray
     nearest: float
     farthest: float
     key_shift: int
-    key_low: int
 
 
 NEAR_FF = float(rounded(NEAR, CLUSTER_M))
 
 
-def key_scale(nearest: float, farthest: float) -> tuple[int, int]:
-    """Key shift and lowest depth: the finest step 2^-shift with which all depths from nearest to farthest have keys of 24 bits and depths of 40.
+def key_scale(nearest: float, farthest: float) -> int:
+    """Key shift: the finest step 2^-shift with which the depths from nearest to farthest have keys of 24 bits, at most `MAX_KEY_SHIFT`.
 
-    The shift is 23 less the exponent of the distance, at most 39 less that of the farthest depth.
+    It is 23 less the exponent of the distance.
     """
-    exponent = lambda v: int(np.frexp(v)[1]) - 1  # noqa: E731
     span = float(ff_sub(farthest, nearest, CLUSTER_M))
-    shift = min(KEY_BITS - 1 - exponent(span) if span > 0.0 else KEY_FIELD, KEY_FIELD - 1 - exponent(farthest))
-    return shift, int(np.floor(np.ldexp(nearest, shift)))
+    return min(KEY_BITS - int(np.frexp(span)[1]), MAX_KEY_SHIFT) if span > 0.0 else MAX_KEY_SHIFT
 
 
 def cull(packed: PackedScene, setup: FrameSetup) -> Culled:
@@ -84,8 +81,8 @@ def cull(packed: PackedScene, setup: FrameSetup) -> Culled:
     keep, depth = np.zeros(len(table), np.bool_), np.zeros((len(table), 2))
     _cull(low, high, image_floats(packed.sigma), setup.position, setup.normal, setup.offset, setup.reach, keep, depth)
     if not keep.any():
-        return Culled(keep, NEAR_FF, NEAR_FF, *key_scale(NEAR_FF, NEAR_FF))
+        return Culled(keep, NEAR_FF, NEAR_FF, key_scale(NEAR_FF, NEAR_FF))
     nearest = max(float(depth[keep, 0].min()), NEAR_FF)
     farthest = max(float(depth[keep, 1].max()), nearest)
-    return Culled(keep, nearest, farthest, *key_scale(nearest, farthest))
+    return Culled(keep, nearest, farthest, key_scale(nearest, farthest))
 

@@ -22,7 +22,7 @@ from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .cull import Culled, cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
-from .setup import CLUSTER_M, FORMATS, KEY_BITS, KEY_FIELD, FrameSetup, FrontFormats, image_floats
+from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
 from .splat import basis_functions, colour_constants, constants, largest_component, pixels, place_largest, project_one, shade
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
@@ -40,17 +40,17 @@ class ListKind(str, Enum):
 
 
 class Outcome:
-    """What became of a Gaussian, in the order of the tests."""
+    """What became of a Gaussian, in the order of the tests. The last three leave a record; faint ones and those that miss all pixels are in no list."""
 
-    CULLED, NEAR, OUTSIDE, FAINT, MISSED, RECORDED = range(6)
+    CULLED, NEAR, OUTSIDE, FAINT, MISSED, LISTED = range(6)
 
 
 OUTCOMES = {
     Outcome.CULLED: "in a culled cluster", Outcome.NEAR: "nearer than 0.2", Outcome.OUTSIDE: "3-sigma box outside the picture",
-    Outcome.FAINT: "opacity below 1/510", Outcome.MISSED: "ellipse holds no pixel", Outcome.RECORDED: "recorded",
+    Outcome.FAINT: "opacity below 1/510", Outcome.MISSED: "ellipse holds no pixel", Outcome.LISTED: "listed",
 }
 
-Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_RECORDED = range(1, 6)  # for numba
+Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_LISTED = range(1, 6)  # for numba
 
 # What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
 # quaternion, or (largest, three codes).
@@ -144,8 +144,14 @@ def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, 
 
 @numba.njit
 def depth_key(depth, shift, low, M):
-    """Key of a depth: its steps of 2^-shift beyond the lowest, saturated."""
-    return min(max(ff_to_fixed_floor(ff_ldexp(depth, shift, M), 0, KEY_FIELD + 1) - low, 0), (1 << KEY_BITS) - 1)
+    """Key of a depth: its steps of 2^-shift beyond the lowest depth, saturated. The difference keeps the order; numbers next to each other may share a key."""
+    return max(ff_to_fixed_floor(ff_ldexp(ff_sub(depth, low, M), shift, M), 0, KEY_BITS + 1), 0)
+
+
+@numba.njit
+def fp16_opacity(opacity, M):
+    """Code of an opacity, an ff number."""
+    return min(ff_to_fixed_round(ff_mul(255.0, opacity, M), 0, 16), OPACITY_LIMIT)
 
 
 @numba.njit
@@ -153,7 +159,7 @@ def opacity_code(chunked, opacity, M):
     """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself."""
     if chunked:
         return np.int64(opacity)
-    return min(ff_to_fixed_round(ff_mul(255.0, ff_round(opacity, M), M), 0, 16), OPACITY_LIMIT)
+    return fp16_opacity(ff_round(opacity, M), M)
 
 
 @numba.njit
@@ -194,20 +200,15 @@ def _splats(
             outcome[j] = Outcome_OUTSIDE
             continue
         code = opacity_code(lanes.chunked, lanes.opacity[i], S)
-        if code == 0:
-            outcome[j] = Outcome_FAINT
-            continue
         steady = steady_one(p, inverse, S)
         r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S)
-        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none)
-        if count == 0:
-            outcome[j] = Outcome_MISSED
-            continue
-        outcome[j] = Outcome_RECORDED
+        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none) if code > 0 else 0
+        outcome[j] = Outcome_LISTED if count > 0 else (Outcome_MISSED if code > 0 else Outcome_FAINT)
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
         key[j] = depth_key(p.t2, shift, key_low, P)
+        flags[j, 0] = p.far
         rgb = np.empty(3)
         colour_lane(i, lanes, values, p, colours, C, rgb)
         if conic:
@@ -218,9 +219,7 @@ def _splats(
             words[j, 0], words[j, 1] = p.x, p.y
             flags[j, 2] = p.spiky
             continue
-        x, far_x = encode_mean(p.x)
-        y, far_y = encode_mean(p.y)
-        flags[j, 0] = far_x or far_y
+        x, y = encode_mean(p.x), encode_mean(p.y)
         low = np.uint64(x) | np.uint64(y) << np.uint64(23)
         l0, l1, l2 = encode_shape(p.l0), encode_shape(abs(p.l1)), encode_shape(p.l2)
         low |= np.uint64(l0) << np.uint64(46)
@@ -248,7 +247,7 @@ def _entries(start, places, numbers, box, cols, S, tile, mask):
 class FrontFrame:
     """What the front end leaves, in record order (R records, E list entries).
 
-    gaussian: int64 (R,), Gaussians of the packed scene. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
+    gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
     records: uint8 (R, bytes).
     key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
@@ -331,10 +330,10 @@ def run_front(
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
-        index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, culled.key_low, P, S, C,
+        index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C,
         outcome, key, words, halves, entries, flags, places, numbers,
     )
-    kept = np.flatnonzero(outcome == Outcome.RECORDED)
+    kept = np.flatnonzero(outcome >= Outcome.FAINT)
     gaussian = index[kept]
     start = np.concatenate([[0], np.cumsum(entries[kept])])
     tile, mask = np.empty(start[-1], np.int32), np.empty(start[-1], np.uint8)
@@ -354,15 +353,13 @@ def run_front(
 def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
     """uint8 (R, bytes) and what did not fit."""
     if kind is RecordKind.FACTORED16:
-        adjusted = {"mean beyond the record's field": int(flags[:, 0].sum()), "colour above 2 clipped": int(flags[:, 1].sum())}
+        adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "colour above 2 clipped": int(flags[:, 1].sum())}
         return np.ascontiguousarray(words).view(np.uint8).reshape(-1, 16), {k: v for k, v in adjusted.items() if v}
     records = np.zeros((len(words), 32), np.uint8)
-    top = 1 << 31
-    records[:, :8] = np.clip(words, -top, top - 1).astype("<i4").view(np.uint8)
+    records[:, :8] = words.astype("<i4").view(np.uint8)
     beyond = (np.abs(halves) > 65504.0).any(axis=1)
     numbers = np.clip(halves, -65504.0, 65504.0).astype(np.float16)
     records[:, 8:22] = numbers.view(np.uint8)
     records[:, 22] = flags[:, 2]
-    far = (words != np.clip(words, -top, top - 1)).any(axis=1)
-    adjusted = {"mean beyond the record's field": int(far.sum()), "value beyond FP16 clamped": int(beyond.sum())}
+    adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "value beyond FP16 clamped": int(beyond.sum())}
     return records, {k: v for k, v in adjusted.items() if v}

@@ -39,14 +39,12 @@ class RecordKind(str, Enum):
 
 @numba.njit
 def encode_mean(x):
-    """(field of 23 bits, whether it was saturated) of a mean in 1/128 pixel: 20 bits in two's complement, times 4^e, the smallest of e = 0 to 7 that
-    holds it."""
+    """Field of 23 bits of a mean in 1/128 pixel, of at most 33 bits: 20 bits in two's complement, times 4^e, the smallest of e = 0 to 7 that holds it."""
     for e in range(MEAN_EXPONENTS):
         m = (x + ((1 << (2 * e)) >> 1)) >> (2 * e)
         if -(1 << (MEAN_FIELD - 1)) <= m < 1 << (MEAN_FIELD - 1):
-            return (e << MEAN_FIELD) | (m & ((1 << MEAN_FIELD) - 1)), False
-    m = (1 << (MEAN_FIELD - 1)) - 1 if x > 0 else 1 << (MEAN_FIELD - 1)
-    return ((MEAN_EXPONENTS - 1) << MEAN_FIELD) | m, True
+            break
+    return (e << MEAN_FIELD) | (m & ((1 << MEAN_FIELD) - 1))
 
 
 @numba.njit

@@ -17,7 +17,7 @@ MAX_PICTURE = 4096
 CLUSTER_M = 23  # mantissa bits of the cluster test: those of the image's own float32
 MEAN_FRACTION = 7  # fraction bits of a mean in pixels
 KEY_BITS = 24
-KEY_FIELD = 40  # bits of a depth in units of a key step, before the nearest depth is taken off
+MAX_KEY_SHIFT = 63
 _RADIUS_MARGIN = 3.0 * np.sqrt(DILATION + np.sqrt(0.1)) + 2.0
 _SLACK = 1.0 + 2.0**-14
 
@@ -27,9 +27,9 @@ class FrontFormats:
     """Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape,
     lists. colour: SH."""
 
-    position: int = 21
-    shape: int = 13
-    colour: int = 13
+    position: int = 19
+    shape: int = 11
+    colour: int = 11
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -25,7 +25,8 @@ from .setup import MEAN_FRACTION, FrontFormats, rounded
 
 SHAPE_SCALE = math.sqrt(0.5 * math.log2(math.e))
 LARGEST_REST = 1023 * 1023 * 2  # what three rotation codes 2 code - 1023 leave for the square of the largest: (1023 sqrt(2))^2
-MEAN_BITS = 36  # of a mean in 1/128 pixel, saturated
+MEAN_BITS = 30  # of a mean in 1/128 pixel, saturated: 2^22 pixels on either side of the middle
+MEAN_TOP = (1 << (MEAN_BITS - 1)) - 1
 _TRACE_FACTOR = (SPIKY_AXIS_RATIO**2 + 1.0) ** 2 / SPIKY_AXIS_RATIO**2  # trace^2 / det where the axis ratio is that of the threshold
 
 
@@ -67,11 +68,11 @@ def place_largest(number, most, a, b, d):
 
 # d: mean less the camera's position, world axes. t: the same in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
 # u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
-# xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel. rxx, ryy, rdet: reciprocal square roots.
+# xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel. rxx, ryy, rdet: reciprocal square roots. far: the mean on the screen is saturated.
 Projection = namedtuple(
     "Projection",
     "d0 d1 d2 t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
-    "xx xy yy det trace spiky rxx ryy rdet m l0 l1 l2 sx sy radius_x radius_y near",
+    "xx xy yy det trace spiky rxx ryy rdet m l0 l1 l2 sx sy radius_x radius_y near far",
 )
 
 
@@ -93,8 +94,10 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     tx = ff_mul(t0, iz, P)
     ty = ff_mul(t1, iz, P)
     half = 1 << (MEAN_FRACTION - 1)
-    screen_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), MEAN_FRACTION, MEAN_BITS) + (width - 1) * half
-    screen_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), MEAN_FRACTION, MEAN_BITS) + (height - 1) * half
+    off_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), MEAN_FRACTION, MEAN_BITS)
+    off_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), MEAN_FRACTION, MEAN_BITS)
+    far = (off_x >= MEAN_TOP) | (off_x < -MEAN_TOP) | (off_y >= MEAN_TOP) | (off_y < -MEAN_TOP)
+    screen_x, screen_y = off_x + (width - 1) * half, off_y + (height - 1) * half
     ax = min(max(ff_round(tx, S), ff_neg(limit[0])), limit[0])
     ay = min(max(ff_round(ty, S), ff_neg(limit[1])), limit[1])
     u0 = ff_sub(row_x[0], ff_mul(ax, row_x_z[0], S), S)
@@ -143,8 +146,7 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     return Projection(
         d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
         s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy,
-        radius_x, radius_y,
-        near,
+        radius_x, radius_y, near, far,
     )
 
 

@@ -1,0 +1,276 @@
+"""The verilated front end: a packed scene in memory, a frame, and what it leaves there (docs/front_end.md).
+
+    frame = front_rtl(packed, camera)
+    frame.records, frame.pointers ...      # to be compared with golden.front.memory.front_memory
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..arithmetic.ff import ff_bits
+from ..errors import FlickerError
+from ..golden.front.frame import ListKind
+from ..golden.front.memory import SLOTS_PER_STEP
+from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
+from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, pointer_lines, writer_columns
+from ..params import TILE
+from ..scene.camera import Camera
+from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
+from ..toolchain import verilate
+from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
+
+HERE = Path(__file__).parent
+BEAT = 64
+RECORD_BYTES = 16
+TABLE_BYTES, HEADER_ALIGN = 32, 4096
+PORTS = ("table", "geometry", "colour", "write")
+PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
+ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
+SMALL_POINTERS, LARGE_POINTERS = 2048, 16384  # lists of a writer: pictures up to 1080p, up to 4096x4096
+
+# front_counters_t of flk_preproc_pkg, the first field in the highest bits.
+_COUNTERS = (
+    *((name, 32, 1) for name in (
+        "cycles", "culled_clusters", "culled_gaussians", "too_near", "outside", "survivors", "faint", "unlisted", "saturated", "clipped", "header_beats",
+        "geometry_beats", "colour_beats", "record_beats",
+    )),
+    ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("key_shift", 8, 1), ("key_low", 9 + FORMATS.position, 1),
+)
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Where things lie: bytes. image: of the file's bytes; records, lists, pointers: and how many there are."""
+
+    image: int
+    records: int
+    record_bytes: int
+    lists: int
+    chunks: int
+    pointers: int
+    pointer_bytes: int
+
+    @staticmethod
+    def of(packed: PackedScene, camera: Camera, chunks: int) -> Regions:
+        step = lambda n: -(-n // HEADER_ALIGN) * HEADER_ALIGN  # noqa: E731
+        cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+        image = 1 << 28
+        records = image + step(len(packed.image()))
+        slots = -(-(int(packed.first[-1]) + int(packed.counts[-1])) // SLOTS_PER_STEP) * SLOTS_PER_STEP
+        lists = records + step(slots * RECORD_BYTES)
+        pointers = lists + step(chunks * WRITERS * CHUNK_LINES * LINE_BYTES)
+        return Regions(image, records, slots * RECORD_BYTES, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
+
+
+def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions) -> int:
+    """The bits of front_registers_t."""
+    setup = FrameSetup.of(camera)
+    f = setup.formats
+    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+    bits: list[tuple[int, int]] = []  # value, width; the highest first
+
+    def numbers(values: np.ndarray, M: int) -> None:
+        """A packed array: its last element highest."""
+        bits.extend((int(ff_bits(float(v), M)), 9 + M) for v in np.asarray(values).ravel()[::-1])
+
+    for values in (setup.position, setup.normal, setup.offset, setup.reach):
+        numbers(values, CLUSTER_M)
+    bits += [(packed.format is PackedFormat.CHUNK, 1), (lists is ListKind.BOX, 1), (camera.width, 13), (camera.height, 13)]
+    numbers(setup.view, f.position)
+    numbers(setup.focal, f.position)
+    for values in (setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit):
+        numbers(values, f.shape)
+    offset = regions.image // BEAT + HEADER_BYTES // BEAT
+    for part in packed.sections().values():
+        bits.append((offset, 34))
+        offset += len(part) // BEAT
+    bits += [
+        (len(packed.table), 24), (regions.records // BEAT, 34), (regions.record_bytes // BEAT, 23), (regions.lists // BEAT, 34), (regions.chunks, 25),
+        (regions.pointers // BEAT, 34), (pointer_lines(cols, rows) // WRITERS, 11), (writer_columns(cols), 8),
+    ]
+    word = 0
+    for value, width in bits:
+        assert 0 <= value < 1 << width
+        word = word << width | value
+    return word
+
+
+def _register_bits() -> int:
+    f = FORMATS
+    cull = (3 + 15 + 5 + 5) * (9 + CLUSTER_M)
+    lane = 28 + 11 * (9 + f.position) + 14 * (9 + f.shape)
+    return cull + lane + 4 * 34 + 24 + 34 + 23 + 34 + 25 + 34 + 11 + 8
+
+
+@dataclass(eq=False)
+class RtlFront:
+    """What a frame left. records: uint8 (slots, 16). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold noise.
+
+    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate.
+    """
+
+    records: np.ndarray
+    memory: np.ndarray
+    pointers: np.ndarray
+    counters: dict[str, int | np.ndarray]
+    error: int
+    traffic: dict[str, PurposeCounts]
+    efficiency: float
+
+    @property
+    def cycles(self) -> int:
+        return int(self.counters["cycles"])
+
+
+def build(pointers: int = SMALL_POINTERS, *, checks: bool = True) -> Path:
+    """Shared library of the simulator; cached by content. checks: with the design's assertions."""
+    words = {"REGISTER_WORDS": -(-_register_bits() // 32)}
+    return verilate(
+        "flk_preprocessing",
+        parameters={"Pointers": pointers},
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", "--assert" if checks else "--no-assert"],
+        cpp=[HERE / "preprocessing_harness.cpp"],
+        depends=HEADERS,
+        settings=[HERE / "preprocessing.vlt"],
+        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -std=c++17 -I{HERE} " + " ".join(f"-D{k}={v}" for k, v in words.items()),
+        opt="-O1" if checks else "-O2",
+        shared=True,
+        kind="sim",
+        name="preprocessing",
+    )
+
+
+@cache
+def _library(path: Path) -> ctypes.CDLL:
+    lib = ctypes.CDLL(str(path))
+    u64, pointer = ctypes.c_uint64, ctypes.c_void_p
+    for name, result, *arguments in (
+        ("failure", ctypes.c_char_p),
+        ("new", pointer, pointer, ctypes.c_int, pointer, u64),
+        ("delete", None, pointer),
+        ("load", ctypes.c_int, pointer, u64, u64, pointer, u64, ctypes.c_uint32),
+        ("read", ctypes.c_int, pointer, u64, u64, pointer),
+        ("fail", None, pointer, u64, u64),
+        ("frame", ctypes.c_int, pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer),
+        ("cycle", u64, pointer),
+        ("efficiency", ctypes.c_double, pointer),
+        ("counts", None, pointer, ctypes.c_uint32, pointer),
+    ):
+        function = getattr(lib, f"flk_front_{name}")
+        function.restype = result
+        function.argtypes = arguments
+    return lib
+
+
+@dataclass(frozen=True)
+class MemoryOptions:
+    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error."""
+
+    timing: Timing | None = None
+    ports: Mapping[str, PortConfig] = field(default_factory=dict)
+    fail: Sequence[tuple[int, int]] = ()
+
+
+PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
+
+
+def front_rtl(
+    packed: PackedScene,
+    camera: Camera,
+    lists: ListKind = ListKind.ELLIPSE,
+    *,
+    chunks: int,
+    memory: MemoryOptions = MemoryOptions(),
+    regions: Regions | None = None,
+    image: bytes | None = None,
+    frames: int = 1,
+    checks: bool = True,
+    seed: int = 1,
+    limit: int = 20_000_000,
+) -> RtlFront:
+    """Run frames of a packed scene through the RTL.
+
+    chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so many times; what the last leaves counts.
+    Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
+    """
+    regions = regions or Regions.of(packed, camera, chunks)
+    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+    own = writer_columns(cols) * -(-rows // 2)
+    lib = _library(build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS, checks=checks))
+    configs = (_Config * len(PORTS))(*(memory.ports.get(name, PORT).structure() for name in PORTS))
+    timing = memory.timing or Timing(*[1] * len(Timing._fields_))
+    sim = lib.flk_front_new(ctypes.byref(timing), memory.timing is None, configs, seed)
+    if not sim:
+        raise FlickerError(f"front end: {lib.flk_front_failure().decode()}")
+    try:
+        data = image or packed.image()
+        at = regions.image
+        sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
+        purposes = [len(PURPOSES), 0, 1, 2, 3]  # the image header has none
+        for size, purpose in zip(sizes, purposes):
+            offset = at - regions.image
+            _load(lib, sim, at, size, data[offset : offset + size], purpose)
+            at += size
+        for base, size, purpose in (
+            (regions.records, regions.record_bytes, 4), (regions.lists, max(regions.chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES, 5),
+            (regions.pointers, regions.pointer_bytes, 6),
+        ):
+            _load(lib, sim, base, size, b"", purpose)
+        for base, size in memory.fail:
+            lib.flk_front_fail(sim, base, size)
+        word = registers(packed, camera, lists, regions)
+        count = -(-_register_bits() // 32)
+        given = np.frombuffer(word.to_bytes(4 * count, "little"), np.uint32).copy()
+        counter_bits = sum(width * n for _, width, n in _COUNTERS)
+        out = np.zeros(-(-counter_bits // 32), np.uint32)
+        error = ctypes.c_uint32()
+        for _ in range(frames):
+            done = lib.flk_front_frame(sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
+            if done < 0:
+                raise FlickerError(f"front end: {lib.flk_front_failure().decode()} (seed {seed})")
+            if not done:
+                raise FlickerError(f"front end: no end within {limit} cycles (seed {seed})")
+        traffic = {}
+        for number, name in enumerate(PURPOSES):
+            counts = PurposeCounts()
+            lib.flk_front_counts(sim, number, ctypes.byref(counts))
+            traffic[name] = counts
+        return RtlFront(
+            _read(lib, sim, regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES),
+            _read(lib, sim, regions.lists, regions.chunks * WRITERS * CHUNK_LINES * LINE_BYTES).view(np.uint64).reshape(-1, 8),
+            _read(lib, sim, regions.pointers, regions.pointer_bytes).view(np.uint32),
+            _counters(out), error.value, traffic, lib.flk_front_efficiency(sim),
+        )
+    finally:
+        lib.flk_front_delete(sim)
+
+
+def _load(lib: ctypes.CDLL, sim: int, base: int, allocated: int, data: bytes, purpose: int) -> None:
+    if not lib.flk_front_load(sim, base, allocated, data, len(data), purpose):
+        raise FlickerError(f"front end: {allocated} bytes at {base:#x} overlap others")
+
+
+def _read(lib: ctypes.CDLL, sim: int, base: int, size: int) -> np.ndarray:
+    out = np.zeros(size, np.uint8)
+    if size and not lib.flk_front_read(sim, base, size, out.ctypes.data):
+        raise FlickerError(f"front end: {size} bytes at {base:#x} are not there")
+    return out
+
+
+def _counters(words: np.ndarray) -> dict[str, int | np.ndarray]:
+    word = int.from_bytes(words.tobytes(), "little")
+    out: dict[str, int | np.ndarray] = {}
+    for name, width, n in reversed(_COUNTERS):
+        values = []
+        for _ in range(n):
+            values.append(word & (1 << width) - 1)
+            word >>= width
+        out[name] = values[0] if n == 1 else np.array(values, np.int64)
+    return out

@@ -1,0 +1,225 @@
+// Merge of the lanes' entries into four list writers, each in the order of the scene.
+//
+// Bank (column & 1) + 2 (row & 1) takes the entries of its tiles: u = column / 2, v = row / 2 and the
+// 52 bits of an entry, {key, number, mask}. A bank's entries leave in order of seq, those of one seq
+// (which all come from one lane) as they came. progress_i[k]: no entry with a seq before it will be
+// taken from lane k any more; modulo 2^SEQ_BITS, all seqs that are under way or offered, and all
+// progress, within half of the range. The earliest entry waiting for a bank leaves when each other
+// lane has a later one waiting for this bank, or none and its progress is not before it. So that
+// nothing stands still, a lane without work has a progress beyond all work that others have.
+// end_i: all lanes have finished, their progress beyond all entries, and nothing more will be
+// offered; each bank then gives one element with out_end_o, which carries no entry, after its last.
+// start_i, for a cycle while idle_o, begins a frame; progress_i is that of the frame from the next
+// cycle on.
+// Latency 2: one for the queue, one for the output register. Throughput: an entry a cycle and lane,
+// an entry a cycle and bank. in_ready_o depends combinationally on in_data_i, the queues and their
+// heads on out_ready_i; no other path.
+//
+// A queue's head of seqs is a register of its own; while the queue is empty it follows progress_i.
+// So the choice is one comparison of registers for each pair of lanes, and a gate.
+module flk_entry_merge
+  import flk_preproc_pkg::*;
+#(
+  parameter int unsigned Depth = 4  // of a lane's queue for a bank
+) (
+  input  logic                            clk_i,
+  input  logic                            rst_ni,
+  // Frame
+  input  logic                            start_i,
+  input  logic                            end_i,
+  output logic                            idle_o,
+  // Entries of the lanes
+  input  logic   [LANES-1:0]              in_valid_i,
+  output logic   [LANES-1:0]              in_ready_o,
+  input  entry_t [LANES-1:0]              in_data_i,
+  input  logic [LANES-1:0][SEQ_BITS-1:0]  progress_i,
+  // Entries of the banks
+  output logic [3:0]                      out_valid_o,
+  input  logic [3:0]                      out_ready_i,
+  output logic [3:0]                      out_end_o,
+  output logic [3:0][6:0]                 out_u_o,
+  output logic [3:0][6:0]                 out_v_o,
+  output logic [3:0][NUMBER_BITS+27:0]    out_entry_o
+);
+
+  localparam int unsigned UsageBits = $clog2(Depth + 1);
+
+  typedef struct packed {
+    logic [6:0]             u;
+    logic [6:0]             v;
+    logic [23:0]            key;
+    logic [NUMBER_BITS-1:0] number;
+    logic [3:0]             mask;
+  } item_t;
+
+  if (Depth < 2) begin : gen_check
+    $error("flk_entry_merge: Depth must be at least 2");
+  end
+
+  logic [LANES-1:0][3:0] queue_ready;  // by lane and bank
+  logic [3:0]            bank_idle;
+
+  for (genvar k = 0; k < LANES; k++) begin : gen_lane
+    assign in_ready_o[k] = queue_ready[k][{in_data_i[k].row[0], in_data_i[k].column[0]}];
+  end
+
+  for (genvar b = 0; b < 4; b++) begin : gen_bank
+    logic  [LANES-1:0]               waits, wins, pop;
+    logic  [LANES-1:0][SEQ_BITS-1:0] seq;  // of the entry that waits, else the lane's progress
+    item_t [LANES-1:0]               item;
+    logic                            room, out_valid_q, out_end_q, ended_q, finish;
+    item_t                           chosen, out_q;
+
+    for (genvar k = 0; k < LANES; k++) begin : gen_queue
+      logic                            push, unused_full, empty;
+      item_t                           item_in;
+      logic [UsageBits-1:0]            usage, left;
+      logic [Depth-1:0][SEQ_BITS-1:0]  seq_d, seq_q;
+
+      assign push    = in_valid_i[k] && queue_ready[k][b] &&
+                       {in_data_i[k].row[0], in_data_i[k].column[0]} == 2'(b);
+      assign item_in = '{
+        u: in_data_i[k].column[7:1], v: in_data_i[k].row[7:1], key: in_data_i[k].key,
+        number: in_data_i[k].number, mask: in_data_i[k].mask
+      };
+
+      flk_fifo #(
+        .Width($bits(item_t)),
+        .Depth(Depth)
+      ) i_items (
+        .clk_i,
+        .rst_ni,
+        .clear_i    (1'b0),
+        .in_valid_i (push),
+        .in_ready_o (queue_ready[k][b]),
+        .in_data_i  (item_in),
+        .out_valid_o(waits[k]),
+        .out_ready_i(pop[k]),
+        .out_data_o (item[k]),
+        .usage_o    (usage),
+        .full_o     (unused_full),
+        .empty_o    (empty)
+      );
+
+      assign left = usage - UsageBits'(pop[k]);
+
+      always_comb begin
+        seq_d = seq_q;
+        if (pop[k]) begin
+          seq_d = seq_q >> SEQ_BITS;
+        end
+        if (left == '0) begin
+          seq_d[0] = progress_i[k];
+        end
+        for (int unsigned d = 0; d < Depth; d++) begin
+          if (push && left == UsageBits'(d)) begin
+            seq_d[d] = in_data_i[k].seq;
+          end
+        end
+      end
+
+      always_ff @(posedge clk_i) begin
+        seq_q <= seq_d;
+      end
+
+      assign seq[k] = seq_q[0];
+
+      logic unused_empty;
+      assign unused_empty = empty;
+
+`ifndef SYNTHESIS
+      logic [SEQ_BITS-1:0] ahead;
+      assign ahead = in_data_i[k].seq - progress_i[k];
+      assert property (@(posedge clk_i) disable iff (!rst_ni) in_valid_i[k] |-> !ahead[SEQ_BITS-1])
+      else $error("flk_entry_merge: an entry behind its lane's progress");
+`endif
+    end
+
+    // Lane i before lane j: of an entry and progress that are equal, the entry.
+    for (genvar k = 0; k < LANES; k++) begin : gen_choice
+      logic [LANES-1:0] earlier;
+      for (genvar j = 0; j < LANES; j++) begin : gen_other
+        if (j == k) begin : gen_self
+          assign earlier[j] = 1'b1;
+        end else if (j > k) begin : gen_compare
+          logic [SEQ_BITS:0] distance;
+          assign distance  = {seq[k], !waits[k]} - {seq[j], !waits[j]};
+          assign earlier[j] = distance[SEQ_BITS];
+        end else begin : gen_compared
+          assign earlier[j] = !gen_choice[j].earlier[k];
+        end
+      end
+      assign wins[k] = waits[k] && earlier == '1;
+    end
+
+    assign room = !out_valid_q || out_ready_i[b];
+    assign pop  = wins & {LANES{room}};
+
+    always_comb begin
+      chosen = '0;
+      for (int unsigned k = 0; k < LANES; k++) begin
+        chosen |= wins[k] ? item[k] : '0;
+      end
+    end
+
+    assign finish = end_i && !ended_q && waits == '0;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        out_valid_q <= 1'b0;
+        out_end_q   <= 1'b0;
+        ended_q     <= 1'b1;
+      end else begin
+        if (room) begin
+          out_valid_q <= wins != '0 || finish;
+          out_end_q   <= finish;
+        end
+        if (start_i) begin
+          ended_q <= 1'b0;
+        end else if (finish && room) begin
+          ended_q <= 1'b1;
+        end
+      end
+    end
+
+    always_ff @(posedge clk_i) begin
+      if (room) begin
+        out_q <= chosen;
+      end
+    end
+
+    assign bank_idle[b]   = waits == '0 && !out_valid_q && ended_q;
+    assign out_valid_o[b] = out_valid_q;
+    assign out_end_o[b]   = out_end_q;
+    assign out_u_o[b]     = out_q.u;
+    assign out_v_o[b]     = out_q.v;
+    assign out_entry_o[b] = {out_q.key, out_q.number, out_q.mask};
+
+`ifndef SYNTHESIS
+    assert property (@(posedge clk_i) disable iff (!rst_ni) $onehot0(wins))
+    else $error("flk_entry_merge: two lanes chosen");
+
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        out_valid_o[b] && !out_ready_i[b] |=>
+        out_valid_o[b] && $stable({out_end_o[b], out_u_o[b], out_v_o[b], out_entry_o[b]}))
+    else $error("flk_entry_merge: output changed before its transfer");
+`endif
+  end
+
+  assign idle_o = bank_idle == '1;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o && !end_i)
+  else $error("flk_entry_merge: start while a frame is under way");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) end_i |-> in_valid_i == '0)
+  else $error("flk_entry_merge: an entry after the end");
+
+  for (genvar k = 0; k < LANES; k++) begin : gen_held
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        in_valid_i[k] && !in_ready_o[k] |=> in_valid_i[k] && $stable(in_data_i[k]))
+    else $error("flk_entry_merge: input changed before its transfer");
+  end
+`endif
+
+endmodule

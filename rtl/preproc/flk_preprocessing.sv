@@ -1,0 +1,831 @@
+// Preprocessing: from a packed scene in memory to records and tile lists in memory (docs/front_end.md).
+//
+// Four cores behind three AXI4 read ports (cluster table, geometry, colours) and one write port. A
+// frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
+// for a cycle when all has been written and answered, error_o and the counters then stay until the
+// next start. Everything that is written is the same for every timing.
+// error_o: bits of FRONT_ERROR_*. An error of the memory ends the frame early where it was met;
+// a cluster beyond the records' region writes nothing; a list writer without a chunk writes no more.
+// Nothing is written outside the regions of records, lists and pointers.
+module flk_preprocessing
+  import flk_front_pkg::*;
+  import flk_preproc_pkg::*;
+#(
+  parameter  int unsigned Pointers = 2048,  // lists of a writer
+  parameter  int unsigned IdBits   = 4,
+  localparam int unsigned Width    = 512,
+  localparam int unsigned Bytes    = Width / 8,
+  localparam int unsigned AddrBits = BEAT_BITS + 6
+) (
+  input  logic               clk_i,
+  input  logic               rst_ni,
+  input  logic               start_i,
+  output logic               idle_o,
+  output logic               done_o,
+  input  front_registers_t   registers_i,
+  output logic [3:0]         error_o,
+  output front_counters_t    counters_o,
+  // Cluster table
+  output logic               table_ar_valid_o,
+  input  logic               table_ar_ready_i,
+  output logic [IdBits-1:0]  table_ar_id_o,
+  output logic [AddrBits-1:0] table_ar_addr_o,
+  output logic [7:0]         table_ar_len_o,
+  output logic [2:0]         table_ar_size_o,
+  output logic [1:0]         table_ar_burst_o,
+  input  logic               table_r_valid_i,
+  output logic               table_r_ready_o,
+  input  logic [IdBits-1:0]  table_r_id_i,
+  input  logic [Width-1:0]   table_r_data_i,
+  input  logic [1:0]         table_r_resp_i,
+  input  logic               table_r_last_i,
+  // Headers and geometry
+  output logic               geometry_ar_valid_o,
+  input  logic               geometry_ar_ready_i,
+  output logic [IdBits-1:0]  geometry_ar_id_o,
+  output logic [AddrBits-1:0] geometry_ar_addr_o,
+  output logic [7:0]         geometry_ar_len_o,
+  output logic [2:0]         geometry_ar_size_o,
+  output logic [1:0]         geometry_ar_burst_o,
+  input  logic               geometry_r_valid_i,
+  output logic               geometry_r_ready_o,
+  input  logic [IdBits-1:0]  geometry_r_id_i,
+  input  logic [Width-1:0]   geometry_r_data_i,
+  input  logic [1:0]         geometry_r_resp_i,
+  input  logic               geometry_r_last_i,
+  // Colours
+  output logic               colour_ar_valid_o,
+  input  logic               colour_ar_ready_i,
+  output logic [IdBits-1:0]  colour_ar_id_o,
+  output logic [AddrBits-1:0] colour_ar_addr_o,
+  output logic [7:0]         colour_ar_len_o,
+  output logic [2:0]         colour_ar_size_o,
+  output logic [1:0]         colour_ar_burst_o,
+  input  logic               colour_r_valid_i,
+  output logic               colour_r_ready_o,
+  input  logic [IdBits-1:0]  colour_r_id_i,
+  input  logic [Width-1:0]   colour_r_data_i,
+  input  logic [1:0]         colour_r_resp_i,
+  input  logic               colour_r_last_i,
+  // Records, lists, pointers
+  output logic               aw_valid_o,
+  input  logic               aw_ready_i,
+  output logic [IdBits-1:0]  aw_id_o,
+  output logic [AddrBits-1:0] aw_addr_o,
+  output logic [7:0]         aw_len_o,
+  output logic [2:0]         aw_size_o,
+  output logic [1:0]         aw_burst_o,
+  output logic               w_valid_o,
+  input  logic               w_ready_i,
+  output logic [Width-1:0]   w_data_o,
+  output logic [Bytes-1:0]   w_strb_o,
+  output logic               w_last_o,
+  input  logic               b_valid_i,
+  output logic               b_ready_o,
+  input  logic [IdBits-1:0]  b_id_i,
+  input  logic [1:0]         b_resp_i
+);
+
+  localparam int unsigned LATENCY = GEOMETRY_DECODE_LATENCY + PROJECTION_LATENCY;
+  localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS);
+  localparam int unsigned RING = 1 << PLACE_BEAT_BITS;
+  localparam int unsigned ListAddrBits = BEAT_BITS;
+
+  if (GEOMETRY_DECODE_LATENCY % 2 != 0 || PROJECTION_LATENCY % 2 != 0) begin : gen_check
+    $error("flk_preprocessing: latencies of the front must be multiples of its interval, 2");
+  end
+
+  // ---- frame ----------------------------------------------------------------------------------------
+
+  typedef enum logic [1:0] {IDLE, FRONT, BACK, LISTS} state_e;
+
+  state_e state_d, state_q;
+  logic   start, cull_idle, geometry_idle, front_idle, back_idle, merge_idle, records_idle, write_idle;
+  logic   colour_idle, ended_q, lists_end, arbiter_empty;
+  logic [LANES-1:0] lane_idle;
+  logic [3:0]       list_idle, list_failed;
+
+  assign start  = state_q == IDLE && start_i;
+  assign idle_o = state_q == IDLE && (&list_idle);
+
+  always_comb begin
+    state_d = state_q;
+    unique case (state_q)
+      IDLE: begin
+        if (start_i) begin
+          state_d = FRONT;
+        end
+      end
+      FRONT: begin  // groups come
+        if (ended_q && front_idle) begin
+          state_d = BACK;
+        end
+      end
+      BACK: begin  // survivors finish
+        if (back_idle) begin
+          state_d = LISTS;
+        end
+      end
+      default: begin  // lists are closed, all is written
+        if (merge_idle && (&list_idle) && records_idle && arbiter_empty && write_idle) begin
+          state_d = IDLE;
+        end
+      end
+    endcase
+  end
+
+  logic done_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q <= IDLE;
+      done_q  <= 1'b0;
+    end else begin
+      state_q <= state_d;
+      done_q  <= state_q == LISTS && state_d == IDLE;
+    end
+  end
+
+  assign done_o    = done_q;
+  assign back_idle = (&lane_idle) && colour_idle;
+  assign lists_end = state_q == LISTS;
+
+  // ---- clusters and geometry ------------------------------------------------------------------------
+
+  logic              kept_valid, kept_ready, kept_end;
+  kept_t             kept;
+  logic              group_valid, group_ready, group_end;
+  group_t            group;
+  logic              cull_error, geometry_error, colour_error;
+  logic signed [7:0] key_shift;
+  position_t         key_low;
+  logic              unused_bounds, unused_cull_done, unused_geometry_done;
+
+  flk_cluster_cull #(
+    .IdBits(IdBits)
+  ) i_cull (
+    .clk_i,
+    .rst_ni,
+    .start_i           (start),
+    .idle_o            (cull_idle),
+    .setup_i           (registers_i.cull),
+    .table_i           (registers_i.table_beat),
+    .clusters_i        (registers_i.clusters),
+    .done_o            (unused_cull_done),
+    .error_o           (cull_error),
+    .bounds_valid_o    (unused_bounds),
+    .key_shift_o       (key_shift),
+    .key_low_o         (key_low),
+    .culled_clusters_o (counters_o.culled_clusters),
+    .culled_gaussians_o(counters_o.culled_gaussians),
+    .out_valid_o       (kept_valid),
+    .out_ready_i       (kept_ready),
+    .out_end_o         (kept_end),
+    .out_cluster_o     (kept),
+    .ar_valid_o        (table_ar_valid_o),
+    .ar_ready_i        (table_ar_ready_i),
+    .ar_id_o           (table_ar_id_o),
+    .ar_addr_o         (table_ar_addr_o),
+    .ar_len_o          (table_ar_len_o),
+    .ar_size_o         (table_ar_size_o),
+    .ar_burst_o        (table_ar_burst_o),
+    .r_valid_i         (table_r_valid_i),
+    .r_ready_o         (table_r_ready_o),
+    .r_id_i            (table_r_id_i),
+    .r_data_i          (table_r_data_i),
+    .r_resp_i          (table_r_resp_i),
+    .r_last_i          (table_r_last_i)
+  );
+
+  flk_geometry_fetch #(
+    .IdBits(IdBits)
+  ) i_geometry (
+    .clk_i,
+    .rst_ni,
+    .start_i         (start),
+    .idle_o          (geometry_idle),
+    .chunked_i       (registers_i.lane.chunked),
+    .position_i      (registers_i.cull.position),
+    .headers_i       (registers_i.headers_beat),
+    .geometry_i      (registers_i.geometry_beat),
+    .done_o          (unused_geometry_done),
+    .error_o         (geometry_error),
+    .header_beats_o  (counters_o.header_beats),
+    .geometry_beats_o(counters_o.geometry_beats),
+    .in_valid_i      (kept_valid),
+    .in_ready_o      (kept_ready),
+    .in_end_i        (kept_end),
+    .in_cluster_i    (kept),
+    .out_valid_o     (group_valid),
+    .out_ready_i     (group_ready),
+    .out_end_o       (group_end),
+    .out_group_o     (group),
+    .ar_valid_o      (geometry_ar_valid_o),
+    .ar_ready_i      (geometry_ar_ready_i),
+    .ar_id_o         (geometry_ar_id_o),
+    .ar_addr_o       (geometry_ar_addr_o),
+    .ar_len_o        (geometry_ar_len_o),
+    .ar_size_o       (geometry_ar_size_o),
+    .ar_burst_o      (geometry_ar_burst_o),
+    .r_valid_i       (geometry_r_valid_i),
+    .r_ready_o       (geometry_r_ready_o),
+    .r_id_i          (geometry_r_id_i),
+    .r_data_i        (geometry_r_data_i),
+    .r_resp_i        (geometry_r_resp_i),
+    .r_last_i        (geometry_r_last_i)
+  );
+
+  // ---- a group enters the lanes ---------------------------------------------------------------------
+
+  typedef struct packed {
+    logic [31:0] colour;
+    logic [19:0] first;
+    logic [1:0]  degree;
+  } place_of_cluster_t;
+
+  typedef struct packed {
+    logic           last;
+    logic [5:0]     group;
+    logic [3:0]     used;
+    cluster_index_t cluster;
+  } side_t;
+
+  logic                   front_en, front_phase_q, enter, room, beyond, beyond_q, take_end;
+  cluster_index_t         cluster_q, cluster, oldest, exit, exit_q;
+  place_of_cluster_t [COLOUR_CLUSTERS-1:0] clusters_q;
+  side_t                  side_in, side;
+  logic [LATENCY-1:0]     front_valid_q;
+  logic                   exit_valid, go;
+
+  assign cluster     = group.first ? cluster_q + 1'b1 : cluster_q;
+  assign room        = !group.first || CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
+  assign group_ready = front_en && !front_phase_q && (group_end || room);
+  assign enter       = group_valid && group_ready && !group_end;
+  assign take_end    = group_valid && group_ready && group_end;
+  // Records of a cluster beyond their region: none of its Gaussians is used.
+  assign beyond      = 25'({group.cluster.first, 4'b0}) + 25'(group.cluster.last) >=
+                       25'({registers_i.record_beats, 2'b0});
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      front_phase_q <= 1'b0;
+      front_valid_q <= '0;
+      cluster_q     <= '1;
+      ended_q       <= 1'b0;
+      beyond_q      <= 1'b0;
+    end else begin
+      if (front_en) begin
+        front_phase_q <= !front_phase_q;
+        front_valid_q <= {front_valid_q[LATENCY-2:0], enter};
+      end
+      if (start) begin
+        cluster_q <= '1;
+        ended_q   <= 1'b0;
+        beyond_q  <= 1'b0;
+      end else begin
+        if (enter) begin
+          cluster_q <= cluster;
+          beyond_q  <= beyond_q || beyond;
+        end
+        if (take_end) begin
+          ended_q <= 1'b1;
+        end
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (enter && group.first) begin
+      clusters_q[cluster[HeaderBits-1:0]] <= {group.header.colour, group.cluster.first,
+                                              group.cluster.degree};
+    end
+  end
+
+  assign side_in.last    = group.last;
+  assign side_in.group   = group.group;
+  assign side_in.used    = beyond ? '0 : group.used;
+  assign side_in.cluster = cluster;
+
+  flk_delay #(
+    .Width($bits(side_t)),
+    .Depth(LATENCY / 2)
+  ) i_side (
+    .clk_i,
+    .en_i(front_en && !front_phase_q),
+    .d_i (side_in),
+    .q_o (side)
+  );
+
+  position_t [2:0] low, step;
+
+  flk_delay #(
+    .Width(2 * $bits(low)),
+    .Depth(GEOMETRY_DECODE_LATENCY / 2)
+  ) i_low (
+    .clk_i,
+    .en_i(front_en && !front_phase_q),
+    .d_i ({group.header.low, group.header.step}),
+    .q_o ({low, step})
+  );
+
+  colour_header_t colour_header;
+
+  assign colour_header = '{sh_zero: group.header.sh_zero, dc_low: group.header.dc_low,
+                           dc_step: group.header.dc_step, sh_step: group.header.sh_step};
+
+  // ---- survivors: numbers and places ----------------------------------------------------------------
+
+  logic [LANES-1:0]                  lane_near, lane_outside, lane_ready, alive;
+  logic [LANES-1:0][2:0] ahead;   // survivors of the group in lanes before this one
+  logic [2:0]                        count;
+  logic [SEQ_BITS-1:0]               issued_q;
+  logic [8:0]                        rank_q;  // survivors of the cluster so far
+  logic [PLACE_BEAT_BITS-1:0]        ring_q;  // beat that is open
+  logic [PLACE_BEAT_BITS:0]          taken_q; // beats told to the writer and not freed
+  logic                              freed, full, partial, partial_q, colour_room, record_room;
+  logic [3:0]                        fill;
+  logic [BEAT_BITS-1:0]              beat, partial_beat_q;
+  logic [3:0]                        partial_quarters_q;
+  logic                              beat_valid, beat_ready;
+  record_beat_t                      told;
+  place_of_cluster_t                 of;
+  logic [LANES-1:0][NUMBER_BITS-1:0] number;
+  place_t [LANES-1:0]                place;
+  logic [LANES-1:0][SEQ_BITS-1:0]    seq;
+  survivors_t                        survivors;
+
+  assign exit_valid = front_valid_q[LATENCY-1];
+  assign alive      = side.used & ~lane_near & ~lane_outside;
+  assign of         = clusters_q[side.cluster[HeaderBits-1:0]];
+  assign exit       = exit_valid ? side.cluster : exit_q;
+
+  always_comb begin
+    count = '0;
+    for (int unsigned k = 0; k < LANES; k++) begin
+      ahead[k] = count;
+      count     = count + 3'(alive[k]);
+    end
+  end
+
+  assign fill    = 4'(rank_q[1:0]) + 4'(count);  // of the open beat, before it goes
+  assign full    = fill[2];
+  assign partial = side.last && fill[1:0] != '0;
+  assign beat    = registers_i.records_beat + BEAT_BITS'({of.first, 2'b0}) + BEAT_BITS'(rank_q[8:2]);
+
+  for (genvar k = 0; k < LANES; k++) begin : gen_numbers
+    logic [2:0] at;
+    assign at               = 3'(rank_q[1:0]) + ahead[k];
+    assign number[k]        = {of.first, 4'b0} + NUMBER_BITS'(rank_q) + NUMBER_BITS'(ahead[k]);
+    assign place[k].beat    = ring_q + PLACE_BEAT_BITS'(at[2]);
+    assign place[k].quarter = at[1:0];
+    assign seq[k]           = issued_q + SEQ_BITS'(ahead[k]);
+  end
+
+  // Two more beats may be needed, and the open one has a place too.
+  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - 3);
+  assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
+  assign front_en     = !exit_valid || go;
+  assign front_idle   = front_valid_q == '0 && !partial_q;
+
+  assign survivors.cluster = side.cluster;
+  assign survivors.colour  = of.colour;
+  assign survivors.degree  = of.degree;
+  assign survivors.group   = side.group;
+  assign survivors.alive   = alive;
+
+  // The beat that is full is told with its group, the one that a cluster leaves open a cycle later.
+  assign beat_valid    = (go && full) || partial_q;
+  assign told.beat     = partial_q ? partial_beat_q : beat;
+  assign told.quarters = partial_q ? partial_quarters_q : '1;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      issued_q  <= '0;
+      rank_q    <= '0;
+      ring_q    <= '0;
+      taken_q   <= '0;
+      partial_q <= 1'b0;
+      exit_q    <= '0;
+    end else begin
+      taken_q   <= taken_q + (PLACE_BEAT_BITS + 1)'(beat_valid) - (PLACE_BEAT_BITS + 1)'(freed);
+      partial_q <= go && partial;
+      if (start) begin
+        exit_q <= '0;
+      end else if (go) begin
+        exit_q   <= side.cluster;
+        issued_q <= issued_q + SEQ_BITS'(count);
+        rank_q   <= side.last ? '0 : rank_q + 9'(count);
+        ring_q   <= ring_q + PLACE_BEAT_BITS'(full) + PLACE_BEAT_BITS'(partial);
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (go) begin
+      partial_beat_q     <= beat + BEAT_BITS'(full);
+      partial_quarters_q <= (4'd1 << fill[1:0]) - 4'd1;
+    end
+  end
+
+  // ---- colours --------------------------------------------------------------------------------------
+
+  logic         [LANES-1:0] part_valid, part_ready;
+  colour_part_t [LANES-1:0] part;
+
+  flk_colour_fetch #(
+    .IdBits(IdBits)
+  ) i_colours (
+    .clk_i,
+    .rst_ni,
+    .start_i    (start),
+    .idle_o     (colour_idle),
+    .chunked_i  (registers_i.lane.chunked),
+    .colours_i  (registers_i.colours_beat),
+    .error_o    (colour_error),
+    .beats_o    (counters_o.colour_beats),
+    .in_valid_i (exit_valid && (&lane_ready) && record_room),
+    .in_ready_o (colour_room),
+    .in_data_i  (survivors),
+    .exit_i     (exit),
+    .oldest_o   (oldest),
+    .out_valid_o(part_valid),
+    .out_ready_i(part_ready),
+    .out_data_o (part),
+    .ar_valid_o (colour_ar_valid_o),
+    .ar_ready_i (colour_ar_ready_i),
+    .ar_id_o    (colour_ar_id_o),
+    .ar_addr_o  (colour_ar_addr_o),
+    .ar_len_o   (colour_ar_len_o),
+    .ar_size_o  (colour_ar_size_o),
+    .ar_burst_o (colour_ar_burst_o),
+    .r_valid_i  (colour_r_valid_i),
+    .r_ready_o  (colour_r_ready_o),
+    .r_id_i     (colour_r_id_i),
+    .r_data_i   (colour_r_data_i),
+    .r_resp_i   (colour_r_resp_i),
+    .r_last_i   (colour_r_last_i)
+  );
+
+  // ---- lanes ----------------------------------------------------------------------------------------
+
+  logic   [LANES-1:0]               record_valid, record_ready, entry_valid, entry_ready;
+  place_t [LANES-1:0]               record_place;
+  logic   [LANES-1:0][127:0]        record;
+  entry_t [LANES-1:0]               entry;
+  logic   [LANES-1:0][SEQ_BITS-1:0] progress;
+  logic   [LANES-1:0]               saturated, clipped, faint, unlisted;
+
+  for (genvar k = 0; k < LANES; k++) begin : gen_lanes
+    flk_preprocessing_core i_core (
+      .clk_i,
+      .rst_ni,
+      .setup_i       (registers_i.lane),
+      .key_shift_i   (key_shift),
+      .key_low_i     (key_low),
+      .idle_o        (lane_idle[k]),
+      .front_en_i    (front_en),
+      .front_phase_i (front_phase_q),
+      .words_i       (group.word[k]),
+      .scale_low_i   (group.header.scale_low),
+      .scale_step_i  (group.header.scale_step),
+      .low_i         (low),
+      .step_i        (step),
+      .near_o        (lane_near[k]),
+      .outside_o     (lane_outside[k]),
+      .push_i        (go && alive[k]),
+      .ready_o       (lane_ready[k]),
+      .seq_i         (seq[k]),
+      .number_i      (number[k]),
+      .place_i       (place[k]),
+      .header_valid_i(enter && group.first),
+      .header_index_i(cluster[HeaderBits-1:0]),
+      .header_i      (colour_header),
+      .part_valid_i  (part_valid[k]),
+      .part_ready_o  (part_ready[k]),
+      .part_i        (part[k]),
+      .record_valid_o(record_valid[k]),
+      .record_ready_i(record_ready[k]),
+      .record_place_o(record_place[k]),
+      .record_o      (record[k]),
+      .entry_valid_o (entry_valid[k]),
+      .entry_ready_i (entry_ready[k]),
+      .entry_o       (entry[k]),
+      .issued_i      (issued_q),
+      .progress_o    (progress[k]),
+      .saturated_o   (saturated[k]),
+      .clipped_o     (clipped[k]),
+      .faint_o       (faint[k]),
+      .unlisted_o    (unlisted[k])
+    );
+  end
+
+  // ---- records --------------------------------------------------------------------------------------
+
+  logic                 line_valid, line_ready;
+  logic [BEAT_BITS-1:0] line_beat;
+  logic [Width-1:0]     line_data;
+  logic [3:0]           line_strobe;
+
+  flk_record_writer i_records (
+    .clk_i,
+    .rst_ni,
+    .idle_o      (records_idle),
+    .in_valid_i  (record_valid),
+    .in_ready_o  (record_ready),
+    .in_place_i  (record_place),
+    .in_record_i (record),
+    .beat_valid_i(beat_valid),
+    .beat_ready_o(beat_ready),
+    .beat_data_i (told),
+    .freed_o     (freed),
+    .out_valid_o (line_valid),
+    .out_ready_i (line_ready),
+    .out_beat_o  (line_beat),
+    .out_data_o  (line_data),
+    .out_strobe_o(line_strobe)
+  );
+
+  // ---- lists ----------------------------------------------------------------------------------------
+
+  logic [3:0]                   merged_valid, merged_ready, merged_end;
+  logic [3:0][6:0]              merged_u, merged_v;
+  logic [3:0][NUMBER_BITS+27:0] merged;
+
+  flk_entry_merge i_merge (
+    .clk_i,
+    .rst_ni,
+    .start_i    (start),
+    .end_i      (lists_end),
+    .idle_o     (merge_idle),
+    .in_valid_i (entry_valid),
+    .in_ready_o (entry_ready),
+    .in_data_i  (entry),
+    .progress_i (progress),
+    .out_valid_o(merged_valid),
+    .out_ready_i(merged_ready),
+    .out_end_o  (merged_end),
+    .out_u_o    (merged_u),
+    .out_v_o    (merged_v),
+    .out_entry_o(merged)
+  );
+
+  typedef struct packed {
+    logic [BEAT_BITS-1:0] beat;
+    logic [3:0]           strobe;
+    logic [Width-1:0]     data;
+  } line_t;
+
+  logic  [4:0]              out_valid, out_ready;
+  line_t [4:0]              out;
+  logic [3:0][31:0]         list_entries, list_lines, list_evicted;
+  logic [3:0][24:0]         list_taken;
+  logic [3:0]               unused_done;
+  localparam int unsigned   LinesBits = $clog2(Pointers / 16 + 1);
+
+  for (genvar b = 0; b < 4; b++) begin : gen_lists
+    logic [ListAddrBits-1:0] address;
+    logic [Width-1:0]        data;
+
+    flk_list_writer #(
+      .Pointers(Pointers)
+    ) i_list (
+      .clk_i,
+      .rst_ni,
+      .start_i        (start),
+      .idle_o         (list_idle[b]),
+      .writer_i       (2'(b)),
+      .columns_i      (registers_i.list_columns),
+      .pointer_lines_i(LinesBits'(registers_i.pointer_lines)),
+      .chunks_i       (registers_i.chunks),
+      .list_base_i    (registers_i.lists_beat),
+      .pointer_base_i (registers_i.pointers_beat),
+      .done_o         (unused_done[b]),
+      .failed_o       (list_failed[b]),
+      .entries_o      (list_entries[b]),
+      .lines_o        (list_lines[b]),
+      .evicted_o      (list_evicted[b]),
+      .taken_o        (list_taken[b]),
+      .in_valid_i     (merged_valid[b]),
+      .in_ready_o     (merged_ready[b]),
+      .in_end_i       (merged_end[b]),
+      .in_u_i         (merged_u[b]),
+      .in_v_i         (merged_v[b]),
+      .in_entry_i     (merged[b]),
+      .out_valid_o    (out_valid[b]),
+      .out_ready_i    (out_ready[b]),
+      .out_address_o  (address),
+      .out_data_o     (data)
+    );
+    assign out[b] = {address, 4'hf, data};
+  end
+
+  assign out_valid[4] = line_valid;
+  assign line_ready   = out_ready[4];
+  assign out[4]       = {line_beat, line_strobe, line_data};
+
+  // ---- writes ---------------------------------------------------------------------------------------
+
+  logic                   chosen_valid, chosen_ready;
+  line_t                  chosen, write;
+  logic                   address_room, address_valid, address_ready, address_empty;
+  logic                   data_room, data_valid, data_ready, data_empty;
+  logic [BEAT_BITS-1:0]   write_beat;
+  logic                   write_answer, write_failed, unused_tag;
+  logic [2:0]             unused_index, unused_data_usage;
+  logic [1:0]             unused_address_usage;
+  logic                   unused_address_full, unused_data_full;
+
+  flk_stream_arbiter #(
+    .Inputs(5),
+    .Width ($bits(line_t))
+  ) i_arbiter (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (out_valid),
+    .in_ready_o (out_ready),
+    .in_data_i  (out),
+    .out_valid_o(chosen_valid),
+    .out_ready_i(chosen_ready),
+    .out_data_o (chosen),
+    .out_index_o(unused_index)
+  );
+
+  // A burst's data wait for its length: addresses and data go their own ways.
+  assign chosen_ready  = address_room && data_room;
+  assign arbiter_empty = !chosen_valid && address_empty && data_empty;
+
+  flk_fifo #(
+    .Width(BEAT_BITS),
+    .Depth(2)
+  ) i_addresses (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (chosen_valid && data_room),
+    .in_ready_o (address_room),
+    .in_data_i  (chosen.beat),
+    .out_valid_o(address_valid),
+    .out_ready_i(address_ready),
+    .out_data_o (write_beat),
+    .usage_o    (unused_address_usage),
+    .full_o     (unused_address_full),
+    .empty_o    (address_empty)
+  );
+
+  flk_fifo #(
+    .Width($bits(line_t)),
+    .Depth(6)
+  ) i_lines (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (chosen_valid && address_room),
+    .in_ready_o (data_room),
+    .in_data_i  (chosen),
+    .out_valid_o(data_valid),
+    .out_ready_i(data_ready),
+    .out_data_o (write),
+    .usage_o    (unused_data_usage),
+    .full_o     (unused_data_full),
+    .empty_o    (data_empty)
+  );
+
+  logic [Bytes-1:0] strobes;
+
+  always_comb begin
+    for (int unsigned q = 0; q < 4; q++) begin
+      strobes[q*(Bytes/4)+:Bytes/4] = {Bytes / 4{write.strobe[q]}};
+    end
+  end
+
+  flk_axi_write #(
+    .AddrBits(AddrBits),
+    .BeatBits(1),
+    .TagBits (1),
+    .Width   (Width),
+    .MaxBeats(1),
+    .Bursts  (64),
+    .IdBits  (IdBits)
+  ) i_write (
+    .clk_i,
+    .rst_ni,
+    .idle_o      (write_idle),
+    .in_valid_i  (address_valid),
+    .in_ready_o  (address_ready),
+    .in_addr_i   ({write_beat, 6'b0}),
+    .in_beats_i  (1'b1),
+    .in_tag_i    (1'b0),
+    .data_valid_i(data_valid),
+    .data_ready_o(data_ready),
+    .data_data_i (write.data),
+    .data_strb_i (strobes),
+    .done_valid_o(write_answer),
+    .done_error_o(write_failed),
+    .done_tag_o  (unused_tag),
+    .aw_valid_o,
+    .aw_ready_i,
+    .aw_id_o,
+    .aw_addr_o,
+    .aw_len_o,
+    .aw_size_o,
+    .aw_burst_o,
+    .w_valid_o,
+    .w_ready_i,
+    .w_data_o,
+    .w_strb_o,
+    .w_last_o,
+    .b_valid_i,
+    .b_ready_o,
+    .b_id_i,
+    .b_resp_i
+  );
+
+  // ---- errors and counters --------------------------------------------------------------------------
+
+  logic        write_error_q;
+  logic [31:0] near_q, outside_q, survivors_q, saturated_q, clipped_q, faint_q, unlisted_q, records_q;
+  logic [31:0] cycles_q;
+
+  function automatic logic [31:0] sum(input logic [LANES-1:0] bits);
+    sum = '0;
+    for (int unsigned k = 0; k < LANES; k++) begin
+      sum = sum + 32'(bits[k]);
+    end
+  endfunction
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      write_error_q <= 1'b0;
+      near_q        <= '0;
+      outside_q     <= '0;
+      survivors_q   <= '0;
+      saturated_q   <= '0;
+      clipped_q     <= '0;
+      faint_q       <= '0;
+      unlisted_q    <= '0;
+      records_q     <= '0;
+      cycles_q      <= '0;
+    end else if (start) begin
+      write_error_q <= 1'b0;
+      near_q        <= '0;
+      outside_q     <= '0;
+      survivors_q   <= '0;
+      saturated_q   <= '0;
+      clipped_q     <= '0;
+      faint_q       <= '0;
+      unlisted_q    <= '0;
+      records_q     <= '0;
+      cycles_q      <= '0;
+    end else if (state_q != IDLE) begin
+      write_error_q <= write_error_q || (write_answer && write_failed);
+      if (go) begin
+        near_q      <= near_q + sum(side.used & lane_near);
+        outside_q   <= outside_q + sum(side.used & ~lane_near & lane_outside);
+        survivors_q <= survivors_q + 32'(count);
+      end
+      saturated_q <= saturated_q + sum(saturated);
+      clipped_q   <= clipped_q + sum(clipped);
+      faint_q     <= faint_q + sum(faint);
+      unlisted_q  <= unlisted_q + sum(unlisted);
+      records_q   <= records_q + 32'(line_valid && line_ready);
+      cycles_q    <= cycles_q + 1'b1;
+    end
+  end
+
+  assign counters_o.too_near       = near_q;
+  assign counters_o.outside      = outside_q;
+  assign counters_o.survivors    = survivors_q;
+  assign counters_o.saturated    = saturated_q;
+  assign counters_o.clipped      = clipped_q;
+  assign counters_o.faint        = faint_q;
+  assign counters_o.unlisted     = unlisted_q;
+  assign counters_o.record_beats = records_q;
+  assign counters_o.cycles       = cycles_q;
+  assign counters_o.entries      = list_entries;
+  assign counters_o.lines        = list_lines;
+  assign counters_o.evicted      = list_evicted;
+  assign counters_o.taken        = list_taken;
+  assign counters_o.key_shift    = key_shift;
+  assign counters_o.key_low      = key_low;
+
+  assign error_o = {|list_failed, beyond_q, write_error_q, cull_error || geometry_error || colour_error};
+
+  logic unused;
+  assign unused = ^{cull_idle, geometry_idle, write.beat, group.cluster.index, beat_ready,
+                    unused_bounds, unused_cull_done, unused_geometry_done, unused_done,
+                    unused_index, unused_address_usage, unused_address_full, unused_data_usage,
+                    unused_data_full, unused_tag, fill[3]};
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
+  else $error("flk_preprocessing: start while a frame is under way");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> beat_ready)
+  else $error("flk_preprocessing: a beat of records without a place");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) partial_q |-> !(go && full))
+  else $error("flk_preprocessing: two beats of records in one cycle");
+`endif
+
+endmodule

@@ -1,0 +1,773 @@
+// Preprocessing core: one of the four lanes of the front end (docs/front_end.md).
+//
+// Front: a Gaussian as it lies in memory goes through decoding and projection. All lanes move
+// together: front_en_i, front_phase_i and the cluster's numbers come from outside, low_i and step_i
+// GEOMETRY_DECODE_LATENCY enabled cycles after the words. alive_o stands when the outputs of
+// flk_projection do; push_i then takes the survivor with its seq, record number and place;
+// ready_o: there is room for it.
+// Back: with its colours (parts, in order) a survivor becomes a record and entries of tile lists.
+// Spherical harmonics of those that wait are ready when their colours come. progress_o: no entry of
+// this lane with a seq before it is to come; issued_i is the next seq that will be given to any lane.
+// Counters are pulses: a survivor whose mean was saturated, whose colour was clipped, whose opacity
+// code is 0, that has no entry. setup_i, key_*_i stay while idle_o is low.
+// Throughput: a Gaussian every two cycles in front, behind every two cycles (SH degree 0 to 2) or
+// four (3), a band of tiles a cycle, an entry a cycle. No combinational path from ready to ready but
+// within the streams' own stages.
+module flk_preprocessing_core
+  import flk_front_pkg::*;
+  import flk_preproc_pkg::*;
+#(
+  parameter  int unsigned Waiting    = 128,  // survivors that wait for colours
+  parameter  int unsigned Unfinished = 256,  // survivors that are not listed yet
+  localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS)
+) (
+  input  logic                        clk_i,
+  input  logic                        rst_ni,
+  input  lane_setup_t                 setup_i,
+  input  logic signed [7:0]           key_shift_i,
+  input  position_t                   key_low_i,
+  output logic                        idle_o,       // nothing behind the front
+  // Front, in step with the other lanes
+  input  logic                        front_en_i,
+  input  logic                        front_phase_i,
+  input  logic [4:0][31:0]            words_i,
+  input  logic [2:0][26:0]            scale_low_i,
+  input  logic [2:0][26:0]            scale_step_i,
+  input  position_t [2:0]             low_i,
+  input  position_t [2:0]             step_i,
+  output logic                        near_o,
+  output logic                        outside_o,
+  input  logic                        push_i,
+  output logic                        ready_o,
+  input  logic [SEQ_BITS-1:0]         seq_i,
+  input  logic [NUMBER_BITS-1:0]      number_i,
+  input  place_t                      place_i,
+  // Headers of clusters
+  input  logic                        header_valid_i,
+  input  logic [HeaderBits-1:0]       header_index_i,
+  input  colour_header_t              header_i,
+  // Colours
+  input  logic                        part_valid_i,
+  output logic                        part_ready_o,
+  input  colour_part_t                part_i,
+  // Records
+  output logic                        record_valid_o,
+  input  logic                        record_ready_i,
+  output place_t                      record_place_o,
+  output logic [127:0]                record_o,
+  // Entries
+  output logic                        entry_valid_o,
+  input  logic                        entry_ready_i,
+  output entry_t                      entry_o,
+  input  logic [SEQ_BITS-1:0]         issued_i,
+  output logic [SEQ_BITS-1:0]         progress_o,
+  // Counters
+  output logic                        saturated_o,
+  output logic                        clipped_o,
+  output logic                        faint_o,
+  output logic                        unlisted_o
+);
+
+  // ---- front ----------------------------------------------------------------------------------------
+
+  position_t [2:0] q;
+  shape_t [2:0]    s;
+  shape_t [3:0]    quat;
+  waiting_t        waiting;
+
+  flk_geometry_decode i_decode (
+    .clk_i,
+    .en_i          (front_en_i),
+    .phase_i       (front_phase_i),
+    .chunked_i     (setup_i.chunked),
+    .word_0_i      (words_i[0]),
+    .word_1_i      (words_i[1]),
+    .word_2_i      (words_i[2]),
+    .word_3_i      (words_i[3]),
+    .word_4_i      (words_i[4]),
+    .scale_low_0_i ($signed(scale_low_i[0])),
+    .scale_low_1_i ($signed(scale_low_i[1])),
+    .scale_low_2_i ($signed(scale_low_i[2])),
+    .scale_step_0_i($signed(scale_step_i[0])),
+    .scale_step_1_i($signed(scale_step_i[1])),
+    .scale_step_2_i($signed(scale_step_i[2])),
+    .q_0_o         (q[0]),
+    .q_1_o         (q[1]),
+    .q_2_o         (q[2]),
+    .s_0_o         (s[0]),
+    .s_1_o         (s[1]),
+    .s_2_o         (s[2]),
+    .qw_o          (quat[0]),
+    .qx_o          (quat[1]),
+    .qy_o          (quat[2]),
+    .qz_o          (quat[3])
+  );
+
+  flk_projection i_projection (
+    .clk_i,
+    .en_i         (front_en_i),
+    .phase_i      (front_phase_i),
+    .low_0_i      (low_i[0]),
+    .low_1_i      (low_i[1]),
+    .low_2_i      (low_i[2]),
+    .step_0_i     (step_i[0]),
+    .step_1_i     (step_i[1]),
+    .step_2_i     (step_i[2]),
+    .q_0_i        (q[0]),
+    .q_1_i        (q[1]),
+    .q_2_i        (q[2]),
+    .s_0_i        (s[0]),
+    .s_1_i        (s[1]),
+    .s_2_i        (s[2]),
+    .qw_i         (quat[0]),
+    .qx_i         (quat[1]),
+    .qy_i         (quat[2]),
+    .qz_i         (quat[3]),
+    .view_00_i    (setup_i.view[0][0]),
+    .view_01_i    (setup_i.view[0][1]),
+    .view_02_i    (setup_i.view[0][2]),
+    .view_10_i    (setup_i.view[1][0]),
+    .view_11_i    (setup_i.view[1][1]),
+    .view_12_i    (setup_i.view[1][2]),
+    .view_20_i    (setup_i.view[2][0]),
+    .view_21_i    (setup_i.view[2][1]),
+    .view_22_i    (setup_i.view[2][2]),
+    .focal_0_i    (setup_i.focal[0]),
+    .focal_1_i    (setup_i.focal[1]),
+    .row_x_0_i    (setup_i.row_x[0]),
+    .row_x_1_i    (setup_i.row_x[1]),
+    .row_x_2_i    (setup_i.row_x[2]),
+    .row_x_z_0_i  (setup_i.row_x_z[0]),
+    .row_x_z_1_i  (setup_i.row_x_z[1]),
+    .row_x_z_2_i  (setup_i.row_x_z[2]),
+    .row_y_0_i    (setup_i.row_y[0]),
+    .row_y_1_i    (setup_i.row_y[1]),
+    .row_y_2_i    (setup_i.row_y[2]),
+    .row_y_z_0_i  (setup_i.row_y_z[0]),
+    .row_y_z_1_i  (setup_i.row_y_z[1]),
+    .row_y_z_2_i  (setup_i.row_y_z[2]),
+    .limit_0_i    (setup_i.limit[0]),
+    .limit_1_i    (setup_i.limit[1]),
+    .width_i      (setup_i.width),
+    .height_i     (setup_i.height),
+    .key_shift_i,
+    .key_low_i,
+    .near_o,
+    .outside_o,
+    .far_o        (waiting.clipped),
+    .x_o          (waiting.x),
+    .y_o          (waiting.y),
+    .sx_o         (waiting.sx),
+    .sy_o         (waiting.sy),
+    .l0_o         (waiting.l0),
+    .l1_o         (waiting.l1),
+    .l2_o         (waiting.l2),
+    .spiky_o      (waiting.spiky),
+    .i0_o         (waiting.i0),
+    .kappa_o      (waiting.kappa),
+    .lean_o       (waiting.lean),
+    .key_o        (waiting.key),
+    .direction_0_o(waiting.direction[0]),
+    .direction_1_o(waiting.direction[1]),
+    .direction_2_o(waiting.direction[2])
+  );
+
+  assign waiting.seq    = seq_i;
+  assign waiting.number = number_i;
+  assign waiting.place  = place_i;
+  assign saturated_o    = push_i && waiting.clipped;
+
+  // ---- survivors that wait --------------------------------------------------------------------------
+
+  // Directions go ahead of the rest.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;
+    place_t                 place;
+    logic [23:0]            key;
+    logic                   spiky;
+    logic signed [30:0]     x;
+    logic signed [30:0]     y;
+    shape_t                 sx;
+    shape_t                 sy;
+    shape_t                 l0;
+    shape_t                 l1;
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+    shape_t                 lean;
+  } survivor_t;
+
+  survivor_t       survivor_in, survivor;
+  colour_t [2:0]   direction;
+  logic            survivor_valid, survivor_ready, survivor_room, survivors_empty;
+  logic            direction_valid, direction_ready, direction_room, directions_empty;
+  logic            seq_room;
+
+  assign survivor_in = '{
+    seq: waiting.seq, number: waiting.number, place: waiting.place, key: waiting.key,
+    spiky: waiting.spiky, x: waiting.x, y: waiting.y, sx: waiting.sx, sy: waiting.sy,
+    l0: waiting.l0, l1: waiting.l1, l2: waiting.l2, i0: waiting.i0, kappa: waiting.kappa,
+    lean: waiting.lean
+  };
+  assign ready_o = survivor_room && direction_room && seq_room;
+
+  flk_sram_fifo #(
+    .Width($bits(survivor_t)),
+    .Depth(Waiting)
+  ) i_survivors (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (push_i),
+    .in_ready_o (survivor_room),
+    .in_data_i  (survivor_in),
+    .out_valid_o(survivor_valid),
+    .out_ready_i(survivor_ready),
+    .out_data_o (survivor),
+    .empty_o    (survivors_empty)
+  );
+
+  flk_sram_fifo #(
+    .Width($bits(colour_t) * 3),
+    .Depth(Waiting)
+  ) i_directions (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (push_i),
+    .in_ready_o (direction_room),
+    .in_data_i  (waiting.direction),
+    .out_valid_o(direction_valid),
+    .out_ready_i(direction_ready),
+    .out_data_o (direction),
+    .empty_o    (directions_empty)
+  );
+
+  // ---- spherical harmonics --------------------------------------------------------------------------
+
+  logic                            basis_en, basis_phase_q, basis_take, basis_out, held_q, held_pop;
+  logic [COLOUR_BASIS_LATENCY-1:0] basis_valid_q;
+  colour_t [15:1]                  basis, basis_q;
+
+  flk_colour_basis i_basis (
+    .clk_i,
+    .en_i         (basis_en),
+    .phase_i      (basis_phase_q),
+    .direction_0_i(direction[0]),
+    .direction_1_i(direction[1]),
+    .direction_2_i(direction[2]),
+    .basis_1_o    (basis[1]),
+    .basis_2_o    (basis[2]),
+    .basis_3_o    (basis[3]),
+    .basis_4_o    (basis[4]),
+    .basis_5_o    (basis[5]),
+    .basis_6_o    (basis[6]),
+    .basis_7_o    (basis[7]),
+    .basis_8_o    (basis[8]),
+    .basis_9_o    (basis[9]),
+    .basis_10_o   (basis[10]),
+    .basis_11_o   (basis[11]),
+    .basis_12_o   (basis[12]),
+    .basis_13_o   (basis[13]),
+    .basis_14_o   (basis[14]),
+    .basis_15_o   (basis[15])
+  );
+
+  assign basis_out       = basis_valid_q[COLOUR_BASIS_LATENCY-1];
+  assign basis_en        = !basis_out || !held_q || held_pop;
+  assign basis_take      = basis_en && !basis_phase_q && direction_valid;
+  assign direction_ready = basis_en && !basis_phase_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      basis_phase_q <= 1'b0;
+      basis_valid_q <= '0;
+      held_q        <= 1'b0;
+    end else begin
+      if (basis_en) begin
+        basis_phase_q <= !basis_phase_q;
+        basis_valid_q <= {basis_valid_q[COLOUR_BASIS_LATENCY-2:0], basis_take};
+      end
+      held_q <= (basis_out && basis_en) || (held_q && !held_pop);
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (basis_out && basis_en) begin
+      basis_q <= basis;
+    end
+  end
+
+  // ---- a part of a colour ---------------------------------------------------------------------------
+
+  logic           part_valid_q, part_move, part_go, side_room, record_room, bounds_room;
+  colour_part_t   part_q;
+  colour_header_t header;
+  colour_t [3:0]      part_basis;
+  colour_t [3:0][2:0] part_step;
+  logic           colour_en;
+
+  assign part_ready_o = !part_valid_q || part_move;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      part_valid_q <= 1'b0;
+    end else if (part_ready_o) begin
+      part_valid_q <= part_valid_i;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (part_valid_i && part_ready_o) begin
+      part_q <= part_i;
+    end
+  end
+
+  flk_sram #(
+    .Width($bits(colour_header_t)),
+    .Depth(COLOUR_CLUSTERS)
+  ) i_headers (
+    .clk_i,
+    .wr_en_i  (header_valid_i),
+    .wr_addr_i(header_index_i),
+    .wr_data_i(header_i),
+    .rd_en_i  (part_valid_i && part_ready_o),
+    .rd_addr_i(part_i.cluster[HeaderBits-1:0]),
+    .rd_data_o(header)
+  );
+
+  logic unused_cluster;
+  assign unused_cluster = ^part_q.cluster;
+
+  // Its first part takes a survivor out of the queue, its last one the spherical harmonics.
+  assign part_go        = held_q && (!part_q.first || (survivor_valid && side_room && record_room &&
+                                                       bounds_room));
+  assign part_move      = part_valid_q && part_go && colour_en;
+  assign survivor_ready = part_move && part_q.first;
+  assign held_pop       = part_move && part_q.last;
+
+  always_comb begin
+    for (int unsigned i = 0; i < 4; i++) begin
+      part_basis[i] = i < 3 || part_q.part != 2'd3 ? basis_q[4'(4 * 32'(part_q.part) + 1 + i)] : '0;
+      unique case (part_q.part)
+        2'd0: part_step[i] = i < 3 ? header.sh_step[0] : header.sh_step[1];
+        2'd1: part_step[i] = header.sh_step[1];
+        default: part_step[i] = header.sh_step[2];
+      endcase
+    end
+  end
+
+  colour_t [2:0] sum, constant;
+
+  flk_colour_group i_group (
+    .clk_i,
+    .en_i        (colour_en),
+    .chunked_i   (setup_i.chunked),
+    .dc_0_i      (part_q.dc[0]),
+    .dc_1_i      (part_q.dc[1]),
+    .dc_2_i      (part_q.dc[2]),
+    .dc_low_0_i  (header.dc_low[0]),
+    .dc_low_1_i  (header.dc_low[1]),
+    .dc_low_2_i  (header.dc_low[2]),
+    .dc_step_0_i (header.dc_step[0]),
+    .dc_step_1_i (header.dc_step[1]),
+    .dc_step_2_i (header.dc_step[2]),
+    .basis_0_i   (part_basis[0]),
+    .basis_1_i   (part_basis[1]),
+    .basis_2_i   (part_basis[2]),
+    .basis_3_i   (part_basis[3]),
+    .raw_00_i    (part_q.raw[0][0]),
+    .raw_01_i    (part_q.raw[0][1]),
+    .raw_02_i    (part_q.raw[0][2]),
+    .raw_10_i    (part_q.raw[1][0]),
+    .raw_11_i    (part_q.raw[1][1]),
+    .raw_12_i    (part_q.raw[1][2]),
+    .raw_20_i    (part_q.raw[2][0]),
+    .raw_21_i    (part_q.raw[2][1]),
+    .raw_22_i    (part_q.raw[2][2]),
+    .raw_30_i    (part_q.raw[3][0]),
+    .raw_31_i    (part_q.raw[3][1]),
+    .raw_32_i    (part_q.raw[3][2]),
+    .step_00_i   (part_step[0][0]),
+    .step_01_i   (part_step[0][1]),
+    .step_02_i   (part_step[0][2]),
+    .step_10_i   (part_step[1][0]),
+    .step_11_i   (part_step[1][1]),
+    .step_12_i   (part_step[1][2]),
+    .step_20_i   (part_step[2][0]),
+    .step_21_i   (part_step[2][1]),
+    .step_22_i   (part_step[2][2]),
+    .step_30_i   (part_step[3][0]),
+    .step_31_i   (part_step[3][1]),
+    .step_32_i   (part_step[3][2]),
+    .zero_i      (header.sh_zero),
+    .used_0_i    (part_q.used[0]),
+    .used_1_i    (part_q.used[1]),
+    .used_2_i    (part_q.used[2]),
+    .used_3_i    (part_q.used[3]),
+    .sum_0_o     (sum[0]),
+    .sum_1_o     (sum[1]),
+    .sum_2_o     (sum[2]),
+    .constant_0_o(constant[0]),
+    .constant_1_o(constant[1]),
+    .constant_2_o(constant[2])
+  );
+
+  // ---- sums of the parts, colour --------------------------------------------------------------------
+
+  typedef struct packed {
+    logic       valid;
+    logic       first;
+    logic       last;
+    logic [1:0] part;
+  } tag_t;
+
+  tag_t [COLOUR_GROUP_LATENCY-1:0] tag_q;
+  tag_t                            tag;
+  colour_t [2:0][3:0]              sums_d, sums_q;  // by channel, part
+  colour_t [2:0]                   constant_d, constant_q;
+  logic                            summed_q;
+  logic [COLOUR_TOTAL_LATENCY-1:0] total_valid_q;
+  logic [2:0][9:0]                 rgb;
+  logic [2:0]                      clipped;
+  logic                            rgb_valid, rgb_ready;
+
+  assign tag = tag_q[COLOUR_GROUP_LATENCY-1];
+
+  always_comb begin
+    sums_d     = sums_q;
+    constant_d = constant_q;
+    if (tag.first) begin
+      sums_d     = '0;
+      constant_d = constant;
+    end
+    for (int unsigned c = 0; c < 3; c++) begin
+      sums_d[c][tag.part] = sum[c];
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      tag_q         <= '0;
+      summed_q      <= 1'b0;
+      total_valid_q <= '0;
+    end else if (colour_en) begin
+      tag_q         <= {tag_q[COLOUR_GROUP_LATENCY-2:0],
+                        part_valid_q && part_go, part_q.first, part_q.last, part_q.part};
+      summed_q      <= tag.valid && tag.last;
+      total_valid_q <= {total_valid_q[COLOUR_TOTAL_LATENCY-2:0], summed_q};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (colour_en && tag.valid) begin
+      sums_q     <= sums_d;
+      constant_q <= constant_d;
+    end
+  end
+
+  for (genvar c = 0; c < 3; c++) begin : gen_channels
+    flk_colour_total i_total (
+      .clk_i,
+      .en_i      (colour_en),
+      .constant_i(constant_q[c]),
+      .sum_0_i   (sums_q[c][0]),
+      .sum_1_i   (sums_q[c][1]),
+      .sum_2_i   (sums_q[c][2]),
+      .sum_3_i   (sums_q[c][3]),
+      .clipped_o (clipped[c]),
+      .code_o    (rgb[c])
+    );
+  end
+
+  assign rgb_valid = total_valid_q[COLOUR_TOTAL_LATENCY-1];
+  assign colour_en = !rgb_valid || rgb_ready;
+
+  // ---- bounds ---------------------------------------------------------------------------------------
+
+  typedef struct packed {
+    logic signed [30:0] x;
+    logic signed [30:0] y;
+    shape_t             sx;
+    shape_t             sy;
+    shape_t             lean;
+    logic [15:0]        opacity;
+  } bounded_t;
+
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;
+    logic [23:0]            key;
+    logic signed [30:0]     x;
+    logic signed [30:0]     y;
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+  } side_t;
+
+  bounded_t                        bounded;
+  side_t                           side;
+  listed_t                         listed, walk;
+  logic                            bounded_valid, side_valid, side_empty, outside_bounds;
+  logic                            bounds_en, bounds_phase_q, bounds_out, bounds_take;
+  logic [SPLAT_BOUNDS_LATENCY-1:0] bounds_valid_q;
+  logic [7:0]                      code, record_code;
+  logic                            walk_room, walk_valid, walk_ready, code_room, code_valid;
+  logic                            bounded_empty, walk_empty, code_empty;
+  logic                            unused_full, unused_full_walk, unused_full_code;
+  logic [1:0]                      unused_usage, unused_usage_walk;
+  logic [4:0]                      unused_usage_code;
+
+  flk_fifo #(
+    .Width($bits(bounded_t)),
+    .Depth(2)
+  ) i_bounded (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (survivor_ready),
+    .in_ready_o (bounds_room),
+    .in_data_i  ({survivor.x, survivor.y, survivor.sx, survivor.sy, survivor.lean, part_q.opacity}),
+    .out_valid_o(bounded_valid),
+    .out_ready_i(bounds_take),
+    .out_data_o (bounded),
+    .usage_o    (unused_usage),
+    .full_o     (unused_full),
+    .empty_o    (bounded_empty)
+  );
+
+  flk_sram_fifo #(
+    .Width($bits(side_t)),
+    .Depth(16)
+  ) i_side (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (survivor_ready),
+    .in_ready_o (side_room),
+    .in_data_i  ({survivor.seq, survivor.number, survivor.key, survivor.x, survivor.y,
+                  survivor.l2, survivor.i0, survivor.kappa}),
+    .out_valid_o(side_valid),
+    .out_ready_i(bounds_out && bounds_en),
+    .out_data_o (side),
+    .empty_o    (side_empty)
+  );
+
+  flk_splat_bounds i_bounds (
+    .clk_i,
+    .en_i     (bounds_en),
+    .phase_i  (bounds_phase_q),
+    .x_i      (bounded.x),
+    .y_i      (bounded.y),
+    .sx_i     (bounded.sx),
+    .sy_i     (bounded.sy),
+    .lean_i   (bounded.lean),
+    .chunked_i(setup_i.chunked),
+    .box_i    (setup_i.box),
+    .opacity_i(bounded.opacity),
+    .width_i  (setup_i.width),
+    .height_i (setup_i.height),
+    .empty_o  (outside_bounds),
+    .x0_o     (listed.x0),
+    .x1_o     (listed.x1),
+    .y0_o     (listed.y0),
+    .y1_o     (listed.y1),
+    .limit_o  (listed.limit),
+    .right_o  (listed.right),
+    .code_o   (code)
+  );
+
+  assign bounds_out  = bounds_valid_q[SPLAT_BOUNDS_LATENCY-1];
+  assign bounds_en   = !bounds_out || (side_valid && walk_room && code_room);
+  assign bounds_take = bounds_en && !bounds_phase_q && bounded_valid;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      bounds_phase_q <= 1'b0;
+      bounds_valid_q <= '0;
+    end else if (bounds_en) begin
+      bounds_phase_q <= !bounds_phase_q;
+      bounds_valid_q <= {bounds_valid_q[SPLAT_BOUNDS_LATENCY-2:0], bounds_take};
+    end
+  end
+
+  assign listed.seq    = side.seq;
+  assign listed.number = side.number;
+  assign listed.key    = side.key;
+  assign listed.empty  = outside_bounds || code == '0;
+  assign listed.x      = side.x;
+  assign listed.y      = side.y;
+  assign listed.l2     = side.l2;
+  assign listed.i0     = side.i0;
+  assign listed.kappa  = side.kappa;
+  assign faint_o       = bounds_out && bounds_en && code == '0;
+
+  // ---- entries --------------------------------------------------------------------------------------
+
+  logic walker_idle, walked, any_q;
+
+  flk_fifo #(
+    .Width($bits(listed_t)),
+    .Depth(2)
+  ) i_walk (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (bounds_out && bounds_en),
+    .in_ready_o (walk_room),
+    .in_data_i  (listed),
+    .out_valid_o(walk_valid),
+    .out_ready_i(walk_ready),
+    .out_data_o (walk),
+    .usage_o    (unused_usage_walk),
+    .full_o     (unused_full_walk),
+    .empty_o    (walk_empty)
+  );
+
+  flk_tile_walker i_walker (
+    .clk_i,
+    .rst_ni,
+    .box_i       (setup_i.box),
+    .idle_o      (walker_idle),
+    .in_valid_i  (walk_valid),
+    .in_ready_o  (walk_ready),
+    .in_data_i   (walk),
+    .out_valid_o (entry_valid_o),
+    .out_ready_i (entry_ready_i),
+    .out_data_o  (entry_o),
+    .done_valid_o(walked)
+  );
+
+  // Whether the splat that is being walked has an entry
+
+  logic                entry_move, seq_valid, seqs_empty;
+  logic [SEQ_BITS-1:0] oldest, progress_d, progress_q;
+
+  assign entry_move = entry_valid_o && entry_ready_i;
+  assign unlisted_o = walked && !any_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      any_q <= 1'b0;
+    end else begin
+      any_q <= entry_move || (any_q && !walked);
+    end
+  end
+
+  flk_sram_fifo #(
+    .Width(SEQ_BITS),
+    .Depth(Unfinished)
+  ) i_seqs (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (push_i),
+    .in_ready_o (seq_room),
+    .in_data_i  (seq_i),
+    .out_valid_o(seq_valid),
+    .out_ready_i(walked),
+    .out_data_o (oldest),
+    .empty_o    (seqs_empty)
+  );
+
+  always_comb begin
+    progress_d = progress_q;
+    if (seqs_empty) begin
+      progress_d = issued_i;
+    end else if (seq_valid && !walked) begin
+      progress_d = oldest;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      progress_q <= '0;
+    end else begin
+      progress_q <= progress_d;
+    end
+  end
+
+  assign progress_o = progress_q;
+
+  // ---- record ---------------------------------------------------------------------------------------
+
+  typedef struct packed {
+    place_t      place;
+    logic        spiky;
+    logic [13:0] l2;
+    logic [14:0] l1;
+    logic [13:0] l0;
+    logic [22:0] y;
+    logic [22:0] x;
+  } fields_t;
+
+  fields_t fields_in, fields;
+  logic    fields_valid, fields_empty;
+
+  assign fields_in.place    = survivor.place;
+  assign fields_in.spiky    = survivor.spiky;
+  assign fields_in.l1[14]   = survivor.l1[SHAPE_MAN_BITS+8];
+
+  flk_mean_field i_x_field (.x_i(survivor.x), .field_o(fields_in.x));
+  flk_mean_field i_y_field (.x_i(survivor.y), .field_o(fields_in.y));
+  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (.x_i(survivor.l0), .field_o(fields_in.l0));
+  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l1_field (
+    .x_i    (survivor.l1),
+    .field_o(fields_in.l1[13:0])
+  );
+  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (.x_i(survivor.l2), .field_o(fields_in.l2));
+
+  flk_sram_fifo #(
+    .Width($bits(fields_t)),
+    .Depth(32)
+  ) i_fields (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (survivor_ready),
+    .in_ready_o (record_room),
+    .in_data_i  (fields_in),
+    .out_valid_o(fields_valid),
+    .out_ready_i(record_valid_o && record_ready_i),
+    .out_data_o (fields),
+    .empty_o    (fields_empty)
+  );
+
+  flk_fifo #(
+    .Width(8),
+    .Depth(16)
+  ) i_codes (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (bounds_out && side_valid && walk_room),
+    .in_ready_o (code_room),
+    .in_data_i  (code),
+    .out_valid_o(code_valid),
+    .out_ready_i(record_valid_o && record_ready_i),
+    .out_data_o (record_code),
+    .usage_o    (unused_usage_code),
+    .full_o     (unused_full_code),
+    .empty_o    (code_empty)
+  );
+
+  assign record_valid_o = rgb_valid && fields_valid && code_valid;
+  assign rgb_ready      = record_ready_i && fields_valid && code_valid;
+  assign record_place_o = fields.place;
+  assign record_o       = {fields.spiky, rgb[2], rgb[1], rgb[0], record_code, fields.l2, fields.l1,
+                           fields.l0, fields.y, fields.x};
+  assign clipped_o      = record_valid_o && record_ready_i && (|clipped);
+
+  assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty && code_empty &&
+                  side_empty && bounded_empty && walk_empty && walker_idle && seqs_empty;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) push_i |-> ready_o)
+  else $error("flk_preprocessing_core: a survivor without a place");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) walked |-> seq_valid)
+  else $error("flk_preprocessing_core: a splat is finished that was not waited for");
+`endif
+
+endmodule

@@ -1,0 +1,175 @@
+"""cocotb tests of flk_colour_fetch: parts against the bytes in memory, beats against those that hold survivors."""
+
+from __future__ import annotations
+
+import cocotb
+from cocotb.triggers import RisingEdge
+from flicker_tb.axi import MemoryPort
+from flicker_tb.bench import Bench
+from flicker_tb.streams import StreamSource, Stream
+
+from flicker.chip.dram import DramConfig
+from flicker.sim.memory import Memory, PortConfig
+from flicker.scene.packed import PackedFormat
+
+BASE, SIZE = 0x40_0000, 0x8_0000
+CLUSTERS = 8  # whose colours may be under way
+PART = (("cluster", 4), ("first", 1), ("last", 1), ("part", 2), ("used", 4), ("opacity", 16), ("dc", 48), ("raw", 192))
+USED = {0: [0], 1: [7], 2: [15, 15], 3: [15, 15, 15, 7]}
+
+
+class Survivors:
+    """A group of survivors as the design takes it."""
+
+    def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int):
+        self.cluster, self.colour, self.degree, self.group, self.alive = cluster, colour, degree, group, alive
+
+    @property
+    def bits(self) -> int:
+        return (self.cluster % 16) << 44 | self.colour << 12 | self.degree << 10 | self.group << 4 | self.alive
+
+
+class Fetch:
+    """The design with its memory."""
+
+    def __init__(self, dut, chunked: bool, perfect: bool, idle: str = "never", stall: str = "never", latency: int = 5):
+        self.dut, self.bench, self.chunked = dut, Bench(dut), chunked
+        self.memory = Memory(DramConfig().timing, perfect)
+        self.memory.allocate(BASE, SIZE, 77)
+        self.data = self.memory.read(BASE, SIZE)
+        rng = self.bench.rng
+        stalls = {k: rng.choice([0.0, 0.3]) for k in ("AR", "R")} if not perfect else {}
+        self.port = MemoryPort(dut, self.memory, PortConfig(max_reads=64, latency=latency, stall=stalls), writes=False)
+        self.source = StreamSource(Stream(dut, "in", ("data",)), self.bench.stall(idle))
+        self.stalls = [self.bench.stall(stall) for _ in range(4)]
+        self.parts: list[list[int]] = [[] for _ in range(4)]
+        for name, value in (("start", 0), ("chunked", chunked), ("colours", BASE // 64), ("exit", 0), ("out_ready", 0)):
+            getattr(dut, f"{name}_i").value = value
+        self.under_way: list[Survivors] = []
+        cocotb.start_soon(self._take())
+
+    async def _take(self) -> None:
+        dut, width = self.dut, sum(b for _, b in PART)
+        while True:
+            ready = sum(int(not next(stall)) << k for k, stall in enumerate(self.stalls))
+            dut.out_ready_i.value = ready
+            await RisingEdge(dut.clk_i)
+            valid = dut.out_valid_o.value
+            if not valid.is_resolvable:
+                continue
+            moved = int(valid) & ready
+            if moved:
+                word = int(dut.out_data_o.value)
+                for k in range(4):
+                    if moved >> k & 1:
+                        self.parts[k].append(word >> (width * k) & (1 << width) - 1)
+
+    def due(self, groups: list[Survivors]) -> list[list[dict[str, int]]]:
+        """Parts of each lane."""
+        form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
+        lanes: list[list[dict[str, int]]] = [[] for _ in range(4)]
+        size = 1 if self.chunked else 2
+        number = lambda at: int.from_bytes(self.data[at : at + size], "little")  # noqa: E731
+        for g in groups:
+            stride = form.colour_stride(g.degree)
+            for k in range(4):
+                if not g.alive >> k & 1:
+                    continue
+                at = g.colour * 64 + (4 * g.group + k) * stride
+                head = [number(at + size * i) for i in range(4)]
+                opacity, dc = (head[0], head[:0:-1]) if self.chunked else (head[0], head[1:])
+                for part, used in enumerate(USED[g.degree]):
+                    raw = {(i, c): number(at + size * (4 + 12 * part + 3 * i + c)) for i in range(4) for c in range(3) if used >> i & 1}
+                    lanes[k].append({"cluster": g.cluster % 16, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
+                                     "opacity": opacity, "dc": dc, "raw": raw})
+        return lanes
+
+    def beats(self, groups: list[Survivors]) -> int:
+        """Beats from a group's first survivor to its last one, each once."""
+        form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
+        found = set()
+        for g in groups:
+            alive = [4 * g.group + k for k in range(4) if g.alive >> k & 1]
+            if alive:
+                stride = form.colour_stride(g.degree)
+                first, last = alive[0] * stride // 64, (alive[-1] * stride + stride - 1) // 64
+                found |= {(g.cluster, b) for b in range(first, last + 1)}
+        return len(found)
+
+    async def run(self, groups: list[Survivors]) -> int:
+        """A frame. Returns its cycles."""
+        dut = self.dut
+        await self.bench.until(lambda: int(dut.idle_o.value) == 1, 2000, "idle")
+        for lane in self.parts:
+            lane.clear()
+        dut.exit_i.value = 0
+        dut.start_i.value = 1
+        await RisingEdge(dut.clk_i)
+        dut.start_i.value = 0
+        due = self.due(groups)
+        begin = self.memory.cycle
+        for g in groups:  # a cluster enters when there is room for it, as in flk_preprocessing
+            await self.bench.until(lambda g=g: (g.cluster - int(dut.oldest_o.value)) % 16 < CLUSTERS, 20_000, "room for a cluster")
+            dut.exit_i.value = g.cluster % 16
+            self.source.send([g.bits])
+            await self.bench.until(lambda: not self.source.pending, 20_000, "a group")
+        count = sum(map(len, due))
+        await self.bench.until(lambda: sum(map(len, self.parts)) >= count, 50_000, "last part")
+        cycles = self.memory.cycle - begin
+        await self.bench.cycles(30)
+        assert int(dut.idle_o.value) == 1
+        assert int(dut.beats_o.value) == self.beats(groups)
+        for k, (got, want) in enumerate(zip(self.parts, due)):
+            assert len(got) == len(want)
+            for i, (word, part) in enumerate(zip(got, want)):
+                fields = {}
+                for name, width in reversed(PART):
+                    fields[name] = word & (1 << width) - 1
+                    word >>= width
+                for name in ("cluster", "first", "last", "part", "used") + (("opacity",) if part["first"] else ()):
+                    assert fields[name] == part[name], f"lane {k}, part {i}: {name} {fields[name]}, due {part[name]}"
+                if part["first"]:
+                    assert [fields["dc"] >> 16 * c & 0xFFFF for c in range(3)] == part["dc"], f"lane {k}, part {i}: dc"
+                for (j, c), value in part["raw"].items():
+                    assert fields["raw"] >> 16 * (3 * j + c) & 0xFFFF == value, f"lane {k}, part {i}: coefficient {j}, channel {c}"
+        return cycles
+
+
+def frame(rng, chunked: bool, clusters: int, degree: int | None = None, full: bool = False) -> list[Survivors]:
+    """Groups of clusters of any size and degree; some clusters and some stretches without survivors."""
+    groups, colour = [], rng.randrange(4)
+    for cluster in range(clusters):
+        d = rng.randrange(4) if degree is None else degree
+        size = 256 if full else rng.choice([1, 2, 5, rng.randint(1, 64), 64])
+        dead = not full and rng.random() < 0.2
+        share = rng.choice([0.1, 0.5, 0.9, 1.0])
+        for group in range(-(-size // 4)):
+            exist = (1 << min(4, size - 4 * group)) - 1
+            alive = exist if full else sum((rng.random() < share) << k for k in range(4)) & exist
+            groups.append(Survivors(cluster, colour, d, group, 0 if dead else alive))
+        stride = (PackedFormat.CHUNK if chunked else PackedFormat.FP16).colour_stride(d)
+        colour += -(-size * stride // 64)
+    return groups
+
+
+@cocotb.test()
+@cocotb.parametrize(chunked=[True, False], idle=["never", "half"], stall=["never", "heavy"])
+async def parts(dut, chunked, idle, stall):
+    """Parts of all lanes, of clusters of all degrees; frames one after the other."""
+    fetch = Fetch(dut, chunked, stall == "never", idle, stall)
+    await fetch.bench.reset()
+    for _ in range(2):
+        await fetch.run(frame(fetch.bench.rng, chunked, 14))
+
+
+@cocotb.test()
+@cocotb.parametrize(degree=[0, 1, 2, 3])
+async def rates(dut, degree):
+    """With every Gaussian alive: as fast as groups come, beats or the lanes' parts allow, nearly."""
+    fetch = Fetch(dut, True, True, latency=40)
+    await fetch.bench.reset()
+    groups = frame(fetch.bench.rng, True, 4, degree, full=True)
+    cycles = await fetch.run(groups)
+    dut._log.info("degree %d: %d cycles for %d Gaussians", degree, cycles, 4 * len(groups))
+    limit = max(2 * len(groups), len(groups) * len(USED[degree]), fetch.beats(groups))
+    assert cycles < 1.25 * limit + 150
