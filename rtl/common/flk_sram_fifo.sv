@@ -28,7 +28,7 @@ module flk_sram_fifo #(
 
   // Pointers and number of words in the memory
 
-  localparam int unsigned PtrBits = $clog2(Depth);
+  localparam int unsigned PtrBits = Depth > 1 ? $clog2(Depth) : 1;
   localparam int unsigned UsedBits = $clog2(Depth + 1);
   localparam logic [PtrBits-1:0] LAST = PtrBits'(Depth - 1);
 
