@@ -59,6 +59,9 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
     "flk_axi_split": [{"Bytes": 4, "MaxBeats": 256, "BeatBits": 4}, {"MaxBeats": 1}, {"Bytes": 128, "MaxBeats": 256}],
     "flk_axi_read": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],
+    "flk_axi_fetch": [{"Width": 64, "MaxBeats": 2, "Places": 3, "TagBits": 3}, {"MaxBeats": 64}],
+    "flk_cluster_cull": [{"BufferBeats": 16, "MaxBeats": 16}],
+    "flk_geometry_fetch": [{"BufferBeats": 20, "Clusters": 3, "MaxBeats": 16, "Bursts": 5}],
     "flk_axi_write": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],
     "flk_bitonic_sorter": [
         {"Lanes": 2, "KeyWidth": 1, "PayloadWidth": 1},

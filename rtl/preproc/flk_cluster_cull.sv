@@ -68,7 +68,7 @@ module flk_cluster_cull
   localparam int unsigned Inside = (CLUSTER_TEST_LATENCY + Interval - 1) / Interval;
   localparam logic [1:0] OUT_PHASE = 2'(CLUSTER_TEST_LATENCY % Interval);
   localparam cluster_t NEAR = 32'h3E4C_CCCD;  // 0.2: no depth is nearer
-  localparam int unsigned MaxShift = 63;
+  localparam logic signed [8:0] MAX_SHIFT = 9'sd63;
   localparam int unsigned KeyBits = 24;
 
   // ---- frame ----------------------------------------------------------------------------------------
@@ -426,8 +426,7 @@ module flk_cluster_cull
 
   // Keys of KeyBits for all depths of the span.
   assign shift_span = 9'(KeyBits - 1 + 127) - 9'(span[30:23]);
-  assign shift      = span == '0 || shift_span > 9'(MaxShift) ? 8'(MaxShift)
-                                                               : 8'(shift_span);
+  assign shift      = span == '0 || shift_span > MAX_SHIFT ? 8'(MAX_SHIFT) : 8'(shift_span);
 
   always_ff @(posedge clk_i) begin
     if (state_q == BOUNDS && step_q == 3'd4) begin

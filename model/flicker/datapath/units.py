@@ -20,7 +20,7 @@ from .graph import BOOL, Ff, Graph, Int, Value, retrace
 MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
 REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
-SCALE_HEADER = Int(-(1 << 26), (1 << 26) - 1)  # low end and step of log2 scales
+SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end and step of log2 scales
 BANDS = MAX_PICTURE // SUBTILE
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...arithmetic.ff import ff_add, ff_mul, ff_sub, pick
 from ...front.projection import NEAR
 from ...scene.packed import PackedScene
-from .setup import CLUSTER_M, KEY_BITS, MAX_KEY_SHIFT, FrameSetup, rounded
+from .setup import CLUSTER_M, KEY_BITS, MAX_KEY_SHIFT, FrameSetup, image_floats, rounded
 
 
 @numba.njit
@@ -77,9 +77,9 @@ def key_scale(nearest: float, farthest: float) -> int:
 def cull(packed: PackedScene, setup: FrameSetup) -> Culled:
     """Test the clusters of a scene."""
     table = packed.table
-    low, high = table["low"].astype(np.float64), table["high"].astype(np.float64)
+    low, high = image_floats(table["low"]), image_floats(table["high"])
     keep, depth = np.zeros(len(table), np.bool_), np.zeros((len(table), 2))
-    _cull(low, high, packed.sigma.astype(np.float64), setup.position, setup.normal, setup.offset, setup.reach, keep, depth)
+    _cull(low, high, image_floats(packed.sigma), setup.position, setup.normal, setup.offset, setup.reach, keep, depth)
     if not keep.any():
         return Culled(keep, NEAR_FF, NEAR_FF, key_scale(NEAR_FF, NEAR_FF))
     nearest = max(float(depth[keep, 0].min()), NEAR_FF)

@@ -22,10 +22,11 @@ from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .cull import Culled, cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
-from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats
+from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
 from .splat import basis_functions, colour_constants, constants, largest_component, pixels, place_largest, project_one, shade
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
+SCALE_HEADER_BITS = 27  # of them, saturated
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
 OPACITY_LIMIT = 255
@@ -54,7 +55,7 @@ Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_LISTED = r
 # What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
 # quaternion, or (largest, three codes).
 Lanes = namedtuple("Lanes", "chunked cluster q s quat opacity dc sh count")
-# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 fraction bits. dc_low, dc_step, sh_step: colour format.
+# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 of 27 bits are fraction. dc_low, dc_step, sh_step: colour format.
 ClusterValues = namedtuple("ClusterValues", "low step scale_low scale_step dc_low dc_step sh_step")
 
 
@@ -92,15 +93,15 @@ def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
     f, h = setup.formats, packed.headers
     n = len(packed.table)
     low, step, dc, sh = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 2)), np.empty((n, 3, 3))
-    fixed = np.zeros((2, n, 3), np.int64)
+    fixed, top = np.zeros((2, n, 3), np.int64), 1 << (SCALE_HEADER_BITS - 1)
     if packed.format is PackedFormat.CHUNK:
-        wide = {name: h[name].astype(np.float64) for name in ("position_low", "position_step", "scale_low", "scale_step", "dc_low", "dc_step", "sh_step")}
+        wide = {name: image_floats(h[name]) for name in ("position_low", "position_step", "scale_low", "scale_step", "dc_low", "dc_step", "sh_step")}
         origin, given = wide["position_low"], wide["position_step"]
         given_dc, given_sh = np.stack([wide["dc_low"], wide["dc_step"]], axis=2), wide["sh_step"]
         for k, name in enumerate(("scale_low", "scale_step")):
-            fixed[k] = np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5).astype(np.int64)
+            fixed[k] = np.clip(np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5), -top, top - 1).astype(np.int64)
     else:
-        origin, given = h["origin"].astype(np.float64), np.ones((n, 3))
+        origin, given = image_floats(h["origin"]), np.ones((n, 3))
         given_dc, given_sh = np.zeros((n, 3, 2)), np.ones((n, 3, 3))
     _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, low, step, dc, sh)
     return ClusterValues(low, step, fixed[0], fixed[1], np.ascontiguousarray(dc[:, :, 0]), np.ascontiguousarray(dc[:, :, 1]), sh)

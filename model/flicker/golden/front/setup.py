@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arithmetic.ff import ff_round
+from ...arithmetic.ff import MIN_NORMAL, ff_round
 from ...errors import FlickerError
 from ...front.projection import _CLAMP, DILATION, NEAR
 from ...params import TILE
@@ -44,6 +44,12 @@ def rounded(values: ArrayLike, bits: int) -> np.ndarray:
     """float64 array of the nearest ff numbers."""
     array = np.asarray(values, np.float64)
     return np.array([ff_round(v, bits) for v in array.ravel().tolist()]).reshape(array.shape)
+
+
+def image_floats(values: np.ndarray) -> np.ndarray:
+    """float64 of float32 numbers in the image as the front end takes them: subnormal ones are 0."""
+    wide = values.astype(np.float64)
+    return np.where(np.abs(wide) < MIN_NORMAL, 0.0, wide)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,86 @@
+// flk_cluster_cull behind the ports that fetch_harness.cpp drives.
+module cluster_cull_bench
+  import flk_preproc_pkg::*;
+#(
+  parameter int unsigned BufferBeats = 32
+) (
+  input  logic            clk_i,
+  input  logic            rst_ni,
+  input  logic            start_i,
+  output logic            idle_o,
+  output logic            done_o,
+  input  logic [959:0]    registers_i,
+  output logic [191:0]    status_o,
+  input  logic            in_valid_i,
+  output logic            in_ready_o,
+  input  logic [95:0]     in_data_i,
+  output logic            out_valid_o,
+  input  logic            out_ready_i,
+  output logic [95:0]     out_data_o,
+  output logic            mem_ar_valid_o,
+  input  logic            mem_ar_ready_i,
+  output logic [3:0]      mem_ar_id_o,
+  output logic [39:0]     mem_ar_addr_o,
+  output logic [7:0]      mem_ar_len_o,
+  output logic [2:0]      mem_ar_size_o,
+  output logic [1:0]      mem_ar_burst_o,
+  input  logic            mem_r_valid_i,
+  output logic            mem_r_ready_o,
+  input  logic [3:0]      mem_r_id_i,
+  input  logic [511:0]    mem_r_data_i,
+  input  logic [1:0]      mem_r_resp_i,
+  input  logic            mem_r_last_i
+);
+
+  logic error, bounds_valid, out_end, unused;
+  logic signed [7:0] key_shift;
+  flk_front_pkg::position_t key_low;
+  logic [31:0] clusters, gaussians;
+  kept_t cluster;
+
+  assign in_ready_o = 1'b0;
+  assign unused = ^{in_valid_i, in_data_i, registers_i[959:954]};
+
+  // Word by word: error and bounds valid, shift, lowest depth, culled clusters and Gaussians.
+  assign status_o = 192'({
+    gaussians, clusters, 32'(key_low), 32'(key_shift), 30'b0, bounds_valid, error
+  });
+  assign out_data_o = 96'({out_end, cluster});
+
+  flk_cluster_cull #(
+    .BufferBeats(BufferBeats)
+  ) i_dut (
+    .clk_i,
+    .rst_ni,
+    .start_i,
+    .idle_o,
+    .setup_i           (registers_i[895:0]),
+    .table_i           (registers_i[896+:BEAT_BITS]),
+    .clusters_i        (registers_i[896+BEAT_BITS+:24]),
+    .done_o,
+    .error_o           (error),
+    .bounds_valid_o    (bounds_valid),
+    .key_shift_o       (key_shift),
+    .key_low_o         (key_low),
+    .culled_clusters_o (clusters),
+    .culled_gaussians_o(gaussians),
+    .out_valid_o,
+    .out_ready_i,
+    .out_end_o         (out_end),
+    .out_cluster_o     (cluster),
+    .ar_valid_o        (mem_ar_valid_o),
+    .ar_ready_i        (mem_ar_ready_i),
+    .ar_id_o           (mem_ar_id_o),
+    .ar_addr_o         (mem_ar_addr_o),
+    .ar_len_o          (mem_ar_len_o),
+    .ar_size_o         (mem_ar_size_o),
+    .ar_burst_o        (mem_ar_burst_o),
+    .r_valid_i         (mem_r_valid_i),
+    .r_ready_o         (mem_r_ready_o),
+    .r_id_i            (mem_r_id_i),
+    .r_data_i          (mem_r_data_i),
+    .r_resp_i          (mem_r_resp_i),
+    .r_last_i          (mem_r_last_i)
+  );
+
+endmodule
