@@ -22,6 +22,8 @@ from .scene.files import scene_kind
 from .scene.metrics import psnr
 from .scene.packed import PackedFormat, PackedScene, load_packed
 from .scene.packing import pack, pack_file
+from .sim.preprocessing import build as build_front
+from .sim.preprocessing import front_frame
 from .sim.render_stage import build, render_rtl
 
 
@@ -38,11 +40,12 @@ class Front(str, Enum):
 
     FLOAT = "float"  # float64 on the host
     GOLDEN = "golden"  # bit-true model of the front end
+    RTL = "rtl"  # verilated front end
 
 
 @dataclass(frozen=True)
 class FrontOptions:
-    """What the front end reads and writes; for `Front.GOLDEN` only.
+    """What the front end reads and writes; not for `Front.FLOAT`.
 
     format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile.
     """
@@ -93,15 +96,24 @@ def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
     return pack_file(path, form or PackedFormat.CHUNK).packed
 
 
-def golden_front(view: View, config: RenderConfig, options: FrontOptions, steps: Steps) -> FrontFrame:
-    """Records and lists of a view by the bit-true front end; 16-byte records for the factored form, 32-byte ones for the conic."""
+def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
+    """Records and lists of a view by the golden model of the front end or by its RTL, and the RTL's statistics; 16-byte records for the factored form,
+    32-byte ones for the conic."""
     if config.coords is Coords.ABSOLUTE:
         raise FlickerError("coords absolute: for --front float only; records hold means in 1/128 pixel")
     kind = RecordKind.FACTORED16 if config.form == Form.FACTORED else RecordKind.CONIC32
+    if front is Front.RTL and kind is not RecordKind.FACTORED16:
+        raise FlickerError("--front rtl: writes records of 16 bytes, for --form factored; those of the conic form come from --front golden")
     with steps.step("packing the scene"):
         packed = packed_scene(view, options.format)
-    with steps.step("preprocessing with the golden model"):
-        return run_front(packed, view.camera, options.lists, kind)
+    if front is Front.GOLDEN:
+        with steps.step("preprocessing with the golden model"):
+            return run_front(packed, view.camera, options.lists, kind), {}
+    with steps.step("building the front end's simulator (once)"):
+        build_front(checks=False)
+    with steps.step("preprocessing with the RTL"):
+        frame, rtl = front_frame(packed, view.camera, options.lists, checks=False)
+    return frame, {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 
 def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
@@ -116,10 +128,9 @@ def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[Subtil
 def _golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
     with steps.step("building sub-tile lists"):
         lists = front.subtile_lists()
-    kept = front.culled.keep
     return lists, {
         "visible": front.outcomes["listed"], "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
-        "clusters": len(kept), "clusters_kept": int(kept.sum()), "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
+        "clusters": len(front.packed.table), "clusters_kept": front.clusters_kept, "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
     }
 
 
@@ -135,14 +146,15 @@ def render_view(
 ) -> Rendered:
     """Render a view of a scene.
 
-    front, options: who preprocesses, and how. With the golden front end the engine `reference` blends its records in float64.
+    front, options: who preprocesses, and how. With a bit-true front end the engine `reference` blends its records in float64.
     compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
     """
     steps = steps or Steps()
     scene, camera = view.scene, view.camera
-    if front is Front.GOLDEN:
-        frame_in = golden_front(view, config, options, steps)
+    if front is not Front.FLOAT:
+        frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = _golden_lists(frame_in, steps)
+        more |= simulated
     else:
         lists, more = _float_lists(view, config, steps)
     stats: dict[str, Any] = {
@@ -189,7 +201,7 @@ def render_view(
         with steps.step("rendering the float64 reference"):
             reference = view.reference
     if engine is Engine.REFERENCE:
-        if front is Front.GOLDEN:
+        if front is not Front.FLOAT:
             with steps.step("blending the records in float64"):
                 image = blend_records(frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height, view.background)
         else:

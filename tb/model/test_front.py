@@ -251,7 +251,7 @@ def test_conic_records(demo: View) -> None:
 def test_nothing_to_see() -> None:
     camera = plain_camera()
     frame = seen_from(some(20, means=[0, 0, -5.0]), camera)
-    assert len(frame.records) == len(frame.entry_tile) == 0 and not frame.culled.keep.any()
+    assert len(frame.records) == len(frame.entry_tile) == 0 and frame.clusters_kept == 0
     assert not picture(frame).any()
     aside = seen_from(some(20, means=[300.0, 0, 4.0]), camera)
     assert len(aside.records) == 0
@@ -343,8 +343,8 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--format", "chunk"], "--format: for --front golden only"),
-    (["--lists", "box"], "--lists: for --front golden only"),
+    (["--format", "chunk"], "--format: for --front golden and rtl only"),
+    (["--lists", "box"], "--lists: for --front golden and rtl only"),
     (["--front", "golden", "--faithful", "--lists", "box"], "--faithful: fixes the configuration, so it cannot be combined with --lists"),
     (["--front", "golden", "--coords", "absolute"], "coords absolute: for --front float only"),
 ])

@@ -62,12 +62,12 @@ def summary(stats: dict, picture: Path | None) -> Table:
     if engine != "reference":
         engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
     table.add_row("engine", engine)
-    if stats.get("front") == "golden":
-        table.add_row("front end", f"golden ({stats['format']}, records {stats['records']})")
+    if stats.get("front") != "float":
+        table.add_row("front end", f"{stats['front']} ({stats['format']}, records {stats['records']})")
     if "psnr_db" in stats:
         table.add_row("PSNR against float64", "equal" if stats["psnr_db"] is None else f"{stats['psnr_db']:.2f} dB")
     for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("list_entries", "list entries"), ("subtile_pairs", "sub-tile pairs"),
-                       ("minitiles_sent", "mini-tiles sent"), ("cycles", "cycles")):
+                       ("minitiles_sent", "mini-tiles sent"), ("front_cycles", "cycles of the front end"), ("cycles", "cycles")):
         if stats.get(key) is not None:
             table.add_row(label, _number(stats[key]))
     for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
@@ -87,9 +87,9 @@ def render(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    front: Annotated[FrontChoice, typer.Option(help="what makes records and lists: float64 on the host, or the bit-true front end")] = FrontChoice.FLOAT,
-    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, with --front golden [default: chunk, or as packed]")] = None,
-    lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, with --front golden [default: ellipse]")] = None,
+    front: Annotated[FrontChoice, typer.Option(help="what makes records and lists: float64 on the host, the bit-true front end, or its RTL")] = FrontChoice.FLOAT,
+    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, with --front golden or rtl [default: chunk, or as packed]")] = None,
+    lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, with --front golden or rtl [default: ellipse]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
@@ -105,7 +105,7 @@ def render(
     chosen: dict[str, object] = {"format": memory, "lists": lists}
     if front is FrontChoice.FLOAT:
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
-            raise FlickerError(f"{names}: for --front golden only")
+            raise FlickerError(f"{names}: for --front golden and rtl only")
     else:
         given |= chosen
     if faithful and any(v is not None for v in given.values()):

@@ -16,10 +16,11 @@ import numpy as np
 
 from ..arithmetic.ff import ff_bits
 from ..errors import FlickerError
-from ..golden.front.frame import ListKind
+from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
+from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
-from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, pointer_lines, writer_columns
+from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -29,10 +30,11 @@ from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
 HERE = Path(__file__).parent
 BEAT = 64
 RECORD_BYTES = 16
-TABLE_BYTES, HEADER_ALIGN = 32, 4096
+PAGE = 4096  # regions begin at a multiple of it
 PORTS = ("table", "geometry", "colour", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
+LIST_ERROR = 3  # bit of the last
 SMALL_POINTERS, LARGE_POINTERS = 2048, 16384  # lists of a writer: pictures up to 1080p, up to 4096x4096
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
@@ -59,7 +61,7 @@ class Regions:
 
     @staticmethod
     def of(packed: PackedScene, camera: Camera, chunks: int) -> Regions:
-        step = lambda n: -(-n // HEADER_ALIGN) * HEADER_ALIGN  # noqa: E731
+        step = lambda n: -(-n // PAGE) * PAGE  # noqa: E731
         cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
         image = 1 << 28
         records = image + step(len(packed.image()))
@@ -69,7 +71,7 @@ class Regions:
         return Regions(image, records, slots * RECORD_BYTES, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 
-def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions) -> int:
+def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int) -> int:
     """The bits of front_registers_t."""
     setup = FrameSetup.of(camera)
     f = setup.formats
@@ -92,7 +94,7 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
         bits.append((offset, 34))
         offset += len(part) // BEAT
     bits += [
-        (len(packed.table), 24), (regions.records // BEAT, 34), (regions.record_bytes // BEAT, 23), (regions.lists // BEAT, 34), (regions.chunks, 25),
+        (len(packed.table), 24), (regions.records // BEAT, 34), (regions.record_bytes // BEAT, 23), (regions.lists // BEAT, 34), (chunks, 25),
         (regions.pointers // BEAT, 34), (pointer_lines(cols, rows) // WRITERS, 11), (writer_columns(cols), 8),
     ]
     word = 0
@@ -225,7 +227,7 @@ def front_rtl(
             _load(lib, sim, base, size, b"", purpose)
         for base, size in memory.fail:
             lib.flk_front_fail(sim, base, size)
-        word = registers(packed, camera, lists, regions)
+        word = registers(packed, camera, lists, regions, chunks)
         count = -(-_register_bits() // 32)
         given = np.frombuffer(word.to_bytes(4 * count, "little"), np.uint32).copy()
         counter_bits = sum(width * n for _, width, n in _COUNTERS)
@@ -250,6 +252,33 @@ def front_rtl(
         )
     finally:
         lib.flk_front_delete(sim)
+
+
+def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, checks: bool = True) -> tuple[FrontFrame, RtlFront]:
+    """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices."""
+    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+    chunks = -(-cols // 2) * -(-rows // 2) + len(packed) // 36 + 64  # two entries a Gaussian
+    while (rtl := front_rtl(packed, camera, lists, chunks=chunks, checks=checks)).error >> LIST_ERROR & 1:
+        chunks *= 4
+    if rtl.error:
+        raise FlickerError("front end: " + ", ".join(text for k, text in enumerate(ERRORS) if rtl.error >> k & 1))
+    read = read_lists(rtl.memory, rtl.pointers, cols, rows)
+    number, splat = np.unique(read.record, return_inverse=True)
+    key = np.zeros(len(number), np.uint32)
+    key[splat] = read.key
+    count = rtl.counters
+    outcomes = {
+        Outcome.CULLED: count["culled_gaussians"], Outcome.NEAR: count["too_near"], Outcome.OUTSIDE: count["outside"], Outcome.FAINT: count["faint"],
+        Outcome.MISSED: count["unlisted"] - count["faint"], Outcome.LISTED: count["survivors"] - count["unlisted"],
+    }
+    adjusted = {"mean beyond 2^22 pixels": count["saturated"], "colour above 2 clipped": count["clipped"]}
+    frame = FrontFrame(
+        camera, packed, RecordKind.FACTORED16, len(packed.table) - int(count["culled_clusters"]), np.full(len(number), -1, np.int64),  # a record does not say whose it is
+        number.astype(np.int64),
+        rtl.records[number], key, splat.astype(np.int32), np.repeat(np.arange(cols * rows, dtype=np.int32), np.diff(read.start)), read.mask,
+        {OUTCOMES[k]: int(v) for k, v in outcomes.items()}, {k: int(v) for k, v in adjusted.items() if v},
+    )
+    return frame, rtl
 
 
 def _load(lib: ctypes.CDLL, sim: int, base: int, allocated: int, data: bytes, purpose: int) -> None:

@@ -19,7 +19,7 @@ from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
-from .cull import Culled, cull
+from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
@@ -251,13 +251,13 @@ class FrontFrame:
     records: uint8 (R, bytes).
     key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
-    culled: of the clusters. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
+    clusters_kept: of the cluster test. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
     """
 
     camera: Camera
     packed: PackedScene
     kind: RecordKind
-    culled: Culled
+    clusters_kept: int
     gaussian: np.ndarray
     number: np.ndarray
     records: np.ndarray
@@ -345,7 +345,7 @@ def run_front(
     outcomes |= {OUTCOMES[k]: int((outcome == k).sum()) for k in range(1, 6)}
     records, adjusted = _records(kind, words[kept], halves[kept] if conic else halves, flags[kept])
     return FrontFrame(
-        camera, packed, kind, culled, gaussian, number, records, key[kept], np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask,
+        camera, packed, kind, int(culled.keep.sum()), gaussian, number, records, key[kept], np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask,
         outcomes, adjusted,
     )
 

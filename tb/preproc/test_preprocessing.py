@@ -1,0 +1,213 @@
+"""The whole front end in RTL against the golden model: memory after the frame, byte by byte, and the counters.
+
+State space: formats, list kinds, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters all culled, one Gaussian,
+Gaussians over the whole picture, a camera inside a cluster, errors of the memory by address, list memory that runs out, a table that points beyond the
+records. Registers and memories begin random; bytes that no one should write are compared too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+from flicker_tb.runner import seed
+
+from flicker.chip.dram import DramConfig
+from flicker.front.view import DEMO, View, load_view
+from flicker.golden.front.frame import FrontFrame, ListKind, run_front
+from flicker.golden.front.memory import front_memory
+from flicker.golden.lists import ListError
+from flicker.pipeline import packed_scene
+from flicker.scene.camera import Camera
+from flicker.scene.files import Scene
+from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packing import pack
+from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.sim.memory import PortConfig
+from flicker.sim.preprocessing import ERRORS, PORTS, MemoryOptions, Regions, RtlFront, front_frame, front_rtl
+
+QUICK = MemoryOptions()
+
+
+def lpddr4(stalls: bool = True) -> MemoryOptions:
+    """DRAM behind ports that pause."""
+    shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2} if stalls else {}
+    return MemoryOptions(DramConfig().timing, {n: PortConfig(max_reads=64, max_writes=64, latency=20, stall=shares, seed=seed() + k) for k, n in enumerate(PORTS)})
+
+
+@cache
+def demo() -> View:
+    return load_view(DEMO, 0, (320, 180))
+
+
+def check(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1) -> tuple[FrontFrame, RtlFront]:
+    """A frame of both, compared."""
+    golden = run_front(packed, camera, lists)
+    image = front_memory(golden)
+    rtl = front_rtl(packed, camera, lists, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed())
+    assert rtl.error == 0
+    written = image.written
+    assert np.array_equal(rtl.records[written], image.records[written])
+    lines = np.unique(np.concatenate([w for w in image.lists.writes])) if image.lists.chunks else np.zeros(0, np.int64)
+    assert np.array_equal(rtl.memory[lines], image.lists.memory[lines])
+    assert np.array_equal(rtl.pointers, image.lists.pointers)
+    untouched(packed, rtl, written, lines)
+    count, out = rtl.counters, golden.outcomes
+    assert [int(count[n]) for n in ("culled_gaussians", "too_near", "outside", "faint", "unlisted")] == [
+        out["in a culled cluster"], out["nearer than 0.2"], out["3-sigma box outside the picture"], out["opacity below 1/510"],
+        out["opacity below 1/510"] + out["ellipse holds no pixel"],
+    ]
+    assert count["survivors"] == len(golden.gaussian) and count["culled_clusters"] == len(packed.table) - golden.clusters_kept
+    assert count["saturated"] == golden.adjusted.get("mean beyond 2^22 pixels", 0) and count["clipped"] == golden.adjusted.get("colour above 2 clipped", 0)
+    for name in ("entries", "lines", "evicted", "taken"):
+        assert np.array_equal(count[name], getattr(image.lists, name)), name
+    traffic = {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items()}
+    per = lambda n: frames * int(count[n])  # noqa: E731
+    assert traffic["headers"] == (per("header_beats"), 0) and traffic["geometry"] == (per("geometry_beats"), 0) and traffic["colour"] == (per("colour_beats"), 0)
+    assert traffic["records"] == (0, per("record_beats")) and traffic["lists"][1] == frames * int(np.sum(count["lines"]))
+    assert traffic["table"][0] == frames * 2 * -(-len(packed.table) // 2)
+    return golden, rtl
+
+
+def untouched(packed: PackedScene, rtl: RtlFront, written: np.ndarray, lines: np.ndarray) -> None:
+    """What the frame does not write holds the noise that was there: words of it are not all alike."""
+    rest = np.setdiff1d(np.arange(len(rtl.memory)), lines)
+    for part in (rtl.records[~written], rtl.memory[rest]):
+        assert len(part) < 4 or len(np.unique(part, axis=0)) > len(part) // 2
+
+
+@pytest.mark.parametrize(("form", "lists"), [(PackedFormat.CHUNK, ListKind.ELLIPSE), (PackedFormat.FP16_LOCAL, ListKind.BOX)])
+def test_demo_scene(form: PackedFormat, lists: ListKind) -> None:
+    view = demo()
+    golden, _ = check(pack(view.scene, form).packed, view.camera, lists)
+    assert len(golden.gaussian) > 50_000
+
+
+def some(count: int, **changes) -> Scene:
+    """Gaussians in front of `plain_camera`; fields as given, broadcast."""
+    rng = np.random.default_rng(5)
+    values = {
+        "means": np.stack([*rng.uniform(-2, 2, (2, count)), rng.uniform(1.0, 6.0, count)], axis=1), "scales": rng.uniform(0.01, 0.2, (count, 3)),
+        "quats": rng.normal(size=(count, 4)), "opacities": rng.uniform(0.01, 1.0, count), "sh": rng.normal(scale=0.3, size=(count, 16, 3)),
+    }
+    for name, value in changes.items():
+        values[name] = np.broadcast_to(value, (count, *np.shape(values[name])[1:])).astype(np.float64)
+    return Scene(**values)
+
+
+def plain_camera(width: int = 200, height: int = 120) -> Camera:
+    return Camera(width, height, 150.0, 150.0, np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_degrees_and_a_slow_memory(degree: int) -> None:
+    """DRAM behind ports with pauses, two frames one after the other."""
+    rng = np.random.default_rng(degree)
+    scene = some(3000, sh=rng.normal(scale=0.3, size=(3000, 16, 3)))
+    sh = scene.sh[:, : (degree + 1) ** 2]
+    form = PackedFormat.CHUNK if degree % 2 else PackedFormat.FP16
+    check(pack(dataclasses.replace(scene, sh=sh), form).packed, plain_camera(), memory=lpddr4(), frames=2)
+
+
+def test_mixed_degrees() -> None:
+    """Clusters of all degrees and sizes, one after the other."""
+    scene = some(2000)
+    sh = scene.sh.copy()
+    place = np.argsort(scene.means[:, 0])
+    for k, part in enumerate(np.array_split(place, 12)):
+        sh[part, (k % 4 + 1) ** 2 :] = 0
+    check(pack(dataclasses.replace(scene, sh=sh), PackedFormat.CHUNK).packed, plain_camera(), memory=lpddr4())
+
+
+CASES = {
+    "one": some(1), "behind": some(300, means=[0.0, 0.0, -5.0]), "near": some(300, means=[0.0, 0.0, 0.1]), "outside": some(300, means=[90.0, 0.0, 4.0]),
+    "inside a cluster": some(600, means=np.random.default_rng(1).uniform(-3, 3, (600, 3))), "one tile": some(256, means=[0.01, 0.02, 4.0], scales=0.001),
+    "large": some(300, scales=5.0), "equal depths": some(400, means=np.c_[np.random.default_rng(2).uniform(-1, 1, (400, 2)), np.full(400, 4.0)]),
+    "faint": some(400, opacities=np.random.default_rng(3).choice([1 / 255, 1.4 / 255, 2 / 255], 400)),
+    "degenerate": some(300, scales=np.random.default_rng(4).choice([1e-7, 1.0], (300, 3))), "bright": some(300, sh=np.random.default_rng(6).normal(scale=4.0, size=(300, 16, 3))),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_cases(name: str) -> None:
+    golden, rtl = check(pack(CASES[name], PackedFormat.CHUNK).packed, plain_camera())
+    assert len(golden.gaussian) > 0 or name in ("behind", "near", "outside")
+    if name == "bright":
+        assert rtl.counters["clipped"] > 0
+
+
+def test_one_gaussian_over_the_largest_picture() -> None:
+    """65,536 tiles of a picture of 4096x4096."""
+    packed = pack(some(1, means=[0.0, 0.0, 1.0], scales=100.0, opacities=0.9), PackedFormat.FP16).packed
+    golden, rtl = check(packed, plain_camera(4096, 4096))
+    assert len(golden.entry_tile) == 65536 and rtl.counters["entries"].sum() == 65536
+
+
+def test_out_of_list_memory() -> None:
+    """The frame ends with a code; writers with memory enough have written all of theirs."""
+    packed = pack(some(2000), PackedFormat.CHUNK).packed
+    camera = plain_camera()
+    least = front_memory(run_front(packed, camera)).lists.chunks
+    image = front_memory(run_front(packed, camera), least - 1).lists
+    rtl = front_rtl(packed, camera, chunks=least - 1, seed=seed())
+    assert image.error is ListError.OUT_OF_MEMORY and rtl.error == 1 << ERRORS.index("out of list memory")
+    lines = np.unique(np.concatenate(image.writes))
+    assert np.array_equal(rtl.memory[lines], image.memory[lines])
+    assert np.array_equal(rtl.counters["lines"], image.lines)
+
+
+@pytest.mark.parametrize("part", ["table", "headers", "geometry", "colour", "records", "lists", "pointers"])
+def test_errors_of_the_memory(part: str) -> None:
+    """The frame ends, with a code; nothing is written outside of the regions, which the memory would refuse."""
+    packed = pack(some(1500), PackedFormat.CHUNK).packed
+    camera = plain_camera()
+    chunks = front_memory(run_front(packed, camera)).lists.chunks
+    regions = Regions.of(packed, camera, chunks)
+    names = ("table", "headers", "geometry", "colour")
+    at = regions.image + 256
+    for name, data in zip(names, packed.sections().values()):
+        if name == part:
+            break
+        at += len(data)
+    base = {"records": regions.records, "lists": regions.lists, "pointers": regions.pointers}.get(part, at)
+    rtl = front_rtl(packed, camera, chunks=chunks, memory=MemoryOptions(fail=[(base, 64)]), seed=seed())
+    assert rtl.error == 1 << ERRORS.index("a read failed" if part in names else "a write failed")
+
+
+def test_records_beyond_their_region() -> None:
+    """A table that is not the scene's own: clusters beyond the records write nothing and the frame says so."""
+    packed = pack(some(1500), PackedFormat.CHUNK).packed
+    camera = plain_camera()
+    chunks = front_memory(run_front(packed, camera)).lists.chunks
+    regions = Regions.of(packed, camera, chunks)
+    table = packed.table.copy()
+    table["first"][-1] += 1 << 18
+    image = packed.image()
+    image = image[:256] + table.tobytes() + image[256 + len(table.tobytes()) :]
+    rtl = front_rtl(packed, camera, chunks=chunks, regions=regions, image=image, seed=seed())
+    assert rtl.error >> ERRORS.index("a cluster's records lie beyond their region") & 1
+
+
+def test_frame_read_back_from_memory() -> None:
+    """What `--front rtl` hands to the rendering stage is what `--front golden` does."""
+    packed = pack(some(1500), PackedFormat.CHUNK).packed
+    golden = run_front(packed, plain_camera()).subtile_lists()
+    frame, _ = front_frame(packed, plain_camera())
+    lists = frame.subtile_lists()
+    assert np.array_equal(lists.start, golden.start) and np.array_equal(lists.mean, golden.mean)
+    assert np.array_equal(lists.gauss[lists.entry], golden.gauss[golden.entry]) and np.array_equal(lists.spiky[lists.entry], golden.spiky[golden.entry])
+
+
+LARGE = ("flowers", "playbot")
+
+
+@pytest.mark.parametrize("real", [pytest.param(r, id=r.folder, marks=[pytest.mark.slow] * (r.folder in LARGE)) for r in REAL_VIEWS])
+def test_real_scenes(real) -> None:
+    """At 640x360; the two large ones with SLOW=1."""
+    folder = real_scenes()
+    if folder is None:
+        pytest.skip("FLICKER_SCENES is not set")
+    view = load_view(real.path(folder), real.number, (640, 360))
+    check(packed_scene(view, None), view.camera)
