@@ -41,7 +41,7 @@ generate: $(STAMP) ## write the generated sources of rtl/ (packages, mask genera
 	@$(BIN)/python scripts/gen_params.py
 
 test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
-	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) tb
+	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) --dist worksteal tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]

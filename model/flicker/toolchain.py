@@ -235,7 +235,7 @@ def verilate(
             make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
                     f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
             _share_runtime(folder, make, log, jobs)
-            _run([*make, f"-j{jobs}"], log)
+            _run([*make, *_share_headers(folder, make, log), f"-j{jobs}"], log)
         stamp.touch()
     return product
 
@@ -312,3 +312,27 @@ def _share_runtime(folder: Path, make: Sequence[object], log: Path, jobs: int) -
                 shutil.copy(folder / name, cache / name)
     for name in objects:
         shutil.copy(cache / name, folder / name)
+
+
+def _share_headers(folder: Path, make: Sequence[object], log: Path) -> list[str]:
+    """What to tell make so that a small build reads the headers of Verilator's run-time library compiled, from the cache.
+
+    A small model is one piece of C++ (a large one brings precompiled headers of its own), and reading those headers takes most of its time.
+    """
+    if not re.search(r"^VM_PARALLEL_BUILDS = 0$", (folder / "Vtop_classes.mk").read_text(), re.M):
+        return []
+    dry = subprocess.run([*map(str, make), "-n", "--no-print-directory", "Vtop__ALL.o"], env=_build_environment(), capture_output=True, text=True)
+    found = re.search(rf"^{re.escape(compiler())} (.*) -c -o Vtop__ALL\.o Vtop__ALL\.cpp$", dry.stdout, re.M)
+    if not found:
+        return []
+    flags = found[1].replace("-MMD", "").split()
+    names = ["verilated.h", *(["verilated_vpi.h"] if (folder / "verilated_vpi.o").exists() else [])]
+    cache = BUILD / "verilator-headers" / _digest(_versions(), *flags, *names)
+    header, compiled = cache / "headers.h", cache / "headers.h.gch"
+    with locked(cache.with_suffix(".lock")):
+        if not compiled.exists():
+            cache.mkdir(exist_ok=True)
+            header.write_text("".join(f'#include "{name}"\n' for name in names))
+            _run([compiler(), *flags, "-x", "c++-header", header, "-o", cache / "new"], log)
+            os.replace(cache / "new", compiled)
+    return [f"CXX={compiler()} -include {header}"]

@@ -6,10 +6,9 @@
 // A splat stays at the input until its last band is on its way: in_ready_o depends combinationally
 // on in_data_i, and no register holds it. box_i keeps still while idle_o is low.
 // Throughput: a band a cycle in (an empty splat counts as one), an entry a cycle out; a tile column
-// between two bands' intervals and a tile row without entries cost a cycle each. Splats of one band
-// and one entry alone: Splats + 1 in SPLAT_BAND_LATENCY + 3 cycles. Latency, from a tile row's last
-// band to its first entry, SPLAT_BAND_LATENCY + 3. Outputs come from registers; in_ready_o does not
-// depend on out_ready_i.
+// between two bands' intervals and a tile row without entries cost a cycle each. At most Splats + 1
+// begin in SPLAT_BAND_LATENCY + 3 cycles. Latency, from a tile row's last band to its first entry,
+// SPLAT_BAND_LATENCY + 3. Outputs come from registers; in_ready_o does not depend on out_ready_i.
 //
 // What the band pipeline does not need lies in a memory until the splat's first tile row comes out;
 // the pipeline stands while a tile row waits that has no place in the queue behind it.

@@ -38,9 +38,10 @@ class Harness:
         path = verilate(
             "arith_harness",
             extra=[HERE / "arith_harness.sv"],
-            args=[f"-GFormats={len(FORMATS)}", f"-GTable={10 * len(FORMATS)}'h{table:x}"],
+            # One piece of C++ compiles in a third of the time.
+            args=[f"-GFormats={len(FORMATS)}", f"-GTable={10 * len(FORMATS)}'h{table:x}", "--output-split", "0"],
             cpp=[HERE / "arith_harness.cpp"],
-            cflags=f"-std=c++17 -DFORMATS={len(FORMATS)}",
+            cflags="-std=c++17",
             shared=True,
             name="arith",
         )

@@ -1,5 +1,5 @@
 // Batch evaluation of the units in arith_harness.sv, called through ctypes (arith_bench.py).
-// FORMATS is the number of formats. Every array holds n rows of uint16.
+// Every array holds n rows of uint16.
 #include <cstdint>
 
 #include "Vtop.h"
@@ -13,6 +13,13 @@ Vtop& top() {
   static Vtop model{&context};
   return model;
 }
+
+template <typename T, std::size_t N>
+constexpr int size(const VlUnpacked<T, N>&) {
+  return N;
+}
+
+const int FORMATS = size(top().conv_o);
 
 // Give the operands to the units behind bit `group` of the clock.
 void step(int group, uint16_t a, uint16_t b) {

@@ -20,7 +20,7 @@ from flicker.params import Form, weight_latency, weight_shape_delay, weight_stag
 ITEMS = 3_000
 
 
-@numba.njit
+@numba.njit(cache=True)
 def conic_terms(dx, dy, s, r):
     """Terms of one pixel in conic form: xx, sx, yy, sy, xy, t, h, E."""
     xx, sx = conic_axis(dx, s[0], r)
@@ -29,7 +29,7 @@ def conic_terms(dx, dy, s, r):
     return xx, sx, yy, sy, xy, t, h, e
 
 
-@numba.njit
+@numba.njit(cache=True)
 def factored_terms(dx, dy, s, r):
     """Terms of one pixel in factored form: p, q, v, vv, u, uu, E."""
     p = mul(s[0], dx, r)

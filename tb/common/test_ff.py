@@ -319,7 +319,8 @@ class Harness:
     def __init__(self) -> None:
         table = int.from_bytes(bytes(FORMATS), "little")
         path = verilate(
-            "ff_harness", extra=[HERE / "ff_harness.sv"], args=[f"-GFormats={len(FORMATS)}", f"-GManBitsOf={8 * len(FORMATS)}'h{table:x}"],
+            "ff_harness", extra=[HERE / "ff_harness.sv"],
+            args=[f"-GFormats={len(FORMATS)}", f"-GManBitsOf={8 * len(FORMATS)}'h{table:x}", "--output-split", "0"],
             cpp=[HERE / "ff_harness.cpp"], cflags="-std=c++17", shared=True, name="ff",
         )
         self._lib = ctypes.CDLL(str(path))

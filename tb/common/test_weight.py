@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
 from flicker.errors import FlickerError
@@ -26,7 +25,7 @@ def test_weight(form: Form, fmt: FloatFormat, cols: int, rows: int) -> None:
     size = {"Cols": cols, "Rows": rows}
     parameters = {"Form": int(form), **size, "ExpBits": fmt.exp_bits, "ManBits": fmt.man_bits, "Fn": int(fmt.fn), "Saturate": int(fmt.saturate)}
     config = {"form": int(form), "format": fmt.name, **size}
-    build_and_test("flk_weight", "cocotb_weight", parameters=parameters, config=config, **QUICK_BUILD)
+    build_and_test("flk_weight", "cocotb_weight", parameters=parameters, config=config, inner=True)
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,13 @@ from __future__ import annotations
 import pytest
 from flicker_tb.bench import netlist
 from flicker_tb.runner import build_and_test, refused
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import FAITHFUL, Form, Precision, RenderConfig
 
 
 def run(form: Form, precision: Precision, depth: int, tests: list[str], **more: int) -> None:
     parameters = {"Form": int(form), "Precision": int(precision), "CtuFifoDepth": depth, **more}
-    build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters, config=parameters, tests=tests, **QUICK_BUILD)
+    build_and_test("flk_ctu", "cocotb_ctu", parameters=parameters, config=parameters, tests=tests, inner=True)
 
 
 # The test's arithmetic is the PRTU's, which has every combination; those marked slow differ in nothing else.

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import Form, Precision
 
@@ -20,4 +19,4 @@ from flicker.params import Form, Precision
 @pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
 def test_prtu(form: Form, precision: Precision) -> None:
     parameters = {"Form": int(form), "Precision": int(precision)}
-    build_and_test("flk_prtu", "cocotb_prtu", parameters=parameters, config=parameters, **QUICK_BUILD)
+    build_and_test("flk_prtu", "cocotb_prtu", parameters=parameters, config=parameters, inner=True)

@@ -56,13 +56,13 @@ def build(
     extra: Sequence[Path] = (),
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
-    opt: str = "-O1",
-    inner: bool = True,
+    opt: str = "-O0",
+    inner: bool = False,
 ) -> Path:
     """Program that runs cocotb on ``top``; built unless an equal build exists.
 
-    cocotb sees all signals, or with ``inner`` false the ports only, which for large designs is several times less C++; registers get random values at the start
-    of a run. With NETLIST=1 in the environment
+    cocotb sees the ports only, or with ``inner`` all signals, which for large designs is several times more C++; registers get random values at the start
+    of a run. Compilation is quick instead of thorough (one piece of C++, ``opt``): most of a simulation's time is Python's. With NETLIST=1 in the environment
     the design is its synthesised netlist instead of the RTL, of which only ports are visible and registers with a reset begin reset.
     Args as of ``flicker.toolchain.verilate``.
     """
@@ -84,7 +84,7 @@ def build(
         sources,
         extra=extra,
         parameters=parameters,
-        args=["--vpi", *visible, "--assert", "--x-assign", "unique",
+        args=["--vpi", *visible, "--output-split", "0", "--assert", "--x-assign", "unique",
               "--x-initial", "unique", *trace, *args],
         cpp=[main],
         ldflags=f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator",
@@ -111,8 +111,8 @@ def build_and_test(
     extra: Sequence[Path] = (),
     sources: Sequence[Path] | None = None,
     args: Sequence[str] = (),
-    opt: str = "-O1",
-    inner: bool = True,
+    opt: str = "-O0",
+    inner: bool = False,
     tests: Sequence[str] = (),
     seeds: int = 1,
 ) -> None:
@@ -158,6 +158,8 @@ def build_and_test(
                 extra_env={
                     "FLICKER_TB_CONFIG": json.dumps(dict(config or {})),
                     "COCOTB_ANSI_OUTPUT": "0",
+                    # pytest's rewriting of every imported module, numba's too, takes seconds.
+                    "COCOTB_REWRITE_ASSERTION_FILES": "cocotb_*.py",
                 },
             )
             ran, failed = get_results(results)

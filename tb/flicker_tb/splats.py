@@ -23,9 +23,6 @@ SPIKY = 1 << FEATURE_BITS  # in splat_elem_t
 SPLAT_EOS = 1 << (FEATURE_BITS + 1)  # in splat_elem_t
 FEATURE_EOS = 1 << FEATURE_BITS  # in feature_elem_t
 
-# Arguments of ``runner.build_and_test`` for units whose C++ takes longer to compile than to run.
-QUICK_BUILD = {"opt": "-O0", "args": ("--output-split", "0")}
-
 # Zeros, smallest and largest subnormal, smallest normal, one and its neighbours, largest, infinity, NaN; both signs.
 SPECIAL = [
     sign | magnitude

@@ -1,6 +1,6 @@
 """The command line: what it writes, and how it refuses bad input.
 
-Runs `flicker` as a user does, in processes of its own. The RTL engine on whole frames is tested in tb/frames; here one small frame
+Runs `flicker` inside the tests' process, and once as a user does. The RTL engine on whole frames is tested in tb/frames; here one small frame
 shows that the engines and the files fit together.
 """
 
@@ -16,16 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene_samples as samples
+from flicker_tb.command import flicker
 
 from flicker.scene.demo import write_demo
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.image import load_picture
-
-
-def flicker(*args: object) -> subprocess.CompletedProcess:
-    """Run the command."""
-    command = [sys.executable, "-m", "flicker.cli.main", *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True)
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +35,8 @@ def test_engines_and_files(demo, tmp_path):
     """Golden and RTL give the same picture and counts; the reference is what they are compared with."""
     stats, pictures = {}, {}
     for engine in ("reference", "golden", "rtl"):
-        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--compare", "reference",
+        # A FIFO of one place: the build that tb/frames makes, too.
+        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--fifo-depth", 1, "--compare", "reference",
                       "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
         assert run.returncode == 0, run.stderr
         stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
@@ -122,6 +118,19 @@ def test_scenes_as_people_have_them(demo, tmp_path):
 
     turned = {up: run(folder, "--up", up)[0]["picture"] for up in ("-y", "z", "-z")}
     assert turned["-y"] == stats[0]["picture"] and len(set(turned.values())) == 3
+
+
+def test_as_a_process(tmp_path):
+    """The command says the same in a process of its own: a picture, a warning, an error."""
+    save_ply(samples.random_scene(1), tmp_path / "scene.ply")
+    shutil.copy(tmp_path / "scene.ply", tmp_path / "scene.spz")
+    for args in (("scene.spz", "--size", "32x32", "--out", "a.png"), ("none.ply",)):
+        words = ["render", *(tmp_path / word if "." in word else word for word in args)]
+        here = flicker(*words)
+        done = subprocess.run([sys.executable, "-m", "flicker.cli.main", *words], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (here.returncode, here.stderr) and done.stderr.count("\n") == 1
+        assert done.returncode == 2 * (args[0] == "none.ply")
+    assert load_picture(tmp_path / "a.png").shape == (32, 32, 3)
 
 
 BAD = {

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 import re
 import struct
-import subprocess
-import sys
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 from scene_samples import random_scene
 
@@ -558,10 +557,6 @@ def test_scenes_too_large_for_the_fields(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 # ---- the command line ----------------------------------------------------------------------------------------------------------------
-
-
-def flicker(*args: object) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-m", "flicker.cli.main", *map(str, args)], capture_output=True, text=True)
 
 
 def test_command(tmp_path: Path) -> None:

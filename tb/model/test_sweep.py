@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from flicker_tb.command import flicker
 from scene_samples import random_scene
 
 from flicker.errors import FlickerError
@@ -197,6 +196,6 @@ def test_failed_view_keeps_the_others(folder, client):
 
 def test_command_refuses(folder):
     """One line on standard error, exit code 2, no Dask cluster started."""
-    run = subprocess.run([sys.executable, "-m", "flicker.cli.main", "sweep", str(write(folder, scenes=["no.ply"]))], capture_output=True, text=True)
+    run = flicker("sweep", write(folder, scenes=["no.ply"]))
     assert run.returncode == 2 and run.stdout == ""
     assert run.stderr.count("\n") == 1 and "no.ply: no such file" in run.stderr

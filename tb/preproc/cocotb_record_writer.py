@@ -10,7 +10,7 @@ from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
 from flicker_tb.bench import Bench
 
-LANES, RING, RECORD = 4, 32, 128
+LANES, RECORD = 4, 128
 
 
 @dataclass
@@ -31,6 +31,8 @@ class Writer:
     def __init__(self, dut) -> None:
         self.dut, self.bench = dut, Bench(dut)
         self.rng = self.bench.rng
+        self.place_bits = len(dut.in_place_i) // LANES
+        self.ring = 1 << self.place_bits - 2
         for name in ("in_valid", "in_place", "in_record", "beat_valid", "beat_data", "out_ready"):
             getattr(dut, f"{name}_i").value = 0
 
@@ -56,8 +58,8 @@ class Writer:
         item_offered, held, first = False, None, -1
         dut.out_ready_i.value = 0
         while lines < len(beats):
-            while assigned < len(beats) and assigned - freed < RING:
-                beat, at = beats[assigned], (self.head + assigned) % RING
+            while assigned < len(beats) and assigned - freed < self.ring:
+                beat, at = beats[assigned], (self.head + assigned) % self.ring
                 for q, record in beat.records.items():
                     lanes[rng.randrange(LANES) if lane_of is None else lane_of(assigned, q)].append((at, q, record))
                 items.append(beat.address << 4 | beat.quarters)
@@ -67,9 +69,9 @@ class Writer:
                 if offered[k] is None and lanes[k] and not next(idles[k]):
                     offered[k] = lanes[k].pop(rng.randrange(len(lanes[k])) if shuffle else 0)
                 shown = offered[k]
-                at, q, record = (rng.getrandbits(5), rng.getrandbits(2), rng.getrandbits(RECORD)) if shown is None else shown
+                at, q, record = (rng.randrange(self.ring), rng.getrandbits(2), rng.getrandbits(RECORD)) if shown is None else shown
                 valid |= (shown is not None) << k
-                places |= (at << 2 | q) << 7 * k
+                places |= (at << 2 | q) << self.place_bits * k
                 records |= record << RECORD * k
             item_offered = item_offered or bool(items and not next(stop_beat))
             ready = not next(stop_line)
@@ -111,7 +113,7 @@ class Writer:
         await edge
         assert int(dut.idle_o.value) == 1 and int(dut.out_valid_o.value) == 0
         assert freed == len(beats) or freed + int(dut.freed_o.value) == len(beats)
-        self.head = (self.head + len(beats)) % RING
+        self.head = (self.head + len(beats)) % self.ring
         return cycle - first
 
 
@@ -123,7 +125,7 @@ async def records(dut, kind):
     """Full and partial beats, records before and after their beat is known, in any order within the ring."""
     test = Writer(dut)
     await test.reset()
-    for count in (1, 2, 45, 150):
+    for count in (1, 2, 45, 300):
         pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
         idle, stall, beat = ([pick() for _ in range(LANES)], pick(), pick()) if kind == "mixed" else ([kind.split()[0]] * LANES, *kind.split()[1:])
         await test.run(test.beats(count), idle, stall, beat, shuffle=test.rng.random() < 0.7)

@@ -30,7 +30,7 @@ MODE = CatMode.OFF if config()["MaskGenerator"] else CatMode.SMOOTH
 
 
 class StageTest:
-    """Drives the four input streams from queues, takes pixels, compares them with the golden models."""
+    """Drives the four input streams from queues, takes pixels, compares them with the golden models; checks idle_o in every cycle."""
 
     def __init__(self, dut) -> None:
         self.dut, self.bench = dut, Bench(dut)
@@ -39,6 +39,7 @@ class StageTest:
         self.expected: dict[tuple, tuple] = {}
         self.got: dict[tuple, tuple] = {}
         self.taken = [0] * CORES
+        self.begun = [False] * CORES  # a list whose token has not come
         self.masked = [0] * CORES  # mini-tiles of all masks
         self.ctu = [CtuModel(FORM, PRECISION, MODE) for _ in range(CORES)]
         self.pixels = [SubtileModel(FORM) for _ in range(CORES)]
@@ -50,6 +51,7 @@ class StageTest:
 
     def _take(self, k: int, word: int) -> None:
         self.taken[k] += 1
+        self.begun[k] = not word & splats.SPLAT_EOS
         for element, mask in self.ctu[k].take(word):
             if element & splats.FEATURE_EOS:
                 place = element & (1 << layout.bits("subtile")) - 1
@@ -72,6 +74,9 @@ class StageTest:
             dut.out_ready_i.value = ready
             await FallingEdge(dut.clk_i)
             if dut.rst_ni.value == 1:
+                if dut.idle_o.value == 1:
+                    assert not any(self.begun), "idle_o is high, but a list has begun"
+                    assert len(self.got) == len(self.expected), "idle_o is high, but pixels are inside"
                 taken, given = int(dut.in_ready_o.value), int(dut.out_valid_o.value) & ready
                 data = int(dut.out_data_o.value)
                 for k in range(CORES):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import Form
 
@@ -32,6 +31,4 @@ def test_channel(case: str) -> None:
         "flk_channel", "cocotb_channel",
         parameters={"Form": int(form), "FifoDepth": depth, "VrusPerChannel": vrus, "MiniTile": m},
         config={"Form": int(form), "FifoDepth": depth, "MiniTile": m, "VrusPerChannel": vrus, "lengths": lengths, "idle": idle, "stall": stall},
-        inner=False,
-        **(QUICK_BUILD if vrus != 2 else {}),
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test, refused
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import MASK_GENERATORS
 
@@ -18,7 +17,7 @@ from flicker.params import MASK_GENERATORS
 @pytest.mark.parametrize("generator", [name if name == "ctu" else pytest.param(name, marks=pytest.mark.slow) for name in MASK_GENERATORS])
 def test_render_stage(generator: str) -> None:
     settings = {"FifoDepth": 4, "VrusPerChannel": 1, "MaskGenerator": list(MASK_GENERATORS).index(generator)}
-    build_and_test("flk_render_stage", "cocotb_render_stage", parameters=settings, config=settings, inner=False, **QUICK_BUILD)
+    build_and_test("flk_render_stage", "cocotb_render_stage", parameters=settings, config=settings)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,6 @@ def test_rendering_core(form: Form, depth: int, idle: str, stall: str) -> None:
         "flk_rendering_core", "cocotb_rendering_core",
         parameters={"Form": int(form), "FifoDepth": depth},
         config={"Form": int(form), "lengths": LENGTHS, "idle": idle, "stall": stall},
-        inner=False,
     )
 
 
@@ -32,7 +31,6 @@ def test_pixel_masks() -> None:
         "flk_rendering_core", "cocotb_rendering_core",
         parameters={"Form": int(Form.FACTORED), "FifoDepth": 4, "MaskBits": SUBTILE_PIXELS, "VrusPerChannel": 1},
         config={"Form": int(Form.FACTORED), "MaskBits": SUBTILE_PIXELS, "VrusPerChannel": 1, "lengths": LENGTHS, "idle": "rare", "stall": "rare"},
-        inner=False,
     )
 
 

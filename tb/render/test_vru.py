@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.runner import build_and_test
-from flicker_tb.splats import QUICK_BUILD
 
 from flicker.params import Form
 
@@ -23,4 +22,4 @@ from flicker.params import Form
 def test_vru(form: Form, pixels: int, stall: str) -> None:
     settings = {"Form": int(form), "Pixels": pixels}
     lengths = [0, 40, 30, 1, 0, 60, 25, 3, 50] * (8 // pixels or 1)
-    build_and_test("flk_vru", "cocotb_vru", parameters=settings, config={**settings, "stall": stall, "lengths": lengths}, **QUICK_BUILD)
+    build_and_test("flk_vru", "cocotb_vru", parameters=settings, config={**settings, "stall": stall, "lengths": lengths}, inner=True)

@@ -46,6 +46,7 @@ def test_zero_one(lanes: int) -> None:
         "cocotb_bitonic_sorter",
         parameters=parameters((lanes, 1, 4, 2)),
         tests=["zero_one"],
+        opt="-O1",  # up to 65,536 vectors
     )
 
 

@@ -61,7 +61,7 @@ E4M3_R = rounding(E4M3)
 E5M2_R = rounding(E5M2)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def rnd(x, r):
     """Round the float32 `x` to the format with constants `r` (nearest, ties to even, subnormals, -0 kept)."""
     drop, half, keep, min_normal, magic, max_bits, over = r
@@ -77,19 +77,19 @@ def rnd(x, r):
     return _float(np.uint32(s | m))
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def mul(a, b, r):
     """Product in the format."""
     return rnd(np.float32(a * b), r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def add(a, b, r):
     """Sum in the format."""
     return rnd(np.float32(a + b), r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def sub(a, b, r):
     """Difference in the format."""
     return rnd(np.float32(a - b), r)

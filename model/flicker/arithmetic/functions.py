@@ -134,7 +134,7 @@ _EXP_LOOKUP = np.stack([
 _EXP_LAST = _EXP_LOOKUP.shape[1] - 1
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def exp_neg_f32(e, base2):
     """`exp_neg` of a float32 that holds an FP16 value; the result too is an FP16 value in a float32."""
     b = _bits_of(e)
@@ -145,7 +145,7 @@ def exp_neg_f32(e, base2):
 # ---- log ---------------------------------------------------------------------------------------
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _log_core(exponent, mantissa, base2):
     """t in 2^-LOG_FRAC_BITS. `exponent` biased (FP16), `mantissa` without the hidden bit."""
     mantissa = mantissa if exponent > 0 else np.int32(0)  # a subnormal counts as 2^-14

@@ -81,7 +81,7 @@ def numbers(name: str) -> Numbers:
     return FORMATS[name]
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def quantise(x, man, emin, top, direction):
     """Round the float64 x: DOWN (toward -infinity), NEAREST (ties to even) or UP.
 

@@ -104,7 +104,7 @@ def rect_weights(x_top, x_bot, y_top, y_bot, mean_x, mean_y, s0, s1, s2, form, p
             e[16 + i], e[20 + i], e[i] = factored_pixel(e[8 + i % 2], e[10 + i // 2], e[14 + i // 2], r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def is_dense(mode, spiky):
     """Whether a splat takes dense sampling (two cycles) in a mode; AUTO's base mode is Smooth-Focused."""
     if mode == M_DENSE:

@@ -27,7 +27,7 @@ def load_splat(n, i, gauss, mean, f):
         f[k] = fp16_value(gauss[i, k])
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def accumulate(c, w, colour, fraction):
     """C + w colour in an unsigned fixed-point accumulator of ACCUMULATOR_INT_BITS and `fraction` bits, saturating; the product is FP16's."""
     unit = np.float32(2.0**fraction)

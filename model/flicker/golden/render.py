@@ -57,7 +57,7 @@ def minitile_weights(f, m, form, col, row, e):
                 e[j * 4 + i] = factored_pixel(col[0, i], row[0, j], row[1, j], FP16_R)[2]
 
 
-@numba.njit
+@numba.njit(cache=True)
 def minitile(f, m, form, state, finished, col, row, e):
     """Blend one splat into mini-tile m; returns (pairs blended, pixels finished)."""
     minitile_weights(f, m, form, col, row, e)

@@ -32,7 +32,7 @@ ALPHA_MAX = _constant(ALPHA_MAX_BITS)
 TRANSMITTANCE_MIN = _constant(TRANSMITTANCE_MIN_BITS)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def alpha_of(e, opacity, base2):
     """(g, alpha after the clamp) of a weight. A negative or NaN weight gives g = 0."""
     g = exp_neg_f32(e, base2)
@@ -40,14 +40,14 @@ def alpha_of(e, opacity, base2):
     return g, (ALPHA_MAX if a > ALPHA_MAX else a)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def next_transmittance(t, alpha):
     """(1 - alpha, T (1 - alpha))."""
     oma = sub(np.float32(1.0), alpha, FP16_R)
     return oma, mul(t, oma, FP16_R)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def blend(c, w, colour):
     """(w colour, C + w colour); a colour is not negative: its sign is ignored."""
     m = mul(w, abs(colour), FP16_R)

@@ -17,14 +17,14 @@ import numba
 from ..arithmetic.fp import add, mul
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def conic_axis(d, s, r):
     """Column or row terms of the conic form: (d d, d d s)."""
     dd = mul(d, d, r)
     return dd, mul(dd, s, r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def conic_pixel(dx, dy, sx, sy, b, r):
     """Pixel terms of the conic form: (xy, t, h, E)."""
     xy = mul(dx, dy, r)
@@ -33,7 +33,7 @@ def conic_pixel(dx, dy, sx, sy, b, r):
     return xy, t, h, add(h, t, r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def factored_row(dy, l1, l2, r):
     """Row terms of the factored form: (q, v, vv)."""
     q = mul(l1, dy, r)
@@ -41,7 +41,7 @@ def factored_row(dy, l1, l2, r):
     return q, v, mul(v, v, r)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def factored_pixel(p, q, vv, r):
     """Pixel terms of the factored form: (u, uu, E)."""
     u = add(p, q, r)

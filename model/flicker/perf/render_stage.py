@@ -90,7 +90,7 @@ def _finish_events(pixel_finish, start, per_vru, last, op):
             op[s, m] = k
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _ones(mask):
     """Set bits of a mini-tile mask."""
     return (mask & 1) + (mask >> 1 & 1) + (mask >> 2 & 1) + (mask >> 3 & 1)

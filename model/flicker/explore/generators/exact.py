@@ -52,7 +52,7 @@ def _two_powers(x: float) -> float:
     return first if rest <= 0 else first + 2.0 ** np.ceil(np.log2(rest))
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _edge(l0, l1, l2, dx, dy, conic, man, emin, top):
     """(u, v, E) in the factored form, (h, t, E) in the conic form, each operation rounded to nearest."""
     if conic:
@@ -73,7 +73,7 @@ def _edge(l0, l1, l2, dx, dy, conic, man, emin, top):
     return u, v, quantise(uu + vv, man, emin, top, NEAREST)
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _margin(l0, l1, l2, fx, fy, conic, kappa, absolute, man, emin, top):
     """Upper bound M on all errors, in the format, rounded up. l0, l1, l2, fx, fy: magnitudes, rounded up; infinite if anything overflows."""
     if conic:

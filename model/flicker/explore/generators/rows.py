@@ -97,7 +97,7 @@ def root_table(fmt: RowFormat) -> np.ndarray:
         table.append(int(np.ceil(np.sqrt(one * one - max(low, 0.0) ** 2) + du)))
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _significand(x):
     return quantise(x, SIGNIFICAND - 1, -1000, 1e300, NEAREST)
 
