@@ -424,9 +424,12 @@ module flk_cluster_cull
     .sum_o(span)
   );
 
-  // Keys of KeyBits for all depths of the span.
+  logic unused_span;  // but its exponent
+  assign unused_span = ^{span[31], span[22:0]};
+
+  // Keys of KeyBits for all depths of the span; a span of 0, code 0, has the largest shift.
   assign shift_span = 9'(KeyBits - 1 + 127) - 9'(span[30:23]);
-  assign shift      = span == '0 || shift_span > MAX_SHIFT ? 8'(MAX_SHIFT) : 8'(shift_span);
+  assign shift      = shift_span > MAX_SHIFT ? 8'(MAX_SHIFT) : 8'(shift_span);
 
   always_ff @(posedge clk_i) begin
     if (state_q == BOUNDS && step_q == 3'd4) begin

@@ -172,22 +172,37 @@ def test_errors_of_the_memory(part: str) -> None:
             break
         at += len(data)
     base = {"records": regions.records, "lists": regions.lists, "pointers": regions.pointers}.get(part, at)
-    rtl = front_rtl(packed, camera, chunks=chunks, memory=MemoryOptions(fail=[(base, 64)]), seed=seed())
+    rtl = front_rtl(packed, camera, chunks=chunks, memory=MemoryOptions(fail=[(base, 2048)]), seed=seed())
     assert rtl.error == 1 << ERRORS.index("a read failed" if part in names else "a write failed")
 
 
 def test_records_beyond_their_region() -> None:
-    """A table that is not the scene's own: clusters beyond the records write nothing and the frame says so."""
+    """Clusters whose records have no place write nothing, and the frame says so; all others write theirs."""
+    packed = pack(some(1500), PackedFormat.CHUNK).packed
+    camera = plain_camera()
+    golden = run_front(packed, camera)
+    image = front_memory(golden)
+    regions = Regions.of(packed, camera, image.lists.chunks)
+    places = int(packed.first[-1])  # of all clusters but the last
+    rtl = front_rtl(packed, camera, chunks=image.lists.chunks, regions=dataclasses.replace(regions, record_bytes=16 * places), seed=seed())
+    assert rtl.error == 1 << ERRORS.index("a cluster's records lie beyond their region")
+    assert image.written[places:].any()
+    written = image.written[:places]
+    assert np.array_equal(rtl.records[written], image.records[:places][written])
+    assert rtl.counters["survivors"] == written.sum()
+
+
+def test_a_table_that_points_beyond_the_image() -> None:
+    """The memory refuses the read, which ends the frame; nothing is written outside of the regions."""
     packed = pack(some(1500), PackedFormat.CHUNK).packed
     camera = plain_camera()
     chunks = front_memory(run_front(packed, camera)).lists.chunks
-    regions = Regions.of(packed, camera, chunks)
     table = packed.table.copy()
     table["first"][-1] += 1 << 18
     image = packed.image()
     image = image[:256] + table.tobytes() + image[256 + len(table.tobytes()) :]
-    rtl = front_rtl(packed, camera, chunks=chunks, regions=regions, image=image, seed=seed())
-    assert rtl.error >> ERRORS.index("a cluster's records lie beyond their region") & 1
+    rtl = front_rtl(packed, camera, chunks=chunks, image=image, seed=seed())
+    assert rtl.error & 1 << ERRORS.index("a read failed")
 
 
 def test_frame_read_back_from_memory() -> None:

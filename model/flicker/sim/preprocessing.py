@@ -67,7 +67,7 @@ class Regions:
         records = image + step(len(packed.image()))
         slots = -(-(int(packed.first[-1]) + int(packed.counts[-1])) // SLOTS_PER_STEP) * SLOTS_PER_STEP
         lists = records + step(slots * RECORD_BYTES)
-        pointers = lists + step(chunks * WRITERS * CHUNK_LINES * LINE_BYTES)
+        pointers = lists + step(max(chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES)
         return Regions(image, records, slots * RECORD_BYTES, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 

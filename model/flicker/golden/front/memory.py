@@ -24,7 +24,7 @@ class FrontImage:
 
 def front_memory(frame: FrontFrame, chunks: int | None = None) -> FrontImage:
     """Memory after a frame. chunks: that each list writer may take; None: as many as the busiest one takes."""
-    slots = int(frame.packed.first[-1]) + -(-int(frame.packed.table["last"][-1] + 1) // SLOTS_PER_STEP) * SLOTS_PER_STEP
+    slots = int(frame.packed.first[-1]) + -(-int(frame.packed.counts[-1]) // SLOTS_PER_STEP) * SLOTS_PER_STEP
     records, written = np.zeros((slots, frame.kind.bytes), np.uint8), np.zeros(slots, np.bool_)
     records[frame.number] = frame.records
     written[frame.number] = True
