@@ -1,11 +1,10 @@
 // Colour fetch: colours of survivors from memory to the lanes (docs/memory_image.md, docs/front_end.md).
 //
 // Survivors of a group of four come in the order of the scene; of their colours those beats are read
-// that hold any, each once. A window of two neighbouring beats is seen by all lanes: each takes its
-// own Gaussians from it, part by part (colour_part_t), in order, as fast as it likes; the window
-// moves on when no lane needs its first beat any more. oldest_o: no part of a cluster before it will
-// be given any more (a running number, modulo); while nothing is under way it follows exit_i, the
-// cluster whose groups are coming now.
+// that hold any, each once. All lanes see one beat at a time; a lane keeps the two that its Gaussians
+// need next and takes them apart (colour_part_t), in order; the beat goes on when no lane needs it.
+// oldest_o: no part of a cluster before it will be given any more (a running number, modulo); while
+// nothing is under way it follows exit_i, the cluster whose groups are coming now.
 // A frame: start_i while idle_o; registers stay until idle_o after the last survivors. An error of
 // the memory: error_o rises and stays until the next start; parts come, but mean nothing.
 // Throughput: a beat a cycle, a part a cycle and lane, a group every cycle. Latency is the memory's
@@ -212,8 +211,8 @@ module flk_colour_fetch
   );
 
   // The tag is that of a request's first beat; the others count on.
-  assign fetch_mark = following_q && fetch_tag == tag_q ? mark_t'({mark_q.cluster, mark_q.at + 1'b1})
-                                                        : fetch_tag;
+  assign fetch_mark = following_q && fetch_tag == tag_q
+                    ? mark_t'({mark_q.cluster, mark_q.at + 1'b1}) : fetch_tag;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -322,7 +321,8 @@ module flk_colour_fetch
     logic                 want_d, want_q;
     cluster_index_t       cluster_d, cluster_q;
     logic [1:0]           degree_d, degree_q, part_d, part_q;
-    logic [BYTE_BITS-1:0] from_d, from_q, end_d, end_q;  // first byte of the part, last of the Gaussian
+    logic [BYTE_BITS-1:0] from_d, from_q;  // first byte of the part
+    logic [BYTE_BITS-1:0] end_d, end_q;    // last byte of the Gaussian
     logic                 more, fire, straddles, final_part;
     logic [BYTE_BITS-1:0] reach;
     logic [AT_BITS-1:0]   last_beat;
@@ -387,7 +387,8 @@ module flk_colour_fetch
     endfunction
 
     // Whether the beat that all see is needed by the Gaussian in work or the next, or by none that is known.
-    assign item_last = AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1) >> 6);
+    assign item_last = AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1)
+                                >> 6);
 
     always_comb begin
       needed = 1'b0;
@@ -537,7 +538,8 @@ module flk_colour_fetch
   always_comb begin
     least = seen_q.cluster;
     for (int unsigned k = 0; k < LANES; k++) begin
-      if (lane_busy[k] && CLUSTER_BITS'(least - lane_cluster[k]) < CLUSTER_BITS'(COLOUR_CLUSTERS)) begin
+      if (lane_busy[k] &&
+          CLUSTER_BITS'(least - lane_cluster[k]) < CLUSTER_BITS'(COLOUR_CLUSTERS)) begin
         least = lane_cluster[k];
       end
     end

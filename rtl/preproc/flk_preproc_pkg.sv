@@ -41,7 +41,7 @@ package flk_preproc_pkg;
 
   // What the lanes take of a cluster's header, and where its colours lie.
   typedef struct packed {
-    logic [31:0]               colour;      // first beat of its colours, from the colour array's first
+    logic [31:0]               colour;      // first beat of its colours in their array
     logic [8:0]                sh_zero;
     position_t [2:0]           low;         // of the means, less the camera's position
     position_t [2:0]           step;
@@ -84,7 +84,8 @@ package flk_preproc_pkg;
     logic [3:0]     alive;
   } survivors_t;
 
-  // Part of a Gaussian's colour: the constant part and opacity with the first, up to four coefficients. Codes of a chunk, or FP16.
+  // Part of a Gaussian's colour: the constant part and opacity with the first, up to four
+  // coefficients. Codes of a chunk, or FP16.
   typedef struct packed {
     cluster_index_t          cluster;
     logic                    first;
@@ -179,7 +180,7 @@ package flk_preproc_pkg;
   // Why a frame failed: bits.
   localparam int unsigned FRONT_ERROR_READ = 0;     // the memory answered a read with an error
   localparam int unsigned FRONT_ERROR_WRITE = 1;    // or a write
-  localparam int unsigned FRONT_ERROR_RECORDS = 2;  // a cluster's slots lie beyond the records' region
+  localparam int unsigned FRONT_ERROR_RECORDS = 2;  // slots of a cluster lie beyond the records
   localparam int unsigned FRONT_ERROR_LISTS = 3;    // a list writer needed a chunk more than it has
 
   typedef struct packed {

@@ -1,4 +1,4 @@
-// Preprocessing: from a packed scene in memory to records and tile lists in memory (docs/front_end.md).
+// Preprocessing: from a packed scene in memory to records and tile lists (docs/front_end.md).
 //
 // Four cores behind three AXI4 read ports (cluster table, geometry, colours) and one write port. A
 // frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
@@ -12,6 +12,7 @@ module flk_preprocessing
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Pointers = 2048,  // lists of a writer
+  parameter  int unsigned Gather   = 64,    // lines that are written together
   parameter  int unsigned IdBits   = 4,
   localparam int unsigned Width    = 512,
   localparam int unsigned Bytes    = Width / 8,
@@ -100,7 +101,8 @@ module flk_preprocessing
   typedef enum logic [1:0] {IDLE, FRONT, BACK, LISTS} state_e;
 
   state_e state_d, state_q;
-  logic   start, cull_idle, geometry_idle, front_idle, back_idle, merge_idle, records_idle, write_idle;
+  logic   start, cull_idle, geometry_idle, front_idle, back_idle;
+  logic   merge_idle, records_idle, write_idle;
   logic   colour_idle, ended_q, lists_end, arbiter_empty;
   logic [LANES-1:0] lane_idle;
   logic [3:0]       list_idle, list_failed;
@@ -258,7 +260,8 @@ module flk_preprocessing
   logic                   exit_valid, go;
 
   assign cluster     = group.first ? cluster_q + 1'b1 : cluster_q;
-  assign room        = !group.first || CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
+  assign room        = !group.first ||
+                       CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
   assign group_ready = front_en && !front_phase_q && (group_end || room);
   assign enter       = group_valid && group_ready && !group_end;
   assign take_end    = group_valid && group_ready && group_end;
@@ -370,7 +373,8 @@ module flk_preprocessing
   assign fill    = 4'(rank_q[1:0]) + 4'(count);  // of the open beat, before it goes
   assign full    = fill[2];
   assign partial = side.last && fill[1:0] != '0;
-  assign beat    = registers_i.records_beat + BEAT_BITS'({of.first, 2'b0}) + BEAT_BITS'(rank_q[8:2]);
+  assign beat    = registers_i.records_beat + BEAT_BITS'({of.first, 2'b0}) +
+                   BEAT_BITS'(rank_q[8:2]);
 
   for (genvar k = 0; k < LANES; k++) begin : gen_numbers
     logic [2:0] at;
@@ -551,7 +555,9 @@ module flk_preprocessing
   logic [3:0][6:0]              merged_u, merged_v;
   logic [3:0][NUMBER_BITS+27:0] merged;
 
-  flk_entry_merge i_merge (
+  flk_entry_merge #(
+    .Depth(8)
+  ) i_merge (
     .clk_i,
     .rst_ni,
     .start_i    (start),
@@ -626,14 +632,14 @@ module flk_preprocessing
   // ---- writes ---------------------------------------------------------------------------------------
 
   logic                   chosen_valid, chosen_ready;
-  line_t                  chosen, write;
+  line_t                  chosen;
+  logic [3:0]             write_strobe;
+  logic [Width-1:0]       write_data;
   logic                   address_room, address_valid, address_ready, address_empty;
   logic                   data_room, data_valid, data_ready, data_empty;
   logic [BEAT_BITS-1:0]   write_beat;
   logic                   write_answer, write_failed, unused_tag;
-  logic [2:0]             unused_index, unused_data_usage;
-  logic [1:0]             unused_address_usage;
-  logic                   unused_address_full, unused_data_full;
+  logic [2:0]             unused_index;
 
   flk_stream_arbiter #(
     .Inputs(5),
@@ -651,13 +657,33 @@ module flk_preprocessing
     .out_index_o(unused_index)
   );
 
-  // A burst's data wait for its length: addresses and data go their own ways.
+  // Lines are gathered and written together, so that the memory's bus turns rarely. A burst's data wait
+  // for its length: addresses and data go their own ways.
+  logic [$clog2(Gather+1)-1:0] gathered_q;  // lines that wait
+  logic [6:0]                  waited_q;    // cycles since the last one came
+  logic                        drain_q, gather, left;
+
+  assign gather        = chosen_valid && chosen_ready;
+  assign left          = data_valid && data_ready;
   assign chosen_ready  = address_room && data_room;
   assign arbiter_empty = !chosen_valid && address_empty && data_empty;
 
-  flk_fifo #(
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      gathered_q <= '0;
+      waited_q   <= '0;
+      drain_q    <= 1'b0;
+    end else begin
+      gathered_q <= gathered_q + ($clog2(Gather + 1))'(gather) - ($clog2(Gather + 1))'(left);
+      waited_q   <= gather ? '0 : waited_q + 7'(!(&waited_q));
+      drain_q    <= drain_q ? gathered_q != '0
+                            : 32'(gathered_q) >= Gather - 2 || (&waited_q) || lists_end;
+    end
+  end
+
+  flk_sram_fifo #(
     .Width(BEAT_BITS),
-    .Depth(2)
+    .Depth(Gather)
   ) i_addresses (
     .clk_i,
     .rst_ni,
@@ -666,28 +692,24 @@ module flk_preprocessing
     .in_ready_o (address_room),
     .in_data_i  (chosen.beat),
     .out_valid_o(address_valid),
-    .out_ready_i(address_ready),
+    .out_ready_i(address_ready && drain_q),
     .out_data_o (write_beat),
-    .usage_o    (unused_address_usage),
-    .full_o     (unused_address_full),
     .empty_o    (address_empty)
   );
 
-  flk_fifo #(
-    .Width($bits(line_t)),
-    .Depth(6)
+  flk_sram_fifo #(
+    .Width(Width + 4),
+    .Depth(Gather)
   ) i_lines (
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
     .in_valid_i (chosen_valid && address_room),
     .in_ready_o (data_room),
-    .in_data_i  (chosen),
+    .in_data_i  ({chosen.strobe, chosen.data}),
     .out_valid_o(data_valid),
     .out_ready_i(data_ready),
-    .out_data_o (write),
-    .usage_o    (unused_data_usage),
-    .full_o     (unused_data_full),
+    .out_data_o ({write_strobe, write_data}),
     .empty_o    (data_empty)
   );
 
@@ -695,7 +717,7 @@ module flk_preprocessing
 
   always_comb begin
     for (int unsigned q = 0; q < 4; q++) begin
-      strobes[q*(Bytes/4)+:Bytes/4] = {Bytes / 4{write.strobe[q]}};
+      strobes[q*(Bytes/4)+:Bytes/4] = {Bytes / 4{write_strobe[q]}};
     end
   end
 
@@ -711,14 +733,14 @@ module flk_preprocessing
     .clk_i,
     .rst_ni,
     .idle_o      (write_idle),
-    .in_valid_i  (address_valid),
+    .in_valid_i  (address_valid && drain_q),
     .in_ready_o  (address_ready),
     .in_addr_i   ({write_beat, 6'b0}),
     .in_beats_i  (1'b1),
     .in_tag_i    (1'b0),
     .data_valid_i(data_valid),
     .data_ready_o(data_ready),
-    .data_data_i (write.data),
+    .data_data_i (write_data),
     .data_strb_i (strobes),
     .done_valid_o(write_answer),
     .done_error_o(write_failed),
@@ -744,7 +766,8 @@ module flk_preprocessing
   // ---- errors and counters --------------------------------------------------------------------------
 
   logic        write_error_q;
-  logic [31:0] near_q, outside_q, survivors_q, saturated_q, clipped_q, faint_q, unlisted_q, records_q;
+  logic [31:0] near_q, outside_q, survivors_q, records_q;
+  logic [31:0] saturated_q, clipped_q, faint_q, unlisted_q;
   logic [31:0] cycles_q;
 
   function automatic logic [31:0] sum(input logic [LANES-1:0] bits);
@@ -809,13 +832,13 @@ module flk_preprocessing
   assign counters_o.key_shift    = key_shift;
   assign counters_o.key_low      = key_low;
 
-  assign error_o = {|list_failed, beyond_q, write_error_q, cull_error || geometry_error || colour_error};
+  assign error_o = {|list_failed, beyond_q, write_error_q,
+                    cull_error || geometry_error || colour_error};
 
   logic unused;
-  assign unused = ^{cull_idle, geometry_idle, write.beat, group.cluster.index, beat_ready,
+  assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,
                     unused_bounds, unused_cull_done, unused_geometry_done, unused_done,
-                    unused_index, unused_address_usage, unused_address_full, unused_data_usage,
-                    unused_data_full, unused_tag, fill[3]};
+                    unused_index, unused_tag, fill[3]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

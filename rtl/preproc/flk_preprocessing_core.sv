@@ -711,12 +711,18 @@ module flk_preprocessing_core
 
   flk_mean_field i_x_field (.x_i(survivor.x), .field_o(fields_in.x));
   flk_mean_field i_y_field (.x_i(survivor.y), .field_o(fields_in.y));
-  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (.x_i(survivor.l0), .field_o(fields_in.l0));
+  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (
+    .x_i    (survivor.l0),
+    .field_o(fields_in.l0)
+  );
   flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l1_field (
     .x_i    (survivor.l1),
     .field_o(fields_in.l1[13:0])
   );
-  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (.x_i(survivor.l2), .field_o(fields_in.l2));
+  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (
+    .x_i    (survivor.l2),
+    .field_o(fields_in.l2)
+  );
 
   flk_sram_fifo #(
     .Width($bits(fields_t)),
@@ -759,8 +765,9 @@ module flk_preprocessing_core
                            fields.l0, fields.y, fields.x};
   assign clipped_o      = record_valid_o && record_ready_i && (|clipped);
 
-  assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty && code_empty &&
-                  side_empty && bounded_empty && walk_empty && walker_idle && seqs_empty;
+  assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty &&
+                  code_empty && side_empty && bounded_empty && walk_empty && walker_idle &&
+                  seqs_empty;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) push_i |-> ready_o)

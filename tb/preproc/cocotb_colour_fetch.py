@@ -6,11 +6,11 @@ import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
 from flicker_tb.bench import Bench
-from flicker_tb.streams import StreamSource, Stream
+from flicker_tb.streams import Stream, StreamSource
 
 from flicker.chip.dram import DramConfig
-from flicker.sim.memory import Memory, PortConfig
 from flicker.scene.packed import PackedFormat
+from flicker.sim.memory import Memory, PortConfig
 
 BASE, SIZE = 0x40_0000, 0x8_0000
 CLUSTERS = 8  # whose colours may be under way

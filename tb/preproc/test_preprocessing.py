@@ -34,7 +34,8 @@ QUICK = MemoryOptions()
 def lpddr4(stalls: bool = True) -> MemoryOptions:
     """DRAM behind ports that pause."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2} if stalls else {}
-    return MemoryOptions(DramConfig().timing, {n: PortConfig(max_reads=64, max_writes=64, latency=20, stall=shares, seed=seed() + k) for k, n in enumerate(PORTS)})
+    config = PortConfig(max_reads=64, max_writes=64, latency=20, stall=shares)
+    return MemoryOptions(DramConfig().timing, {n: dataclasses.replace(config, seed=seed() + k) for k, n in enumerate(PORTS)})
 
 
 @cache
@@ -42,7 +43,9 @@ def demo() -> View:
     return load_view(DEMO, 0, (320, 180))
 
 
-def check(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1) -> tuple[FrontFrame, RtlFront]:
+def check(
+    packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1,
+) -> tuple[FrontFrame, RtlFront]:
     """A frame of both, compared."""
     golden = run_front(packed, camera, lists)
     image = front_memory(golden)
@@ -65,7 +68,7 @@ def check(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPS
         assert np.array_equal(count[name], getattr(image.lists, name)), name
     traffic = {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items()}
     per = lambda n: frames * int(count[n])  # noqa: E731
-    assert traffic["headers"] == (per("header_beats"), 0) and traffic["geometry"] == (per("geometry_beats"), 0) and traffic["colour"] == (per("colour_beats"), 0)
+    assert {n: traffic[n] for n in ("headers", "geometry", "colour")} == {n: (per(f"{n.removesuffix('s')}_beats"), 0) for n in ("headers", "geometry", "colour")}
     assert traffic["records"] == (0, per("record_beats")) and traffic["lists"][1] == frames * int(np.sum(count["lines"]))
     assert traffic["table"][0] == frames * 2 * -(-len(packed.table) // 2)
     return golden, rtl
@@ -126,7 +129,8 @@ CASES = {
     "inside a cluster": some(600, means=np.random.default_rng(1).uniform(-3, 3, (600, 3))), "one tile": some(256, means=[0.01, 0.02, 4.0], scales=0.001),
     "large": some(300, scales=5.0), "equal depths": some(400, means=np.c_[np.random.default_rng(2).uniform(-1, 1, (400, 2)), np.full(400, 4.0)]),
     "faint": some(400, opacities=np.random.default_rng(3).choice([1 / 255, 1.4 / 255, 2 / 255], 400)),
-    "degenerate": some(300, scales=np.random.default_rng(4).choice([1e-7, 1.0], (300, 3))), "bright": some(300, sh=np.random.default_rng(6).normal(scale=4.0, size=(300, 16, 3))),
+    "degenerate": some(300, scales=np.random.default_rng(4).choice([1e-7, 1.0], (300, 3))),
+    "bright": some(300, sh=np.random.default_rng(6).normal(scale=4.0, size=(300, 16, 3))),
 }
 
 

@@ -89,11 +89,25 @@ class Value:
     constant: int | None = None  # bits
     register: bool = False
 
+    @property
+    def range(self) -> Int:
+        """Of an integer."""
+        if not isinstance(self.kind, Int):
+            raise FlickerError(f"datapath: {self.name} is no integer")
+        return self.kind
+
+    @property
+    def M(self) -> int:
+        """Mantissa bits of an ff number."""
+        if not isinstance(self.kind, Ff):
+            raise FlickerError(f"datapath: {self.name} is no ff number")
+        return self.kind.M
+
     # Integers and comparisons as Python writes them.
 
     def _int(self, other: Any, text: str, bounds: Callable[[Int, Int], tuple[int, int]]) -> Value:
-        a, b = self, self.graph.integer(other)
-        return self.graph.expression(text, Int(*bounds(a.kind, b.kind)), (a, b))
+        b = self.graph.integer(other)
+        return self.graph.expression(text, Int(*bounds(self.range, b.range)), (self, b))
 
     def __add__(self, other: Any) -> Value:
         return self._int(other, "{0} + {1}", lambda a, b: (a.low + b.low, a.high + b.high))
@@ -110,8 +124,8 @@ class Value:
         if isinstance(self.kind, Ff):
             return self.graph.scaled(self, other)
         b = self.graph.integer(other)
-        if b.constant is not None and b.kind.low > 0 and b.kind.low & (b.kind.low - 1) == 0:
-            return self << (b.kind.low.bit_length() - 1)
+        if b.constant is not None and b.range.low > 0 and b.range.low & (b.range.low - 1) == 0:
+            return self << (b.range.low.bit_length() - 1)
         ends = lambda p, q: [x * y for x in (p.low, p.high) for y in (q.low, q.high)]  # noqa: E731
         return self._int(b, "{0} * {1}", lambda p, q: (min(ends(p, q)), max(ends(p, q))))
 
@@ -121,10 +135,10 @@ class Value:
         return self.graph.integer(0) - self
 
     def __lshift__(self, places: int) -> Value:
-        return self.graph.wire(f"{{0}} <<< {places}", Int(self.kind.low << places, self.kind.high << places), (self,))
+        return self.graph.wire(f"{{0}} <<< {places}", Int(self.range.low << places, self.range.high << places), (self,))
 
     def __rshift__(self, places: int) -> Value:
-        return self.graph.wire(f"{{0}} >>> {places}", Int(self.kind.low >> places, self.kind.high >> places), (self,))
+        return self.graph.wire(f"{{0}} >>> {places}", Int(self.range.low >> places, self.range.high >> places), (self,))
 
     def __le__(self, other: Any) -> Value:
         return self.graph.compare(self, other, "{0} <= {1}")
@@ -248,17 +262,17 @@ class Graph:
 
     def ff_neg(self, x: Value) -> Value:
         top = x.kind.bits - 1
-        return self.wire(f"{{{{{{0}}[{top}] ^ (|{{0}}[{top - 1}:{x.kind.M}]), {{0}}[{top - 1}:0]}}}}", x.kind, (x,))
+        return self.wire(f"{{{{{{0}}[{top}] ^ (|{{0}}[{top - 1}:{x.M}]), {{0}}[{top - 1}:0]}}}}", x.kind, (x,))
 
     def ff_abs(self, x: Value) -> Value:
         return self.wire(f"{{{{1'b0, {{0}}[{x.kind.bits - 2}:0]}}}}", x.kind, (x,))
 
     def ff_round(self, x: Value, M: int) -> Value:
-        if x.kind.M == M:
+        if x.M == M:
             return x
-        if x.kind.M < M:
-            return self.wire(f"{{{{{{0}}, {M - x.kind.M}'b0}}}}", Ff(M), (x,))
-        return self.make(Ff(M), Operator("flk_ff_narrow", (("FromBits", x.kind.M), ("ManBits", M)), ("x_i", "y_o"), clocked=False), (x,))
+        if x.M < M:
+            return self.wire(f"{{{{{{0}}, {M - x.M}'b0}}}}", Ff(M), (x,))
+        return self.make(Ff(M), Operator("flk_ff_narrow", (("FromBits", x.M), ("ManBits", M)), ("x_i", "y_o"), clocked=False), (x,))
 
     def scaled(self, x: Value, factor: float) -> Value:
         """x times a power of two, saturated."""
@@ -269,10 +283,10 @@ class Graph:
 
     def ldexp(self, x: Value, shift: Any) -> Value:
         shift = self.integer(shift)
-        return self.make(x.kind, Operator("flk_ff_ldexp", (("ManBits", x.kind.M), ("ShiftBits", 10)), ("x_i", "shift_i", "y_o"), clocked=False), (x, shift))
+        return self.make(x.kind, Operator("flk_ff_ldexp", (("ManBits", x.M), ("ShiftBits", 10)), ("x_i", "shift_i", "y_o"), clocked=False), (x, shift))
 
     def to_fixed(self, x: Value, frac_bits: int, bits: int, nearest: bool) -> Value:
-        parameters = (("Bits", bits), ("FracBits", frac_bits), ("Round", int(nearest)), ("ManBits", x.kind.M), ("Stages", 2))
+        parameters = (("Bits", bits), ("FracBits", frac_bits), ("Round", int(nearest)), ("ManBits", x.M), ("Stages", 2))
         return self.make(Int(-(1 << (bits - 1)), (1 << (bits - 1)) - 1), Operator("flk_ff_to_fixed", parameters, ("x_i", "y_o"), 2, True), (x,))
 
     def from_fp16(self, bits: Value, M: int) -> Value:
@@ -284,8 +298,8 @@ class Graph:
 
     def from_fixed(self, i: Any, frac_bits: int, M: int) -> Value:
         i = self.integer(i)
-        if not i.kind.signed:  # a sign bit
-            kind = Int(-1 - i.kind.high, i.kind.high)
+        if not i.range.signed:  # a sign bit
+            kind = Int(-1 - i.range.high, i.range.high)
             i = self.wire(f"{kind.bits}'({{0}})", kind, (i,))
         parameters = (("Bits", i.kind.bits), ("FracBits", frac_bits), ("ManBits", M), ("Stages", 2))
         return self.make(Ff(M), Operator("flk_ff_from_fixed", parameters, ("x_i", "y_o"), 2, True), (i,))
@@ -296,26 +310,26 @@ class Graph:
         return self.make(Ff(M), Operator("flk_ff_exp2", parameters, ("l_i", "y_o"), count, True), (L,))
 
     def less(self, a: Value, b: Value) -> Value:
-        return self.make(BOOL, Operator("flk_ff_cmp", (("ManBits", a.kind.M),), ("a_i", "b_i", "lt_o"), clocked=False), (a, b))
+        return self.make(BOOL, Operator("flk_ff_cmp", (("ManBits", a.M),), ("a_i", "b_i", "lt_o"), clocked=False), (a, b))
 
     # ---- choice ------------------------------------------------------------------------------------
 
     def compare(self, a: Value, other: Any, text: str) -> Value:
         if isinstance(a.kind, Int):
             return self.expression(text, BOOL, (a, self.integer(other)))
-        b = self.number(other, a.kind.M)
+        b = self.number(other, a.M)
         operation = text[4:-4]
         less = self.less(b, a) if operation in ("<=", ">") else self.less(a, b)
         return less if operation in ("<", ">") else self.wire("!{0}", BOOL, (less,))
 
     def pick(self, condition: Value, a: Any, b: Any) -> Value:
         if isinstance(a, Value) and isinstance(a.kind, Ff) or isinstance(b, Value) and isinstance(b.kind, Ff):
-            M = next(v.kind.M for v in (a, b) if isinstance(v, Value))
+            M = next(v.M for v in (a, b) if isinstance(v, Value))
             a, b = self.number(a, M), self.number(b, M)
             kind: Kind = a.kind
         else:
             a, b = self.integer(a), self.integer(b)
-            kind = Int(min(a.kind.low, b.kind.low), max(a.kind.high, b.kind.high))
+            kind = Int(min(a.range.low, b.range.low), max(a.range.high, b.range.high))
         return self.expression("{0} ? {1} : {2}", kind, (condition, a, b))
 
     def extreme(self, a: Any, b: Any, largest: bool) -> Value:
@@ -328,7 +342,7 @@ class Graph:
             return self.pick(self.less(a, b) if largest else self.less(b, a), b, a)
         a, b = self.integer(a), self.integer(b)
         f = max if largest else min
-        bounds = Int(f(a.kind.low, b.kind.low), f(a.kind.high, b.kind.high))
+        bounds = Int(f(a.range.low, b.range.low), f(a.range.high, b.range.high))
         return self.expression("{0} < {1} ? {1} : {0}" if largest else "{1} < {0} ? {1} : {0}", bounds, (a, b))
 
 

@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..arithmetic.ff import ff_add, ff_mul, ff_round, ff_sub
 from ..golden.front import cull, frame, reach, splat
 from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats

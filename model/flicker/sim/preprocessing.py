@@ -206,7 +206,9 @@ def front_rtl(
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     own = writer_columns(cols) * -(-rows // 2)
     lib = _library(build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS, checks=checks))
-    configs = (_Config * len(PORTS))(*(memory.ports.get(name, PORT).structure() for name in PORTS))
+    configs = (_Config * len(PORTS))()
+    for k, name in enumerate(PORTS):
+        configs[k] = memory.ports.get(name, PORT).structure()  # type: ignore[call-overload]
     timing = memory.timing or Timing(*[1] * len(Timing._fields_))
     sim = lib.flk_front_new(ctypes.byref(timing), memory.timing is None, configs, seed)
     if not sim:
@@ -273,7 +275,8 @@ def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.
     }
     adjusted = {"mean beyond 2^22 pixels": count["saturated"], "colour above 2 clipped": count["clipped"]}
     frame = FrontFrame(
-        camera, packed, RecordKind.FACTORED16, len(packed.table) - int(count["culled_clusters"]), np.full(len(number), -1, np.int64),  # a record does not say whose it is
+        camera, packed, RecordKind.FACTORED16, len(packed.table) - int(count["culled_clusters"]),
+        np.full(len(number), -1, np.int64),  # a record does not say whose it is
         number.astype(np.int64),
         rtl.records[number], key, splat.astype(np.int32), np.repeat(np.arange(cols * rows, dtype=np.int32), np.diff(read.start)), read.mask,
         {OUTCOMES[k]: int(v) for k, v in outcomes.items()}, {k: int(v) for k, v in adjusted.items() if v},

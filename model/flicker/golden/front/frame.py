@@ -247,7 +247,8 @@ def _entries(start, places, numbers, box, cols, S, tile, mask):
 class FrontFrame:
     """What the front end leaves, in record order (R records, E list entries).
 
-    gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed. number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
+    gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed.
+    number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
     records: uint8 (R, bytes).
     key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
@@ -345,8 +346,8 @@ def run_front(
     outcomes |= {OUTCOMES[k]: int((outcome == k).sum()) for k in range(1, 6)}
     records, adjusted = _records(kind, words[kept], halves[kept] if conic else halves, flags[kept])
     return FrontFrame(
-        camera, packed, kind, int(culled.keep.sum()), gaussian, number, records, key[kept], np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask,
-        outcomes, adjusted,
+        camera, packed, kind, int(culled.keep.sum()), gaussian, number, records, key[kept],
+        np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted,
     )
 
 
