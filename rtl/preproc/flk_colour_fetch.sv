@@ -367,13 +367,6 @@ module flk_colour_fetch
       end_q     <= end_d;
     end
 
-    // It reaches 16 bytes of a chunk's Gaussian, 32 of FP16's, or to the Gaussian's end.
-    assign reach     = from_q + (chunked_i ? BYTE_BITS'(15) : BYTE_BITS'(31));
-    assign last_beat = reach < end_q ? reach[BYTE_BITS-1:6] : end_q[BYTE_BITS-1:6];
-    assign straddles = last_beat != from_q[BYTE_BITS-1:6];
-    assign fire      = want_q && l0_valid_q && l0_q == {cluster_q, from_q[BYTE_BITS-1:6]} &&
-                       (!straddles || l1_valid_q) && (!out_valid_o[k] || out_ready_i[k]);
-
     // Two beats of the lane's own: the one in which the part begins, and the next that is needed.
 
     logic                  l0_valid_d, l0_valid_q, l1_valid_d, l1_valid_q;
@@ -381,6 +374,14 @@ module flk_colour_fetch
     logic [31:0][31:0]     window_q;  // words of both
     logic                  needed, passed, shift, take, has, drop;
     logic [AT_BITS-1:0]    item_last;
+
+    // It reaches 16 bytes of a chunk's Gaussian, 32 of FP16's, or to the Gaussian's end.
+    assign reach     = from_q + (chunked_i ? BYTE_BITS'(15) : BYTE_BITS'(31));
+    assign last_beat = reach < end_q ? reach[BYTE_BITS-1:6] : end_q[BYTE_BITS-1:6];
+    assign straddles = last_beat != from_q[BYTE_BITS-1:6];
+    assign fire      = want_q && l0_valid_q && l0_q == {cluster_q, from_q[BYTE_BITS-1:6]} &&
+                       (!straddles || l1_valid_q) && (!out_valid_o[k] || out_ready_i[k]);
+
 
     function automatic logic later(input cluster_index_t a, input cluster_index_t b);
       return a != b && CLUSTER_BITS'(a - b) <= CLUSTER_BITS'(COLOUR_CLUSTERS);

@@ -393,9 +393,9 @@ module flk_projection (
   logic [1:0][27:0] low_0_i_q;
   logic [1:0][27:0] low_1_i_q;
   logic [1:0][27:0] low_2_i_q;
-  logic [9:0][19:0] s_0_i_q;
-  logic [9:0][19:0] s_1_i_q;
-  logic [9:0][19:0] s_2_i_q;
+  logic [19:0] s_0_i_end;
+  logic [19:0] s_1_i_end;
+  logic [19:0] s_2_i_end;
   logic [5:0][19:0] qw_i_q;
   logic [5:0][19:0] qx_i_q;
   logic [5:0][19:0] qy_i_q;
@@ -411,20 +411,20 @@ module flk_projection (
   logic [0:0][27:0] v63_q;
   logic [0:0][27:0] t2_q;
   logic [0:0][0:0] v66_q;
-  logic [23:0][0:0] near_q;
+  logic [0:0] near_end;
   logic [0:0][27:0] iz_q;
   logic [0:0][27:0] tx_q;
   logic [0:0][27:0] ty_q;
-  logic [12:0][29:0] v72_q;
+  logic [29:0] v72_end;
   logic [0:0][27:0] v73_q;
-  logic [13:0][29:0] v74_q;
+  logic [29:0] v74_end;
   logic [0:0][0:0] v75_q;
   logic [0:0][0:0] v76_q;
   logic [0:0][0:0] v77_q;
   logic [0:0][0:0] v78_q;
   logic [0:0][0:0] v79_q;
   logic [0:0][0:0] v80_q;
-  logic [16:0][0:0] far_q;
+  logic [0:0] far_end;
   logic [4:0][30:0] x_q;
   logic [3:0][30:0] y_q;
   logic [0:0][19:0] v88_q;
@@ -439,18 +439,18 @@ module flk_projection (
   logic [0:0][19:0] ay_q;
   logic [0:0][19:0] n_q;
   logic [6:0][19:0] r00_q;
-  logic [7:0][19:0] r01_q;
-  logic [7:0][19:0] r02_q;
-  logic [7:0][19:0] r10_q;
+  logic [19:0] r01_end;
+  logic [19:0] r02_end;
+  logic [19:0] r10_end;
   logic [6:0][19:0] r11_q;
-  logic [7:0][19:0] r12_q;
-  logic [7:0][19:0] r20_q;
-  logic [7:0][19:0] r21_q;
+  logic [19:0] r12_end;
+  logic [19:0] r20_end;
+  logic [19:0] r21_end;
   logic [6:0][19:0] r22_q;
   logic [0:0][19:0] v145_q;
   logic [8:0][19:0] s0_q;
-  logic [8:0][19:0] s1_q;
-  logic [7:0][19:0] s2_q;
+  logic [19:0] s1_end;
+  logic [19:0] s2_end;
   logic [0:0][19:0] v151_q;
   logic [0:0][19:0] gu0_q;
   logic [1:0][19:0] v157_q;
@@ -499,19 +499,16 @@ module flk_projection (
   logic [0:0][0:0] v263_q;
   logic [0:0][0:0] outside_q;
   logic [0:0][27:0] v266_q;
-  logic [20:0][23:0] key_q;
-  logic [28:0][19:0] direction_0_q;
-  logic [27:0][19:0] direction_1_q;
-  logic [27:0][19:0] direction_2_q;
+  logic [23:0] key_end;
+  logic [19:0] direction_0_end;
+  logic [19:0] direction_1_end;
+  logic [19:0] direction_2_end;
 
   always_ff @(posedge clk_i) begin
     if (en_i && phase_i == 1'd0) begin
       low_0_i_q <= {low_0_i_q[0:0], low_0_i};
       low_1_i_q <= {low_1_i_q[0:0], low_1_i};
       low_2_i_q <= {low_2_i_q[0:0], low_2_i};
-      s_0_i_q <= {s_0_i_q[8:0], s_0_i};
-      s_1_i_q <= {s_1_i_q[8:0], s_1_i};
-      s_2_i_q <= {s_2_i_q[8:0], s_2_i};
       qw_i_q <= {qw_i_q[4:0], qw_i};
       qx_i_q <= {qx_i_q[4:0], qx_i};
       qy_i_q <= {qy_i_q[4:0], qy_i};
@@ -521,11 +518,9 @@ module flk_projection (
       v53_q <= v53;
       v58_q <= {v58_q[0:0], v58};
       v63_q <= v63;
-      near_q <= {near_q[22:0], near};
       iz_q <= iz;
       tx_q <= tx;
       ty_q <= ty;
-      v72_q <= {v72_q[11:0], v72};
       v73_q <= v73;
       v75_q <= v75;
       v76_q <= v76;
@@ -540,7 +535,6 @@ module flk_projection (
       ay_q <= ay;
       n_q <= n;
       v145_q <= v145;
-      s2_q <= {s2_q[6:0], s2};
       v187_q <= v187;
       v192_q <= v192;
       v197_q <= v197;
@@ -567,10 +561,6 @@ module flk_projection (
       lean_q <= {lean_q[4:0], lean};
       v262_q <= v262;
       outside_q <= outside;
-      key_q <= {key_q[19:0], key};
-      direction_0_q <= {direction_0_q[27:0], direction_0};
-      direction_1_q <= {direction_1_q[26:0], direction_1};
-      direction_2_q <= {direction_2_q[26:0], direction_2};
     end
   end
 
@@ -582,26 +572,17 @@ module flk_projection (
       t1_q <= t1;
       t2_q <= t2;
       v66_q <= v66;
-      v74_q <= {v74_q[12:0], v74};
       v77_q <= v77;
       v78_q <= v78;
       v80_q <= v80;
-      far_q <= {far_q[15:0], far};
       v90_q <= v90;
       v92_q <= v92;
       v96_q <= v96;
       v98_q <= v98;
       r00_q <= {r00_q[5:0], r00};
-      r01_q <= {r01_q[6:0], r01};
-      r02_q <= {r02_q[6:0], r02};
-      r10_q <= {r10_q[6:0], r10};
       r11_q <= {r11_q[5:0], r11};
-      r12_q <= {r12_q[6:0], r12};
-      r20_q <= {r20_q[6:0], r20};
-      r21_q <= {r21_q[6:0], r21};
       r22_q <= {r22_q[5:0], r22};
       s0_q <= {s0_q[7:0], s0};
-      s1_q <= {s1_q[7:0], s1};
       v151_q <= v151;
       gu0_q <= gu0;
       v157_q <= {v157_q[0:0], v157};
@@ -626,6 +607,50 @@ module flk_projection (
       v266_q <= v266;
     end
   end
+
+  flk_delay_ram #(.Width(20), .Depth(8)) i_ring_0_8 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({s2}), .q_o({s2_end})
+  );
+
+  flk_delay_ram #(.Width(60), .Depth(10)) i_ring_0_10 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({s_0_i, s_1_i, s_2_i}), .q_o({s_0_i_end, s_1_i_end, s_2_i_end})
+  );
+
+  flk_delay_ram #(.Width(30), .Depth(13)) i_ring_0_13 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({v72}), .q_o({v72_end})
+  );
+
+  flk_delay_ram #(.Width(24), .Depth(21)) i_ring_0_21 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({key}), .q_o({key_end})
+  );
+
+  flk_delay_ram #(.Width(1), .Depth(24)) i_ring_0_24 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({near}), .q_o({near_end})
+  );
+
+  flk_delay_ram #(.Width(40), .Depth(28)) i_ring_0_28 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({direction_1, direction_2}), .q_o({direction_1_end, direction_2_end})
+  );
+
+  flk_delay_ram #(.Width(20), .Depth(29)) i_ring_0_29 (
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({direction_0}), .q_o({direction_0_end})
+  );
+
+  flk_delay_ram #(.Width(120), .Depth(8)) i_ring_1_8 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({r01, r02, r10, r12, r20, r21}), .q_o({r01_end, r02_end, r10_end, r12_end, r20_end, r21_end})
+  );
+
+  flk_delay_ram #(.Width(20), .Depth(9)) i_ring_1_9 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({s1}), .q_o({s1_end})
+  );
+
+  flk_delay_ram #(.Width(30), .Depth(14)) i_ring_1_14 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({v74}), .q_o({v74_end})
+  );
+
+  flk_delay_ram #(.Width(1), .Depth(17)) i_ring_1_17 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({far}), .q_o({far_end})
+  );
 
   flk_ff_mul #(.ManBits(19), .Stages(3)) i_u_v45 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? step_0_i : view_02_i), .b_i(phase_i == 1'd0 ? q_0_i : d2_q[0]), .prod_o(u_v45));
   assign v45 = u_v45;
@@ -682,10 +707,10 @@ module flk_projection (
   assign far = v79_q[0] | v80_q[0];
   assign v82 = 12'(width_i - 13'd1);
   assign v83 = 18'(18'(v82) <<< 6);
-  assign x = 31'(31'($signed(v72_q[12])) + $signed(31'(v83)));
+  assign x = 31'(31'($signed(v72_end)) + $signed(31'(v83)));
   assign v85 = 12'(height_i - 13'd1);
   assign v86 = 18'(18'(v85) <<< 6);
-  assign y = 31'(31'($signed(v74_q[13])) + $signed(31'(v86)));
+  assign y = 31'(31'($signed(v74_end)) + $signed(31'(v86)));
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_v88 (.x_i(tx), .y_o(v88));
   assign v89 = {limit_0_i[19] ^ (|limit_0_i[18:11]), limit_0_i[18:0]};
   flk_ff_cmp #(.ManBits(11)) i_v90 (.a_i(v88_q[0]), .b_i(v89), .lt_o(v90));
@@ -728,7 +753,7 @@ module flk_projection (
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v165 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v164_q[0] : row_y_1_i), .b_i(phase_i == 1'd0 ? v163_q[1] : {!v108[19], v108[18:0]}), .sum_o(u_v165));
   assign v165 = u_v165;
   assign v1 = u_v165;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gu1 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v159 : ay_q[0]), .b_i(phase_i == 1'd0 ? s1_q[8] : row_y_z_2_i), .prod_o(u_gu1));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gu1 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v159 : ay_q[0]), .b_i(phase_i == 1'd0 ? s1_end : row_y_z_2_i), .prod_o(u_gu1));
   assign gu1 = u_gu1;
   assign v110 = u_gu1;
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v171 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v170_q[0] : row_y_2_i), .b_i(phase_i == 1'd0 ? v169_q[1] : {!v110[19], v110[18:0]}), .sum_o(u_v171));
@@ -737,16 +762,16 @@ module flk_projection (
   flk_ff_recip #(.ManBits(11), .Stages(2)) i_u_v119 (.clk_i, .en_i, .x_i(norm), .y_o(u_v119));
   assign v119 = u_v119;
   flk_ff_ldexp #(.ManBits(11), .ShiftBits(10)) i_n (.x_i(v119), .shift_i(10'sd1), .y_o(n));
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gu2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v165 : n_q[0]), .b_i(phase_i == 1'd0 ? s2_q[7] : qx_i_q[4]), .prod_o(u_gu2));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gu2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v165 : n_q[0]), .b_i(phase_i == 1'd0 ? s2_end : qx_i_q[4]), .prod_o(u_gu2));
   assign gu2 = u_gu2;
   assign v121 = u_gu2;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv0 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v171 : n_q[0]), .b_i(phase_i == 1'd0 ? s0_q[8] : qy_i_q[4]), .prod_o(u_gv0));
   assign gv0 = u_gv0;
   assign v122 = u_gv0;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv1 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v177 : n_q[0]), .b_i(phase_i == 1'd0 ? s1_q[8] : qz_i_q[4]), .prod_o(u_gv1));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv1 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v177 : n_q[0]), .b_i(phase_i == 1'd0 ? s1_end : qz_i_q[4]), .prod_o(u_gv1));
   assign gv1 = u_gv1;
   assign v123 = u_gv1;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v183 : qw_i_q[5]), .b_i(phase_i == 1'd0 ? s2_q[7] : v121), .prod_o(u_gv2));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v183 : qw_i_q[5]), .b_i(phase_i == 1'd0 ? s2_end : v121), .prod_o(u_gv2));
   assign gv2 = u_gv2;
   assign v124 = u_gv2;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v185 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu0_q[0] : qw_i_q[5]), .b_i(phase_i == 1'd0 ? gu0_q[0] : v122), .prod_o(u_v185));
@@ -810,19 +835,19 @@ module flk_projection (
   assign v212 = u_v212;
   assign r22 = u_v212;
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_v145 (.x_i(iz), .y_o(v145));
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_s2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? s_2_i_q[9] : s_0_i_q[9]), .b_i(v145_q[0]), .prod_o(u_s2));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_s2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? s_2_i_end : s_0_i_end), .b_i(v145_q[0]), .prod_o(u_s2));
   assign s2 = u_s2;
   assign s0 = u_s2;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v200 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu1 : s_1_i_q[9]), .b_i(phase_i == 1'd0 ? gv2 : v145_q[0]), .prod_o(u_v200));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v200 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu1 : s_1_i_end), .b_i(phase_i == 1'd0 ? gv2 : v145_q[0]), .prod_o(u_v200));
   assign v200 = u_v200;
   assign s1 = u_v200;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v201 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu2 : u0), .b_i(phase_i == 1'd0 ? gv1 : r00_q[6]), .prod_o(u_v201));
   assign v201 = u_v201;
   assign v149 = u_v201;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v203 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu2 : u1), .b_i(phase_i == 1'd0 ? gv0 : r10_q[7]), .prod_o(u_v203));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v203 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu2 : u1), .b_i(phase_i == 1'd0 ? gv0 : r10_end), .prod_o(u_v203));
   assign v203 = u_v203;
   assign v150 = u_v203;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v204 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu0_q[0] : u2), .b_i(phase_i == 1'd0 ? gv2 : r20_q[7]), .prod_o(u_v204));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v204 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu0_q[0] : u2), .b_i(phase_i == 1'd0 ? gv2 : r20_end), .prod_o(u_v204));
   assign v204 = u_v204;
   assign v151 = u_v204;
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v213 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v212 : v149), .b_i(phase_i == 1'd0 ? v211_q[0] : v150), .sum_o(u_v213));
@@ -834,22 +859,22 @@ module flk_projection (
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v206 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu0_q[0] : v153), .b_i(phase_i == 1'd0 ? gv1 : s0_q[7]), .prod_o(u_v206));
   assign v206 = u_v206;
   assign gu0 = u_v206;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v207 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu1 : u0), .b_i(phase_i == 1'd0 ? gv0 : r01_q[7]), .prod_o(u_v207));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v207 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? gu1 : u0), .b_i(phase_i == 1'd0 ? gv0 : r01_end), .prod_o(u_v207));
   assign v207 = u_v207;
   assign v155 = u_v207;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v209 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? cross0 : u1), .b_i(phase_i == 1'd0 ? cross0 : r11_q[6]), .prod_o(u_v209));
   assign v209 = u_v209;
   assign v156 = u_v209;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v210 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? cross1 : u2), .b_i(phase_i == 1'd0 ? cross1 : r21_q[7]), .prod_o(u_v210));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v210 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? cross1 : u2), .b_i(phase_i == 1'd0 ? cross1 : r21_end), .prod_o(u_v210));
   assign v210 = u_v210;
   assign v157 = u_v210;
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v216 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v215 : v155), .b_i(phase_i == 1'd0 ? 20'h3db85 : v156), .sum_o(u_v216));
   assign v216 = u_v216;
   assign v158 = u_v216;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v211 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? cross2 : u0), .b_i(phase_i == 1'd0 ? cross2 : r02_q[7]), .prod_o(u_v211));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v211 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? cross2 : u0), .b_i(phase_i == 1'd0 ? cross2 : r02_end), .prod_o(u_v211));
   assign v211 = u_v211;
   assign v161 = u_v211;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v215 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3e99a : u1), .b_i(phase_i == 1'd0 ? v214 : r12_q[7]), .prod_o(u_v215));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v215 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3e99a : u1), .b_i(phase_i == 1'd0 ? v214 : r12_end), .prod_o(u_v215));
   assign v215 = u_v215;
   assign v162 = u_v215;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v221 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? trace : u2), .b_i(phase_i == 1'd0 ? trace : r22_q[6]), .prod_o(u_v221));
@@ -861,31 +886,31 @@ module flk_projection (
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v222 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? det : v0), .b_i(phase_i == 1'd0 ? 20'h4131c : r00_q[6]), .prod_o(u_v222));
   assign v222 = u_v222;
   assign v167 = u_v222;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_m (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3f597 : v1), .b_i(phase_i == 1'd0 ? v228_q[0] : r10_q[7]), .prod_o(u_m));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_m (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3f597 : v1), .b_i(phase_i == 1'd0 ? v228_q[0] : r10_end), .prod_o(u_m));
   assign m = u_m;
   assign v168 = u_m;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_l2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3f597 : v2), .b_i(phase_i == 1'd0 ? ryy_q[4] : r20_q[7]), .prod_o(u_l2));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_l2 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? 20'h3f597 : v2), .b_i(phase_i == 1'd0 ? ryy_q[4] : r20_end), .prod_o(u_l2));
   assign l2 = u_l2;
   assign v169 = u_l2;
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_xx (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v189 : v167), .b_i(phase_i == 1'd0 ? 20'h3e99a : v168), .sum_o(u_xx));
   assign xx = u_xx;
   assign v170 = u_xx;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_l0 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? yy_q[6] : v0), .b_i(phase_i == 1'd0 ? m : r01_q[7]), .prod_o(u_l0));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_l0 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? yy_q[6] : v0), .b_i(phase_i == 1'd0 ? m : r01_end), .prod_o(u_l0));
   assign l0 = u_l0;
   assign v173 = u_l0;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v232 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? xy_q[7] : v1), .b_i(phase_i == 1'd0 ? m : r11_q[6]), .prod_o(u_v232));
   assign v232 = u_v232;
   assign v174 = u_v232;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_sx (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? xx_q[0] : v2), .b_i(phase_i == 1'd0 ? rxx : r21_q[7]), .prod_o(u_sx));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_sx (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? xx_q[0] : v2), .b_i(phase_i == 1'd0 ? rxx : r21_end), .prod_o(u_sx));
   assign sx = u_sx;
   assign v175 = u_sx;
   flk_ff_add #(.ManBits(11), .Stages(2)) i_u_yy (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v194 : v173), .b_i(phase_i == 1'd0 ? 20'h3e99a : v174), .sum_o(u_yy));
   assign yy = u_yy;
   assign v176 = u_yy;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_sy (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? yy_q[0] : v0), .b_i(phase_i == 1'd0 ? ryy : r02_q[7]), .prod_o(u_sy));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_sy (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? yy_q[0] : v0), .b_i(phase_i == 1'd0 ? ryy : r02_end), .prod_o(u_sy));
   assign sy = u_sy;
   assign v179 = u_sy;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v259 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? ryy : v1), .b_i(phase_i == 1'd0 ? ryy : r12_q[7]), .prod_o(u_v259));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v259 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? ryy : v1), .b_i(phase_i == 1'd0 ? ryy : r12_end), .prod_o(u_v259));
   assign v259 = u_v259;
   assign v180 = u_v259;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v257 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v256_q[0] : v2), .b_i(phase_i == 1'd0 ? ryy_q[4] : r22_q[6]), .prod_o(u_v257));
@@ -943,9 +968,9 @@ module flk_projection (
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_1 (.x_i(d1_q[0]), .y_o(direction_1));
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_2 (.x_i(d2_q[0]), .y_o(direction_2));
 
-  assign near_o = near_q[23];
+  assign near_o = near_end;
   assign outside_o = outside_q[0];
-  assign far_o = far_q[16];
+  assign far_o = far_end;
   assign x_o = $signed(x_q[4]);
   assign y_o = $signed(y_q[3]);
   assign sx_o = sx_q[5];
@@ -957,9 +982,9 @@ module flk_projection (
   assign i0_o = i0;
   assign kappa_o = kappa_q[4];
   assign lean_o = lean_q[5];
-  assign key_o = key_q[20];
-  assign direction_0_o = direction_0_q[28];
-  assign direction_1_o = direction_1_q[27];
-  assign direction_2_o = direction_2_q[27];
+  assign key_o = key_end;
+  assign direction_0_o = direction_0_end;
+  assign direction_1_o = direction_1_end;
+  assign direction_2_o = direction_2_end;
 
 endmodule

@@ -38,7 +38,7 @@ from flicker.toolchain import ROOT
 from .common import Say, significant
 
 OPERATORS = FOLDER / "operators"
-COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "ff", "load", "clock_free", "clock_gated", "key")
+COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff", "load", "clock_free", "clock_gated", "key")
 INSTANCE = re.compile(r"^\s*(\w+) (?:\\\S+ |\w+) \(\n(.*?)\n\s*\);", re.M | re.S)
 PIN = re.compile(r"\.(\w+)\((.*?)\)(?:,|$)", re.M)
 
@@ -61,7 +61,7 @@ class Synthesised:
                 raise KeyError(key)
             self.results[key] = json.loads(path.read_text()) | loads(UNITS / key / "netlist.v", self.library)
         own = self.results[key]
-        names = ("ge_seq", "ge_comb", "mem_bits", "ff", "load", "clock_free", "clock_gated")
+        names = ("ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff", "load", "clock_free", "clock_gated")
         total = {name: own[name] for name in names}
         for child, count in own["children"].items():
             inside = self.total(child)
@@ -221,7 +221,7 @@ def synthesise(name: str, text: str, library: Library) -> dict:
             error = folder / "error"
             raise FlickerError(f"operator {name}: {error.read_text() if error.exists() else 'synthesis failed'} (see {folder / 'log'})")
     result = json.loads((folder / "result.json").read_text())
-    row = {n: result[n] for n in ("ge_seq", "ge_comb", "mem_bits", "ff")} | loads(folder / "netlist.v", library)
+    row = {n: result[n] for n in ("ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff")} | loads(folder / "netlist.v", library)
     return {"unit": "op", "config": name, "ge": row["ge_seq"] + row["ge_comb"], **row, "key": key}
 
 

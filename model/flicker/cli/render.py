@@ -88,7 +88,7 @@ def render(
     size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
     front: Annotated[FrontChoice, typer.Option(help="what makes records and lists: float64 on the host, bit-true front end, its RTL")] = FrontChoice.FLOAT,
-    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not with --front float [default: chunk, or as packed]")] = None,
+    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,

@@ -13,8 +13,8 @@ class _Writer:
     def __init__(self, plan: Schedule) -> None:
         self.plan, self.graph = plan, plan.graph
         self.names: dict[Value, str] = {}
-        self.deepest: dict[Value, int] = {}
         self._name()
+        self.rows = _rows(plan)
 
     def _name(self) -> None:
         taken = set()
@@ -40,8 +40,8 @@ class _Writer:
         assert k >= 0, (self.names[v], cycle)
         if k == 0:
             return self.names[v]
-        self.deepest[v] = max(self.deepest.get(v, 0), k)
-        text = f"{self.names[v]}_q[{k - 1}]"
+        row, deepest = self.rows[v]
+        text = f"{self.names[v]}_q[{k - 1}]" if k <= row else f"{self.names[v]}_end"
         return f"$signed({text})" if isinstance(v.kind, Int) and v.kind.signed else text
 
     def begin(self, v: Value) -> int:
@@ -236,24 +236,49 @@ def _unit(w: _Writer, plan: Schedule, unit: Unit) -> list[str]:
     return out
 
 
-def _registers(w: _Writer, plan: Schedule) -> list[str]:
-    """Registers of all values, by the phase in which they load. Depths are known only once all users have been written: a first pass collects them."""
-    users: list[tuple[Value, int]] = [(o, plan.begin[v]) for v in plan.begin for o in v.operands]
-    users += [(v, plan.latency) for v in w.graph.outputs.values()]
-    depth: dict[Value, int] = {}
+LONG = 8  # registers in a row that become a memory
+
+
+def _rows(plan: Schedule) -> dict[Value, tuple[int, int]]:
+    """Registers behind each value, and with the memory behind them: where the last user alone is far away, a memory takes what lies between."""
+    taps: dict[Value, set[int]] = {}
+    users = [(o, plan.begin[v]) for v in plan.begin for o in v.operands] + [(v, plan.latency) for v in plan.graph.outputs.values()]
     for v, cycle in users:
         if v.constant is None and (k := plan.registers(v, cycle)) > 0:
-            depth[v] = max(depth.get(v, 0), k)
+            taps.setdefault(v, set()).add(k)
+    rows = {}
+    for v, found in taps.items():
+        *inner, deepest = sorted(found)
+        row = max(inner, default=0)
+        rows[v] = (row if deepest - row >= LONG else deepest, deepest)
+    return rows
+
+
+def _registers(w: _Writer, plan: Schedule) -> list[str]:
+    """Registers of all values, by the phase in which they load, and the memories, one for rows of equal length."""
     out: list[str] = []
     loads: dict[int, list[str]] = {}
+    rings: dict[tuple[int, int], list[Value]] = {}
     for v in w.graph.values:
-        if v in depth:
-            n, bits, name = depth[v], v.kind.bits, w.names[v]
-            out.append(f"  logic [{n - 1}:0][{bits - 1}:0] {name}_q;")
-            value = f"{name}_q <= {name};" if n == 1 else f"{name}_q <= {{{name}_q[{n - 2}:0], {name}}};"
-            loads.setdefault(plan.ready(v) % plan.interval, []).append(f"      {value}")
+        if v not in w.rows:
+            continue
+        bits, name, phase = v.kind.bits, w.names[v], plan.ready(v) % plan.interval
+        row, deepest = w.rows[v]
+        if deepest > row:
+            rings.setdefault((phase, deepest - row), []).append(v)
+            out.append(f"  logic [{bits - 1}:0] {name}_end;")
+        if row:
+            out.append(f"  logic [{row - 1}:0][{bits - 1}:0] {name}_q;")
+            shift = f"{{{name}_q[{row - 2}:0], {name}}}" if row > 1 else name
+            loads.setdefault(phase, []).append(f"      {name}_q <= {shift};")
     out.append("")
+    wide = max((plan.interval - 1).bit_length(), 1)
+    enable = lambda phase: "en_i" if plan.interval == 1 else f"en_i && phase_i == {wide}'d{phase}"  # noqa: E731
     for phase, lines in sorted(loads.items()):
-        when = "en_i" if plan.interval == 1 else f"en_i && phase_i == {max((plan.interval - 1).bit_length(), 1)}'d{phase}"
-        out += ["  always_ff @(posedge clk_i) begin", f"    if ({when}) begin", *lines, "    end", "  end", ""]
+        out += ["  always_ff @(posedge clk_i) begin", f"    if ({enable(phase)}) begin", *lines, "    end", "  end", ""]
+    for (phase, depth), values in sorted(rings.items()):
+        begins = ", ".join(f"{w.names[v]}_q[{w.rows[v][0] - 1}]" if w.rows[v][0] else w.names[v] for v in values)
+        ends = ", ".join(f"{w.names[v]}_end" for v in values)
+        out += [f"  flk_delay_ram #(.Width({sum(v.kind.bits for v in values)}), .Depth({depth})) i_ring_{phase}_{depth} (",
+                f"    .clk_i, .en_i({enable(phase)}), .d_i({{{begins}}}), .q_o({{{ends}}})", "  );", ""]
     return out

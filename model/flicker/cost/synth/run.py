@@ -21,7 +21,7 @@ from pathlib import Path
 
 from ...errors import FlickerError
 from ...toolchain import BUILD, locked, sources_of
-from .units import COMPOSED, Unit, open_bits
+from .units import COMPOSED, MEMORY, Unit, open_bits
 
 FOLDER = BUILD / "synth"
 UNITS = FOLDER / "units"
@@ -78,19 +78,19 @@ class Runner:
                 _process(folder, job)
         return json.loads((folder / "plan.json").read_text())
 
-    def add(self, top: str, parameters: dict[str, int]) -> str:
-        """Plan a unit and its parts; returns its key."""
-        identity = (top, tuple(sorted(parameters.items())))
+    def add(self, top: str, parameters: dict[str, int], part: bool = False) -> str:
+        """Plan a unit and its parts; returns its key. part: it is one of another unit, where a memory is a macro."""
+        identity = (top, tuple(sorted(parameters.items())), part and top == MEMORY)
         if identity in self.keys:
             return self.keys[identity]
-        job = self._job(top, parameters, "synthesise")
+        job = self._job(top, parameters, "macro" if part and top == MEMORY else "synthesise")
         for instance, module, everything in self._children(top, parameters) if top in COMPOSED else []:
             text = next(path for path in sources_of(top) if path.stem == module).read_text()
             own = re.findall(r"^\s*parameter\s+[\w\s]*?(\w+)\s*=", text, re.M)
-            key = self.add(module, {name: everything[name] for name in own if name in everything})
+            key = self.add(module, {name: everything[name] for name in own if name in everything}, part=True)
             job["children"][instance] = key
             job["child_parameters"][instance] = sorted(everything)
-        key = f"{top}-{_digest(self._sources(top), job['parameters'], job['open'], sorted(job['children'].items()), *self.common)}"
+        key = f"{top}-{_digest(job['action'], self._sources(top), job['parameters'], job['open'], sorted(job['children'].items()), *self.common)}"
         self.keys[identity] = key
         self.tasks[key] = job
         return key
@@ -134,9 +134,9 @@ class Runner:
         self.report(key, json.loads((folder / "result.json").read_text())["seconds"])
 
     def total(self, key: str) -> dict:
-        """Sums of a unit over itself and its parts: ge, ge_seq, ge_comb, ge_drivers, ff, mem_bits; fo4 and paths."""
+        """Sums of a unit over itself and its parts: ge, ge_seq, ge_comb, ge_drivers, ff, mem_bits, sram_bits; fo4 and paths."""
         own = self.results[key]
-        sums = ("ge_seq", "ge_comb", "ge_drivers", "ff", "mem_bits")
+        sums = ("ge_seq", "ge_comb", "ge_drivers", "ff", "mem_bits", "sram_bits")
         total: dict = {name: own[name] for name in ("top", "seconds", *sums)} | {"key": key, "paths": list(own["paths"])}
         for child, count in own["children"].items():
             inside = self.total(child)

@@ -29,8 +29,10 @@ PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
 FEATURE_BITS = layout.bits("feature_elem")
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
+MEMORY = "flk_sram"  # a macro where it is a part of another unit
+
 # Operators that the pipelines of the front end are put together from.
-FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed"]
+FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_delay_ram"]
 
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
 COMPOSED: dict[str, list[str]] = {
@@ -41,6 +43,24 @@ COMPOSED: dict[str, list[str]] = {
     "flk_mask_all": ["flk_pipe_reg"],
     "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
     **{p.module: list(FF_OPERATORS) for p in PIPELINES},
+    "flk_sram_fifo": [MEMORY],
+    "flk_delay_ram": [MEMORY],
+    "flk_list_writer": [MEMORY],
+    "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
+    "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
+    "flk_entry_merge": ["flk_fifo"],
+    "flk_axi_fetch": ["flk_axi_read"],
+    "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_ff_add", "flk_fifo"],
+    "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
+    "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
+    "flk_preprocessing_core": [
+        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis", "flk_colour_group", "flk_colour_total",
+        "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
+    ],
+    "flk_preprocessing": [
+        "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
+        "flk_stream_arbiter", "flk_sram_fifo", "flk_axi_write", "flk_delay",
+    ],
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
@@ -92,8 +112,19 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
+        # Lines of 2048 pointers; answers come under the one identifier there is, and no access is exclusive.
+        "flk_preprocessing": [
+            *(f"registers_i[{bit}]" for bit in range(16, 19)),
+            *(f"{port}r_{name}" for port in ("table_", "geometry_", "colour_") for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))),
+            "b_resp_i[0]", *(f"b_id_i[{bit}]" for bit in range(4)),
+        ],
+        "flk_preprocessing_core": ["part_i[267]"],  # of eight clusters the low bits tell
+        # FP16 opacities are positive.
+        "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
+        # Of a magnitude.
+        "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
-        **{f"flk_{name}": ["width_i[12]", "height_i[12]"] for name in ("splat_bounds", "projection")},
+        "flk_projection": ["width_i[12]", "height_i[12]"],
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
@@ -233,7 +264,13 @@ def _stage() -> list[Unit]:
 
 def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
-    return [unit(p.module) for p in PIPELINES]
+    return [unit(p.module) for p in PIPELINES] + [
+        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
+        unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
+        unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
+        unit("flk_entry_merge", "queues of 8", Depth=8),
+        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
+    ]
 
 
 def all_units() -> list[Unit]:
