@@ -6,7 +6,7 @@ import re
 import textwrap
 
 from .graph import BOOL, Ff, Graph, Int, Value
-from .schedule import Schedule, Unit, schedule
+from .schedule import Schedule, Unit, needed, schedule
 
 
 class _Writer:
@@ -101,8 +101,9 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
     body: list[str] = []
     turns = {v: unit for unit in plan.units for v in unit.turns.values()}
     made: set[int] = set()
+    live = needed(graph)
     for v in graph.values:
-        if v.operator is None or (v not in plan.begin and not _needed(v, graph)):
+        if v.operator is None or v not in live:
             continue
         note = f"  // cycle {plan.ready(v)}" if v in plan.begin else ""
         wires.append(f"  {w.type_of(v)} {w.names[v]};{note}")
@@ -137,16 +138,6 @@ def _head(head: str, name: str, plan: Schedule) -> str:
 
 def _builder(name: str) -> str:
     return name.removeprefix("flk_").removeprefix("splat_")
-
-
-def _needed(v: Value, graph: Graph) -> bool:
-    pending, seen = list(graph.outputs.values()), set()
-    while pending:
-        o = pending.pop()
-        if o not in seen:
-            seen.add(o)
-            pending += o.operands
-    return v in seen
 
 
 def _comment(head: str) -> list[str]:

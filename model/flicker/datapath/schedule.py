@@ -71,8 +71,8 @@ def _shared(value: Value) -> bool:
 class _Scheduler:
     def __init__(self, graph: Graph, interval: int) -> None:
         self.graph, self.interval = graph, interval
-        self.live = _reached(graph)
-        self.order = [v for v in graph.values if v in self.live and v.operator is not None and not _fixed(v)]
+        live = needed(graph)
+        self.order = [v for v in graph.values if v in live and v.operator is not None and not _fixed(v)]
         self.users: dict[Value, list[Value]] = defaultdict(list)
         for v in self.order:
             for o in set(v.operands):
@@ -153,7 +153,8 @@ class _Scheduler:
                 return
 
 
-def _reached(graph: Graph) -> set[Value]:
+def needed(graph: Graph) -> set[Value]:
+    """Values that an output depends on."""
     reached: set[Value] = set()
     pending = list(graph.outputs.values())
     while pending:
