@@ -1,7 +1,7 @@
 """The whole front end in RTL against the golden model: memory after the frame, byte by byte, and the counters.
 
 State space: formats, list kinds, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters all culled, one Gaussian,
-Gaussians over the whole picture, a camera inside a cluster, errors of the memory by address, list memory that runs out, a table that points beyond the
+a Gaussian over 4096x4096 (SLOW=1), a camera inside a cluster, errors of the memory by address, list memory that runs out, a table that points beyond the
 records. Registers and memories begin random; bytes that no one should write are compared too.
 """
 
@@ -143,8 +143,9 @@ def test_cases(name: str) -> None:
         assert rtl.counters["clipped"] > 0
 
 
+@pytest.mark.slow
 def test_one_gaussian_over_the_largest_picture() -> None:
-    """65,536 tiles of a picture of 4096x4096."""
+    """65,536 tiles of a picture of 4096x4096: a build of its own, with more pointers."""
     packed = pack(some(1, means=[0.0, 0.0, 1.0], scales=100.0, opacities=0.9), PackedFormat.FP16).packed
     golden, rtl = check(packed, plain_camera(4096, 4096))
     assert len(golden.entry_tile) == 65536 and rtl.counters["entries"].sum() == 65536
