@@ -168,7 +168,7 @@ def test_areas_and_tables_of_synthesis_agree() -> None:
     """areas.csv and the table of units in docs/synthesis.md are of one synthesis."""
     text = pages.get(("synthesis", "units"))
     rows = [line.strip("| ").split(" | ") for line in text[text.index("### Units") :].splitlines() if line.startswith("| ")]
-    listed = {(row[0], row[1]): float(row[2].replace(",", "")) for row in rows if len(row) == 9 and row[2][:1].isdigit()}
+    listed = {(row[0], row[1]): float(row[2].replace(",", "")) for row in rows if len(row) == 10 and row[2][:1].isdigit()}
     assert len(listed) > 80
     for key, ge in listed.items():
         assert parts()[key].ge == pytest.approx(ge, abs=0.6), key
