@@ -163,6 +163,14 @@ async def parts(dut, chunked, idle, stall):
 
 
 @cocotb.test()
+async def a_lane_that_waits(dut):
+    """One lane has survivors in a cluster and then in the one with the same number, sixteen later; others have some in all of them."""
+    fetch = Fetch(dut, True, True, latency=3)
+    await fetch.bench.reset()
+    await fetch.run([Survivors(c, 2 * c, 0, 0, 15 if c % 16 == 0 else 1) for c in range(33)])
+
+
+@cocotb.test()
 @cocotb.parametrize(degree=[0, 1, 2, 3])
 async def rates(dut, degree):
     """With every Gaussian alive: as fast as groups come, beats or the lanes' parts allow, nearly."""
