@@ -8,7 +8,7 @@ records. Registers and memories begin random; bytes that no one should write are
 from __future__ import annotations
 
 import dataclasses
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -26,9 +26,11 @@ from flicker.scene.packed import PackedFormat, PackedScene
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import ERRORS, PORTS, MemoryOptions, Regions, RtlFront, front_frame, front_rtl
+from flicker.sim.preprocessing import ERRORS, PORTS, MemoryOptions, Regions, RtlFront, front_frame
+from flicker.sim.preprocessing import front_rtl as any_front_rtl
 
 QUICK = MemoryOptions()
+front_rtl = partial(any_front_rtl, limit=600_000)  # a frame that hangs says so within minutes
 
 
 def lpddr4(stalls: bool = True) -> MemoryOptions:
