@@ -20,7 +20,7 @@ from flicker.datapath.units import SCALE_HEADER
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import cull, frame, reach, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
-from flicker.golden.front.setup import CLUSTER_M, FORMATS, MEAN_FRACTION, FrameSetup
+from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
 from flicker.scene.packed import PackedFormat, PackedScene
 from flicker.scene.packing import pack
 
@@ -366,4 +366,3 @@ def test_units_are_named_in_this_file() -> None:
 
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
         "cluster_test", "cluster_header", "geometry_decode", "projection", "splat_bounds", "splat_band", "colour_basis", "colour_group", "colour_total")}
-    assert MEAN_FRACTION == 7

@@ -264,9 +264,6 @@ class Graph:
         top = x.kind.bits - 1
         return self.wire(f"{{{{{{0}}[{top}] ^ (|{{0}}[{top - 1}:{x.M}]), {{0}}[{top - 1}:0]}}}}", x.kind, (x,))
 
-    def ff_abs(self, x: Value) -> Value:
-        return self.wire(f"{{{{1'b0, {{0}}[{x.kind.bits - 2}:0]}}}}", x.kind, (x,))
-
     def ff_round(self, x: Value, M: int) -> Value:
         if x.M == M:
             return x
@@ -371,7 +368,6 @@ def _symbolic() -> dict[str, Any]:
         "ff_rsqrt": lambda x, M: x.graph.ff_function("flk_ff_rsqrt", x, M),
         "ff_sqrt": lambda x, M: x.graph.ff_function("flk_ff_sqrt", x, M),
         "ff_neg": lambda x: x.graph.ff_neg(x),
-        "ff_abs": lambda x: x.graph.ff_abs(x),
         "ff_round": lambda x, M: x.graph.ff_round(x, M),
         "ff_ldexp": lambda x, shift, M: x.graph.ldexp(x, shift),
         "ff_to_fixed_round": lambda x, frac_bits, bits: x.graph.to_fixed(x, frac_bits, bits, True),

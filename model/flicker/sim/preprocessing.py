@@ -113,7 +113,8 @@ def _register_bits() -> int:
 
 @dataclass(eq=False)
 class RtlFront:
-    """What a frame left. records: uint8 (slots, 16). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold noise.
+    """What a frame left. records: uint8 (slots, 16). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold noise, that of
+    `before`: records and memory as they were.
 
     counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate.
     """
@@ -125,6 +126,7 @@ class RtlFront:
     error: int
     traffic: dict[str, PurposeCounts]
     efficiency: float
+    before: tuple[np.ndarray, np.ndarray]
 
     @property
     def cycles(self) -> int:
@@ -235,6 +237,7 @@ def front_rtl(
         counter_bits = sum(width * n for _, width, n in _COUNTERS)
         out = np.zeros(-(-counter_bits // 32), np.uint32)
         error = ctypes.c_uint32()
+        before = _records(lib, sim, regions), _lines(lib, sim, regions)
         for _ in range(frames):
             done = lib.flk_front_frame(sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
             if done < 0:
@@ -247,10 +250,9 @@ def front_rtl(
             lib.flk_front_counts(sim, number, ctypes.byref(counts))
             traffic[name] = counts
         return RtlFront(
-            _read(lib, sim, regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES),
-            _read(lib, sim, regions.lists, regions.chunks * WRITERS * CHUNK_LINES * LINE_BYTES).view(np.uint64).reshape(-1, 8),
+            _records(lib, sim, regions), _lines(lib, sim, regions),
             _read(lib, sim, regions.pointers, regions.pointer_bytes).view(np.uint32),
-            _counters(out), error.value, traffic, lib.flk_front_efficiency(sim),
+            _counters(out), error.value, traffic, lib.flk_front_efficiency(sim), before,
         )
     finally:
         lib.flk_front_delete(sim)
@@ -294,6 +296,14 @@ def _read(lib: ctypes.CDLL, sim: int, base: int, size: int) -> np.ndarray:
     if size and not lib.flk_front_read(sim, base, size, out.ctypes.data):
         raise FlickerError(f"front end: {size} bytes at {base:#x} are not there")
     return out
+
+
+def _records(lib: ctypes.CDLL, sim: int, regions: Regions) -> np.ndarray:
+    return _read(lib, sim, regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES)
+
+
+def _lines(lib: ctypes.CDLL, sim: int, regions: Regions) -> np.ndarray:
+    return _read(lib, sim, regions.lists, regions.chunks * WRITERS * CHUNK_LINES * LINE_BYTES).view(np.uint64).reshape(-1, 8)
 
 
 def _counters(words: np.ndarray) -> dict[str, int | np.ndarray]:
