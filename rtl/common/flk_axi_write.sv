@@ -8,7 +8,8 @@
 // whether any of its bursts failed, done_tag_o is its tag. Latency of the addresses 2; beats pass
 // combinationally: data_valid_i to w_valid_o, w_ready_i to data_ready_o, at the earliest in the
 // cycle after their address is first offered; done 1 after b_valid_i. idle_o: no request inside,
-// no answer to come. No clear: what has begun is written.
+// no answer to come. No clear: what has begun is written. Requests of one beat without tags
+// (BeatBits 1, MaxBeats 1, Tagged 0) are counted instead of listed, so that Bursts may be large.
 module flk_axi_write #(
   parameter  int unsigned AddrBits = 40,
   parameter  int unsigned BeatBits = 16,
@@ -16,6 +17,7 @@ module flk_axi_write #(
   parameter  int unsigned Width    = 512,
   parameter  int unsigned MaxBeats = 16,
   parameter  int unsigned Bursts   = 8,   // under way
+  parameter  bit          Tagged   = 1'b1, // requests have tags; else done_tag_o is 0
   parameter  int unsigned IdBits   = 4,
   parameter  int unsigned Id       = 0,
   localparam int unsigned Bytes    = Width / 8
@@ -56,6 +58,10 @@ module flk_axi_write #(
   input  logic [IdBits-1:0]   b_id_i,
   input  logic [1:0]          b_resp_i
 );
+
+  if (!Tagged && (BeatBits != 1 || MaxBeats != 1)) begin : gen_check
+    $error("flk_axi_write: Tagged 0 wants BeatBits 1 and MaxBeats 1");
+  end
 
   logic split_idle, split_valid, split_ready, split_last;
   logic [TagBits-1:0] split_tag;
@@ -110,26 +116,74 @@ module flk_axi_write #(
 
   logic       length_valid, w_move;
   logic [7:0] length, beat_d, beat_q;
-  logic [$clog2(Bursts+1)-1:0] unused_usage;
-  logic unused_full, unused_empty;
+  logic       answer_valid, answer_last, answer_move, empty;
+  logic [TagBits-1:0] answer_tag;
 
-  flk_fifo #(
-    .Width(8),
-    .Depth(Bursts)
-  ) i_lengths (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (tell),
-    .in_ready_o (lengths_room),
-    .in_data_i  (aw_len_o),
-    .out_valid_o(length_valid),
-    .out_ready_i(w_move && w_last_o),
-    .out_data_o (length),
-    .usage_o    (unused_usage),
-    .full_o     (unused_full),
-    .empty_o    (unused_empty)
-  );
+  if (!Tagged) begin : gen_counted
+    logic [$clog2(Bursts+1)-1:0] beats_q, answers_q;
+
+    assign lengths_room = 1'b1;  // no more beats than answers to come
+    assign answers_room = answers_q != ($clog2(Bursts + 1))'(Bursts);
+    assign length_valid = beats_q != '0;
+    assign length       = '0;
+    assign answer_valid = answers_q != '0;
+    assign answer_last  = 1'b1;
+    assign answer_tag   = '0;
+    assign empty        = !answer_valid;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        beats_q   <= '0;
+        answers_q <= '0;
+      end else begin
+        beats_q   <= beats_q + ($clog2(Bursts + 1))'(tell) - ($clog2(Bursts + 1))'(w_move);
+        answers_q <= answers_q + ($clog2(Bursts + 1))'(tell)
+                   - ($clog2(Bursts + 1))'(answer_move);
+      end
+    end
+
+    logic unused_listed;
+    assign unused_listed = ^{split_last, split_tag, aw_len_o};
+  end else begin : gen_listed
+    logic [$clog2(Bursts+1)-1:0] unused_usage, unused_answers;
+    logic unused_full, unused_empty, unused_answers_full;
+
+    flk_fifo #(
+      .Width(8),
+      .Depth(Bursts)
+    ) i_lengths (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (tell),
+      .in_ready_o (lengths_room),
+      .in_data_i  (aw_len_o),
+      .out_valid_o(length_valid),
+      .out_ready_i(w_move && w_last_o),
+      .out_data_o (length),
+      .usage_o    (unused_usage),
+      .full_o     (unused_full),
+      .empty_o    (unused_empty)
+    );
+
+    flk_fifo #(
+      .Width(TagBits + 1),
+      .Depth(Bursts)
+    ) i_answers (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (tell),
+      .in_ready_o (answers_room),
+      .in_data_i  ({split_last, split_tag}),
+      .out_valid_o(answer_valid),
+      .out_ready_i(b_valid_i),
+      .out_data_o ({answer_last, answer_tag}),
+      .usage_o    (unused_answers),
+      .full_o     (unused_answers_full),
+      .empty_o    (empty)
+    );
+  end
 
   assign w_valid_o    = data_valid_i && length_valid;
   assign data_ready_o = w_ready_i && length_valid;
@@ -147,30 +201,9 @@ module flk_axi_write #(
 
   // Answers
 
-  logic answer_valid, answer_last, answer_move, empty;
   logic failed_d, failed_q;  // an earlier burst of the request
   logic done_valid_d, done_valid_q, done_error_q;
-  logic [TagBits-1:0] answer_tag, done_tag_q;
-  logic [$clog2(Bursts+1)-1:0] unused_answers;
-  logic unused_answers_full;
-
-  flk_fifo #(
-    .Width(TagBits + 1),
-    .Depth(Bursts)
-  ) i_answers (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (tell),
-    .in_ready_o (answers_room),
-    .in_data_i  ({split_last, split_tag}),
-    .out_valid_o(answer_valid),
-    .out_ready_i(b_valid_i),
-    .out_data_o ({answer_last, answer_tag}),
-    .usage_o    (unused_answers),
-    .full_o     (unused_answers_full),
-    .empty_o    (empty)
-  );
+  logic [TagBits-1:0] done_tag_q;
 
   assign b_ready_o    = answer_valid;
   assign answer_move  = b_valid_i && answer_valid;

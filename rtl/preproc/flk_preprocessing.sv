@@ -12,7 +12,7 @@ module flk_preprocessing
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Pointers = 2048,  // lists of a writer
-  parameter  int unsigned Gather   = 64,    // lines that are written together
+  parameter  int unsigned Gather   = 256,   // lines that are written together
   parameter  int unsigned IdBits   = 4,
   localparam int unsigned Width    = 512,
   localparam int unsigned Bytes    = Width / 8,
@@ -437,7 +437,8 @@ module flk_preprocessing
   colour_part_t [LANES-1:0] part;
 
   flk_colour_fetch #(
-    .IdBits(IdBits)
+    .BufferBeats(128),
+    .IdBits     (IdBits)
   ) i_colours (
     .clk_i,
     .rst_ni,
@@ -727,7 +728,8 @@ module flk_preprocessing
     .TagBits (1),
     .Width   (Width),
     .MaxBeats(1),
-    .Bursts  (64),
+    .Bursts  (256),
+    .Tagged  (1'b0),
     .IdBits  (IdBits)
   ) i_write (
     .clk_i,

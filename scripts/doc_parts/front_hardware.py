@@ -18,7 +18,7 @@ from flicker.sim.preprocessing import PORTS, PURPOSES, MemoryOptions, build, fro
 
 from .common import Say, titled_views
 
-PORT = PortConfig(max_reads=128, max_writes=128, latency=20, hazards=False)
+PORT = PortConfig(max_reads=128, max_writes=256, latency=20, hazards=False)
 MEMORIES = {
     "perfect, latency 20": MemoryOptions(ports=dict.fromkeys(PORTS, PORT)),
     "LPDDR4, 20 cycles on top": MemoryOptions(DramConfig().timing, dict.fromkeys(PORTS, PORT)),

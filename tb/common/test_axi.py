@@ -29,6 +29,7 @@ def test_axi_read(parameters):
 
 @pytest.mark.parametrize("parameters", [
     {}, {"Width": 64, "MaxBeats": 64, "TagBits": 8, "Bursts": 3}, {"Width": 128, "MaxBeats": 4, "Bursts": 1, "IdBits": 1, "Id": 1},
+    {"Width": 64, "MaxBeats": 1, "BeatBits": 1, "Tagged": 0, "Bursts": 5},
 ])
 def test_axi_write(parameters):
     rate = [] if not parameters else ["write", "write_other_memory", "no_answer"]

@@ -1,0 +1,270 @@
+"""Preprocessing as the RTL does it (`flk_preprocessing`): what it moves, to the byte, and an estimate of its cycles.
+
+Traffic follows from the golden front end alone. Cycles are those of the slower of two: the units, simulated cycle by cycle from a group of Gaussians at the
+front to an entry at a list writer (`unit_cycles`), and the DRAM with all streams in the order in which they come (`simulate`). docs/chip_model.md has both
+beside the RTL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from ..golden.front.cull import cull
+from ..golden.front.frame import FrontFrame
+from ..golden.front.memory import FrontImage
+from ..golden.front.setup import FrameSetup
+from ..golden.lists import WRITERS, pointer_lines
+from ..params import TILE
+from ..scene.packed import BEAT, HEADER_BYTES
+from ..sim.preprocessing import Regions
+from .dram import READ, WRITE, DramConfig, simulate
+
+# Of the RTL, times in cycles.
+LANES = 4
+CLUSTER_CYCLES = 4  # of the cluster test; the frame begins with a pass over all clusters
+GROUP_CYCLES = 2  # a group of four enters the front
+LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
+LATENCY = 110  # from a group to its entries, colours at hand
+WAITING = 128  # survivors of a lane between front and entries
+MERGE_DEPTH = 8  # entries of a lane that wait for a list writer
+GATHER = 64  # lines that are written together
+
+
+@dataclass(frozen=True, eq=False)
+class Beats:
+    """What one purpose moves, in order. beat: int64 (B,), address / 64. due: float64 (B,), Gaussians that entered the front when it moves. write: else read."""
+
+    name: str
+    beat: np.ndarray
+    due: np.ndarray
+    write: bool
+
+    @property
+    def bytes(self) -> int:
+        return len(self.beat) * BEAT
+
+
+def _ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """first[0], first[0] + 1, ... `count[0]` of them, then those of first[1]."""
+    return np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+
+
+def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
+    """All beats of a frame, by purpose, at the addresses of `Regions.of`. image: of `front_memory`."""
+    packed, camera = frame.packed, frame.camera
+    regions = Regions.of(packed, camera, image.lists.chunks)
+    base, at = {}, (regions.image + HEADER_BYTES) // BEAT
+    for name, part in packed.sections().items():
+        base[name] = at
+        at += len(part) // BEAT
+    keep = np.flatnonzero(cull(packed, FrameSetup.of(camera)).keep)
+    size = packed.counts[keep]
+    before = np.concatenate([[0], np.cumsum(size)])  # Gaussians of kept clusters, by cluster
+    table = np.arange(-(-len(packed.table) * packed.table.itemsize // BEAT))
+    entry = table * BEAT // packed.table.itemsize  # first cluster of a beat
+    due_table = before[np.searchsorted(keep, np.minimum(entry, len(packed.table) - 1))]
+    header = packed.headers.itemsize // BEAT
+    kind, words = packed.format.geometry
+    each = kind.itemsize * words
+    geometry = -(-size * each // BEAT)
+    first = base["geometry"] + packed.first[keep] * each // BEAT
+    geometry_beats = _ranges(first, geometry)
+    per_beat = BEAT / each
+    inside = geometry_beats - np.repeat(first, geometry)
+    out = [
+        Beats("table", base["table"] + np.concatenate([table, table]), np.concatenate([np.zeros(len(table)), due_table.astype(np.float64)]), False),
+        Beats("headers", base["headers"] + _ranges(keep * header, np.full(len(keep), header)), np.repeat(before[:-1], header).astype(np.float64), False),
+        Beats("geometry", geometry_beats, np.repeat(before[:-1], geometry) + inside * per_beat, False),
+    ]
+    # Gaussians by their place among those of kept clusters.
+    cluster = packed.cluster[frame.gaussian]
+    slot = np.searchsorted(keep, cluster)
+    within = frame.gaussian - packed.start[cluster]
+    place = before[slot] + within
+    beat, due = _colour_beats(cluster, within, place, packed.headers["colour"].astype(np.int64), np.array([packed.format.colour_stride(d) for d in range(4)]),
+                              packed.degrees)
+    out.append(Beats("colour", base["colour"] + beat, due, False))
+    record = np.unique(regions.records + frame.number * frame.kind.bytes) // BEAT
+    last = np.concatenate([record[1:] != record[:-1], [True]]) if len(record) else np.zeros(0, np.bool_)
+    out.append(Beats("records", record[last], place[last].astype(np.float64), True))
+    entries = place[frame.entry_splat] if len(frame.entry_splat) else np.zeros(1)
+    lines, when = [], []
+    for own in image.lists.writes:
+        lines.append(regions.lists // BEAT + own)
+        when.append(entries[np.minimum((np.arange(len(own)) + 0.5) / max(len(own), 1) * len(entries), len(entries) - 1).astype(np.int64)])
+    order = np.argsort(np.concatenate(when), kind="stable")
+    out.append(Beats("lists", np.concatenate(lines)[order], np.concatenate(when)[order].astype(np.float64), True))
+    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+    pointers = regions.pointers // BEAT + np.arange(pointer_lines(cols, rows))
+    out.append(Beats("pointers", pointers, np.full(len(pointers), np.inf), True))
+    return out
+
+
+@numba.njit(cache=True)
+def _colour_beats(cluster, within, place, colour, stride, degree):
+    """Beats with colours of survivors, each once, from a group's first survivor to its last; and when."""
+    beat = np.empty(len(cluster) * 4 + 4, np.int64)
+    due = np.empty(len(beat))
+    n = 0
+    last = np.int64(-1)
+    i = 0
+    while i < len(cluster):
+        k = cluster[i]
+        j = i
+        while j + 1 < len(cluster) and cluster[j + 1] == k and within[j + 1] // 4 == within[i] // 4:
+            j += 1
+        size = stride[degree[k]]
+        low = colour[k] + within[i] * size // 64
+        high = colour[k] + ((within[j] + 1) * size - 1) // 64
+        for b in range(max(low, last + 1) if last >= colour[k] else low, high + 1):
+            beat[n] = b
+            due[n] = place[i]
+            n += 1
+        last = high
+        i = j + 1
+    return beat[:n], due[:n]
+
+
+def dram_cycles(beats: Sequence[Beats], config: DramConfig = DramConfig(), gather: int = GATHER) -> int:
+    """Cycles of the chip's clock that the DRAM needs for a frame's traffic; writes come `gather` lines at a time."""
+    reads = [b for b in beats if not b.write]
+    writes = [b for b in beats if b.write]
+    read, read_due = np.concatenate([b.beat for b in reads]), np.concatenate([b.due for b in reads])
+    write, write_due = np.concatenate([b.beat for b in writes]), np.concatenate([b.due for b in writes])
+    order = np.argsort(write_due, kind="stable")
+    write, write_due = write[order], write_due[order]
+    group = np.arange(len(write)) // gather
+    write_due = write_due[np.minimum((group + 1) * gather, len(write)) - 1]  # with the last line of its group
+    order = np.argsort(np.concatenate([read_due, write_due]), kind="stable")
+    beat = np.concatenate([read, write])[order]
+    kind = np.concatenate([np.full(len(read), READ, np.int8), np.full(len(write), WRITE, np.int8)])[order]
+    step = BEAT // config.burst_bytes
+    return simulate((beat[:, None] * step + np.arange(step)).ravel(), np.repeat(kind, step), config).cycles
+
+
+@numba.njit(cache=True)
+def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency):
+    """Cycles until the last entry is with its list writer.
+
+    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the lane's colour stage), first (S + 1,) entry,
+    bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
+    """
+    survivors = len(group)
+    own = np.empty((4, survivors), np.int64)  # survivors of each lane
+    count = np.zeros(4, np.int64)
+    for s in range(survivors):
+        own[lane[s], count[lane[s]]] = s
+        count[lane[s]] += 1
+    ready = np.zeros(survivors, np.int64)  # when a survivor may begin its entries
+    queue = np.zeros((4, 4, depth), np.int64)
+    head, size = np.zeros((4, 4), np.int64), np.zeros((4, 4), np.int64)
+    begun, at, until, free = np.zeros(4, np.int64), np.zeros(4, np.int64), np.zeros(4, np.int64), np.zeros(4, np.int64)
+    out = np.zeros(4, np.int64)  # survivors of each lane that left the front
+    next_survivor = 0
+    clock = np.int64(0)
+    shift = np.int64(0)  # cycles that the front has stood
+    left = np.int64(0)
+    while left < len(bank) or next_survivor < survivors or begun.min() < 0:
+        # Banks take the earliest entry that waits, when none before it can come.
+        for b in range(4):
+            best, which = np.int64(1) << 60, -1
+            for k in range(4):
+                if size[k, b] > 0 and queue[k, b, head[k, b]] < best:
+                    best, which = queue[k, b, head[k, b]], k
+            if which < 0:
+                continue
+            for k in range(4):
+                if size[k, b] == 0:
+                    earliest = own[k, begun[k]] if begun[k] < out[k] else next_survivor
+                    if earliest < best:
+                        which = -1
+                        break
+            if which >= 0:
+                head[which, b] = (head[which, b] + 1) % depth
+                size[which, b] -= 1
+                left += 1
+        # Lanes hand over an entry a cycle; a splat takes a cycle a band at least.
+        for k in range(4):
+            if begun[k] >= out[k]:
+                continue
+            s = own[k, begun[k]]
+            if at[k] == 0 and until[k] < ready[s]:
+                until[k] = ready[s]
+            if clock < ready[s]:
+                continue
+            e = first[s] + at[k]
+            if e < first[s + 1]:
+                b = bank[e]
+                if size[k, b] == depth:
+                    continue
+                queue[k, b, (head[k, b] + size[k, b]) % depth] = s
+                size[k, b] += 1
+                at[k] += 1
+            if first[s] + at[k] == first[s + 1] and clock >= until[k] + bands[s] - 1:
+                begun[k] += 1
+                at[k] = 0
+                until[k] = clock + 1
+        # The front: the survivors of a group leave together when all lanes have room.
+        while next_survivor < survivors and 2 * group[next_survivor] + shift <= clock:
+            if (out - begun).max() >= waiting:
+                shift += clock + 1 - (2 * group[next_survivor] + shift)
+                break
+            g = group[next_survivor]
+            while next_survivor < survivors and group[next_survivor] == g:
+                k = lane[next_survivor]
+                free[k] = max(free[k], clock) + busy[next_survivor]
+                ready[next_survivor] = free[k] + latency
+                out[k] += 1
+                next_survivor += 1
+        if left == len(bank) and next_survivor == survivors:
+            break
+        clock += 1
+    return clock
+
+
+def unit_cycles(frame: FrontFrame) -> int:
+    """Cycles of a frame if the memory were perfect."""
+    packed = frame.packed
+    keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)).keep)
+    groups = -(-packed.counts[keep] // LANES)
+    start = np.concatenate([[0], np.cumsum(groups)])
+    cluster = packed.cluster[frame.gaussian]
+    within = frame.gaussian - packed.start[cluster]
+    group = start[np.searchsorted(keep, cluster)] + within // LANES
+    degree = packed.degrees[cluster]
+    lane = within % LANES
+    cols = -(-frame.camera.width // TILE)
+    first = np.concatenate([[0], np.cumsum(np.bincount(frame.entry_splat, minlength=len(frame.gaussian)))])
+    x, y = frame.entry_tile % cols, frame.entry_tile // cols
+    # Bands of 8 rows of pixels: the two halves of a row of tiles that some mask has.
+    half = np.stack([(frame.entry_mask & 3) > 0, (frame.entry_mask & 12) > 0], axis=1)
+    band = (frame.entry_splat.astype(np.int64)[:, None] << 20 | y[:, None].astype(np.int64) << 1 | np.arange(2))[half]
+    bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
+    front = _unit_cycles(
+        group, lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, WAITING, MERGE_DEPTH, LATENCY,
+    )
+    return int(max(front, GROUP_CYCLES * start[-1])) + CLUSTER_CYCLES * len(packed.table)
+
+
+@dataclass(frozen=True, eq=False)
+class PreprocessingEstimate:
+    """A frame's preprocessing. units, dram: cycles of each alone. bytes: by purpose."""
+
+    units: int
+    dram: int
+    bytes: dict[str, int]
+
+    @property
+    def cycles(self) -> int:
+        return max(self.units, self.dram)
+
+
+def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None = DramConfig()) -> PreprocessingEstimate:
+    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory."""
+    beats = traffic(frame, image)
+    assert sum(len(b.beat) for b in beats if b.name == "lists") == int(image.lists.lines.sum()) and len(image.lists.writes) == WRITERS
+    return PreprocessingEstimate(unit_cycles(frame), dram_cycles(beats, config) if config else 0, {b.name: b.bytes for b in beats})
