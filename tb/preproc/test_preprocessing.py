@@ -15,6 +15,8 @@ import pytest
 from flicker_tb.runner import seed
 
 from flicker.chip.dram import DramConfig
+from flicker.chip.preprocessing import traffic as chip_traffic
+from flicker.chip.preprocessing import unit_cycles
 from flicker.front.view import DEMO, View, load_view
 from flicker.golden.front.frame import FrontFrame, ListKind, run_front
 from flicker.golden.front.memory import front_memory
@@ -73,7 +75,8 @@ def check(
     for name in ("header", "geometry", "colour"):
         assert traffic["headers" if name == "header" else name] == (per(f"{name}_beats"), 0)
     assert traffic["records"] == (0, per("record_beats")) and traffic["lists"][1] == frames * int(np.sum(count["lines"]))
-    assert traffic["table"][0] == frames * 2 * -(-len(packed.table) // 2)
+    beats = {b.name: frames * len(b.beat) for b in chip_traffic(golden, image)}
+    assert beats == {n: sum(pair) for n, pair in traffic.items()}
     return golden, rtl
 
 
@@ -87,8 +90,9 @@ def untouched(rtl: RtlFront, written: np.ndarray, lines: np.ndarray) -> None:
 @pytest.mark.parametrize(("form", "lists"), [(PackedFormat.CHUNK, ListKind.ELLIPSE), (PackedFormat.FP16_LOCAL, ListKind.BOX)])
 def test_demo_scene(form: PackedFormat, lists: ListKind) -> None:
     view = demo()
-    golden, _ = check(pack(view.scene, form).packed, view.camera, lists)
+    golden, rtl = check(pack(view.scene, form).packed, view.camera, lists)
     assert len(golden.gaussian) > 50_000
+    assert abs(unit_cycles(golden) / rtl.cycles - 1) <= 0.1  # the chip model's estimate
 
 
 def some(count: int, **changes) -> Scene:

@@ -1,5 +1,8 @@
 """Estimate of a whole frame: cycles of every stage, bytes of every purpose, the bottleneck.
 
+Preprocessing in the configuration that exists as RTL comes from `preprocessing` (its bytes, its cycles within a few per cent); in any other, and rendering
+always, it is a model of units that were not built.
+
 Two phases share the memory: preprocessing (cull, project, colour, records and lists to DRAM) and rendering (lists and
 records from DRAM, sort, contribution test and blending, pixels to DRAM). A list is complete only when the last
 Gaussian has been seen, so the phases of one frame follow each other; with double-buffered lists the rendering of one
@@ -17,11 +20,16 @@ import numpy as np
 from ..errors import FlickerError
 from ..front.records import SubtileLists
 from ..front.view import View
+from ..golden.front.frame import run_front
+from ..golden.front.memory import front_memory
 from ..params import TILE, Form
+from ..pipeline import packed_scene
 from ..scene.camera import Camera
 from ..scene.clusters import Clusters, build_clusters
 from ..scene.memory import CHUNK, MemoryFormat, layout
+from ..scene.packed import PackedFormat
 from . import constants as c
+from . import preprocessing
 from .cull import cull
 from .delivery import broadcast_cycles, consumed
 from .dram import READ, WRITE, DramConfig, Stream, interleave, simulate
@@ -33,6 +41,7 @@ _GEOMETRY_BASE = 0
 _COLOUR_BASE = 1 << 28
 _HEADER_BASE = 3 << 28
 _FRAME_BASE = 1 << 31
+_PACKED = {MemoryFormat.FP16: PackedFormat.FP16, MemoryFormat.FP16_LOCAL: PackedFormat.FP16_LOCAL, MemoryFormat.CHUNK: PackedFormat.CHUNK}
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,13 @@ class ChipConfig:
         if self.cull_shape not in ("box", "sphere", "none"):
             raise FlickerError(f"chip: cull_shape must be box, sphere or none, not {self.cull_shape}")
 
+    @property
+    def as_built(self) -> bool:
+        """Whether preprocessing is what flk_preprocessing does."""
+        return (
+            self.memory in _PACKED and self.cluster_size == CHUNK and self.cull_shape == "box" and self.two_step and self.scheme == SCHEMES[RECOMMENDED]
+        )
+
 
 DEFAULT_CHIP = ChipConfig()
 
@@ -72,6 +88,14 @@ class Prepared:
     clusters: Clusters
     splats: Splats
     needed: np.ndarray
+    _built: dict[tuple, preprocessing.Preprocessing] = field(default_factory=dict)
+
+    def preprocessing(self, memory: MemoryFormat, dram: DramConfig) -> preprocessing.Preprocessing:
+        """The front end's frame, for a format that it reads; kept."""
+        if (memory, dram) not in self._built:
+            frame = run_front(packed_scene(self.view, _PACKED[memory]), self.view.camera)
+            self._built[memory, dram] = preprocessing.estimate(frame, front_memory(frame), dram)
+        return self._built[memory, dram]
 
     @property
     def lists(self) -> SubtileLists:
@@ -213,11 +237,14 @@ def frame_estimate(
     front, counts = _parameter_streams(prepared, chip)
     records = Stream.span("record write", Addresses().records, len(prepared.splats) * c.RECORD_BYTES, WRITE)
     front += [records] + [s for s in result.streams if s.name not in result.back]
+    built = prepared.preprocessing(chip.memory, chip.dram) if chip.as_built else None
+    if built is not None:
+        front = built.streams(chip.dram)
     back = [s for s in result.streams if s.name in result.back] + [_pixels(prepared.view.camera)]
     coefficients = prepared.view.scene.sh.shape[1]
     cores = c.PREPROCESSING_CORES
     colour = counts["colour read"] * -(-coefficients // c.SH_COEFFICIENTS_PER_CYCLE)
-    stages = [
+    stages = [Stage("front end", "preprocessing", built.units)] if built is not None else [
         Stage("cull clusters", "preprocessing", -(-counts["clusters"] * c.CLUSTER_TEST_CYCLES // cores)),
         Stage("project", "preprocessing", -(-counts["geometry read"] * c.GEOMETRY_CYCLES // cores)),
         Stage("colour", "preprocessing", -(-colour // cores)),
@@ -238,7 +265,7 @@ def frame_estimate(
     }
     return FrameEstimate(
         stages, [_purpose(s, "preprocessing", chip.dram) for s in front] + [_purpose(s, "rendering", chip.dram) for s in back],
-        (_phase_cycles(front, chip.dram), _phase_cycles(back, chip.dram)), counts, result.on_chip,
+        (built.dram if built is not None else _phase_cycles(front, chip.dram), _phase_cycles(back, chip.dram)), counts, result.on_chip,
     )
 
 

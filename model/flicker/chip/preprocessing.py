@@ -17,11 +17,11 @@ from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.front.setup import FrameSetup
-from ..golden.lists import WRITERS, pointer_lines
+from ..golden.lists import ENTRY_BITS, pointer_lines
 from ..params import TILE
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
-from .dram import READ, WRITE, DramConfig, simulate
+from .dram import READ, WRITE, DramConfig, Stream, simulate
 
 # Of the RTL, times in cycles.
 LANES = 4
@@ -31,7 +31,7 @@ LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
 WAITING = 128  # survivors of a lane between front and entries
 MERGE_DEPTH = 8  # entries of a lane that wait for a list writer
-GATHER = 64  # lines that are written together
+GATHER = 256  # lines that are written together
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,11 @@ def _colour_beats(cluster, within, place, colour, stride, degree):
     return beat[:n], due[:n]
 
 
-def dram_cycles(beats: Sequence[Beats], config: DramConfig = DramConfig(), gather: int = GATHER) -> int:
+def _bursts(beat: np.ndarray, step: int) -> np.ndarray:
+    return (beat[:, None] * step + np.arange(step)).ravel()
+
+
+def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER) -> int:
     """Cycles of the chip's clock that the DRAM needs for a frame's traffic; writes come `gather` lines at a time."""
     reads = [b for b in beats if not b.write]
     writes = [b for b in beats if b.write]
@@ -143,15 +147,14 @@ def dram_cycles(beats: Sequence[Beats], config: DramConfig = DramConfig(), gathe
     beat = np.concatenate([read, write])[order]
     kind = np.concatenate([np.full(len(read), READ, np.int8), np.full(len(write), WRITE, np.int8)])[order]
     step = BEAT // config.burst_bytes
-    return simulate((beat[:, None] * step + np.arange(step)).ravel(), np.repeat(kind, step), config).cycles
+    return simulate(_bursts(beat, step), np.repeat(kind, step), config).cycles
 
 
 @numba.njit(cache=True)
 def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency):
     """Cycles until the last entry is with its list writer.
 
-    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the lane's colour stage), first (S + 1,) entry,
-    bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
+    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the colour stage), first entry (S + 1,), bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
     """
     survivors = len(group)
     own = np.empty((4, survivors), np.int64)  # survivors of each lane
@@ -251,20 +254,34 @@ def unit_cycles(frame: FrontFrame) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class PreprocessingEstimate:
-    """A frame's preprocessing. units, dram: cycles of each alone. bytes: by purpose."""
+class Preprocessing:
+    """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each alone."""
 
+    beats: Sequence[Beats]
+    used: dict[str, int]
     units: int
     dram: int
-    bytes: dict[str, int]
 
     @property
     def cycles(self) -> int:
         return max(self.units, self.dram)
 
+    @property
+    def bytes(self) -> dict[str, int]:
+        return {b.name: b.bytes for b in self.beats}
 
-def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None = DramConfig()) -> PreprocessingEstimate:
+    def streams(self, config: DramConfig) -> list[Stream]:
+        """The same as bursts of the DRAM."""
+        step = BEAT // config.burst_bytes
+        return [
+            Stream(b.name, _bursts(b.beat, step), np.full(len(b.beat) * step, WRITE if b.write else READ, np.int8), self.used[b.name]) for b in self.beats
+        ]
+
+
+def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None) -> Preprocessing:
     """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory."""
     beats = traffic(frame, image)
-    assert sum(len(b.beat) for b in beats if b.name == "lists") == int(image.lists.lines.sum()) and len(image.lists.writes) == WRITERS
-    return PreprocessingEstimate(unit_cycles(frame), dram_cycles(beats, config) if config else 0, {b.name: b.bytes for b in beats})
+    used = {b.name: b.bytes for b in beats}
+    used["records"] = len(frame.number) * frame.kind.bytes
+    used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
+    return Preprocessing(beats, used, unit_cycles(frame), dram_cycles(beats, config) if config else 0)
