@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 from flicker.chip.dram import DramConfig
+from flicker.chip.preprocessing import estimate
 from flicker.errors import FlickerError
 from flicker.golden.front.frame import run_front
 from flicker.golden.front.memory import front_memory
@@ -14,7 +15,7 @@ from flicker.markdown import table
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import PORTS, PURPOSES, MemoryOptions, build, front_rtl
+from flicker.sim.preprocessing import BEAT, PORTS, PURPOSES, MemoryOptions, build, front_rtl
 
 from .common import Say, titled_views
 
@@ -44,13 +45,16 @@ def tables(say: Say) -> dict[str, str]:
             if not (np.array_equal(rtl.records[due.written], due.records[due.written]) and np.array_equal(rtl.memory[lines], due.lists.memory[lines])
                     and np.array_equal(rtl.pointers, due.lists.pointers)):
                 raise FlickerError(f"{title}: memory differs from the golden model's")
+            model = estimate(golden, due, DramConfig() if memory.timing else None)
+            if {n: BEAT * (c.read_beats + c.write_beats) for n, c in rtl.traffic.items()} != model.bytes:
+                raise FlickerError(f"{title}: bytes differ from the chip model's")
             rows.append((title, name, f"{len(packed):,}", f"{len(golden.entry_tile):,}", f"{rtl.cycles:,}", f"{rtl.efficiency:.0%}" if rtl.efficiency else "",
-                         f"{rtl.cycles / seconds:,.0f}"))
+                         f"{model.cycles:,}", f"{model.cycles / rtl.cycles - 1:+.1%}", f"{rtl.cycles / seconds:,.0f}"))
         traffic.append((title, *(f"{64 * (c.read_beats + c.write_beats) / 1e6:.2f}" for c in (rtl.traffic[p] for p in PURPOSES)),
                         f"{64 * sum(c.read_beats + c.write_beats for c in rtl.traffic.values()) / 1e6:.2f}"))
     return {
         "cycles": table(
-            ["view", "memory", "Gaussians", "list entries", "cycles", "of the memory's peak rate", "simulated cycles a second"], rows,
+            ["view", "memory", "Gaussians", "list entries", "cycles", "of the memory's peak rate", "chip model", "off by", "simulated cycles a second"], rows,
         ),
         "traffic": table(["view, MB", *PURPOSES, "all"], traffic),
     }
