@@ -103,8 +103,8 @@ def record_to_splat(record: int, kind: RecordKind, col: int, row: int) -> ToSpla
     if kind is RecordKind.CONIC32:
         x, y = ((field(low, 32) ^ 1 << 31) - (1 << 31) for low in (0, 32))
         half = [field(64 + 16 * k, 16) for k in range(7)]
-        return ToSplat(mean_to_fp16(x, col), mean_to_fp16(y, row), (half[0], half[1], half[2]), *half[3:], bool(field(176, 1)))
+        return ToSplat(mean_to_fp16(x, col), mean_to_fp16(y, row), (half[0], half[1], half[2]), half[3], half[4], half[5], half[6], field(176, 1) == 1)
     means = mean_to_fp16(_mean_field(field(0, 23)), col), mean_to_fp16(_mean_field(field(23, 23)), row)
     shape = shape_to_fp16(field(46, 14)), shape_to_fp16(field(60, 14), field(74, 1) == 1), shape_to_fp16(field(75, 14))
-    colours = [colour_to_fp16(field(97 + 10 * k, 10)) for k in range(3)]
-    return ToSplat(*means, shape, opacity_to_fp16(field(89, 8)), *colours, field(127, 1) == 1)
+    red, green, blue = (colour_to_fp16(field(97 + 10 * k, 10)) for k in range(3))
+    return ToSplat(*means, shape, opacity_to_fp16(field(89, 8)), red, green, blue, field(127, 1) == 1)
