@@ -1,6 +1,7 @@
 // Shape number of a record to FP16: 5 bits of exponent (bias 30) above 9 of mantissa, 0 for exponent 0
 // (docs/front_end.md). Exact from 2^-15 on; below it FP16 has fewer bits, and the nearest number is
-// taken, ties to even. Combinational.
+// taken, ties to even. Exponent 0 needs no case of its own: shifted that far, any mantissa is 0.
+// Combinational.
 module flk_shape_to_fp16
   import flk_pkg::*;
 (
@@ -29,14 +30,8 @@ module flk_shape_to_fp16
   assign round_up   = shifted[MAX_DROP-1] && ((|shifted[MAX_DROP-2:0]) || shifted[MAX_DROP]);
   assign subnormal  = shifted[MAN_BITS+MAX_DROP:MAX_DROP] + (MAN_BITS + 1)'(round_up);
 
-  always_comb begin
-    if (exp > 5'(LOWEST)) begin
-      shape_o = {negative_i, exp - 5'(LOWEST), man, 1'b0};
-    end else if (exp != '0) begin
-      shape_o = {negative_i, 5'd0, subnormal};
-    end else begin
-      shape_o = {negative_i, 15'd0};
-    end
-  end
+  assign shape_o = {
+    negative_i, (exp > 5'(LOWEST)) ? {exp - 5'(LOWEST), man, 1'b0} : {5'd0, subnormal}
+  };
 
 endmodule
