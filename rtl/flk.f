@@ -58,7 +58,9 @@ render/flk_mask_generator.sv
 render/flk_perf_counters.sv
 render/flk_pixel_drain.sv
 render/flk_pixel_state.sv
+render/flk_record_to_splat.sv
 render/flk_rendering_core.sv
+render/flk_shape_to_fp16.sv
 render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv

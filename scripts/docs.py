@@ -83,6 +83,7 @@ PARTS = (
     Part("energy", "energy of a frame by part", ("",), energy.tables, scenes_missing),
     Part("frames", "few configurations on real views; from the default to lanes, step by step", ("summary", "ablation"), frames.tables, scenes_missing),
     Part("stability", "where configurations break", ("",), stability.tables),
+    Part("stability_front", "where front ends break: records of 16 and 32 bytes, number formats", ("records", "formats"), stability.front_tables),
     Part("subnormals", "subnormal numbers flushed to zero", ("",), subnormals.tables, scenes_missing),
     Part("pictures", "pictures, work and misses of mask generators", ("work", "slots"), pictures.tables, scenes_missing),
     Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),

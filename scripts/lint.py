@@ -56,6 +56,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_weight": [{"Form": 0}, {"Form": 0, "Cols": 2, "Rows": 2, "ExpBits": 4, "ManBits": 3, "Fn": 1, "Saturate": 1}],
     "flk_blend_pipe": [{"Form": 0}],
     "flk_pixel_state": [{"Pixels": 4}],
+    "flk_record_to_splat": [{"Form": 0}],
     "flk_exp_neg_pipe": [{"Base2": 0, "Stages": 3}],
     "flk_axi_split": [{"Bytes": 4, "MaxBeats": 256, "BeatBits": 4}, {"MaxBeats": 1}, {"Bytes": 128, "MaxBeats": 256}],
     "flk_axi_read": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],

@@ -1,9 +1,11 @@
-"""`make docs PART=stability`: where chosen configurations break, in docs/stability.md."""
+"""`make docs PART=stability`: where chosen configurations break, in docs/stability.md; `PART=stability_front`: where front ends do, there and in
+docs/front_end.md."""
 
 from __future__ import annotations
 
+from flicker.explore.stability.front_ends import FRONT_ENDS
 from flicker.explore.stability.run import run_stability
-from flicker.explore.stability.write import LINES, markdown_table
+from flicker.explore.stability.write import FRONT_TABLES, LINES, markdown_table
 
 from .common import Say
 
@@ -13,3 +15,8 @@ SEED = 1
 def tables(say: Say) -> dict[str, str]:
     result = run_stability(names=LINES, seed=SEED, progress=lambda done, total: say(f"case {done} of {total}"))
     return {"": markdown_table(result)}
+
+
+def front_tables(say: Say) -> dict[str, str]:
+    result = run_stability(names=list(FRONT_ENDS), seed=SEED, progress=lambda done, total: say(f"case {done} of {total}"))
+    return {place: made(result) for place, made in FRONT_TABLES.items()}

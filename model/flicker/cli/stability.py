@@ -10,19 +10,21 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..explore.stability.families import FAMILIES
+from ..explore.stability.front_ends import FRONT_ENDS
 from ..explore.stability.run import run_stability, suite
-from ..explore.stability.write import break_table, check_folder, write_csv, write_markdown, write_pictures
+from ..explore.stability.write import FRONT_TABLES, break_table, check_folder, markdown_table, write_csv, write_markdown, write_pictures
 
 
 def stability(
     family: Annotated[list[str] | None, typer.Option(help="family of inputs, repeatable [default: all]")] = None,
     config: Annotated[list[str] | None, typer.Option(help="configuration, repeatable [default: the suite]")] = None,
+    front: Annotated[bool, typer.Option("--front", help="the packed front ends: records of 16 against 32 bytes, number formats")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen configurations")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
     out: Annotated[Path, typer.Option(help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
     show: Annotated[bool, typer.Option("--list", help="list families and configurations, run nothing")] = False,
 ) -> None:
-    """Run families of hard inputs through every configuration: error against float64, and where each breaks."""
+    """Run families of hard inputs through every configuration and front end: error against float64, and where each breaks."""
     console = Console()
     if show:
         for f in FAMILIES.values():
@@ -31,16 +33,20 @@ def stability(
             console.print(name, highlight=False)
         return
     check_folder(out)
+    chosen = [*(config or []), *(FRONT_ENDS if front else [])]
     with Progress(
         TextColumn("stability"), BarColumn(), TextColumn("{task.completed}/{task.total} cases"), TimeElapsedColumn(),
         console=console, transient=True, disable=not console.is_terminal,
     ) as bar:
         task = bar.add_task("cases", total=None)
         result = run_stability(
-            family, config, seed=seed, quick=quick, progress=lambda done, total: bar.update(task, completed=done, total=total),
+            family, chosen, seed=seed, quick=quick, progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     write_csv(result, out / "stability.csv")
-    write_markdown(result, out / "stability.md")
+    write_markdown(markdown_table(result), out / "stability.md")
+    if set(FRONT_ENDS) <= set(result.configurations):
+        for name, made in FRONT_TABLES.items():
+            write_markdown(made(result), out / f"front_{name}.md")
     pictures = write_pictures(result, out)
     console.print(break_table(result))
     console.print(f"{out / 'stability.csv'}, {', '.join(map(str, pictures))}", soft_wrap=True)

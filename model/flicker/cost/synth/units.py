@@ -121,6 +121,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_preprocessing_core": ["part_i[267]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
+        # Zeros fill a record of 32 bytes.
+        "flk_record_to_splat": [] if factored else [f"in_record_i[{bit}]" for bit in range(177, 256)],
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
@@ -269,6 +271,7 @@ def _front() -> list[Unit]:
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 8", Depth=8),
+        unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
     ]
 

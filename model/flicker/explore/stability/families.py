@@ -1,6 +1,7 @@
 """Families of hard inputs. Each is swept over one parameter, from harmless to extreme; small pictures, seeded.
 
-All steps of a sweep draw from the same random numbers, so that neighbouring steps differ in the parameter only.
+All steps of a sweep draw from the same random numbers, so that neighbouring steps differ in the parameter only. Configurations start from a case's
+projection, front ends from its scene.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import numpy as np
 
 from ...errors import FlickerError
 from ...front.projection import Projected, project
-from ...scene.camera import Camera
+from ...golden.front.setup import MAX_PICTURE
+from ...scene.camera import MAX_SIZE, Camera
 from ...scene.files import Scene
+from ...scene.gaussians import SH_DEGREES
 
 SIZE = 64
 DEPTH = 4.0
@@ -23,15 +26,19 @@ _C0 = 0.28209479177387814
 
 @dataclass
 class Case:
-    """One input: what the configurations get and what the reference renders.
+    """One input: what configurations and front ends get and what the reference renders.
 
     truth: projection that the reference renders when it is not the configurations' own (the input means the same, written well).
-    origin: window's first pixel on the screen.
+    origin: window's first pixel on the screen. scene, screen: what the front ends get, `camera` being a window of `screen`. meant: the scene written
+    well, when it is not.
     """
 
     projected: Projected
     camera: Camera
+    scene: Scene
+    screen: Camera
     truth: Projected | None = None
+    meant: Scene | None = None
     origin: tuple[int, int] = (0, 0)
 
 
@@ -57,6 +64,11 @@ def _about_z(angle: np.ndarray) -> np.ndarray:
     return quats
 
 
+def _turned(rng: np.random.Generator, n: int) -> np.ndarray:
+    quats = rng.normal(size=(n, 4))
+    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
+
+
 def _colours(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.uniform(0.05, 1.0, (n, 3))
 
@@ -73,7 +85,12 @@ def _scene(mean, sigma, angle, depth, opacity, rgb, camera: Camera) -> Scene:
 
 
 def _case(scene: Scene, camera: Camera) -> Case:
-    return Case(project(scene, camera), camera)
+    return Case(project(scene, camera), camera, scene, camera)
+
+
+def _window(scene: Scene, screen: Camera, x0: int) -> Case:
+    """The window at (x0, x0) of a screen."""
+    return Case(*crop(project(scene, screen), screen, x0, x0), scene, screen, origin=(x0, x0))
 
 
 def _layers(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -141,12 +158,12 @@ def crop(projected: Projected, camera: Camera, x0: int, y0: int, size: int = SIZ
 
 def _screen(x0: float, rng: np.random.Generator) -> Case:
     n = 150
-    wide = Camera(16384, 16384, 16384.0, 16384.0, np.zeros(3), np.eye(3))
+    side = MAX_PICTURE if x0 + SIZE <= MAX_PICTURE else MAX_SIZE
+    wide = _camera(side, side)
     mean = _inside(rng, n) + x0
     sigma = rng.uniform(0.6, 4, (n, 2))
     scene = _scene(mean, sigma, rng.uniform(0, 3, n), _layers(rng, n), rng.uniform(0.3, 0.95, n), _colours(rng, n), wide)
-    projected, camera = crop(project(scene, wide), wide, int(x0), int(x0))
-    return Case(projected, camera, origin=(int(x0), int(x0)))
+    return _window(scene, wide, int(x0))
 
 
 def _depth_gap(gap: float, rng: np.random.Generator) -> Case:
@@ -167,7 +184,7 @@ def _depth_gap(gap: float, rng: np.random.Generator) -> Case:
     projected = project(scene, camera)
     z = (scene.means.astype(np.float64) @ rotation)[:, 2][projected.index]
     order = np.lexsort((projected.index, z))
-    return Case(projected, camera, Projected(**{k: v[order] for k, v in vars(projected).items()}))
+    return Case(projected, camera, scene, camera, truth=Projected(**{k: v[order] for k, v in vars(projected).items()}))
 
 
 def _depth_range(far: float, rng: np.random.Generator) -> Case:
@@ -209,7 +226,7 @@ def _quaternion(norm: float, rng: np.random.Generator) -> Case:
     means = np.concatenate([(_inside(rng, n) - 31.5) * (depth / SIZE)[:, None], depth[:, None]], 1)
     rest = np.exp(rng.uniform(-3.5, -1, (n, 3))), rng.uniform(0.3, 0.95, n), (_colours(rng, n)[:, None] - 0.5) / _C0
     unit, other = (Scene(means, rest[0], q, *rest[1:]) for q in (quats, quats * norm))
-    return Case(project(other, camera), camera, project(unit, camera))
+    return Case(project(other, camera), camera, other, camera, project(unit, camera), unit)
 
 
 def _colour(top: float, rng: np.random.Generator) -> Case:
@@ -231,12 +248,63 @@ def _inside_gaussian(ratio: float, rng: np.random.Generator) -> Case:
     return _case(scene, camera)
 
 
+def _threshold(level: float, rng: np.random.Generator) -> Case:
+    """Layers of one opacity before solid Gaussians."""
+    n, solid = 300, 40
+    camera = _camera()
+    depth = np.concatenate([np.sort(rng.uniform(2.0, 4.0, n)), np.sort(rng.uniform(4.0, 6.0, solid))])
+    opacity = np.concatenate([np.full(n, level / 255), rng.uniform(0.5, 0.95, solid)])
+    scene = _scene(_inside(rng, n + solid), rng.uniform(2, 8, (n + solid, 2)), rng.uniform(0, 3, n + solid), depth, opacity, _colours(rng, n + solid), camera)
+    return _case(scene, camera)
+
+
+def _cluster(extent: float, rng: np.random.Generator) -> Case:
+    """One cluster: a part of it in front of the camera, the rest in a cube about the middle of that part; from an extent of 4 on, the camera is in the cube."""
+    seen, n = 100, 256
+    camera = _camera()
+    depth = rng.uniform(2.0, 6.0, seen)
+    front = np.concatenate([(_inside(rng, seen) - 31.5) * (depth / SIZE)[:, None], depth[:, None]], 1)
+    rest = rng.uniform(-extent, extent, (n - seen, 3)) + (0, 0, DEPTH)
+    quats, scales = _turned(rng, n), np.exp(rng.uniform(-3.5, -1.5, (n, 3)))
+    return _case(Scene(np.concatenate([front, rest]), scales, quats, rng.uniform(0.1, 0.8, n), (_colours(rng, n)[:, None] - 0.5) / _C0), camera)
+
+
+def _one_tile(extent: float, rng: np.random.Generator) -> Case:
+    """The 256 Gaussians of a cluster about a point of the only tile, in layers."""
+    n = 256
+    camera = _camera(16)
+    mean = 7.7 + (rng.random((n, 2)) - 0.5) * extent
+    scene = _scene(mean, rng.uniform(0.6, 4.0, (n, 2)), rng.uniform(0, 3, n), _layers(rng, n), rng.uniform(0.02, 0.2, n), _colours(rng, n), camera)
+    return _case(scene, camera)
+
+
+def _covering(side: float, rng: np.random.Generator) -> Case:
+    """One slanted Gaussian over a square picture, of which the last window is drawn."""
+    screen = _camera(int(side), side)
+    angle, place = rng.uniform(0.2, 1.3, 1), rng.uniform(0.3, 0.5, (1, 2)) * side
+    scene = _scene(place, np.array([[1.0, 0.5]]) * side, angle, DEPTH, 0.9, _colours(rng, 1), screen)
+    return _window(scene, screen, int(side) - SIZE)
+
+
+def _harmonics(top: float, rng: np.random.Generator) -> Case:
+    """Spherical harmonics of degree 3 with coefficients up to `top`, seen from many directions."""
+    n = 100
+    camera = _camera(SIZE, SIZE / 4)
+    depth = _layers(rng, n)
+    means = np.concatenate([(_inside(rng, n) - 31.5) * (depth / camera.fx)[:, None], depth[:, None]], 1)
+    sh = rng.uniform(-top, top, (n, max(SH_DEGREES), 3))
+    sh[:, 0] = (_colours(rng, n) - 0.5) / _C0
+    quats, scales = _turned(rng, n), np.exp(rng.uniform(-1.5, 0.3, (n, 3)))
+    return _case(Scene(means, scales, quats, rng.uniform(0.1, 0.6, n), sh), camera)
+
+
 FAMILIES: dict[str, Family] = {f.name: f for f in (
     Family("thin", "thin, slanted Gaussians", "axis ratio before dilation", (1, 3, 10, 30, 100, 300, 1000, 3000, 10000), _thin),
     Family("thin_far", "thin, slanted, mean far along the axis", "distance in px", (0, 16, 64, 256, 1024, 4096), _thin_far),
     Family("far_mean", "means far outside the tile", "distance in px", (0, 64, 256, 1024, 4096, 16384, 60000), _far),
     Family("footprint", "footprint", "sigma in px", (3, 1, 0.3, 0.1, 10, 30, 100, 1000, 10000), _footprint),
     Family("faint", "opacity near 1/255", "255 x opacity", (128, 16, 4, 2, 1.5, 1.1, 1.02, 1.001), _faint),
+    Family("threshold", "opacity at 1/255", "255 x opacity", (4, 1.1, 1.01, 1.001, 1, 0.999, 0.99, 0.5), _threshold),
     Family("opaque", "opacity up to 1", "opacity", (0.5, 0.9, 0.99, 0.995, 0.999, 1.0), _full),
     Family("screen", "screen coordinates", "first pixel of the window", (0, 1024, 2048, 3776, 8192, 16320), _screen),
     Family("depth_gap", "nearly equal depths", "gap between layers", (0.1, 1e-3, 1e-5, 1e-6, 1e-7, 0.0), _depth_gap),
@@ -245,7 +313,11 @@ FAMILIES: dict[str, Family] = {f.name: f for f in (
     Family("singular", "near-singular covariance", "smallest / largest axis", (1, 0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-12), _singular),
     Family("quaternion", "quaternions not of unit length", "length", (1, 1.001, 1.1, 10, 1e3, 1e6, 1e-3, 1e-6), _quaternion),
     Family("colour", "colours out of range", "largest colour", (1, 2, 10, 100, 1e4, 1e5), _colour),
+    Family("sh", "spherical harmonics out of range", "largest coefficient", (0.02, 0.1, 0.3, 1, 3, 10, 100, 1e4), _harmonics),
     Family("inside", "camera inside Gaussians", "sigma / distance", (0.1, 0.3, 1, 3, 10, 30, 100), _inside_gaussian),
+    Family("cluster", "camera inside a cluster", "half the cluster's extent", (2, 4, 10, 30, 100, 300, 1e3, 1e4), _cluster),
+    Family("one_tile", "a whole cluster in one tile", "extent in px", (16, 8, 4, 1, 0.1, 0.01, 0.0), _one_tile),
+    Family("covering", "one Gaussian over a whole picture", "side of the picture in px", (64, 256, 1024, 2048, 4096), _covering),
 )}
 
 

@@ -1,4 +1,4 @@
-"""Runs the suite: every configuration on every case, against the float64 reference."""
+"""Runs the suite: every configuration and front end on every case, against the float64 reference."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ import numpy as np
 
 from ...front.reference import render_reference
 from ...front.view import View
+from ...golden.front.setup import FORMATS
 from ...params import Coords
 from ...scene.metrics import psnr
 from ..configurations import get_configuration, group
 from ..machine import Configuration, run
 from .families import FAMILIES, get_family
+from .front_ends import FRONT_ENDS, Drawer, FrontEnd, drawable
 
 BROKEN_PSNR = 40.0  # dB
 BROKEN_ERROR = 0.25  # of a pixel's channel, relative where the reference exceeds 1
@@ -27,7 +29,7 @@ _ABSOLUTE_TOO = ("no-ctu-32", "no-ctu-32-conic", "flicker", "faithful")
 
 @dataclass(frozen=True)
 class Point:
-    """One configuration on one case.
+    """One configuration, or front end, on one case.
 
     psnr_db: against the float64 reference, pictures clamped to [0, 1]; inf when equal, -inf when the picture holds a NaN.
     max_error: largest difference of a channel before clamping, divided by the reference where that exceeds 1.
@@ -77,12 +79,18 @@ class Stability:
 
 
 def suite() -> list[str]:
-    """All configurations but those whose picture another one has by proof; then some with absolute coordinates."""
-    return group("stability") + [name + ABSOLUTE for name in _ABSOLUTE_TOO]
+    """All configurations but those whose picture another one has by proof; then some with absolute coordinates, and the front ends."""
+    return group("stability") + [name + ABSOLUTE for name in _ABSOLUTE_TOO] + list(FRONT_ENDS)
 
 
-def _split(name: str) -> tuple[Configuration, Coords]:
+def _quick_suite() -> list[str]:
+    return [*group("stability, quick"), "no-ctu-32" + ABSOLUTE, *(name for name, front in FRONT_ENDS.items() if front.record and front.formats == FORMATS)]
+
+
+def _split(name: str) -> tuple[Configuration | FrontEnd, Coords]:
     base, absolute, _ = name.partition(ABSOLUTE)
+    if base in FRONT_ENDS and not absolute:
+        return FRONT_ENDS[base], Coords.LOCAL
     return get_configuration(base), Coords.ABSOLUTE if absolute else Coords.LOCAL
 
 
@@ -106,13 +114,18 @@ def _points(steps: list, picked: list, seed: int, progress: Callable[[int, int],
         case = family.make(value, np.random.default_rng([seed, crc32(family.name.encode())]))
         reference = render_reference(case.truth or case.projected, case.camera)
         views = {coords: View(case.camera, projected=case.projected, coords=coords, origin=case.origin) for coords in Coords}
-        for name, configuration, coords in picked:
-            with np.errstate(all="ignore"):
-                image = run(configuration, views[coords]).image
-                measured = _measure(image, reference)
-            points.append(Point(
-                family.name, family.parameter, k, value, name, configuration.form.name.lower(), configuration.generator.precision, *measured,
-            ))
+        by_front = Drawer(case)
+        for name, chosen, coords in picked:
+            if isinstance(chosen, FrontEnd):
+                if not drawable(case):
+                    continue
+                form, precision = chosen.form, chosen.precision
+                measured = _measure(*by_front(chosen))
+            else:
+                form, precision = chosen.form.name.lower(), chosen.generator.precision
+                with np.errstate(all="ignore"):
+                    measured = _measure(run(chosen, views[coords]).image, reference)
+            points.append(Point(family.name, family.parameter, k, value, name, form, precision, *measured))
     return points
 
 
@@ -124,13 +137,14 @@ def run_stability(
     quick: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Stability:
-    """Run families (all) with configurations (the suite, or those of the quick choice).
+    """Run families (all) with configurations and front ends (the suite, or those of the quick choice). A front end has no point where the screen is too
+    large for it.
 
     quick: first, middle and last step only. progress: called with (cases done, cases in all). Raises FlickerError, before any
     work, for an unknown family or configuration.
     """
     chosen = [get_family(name) for name in families or FAMILIES]
-    picked = [(name, *_split(name)) for name in names or ([*group("stability, quick"), "no-ctu-32" + ABSOLUTE] if quick else suite())]
+    picked = [(name, *_split(name)) for name in names or (_quick_suite() if quick else suite())]
     steps = [(f, k) for f in chosen for k in (_quick(f.values) if quick else range(len(f.values)))]
     threads = numba.get_num_threads()
     numba.set_num_threads(1)  # the pictures are too small to share among threads

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from rich.table import Table
 from ... import markdown
 from ...errors import FlickerError
 from .families import FAMILIES
+from .front_ends import IMAGES, RECORDS, WIDE, WIDE_IMAGE, FrontEnd
 from .run import BROKEN_ERROR, BROKEN_PSNR, Point, Stability
 
 
@@ -49,9 +51,13 @@ def break_table(result: Stability) -> Table:
     return table
 
 
+def _shown(result: Stability) -> list[str]:
+    return [m for m in LINES if m in result.configurations] or result.configurations
+
+
 def markdown_table(result: Stability) -> str:
     """Chosen configurations (LINES), families as rows: where each breaks, or its lowest PSNR."""
-    shown = [m for m in LINES if m in result.configurations] or result.configurations
+    shown = _shown(result)
     rows = []
     for family in result.families:
         cells = []
@@ -63,10 +69,60 @@ def markdown_table(result: Stability) -> str:
     return markdown.table(["family", *(f"`{m}`" for m in shown)], rows)
 
 
-def write_markdown(result: Stability, path: Path) -> None:
-    """`markdown_table` into a file. Raises FlickerError when it cannot be written."""
+def _first_and_lowest(result: Stability, family: str, front: FrontEnd) -> str:
+    point = result.breaks(family, front.name)
+    lowest = min(p.psnr_db for p in result.sweep(family, front.name))
+    return f"{'-' if point is None else f'**{_value(point.value)}**'} ({lowest:.0f})"
+
+
+def _breaks_earlier(result: Stability, family: str, front: FrontEnd, other: FrontEnd) -> bool:
+    """Whether `front` breaks at an earlier step than `other`."""
+    a, b = (result.breaks(family, f.name) for f in (front, other))
+    return a is not None and (b is None or a.step < b.step)
+
+
+def record_table(result: Stability) -> str:
+    """Records of 16 against 32 bytes, families as rows: first broken step and lowest PSNR, behind those of packing alone; where 16 bytes break earlier."""
+    rows = []
+    for family in result.families:
+        cells, earlier = [], []
+        for image in IMAGES:
+            cells += [_first_and_lowest(result, family, FrontEnd(image, record)) for record in (None, *RECORDS)]
+            if _breaks_earlier(result, family, *(FrontEnd(image, record) for record in RECORDS)):
+                earlier.append(f"`{image.value}`")
+        rows.append([family, *cells, ", ".join(earlier) or "-"])
+    columns = [f"`{image.value}`, {what}" for image in IMAGES for what in ("packed", *(f"{record.bytes} bytes" for record in RECORDS))]
+    return markdown.table(["family", *columns, "16 bytes earlier"], rows)
+
+
+def format_table(result: Stability) -> str:
+    """Number formats of the front end, families as rows: first broken step and lowest PSNR, the largest loss at a step, and where the default breaks
+    earlier."""
+    rows, columns = [], []
+    for record in RECORDS:
+        fronts = FrontEnd(WIDE_IMAGE, record), FrontEnd(WIDE_IMAGE, record, WIDE)
+        columns += [*(f"{record.bytes} bytes, {front.precision}" for front in fronts), "largest loss, dB"]
+    for family in result.families:
+        cells, earlier = [], []
+        for record in RECORDS:
+            fronts = FrontEnd(WIDE_IMAGE, record), FrontEnd(WIDE_IMAGE, record, WIDE)
+            cells += [_first_and_lowest(result, family, front) for front in fronts]
+            steps = [(b.psnr_db - a.psnr_db, a.psnr_db) for a, b in zip(*(result.sweep(family, front.name) for front in fronts)) if np.isfinite(b.psnr_db)]
+            loss, at = max(steps)
+            cells.append(f"{max(loss, 0.0):.1f} (to {at:.0f})")
+            if _breaks_earlier(result, family, *fronts):
+                earlier.append(f"{record.bytes} bytes")
+        rows.append([family, *cells, ", ".join(earlier) or "-"])
+    return markdown.table(["family", *columns, "breaks earlier"], rows)
+
+
+FRONT_TABLES: dict[str, Callable[[Stability], str]] = {"records": record_table, "formats": format_table}
+
+
+def write_markdown(text: str, path: Path) -> None:
+    """A table into a file. Raises FlickerError when it cannot be written."""
     try:
-        path.write_text(markdown_table(result) + "\n")
+        path.write_text(text + "\n")
     except OSError as error:
         raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
 
