@@ -154,7 +154,8 @@ def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER
 def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency):
     """Cycles until the last entry is with its list writer.
 
-    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the colour stage), first entry (S + 1,), bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
+    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the colour stage), first entry (S + 1,),
+    bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
     """
     survivors = len(group)
     own = np.empty((4, survivors), np.int64)  # survivors of each lane
