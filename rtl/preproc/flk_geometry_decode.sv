@@ -32,6 +32,7 @@ module flk_geometry_decode (
   output logic [19:0]        qz_o
 );
 
+  logic next_odd;  // the phase of the next cycle
   logic [15:0] v12;  // cycle 0
   logic [15:0] v13;  // cycle 0
   logic [15:0] v14;  // cycle 0
@@ -48,6 +49,7 @@ module flk_geometry_decode (
   logic signed [11:0] v25;  // cycle 0
   logic [27:0] v26;  // cycle 2
   logic [27:0] u_v26;
+  logic [11:0] u_v26_x, u_v26_x_even, u_v26_x_odd;
   logic [27:0] v27;  // cycle 0
   logic [27:0] q_0;  // cycle 2
   logic signed [10:0] v29;  // cycle 0
@@ -70,6 +72,7 @@ module flk_geometry_decode (
   logic signed [19:0] v45;  // cycle 4
   logic [19:0] v46;  // cycle 7
   logic [19:0] u_v64;
+  logic [19:0] u_v64_l, u_v64_l_even, u_v64_l_odd;
   logic [19:0] v47;  // cycle 5
   logic [19:0] s_0;  // cycle 7
   logic signed [36:0] v49;  // cycle 0
@@ -114,6 +117,7 @@ module flk_geometry_decode (
   logic [19:0] u_v85;
   logic [19:0] v86;  // cycle 9
   logic [19:0] u_v88;
+  logic [10:0] u_v88_x, u_v88_x_even, u_v88_x_odd;
   logic [19:0] v87;  // cycle 9
   logic [19:0] u_v87;
   logic [19:0] v88;  // cycle 10
@@ -282,6 +286,7 @@ module flk_geometry_decode (
     end
   end
 
+  assign next_odd = phase_i ^ en_i;
   assign v12 = word_0_i[15:0];
   assign v13 = word_0_i[31:16];
   assign v14 = word_1_i[15:0];
@@ -296,7 +301,11 @@ module flk_geometry_decode (
   assign v23 = word_0_i[20:11];
   assign v24 = word_0_i[10:0];
   assign v25 = 12'(v22);
-  flk_ff_from_fixed #(.Bits(12), .FracBits(0), .ManBits(19), .Stages(2)) i_u_v26 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v25 : v33), .y_o(u_v26));
+  assign u_v26_x_even = v25;
+  assign u_v26_x_odd = v33;
+  flk_phase_mux #(.Width(6)) i_u_v26_x_0 (.clk_i, .odd_i(next_odd), .a_i(u_v26_x_even[5:0]), .b_i(u_v26_x_odd[5:0]), .y_o(u_v26_x[5:0]));
+  flk_phase_mux #(.Width(6)) i_u_v26_x_1 (.clk_i, .odd_i(next_odd), .a_i(u_v26_x_even[11:6]), .b_i(u_v26_x_odd[11:6]), .y_o(u_v26_x[11:6]));
+  flk_ff_from_fixed #(.Bits(12), .FracBits(0), .ManBits(19), .Stages(2)) i_u_v26 (.clk_i, .en_i, .x_i(u_v26_x), .y_o(u_v26));
   assign v26 = u_v26;
   assign v34 = u_v26;
   flk_ff_from_fp16 #(.ManBits(19)) i_v27 (.x_i(v12), .y_o(v27));
@@ -318,7 +327,11 @@ module flk_geometry_decode (
   assign v43 = 30'($signed(v42_q[0]) >>> 8);
   assign v44 = 30'(v43 < -30'sd524288 ? -30'sd524288 : v43);
   assign v45 = 20'(30'sd524287 < $signed(v44_q[0]) ? 30'sd524287 : $signed(v44_q[0]));
-  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v64 (.clk_i, .en_i, .l_i(20'(phase_i == 1'd0 ? $signed(v63_q[0]) : $signed(v45_q[0]))), .y_o(u_v64));
+  assign u_v64_l_even = $signed(v63_q[0]);
+  assign u_v64_l_odd = $signed(v45_q[0]);
+  flk_phase_mux #(.Width(10)) i_u_v64_l_0 (.clk_i, .odd_i(next_odd), .a_i(u_v64_l_even[9:0]), .b_i(u_v64_l_odd[9:0]), .y_o(u_v64_l[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v64_l_1 (.clk_i, .odd_i(next_odd), .a_i(u_v64_l_even[19:10]), .b_i(u_v64_l_odd[19:10]), .y_o(u_v64_l[19:10]));
+  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v64 (.clk_i, .en_i, .l_i(20'(u_v64_l)), .y_o(u_v64));
   assign v64 = u_v64;
   assign v46 = u_v64;
   flk_ff_from_fp16 #(.ManBits(11)) i_v47 (.x_i(v15_q[2]), .y_o(v47));
@@ -362,7 +375,11 @@ module flk_geometry_decode (
   assign v84 = u_v84;
   flk_ff_sqrt #(.ManBits(11), .Stages(2)) i_u_v85 (.clk_i, .en_i, .x_i(v84), .y_o(u_v85));
   assign v85 = u_v85;
-  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v88 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? $signed(v75_q[3]) : $signed(v69_q[3])), .y_o(u_v88));
+  assign u_v88_x_even = $signed(v75_q[3]);
+  assign u_v88_x_odd = $signed(v69_q[3]);
+  flk_phase_mux #(.Width(5)) i_u_v88_x_0 (.clk_i, .odd_i(next_odd), .a_i(u_v88_x_even[4:0]), .b_i(u_v88_x_odd[4:0]), .y_o(u_v88_x[4:0]));
+  flk_phase_mux #(.Width(6)) i_u_v88_x_1 (.clk_i, .odd_i(next_odd), .a_i(u_v88_x_even[10:5]), .b_i(u_v88_x_odd[10:5]), .y_o(u_v88_x[10:5]));
+  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v88 (.clk_i, .en_i, .x_i(u_v88_x), .y_o(u_v88));
   assign v88 = u_v88;
   assign v86 = u_v88;
   flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v87 (.clk_i, .en_i, .x_i($signed(v72_q[3])), .y_o(u_v87));

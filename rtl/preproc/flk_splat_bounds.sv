@@ -133,11 +133,14 @@ module flk_splat_bounds (
     20'h40fe9, 20'h40fec, 20'h40fee, 20'h40ff1, 20'h40ff4, 20'h40ff7, 20'h40ffa, 20'h40ffd
   };
 
+  logic next_odd;  // the phase of the next cycle
   logic [15:0] v10;  // cycle 0
   logic [7:0] v11;  // cycle 0
   logic [19:0] v12;  // cycle 0
   logic [19:0] v13;  // cycle 3
   logic [19:0] u_v43;
+  logic [19:0] u_v43_a, u_v43_a_even, u_v43_a_odd;
+  logic [19:0] u_v43_b, u_v43_b_even, u_v43_b_odd;
   logic signed [15:0] v14;  // cycle 5
   logic signed [15:0] u_v14;
   logic signed [15:0] v15;  // cycle 5
@@ -147,6 +150,7 @@ module flk_splat_bounds (
   logic [19:0] v19;  // cycle 8
   logic [19:0] v20;  // cycle 11
   logic [19:0] u_v31;
+  logic [19:0] u_v31_b, u_v31_b_even, u_v31_b_odd;
   logic signed [29:0] v21;  // cycle 13
   logic signed [29:0] u_v32;
   logic signed [31:0] v22;  // cycle 13
@@ -260,10 +264,19 @@ module flk_splat_bounds (
     end
   end
 
+  assign next_odd = phase_i ^ en_i;
   assign v10 = opacity_i & 16'h7fff;
   assign v11 = opacity_i[7:0];
   flk_ff_from_fp16 #(.ManBits(11)) i_v12 (.x_i(v10), .y_o(v12));
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v43 (.clk_i, .en_i, .a_i(phase_i == 1'd0 ? v42_q[0] : 20'h437f0), .b_i(phase_i == 1'd0 ? lean_i_q[3] : v12_q[0]), .prod_o(u_v43));
+  assign u_v43_a_even = v42_q[0];
+  assign u_v43_a_odd = 20'h437f0;
+  flk_phase_mux #(.Width(10)) i_u_v43_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v43_a_even[9:0]), .b_i(u_v43_a_odd[9:0]), .y_o(u_v43_a[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v43_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v43_a_even[19:10]), .b_i(u_v43_a_odd[19:10]), .y_o(u_v43_a[19:10]));
+  assign u_v43_b_even = lean_i_q[3];
+  assign u_v43_b_odd = v12_q[0];
+  flk_phase_mux #(.Width(10)) i_u_v43_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v43_b_even[9:0]), .b_i(u_v43_b_odd[9:0]), .y_o(u_v43_b[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v43_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v43_b_even[19:10]), .b_i(u_v43_b_odd[19:10]), .y_o(u_v43_b[19:10]));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v43 (.clk_i, .en_i, .a_i(u_v43_a), .b_i(u_v43_b), .prod_o(u_v43));
   assign v43 = u_v43;
   assign v13 = u_v43;
   flk_ff_to_fixed #(.Bits(16), .FracBits(0), .Round(1), .ManBits(11), .Stages(2)) i_u_v14 (.clk_i, .en_i, .x_i(v13), .y_o(u_v14));
@@ -273,7 +286,11 @@ module flk_splat_bounds (
   assign code = 8'($signed(v16_q[0]));
   assign v18 = CUT[code];
   assign v19 = box_i ? 20'h40400 : v18_q[0];
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v31 (.clk_i, .en_i, .a_i(v19_q[0]), .b_i(phase_i == 1'd0 ? sy_i_q[4] : sx_i_q[4]), .prod_o(u_v31));
+  assign u_v31_b_even = sy_i_q[4];
+  assign u_v31_b_odd = sx_i_q[4];
+  flk_phase_mux #(.Width(10)) i_u_v31_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v31_b_even[9:0]), .b_i(u_v31_b_odd[9:0]), .y_o(u_v31_b[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v31_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v31_b_even[19:10]), .b_i(u_v31_b_odd[19:10]), .y_o(u_v31_b[19:10]));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v31 (.clk_i, .en_i, .a_i(v19_q[0]), .b_i(u_v31_b), .prod_o(u_v31));
   assign v31 = u_v31;
   assign v20 = u_v31;
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v32 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v31 : v20), .y_o(u_v32));

@@ -32,7 +32,7 @@ FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 MEMORY = "flk_sram"  # a macro where it is a part of another unit
 
 # Operators that the pipelines of the front end are put together from.
-FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_delay_ram"]
+FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_fixed_mul", "flk_phase_mux", "flk_delay_ram"]
 
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
 COMPOSED: dict[str, list[str]] = {
@@ -54,7 +54,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
     "flk_preprocessing_core": [
-        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis", "flk_colour_group", "flk_colour_total",
+        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis", "flk_colour_group", "flk_colour_constant", "flk_colour_term",
         "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
     ],
     "flk_preprocessing": [
