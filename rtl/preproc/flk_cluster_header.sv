@@ -41,7 +41,7 @@ module flk_cluster_header (
   output logic [27:0]        low_0_o,
   output logic [27:0]        step_0_o,
   output logic signed [26:0] scale_low_0_o,
-  output logic signed [26:0] scale_step_0_o,
+  output logic [16:0]        scale_step_0_o,
   output logic signed [19:0] dc_low_0_o,
   output logic [19:0]        dc_step_0_o,
   output logic [19:0]        sh_step_00_o,
@@ -50,7 +50,7 @@ module flk_cluster_header (
   output logic [27:0]        low_1_o,
   output logic [27:0]        step_1_o,
   output logic signed [26:0] scale_low_1_o,
-  output logic signed [26:0] scale_step_1_o,
+  output logic [16:0]        scale_step_1_o,
   output logic signed [19:0] dc_low_1_o,
   output logic [19:0]        dc_step_1_o,
   output logic [19:0]        sh_step_01_o,
@@ -59,7 +59,7 @@ module flk_cluster_header (
   output logic [27:0]        low_2_o,
   output logic [27:0]        step_2_o,
   output logic signed [26:0] scale_low_2_o,
-  output logic signed [26:0] scale_step_2_o,
+  output logic [16:0]        scale_step_2_o,
   output logic signed [19:0] dc_low_2_o,
   output logic [19:0]        dc_step_2_o,
   output logic [19:0]        sh_step_02_o,
@@ -75,29 +75,32 @@ module flk_cluster_header (
   logic [27:0] step_0;  // cycle 0
   logic signed [26:0] scale_low_0;  // cycle 2
   logic signed [26:0] u_scale_low_0;
-  logic signed [26:0] scale_step_0;  // cycle 2
-  logic signed [26:0] u_scale_step_0;
+  logic signed [17:0] v34;  // cycle 2
+  logic signed [17:0] u_v34;
+  logic [16:0] scale_step_0;  // cycle 2
   logic signed [19:0] dc_low_0;  // cycle 2
   logic signed [19:0] u_dc_low_0;
   logic [19:0] dc_step_0;  // cycle 0
   logic [19:0] sh_step_00;  // cycle 0
   logic [19:0] sh_step_10;  // cycle 0
   logic [19:0] sh_step_20;  // cycle 0
-  logic [31:0] v40;  // cycle 5
+  logic [31:0] v41;  // cycle 5
   logic [27:0] low_1;  // cycle 5
   logic [27:0] step_1;  // cycle 0
   logic signed [26:0] scale_low_1;  // cycle 5
-  logic signed [26:0] scale_step_1;  // cycle 5
+  logic signed [17:0] v45;  // cycle 3
+  logic [16:0] scale_step_1;  // cycle 3
   logic signed [19:0] dc_low_1;  // cycle 5
   logic [19:0] dc_step_1;  // cycle 0
   logic [19:0] sh_step_01;  // cycle 0
   logic [19:0] sh_step_11;  // cycle 0
   logic [19:0] sh_step_21;  // cycle 0
-  logic [31:0] v50;  // cycle 6
+  logic [31:0] v52;  // cycle 6
   logic [27:0] low_2;  // cycle 6
   logic [27:0] step_2;  // cycle 0
   logic signed [26:0] scale_low_2;  // cycle 4
-  logic signed [26:0] scale_step_2;  // cycle 4
+  logic signed [17:0] v56;  // cycle 4
+  logic [16:0] scale_step_2;  // cycle 4
   logic signed [19:0] dc_low_2;  // cycle 4
   logic [19:0] dc_step_2;  // cycle 0
   logic [19:0] sh_step_02;  // cycle 0
@@ -114,7 +117,7 @@ module flk_cluster_header (
   logic [0:0][27:0] low_0_q;
   logic [1:0][27:0] step_0_q;
   logic [1:0][26:0] scale_low_0_q;
-  logic [1:0][26:0] scale_step_0_q;
+  logic [1:0][16:0] scale_step_0_q;
   logic [1:0][19:0] dc_low_0_q;
   logic [1:0][19:0] dc_step_0_q;
   logic [1:0][19:0] sh_step_00_q;
@@ -123,7 +126,7 @@ module flk_cluster_header (
   logic [0:0][27:0] low_1_q;
   logic [1:0][27:0] step_1_q;
   logic [0:0][26:0] scale_low_1_q;
-  logic [0:0][26:0] scale_step_1_q;
+  logic [1:0][16:0] scale_step_1_q;
   logic [0:0][19:0] dc_low_1_q;
   logic [1:0][19:0] dc_step_1_q;
   logic [1:0][19:0] sh_step_01_q;
@@ -132,7 +135,7 @@ module flk_cluster_header (
   logic [0:0][27:0] low_2_q;
   logic [1:0][27:0] step_2_q;
   logic [0:0][26:0] scale_low_2_q;
-  logic [0:0][26:0] scale_step_2_q;
+  logic [0:0][16:0] scale_step_2_q;
   logic [0:0][19:0] dc_low_2_q;
   logic [1:0][19:0] dc_step_2_q;
   logic [1:0][19:0] sh_step_02_q;
@@ -175,7 +178,6 @@ module flk_cluster_header (
     if (en_i && phase_i == 2'd1) begin
       low_1_q <= low_1;
       scale_low_1_q <= scale_low_1;
-      scale_step_1_q <= scale_step_1;
       dc_low_1_q <= dc_low_1;
     end
   end
@@ -190,6 +192,12 @@ module flk_cluster_header (
   end
 
   always_ff @(posedge clk_i) begin
+    if (en_i && phase_i == 2'd3) begin
+      scale_step_1_q <= {scale_step_1_q[0:0], scale_step_1};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
     if (en_i) begin
       u_v30_a_q <= phase_i == 2'd0 ? origin_0_i : phase_i == 2'd1 ? origin_1_i_q[0] : origin_2_i_q[0];
       u_v30_b_q <= phase_i == 2'd0 ? {!position_0_i[31], position_0_i[30:0]} : phase_i == 2'd1 ? {!position_1_i[31], position_1_i[30:0]} : {!position_2_i[31], position_2_i[30:0]};
@@ -197,18 +205,19 @@ module flk_cluster_header (
   end
   flk_ff_add #(.ManBits(23), .Stages(3)) i_u_v30 (.clk_i, .en_i, .a_i(u_v30_a_q), .b_i(u_v30_b_q), .sum_o(u_v30));
   assign v30 = u_v30;
-  assign v40 = u_v30;
-  assign v50 = u_v30;
+  assign v41 = u_v30;
+  assign v52 = u_v30;
   flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_0 (.x_i(v30), .y_o(low_0));
   flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_0 (.x_i(step_0_i), .y_o(step_0));
   flk_ff_to_fixed #(.Bits(27), .FracBits(20), .Round(1), .ManBits(23), .Stages(2)) i_u_scale_low_0 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? scale_low_0_i : phase_i == 2'd2 ? scale_low_2_i_q[0] : scale_low_1_i_q[0]), .y_o(u_scale_low_0));
   assign scale_low_0 = u_scale_low_0;
   assign scale_low_2 = u_scale_low_0;
   assign scale_low_1 = u_scale_low_0;
-  flk_ff_to_fixed #(.Bits(27), .FracBits(20), .Round(1), .ManBits(23), .Stages(2)) i_u_scale_step_0 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? scale_step_0_i : phase_i == 2'd2 ? scale_step_2_i_q[0] : scale_step_1_i_q[0]), .y_o(u_scale_step_0));
-  assign scale_step_0 = u_scale_step_0;
-  assign scale_step_2 = u_scale_step_0;
-  assign scale_step_1 = u_scale_step_0;
+  flk_ff_to_fixed #(.Bits(18), .FracBits(20), .Round(1), .ManBits(23), .Stages(2)) i_u_v34 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? scale_step_0_i : phase_i == 2'd1 ? scale_step_1_i_q[0] : scale_step_2_i_q[0]), .y_o(u_v34));
+  assign v34 = u_v34;
+  assign v45 = u_v34;
+  assign v56 = u_v34;
+  assign scale_step_0 = 17'(17'(v34 & ~(v34 >>> 17)));
   flk_ff_to_fixed #(.Bits(20), .FracBits(13), .Round(1), .ManBits(23), .Stages(2)) i_u_dc_low_0 (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? dc_low_0_i : phase_i == 2'd2 ? dc_low_2_i_q[0] : dc_low_1_i_q[0]), .y_o(u_dc_low_0));
   assign dc_low_0 = u_dc_low_0;
   assign dc_low_2 = u_dc_low_0;
@@ -217,14 +226,16 @@ module flk_cluster_header (
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_00 (.x_i(sh_step_00_i), .y_o(sh_step_00));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_10 (.x_i(sh_step_10_i), .y_o(sh_step_10));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_20 (.x_i(sh_step_20_i), .y_o(sh_step_20));
-  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_1 (.x_i(v40), .y_o(low_1));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_1 (.x_i(v41), .y_o(low_1));
   flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_1 (.x_i(step_1_i), .y_o(step_1));
+  assign scale_step_1 = 17'(17'(v45 & ~(v45 >>> 17)));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_step_1 (.x_i(dc_step_1_i), .y_o(dc_step_1));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_01 (.x_i(sh_step_01_i), .y_o(sh_step_01));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_11 (.x_i(sh_step_11_i), .y_o(sh_step_11));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_21 (.x_i(sh_step_21_i), .y_o(sh_step_21));
-  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_2 (.x_i(v50), .y_o(low_2));
+  flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_low_2 (.x_i(v52), .y_o(low_2));
   flk_ff_narrow #(.FromBits(23), .ManBits(19)) i_step_2 (.x_i(step_2_i), .y_o(step_2));
+  assign scale_step_2 = 17'(17'(v56 & ~(v56 >>> 17)));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_dc_step_2 (.x_i(dc_step_2_i), .y_o(dc_step_2));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_02 (.x_i(sh_step_02_i), .y_o(sh_step_02));
   flk_ff_narrow #(.FromBits(23), .ManBits(11)) i_sh_step_12 (.x_i(sh_step_12_i), .y_o(sh_step_12));
@@ -233,7 +244,7 @@ module flk_cluster_header (
   assign low_0_o = low_0_q[0];
   assign step_0_o = step_0_q[1];
   assign scale_low_0_o = $signed(scale_low_0_q[1]);
-  assign scale_step_0_o = $signed(scale_step_0_q[1]);
+  assign scale_step_0_o = scale_step_0_q[1];
   assign dc_low_0_o = $signed(dc_low_0_q[1]);
   assign dc_step_0_o = dc_step_0_q[1];
   assign sh_step_00_o = sh_step_00_q[1];
@@ -242,7 +253,7 @@ module flk_cluster_header (
   assign low_1_o = low_1_q[0];
   assign step_1_o = step_1_q[1];
   assign scale_low_1_o = $signed(scale_low_1_q[0]);
-  assign scale_step_1_o = $signed(scale_step_1_q[0]);
+  assign scale_step_1_o = scale_step_1_q[1];
   assign dc_low_1_o = $signed(dc_low_1_q[0]);
   assign dc_step_1_o = dc_step_1_q[1];
   assign sh_step_01_o = sh_step_01_q[1];
@@ -251,7 +262,7 @@ module flk_cluster_header (
   assign low_2_o = low_2_q[0];
   assign step_2_o = step_2_q[1];
   assign scale_low_2_o = $signed(scale_low_2_q[0]);
-  assign scale_step_2_o = $signed(scale_step_2_q[0]);
+  assign scale_step_2_o = scale_step_2_q[0];
   assign dc_low_2_o = $signed(dc_low_2_q[0]);
   assign dc_step_2_o = dc_step_2_q[1];
   assign sh_step_02_o = sh_step_02_q[1];

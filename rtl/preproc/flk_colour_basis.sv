@@ -64,16 +64,16 @@ module flk_colour_basis (
   logic signed [10:0] v19;  // cycle 18
   logic signed [11:0] basis_3;  // cycle 20
   logic signed [13:0] v21;  // cycle 15
-  logic signed [14:0] u_v21;
+  logic signed [13:0] u_v21;
   logic [12:0] u_v21_a, u_v21_a_even, u_v21_a_odd;
   logic [13:0] u_v21_b, u_v21_b_even, u_v21_b_odd;
   logic signed [13:0] v22;  // cycle 15
-  logic signed [14:0] u_v22;
+  logic signed [13:0] u_v22;
   logic [12:0] u_v22_a, u_v22_a_even, u_v22_a_odd;
   logic [13:0] u_v22_b, u_v22_b_even, u_v22_b_odd;
   logic signed [13:0] v23;  // cycle 16
   logic signed [13:0] v24;  // cycle 15
-  logic signed [14:0] u_v24;
+  logic signed [13:0] u_v24;
   logic [12:0] u_v24_a, u_v24_a_even, u_v24_a_odd;
   logic [13:0] u_v24_b, u_v24_b_even, u_v24_b_odd;
   logic signed [13:0] v25;  // cycle 16
@@ -94,12 +94,12 @@ module flk_colour_basis (
   logic signed [14:0] v40;  // cycle 15
   logic signed [13:0] v41;  // cycle 16
   logic signed [13:0] v42;  // cycle 18
-  logic signed [14:0] u_v47;
+  logic signed [13:0] u_v47;
   logic [13:0] u_v47_b, u_v47_b_even, u_v47_b_odd;
   logic signed [11:0] basis_9;  // cycle 18
   logic signed [13:0] v44;  // cycle 15
   logic signed [13:0] v45;  // cycle 17
-  logic signed [14:0] u_v45;
+  logic signed [13:0] u_v45;
   logic [13:0] u_v45_b, u_v45_b_even, u_v45_b_odd;
   logic signed [11:0] basis_10;  // cycle 17
   logic signed [13:0] v47;  // cycle 19
@@ -108,17 +108,18 @@ module flk_colour_basis (
   logic signed [13:0] v50;  // cycle 18
   logic signed [11:0] basis_12;  // cycle 18
   logic signed [13:0] v52;  // cycle 19
-  logic signed [14:0] u_v52;
+  logic signed [13:0] u_v52;
   logic [13:0] u_v52_b, u_v52_b_even, u_v52_b_odd;
   logic signed [11:0] basis_13;  // cycle 19
   logic signed [13:0] v54;  // cycle 16
   logic signed [13:0] v55;  // cycle 18
-  logic signed [14:0] u_v55;
+  logic signed [13:0] u_v55;
   logic signed [11:0] basis_14;  // cycle 18
   logic signed [14:0] v57;  // cycle 15
   logic signed [13:0] v58;  // cycle 16
   logic signed [13:0] v59;  // cycle 18
   logic signed [11:0] basis_15;  // cycle 18
+  logic unused_wrapped;
   logic [4:0][19:0] direction_0_i_q;
   logic [4:0][19:0] direction_1_i_q;
   logic [4:0][19:0] direction_2_i_q;
@@ -274,9 +275,9 @@ module flk_colour_basis (
   assign u_v21_b_odd = 14'(v14);
   flk_phase_mux #(.Width(7)) i_u_v21_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v21_b_even[6:0]), .b_i(u_v21_b_odd[6:0]), .y_o(u_v21_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v21_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v21_b_even[13:7]), .b_i(u_v21_b_odd[13:7]), .y_o(u_v21_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v21 (.clk_i, .en_i, .a_i(u_v21_a), .b_i(u_v21_b), .y_o(u_v21));
-  assign v21 = 14'(u_v21);
-  assign v23 = 14'(u_v21);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v21 (.clk_i, .en_i, .a_i(u_v21_a), .b_i(u_v21_b), .y_o(u_v21));
+  assign v21 = u_v21;
+  assign v23 = u_v21;
   assign u_v22_a_even = v12;
   assign u_v22_a_odd = $signed(v12_q[0]);
   flk_phase_mux #(.Width(6)) i_u_v22_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v22_a_even[5:0]), .b_i(u_v22_a_odd[5:0]), .y_o(u_v22_a[5:0]));
@@ -285,9 +286,9 @@ module flk_colour_basis (
   assign u_v22_b_odd = 14'(v14);
   flk_phase_mux #(.Width(7)) i_u_v22_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v22_b_even[6:0]), .b_i(u_v22_b_odd[6:0]), .y_o(u_v22_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v22_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v22_b_even[13:7]), .b_i(u_v22_b_odd[13:7]), .y_o(u_v22_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v22 (.clk_i, .en_i, .a_i(u_v22_a), .b_i(u_v22_b), .y_o(u_v22));
-  assign v22 = 14'(u_v22);
-  assign v25 = 14'(u_v22);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v22 (.clk_i, .en_i, .a_i(u_v22_a), .b_i(u_v22_b), .y_o(u_v22));
+  assign v22 = u_v22;
+  assign v25 = u_v22;
   assign u_v24_a_even = v10;
   assign u_v24_a_odd = $signed(v10_q[0]);
   flk_phase_mux #(.Width(6)) i_u_v24_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v24_a_even[5:0]), .b_i(u_v24_a_odd[5:0]), .y_o(u_v24_a[5:0]));
@@ -296,9 +297,9 @@ module flk_colour_basis (
   assign u_v24_b_odd = 14'(v14);
   flk_phase_mux #(.Width(7)) i_u_v24_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v24_b_even[6:0]), .b_i(u_v24_b_odd[6:0]), .y_o(u_v24_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v24_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v24_b_even[13:7]), .b_i(u_v24_b_odd[13:7]), .y_o(u_v24_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v24 (.clk_i, .en_i, .a_i(u_v24_a), .b_i(u_v24_b), .y_o(u_v24));
-  assign v24 = 14'(u_v24);
-  assign v26 = 14'(u_v24);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v24 (.clk_i, .en_i, .a_i(u_v24_a), .b_i(u_v24_b), .y_o(u_v24));
+  assign v24 = u_v24;
+  assign v26 = u_v24;
   assign v27 = 14'(((15'(v21) <<< 0) - (15'(v22) <<< 0)) >>> 0);
   assign v28 = 13'(((27'(v24) <<< 12) + (27'(v24) <<< 9) - (27'(v24) <<< 7) - (27'(v24) <<< 2) - (27'(v24) <<< 0) + 27'sd4096) >>> 13);
   assign basis_4 = 12'($signed(v28_q[0]));
@@ -318,18 +319,18 @@ module flk_colour_basis (
   assign u_v47_b_odd = $signed(v41_q[0]);
   flk_phase_mux #(.Width(7)) i_u_v47_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v47_b_even[6:0]), .b_i(u_v47_b_odd[6:0]), .y_o(u_v47_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v47_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v47_b_even[13:7]), .b_i(u_v47_b_odd[13:7]), .y_o(u_v47_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v47 (.clk_i, .en_i, .a_i($signed(v12_q[1])), .b_i(u_v47_b), .y_o(u_v47));
-  assign v47 = 14'(u_v47);
-  assign v42 = 14'(u_v47);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v47 (.clk_i, .en_i, .a_i($signed(v12_q[1])), .b_i(u_v47_b), .y_o(u_v47));
+  assign v47 = u_v47;
+  assign v42 = u_v47;
   assign basis_9 = 12'(v42);
   assign v44 = 14'(((28'(v24) <<< 14) - (28'(v24) <<< 12) - (28'(v24) <<< 9) + (28'(v24) <<< 6) + 28'sd4096) >>> 13);
   assign u_v45_b_even = $signed(v44_q[0]);
   assign u_v45_b_odd = $signed(v49_q[0]);
   flk_phase_mux #(.Width(7)) i_u_v45_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v45_b_even[6:0]), .b_i(u_v45_b_odd[6:0]), .y_o(u_v45_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v45_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v45_b_even[13:7]), .b_i(u_v45_b_odd[13:7]), .y_o(u_v45_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v45 (.clk_i, .en_i, .a_i($signed(v14_q[0])), .b_i(u_v45_b), .y_o(u_v45));
-  assign v45 = 14'(u_v45);
-  assign v50 = 14'(u_v45);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v45 (.clk_i, .en_i, .a_i($signed(v14_q[0])), .b_i(u_v45_b), .y_o(u_v45));
+  assign v45 = u_v45;
+  assign v50 = u_v45;
   assign basis_10 = 12'(v45);
   assign basis_11 = 12'(v47);
   assign v49 = 14'(((28'(v23) <<< 13) - (28'(v23) <<< 9) - (28'(v23) <<< 5) - (28'(v23) <<< 2) + (28'(v23) <<< 0) - 28'sd18784256) >>> 13);
@@ -338,17 +339,18 @@ module flk_colour_basis (
   assign u_v52_b_odd = $signed(v58_q[0]);
   flk_phase_mux #(.Width(7)) i_u_v52_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v52_b_even[6:0]), .b_i(u_v52_b_odd[6:0]), .y_o(u_v52_b[6:0]));
   flk_phase_mux #(.Width(7)) i_u_v52_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v52_b_even[13:7]), .b_i(u_v52_b_odd[13:7]), .y_o(u_v52_b[13:7]));
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v52 (.clk_i, .en_i, .a_i($signed(v10_q[1])), .b_i(u_v52_b), .y_o(u_v52));
-  assign v52 = 14'(u_v52);
-  assign v59 = 14'(u_v52);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v52 (.clk_i, .en_i, .a_i($signed(v10_q[1])), .b_i(u_v52_b), .y_o(u_v52));
+  assign v52 = u_v52;
+  assign v59 = u_v52;
   assign basis_13 = 12'(v52);
   assign v54 = 14'(((28'($signed(v27_q[0])) <<< 13) - (28'($signed(v27_q[0])) <<< 11) - (28'($signed(v27_q[0])) <<< 8) + (28'($signed(v27_q[0])) <<< 5) + 28'sd4096) >>> 13);
-  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(15), .Stages(1)) i_u_v55 (.clk_i, .en_i, .a_i($signed(v14_q[0])), .b_i($signed(v54_q[0])), .y_o(u_v55));
-  assign v55 = 14'(u_v55);
+  flk_fixed_mul #(.ABits(13), .BBits(14), .Drop(12), .OutBits(14), .Stages(1)) i_u_v55 (.clk_i, .en_i, .a_i($signed(v14_q[0])), .b_i($signed(v54_q[0])), .y_o(u_v55));
+  assign v55 = u_v55;
   assign basis_14 = 12'(v55);
   assign v57 = 15'(((16'(v21) <<< 0) - (16'(v22) <<< 2) + (16'(v22) <<< 0)) >>> 0);
   assign v58 = 14'((- (28'($signed(v57_q[0])) <<< 11) - (28'($signed(v57_q[0])) <<< 9) + (28'($signed(v57_q[0])) <<< 7) + (28'($signed(v57_q[0])) <<< 4) - (28'($signed(v57_q[0])) <<< 0) + 28'sd4096) >>> 13);
   assign basis_15 = 12'(v59);
+  assign unused_wrapped = ^{v28, v30, v32, v34, v36, v42, v45, v47, v50, v52, v55, v59};
 
   assign basis_1_o = basis_1;
   assign basis_2_o = basis_2;

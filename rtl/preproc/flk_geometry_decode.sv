@@ -17,9 +17,9 @@ module flk_geometry_decode (
   input  logic signed [26:0] scale_low_0_i,
   input  logic signed [26:0] scale_low_1_i,
   input  logic signed [26:0] scale_low_2_i,
-  input  logic signed [26:0] scale_step_0_i,
-  input  logic signed [26:0] scale_step_1_i,
-  input  logic signed [26:0] scale_step_2_i,
+  input  logic [16:0]        scale_step_0_i,
+  input  logic [16:0]        scale_step_1_i,
+  input  logic [16:0]        scale_step_2_i,
   output logic [27:0]        q_0_o,
   output logic [27:0]        q_1_o,
   output logic [27:0]        q_2_o,
@@ -64,32 +64,32 @@ module flk_geometry_decode (
   logic [10:0] v37;  // cycle 0
   logic [9:0] v38;  // cycle 0
   logic [10:0] v39;  // cycle 0
-  logic signed [37:0] v40;  // cycle 0
-  logic signed [37:0] v41;  // cycle 1
-  logic signed [37:0] v42;  // cycle 2
-  logic signed [29:0] v43;  // cycle 3
-  logic signed [29:0] v44;  // cycle 3
+  logic [27:0] v40;  // cycle 0
+  logic signed [29:0] v41;  // cycle 1
+  logic signed [29:0] v42;  // cycle 2
+  logic signed [21:0] v43;  // cycle 3
+  logic signed [21:0] v44;  // cycle 3
   logic signed [19:0] v45;  // cycle 4
   logic [19:0] v46;  // cycle 7
   logic [19:0] u_v64;
   logic [19:0] u_v64_l, u_v64_l_even, u_v64_l_odd;
   logic [19:0] v47;  // cycle 5
   logic [19:0] s_0;  // cycle 7
-  logic signed [36:0] v49;  // cycle 0
-  logic signed [36:0] v50;  // cycle 1
-  logic signed [36:0] v51;  // cycle 2
-  logic signed [28:0] v52;  // cycle 3
-  logic signed [28:0] v53;  // cycle 3
+  logic [26:0] v49;  // cycle 0
+  logic signed [28:0] v50;  // cycle 1
+  logic signed [28:0] v51;  // cycle 2
+  logic signed [20:0] v52;  // cycle 3
+  logic signed [20:0] v53;  // cycle 3
   logic signed [19:0] v54;  // cycle 4
   logic [19:0] v55;  // cycle 7
   logic [19:0] u_v55;
   logic [19:0] v56;  // cycle 5
   logic [19:0] s_1;  // cycle 7
-  logic signed [37:0] v58;  // cycle 0
-  logic signed [37:0] v59;  // cycle 1
-  logic signed [37:0] v60;  // cycle 2
-  logic signed [29:0] v61;  // cycle 3
-  logic signed [29:0] v62;  // cycle 3
+  logic [27:0] v58;  // cycle 0
+  logic signed [29:0] v59;  // cycle 1
+  logic signed [29:0] v60;  // cycle 2
+  logic signed [21:0] v61;  // cycle 3
+  logic signed [21:0] v62;  // cycle 3
   logic signed [19:0] v63;  // cycle 4
   logic [19:0] v64;  // cycle 8
   logic [19:0] v65;  // cycle 6
@@ -157,24 +157,24 @@ module flk_geometry_decode (
   logic [5:0][27:0] q_1_q;
   logic [0:0][27:0] v35_q;
   logic [5:0][27:0] q_2_q;
-  logic [0:0][37:0] v40_q;
-  logic [0:0][37:0] v41_q;
-  logic [0:0][37:0] v42_q;
-  logic [0:0][29:0] v44_q;
+  logic [0:0][27:0] v40_q;
+  logic [0:0][29:0] v41_q;
+  logic [0:0][29:0] v42_q;
+  logic [0:0][21:0] v44_q;
   logic [0:0][19:0] v45_q;
   logic [0:0][19:0] v47_q;
   logic [3:0][19:0] s_0_q;
-  logic [0:0][36:0] v49_q;
-  logic [0:0][36:0] v50_q;
-  logic [0:0][36:0] v51_q;
-  logic [0:0][28:0] v53_q;
+  logic [0:0][26:0] v49_q;
+  logic [0:0][28:0] v50_q;
+  logic [0:0][28:0] v51_q;
+  logic [0:0][20:0] v53_q;
   logic [0:0][19:0] v54_q;
   logic [0:0][19:0] v56_q;
   logic [3:0][19:0] s_1_q;
-  logic [0:0][37:0] v58_q;
-  logic [0:0][37:0] v59_q;
-  logic [0:0][37:0] v60_q;
-  logic [0:0][29:0] v62_q;
+  logic [0:0][27:0] v58_q;
+  logic [0:0][29:0] v59_q;
+  logic [0:0][29:0] v60_q;
+  logic [0:0][21:0] v62_q;
   logic [0:0][19:0] v63_q;
   logic [0:0][19:0] v65_q;
   logic [2:0][19:0] s_2_q;
@@ -321,12 +321,12 @@ module flk_geometry_decode (
   assign v37 = word_2_i[31:21];
   assign v38 = word_2_i[20:11];
   assign v39 = word_2_i[10:0];
-  assign v40 = 38'($signed(38'(v37)) * 38'(scale_step_0_i));
-  assign v41 = 38'(38'($signed(scale_low_0_i_q[0])) + $signed(v40_q[0]));
-  assign v42 = 38'($signed(v41_q[0]) + 38'sd128);
-  assign v43 = 30'($signed(v42_q[0]) >>> 8);
-  assign v44 = 30'(v43 < -30'sd524288 ? -30'sd524288 : v43);
-  assign v45 = 20'(30'sd524287 < $signed(v44_q[0]) ? 30'sd524287 : $signed(v44_q[0]));
+  assign v40 = 28'(28'(v37) * 28'(scale_step_0_i));
+  assign v41 = 30'(30'($signed(scale_low_0_i_q[0])) + $signed(30'(v40_q[0])));
+  assign v42 = 30'($signed(v41_q[0]) + 30'sd128);
+  assign v43 = 22'($signed(v42_q[0]) >>> 8);
+  assign v44 = 22'(v43 < -22'sd524288 ? -22'sd524288 : v43);
+  assign v45 = 20'(22'sd524287 < $signed(v44_q[0]) ? 22'sd524287 : $signed(v44_q[0]));
   assign u_v64_l_even = $signed(v63_q[0]);
   assign u_v64_l_odd = $signed(v45_q[0]);
   flk_phase_mux #(.Width(10)) i_u_v64_l_0 (.clk_i, .odd_i(next_odd), .a_i(u_v64_l_even[9:0]), .b_i(u_v64_l_odd[9:0]), .y_o(u_v64_l[9:0]));
@@ -336,22 +336,22 @@ module flk_geometry_decode (
   assign v46 = u_v64;
   flk_ff_from_fp16 #(.ManBits(11)) i_v47 (.x_i(v15_q[2]), .y_o(v47));
   assign s_0 = chunked_i ? v46 : v47_q[0];
-  assign v49 = 37'($signed(37'(v38)) * 37'(scale_step_1_i));
-  assign v50 = 37'(37'($signed(scale_low_1_i_q[0])) + $signed(v49_q[0]));
-  assign v51 = 37'($signed(v50_q[0]) + 37'sd128);
-  assign v52 = 29'($signed(v51_q[0]) >>> 8);
-  assign v53 = 29'(v52 < -29'sd524288 ? -29'sd524288 : v52);
-  assign v54 = 20'(29'sd524287 < $signed(v53_q[0]) ? 29'sd524287 : $signed(v53_q[0]));
+  assign v49 = 27'(27'(v38) * 27'(scale_step_1_i));
+  assign v50 = 29'(29'($signed(scale_low_1_i_q[0])) + $signed(29'(v49_q[0])));
+  assign v51 = 29'($signed(v50_q[0]) + 29'sd128);
+  assign v52 = 21'($signed(v51_q[0]) >>> 8);
+  assign v53 = 21'(v52 < -21'sd524288 ? -21'sd524288 : v52);
+  assign v54 = 20'(21'sd524287 < $signed(v53_q[0]) ? 21'sd524287 : $signed(v53_q[0]));
   flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v55 (.clk_i, .en_i, .l_i(20'($signed(v54_q[0]))), .y_o(u_v55));
   assign v55 = u_v55;
   flk_ff_from_fp16 #(.ManBits(11)) i_v56 (.x_i(v16_q[2]), .y_o(v56));
   assign s_1 = chunked_i ? v55 : v56_q[0];
-  assign v58 = 38'($signed(38'(v39)) * 38'(scale_step_2_i));
-  assign v59 = 38'(38'($signed(scale_low_2_i_q[0])) + $signed(v58_q[0]));
-  assign v60 = 38'($signed(v59_q[0]) + 38'sd128);
-  assign v61 = 30'($signed(v60_q[0]) >>> 8);
-  assign v62 = 30'(v61 < -30'sd524288 ? -30'sd524288 : v61);
-  assign v63 = 20'(30'sd524287 < $signed(v62_q[0]) ? 30'sd524287 : $signed(v62_q[0]));
+  assign v58 = 28'(28'(v39) * 28'(scale_step_2_i));
+  assign v59 = 30'(30'($signed(scale_low_2_i_q[0])) + $signed(30'(v58_q[0])));
+  assign v60 = 30'($signed(v59_q[0]) + 30'sd128);
+  assign v61 = 22'($signed(v60_q[0]) >>> 8);
+  assign v62 = 22'(v61 < -22'sd524288 ? -22'sd524288 : v61);
+  assign v63 = 20'(22'sd524287 < $signed(v62_q[0]) ? 22'sd524287 : $signed(v62_q[0]));
   flk_ff_from_fp16 #(.ManBits(11)) i_v65 (.x_i(v17_q[2]), .y_o(v65));
   assign s_2 = chunked_i ? v64 : v65_q[0];
   assign v67 = word_1_i[29:20];

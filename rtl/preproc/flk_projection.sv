@@ -147,19 +147,19 @@ module flk_projection (
   logic signed [29:0] u_v74;
   logic [27:0] v73;  // cycle 33
   logic signed [29:0] v74;  // cycle 36
-  logic v75;  // cycle 35
-  logic v76;  // cycle 35
-  logic v77;  // cycle 36
-  logic v78;  // cycle 36
-  logic v79;  // cycle 37
-  logic v80;  // cycle 36
-  logic far;  // cycle 38
+  logic v75;  // cycle 36
+  logic v76;  // cycle 36
+  logic v77;  // cycle 37
+  logic v78;  // cycle 37
+  logic v79;  // cycle 38
+  logic v80;  // cycle 37
+  logic far;  // cycle 39
   logic [11:0] v82;
   logic [17:0] v83;
   logic signed [30:0] x;  // cycle 62
   logic [11:0] v85;
   logic [17:0] v86;
-  logic signed [30:0] y;  // cycle 62
+  logic signed [30:0] y;  // cycle 64
   logic [19:0] v88;  // cycle 29
   logic [19:0] v89;
   logic v90;  // cycle 30
@@ -516,31 +516,31 @@ module flk_projection (
   logic signed [29:0] u_radius_y;
   logic [19:0] v238;  // cycle 61
   logic signed [29:0] radius_y;  // cycle 64
-  logic signed [31:0] v240;  // cycle 63
-  logic signed [31:0] v241;  // cycle 64
-  logic signed [31:0] v242;  // cycle 65
-  logic signed [24:0] v243;  // cycle 66
-  logic signed [31:0] v244;  // cycle 63
-  logic signed [24:0] v245;  // cycle 64
-  logic [23:0] v246;  // cycle 66
-  logic signed [23:0] v247;  // cycle 64
-  logic signed [31:0] v248;  // cycle 64
-  logic signed [31:0] v249;  // cycle 65
-  logic signed [31:0] v250;  // cycle 66
-  logic signed [24:0] v251;  // cycle 67
-  logic signed [31:0] v252;  // cycle 64
-  logic signed [24:0] v253;  // cycle 65
-  logic [23:0] v254;  // cycle 67
-  logic signed [23:0] v255;  // cycle 65
+  logic signed [31:0] v240;  // cycle 64
+  logic signed [31:0] v241;  // cycle 65
+  logic signed [31:0] v242;  // cycle 66
+  logic signed [24:0] v243;  // cycle 67
+  logic signed [31:0] v244;  // cycle 64
+  logic signed [24:0] v245;  // cycle 65
+  logic [23:0] v246;  // cycle 67
+  logic signed [23:0] v247;  // cycle 65
+  logic signed [31:0] v248;  // cycle 65
+  logic signed [31:0] v249;  // cycle 66
+  logic signed [31:0] v250;  // cycle 67
+  logic signed [24:0] v251;  // cycle 68
+  logic signed [31:0] v252;  // cycle 65
+  logic signed [24:0] v253;  // cycle 66
+  logic [23:0] v254;  // cycle 68
+  logic signed [23:0] v255;  // cycle 66
   logic [19:0] v256;  // cycle 67
   logic [19:0] v257;  // cycle 69
   logic [19:0] i0;  // cycle 71
   logic [19:0] v259;  // cycle 59
   logic [19:0] kappa;  // cycle 61
   logic [19:0] lean;  // cycle 59
-  logic v262;  // cycle 67
-  logic v263;  // cycle 68
-  logic outside;  // cycle 69
+  logic v262;  // cycle 68
+  logic v263;  // cycle 69
+  logic outside;  // cycle 70
   logic [27:0] v265;  // cycle 25
   logic [27:0] v266;  // cycle 25
   logic signed [24:0] v267;  // cycle 28
@@ -577,9 +577,11 @@ module flk_projection (
   logic [0:0][27:0] iz_q;
   logic [29:0] v72_end;
   logic [29:0] v72_end_q;
+  logic [0:0][29:0] v72_q;
   logic [0:0][27:0] v73_q;
   logic [29:0] v74_end;
   logic [29:0] v74_end_q;
+  logic [0:0][29:0] v74_q;
   logic [0:0][0:0] v75_q;
   logic [0:0][0:0] v76_q;
   logic [0:0][0:0] v77_q;
@@ -588,7 +590,7 @@ module flk_projection (
   logic [0:0][0:0] v80_q;
   logic [0:0] far_end;
   logic [4:0][30:0] x_q;
-  logic [4:0][30:0] y_q;
+  logic [3:0][30:0] y_q;
   logic [0:0][19:0] v88_q;
   logic [0:0][0:0] v90_q;
   logic [0:0][19:0] v91_q;
@@ -657,7 +659,9 @@ module flk_projection (
   logic [0:0][19:0] l1_q;
   logic [6:0][19:0] sx_q;
   logic [6:0][19:0] sy_q;
+  logic [0:0][29:0] radius_x_q;
   logic [0:0][19:0] v238_q;
+  logic [0:0][29:0] radius_y_q;
   logic [0:0][31:0] v240_q;
   logic [0:0][31:0] v241_q;
   logic [0:0][31:0] v242_q;
@@ -675,7 +679,7 @@ module flk_projection (
   logic [6:0][19:0] lean_q;
   logic [0:0][0:0] v262_q;
   logic [0:0][0:0] v263_q;
-  logic [1:0][0:0] outside_q;
+  logic [0:0][0:0] outside_q;
   logic [0:0][27:0] v266_q;
   logic [23:0] key_end;
   logic [19:0] direction_0_end;
@@ -701,11 +705,12 @@ module flk_projection (
       v64_q <= v64;
       iz_q <= iz;
       v74_end_q <= v74_end;
-      v77_q <= v77;
-      v78_q <= v78;
-      v80_q <= v80;
+      v74_q <= v74;
+      v75_q <= v75;
+      v76_q <= v76;
+      v79_q <= v79;
       x_q <= {x_q[3:0], x};
-      y_q <= {y_q[3:0], y};
+      y_q <= {y_q[2:0], y};
       v90_q <= v90;
       v92_q <= v92;
       v96_q <= v96;
@@ -731,13 +736,15 @@ module flk_projection (
       cross0_q <= cross0;
       spiky_q <= {spiky_q[2:0], spiky};
       rdet_q <= rdet;
-      v241_q <= v241;
-      v246_q <= v246;
-      v247_q <= {v247_q[0:0], v247};
-      v248_q <= v248;
-      v250_q <= v250;
-      v252_q <= v252;
-      v263_q <= v263;
+      radius_y_q <= radius_y;
+      v240_q <= v240;
+      v242_q <= v242;
+      v244_q <= v244;
+      v249_q <= v249;
+      v254_q <= v254;
+      v255_q <= {v255_q[0:0], v255};
+      v262_q <= v262;
+      outside_q <= outside;
     end
   end
 
@@ -750,10 +757,11 @@ module flk_projection (
       v63_q <= {v63_q[0:0], v63};
       v66_q <= v66;
       v72_end_q <= v72_end;
+      v72_q <= v72;
       v73_q <= v73;
-      v75_q <= v75;
-      v76_q <= v76;
-      v79_q <= v79;
+      v77_q <= v77;
+      v78_q <= v78;
+      v80_q <= v80;
       v88_q <= v88;
       v91_q <= v91;
       ax_q <= ax;
@@ -786,28 +794,24 @@ module flk_projection (
       l1_q <= l1;
       sx_q <= {sx_q[5:0], sx};
       sy_q <= {sy_q[5:0], sy};
+      radius_x_q <= radius_x;
       v238_q <= v238;
-      v240_q <= v240;
-      v242_q <= v242;
-      v244_q <= v244;
-      v249_q <= v249;
-      v254_q <= v254;
-      v255_q <= {v255_q[0:0], v255};
+      v241_q <= v241;
+      v246_q <= v246;
+      v247_q <= {v247_q[0:0], v247};
+      v248_q <= v248;
+      v250_q <= v250;
+      v252_q <= v252;
       i0_q <= i0;
       kappa_q <= {kappa_q[4:0], kappa};
       lean_q <= {lean_q[5:0], lean};
-      v262_q <= v262;
-      outside_q <= {outside_q[0:0], outside};
+      v263_q <= v263;
       v266_q <= v266;
     end
   end
 
   flk_delay_ram #(.Width(90), .Depth(12)) i_ring_0_12 (
-    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({s_0_i, s_1_i, s_2_i, v74}), .q_o({s_0_i_end, s_1_i_end, s_2_i_end, v74_end})
-  );
-
-  flk_delay_ram #(.Width(1), .Depth(17)) i_ring_0_17 (
-    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({far}), .q_o({far_end})
+    .clk_i, .en_i(en_i && phase_i == 1'd0), .d_i({s_0_i, s_1_i, s_2_i, v74_q[0]}), .q_o({s_0_i_end, s_1_i_end, s_2_i_end, v74_end})
   );
 
   flk_delay_ram #(.Width(24), .Depth(22)) i_ring_0_22 (
@@ -838,8 +842,12 @@ module flk_projection (
     .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({r01, r02, r10, r12, r20, r21}), .q_o({r01_end, r02_end, r10_end, r12_end, r20_end, r21_end})
   );
 
-  flk_delay_ram #(.Width(30), .Depth(13)) i_ring_1_13 (
-    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({v72}), .q_o({v72_end})
+  flk_delay_ram #(.Width(30), .Depth(12)) i_ring_1_12 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({v72_q[0]}), .q_o({v72_end})
+  );
+
+  flk_delay_ram #(.Width(1), .Depth(17)) i_ring_1_17 (
+    .clk_i, .en_i(en_i && phase_i == 1'd1), .d_i({far}), .q_o({far_end})
   );
 
   assign next_odd = phase_i ^ en_i;
@@ -967,12 +975,12 @@ module flk_projection (
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(19), .Stages(2)) i_u_v74 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v73_q[0] : v71), .y_o(u_v74));
   assign v74 = u_v74;
   assign v72 = u_v74;
-  assign v75 = v72 >= 30'sd536870911;
-  assign v76 = v72 < -30'sd536870911;
+  assign v75 = $signed(v72_q[0]) >= 30'sd536870911;
+  assign v76 = $signed(v72_q[0]) < -30'sd536870911;
   assign v77 = v75_q[0] | v76_q[0];
-  assign v78 = v74 >= 30'sd536870911;
+  assign v78 = $signed(v74_q[0]) >= 30'sd536870911;
   assign v79 = v77_q[0] | v78_q[0];
-  assign v80 = v74 < -30'sd536870911;
+  assign v80 = $signed(v74_q[0]) < -30'sd536870911;
   assign far = v79_q[0] | v80_q[0];
   assign v82 = 12'(width_i - 13'd1);
   assign v83 = 18'(18'(v82) <<< 6);
@@ -1738,19 +1746,19 @@ module flk_projection (
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_radius_y (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v238_q[0] : v236), .y_o(u_radius_y));
   assign radius_y = u_radius_y;
   assign radius_x = u_radius_y;
-  assign v240 = 32'(32'($signed(x_q[0])) - 32'(radius_x));
+  assign v240 = 32'(32'($signed(x_q[0])) - 32'($signed(radius_x_q[0])));
   assign v241 = 32'($signed(v240_q[0]) + 32'sd128);
   assign v242 = 32'($signed(v241_q[0]) - 32'sd1);
   assign v243 = 25'($signed(v242_q[0]) >>> 7);
-  assign v244 = 32'(32'($signed(x_q[0])) + 32'(radius_x));
+  assign v244 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
   assign v245 = 25'($signed(v244_q[0]) >>> 7);
   assign v246 = 24'(v243 < 25'sd0 ? 25'sd0 : v243);
   assign v247 = 24'($signed(25'(v82)) < v245 ? $signed(25'(v82)) : v245);
-  assign v248 = 32'(32'($signed(y_q[0])) - 32'(radius_y));
+  assign v248 = 32'(32'($signed(y_q[0])) - 32'($signed(radius_y_q[0])));
   assign v249 = 32'($signed(v248_q[0]) + 32'sd128);
   assign v250 = 32'($signed(v249_q[0]) - 32'sd1);
   assign v251 = 25'($signed(v250_q[0]) >>> 7);
-  assign v252 = 32'(32'($signed(y_q[0])) + 32'(radius_y));
+  assign v252 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
   assign v253 = 25'($signed(v252_q[0]) >>> 7);
   assign v254 = 24'(v251 < 25'sd0 ? 25'sd0 : v251);
   assign v255 = 24'($signed(25'(v85)) < v253 ? $signed(25'(v85)) : v253);
@@ -1766,10 +1774,10 @@ module flk_projection (
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_2 (.x_i(d2_q[0]), .y_o(direction_2));
 
   assign near_o = near_end;
-  assign outside_o = outside_q[1];
+  assign outside_o = outside_q[0];
   assign far_o = far_end;
   assign x_o = $signed(x_q[4]);
-  assign y_o = $signed(y_q[4]);
+  assign y_o = $signed(y_q[3]);
   assign sx_o = sx_q[6];
   assign sy_o = sy_q[6];
   assign l0_o = l0_q[0];

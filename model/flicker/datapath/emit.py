@@ -122,6 +122,9 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
             body += _instance(w, v, w.names[v])
         else:
             body.append(f"  assign {w.names[v]} = {_expression(w, v)};")
+    if wrapped := _wrapped(graph, live):
+        wires.append("  logic unused_wrapped;")
+        body.append(f"  assign unused_wrapped = ^{{{', '.join(w.names[v] for v in wrapped)}}};")
     if any("next_odd" in line for line in body):
         wires.insert(0, "  logic next_odd;  // the phase of the next cycle")
         body.insert(0, "  assign next_odd = phase_i ^ en_i;")
@@ -131,6 +134,17 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
         *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
     ])
     return text, plan
+
+
+def _wrapped(graph: Graph, live: set[Value]) -> list[Value]:
+    """Values of which only low bits are used."""
+    users: dict[Value, list[Value]] = {}
+    for v in graph.values:
+        if v in live:
+            for o in v.operands:
+                users.setdefault(o, []).append(v)
+    narrow = lambda v, o: v.operator.wiring and re.fullmatch(r"\d+'\(\{0\}\)", v.operator.text) and v.kind.bits < o.kind.bits  # noqa: E731
+    return [o for o, found in users.items() if o not in graph.outputs.values() and all(narrow(v, o) for v in found)]
 
 
 def _head(head: str, name: str, plan: Schedule) -> str:
@@ -245,7 +259,8 @@ def _unit(w: _Writer, plan: Schedule, unit: Unit) -> tuple[list[str], list[str]]
         ports.append(text)
     if held:
         declared += [f"  logic [{bits - 1}:0] {register};" for register, bits, _ in held]
-        body += ["  always_ff @(posedge clk_i) begin", "    if (en_i) begin", *(f"      {register} <= {text};" for register, _, text in held), "    end", "  end"]
+        loads = [f"      {register} <= {text};" for register, _, text in held]
+        body += ["  always_ff @(posedge clk_i) begin", "    if (en_i) begin", *loads, "    end", "  end"]
     body += _text(first, [*ports, name], name, True)
     result = parameters.get("OutBits", 0)
     for v in turns.values():

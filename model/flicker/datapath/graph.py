@@ -90,7 +90,7 @@ class Value:
     name: str = ""
     constant: int | None = None  # bits
     register: bool = False
-    late: bool = False  # an input that stands late in its cycle: registered first
+    late: bool = False  # stands late in its cycle: registered before it is used
 
     @property
     def range(self) -> Int:
@@ -312,7 +312,8 @@ class Graph:
         ends = [x * y for x in (a.range.low, a.range.high) for y in (b.range.low, b.range.high)]
         half = 1 << (drop - 1)
         kind = Int(min((min(ends) + half) >> drop, -1), (max(ends) + half) >> drop)
-        parameters = (("ABits", a.kind.bits), ("BBits", wide), ("Drop", drop), ("OutBits", a.kind.bits + wide - drop), ("Stages", 1))
+        out = max(a.kind.bits + wide - drop - 1, kind.bits)
+        parameters = (("ABits", a.kind.bits), ("BBits", wide), ("Drop", drop), ("OutBits", out), ("Stages", 1))
         return self.make(kind, Operator("flk_fixed_mul", parameters, ("a_i", "b_i", "y_o"), 1, True), (a, b))
 
     def fixed_mix(self, a: Any, factor_a: int, b: Any, factor_b: int, offset: int, drop: int) -> Value:

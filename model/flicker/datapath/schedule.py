@@ -17,6 +17,7 @@ from .graph import Graph, Operator, Value
 
 REACH = 12  # cycles by which a move may go
 SWEEPS = 20
+WIDE = 28  # bits of a whole number that several sums take out of a register of its own
 
 
 @dataclass(eq=False)
@@ -59,7 +60,7 @@ def _ready(value: Value, begin: dict[Value, int]) -> int:
 
 
 def _settle(value: Value) -> int:
-    """Cycles between a value and its first use: expressions end in a register, and late inputs."""
+    """Cycles between a value and its first use: expressions end in a register, and late inputs, and wide numbers."""
     operator = value.operator
     if value.late:
         return 1
@@ -172,7 +173,7 @@ SLOW = {"flk_ff_add": 15, "flk_ff_mul": 15}
 
 
 def _hold(graph: Graph, interval: int) -> None:
-    """Mark the operations of units that take turns and are slow."""
+    """Mark what is slow where units take turns: operations with registers in front, wide whole numbers with one behind."""
     counts: dict[Operator, int] = defaultdict(int)
     live = needed(graph)
     for v in graph.values:
@@ -180,7 +181,10 @@ def _hold(graph: Graph, interval: int) -> None:
             counts[v.operator] += 1
     for v in graph.values:
         operator = v.operator
-        if operator is not None and interval > 1 and counts[operator] > 1 and dict(operator.parameters).get("ManBits", 0) >= SLOW.get(operator.module, 99):
+        if operator is None or interval == 1 or counts[operator] < 2:
+            continue
+        v.late = operator.module == "flk_ff_to_fixed" and v.kind.bits >= WIDE
+        if dict(operator.parameters).get("ManBits", 0) >= SLOW.get(operator.module, 99):
             v.operator = replace(operator, latency=operator.latency + 1, held=True)
 
 

@@ -18,7 +18,8 @@ from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
 REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
-SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end and step of log2 scales
+SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end of log2 scales
+SCALE_STEP = Int(0, (1 << frame.SCALE_STEP_BITS) - 1)
 BANDS = MAX_PICTURE // SUBTILE
 BASIS = Int(-(1 << (colour.BASIS_BITS - 1)), (1 << (colour.BASIS_BITS - 1)) - 1)
 TERM = Int(-(1 << (colour.TERM_BITS - 1)), (1 << (colour.TERM_BITS - 1)) - 1)
@@ -70,14 +71,15 @@ def cluster_header(formats: FrontFormats) -> Graph:
     g, kind = Graph(), Ff(CLUSTER_M)
     P, C = formats.position, formats.colour
     origin, step, position = g.inputs("origin", kind, (3,)), g.inputs("step", kind, (3,)), g.inputs("position", kind, (3,), register=True)
-    scale = {n: g.inputs(n, kind, (3,)) for n in ("scale_low", "scale_step")}
+    scale_low, scale_step = (g.inputs(n, kind, (3,)) for n in ("scale_low", "scale_step"))
     dc_low, dc_step = (g.inputs(n, kind, (3,)) for n in ("dc_low", "dc_step"))
     sh = g.inputs("sh_step", kind, (3, 3))  # by degree and channel
     for k in range(3):
         g.output(f"low_{k}", _symbolic(lambda a, b: ff_round(ff_sub(a, b, CLUSTER_M), P))(origin[k], position[k]))
         g.output(f"step_{k}", g.ff_round(step[k], P))
-        for name, values in scale.items():
-            g.output(f"{name}_{k}", g.to_fixed(values[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
+        g.output(f"scale_low_{k}", g.to_fixed(scale_low[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
+        signed = g.to_fixed(scale_step[k], frame.SCALE_HEADER_FRACTION, SCALE_STEP.bits + 1, True)
+        g.output(f"scale_step_{k}", g.wire(f"{SCALE_STEP.bits}'({{0}} & ~({{0}} >>> {SCALE_STEP.bits}))", SCALE_STEP, (signed,)))
         g.output(f"dc_low_{k}", g.to_fixed(dc_low[k], colour.TERM_FRACTION, colour.TERM_BITS, True))
         g.output(f"dc_step_{k}", g.ff_round(dc_step[k], C))
         for degree in range(3):
@@ -90,7 +92,7 @@ def geometry_decode(formats: FrontFormats) -> Graph:
     g = Graph()
     P, S = formats.position, formats.shape
     chunked, words = g.input("chunked", BOOL, register=True), g.inputs("word", WORD, (5,))
-    low, step = (g.inputs(n, SCALE_HEADER, (3,)) for n in ("scale_low", "scale_step"))
+    low, step = g.inputs("scale_low", SCALE_HEADER, (3,)), g.inputs("scale_step", SCALE_STEP, (3,))
     halves = [g.slice(words[k // 2], 16 * (k % 2), 16) for k in range(10)]
     codes = [g.slice(words[0], at, bits) for at, bits in ((21, 11), (11, 10), (0, 11))]
     for k in range(3):
@@ -240,14 +242,15 @@ def colour_term(formats: FrontFormats) -> Graph:
     return g
 
 
-def _degree_sum() -> Int:
-    """Sum of a degree: five or seven products, in groups of three and one; what the groups' ranges allow."""
-    graph = colour_group(FORMATS)
-    low, high = (sum(getattr(graph.outputs[f"{name}_0"].range, end) for name in ("first", "fourth")) for end in ("low", "high"))
-    return Int(2 * low, 2 * high)
+def _sums() -> tuple[Int, Int]:
+    """What a group's sum of three products and its fourth may be."""
+    outputs = colour_group(FORMATS).outputs
+    return outputs["first_0"].range, outputs["fourth_0"].range
 
 
-DEGREE_SUM = _degree_sum()
+GROUP_FIRST, GROUP_FOURTH = _sums()
+DEGREE_SUM = Int(2 * (GROUP_FIRST.low + GROUP_FOURTH.low), 2 * (GROUP_FIRST.high + GROUP_FOURTH.high))  # of two groups
+CONSTANT = Int(2 * TERM.low, 2 * TERM.high)
 
 PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),

@@ -54,8 +54,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
     "flk_preprocessing_core": [
-        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis", "flk_colour_group", "flk_colour_constant", "flk_colour_term",
-        "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
+        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
+        "flk_colour_group", "flk_colour_constant", "flk_colour_term", "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",

@@ -39,7 +39,8 @@ from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image
 from .splat import constants, largest_component, pixels, place_largest, project_one
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
-SCALE_HEADER_BITS = 27  # of them, saturated
+SCALE_HEADER_BITS = 27  # of the low end, saturated
+SCALE_STEP_BITS = 17  # of the step, saturated, not negative: up to 1/8
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
 OPACITY_LIMIT = 255
@@ -69,7 +70,7 @@ Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_LISTED = r
 # What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
 # quaternion, or (largest, three codes).
 Lanes = namedtuple("Lanes", "chunked cluster q s quat opacity dc sh count")
-# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 of 27 bits are fraction. dc_low: fixed point, 13 of 20 bits are
+# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 fraction bits. dc_low: fixed point, 13 of 20 bits are
 # fraction. dc_step, sh_step: colour format.
 ClusterValues = namedtuple("ClusterValues", "low step scale_low scale_step dc_low dc_step sh_step")
 
@@ -109,12 +110,13 @@ def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
     n = len(packed.table)
     low, step, dc_low, dc_step, sh = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3), np.int64), np.empty((n, 3)), np.empty((n, 3, 3))
     fixed, top = np.zeros((2, n, 3), np.int64), 1 << (SCALE_HEADER_BITS - 1)
+    limits = ((-top, top - 1), (0, (1 << SCALE_STEP_BITS) - 1))
     if packed.format is PackedFormat.CHUNK:
         wide = {name: image_floats(h[name]) for name in ("position_low", "position_step", "scale_low", "scale_step", "dc_low", "dc_step", "sh_step")}
         origin, given = wide["position_low"], wide["position_step"]
         given_dc, given_sh = np.stack([wide["dc_low"], wide["dc_step"]], axis=2), wide["sh_step"]
         for k, name in enumerate(("scale_low", "scale_step")):
-            fixed[k] = np.clip(np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5), -top, top - 1).astype(np.int64)
+            fixed[k] = np.clip(np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5), *limits[k]).astype(np.int64)
     else:
         origin, given = image_floats(h["origin"]), np.ones((n, 3))
         given_dc, given_sh = np.zeros((n, 3, 2)), np.ones((n, 3, 3))
