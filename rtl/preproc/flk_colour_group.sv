@@ -29,53 +29,53 @@ module flk_colour_group (
   input  logic               used_1_i,
   input  logic               used_2_i,
   input  logic               used_3_i,
-  output logic signed [21:0] first_0_o,
-  output logic signed [19:0] fourth_0_o,
-  output logic signed [21:0] first_1_o,
-  output logic signed [19:0] fourth_1_o,
-  output logic signed [21:0] first_2_o,
-  output logic signed [19:0] fourth_2_o
+  output logic signed [20:0] first_0_o,
+  output logic signed [18:0] fourth_0_o,
+  output logic signed [20:0] first_1_o,
+  output logic signed [18:0] fourth_1_o,
+  output logic signed [20:0] first_2_o,
+  output logic signed [18:0] fourth_2_o
 );
 
-  logic signed [14:0] v22;  // cycle 1
-  logic signed [14:0] v23;  // cycle 1
-  logic signed [14:0] v24;  // cycle 1
-  logic signed [14:0] v25;  // cycle 1
-  logic signed [19:0] v26;  // cycle 3
-  logic signed [19:0] u_v26;
-  logic signed [19:0] v27;  // cycle 3
-  logic signed [19:0] u_v27;
-  logic signed [19:0] v28;  // cycle 3
-  logic signed [19:0] u_v28;
-  logic signed [21:0] first_0;  // cycle 3
-  logic signed [19:0] fourth_0;  // cycle 3
-  logic signed [19:0] u_fourth_0;
-  logic signed [14:0] v31;  // cycle 1
-  logic signed [14:0] v32;  // cycle 1
-  logic signed [14:0] v33;  // cycle 1
-  logic signed [14:0] v34;  // cycle 1
-  logic signed [19:0] v35;  // cycle 3
-  logic signed [19:0] u_v35;
-  logic signed [19:0] v36;  // cycle 3
-  logic signed [19:0] u_v36;
-  logic signed [19:0] v37;  // cycle 3
-  logic signed [19:0] u_v37;
-  logic signed [21:0] first_1;  // cycle 3
-  logic signed [19:0] fourth_1;  // cycle 3
-  logic signed [19:0] u_fourth_1;
-  logic signed [14:0] v40;  // cycle 1
-  logic signed [14:0] v41;  // cycle 1
-  logic signed [14:0] v42;  // cycle 1
-  logic signed [14:0] v43;  // cycle 1
-  logic signed [19:0] v44;  // cycle 3
-  logic signed [19:0] u_v44;
-  logic signed [19:0] v45;  // cycle 3
-  logic signed [19:0] u_v45;
-  logic signed [19:0] v46;  // cycle 3
-  logic signed [19:0] u_v46;
-  logic signed [21:0] first_2;  // cycle 3
-  logic signed [19:0] fourth_2;  // cycle 3
-  logic signed [19:0] u_fourth_2;
+  logic signed [13:0] v22;  // cycle 1
+  logic signed [13:0] v23;  // cycle 1
+  logic signed [13:0] v24;  // cycle 1
+  logic signed [13:0] v25;  // cycle 1
+  logic signed [18:0] v26;  // cycle 3
+  logic signed [18:0] u_v26;
+  logic signed [18:0] v27;  // cycle 3
+  logic signed [18:0] u_v27;
+  logic signed [18:0] v28;  // cycle 3
+  logic signed [18:0] u_v28;
+  logic signed [20:0] first_0;  // cycle 3
+  logic signed [18:0] fourth_0;  // cycle 3
+  logic signed [18:0] u_fourth_0;
+  logic signed [13:0] v31;  // cycle 1
+  logic signed [13:0] v32;  // cycle 1
+  logic signed [13:0] v33;  // cycle 1
+  logic signed [13:0] v34;  // cycle 1
+  logic signed [18:0] v35;  // cycle 3
+  logic signed [18:0] u_v35;
+  logic signed [18:0] v36;  // cycle 3
+  logic signed [18:0] u_v36;
+  logic signed [18:0] v37;  // cycle 3
+  logic signed [18:0] u_v37;
+  logic signed [20:0] first_1;  // cycle 3
+  logic signed [18:0] fourth_1;  // cycle 3
+  logic signed [18:0] u_fourth_1;
+  logic signed [13:0] v40;  // cycle 1
+  logic signed [13:0] v41;  // cycle 1
+  logic signed [13:0] v42;  // cycle 1
+  logic signed [13:0] v43;  // cycle 1
+  logic signed [18:0] v44;  // cycle 3
+  logic signed [18:0] u_v44;
+  logic signed [18:0] v45;  // cycle 3
+  logic signed [18:0] u_v45;
+  logic signed [18:0] v46;  // cycle 3
+  logic signed [18:0] u_v46;
+  logic signed [20:0] first_2;  // cycle 3
+  logic signed [18:0] fourth_2;  // cycle 3
+  logic signed [18:0] u_fourth_2;
   logic [1:0][11:0] basis_0_i_q;
   logic [1:0][11:0] basis_1_i_q;
   logic [1:0][11:0] basis_2_i_q;
@@ -97,24 +97,24 @@ module flk_colour_group (
   logic [0:0][0:0] used_1_i_q;
   logic [0:0][0:0] used_2_i_q;
   logic [0:0][0:0] used_3_i_q;
-  logic [0:0][14:0] v22_q;
-  logic [0:0][14:0] v23_q;
-  logic [0:0][14:0] v24_q;
-  logic [0:0][14:0] v25_q;
-  logic [0:0][21:0] first_0_q;
-  logic [0:0][19:0] fourth_0_q;
-  logic [0:0][14:0] v31_q;
-  logic [0:0][14:0] v32_q;
-  logic [0:0][14:0] v33_q;
-  logic [0:0][14:0] v34_q;
-  logic [0:0][21:0] first_1_q;
-  logic [0:0][19:0] fourth_1_q;
-  logic [0:0][14:0] v40_q;
-  logic [0:0][14:0] v41_q;
-  logic [0:0][14:0] v42_q;
-  logic [0:0][14:0] v43_q;
-  logic [0:0][21:0] first_2_q;
-  logic [0:0][19:0] fourth_2_q;
+  logic [0:0][13:0] v22_q;
+  logic [0:0][13:0] v23_q;
+  logic [0:0][13:0] v24_q;
+  logic [0:0][13:0] v25_q;
+  logic [0:0][20:0] first_0_q;
+  logic [0:0][18:0] fourth_0_q;
+  logic [0:0][13:0] v31_q;
+  logic [0:0][13:0] v32_q;
+  logic [0:0][13:0] v33_q;
+  logic [0:0][13:0] v34_q;
+  logic [0:0][20:0] first_1_q;
+  logic [0:0][18:0] fourth_1_q;
+  logic [0:0][13:0] v40_q;
+  logic [0:0][13:0] v41_q;
+  logic [0:0][13:0] v42_q;
+  logic [0:0][13:0] v43_q;
+  logic [0:0][20:0] first_2_q;
+  logic [0:0][18:0] fourth_2_q;
 
   always_ff @(posedge clk_i) begin
     if (en_i) begin
@@ -164,40 +164,40 @@ module flk_colour_group (
   flk_coefficient #() i_v23 (.chunked_i(chunked_i), .used_i(used_1_i_q[0]), .raw_i(raw_10_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v23));
   flk_coefficient #() i_v24 (.chunked_i(chunked_i), .used_i(used_2_i_q[0]), .raw_i(raw_20_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v24));
   flk_coefficient #() i_v25 (.chunked_i(chunked_i), .used_i(used_3_i_q[0]), .raw_i(raw_30_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v25));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v26 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v22_q[0])), .y_o(u_v26));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v26 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v22_q[0])), .y_o(u_v26));
   assign v26 = u_v26;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v27 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v23_q[0])), .y_o(u_v27));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v27 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v23_q[0])), .y_o(u_v27));
   assign v27 = u_v27;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v28 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v24_q[0])), .y_o(u_v28));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v28 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v24_q[0])), .y_o(u_v28));
   assign v28 = u_v28;
-  assign first_0 = 22'(22'(v26) + 22'(v27) + 22'(v28));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_fourth_0 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v25_q[0])), .y_o(u_fourth_0));
+  assign first_0 = 21'(21'(v26) + 21'(v27) + 21'(v28));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_fourth_0 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v25_q[0])), .y_o(u_fourth_0));
   assign fourth_0 = u_fourth_0;
   flk_coefficient #() i_v31 (.chunked_i(chunked_i), .used_i(used_0_i_q[0]), .raw_i(raw_01_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v31));
   flk_coefficient #() i_v32 (.chunked_i(chunked_i), .used_i(used_1_i_q[0]), .raw_i(raw_11_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v32));
   flk_coefficient #() i_v33 (.chunked_i(chunked_i), .used_i(used_2_i_q[0]), .raw_i(raw_21_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v33));
   flk_coefficient #() i_v34 (.chunked_i(chunked_i), .used_i(used_3_i_q[0]), .raw_i(raw_31_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v34));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v35 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v31_q[0])), .y_o(u_v35));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v35 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v31_q[0])), .y_o(u_v35));
   assign v35 = u_v35;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v36 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v32_q[0])), .y_o(u_v36));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v36 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v32_q[0])), .y_o(u_v36));
   assign v36 = u_v36;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v37 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v33_q[0])), .y_o(u_v37));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v37 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v33_q[0])), .y_o(u_v37));
   assign v37 = u_v37;
-  assign first_1 = 22'(22'(v35) + 22'(v36) + 22'(v37));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_fourth_1 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v34_q[0])), .y_o(u_fourth_1));
+  assign first_1 = 21'(21'(v35) + 21'(v36) + 21'(v37));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_fourth_1 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v34_q[0])), .y_o(u_fourth_1));
   assign fourth_1 = u_fourth_1;
   flk_coefficient #() i_v40 (.chunked_i(chunked_i), .used_i(used_0_i_q[0]), .raw_i(raw_02_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v40));
   flk_coefficient #() i_v41 (.chunked_i(chunked_i), .used_i(used_1_i_q[0]), .raw_i(raw_12_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v41));
   flk_coefficient #() i_v42 (.chunked_i(chunked_i), .used_i(used_2_i_q[0]), .raw_i(raw_22_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v42));
   flk_coefficient #() i_v43 (.chunked_i(chunked_i), .used_i(used_3_i_q[0]), .raw_i(raw_32_i_q[0]), .zero_i(zero_i_q[0]), .y_o(v43));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v44 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v40_q[0])), .y_o(u_v44));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v44 (.clk_i, .en_i, .a_i($signed(basis_0_i_q[1])), .b_i($signed(v40_q[0])), .y_o(u_v44));
   assign v44 = u_v44;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v45 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v41_q[0])), .y_o(u_v45));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v45 (.clk_i, .en_i, .a_i($signed(basis_1_i_q[1])), .b_i($signed(v41_q[0])), .y_o(u_v45));
   assign v45 = u_v45;
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_v46 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v42_q[0])), .y_o(u_v46));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_v46 (.clk_i, .en_i, .a_i($signed(basis_2_i_q[1])), .b_i($signed(v42_q[0])), .y_o(u_v46));
   assign v46 = u_v46;
-  assign first_2 = 22'(22'(v44) + 22'(v45) + 22'(v46));
-  flk_fixed_mul #(.ABits(12), .BBits(15), .Drop(6), .OutBits(20), .Stages(1)) i_u_fourth_2 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v43_q[0])), .y_o(u_fourth_2));
+  assign first_2 = 21'(21'(v44) + 21'(v45) + 21'(v46));
+  flk_fixed_mul #(.ABits(12), .BBits(14), .Drop(6), .OutBits(19), .Stages(1)) i_u_fourth_2 (.clk_i, .en_i, .a_i($signed(basis_3_i_q[1])), .b_i($signed(v43_q[0])), .y_o(u_fourth_2));
   assign fourth_2 = u_fourth_2;
 
   assign first_0_o = $signed(first_0_q[0]);

@@ -8,7 +8,7 @@ module flk_colour_term (
   input  logic               clk_i,
   input  logic               en_i,
   input  logic               chunked_i,
-  input  logic signed [22:0] sum_i,
+  input  logic signed [21:0] sum_i,
   input  logic [19:0]        step_i,
   output logic signed [19:0] term_o
 );
@@ -30,8 +30,8 @@ module flk_colour_term (
     end
   end
 
-  assign v3 = chunked_i ? step_i_q[0] : 20'h39800;
-  flk_ff_from_fixed #(.Bits(23), .FracBits(5), .ManBits(11), .Stages(2)) i_u_v4 (.clk_i, .en_i, .x_i(sum_i), .y_o(u_v4));
+  assign v3 = chunked_i ? step_i_q[0] : 20'h3a000;
+  flk_ff_from_fixed #(.Bits(22), .FracBits(5), .ManBits(11), .Stages(2)) i_u_v4 (.clk_i, .en_i, .x_i(sum_i), .y_o(u_v4));
   assign v4 = u_v4;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v5 (.clk_i, .en_i, .a_i(v3_q[0]), .b_i(v4), .prod_o(u_v5));
   assign v5 = u_v5;

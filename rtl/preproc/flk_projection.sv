@@ -517,34 +517,32 @@ module flk_projection (
   logic [19:0] v238;  // cycle 61
   logic signed [29:0] radius_y;  // cycle 64
   logic signed [31:0] v240;  // cycle 64
-  logic signed [31:0] v241;  // cycle 65
-  logic signed [31:0] v242;  // cycle 66
-  logic signed [24:0] v243;  // cycle 67
-  logic signed [31:0] v244;  // cycle 64
-  logic signed [24:0] v245;  // cycle 65
-  logic [23:0] v246;  // cycle 67
-  logic signed [23:0] v247;  // cycle 65
-  logic signed [31:0] v248;  // cycle 65
-  logic signed [31:0] v249;  // cycle 66
-  logic signed [31:0] v250;  // cycle 67
-  logic signed [24:0] v251;  // cycle 68
-  logic signed [31:0] v252;  // cycle 65
-  logic signed [24:0] v253;  // cycle 66
-  logic [23:0] v254;  // cycle 68
-  logic signed [23:0] v255;  // cycle 66
-  logic [19:0] v256;  // cycle 67
-  logic [19:0] v257;  // cycle 69
+  logic signed [24:0] v241;  // cycle 65
+  logic signed [24:0] v242;  // cycle 65
+  logic signed [31:0] v243;  // cycle 64
+  logic signed [24:0] v244;  // cycle 65
+  logic [23:0] v245;  // cycle 66
+  logic signed [23:0] v246;  // cycle 65
+  logic signed [31:0] v247;  // cycle 65
+  logic signed [24:0] v248;  // cycle 66
+  logic signed [24:0] v249;  // cycle 66
+  logic signed [31:0] v250;  // cycle 65
+  logic signed [24:0] v251;  // cycle 66
+  logic [23:0] v252;  // cycle 67
+  logic signed [23:0] v253;  // cycle 66
+  logic [19:0] v254;  // cycle 67
+  logic [19:0] v255;  // cycle 69
   logic [19:0] i0;  // cycle 71
-  logic [19:0] v259;  // cycle 59
+  logic [19:0] v257;  // cycle 59
   logic [19:0] kappa;  // cycle 61
   logic [19:0] lean;  // cycle 59
-  logic v262;  // cycle 68
-  logic v263;  // cycle 69
-  logic outside;  // cycle 70
-  logic [27:0] v265;  // cycle 25
-  logic [27:0] v266;  // cycle 25
-  logic signed [24:0] v267;  // cycle 28
-  logic signed [24:0] u_v267;
+  logic v260;  // cycle 67
+  logic v261;  // cycle 68
+  logic outside;  // cycle 69
+  logic [27:0] v263;  // cycle 25
+  logic [27:0] v264;  // cycle 25
+  logic signed [24:0] v265;  // cycle 28
+  logic signed [24:0] u_v265;
   logic [23:0] key;  // cycle 28
   logic [19:0] direction_0;  // cycle 8
   logic [19:0] direction_1;  // cycle 10
@@ -663,24 +661,22 @@ module flk_projection (
   logic [0:0][19:0] v238_q;
   logic [0:0][29:0] radius_y_q;
   logic [0:0][31:0] v240_q;
-  logic [0:0][31:0] v241_q;
-  logic [0:0][31:0] v242_q;
-  logic [0:0][31:0] v244_q;
+  logic [0:0][24:0] v242_q;
+  logic [0:0][31:0] v243_q;
+  logic [0:0][23:0] v245_q;
   logic [0:0][23:0] v246_q;
-  logic [1:0][23:0] v247_q;
-  logic [0:0][31:0] v248_q;
-  logic [0:0][31:0] v249_q;
+  logic [0:0][31:0] v247_q;
+  logic [0:0][24:0] v249_q;
   logic [0:0][31:0] v250_q;
-  logic [0:0][31:0] v252_q;
-  logic [0:0][23:0] v254_q;
-  logic [1:0][23:0] v255_q;
+  logic [0:0][23:0] v252_q;
+  logic [0:0][23:0] v253_q;
   logic [0:0][19:0] i0_q;
   logic [5:0][19:0] kappa_q;
   logic [6:0][19:0] lean_q;
-  logic [0:0][0:0] v262_q;
-  logic [0:0][0:0] v263_q;
-  logic [0:0][0:0] outside_q;
-  logic [0:0][27:0] v266_q;
+  logic [0:0][0:0] v260_q;
+  logic [0:0][0:0] v261_q;
+  logic [1:0][0:0] outside_q;
+  logic [0:0][27:0] v264_q;
   logic [23:0] key_end;
   logic [19:0] direction_0_end;
   logic [19:0] direction_1_end;
@@ -738,13 +734,11 @@ module flk_projection (
       rdet_q <= rdet;
       radius_y_q <= radius_y;
       v240_q <= v240;
-      v242_q <= v242;
-      v244_q <= v244;
+      v243_q <= v243;
+      v245_q <= v245;
       v249_q <= v249;
-      v254_q <= v254;
-      v255_q <= {v255_q[0:0], v255};
-      v262_q <= v262;
-      outside_q <= outside;
+      v253_q <= v253;
+      v261_q <= v261;
     end
   end
 
@@ -796,17 +790,17 @@ module flk_projection (
       sy_q <= {sy_q[5:0], sy};
       radius_x_q <= radius_x;
       v238_q <= v238;
-      v241_q <= v241;
+      v242_q <= v242;
       v246_q <= v246;
-      v247_q <= {v247_q[0:0], v247};
-      v248_q <= v248;
+      v247_q <= v247;
       v250_q <= v250;
       v252_q <= v252;
       i0_q <= i0;
       kappa_q <= {kappa_q[4:0], kappa};
       lean_q <= {lean_q[5:0], lean};
-      v263_q <= v263;
-      v266_q <= v266;
+      v260_q <= v260;
+      outside_q <= {outside_q[0:0], outside};
+      v264_q <= v264;
     end
   end
 
@@ -967,7 +961,7 @@ module flk_projection (
   end
   flk_ff_add #(.ManBits(19), .Stages(3)) i_u_v64 (.clk_i, .en_i, .a_i(u_v64_a_q), .b_i(u_v64_b_q), .sum_o(u_v64));
   assign v64 = u_v64;
-  assign v265 = u_v64;
+  assign v263 = u_v64;
   flk_ff_cmp #(.ManBits(19)) i_v66 (.a_i(28'h3e4cccd), .b_i(t2), .lt_o(v66));
   assign near = !v66_q[0];
   flk_ff_recip #(.ManBits(19), .Stages(3)) i_u_iz (.clk_i, .en_i, .x_i(t2), .y_o(u_iz));
@@ -1615,9 +1609,9 @@ module flk_projection (
   flk_phase_mux #(.Width(10)) i_u_gv2_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_gv2_b_even[19:10]), .b_i(u_gv2_b_odd[19:10]), .y_o(u_gv2_b[19:10]));
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_gv2 (.clk_i, .en_i, .a_i(u_gv2_a), .b_i(u_gv2_b), .prod_o(u_gv2));
   assign gv2 = u_gv2;
-  assign v256 = u_gv2;
+  assign v254 = u_gv2;
   assign u_v185_a_even = gu0;
-  assign u_v185_a_odd = v256;
+  assign u_v185_a_odd = v254;
   flk_phase_mux #(.Width(10)) i_u_v185_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v185_a_even[9:0]), .b_i(u_v185_a_odd[9:0]), .y_o(u_v185_a[9:0]));
   flk_phase_mux #(.Width(10)) i_u_v185_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v185_a_even[19:10]), .b_i(u_v185_a_odd[19:10]), .y_o(u_v185_a[19:10]));
   assign u_v185_b_even = gu0;
@@ -1626,9 +1620,9 @@ module flk_projection (
   flk_phase_mux #(.Width(10)) i_u_v185_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v185_b_even[19:10]), .b_i(u_v185_b_odd[19:10]), .y_o(u_v185_b[19:10]));
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v185 (.clk_i, .en_i, .a_i(u_v185_a), .b_i(u_v185_b), .prod_o(u_v185));
   assign v185 = u_v185;
-  assign v257 = u_v185;
+  assign v255 = u_v185;
   assign u_v186_a_even = gu1;
-  assign u_v186_a_odd = v257;
+  assign u_v186_a_odd = v255;
   flk_phase_mux #(.Width(10)) i_u_v186_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v186_a_even[9:0]), .b_i(u_v186_a_odd[9:0]), .y_o(u_v186_a[9:0]));
   flk_phase_mux #(.Width(10)) i_u_v186_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v186_a_even[19:10]), .b_i(u_v186_a_odd[19:10]), .y_o(u_v186_a[19:10]));
   assign u_v186_b_even = gu1;
@@ -1677,13 +1671,13 @@ module flk_projection (
   flk_phase_mux #(.Width(10)) i_u_v190_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v190_b_even[19:10]), .b_i(u_v190_b_odd[19:10]), .y_o(u_v190_b[19:10]));
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v190 (.clk_i, .en_i, .a_i(u_v190_a), .b_i(u_v190_b), .prod_o(u_v190));
   assign v190 = u_v190;
-  assign v259 = u_v190;
+  assign v257 = u_v190;
   assign u_v191_a_even = gv1;
   assign u_v191_a_odd = xy_q[2];
   flk_phase_mux #(.Width(10)) i_u_v191_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v191_a_even[9:0]), .b_i(u_v191_a_odd[9:0]), .y_o(u_v191_a[9:0]));
   flk_phase_mux #(.Width(10)) i_u_v191_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v191_a_even[19:10]), .b_i(u_v191_a_odd[19:10]), .y_o(u_v191_a[19:10]));
   assign u_v191_b_even = gv1;
-  assign u_v191_b_odd = v259;
+  assign u_v191_b_odd = v257;
   flk_phase_mux #(.Width(10)) i_u_v191_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v191_b_even[9:0]), .b_i(u_v191_b_odd[9:0]), .y_o(u_v191_b[9:0]));
   flk_phase_mux #(.Width(10)) i_u_v191_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v191_b_even[19:10]), .b_i(u_v191_b_odd[19:10]), .y_o(u_v191_b[19:10]));
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v191 (.clk_i, .en_i, .a_i(u_v191_a), .b_i(u_v191_b), .prod_o(u_v191));
@@ -1746,35 +1740,33 @@ module flk_projection (
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_radius_y (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v238_q[0] : v236), .y_o(u_radius_y));
   assign radius_y = u_radius_y;
   assign radius_x = u_radius_y;
-  assign v240 = 32'(32'($signed(x_q[0])) - 32'($signed(radius_x_q[0])));
-  assign v241 = 32'($signed(v240_q[0]) + 32'sd128);
-  assign v242 = 32'($signed(v241_q[0]) - 32'sd1);
-  assign v243 = 25'($signed(v242_q[0]) >>> 7);
-  assign v244 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
-  assign v245 = 25'($signed(v244_q[0]) >>> 7);
-  assign v246 = 24'(v243 < 25'sd0 ? 25'sd0 : v243);
-  assign v247 = 24'($signed(25'(v82)) < v245 ? $signed(25'(v82)) : v245);
-  assign v248 = 32'(32'($signed(y_q[0])) - 32'($signed(radius_y_q[0])));
-  assign v249 = 32'($signed(v248_q[0]) + 32'sd128);
-  assign v250 = 32'($signed(v249_q[0]) - 32'sd1);
+  assign v240 = 32'(32'($signed(radius_x_q[0])) - 32'($signed(x_q[0])));
+  assign v241 = 25'($signed(v240_q[0]) >>> 7);
+  assign v242 = 25'(25'sd0 - v241);
+  assign v243 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
+  assign v244 = 25'($signed(v243_q[0]) >>> 7);
+  assign v245 = 24'($signed(v242_q[0]) < 25'sd0 ? 25'sd0 : $signed(v242_q[0]));
+  assign v246 = 24'($signed(25'(v82)) < v244 ? $signed(25'(v82)) : v244);
+  assign v247 = 32'(32'($signed(radius_y_q[0])) - 32'($signed(y_q[0])));
+  assign v248 = 25'($signed(v247_q[0]) >>> 7);
+  assign v249 = 25'(25'sd0 - v248);
+  assign v250 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
   assign v251 = 25'($signed(v250_q[0]) >>> 7);
-  assign v252 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
-  assign v253 = 25'($signed(v252_q[0]) >>> 7);
-  assign v254 = 24'(v251 < 25'sd0 ? 25'sd0 : v251);
-  assign v255 = 24'($signed(25'(v85)) < v253 ? $signed(25'(v85)) : v253);
-  assign v262 = $signed(25'(v246_q[0])) > 25'($signed(v247_q[1]));
-  assign v263 = $signed(25'(v254_q[0])) > 25'($signed(v255_q[1]));
-  assign outside = v262_q[0] | v263_q[0];
-  flk_ff_ldexp #(.ManBits(19), .ShiftBits(10)) i_v266 (.x_i(v265), .shift_i(10'(key_shift_i)), .y_o(v266));
-  flk_ff_to_fixed #(.Bits(25), .FracBits(0), .Round(0), .ManBits(19), .Stages(2)) i_u_v267 (.clk_i, .en_i, .x_i(v266_q[0]), .y_o(u_v267));
-  assign v267 = u_v267;
-  assign key = 24'(v267 < 25'sd0 ? 25'sd0 : v267);
+  assign v252 = 24'($signed(v249_q[0]) < 25'sd0 ? 25'sd0 : $signed(v249_q[0]));
+  assign v253 = 24'($signed(25'(v85)) < v251 ? $signed(25'(v85)) : v251);
+  assign v260 = $signed(25'(v245_q[0])) > 25'($signed(v246_q[0]));
+  assign v261 = $signed(25'(v252_q[0])) > 25'($signed(v253_q[0]));
+  assign outside = v260_q[0] | v261_q[0];
+  flk_ff_ldexp #(.ManBits(19), .ShiftBits(10)) i_v264 (.x_i(v263), .shift_i(10'(key_shift_i)), .y_o(v264));
+  flk_ff_to_fixed #(.Bits(25), .FracBits(0), .Round(0), .ManBits(19), .Stages(2)) i_u_v265 (.clk_i, .en_i, .x_i(v264_q[0]), .y_o(u_v265));
+  assign v265 = u_v265;
+  assign key = 24'(v265 < 25'sd0 ? 25'sd0 : v265);
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_0 (.x_i(d0), .y_o(direction_0));
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_1 (.x_i(d1_q[0]), .y_o(direction_1));
   flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_2 (.x_i(d2_q[0]), .y_o(direction_2));
 
   assign near_o = near_end;
-  assign outside_o = outside_q[0];
+  assign outside_o = outside_q[1];
   assign far_o = far_end;
   assign x_o = $signed(x_q[4]);
   assign y_o = $signed(y_q[3]);

@@ -325,7 +325,7 @@ def test_bright_colours_are_clipped_and_counted() -> None:
 
 def test_coefficients_of_fp16_end_at_4() -> None:
     sh = np.zeros((2, 4, 3))
-    sh[:, 2] = np.array([[6.0], [16383 / 4096]]) * [1.0, -1.0, 1.0]
+    sh[:, 2] = np.array([[6.0], [8191 / 2048]]) * [1.0, -1.0, 1.0]
     rgb = seen_from(some(2, sh=sh, means=[0.0, 0.0, 4.0]), plain_camera()).splats().rgb
     assert (rgb[0] == rgb[1]).all() and rgb[0, 0] == 1023 / 512 and rgb[0, 1] == 0.0
 

@@ -53,6 +53,7 @@ class Int:
 
 
 BOOL = Int(0, 1)
+LARGE = 170  # bits by bits of a product of whole numbers that is too slow for one cycle
 Kind = Ff | Int
 
 
@@ -129,6 +130,9 @@ class Value:
         b = self.graph.integer(other)
         if b.constant is not None and b.range.low > 0 and b.range.low & (b.range.low - 1) == 0:
             return self << (b.range.low.bit_length() - 1)
+        if b.constant is None and self.kind.bits * b.kind.bits > LARGE and not b.range.signed:
+            low = b.kind.bits - b.kind.bits // 2  # in two parts, each with a register behind it
+            return self * self.graph.slice(b, 0, low) + (self * self.graph.slice(b, low, b.kind.bits - low) << low)
         ends = lambda p, q: [x * y for x in (p.low, p.high) for y in (q.low, q.high)]  # noqa: E731
         return self._int(b, "{0} * {1}", lambda p, q: (min(ends(p, q)), max(ends(p, q))))
 

@@ -21,8 +21,8 @@ DIRECTION_FRACTION = 12
 DIRECTION_BITS = 13  # of a direction's component, saturated: 1 is 4095/4096
 BASIS_FRACTION = 11
 BASIS_BITS = 12  # all functions lie between -1 and 1
-COEFFICIENT_FRACTION = 12  # of a coefficient that was FP16
-COEFFICIENT_BITS = 15  # of one, saturated
+COEFFICIENT_FRACTION = 11  # of a coefficient that was FP16
+COEFFICIENT_BITS = 14  # of one, saturated: 4
 PRODUCT_DROP = 6  # fraction bits that are rounded off a product
 SUM_FRACTION = BASIS_FRACTION - PRODUCT_DROP  # of the sum of a degree, in units of its coefficients
 TERM_FRACTION = 13  # of what is added to a colour
@@ -55,7 +55,8 @@ def _dot(a0, a1, a2, M):
 def basis_functions(d0, d1, d2, degree, out, M):
     """Spherical harmonics 1 to (degree + 1)^2 - 1 in the direction d, ff (M bits), into out (16,): whole numbers, 11 fraction bits.
 
-    Of a d whose square is no ff number other than 0 they are wrong, but within their bits."""
+    Where the square of d is 0 or saturated they are wrong, but within their bits.
+    """
     one = 1 << DIRECTION_FRACTION
     rn = ff_rsqrt(_dot(d0, d1, d2, M), M)
     x = ff_to_fixed_round(ff_mul(d0, rn, M), DIRECTION_FRACTION, DIRECTION_BITS)
@@ -113,7 +114,7 @@ def group_sums(basis, coefficient):
 
 @numba.njit
 def term(sum_, step, M):
-    """What a degree adds to a channel: step times the sum of the degree. step: ff (M bits), 2^-12 where coefficients were FP16."""
+    """What a degree adds to a channel: step times the sum of the degree. step: ff (M bits), 2^-11 where coefficients were FP16."""
     return ff_to_fixed_round(ff_mul(step, ff_from_fixed(sum_, SUM_FRACTION, M), M), TERM_FRACTION, TERM_BITS)
 
 

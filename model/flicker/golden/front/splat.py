@@ -149,7 +149,6 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
 @numba.njit
 def pixels(centre, reach, size):
     """First and last pixel centre of 0..size - 1 within centre +- reach, both in 1/128 pixel; the first is past the last where there is none."""
-    one = 1 << MEAN_FRACTION
-    first = (centre - reach + one - 1) >> MEAN_FRACTION
+    first = -((reach - centre) >> MEAN_FRACTION)  # rounded up
     last = (centre + reach) >> MEAN_FRACTION
     return max(first, 0), min(last, size - 1)
