@@ -16,7 +16,7 @@ module flk_fixed_mul #(
 );
 
   if (Drop < 1 || OutBits + Drop > ABits + BBits) begin : gen_check_size
-    $error("flk_fixed_mul: Drop must be at least 1, and OutBits no more than the product has above it");
+    $error("flk_fixed_mul: Drop must be 1 or more, OutBits at most what the product has above");
   end
   if (Stages > 1) begin : gen_check_stages
     $error("flk_fixed_mul: Stages must be 0 or 1");

@@ -514,7 +514,8 @@ module flk_preprocessing_core
       total_valid_q <= 1'b0;
       rgb_valid_q   <= 1'b0;
     end else if (colour_en) begin
-      end_q         <= {end_q[TermCycles-2:0], tag.valid && tag.part != 2'd2, tag.first, tag.last};
+      end_q         <= {end_q[TermCycles-2:0],
+                        tag.valid && tag.part != 2'd2, tag.first, tag.last};
       total_valid_q <= ended.term && ended.last;
       rgb_valid_q   <= total_valid_q;
     end

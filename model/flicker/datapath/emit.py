@@ -114,10 +114,10 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
             unit = turns[v]
             if id(unit) not in made:
                 made.add(id(unit))
-                declared, text = _unit(w, plan, unit)
+                declared, lines = _unit(w, plan, unit)
                 bits = dict(v.operator.parameters).get("OutBits", 0)
                 wires += [f"  logic signed [{bits - 1}:0] {_unit_name(w, unit)};" if bits else f"  {w.type_of(v)} {_unit_name(w, unit)};", *declared]
-                body += text
+                body += lines
         elif v.operator.module:
             body += _instance(w, v, w.names[v])
         else:

@@ -177,7 +177,7 @@ def _hold(graph: Graph, interval: int) -> None:
     counts: dict[Operator, int] = defaultdict(int)
     live = needed(graph)
     for v in graph.values:
-        if v in live and _shared(v):
+        if v in live and v.operator is not None and _shared(v):
             counts[v.operator] += 1
     for v in graph.values:
         operator = v.operator
