@@ -29,6 +29,7 @@ common/flk_ff_rsqrt.sv
 common/flk_ff_sqrt.sv
 common/flk_ff_to_fixed.sv
 common/flk_fifo.sv
+common/flk_fixed_mul.sv
 common/flk_fixed_to_fp.sv
 common/flk_fp_add.sv
 common/flk_fp_add_pipe.sv
@@ -40,6 +41,7 @@ common/flk_fp_to_fixed.sv
 common/flk_log_opacity.sv
 common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
+common/flk_phase_mux.sv
 common/flk_pipe_reg.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
@@ -68,10 +70,12 @@ sort/flk_compare_exchange.sv
 preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv
+preproc/flk_coefficient.sv
 preproc/flk_colour_basis.sv
+preproc/flk_colour_constant.sv
 preproc/flk_colour_fetch.sv
 preproc/flk_colour_group.sv
-preproc/flk_colour_total.sv
+preproc/flk_colour_term.sv
 preproc/flk_entry_merge.sv
 preproc/flk_geometry_decode.sv
 preproc/flk_geometry_fetch.sv

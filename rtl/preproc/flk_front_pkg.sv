@@ -12,15 +12,25 @@ package flk_front_pkg;
   typedef logic [19:0] colour_t;
   typedef logic [31:0] cluster_t;
 
+  // Spherical harmonics, sums of products with coefficients, and what they add to a colour
+  localparam int unsigned TERM_FRACTION = 13;
+  typedef logic signed [11:0] basis_t;
+  typedef logic signed [20:0] group_first_t;
+  typedef logic signed [18:0] group_fourth_t;
+  typedef logic signed [21:0] degree_sum_t;
+  typedef logic signed [19:0] term_t;
+  typedef logic signed [20:0] constant_t;
+
   // Cycles from an element to its outputs
-  localparam int unsigned CLUSTER_TEST_LATENCY = 32;
+  localparam int unsigned CLUSTER_TEST_LATENCY = 36;
   localparam int unsigned CLUSTER_HEADER_LATENCY = 8;
   localparam int unsigned GEOMETRY_DECODE_LATENCY = 14;
-  localparam int unsigned PROJECTION_LATENCY = 64;
+  localparam int unsigned PROJECTION_LATENCY = 72;
   localparam int unsigned SPLAT_BOUNDS_LATENCY = 20;
   localparam int unsigned SPLAT_BAND_LATENCY = 26;
-  localparam int unsigned COLOUR_BASIS_LATENCY = 22;
-  localparam int unsigned COLOUR_GROUP_LATENCY = 13;
-  localparam int unsigned COLOUR_TOTAL_LATENCY = 9;
+  localparam int unsigned COLOUR_BASIS_LATENCY = 20;
+  localparam int unsigned COLOUR_GROUP_LATENCY = 4;
+  localparam int unsigned COLOUR_CONSTANT_LATENCY = 8;
+  localparam int unsigned COLOUR_TERM_LATENCY = 6;
 
 endpackage

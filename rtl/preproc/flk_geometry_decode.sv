@@ -17,9 +17,9 @@ module flk_geometry_decode (
   input  logic signed [26:0] scale_low_0_i,
   input  logic signed [26:0] scale_low_1_i,
   input  logic signed [26:0] scale_low_2_i,
-  input  logic signed [26:0] scale_step_0_i,
-  input  logic signed [26:0] scale_step_1_i,
-  input  logic signed [26:0] scale_step_2_i,
+  input  logic [16:0]        scale_step_0_i,
+  input  logic [16:0]        scale_step_1_i,
+  input  logic [16:0]        scale_step_2_i,
   output logic [27:0]        q_0_o,
   output logic [27:0]        q_1_o,
   output logic [27:0]        q_2_o,
@@ -32,6 +32,7 @@ module flk_geometry_decode (
   output logic [19:0]        qz_o
 );
 
+  logic next_odd;  // the phase of the next cycle
   logic [15:0] v12;  // cycle 0
   logic [15:0] v13;  // cycle 0
   logic [15:0] v14;  // cycle 0
@@ -48,6 +49,7 @@ module flk_geometry_decode (
   logic signed [11:0] v25;  // cycle 0
   logic [27:0] v26;  // cycle 2
   logic [27:0] u_v26;
+  logic [11:0] u_v26_x, u_v26_x_even, u_v26_x_odd;
   logic [27:0] v27;  // cycle 0
   logic [27:0] q_0;  // cycle 2
   logic signed [10:0] v29;  // cycle 0
@@ -62,78 +64,90 @@ module flk_geometry_decode (
   logic [10:0] v37;  // cycle 0
   logic [9:0] v38;  // cycle 0
   logic [10:0] v39;  // cycle 0
-  logic signed [37:0] v40;  // cycle 0
-  logic signed [37:0] v41;  // cycle 1
-  logic signed [37:0] v42;  // cycle 2
-  logic signed [29:0] v43;  // cycle 3
-  logic signed [29:0] v44;  // cycle 3
-  logic signed [19:0] v45;  // cycle 4
-  logic [19:0] v46;  // cycle 7
-  logic [19:0] u_v64;
-  logic [19:0] v47;  // cycle 5
-  logic [19:0] s_0;  // cycle 7
-  logic signed [36:0] v49;  // cycle 0
-  logic signed [36:0] v50;  // cycle 1
-  logic signed [36:0] v51;  // cycle 2
-  logic signed [28:0] v52;  // cycle 3
-  logic signed [28:0] v53;  // cycle 3
-  logic signed [19:0] v54;  // cycle 4
-  logic [19:0] v55;  // cycle 7
-  logic [19:0] u_v55;
-  logic [19:0] v56;  // cycle 5
+  logic [8:0] v40;  // cycle 0
+  logic [19:0] v41;  // cycle 0
+  logic [7:0] v42;  // cycle 0
+  logic [18:0] v43;  // cycle 0
+  logic [27:0] v44;  // cycle 1
+  logic [27:0] v45;  // cycle 1
+  logic signed [29:0] v46;  // cycle 2
+  logic signed [29:0] v47;  // cycle 3
+  logic signed [21:0] v48;  // cycle 4
+  logic signed [21:0] v49;  // cycle 4
+  logic signed [19:0] v50;  // cycle 5
+  logic [19:0] v51;  // cycle 8
+  logic [19:0] u_v51;
+  logic [19:0] u_v51_l, u_v51_l_even, u_v51_l_odd;
+  logic [19:0] v52;  // cycle 6
+  logic [19:0] s_0;  // cycle 8
+  logic [26:0] v54;  // cycle 0
+  logic signed [28:0] v55;  // cycle 1
+  logic signed [28:0] v56;  // cycle 2
+  logic signed [20:0] v57;  // cycle 3
+  logic signed [20:0] v58;  // cycle 3
+  logic signed [19:0] v59;  // cycle 4
+  logic [19:0] v60;  // cycle 7
+  logic [19:0] v61;  // cycle 5
   logic [19:0] s_1;  // cycle 7
-  logic signed [37:0] v58;  // cycle 0
-  logic signed [37:0] v59;  // cycle 1
-  logic signed [37:0] v60;  // cycle 2
-  logic signed [29:0] v61;  // cycle 3
-  logic signed [29:0] v62;  // cycle 3
-  logic signed [19:0] v63;  // cycle 4
-  logic [19:0] v64;  // cycle 8
-  logic [19:0] v65;  // cycle 6
+  logic [8:0] v63;  // cycle 0
+  logic [19:0] v64;  // cycle 0
+  logic [7:0] v65;  // cycle 0
+  logic [18:0] v66;  // cycle 0
+  logic [27:0] v67;  // cycle 1
+  logic [27:0] v68;  // cycle 1
+  logic signed [29:0] v69;  // cycle 2
+  logic signed [29:0] v70;  // cycle 3
+  logic signed [21:0] v71;  // cycle 4
+  logic signed [21:0] v72;  // cycle 4
+  logic signed [19:0] v73;  // cycle 5
+  logic [19:0] v74;  // cycle 8
+  logic [19:0] u_v74;
+  logic [19:0] v75;  // cycle 6
   logic [19:0] s_2;  // cycle 8
-  logic [9:0] v67;  // cycle 0
-  logic [10:0] v68;  // cycle 0
-  logic signed [10:0] v69;  // cycle 0
-  logic [9:0] v70;  // cycle 0
-  logic [10:0] v71;  // cycle 0
-  logic signed [10:0] v72;  // cycle 0
-  logic [9:0] v73;  // cycle 0
-  logic [10:0] v74;  // cycle 0
-  logic signed [10:0] v75;  // cycle 0
-  logic signed [20:0] v76;  // cycle 1
-  logic signed [20:0] v77;  // cycle 1
-  logic signed [21:0] v78;  // cycle 2
-  logic signed [20:0] v79;  // cycle 1
-  logic signed [22:0] v80;  // cycle 3
-  logic signed [23:0] v81;  // cycle 4
-  logic [22:0] v82;  // cycle 5
-  logic signed [23:0] v83;  // cycle 6
-  logic [19:0] v84;  // cycle 8
-  logic [19:0] u_v84;
-  logic [19:0] v85;  // cycle 10
-  logic [19:0] u_v85;
-  logic [19:0] v86;  // cycle 9
-  logic [19:0] u_v88;
-  logic [19:0] v87;  // cycle 9
-  logic [19:0] u_v87;
-  logic [19:0] v88;  // cycle 10
-  logic [1:0] v89;  // cycle 0
-  logic v90;  // cycle 0
-  logic [19:0] v91;  // cycle 10
-  logic v92;  // cycle 0
-  logic [19:0] v93;  // cycle 10
-  logic [19:0] v94;  // cycle 11
-  logic v95;  // cycle 0
-  logic [19:0] v96;  // cycle 10
-  logic [19:0] v97;  // cycle 11
+  logic [9:0] v77;  // cycle 0
+  logic [10:0] v78;  // cycle 0
+  logic signed [10:0] v79;  // cycle 0
+  logic [9:0] v80;  // cycle 0
+  logic [10:0] v81;  // cycle 0
+  logic signed [10:0] v82;  // cycle 0
+  logic [9:0] v83;  // cycle 0
+  logic [10:0] v84;  // cycle 0
+  logic signed [10:0] v85;  // cycle 0
+  logic signed [20:0] v86;  // cycle 1
+  logic signed [20:0] v87;  // cycle 1
+  logic signed [21:0] v88;  // cycle 2
+  logic signed [20:0] v89;  // cycle 1
+  logic signed [22:0] v90;  // cycle 3
+  logic signed [23:0] v91;  // cycle 4
+  logic [22:0] v92;  // cycle 5
+  logic signed [23:0] v93;  // cycle 6
+  logic [19:0] v94;  // cycle 8
+  logic [19:0] u_v94;
+  logic [19:0] v95;  // cycle 10
+  logic [19:0] u_v95;
+  logic [19:0] v96;  // cycle 9
+  logic [19:0] u_v98;
+  logic [10:0] u_v98_x, u_v98_x_even, u_v98_x_odd;
+  logic [19:0] v97;  // cycle 9
+  logic [19:0] u_v97;
   logic [19:0] v98;  // cycle 10
-  logic [19:0] v99;  // cycle 10
-  logic [19:0] qw;  // cycle 12
+  logic [1:0] v99;  // cycle 0
+  logic v100;  // cycle 0
   logic [19:0] v101;  // cycle 10
-  logic [19:0] qx;  // cycle 12
+  logic v102;  // cycle 0
   logic [19:0] v103;  // cycle 10
+  logic [19:0] v104;  // cycle 11
+  logic v105;  // cycle 0
+  logic [19:0] v106;  // cycle 10
+  logic [19:0] v107;  // cycle 11
+  logic [19:0] v108;  // cycle 10
+  logic [19:0] v109;  // cycle 10
+  logic [19:0] qw;  // cycle 12
+  logic [19:0] v111;  // cycle 10
+  logic [19:0] qx;  // cycle 12
+  logic [19:0] v113;  // cycle 10
   logic [19:0] qy;  // cycle 12
-  logic [19:0] v105;  // cycle 10
+  logic [19:0] v115;  // cycle 10
   logic [19:0] qz;  // cycle 12
   logic [0:0][26:0] scale_low_0_i_q;
   logic [0:0][26:0] scale_low_1_i_q;
@@ -153,55 +167,59 @@ module flk_geometry_decode (
   logic [5:0][27:0] q_1_q;
   logic [0:0][27:0] v35_q;
   logic [5:0][27:0] q_2_q;
-  logic [0:0][37:0] v40_q;
-  logic [0:0][37:0] v41_q;
-  logic [0:0][37:0] v42_q;
-  logic [0:0][29:0] v44_q;
-  logic [0:0][19:0] v45_q;
-  logic [0:0][19:0] v47_q;
-  logic [3:0][19:0] s_0_q;
-  logic [0:0][36:0] v49_q;
-  logic [0:0][36:0] v50_q;
-  logic [0:0][36:0] v51_q;
-  logic [0:0][28:0] v53_q;
-  logic [0:0][19:0] v54_q;
-  logic [0:0][19:0] v56_q;
+  logic [0:0][19:0] v41_q;
+  logic [0:0][18:0] v43_q;
+  logic [0:0][27:0] v45_q;
+  logic [0:0][29:0] v46_q;
+  logic [0:0][29:0] v47_q;
+  logic [0:0][21:0] v49_q;
+  logic [0:0][19:0] v50_q;
+  logic [0:0][19:0] v52_q;
+  logic [2:0][19:0] s_0_q;
+  logic [0:0][26:0] v54_q;
+  logic [0:0][28:0] v55_q;
+  logic [0:0][28:0] v56_q;
+  logic [0:0][20:0] v58_q;
+  logic [0:0][19:0] v59_q;
+  logic [0:0][19:0] v61_q;
   logic [3:0][19:0] s_1_q;
-  logic [0:0][37:0] v58_q;
-  logic [0:0][37:0] v59_q;
-  logic [0:0][37:0] v60_q;
-  logic [0:0][29:0] v62_q;
-  logic [0:0][19:0] v63_q;
-  logic [0:0][19:0] v65_q;
+  logic [0:0][19:0] v64_q;
+  logic [0:0][18:0] v66_q;
+  logic [0:0][27:0] v68_q;
+  logic [0:0][29:0] v69_q;
+  logic [0:0][29:0] v70_q;
+  logic [0:0][21:0] v72_q;
+  logic [0:0][19:0] v73_q;
+  logic [0:0][19:0] v75_q;
   logic [2:0][19:0] s_2_q;
-  logic [3:0][10:0] v69_q;
-  logic [3:0][10:0] v72_q;
-  logic [3:0][10:0] v75_q;
-  logic [0:0][20:0] v76_q;
-  logic [0:0][20:0] v77_q;
-  logic [0:0][21:0] v78_q;
-  logic [0:0][20:0] v79_q;
-  logic [0:0][22:0] v80_q;
-  logic [0:0][23:0] v81_q;
-  logic [0:0][22:0] v82_q;
-  logic [0:0][19:0] v86_q;
-  logic [0:0][19:0] v87_q;
-  logic [5:0][0:0] v90_q;
-  logic [0:0][19:0] v91_q;
-  logic [5:0][0:0] v92_q;
-  logic [0:0][19:0] v93_q;
-  logic [0:0][19:0] v94_q;
-  logic [4:0][0:0] v95_q;
+  logic [3:0][10:0] v79_q;
+  logic [3:0][10:0] v82_q;
+  logic [3:0][10:0] v85_q;
+  logic [0:0][20:0] v86_q;
+  logic [0:0][20:0] v87_q;
+  logic [0:0][21:0] v88_q;
+  logic [0:0][20:0] v89_q;
+  logic [0:0][22:0] v90_q;
+  logic [0:0][23:0] v91_q;
+  logic [0:0][22:0] v92_q;
   logic [0:0][19:0] v96_q;
   logic [0:0][19:0] v97_q;
-  logic [0:0][19:0] v98_q;
-  logic [0:0][19:0] v99_q;
-  logic [0:0][19:0] qw_q;
+  logic [5:0][0:0] v100_q;
   logic [0:0][19:0] v101_q;
-  logic [0:0][19:0] qx_q;
+  logic [5:0][0:0] v102_q;
   logic [0:0][19:0] v103_q;
+  logic [0:0][19:0] v104_q;
+  logic [4:0][0:0] v105_q;
+  logic [0:0][19:0] v106_q;
+  logic [0:0][19:0] v107_q;
+  logic [0:0][19:0] v108_q;
+  logic [0:0][19:0] v109_q;
+  logic [0:0][19:0] qw_q;
+  logic [0:0][19:0] v111_q;
+  logic [0:0][19:0] qx_q;
+  logic [0:0][19:0] v113_q;
   logic [0:0][19:0] qy_q;
-  logic [0:0][19:0] v105_q;
+  logic [0:0][19:0] v115_q;
   logic [0:0][19:0] qz_q;
 
   always_ff @(posedge clk_i) begin
@@ -222,36 +240,40 @@ module flk_geometry_decode (
       q_0_q <= {q_0_q[4:0], q_0};
       v31_q <= v31;
       q_1_q <= {q_1_q[4:0], q_1};
-      v40_q <= v40;
-      v42_q <= v42;
-      v45_q <= v45;
+      v41_q <= v41;
+      v43_q <= v43;
+      v46_q <= v46;
       v49_q <= v49;
-      v51_q <= v51;
+      v52_q <= v52;
+      s_0_q <= {s_0_q[1:0], s_0};
       v54_q <= v54;
-      v58_q <= v58;
-      v60_q <= v60;
-      v63_q <= v63;
-      v65_q <= v65;
+      v56_q <= v56;
+      v59_q <= v59;
+      v64_q <= v64;
+      v66_q <= v66;
+      v69_q <= v69;
+      v72_q <= v72;
+      v75_q <= v75;
       s_2_q <= {s_2_q[1:0], s_2};
-      v69_q <= {v69_q[2:0], v69};
-      v72_q <= {v72_q[2:0], v72};
-      v75_q <= {v75_q[2:0], v75};
-      v78_q <= v78;
-      v81_q <= v81;
-      v90_q <= {v90_q[4:0], v90};
+      v79_q <= {v79_q[2:0], v79};
+      v82_q <= {v82_q[2:0], v82};
+      v85_q <= {v85_q[2:0], v85};
+      v88_q <= v88;
       v91_q <= v91;
-      v92_q <= {v92_q[4:0], v92};
-      v93_q <= v93;
-      v95_q <= {v95_q[3:0], v95};
-      v96_q <= v96;
-      v98_q <= v98;
-      v99_q <= v99;
-      qw_q <= qw;
+      v100_q <= {v100_q[4:0], v100};
       v101_q <= v101;
-      qx_q <= qx;
+      v102_q <= {v102_q[4:0], v102};
       v103_q <= v103;
+      v105_q <= {v105_q[3:0], v105};
+      v106_q <= v106;
+      v108_q <= v108;
+      v109_q <= v109;
+      qw_q <= qw;
+      v111_q <= v111;
+      qx_q <= qx;
+      v113_q <= v113;
       qy_q <= qy;
-      v105_q <= v105;
+      v115_q <= v115;
       qz_q <= qz;
     end
   end
@@ -260,28 +282,29 @@ module flk_geometry_decode (
     if (en_i && phase_i == 1'd1) begin
       v35_q <= v35;
       q_2_q <= {q_2_q[4:0], q_2};
-      v41_q <= v41;
-      v44_q <= v44;
+      v45_q <= v45;
       v47_q <= v47;
-      s_0_q <= {s_0_q[2:0], s_0};
       v50_q <= v50;
-      v53_q <= v53;
-      v56_q <= v56;
+      v55_q <= v55;
+      v58_q <= v58;
+      v61_q <= v61;
       s_1_q <= {s_1_q[2:0], s_1};
-      v59_q <= v59;
-      v62_q <= v62;
-      v76_q <= v76;
-      v77_q <= v77;
-      v79_q <= v79;
-      v80_q <= v80;
-      v82_q <= v82;
+      v68_q <= v68;
+      v70_q <= v70;
+      v73_q <= v73;
       v86_q <= v86;
       v87_q <= v87;
-      v94_q <= v94;
+      v89_q <= v89;
+      v90_q <= v90;
+      v92_q <= v92;
+      v96_q <= v96;
       v97_q <= v97;
+      v104_q <= v104;
+      v107_q <= v107;
     end
   end
 
+  assign next_odd = phase_i ^ en_i;
   assign v12 = word_0_i[15:0];
   assign v13 = word_0_i[31:16];
   assign v14 = word_1_i[15:0];
@@ -296,7 +319,11 @@ module flk_geometry_decode (
   assign v23 = word_0_i[20:11];
   assign v24 = word_0_i[10:0];
   assign v25 = 12'(v22);
-  flk_ff_from_fixed #(.Bits(12), .FracBits(0), .ManBits(19), .Stages(2)) i_u_v26 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v25 : v33), .y_o(u_v26));
+  assign u_v26_x_even = v25;
+  assign u_v26_x_odd = v33;
+  flk_phase_mux #(.Width(6)) i_u_v26_x_0 (.clk_i, .odd_i(next_odd), .a_i(u_v26_x_even[5:0]), .b_i(u_v26_x_odd[5:0]), .y_o(u_v26_x[5:0]));
+  flk_phase_mux #(.Width(6)) i_u_v26_x_1 (.clk_i, .odd_i(next_odd), .a_i(u_v26_x_even[11:6]), .b_i(u_v26_x_odd[11:6]), .y_o(u_v26_x[11:6]));
+  flk_ff_from_fixed #(.Bits(12), .FracBits(0), .ManBits(19), .Stages(2)) i_u_v26 (.clk_i, .en_i, .x_i(u_v26_x), .y_o(u_v26));
   assign v26 = u_v26;
   assign v34 = u_v26;
   flk_ff_from_fp16 #(.ManBits(19)) i_v27 (.x_i(v12), .y_o(v27));
@@ -312,84 +339,102 @@ module flk_geometry_decode (
   assign v37 = word_2_i[31:21];
   assign v38 = word_2_i[20:11];
   assign v39 = word_2_i[10:0];
-  assign v40 = 38'($signed(38'(v37)) * 38'(scale_step_0_i));
-  assign v41 = 38'(38'($signed(scale_low_0_i_q[0])) + $signed(v40_q[0]));
-  assign v42 = 38'($signed(v41_q[0]) + 38'sd128);
-  assign v43 = 30'($signed(v42_q[0]) >>> 8);
-  assign v44 = 30'(v43 < -30'sd524288 ? -30'sd524288 : v43);
-  assign v45 = 20'(30'sd524287 < $signed(v44_q[0]) ? 30'sd524287 : $signed(v44_q[0]));
-  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v64 (.clk_i, .en_i, .l_i(20'(phase_i == 1'd0 ? $signed(v63_q[0]) : $signed(v45_q[0]))), .y_o(u_v64));
-  assign v64 = u_v64;
-  assign v46 = u_v64;
-  flk_ff_from_fp16 #(.ManBits(11)) i_v47 (.x_i(v15_q[2]), .y_o(v47));
-  assign s_0 = chunked_i ? v46 : v47_q[0];
-  assign v49 = 37'($signed(37'(v38)) * 37'(scale_step_1_i));
-  assign v50 = 37'(37'($signed(scale_low_1_i_q[0])) + $signed(v49_q[0]));
-  assign v51 = 37'($signed(v50_q[0]) + 37'sd128);
-  assign v52 = 29'($signed(v51_q[0]) >>> 8);
-  assign v53 = 29'(v52 < -29'sd524288 ? -29'sd524288 : v52);
-  assign v54 = 20'(29'sd524287 < $signed(v53_q[0]) ? 29'sd524287 : $signed(v53_q[0]));
-  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v55 (.clk_i, .en_i, .l_i(20'($signed(v54_q[0]))), .y_o(u_v55));
-  assign v55 = u_v55;
-  flk_ff_from_fp16 #(.ManBits(11)) i_v56 (.x_i(v16_q[2]), .y_o(v56));
-  assign s_1 = chunked_i ? v55 : v56_q[0];
-  assign v58 = 38'($signed(38'(v39)) * 38'(scale_step_2_i));
-  assign v59 = 38'(38'($signed(scale_low_2_i_q[0])) + $signed(v58_q[0]));
-  assign v60 = 38'($signed(v59_q[0]) + 38'sd128);
-  assign v61 = 30'($signed(v60_q[0]) >>> 8);
-  assign v62 = 30'(v61 < -30'sd524288 ? -30'sd524288 : v61);
-  assign v63 = 20'(30'sd524287 < $signed(v62_q[0]) ? 30'sd524287 : $signed(v62_q[0]));
-  flk_ff_from_fp16 #(.ManBits(11)) i_v65 (.x_i(v17_q[2]), .y_o(v65));
-  assign s_2 = chunked_i ? v64 : v65_q[0];
-  assign v67 = word_1_i[29:20];
-  assign v68 = 11'(11'(v67) <<< 1);
-  assign v69 = 11'($signed(12'(v68)) - 12'sd1023);
-  assign v70 = word_1_i[19:10];
-  assign v71 = 11'(11'(v70) <<< 1);
-  assign v72 = 11'($signed(12'(v71)) - 12'sd1023);
-  assign v73 = word_1_i[9:0];
-  assign v74 = 11'(11'(v73) <<< 1);
-  assign v75 = 11'($signed(12'(v74)) - 12'sd1023);
-  assign v76 = 21'(21'($signed(v69_q[0])) * 21'($signed(v69_q[0])));
-  assign v77 = 21'(21'($signed(v72_q[0])) * 21'($signed(v72_q[0])));
-  assign v78 = 22'(22'($signed(v76_q[0])) + 22'($signed(v77_q[0])));
-  assign v79 = 21'(21'($signed(v75_q[0])) * 21'($signed(v75_q[0])));
-  assign v80 = 23'(23'($signed(v78_q[0])) + 23'($signed(v79_q[0])));
-  assign v81 = 24'(24'sd2093058 - 24'($signed(v80_q[0])));
-  assign v82 = 23'($signed(v81_q[0]) < 24'sd0 ? 24'sd0 : $signed(v81_q[0]));
-  assign v83 = 24'(v82_q[0]);
-  flk_ff_from_fixed #(.Bits(24), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v84 (.clk_i, .en_i, .x_i(v83), .y_o(u_v84));
-  assign v84 = u_v84;
-  flk_ff_sqrt #(.ManBits(11), .Stages(2)) i_u_v85 (.clk_i, .en_i, .x_i(v84), .y_o(u_v85));
-  assign v85 = u_v85;
-  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v88 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? $signed(v75_q[3]) : $signed(v69_q[3])), .y_o(u_v88));
-  assign v88 = u_v88;
-  assign v86 = u_v88;
-  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v87 (.clk_i, .en_i, .x_i($signed(v72_q[3])), .y_o(u_v87));
-  assign v87 = u_v87;
-  assign v89 = word_1_i[31:30];
-  assign v90 = v89 < 2'd1;
-  assign v91 = v90_q[4] ? v85 : v86_q[0];
-  assign v92 = v89 < 2'd2;
-  assign v93 = v92_q[4] ? v85 : v87_q[0];
-  assign v94 = v90_q[5] ? v86_q[0] : v93_q[0];
-  assign v95 = v89 < 2'd3;
-  assign v96 = v95_q[4] ? v85 : v88;
-  assign v97 = v92_q[5] ? v87_q[0] : v96_q[0];
-  assign v98 = v95_q[4] ? v88 : v85;
-  flk_ff_from_fp16 #(.ManBits(11)) i_v99 (.x_i(v18_q[4]), .y_o(v99));
-  assign qw = chunked_i ? v91_q[0] : v99_q[0];
-  flk_ff_from_fp16 #(.ManBits(11)) i_v101 (.x_i(v19_q[4]), .y_o(v101));
-  assign qx = chunked_i ? v94_q[0] : v101_q[0];
-  flk_ff_from_fp16 #(.ManBits(11)) i_v103 (.x_i(v20_q[4]), .y_o(v103));
-  assign qy = chunked_i ? v97_q[0] : v103_q[0];
-  flk_ff_from_fp16 #(.ManBits(11)) i_v105 (.x_i(v21_q[4]), .y_o(v105));
-  assign qz = chunked_i ? v98_q[0] : v105_q[0];
+  assign v40 = scale_step_0_i[8:0];
+  assign v41 = 20'(20'(v37) * 20'(v40));
+  assign v42 = scale_step_0_i[16:9];
+  assign v43 = 19'(19'(v37) * 19'(v42));
+  assign v44 = 28'(28'(v43_q[0]) <<< 9);
+  assign v45 = 28'(28'(v41_q[0]) + v44);
+  assign v46 = 30'(30'($signed(scale_low_0_i_q[0])) + $signed(30'(v45_q[0])));
+  assign v47 = 30'($signed(v46_q[0]) + 30'sd128);
+  assign v48 = 22'($signed(v47_q[0]) >>> 8);
+  assign v49 = 22'(v48 < -22'sd524288 ? -22'sd524288 : v48);
+  assign v50 = 20'(22'sd524287 < $signed(v49_q[0]) ? 22'sd524287 : $signed(v49_q[0]));
+  assign u_v51_l_even = $signed(v50_q[0]);
+  assign u_v51_l_odd = $signed(v59_q[0]);
+  flk_phase_mux #(.Width(10)) i_u_v51_l_0 (.clk_i, .odd_i(next_odd), .a_i(u_v51_l_even[9:0]), .b_i(u_v51_l_odd[9:0]), .y_o(u_v51_l[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v51_l_1 (.clk_i, .odd_i(next_odd), .a_i(u_v51_l_even[19:10]), .b_i(u_v51_l_odd[19:10]), .y_o(u_v51_l[19:10]));
+  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v51 (.clk_i, .en_i, .l_i(20'(u_v51_l)), .y_o(u_v51));
+  assign v51 = u_v51;
+  assign v60 = u_v51;
+  flk_ff_from_fp16 #(.ManBits(11)) i_v52 (.x_i(v15_q[2]), .y_o(v52));
+  assign s_0 = chunked_i ? v51 : v52_q[0];
+  assign v54 = 27'(27'(v38) * 27'(scale_step_1_i));
+  assign v55 = 29'(29'($signed(scale_low_1_i_q[0])) + $signed(29'(v54_q[0])));
+  assign v56 = 29'($signed(v55_q[0]) + 29'sd128);
+  assign v57 = 21'($signed(v56_q[0]) >>> 8);
+  assign v58 = 21'(v57 < -21'sd524288 ? -21'sd524288 : v57);
+  assign v59 = 20'(21'sd524287 < $signed(v58_q[0]) ? 21'sd524287 : $signed(v58_q[0]));
+  flk_ff_from_fp16 #(.ManBits(11)) i_v61 (.x_i(v16_q[2]), .y_o(v61));
+  assign s_1 = chunked_i ? v60 : v61_q[0];
+  assign v63 = scale_step_2_i[8:0];
+  assign v64 = 20'(20'(v39) * 20'(v63));
+  assign v65 = scale_step_2_i[16:9];
+  assign v66 = 19'(19'(v39) * 19'(v65));
+  assign v67 = 28'(28'(v66_q[0]) <<< 9);
+  assign v68 = 28'(28'(v64_q[0]) + v67);
+  assign v69 = 30'(30'($signed(scale_low_2_i_q[0])) + $signed(30'(v68_q[0])));
+  assign v70 = 30'($signed(v69_q[0]) + 30'sd128);
+  assign v71 = 22'($signed(v70_q[0]) >>> 8);
+  assign v72 = 22'(v71 < -22'sd524288 ? -22'sd524288 : v71);
+  assign v73 = 20'(22'sd524287 < $signed(v72_q[0]) ? 22'sd524287 : $signed(v72_q[0]));
+  flk_ff_exp2 #(.ManBits(11), .IntBits(8), .FracBits(12), .Stages(2)) i_u_v74 (.clk_i, .en_i, .l_i(20'($signed(v73_q[0]))), .y_o(u_v74));
+  assign v74 = u_v74;
+  flk_ff_from_fp16 #(.ManBits(11)) i_v75 (.x_i(v17_q[2]), .y_o(v75));
+  assign s_2 = chunked_i ? v74 : v75_q[0];
+  assign v77 = word_1_i[29:20];
+  assign v78 = 11'(11'(v77) <<< 1);
+  assign v79 = 11'($signed(12'(v78)) - 12'sd1023);
+  assign v80 = word_1_i[19:10];
+  assign v81 = 11'(11'(v80) <<< 1);
+  assign v82 = 11'($signed(12'(v81)) - 12'sd1023);
+  assign v83 = word_1_i[9:0];
+  assign v84 = 11'(11'(v83) <<< 1);
+  assign v85 = 11'($signed(12'(v84)) - 12'sd1023);
+  assign v86 = 21'(21'($signed(v79_q[0])) * 21'($signed(v79_q[0])));
+  assign v87 = 21'(21'($signed(v82_q[0])) * 21'($signed(v82_q[0])));
+  assign v88 = 22'(22'($signed(v86_q[0])) + 22'($signed(v87_q[0])));
+  assign v89 = 21'(21'($signed(v85_q[0])) * 21'($signed(v85_q[0])));
+  assign v90 = 23'(23'($signed(v88_q[0])) + 23'($signed(v89_q[0])));
+  assign v91 = 24'(24'sd2093058 - 24'($signed(v90_q[0])));
+  assign v92 = 23'($signed(v91_q[0]) < 24'sd0 ? 24'sd0 : $signed(v91_q[0]));
+  assign v93 = 24'(v92_q[0]);
+  flk_ff_from_fixed #(.Bits(24), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v94 (.clk_i, .en_i, .x_i(v93), .y_o(u_v94));
+  assign v94 = u_v94;
+  flk_ff_sqrt #(.ManBits(11), .Stages(2)) i_u_v95 (.clk_i, .en_i, .x_i(v94), .y_o(u_v95));
+  assign v95 = u_v95;
+  assign u_v98_x_even = $signed(v85_q[3]);
+  assign u_v98_x_odd = $signed(v79_q[3]);
+  flk_phase_mux #(.Width(5)) i_u_v98_x_0 (.clk_i, .odd_i(next_odd), .a_i(u_v98_x_even[4:0]), .b_i(u_v98_x_odd[4:0]), .y_o(u_v98_x[4:0]));
+  flk_phase_mux #(.Width(6)) i_u_v98_x_1 (.clk_i, .odd_i(next_odd), .a_i(u_v98_x_even[10:5]), .b_i(u_v98_x_odd[10:5]), .y_o(u_v98_x[10:5]));
+  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v98 (.clk_i, .en_i, .x_i(u_v98_x), .y_o(u_v98));
+  assign v98 = u_v98;
+  assign v96 = u_v98;
+  flk_ff_from_fixed #(.Bits(11), .FracBits(0), .ManBits(11), .Stages(2)) i_u_v97 (.clk_i, .en_i, .x_i($signed(v82_q[3])), .y_o(u_v97));
+  assign v97 = u_v97;
+  assign v99 = word_1_i[31:30];
+  assign v100 = v99 < 2'd1;
+  assign v101 = v100_q[4] ? v95 : v96_q[0];
+  assign v102 = v99 < 2'd2;
+  assign v103 = v102_q[4] ? v95 : v97_q[0];
+  assign v104 = v100_q[5] ? v96_q[0] : v103_q[0];
+  assign v105 = v99 < 2'd3;
+  assign v106 = v105_q[4] ? v95 : v98;
+  assign v107 = v102_q[5] ? v97_q[0] : v106_q[0];
+  assign v108 = v105_q[4] ? v98 : v95;
+  flk_ff_from_fp16 #(.ManBits(11)) i_v109 (.x_i(v18_q[4]), .y_o(v109));
+  assign qw = chunked_i ? v101_q[0] : v109_q[0];
+  flk_ff_from_fp16 #(.ManBits(11)) i_v111 (.x_i(v19_q[4]), .y_o(v111));
+  assign qx = chunked_i ? v104_q[0] : v111_q[0];
+  flk_ff_from_fp16 #(.ManBits(11)) i_v113 (.x_i(v20_q[4]), .y_o(v113));
+  assign qy = chunked_i ? v107_q[0] : v113_q[0];
+  flk_ff_from_fp16 #(.ManBits(11)) i_v115 (.x_i(v21_q[4]), .y_o(v115));
+  assign qz = chunked_i ? v108_q[0] : v115_q[0];
 
   assign q_0_o = q_0_q[5];
   assign q_1_o = q_1_q[5];
   assign q_2_o = q_2_q[5];
-  assign s_0_o = s_0_q[3];
+  assign s_0_o = s_0_q[2];
   assign s_1_o = s_1_q[3];
   assign s_2_o = s_2_q[2];
   assign qw_o = qw_q[0];

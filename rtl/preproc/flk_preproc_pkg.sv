@@ -46,8 +46,8 @@ package flk_preproc_pkg;
     position_t [2:0]           low;         // of the means, less the camera's position
     position_t [2:0]           step;
     logic signed [2:0][26:0]   scale_low;   // fixed point, 20 fraction bits
-    logic signed [2:0][26:0]   scale_step;
-    colour_t [2:0]             dc_low;
+    logic [2:0][16:0]          scale_step;
+    term_t [2:0]               dc_low;      // fixed point, 13 fraction bits
     colour_t [2:0]             dc_step;
     colour_t [2:0][2:0]        sh_step;     // by degree, channel
   } header_t;
@@ -70,7 +70,7 @@ package flk_preproc_pkg;
 
   typedef struct packed {
     logic [8:0]         sh_zero;
-    colour_t [2:0]      dc_low;
+    term_t [2:0]        dc_low;   // fixed point, 13 fraction bits
     colour_t [2:0]      dc_step;
     colour_t [2:0][2:0] sh_step;  // by degree, channel
   } colour_header_t;

@@ -32,7 +32,7 @@ module flk_preprocessing_core
   input  logic                        front_phase_i,
   input  logic [4:0][31:0]            words_i,
   input  logic [2:0][26:0]            scale_low_i,
-  input  logic [2:0][26:0]            scale_step_i,
+  input  logic [2:0][16:0]            scale_step_i,
   input  position_t [2:0]             low_i,
   input  position_t [2:0]             step_i,
   output logic                        near_o,
@@ -88,9 +88,9 @@ module flk_preprocessing_core
     .scale_low_0_i ($signed(scale_low_i[0])),
     .scale_low_1_i ($signed(scale_low_i[1])),
     .scale_low_2_i ($signed(scale_low_i[2])),
-    .scale_step_0_i($signed(scale_step_i[0])),
-    .scale_step_1_i($signed(scale_step_i[1])),
-    .scale_step_2_i($signed(scale_step_i[2])),
+    .scale_step_0_i(scale_step_i[0]),
+    .scale_step_1_i(scale_step_i[1]),
+    .scale_step_2_i(scale_step_i[2]),
     .q_0_o         (q[0]),
     .q_1_o         (q[1]),
     .q_2_o         (q[2]),
@@ -248,7 +248,7 @@ module flk_preprocessing_core
 
   logic                            basis_en, basis_phase_q, basis_take, basis_out, held_q, held_pop;
   logic [COLOUR_BASIS_LATENCY-1:0] basis_valid_q;
-  colour_t [15:1]                  basis, basis_q;
+  basis_t [15:1]                   basis, basis_q;
 
   flk_colour_basis i_basis (
     .clk_i,
@@ -304,8 +304,8 @@ module flk_preprocessing_core
   logic           part_valid_q, part_move, part_go, side_room, record_room, bounds_room;
   colour_part_t   part_q;
   colour_header_t header;
-  colour_t [3:0]      part_basis;
-  colour_t [3:0][2:0] part_step;
+  basis_t [3:0]   part_basis;
+  colour_t [2:0]  part_step;
   logic           colour_en;
 
   assign part_ready_o = !part_valid_q || part_move;
@@ -347,75 +347,88 @@ module flk_preprocessing_core
   assign survivor_ready = part_move && part_q.first;
   assign held_pop       = part_move && part_q.last;
 
+  // Of the degree that ends with the part.
   always_comb begin
     for (int unsigned i = 0; i < 4; i++) begin
       part_basis[i] = i < 3 || part_q.part != 2'd3 ? basis_q[4'(4 * 32'(part_q.part) + 1 + i)] : '0;
-      unique case (part_q.part)
-        2'd0: part_step[i] = i < 3 ? header.sh_step[0] : header.sh_step[1];
-        2'd1: part_step[i] = header.sh_step[1];
-        default: part_step[i] = header.sh_step[2];
-      endcase
     end
+    unique case (part_q.part)
+      2'd0: part_step = header.sh_step[0];
+      2'd1: part_step = header.sh_step[1];
+      default: part_step = header.sh_step[2];
+    endcase
   end
 
-  colour_t [2:0] sum, constant;
+  group_first_t [2:0]  first;
+  group_fourth_t [2:0] fourth;
+  constant_t [2:0]     constant, constant_late;
+  colour_t [2:0]       sum_step;
 
   flk_colour_group i_group (
+    .clk_i,
+    .en_i      (colour_en),
+    .chunked_i (setup_i.chunked),
+    .basis_0_i (part_basis[0]),
+    .basis_1_i (part_basis[1]),
+    .basis_2_i (part_basis[2]),
+    .basis_3_i (part_basis[3]),
+    .raw_00_i  (part_q.raw[0][0]),
+    .raw_01_i  (part_q.raw[0][1]),
+    .raw_02_i  (part_q.raw[0][2]),
+    .raw_10_i  (part_q.raw[1][0]),
+    .raw_11_i  (part_q.raw[1][1]),
+    .raw_12_i  (part_q.raw[1][2]),
+    .raw_20_i  (part_q.raw[2][0]),
+    .raw_21_i  (part_q.raw[2][1]),
+    .raw_22_i  (part_q.raw[2][2]),
+    .raw_30_i  (part_q.raw[3][0]),
+    .raw_31_i  (part_q.raw[3][1]),
+    .raw_32_i  (part_q.raw[3][2]),
+    .zero_i    (header.sh_zero),
+    .used_0_i  (part_q.used[0]),
+    .used_1_i  (part_q.used[1]),
+    .used_2_i  (part_q.used[2]),
+    .used_3_i  (part_q.used[3]),
+    .first_0_o (first[0]),
+    .fourth_0_o(fourth[0]),
+    .first_1_o (first[1]),
+    .fourth_1_o(fourth[1]),
+    .first_2_o (first[2]),
+    .fourth_2_o(fourth[2])
+  );
+
+  flk_colour_constant i_constant (
     .clk_i,
     .en_i        (colour_en),
     .chunked_i   (setup_i.chunked),
     .dc_0_i      (part_q.dc[0]),
     .dc_1_i      (part_q.dc[1]),
     .dc_2_i      (part_q.dc[2]),
-    .dc_low_0_i  (header.dc_low[0]),
-    .dc_low_1_i  (header.dc_low[1]),
-    .dc_low_2_i  (header.dc_low[2]),
-    .dc_step_0_i (header.dc_step[0]),
-    .dc_step_1_i (header.dc_step[1]),
-    .dc_step_2_i (header.dc_step[2]),
-    .basis_0_i   (part_basis[0]),
-    .basis_1_i   (part_basis[1]),
-    .basis_2_i   (part_basis[2]),
-    .basis_3_i   (part_basis[3]),
-    .raw_00_i    (part_q.raw[0][0]),
-    .raw_01_i    (part_q.raw[0][1]),
-    .raw_02_i    (part_q.raw[0][2]),
-    .raw_10_i    (part_q.raw[1][0]),
-    .raw_11_i    (part_q.raw[1][1]),
-    .raw_12_i    (part_q.raw[1][2]),
-    .raw_20_i    (part_q.raw[2][0]),
-    .raw_21_i    (part_q.raw[2][1]),
-    .raw_22_i    (part_q.raw[2][2]),
-    .raw_30_i    (part_q.raw[3][0]),
-    .raw_31_i    (part_q.raw[3][1]),
-    .raw_32_i    (part_q.raw[3][2]),
-    .step_00_i   (part_step[0][0]),
-    .step_01_i   (part_step[0][1]),
-    .step_02_i   (part_step[0][2]),
-    .step_10_i   (part_step[1][0]),
-    .step_11_i   (part_step[1][1]),
-    .step_12_i   (part_step[1][2]),
-    .step_20_i   (part_step[2][0]),
-    .step_21_i   (part_step[2][1]),
-    .step_22_i   (part_step[2][2]),
-    .step_30_i   (part_step[3][0]),
-    .step_31_i   (part_step[3][1]),
-    .step_32_i   (part_step[3][2]),
-    .zero_i      (header.sh_zero),
-    .used_0_i    (part_q.used[0]),
-    .used_1_i    (part_q.used[1]),
-    .used_2_i    (part_q.used[2]),
-    .used_3_i    (part_q.used[3]),
-    .sum_0_o     (sum[0]),
-    .sum_1_o     (sum[1]),
-    .sum_2_o     (sum[2]),
+    .low_0_i     (header.dc_low[0]),
+    .low_1_i     (header.dc_low[1]),
+    .low_2_i     (header.dc_low[2]),
+    .step_0_i    (header.dc_step[0]),
+    .step_1_i    (header.dc_step[1]),
+    .step_2_i    (header.dc_step[2]),
     .constant_0_o(constant[0]),
     .constant_1_o(constant[1]),
     .constant_2_o(constant[2])
   );
 
-  // ---- sums of the parts, colour --------------------------------------------------------------------
+  flk_delay #(
+    .Width($bits(part_step)),
+    .Depth(COLOUR_GROUP_LATENCY + 1)
+  ) i_step (
+    .clk_i,
+    .en_i(colour_en),
+    .d_i (part_step),
+    .q_o (sum_step)
+  );
 
+  // ---- sums of the degrees --------------------------------------------------------------------------
+
+  // Degree 1 ends with the third coefficient of part 0, degree 2 with part 1, degree 3 with part 3:
+  // what comes before waits for it.
   typedef struct packed {
     logic       valid;
     logic       first;
@@ -425,63 +438,127 @@ module flk_preprocessing_core
 
   tag_t [COLOUR_GROUP_LATENCY-1:0] tag_q;
   tag_t                            tag;
-  colour_t [2:0][3:0]              sums_d, sums_q;  // by channel, part
-  colour_t [2:0]                   constant_d, constant_q;
-  logic                            summed_q;
-  logic [COLOUR_TOTAL_LATENCY-1:0] total_valid_q;
-  logic [2:0][9:0]                 rgb;
-  logic [2:0]                      clipped;
-  logic                            rgb_valid, rgb_ready;
+  degree_sum_t [2:0]               sum_d, sum_q;  // of a degree that ends
+  degree_sum_t [2:0]               held_d, held_sum_q;
+
+  localparam int unsigned SumBits = $bits(degree_sum_t);
 
   assign tag = tag_q[COLOUR_GROUP_LATENCY-1];
 
   always_comb begin
-    sums_d     = sums_q;
-    constant_d = constant_q;
-    if (tag.first) begin
-      sums_d     = '0;
-      constant_d = constant;
-    end
     for (int unsigned c = 0; c < 3; c++) begin
-      sums_d[c][tag.part] = sum[c];
+      if (tag.part == 2'd0) begin
+        sum_d[c]  = SumBits'($signed(first[c]));
+        held_d[c] = SumBits'($signed(fourth[c]));
+      end else begin
+        held_d[c] = SumBits'($signed(first[c])) + SumBits'($signed(fourth[c]));
+        sum_d[c]  = held_d[c] + held_sum_q[c];
+      end
     end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      tag_q         <= '0;
-      summed_q      <= 1'b0;
-      total_valid_q <= '0;
+      tag_q <= '0;
     end else if (colour_en) begin
-      tag_q         <= {tag_q[COLOUR_GROUP_LATENCY-2:0],
-                        part_valid_q && part_go, part_q.first, part_q.last, part_q.part};
-      summed_q      <= tag.valid && tag.last;
-      total_valid_q <= {total_valid_q[COLOUR_TOTAL_LATENCY-2:0], summed_q};
+      tag_q <= {tag_q[COLOUR_GROUP_LATENCY-2:0],
+                part_valid_q && part_go, part_q.first, part_q.last, part_q.part};
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (colour_en && tag.valid) begin
-      sums_q     <= sums_d;
-      constant_q <= constant_d;
+      held_sum_q <= held_d;
+      sum_q      <= sum_d;
+    end
+  end
+
+  // ---- colour ---------------------------------------------------------------------------------------
+
+  localparam int unsigned TermCycles = 1 + COLOUR_TERM_LATENCY;  // behind the group's sums
+  localparam int unsigned TotalBits = $bits(term_t) + 3;         // the constant part and three terms
+  localparam int unsigned Drop = TERM_FRACTION - 9;              // a record has 9 fraction bits
+
+  typedef struct packed {
+    logic term;   // a degree has ended
+    logic first;
+    logic last;
+  } end_t;
+
+  if (COLOUR_GROUP_LATENCY + TermCycles < COLOUR_CONSTANT_LATENCY) begin : gen_check_latency
+    $error("flk_preprocessing_core: the constant part is later than the first term");
+  end
+
+  end_t [TermCycles-1:0] end_q;
+  end_t                  ended;
+  logic                  total_valid_q, rgb_valid_q;
+  logic [2:0][9:0]       rgb;
+  logic [2:0]            clipped;
+  logic                  rgb_valid, rgb_ready;
+
+  flk_delay #(
+    .Width($bits(constant)),
+    .Depth(COLOUR_GROUP_LATENCY + TermCycles - COLOUR_CONSTANT_LATENCY)
+  ) i_constant_late (
+    .clk_i,
+    .en_i(colour_en),
+    .d_i (constant),
+    .q_o (constant_late)
+  );
+
+  assign ended = end_q[TermCycles-1];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      end_q         <= '0;
+      total_valid_q <= 1'b0;
+      rgb_valid_q   <= 1'b0;
+    end else if (colour_en) begin
+      end_q         <= {end_q[TermCycles-2:0],
+                        tag.valid && tag.part != 2'd2, tag.first, tag.last};
+      total_valid_q <= ended.term && ended.last;
+      rgb_valid_q   <= total_valid_q;
     end
   end
 
   for (genvar c = 0; c < 3; c++) begin : gen_channels
-    flk_colour_total i_total (
+    term_t                       term;
+    logic signed [TotalBits-1:0] total_q;
+    logic signed [TotalBits-1:0] rounded;
+    logic [9:0]                  code_q;
+    logic                        clipped_q;
+
+    flk_colour_term i_term (
       .clk_i,
-      .en_i      (colour_en),
-      .constant_i(constant_q[c]),
-      .sum_0_i   (sums_q[c][0]),
-      .sum_1_i   (sums_q[c][1]),
-      .sum_2_i   (sums_q[c][2]),
-      .sum_3_i   (sums_q[c][3]),
-      .clipped_o (clipped[c]),
-      .code_o    (rgb[c])
+      .en_i     (colour_en),
+      .chunked_i(setup_i.chunked),
+      .sum_i    ($signed(sum_q[c])),
+      .step_i   (sum_step[c]),
+      .term_o   (term)
     );
+
+    assign rounded = (total_q + TotalBits'(1 << (Drop - 1))) >>> Drop;
+
+    always_ff @(posedge clk_i) begin
+      if (colour_en && ended.term) begin
+        total_q <= (ended.first ? TotalBits'($signed(constant_late[c])) : total_q)
+                 + TotalBits'(term);
+      end
+      if (colour_en) begin
+        clipped_q <= rounded > TotalBits'(1023);
+        if (rounded < 0) begin
+          code_q <= '0;
+        end else begin
+          code_q <= rounded > TotalBits'(1023) ? '1 : rounded[9:0];
+        end
+      end
+    end
+
+    assign rgb[c]     = code_q;
+    assign clipped[c] = clipped_q;
   end
 
-  assign rgb_valid = total_valid_q[COLOUR_TOTAL_LATENCY-1];
+  assign rgb_valid = rgb_valid_q;
   assign colour_en = !rgb_valid || rgb_ready;
 
   // ---- bounds ---------------------------------------------------------------------------------------
@@ -702,25 +779,56 @@ module flk_preprocessing_core
     logic [22:0] x;
   } fields_t;
 
-  fields_t fields_in, fields;
-  logic    fields_valid, fields_empty;
+  // The survivor stands a cycle in registers: the queue's memory is too slow for the fields.
+  typedef struct packed {
+    place_t             place;
+    logic               spiky;
+    logic signed [30:0] x;
+    logic signed [30:0] y;
+    shape_t             l0;
+    shape_t             l1;
+    shape_t             l2;
+  } recorded_t;
 
-  assign fields_in.place    = survivor.place;
-  assign fields_in.spiky    = survivor.spiky;
-  assign fields_in.l1[14]   = survivor.l1[SHAPE_MAN_BITS+8];
+  recorded_t recorded_q;
+  fields_t   fields_in, fields;
+  logic      fields_valid, fields_empty, fields_room, recorded_valid_q;
 
-  flk_mean_field i_x_field (.x_i(survivor.x), .field_o(fields_in.x));
-  flk_mean_field i_y_field (.x_i(survivor.y), .field_o(fields_in.y));
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      recorded_valid_q <= 1'b0;
+    end else begin
+      recorded_valid_q <= survivor_ready;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (survivor_ready) begin
+      recorded_q <= '{
+        place: survivor.place, spiky: survivor.spiky, x: survivor.x, y: survivor.y,
+        l0: survivor.l0, l1: survivor.l1, l2: survivor.l2
+      };
+    end
+  end
+
+  assign record_room = fields_room && !recorded_valid_q;
+
+  assign fields_in.place    = recorded_q.place;
+  assign fields_in.spiky    = recorded_q.spiky;
+  assign fields_in.l1[14]   = recorded_q.l1[SHAPE_MAN_BITS+8];
+
+  flk_mean_field i_x_field (.x_i(recorded_q.x), .field_o(fields_in.x));
+  flk_mean_field i_y_field (.x_i(recorded_q.y), .field_o(fields_in.y));
   flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (
-    .x_i    (survivor.l0),
+    .x_i    (recorded_q.l0),
     .field_o(fields_in.l0)
   );
   flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l1_field (
-    .x_i    (survivor.l1),
+    .x_i    (recorded_q.l1),
     .field_o(fields_in.l1[13:0])
   );
   flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (
-    .x_i    (survivor.l2),
+    .x_i    (recorded_q.l2),
     .field_o(fields_in.l2)
   );
 
@@ -731,8 +839,8 @@ module flk_preprocessing_core
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
-    .in_valid_i (survivor_ready),
-    .in_ready_o (record_room),
+    .in_valid_i (recorded_valid_q),
+    .in_ready_o (fields_room),
     .in_data_i  (fields_in),
     .out_valid_o(fields_valid),
     .out_ready_i(record_valid_o && record_ready_i),
@@ -766,6 +874,7 @@ module flk_preprocessing_core
   assign clipped_o      = record_valid_o && record_ready_i && (|clipped);
 
   assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty &&
+                  !recorded_valid_q &&
                   code_empty && side_empty && bounded_empty && walk_empty && walker_idle &&
                   seqs_empty;
 

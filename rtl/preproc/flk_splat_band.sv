@@ -89,6 +89,7 @@ module flk_splat_band (
   logic [8:0] first;  // cycle 25
   logic [8:0] last;  // cycle 25
   logic [30:0] x_i_end;
+  logic [30:0] x_i_end_q;
   logic [1:0][30:0] y_i_q;
   logic [1:0][29:0] right_i_q;
   logic [23:0][11:0] x0_i_q;
@@ -96,8 +97,10 @@ module flk_splat_band (
   logic [0:0][11:0] y1_i_q;
   logic [5:0][19:0] l2_i_q;
   logic [19:0] i0_i_end;
+  logic [19:0] i0_i_end_q;
   logic [5:0][19:0] kappa_i_q;
   logic [19:0] limit_i_end;
+  logic [19:0] limit_i_end_q;
   logic [0:0][11:0] v14_q;
   logic [0:0][30:0] v16_q;
   logic [0:0][11:0] v17_q;
@@ -105,12 +108,12 @@ module flk_splat_band (
   logic [0:0][30:0] v20_q;
   logic [0:0][30:0] v21_q;
   logic [0:0][30:0] v22_q;
-  logic [19:0] v25_end;
+  logic [7:0][19:0] v25_q;
   logic [0:0][31:0] v32_q;
   logic [0:0][30:0] v33_q;
   logic [0:0][30:0] v34_q;
   logic [0:0][30:0] v35_q;
-  logic [19:0] v38_end;
+  logic [7:0][19:0] v38_q;
   logic [0:0][31:0] v45_q;
   logic [0:0][31:0] v46_q;
   logic [0:0][31:0] v47_q;
@@ -124,13 +127,16 @@ module flk_splat_band (
 
   always_ff @(posedge clk_i) begin
     if (en_i) begin
+      x_i_end_q <= x_i_end;
       y_i_q <= {y_i_q[0:0], y_i};
       right_i_q <= {right_i_q[0:0], right_i};
       x0_i_q <= {x0_i_q[22:0], x0_i};
       x1_i_q <= {x1_i_q[20:0], x1_i};
       y1_i_q <= y1_i;
       l2_i_q <= {l2_i_q[4:0], l2_i};
+      i0_i_end_q <= i0_i_end;
       kappa_i_q <= {kappa_i_q[4:0], kappa_i};
+      limit_i_end_q <= limit_i_end;
       v14_q <= v14;
       v16_q <= v16;
       v17_q <= v17;
@@ -138,10 +144,12 @@ module flk_splat_band (
       v20_q <= v20;
       v21_q <= v21;
       v22_q <= v22;
+      v25_q <= {v25_q[6:0], v25};
       v32_q <= v32;
       v33_q <= v33;
       v34_q <= v34;
       v35_q <= v35;
+      v38_q <= {v38_q[6:0], v38};
       v45_q <= v45;
       v46_q <= v46;
       v47_q <= v47;
@@ -155,19 +163,15 @@ module flk_splat_band (
     end
   end
 
-  flk_delay_ram #(.Width(40), .Depth(8)) i_ring_0_8 (
-    .clk_i, .en_i(en_i), .d_i({v25, v38}), .q_o({v25_end, v38_end})
-  );
-
-  flk_delay_ram #(.Width(20), .Depth(10)) i_ring_0_10 (
+  flk_delay_ram #(.Width(20), .Depth(9)) i_ring_0_9 (
     .clk_i, .en_i(en_i), .d_i({limit_i}), .q_o({limit_i_end})
   );
 
-  flk_delay_ram #(.Width(20), .Depth(14)) i_ring_0_14 (
+  flk_delay_ram #(.Width(20), .Depth(13)) i_ring_0_13 (
     .clk_i, .en_i(en_i), .d_i({i0_i}), .q_o({i0_i_end})
   );
 
-  flk_delay_ram #(.Width(31), .Depth(20)) i_ring_0_20 (
+  flk_delay_ram #(.Width(31), .Depth(19)) i_ring_0_19 (
     .clk_i, .en_i(en_i), .d_i({x_i}), .q_o({x_i_end})
   );
 
@@ -189,17 +193,17 @@ module flk_splat_band (
   assign v25 = u_v25;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v26 (.clk_i, .en_i, .a_i(v24), .b_i(v24), .prod_o(u_v26));
   assign v26 = u_v26;
-  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v27 (.clk_i, .en_i, .a_i(limit_i_end), .b_i({!v26[19], v26[18:0]}), .sum_o(u_v27));
+  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v27 (.clk_i, .en_i, .a_i(limit_i_end_q), .b_i({!v26[19], v26[18:0]}), .sum_o(u_v27));
   assign v27 = u_v27;
   flk_ff_sqrt #(.ManBits(11), .Stages(2)) i_u_v28 (.clk_i, .en_i, .x_i(v27), .y_o(u_v28));
   assign v28 = u_v28;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v29 (.clk_i, .en_i, .a_i(i0_i_end), .b_i(v28), .prod_o(u_v29));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v29 (.clk_i, .en_i, .a_i(i0_i_end_q), .b_i(v28), .prod_o(u_v29));
   assign v29 = u_v29;
-  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v30 (.clk_i, .en_i, .a_i(v25_end), .b_i(v29), .sum_o(u_v30));
+  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v30 (.clk_i, .en_i, .a_i(v25_q[7]), .b_i(v29), .sum_o(u_v30));
   assign v30 = u_v30;
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v31 (.clk_i, .en_i, .x_i(v30), .y_o(u_v31));
   assign v31 = u_v31;
-  assign v32 = 32'(32'($signed(x_i_end)) + 32'(v31));
+  assign v32 = 32'(32'($signed(x_i_end_q)) + 32'(v31));
   assign v33 = 31'(31'sd0 - 31'($signed(right_i_q[0])));
   assign v34 = 31'($signed(v33_q[0]) < $signed(v16_q[0]) ? $signed(v16_q[0]) : $signed(v33_q[0]));
   assign v35 = 31'($signed(v20_q[0]) < $signed(v34_q[0]) ? $signed(v20_q[0]) : $signed(v34_q[0]));
@@ -211,17 +215,17 @@ module flk_splat_band (
   assign v38 = u_v38;
   flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v39 (.clk_i, .en_i, .a_i(v37), .b_i(v37), .prod_o(u_v39));
   assign v39 = u_v39;
-  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v40 (.clk_i, .en_i, .a_i(limit_i_end), .b_i({!v39[19], v39[18:0]}), .sum_o(u_v40));
+  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v40 (.clk_i, .en_i, .a_i(limit_i_end_q), .b_i({!v39[19], v39[18:0]}), .sum_o(u_v40));
   assign v40 = u_v40;
   flk_ff_sqrt #(.ManBits(11), .Stages(2)) i_u_v41 (.clk_i, .en_i, .x_i(v40), .y_o(u_v41));
   assign v41 = u_v41;
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v42 (.clk_i, .en_i, .a_i(i0_i_end), .b_i(v41), .prod_o(u_v42));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v42 (.clk_i, .en_i, .a_i(i0_i_end_q), .b_i(v41), .prod_o(u_v42));
   assign v42 = u_v42;
-  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v43 (.clk_i, .en_i, .a_i(v38_end), .b_i({!v42[19], v42[18:0]}), .sum_o(u_v43));
+  flk_ff_add #(.ManBits(11), .Stages(2)) i_u_v43 (.clk_i, .en_i, .a_i(v38_q[7]), .b_i({!v42[19], v42[18:0]}), .sum_o(u_v43));
   assign v43 = u_v43;
   flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v44 (.clk_i, .en_i, .x_i(v43), .y_o(u_v44));
   assign v44 = u_v44;
-  assign v45 = 32'(32'($signed(x_i_end)) + 32'(v44));
+  assign v45 = 32'(32'($signed(x_i_end_q)) + 32'(v44));
   assign v46 = 32'($signed(v45_q[0]) + 32'sd128);
   assign v47 = 32'($signed(v46_q[0]) - 32'sd1);
   assign v48 = 25'($signed(v47_q[0]) >>> 7);

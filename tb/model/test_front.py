@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 
 from flicker.cli.main import app
 from flicker.errors import FlickerError
-from flicker.front.projection import project
+from flicker.front.projection import _C1, _C2, _C3, project
 from flicker.front.view import DEMO, View, load_view
+from flicker.golden.front import colour
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.cull import cull, key_scale
 from flicker.golden.front.frame import FrontFrame, ListKind, depth_key, run_front
@@ -311,13 +312,38 @@ def test_degenerate_scales() -> None:
 
 def test_bright_colours_are_clipped_and_counted() -> None:
     rng = np.random.default_rng(1)
-    sh = rng.normal(scale=3.0, size=(64, 16, 3))
+    sh = rng.normal(size=(64, 16, 3))
+    sh[:, 0] *= 3.0
+    assert np.abs(sh[:, 1:]).max() < 4.0
     frame = run_front(pack(Scene(**(vars_of(some(64)) | {"sh": sh})), PackedFormat.FP16).packed, plain_camera())
     exact = project(decode(frame.packed), plain_camera())
     place = np.argsort(exact.index)
     too_bright = (exact.rgb[place] > 1023.5 / 512).any(axis=1)
     assert frame.adjusted["colour above 2 clipped"] == too_bright.sum() > 0
     assert np.abs(frame.splats().rgb - np.clip(exact.rgb[place], 0, 1023 / 512)).max() < 0.01
+
+
+def test_coefficients_of_fp16_end_at_4() -> None:
+    sh = np.zeros((2, 4, 3))
+    sh[:, 2] = np.array([[6.0], [8191 / 2048]]) * [1.0, -1.0, 1.0]
+    scene = Scene(**(vars_of(some(2, means=[0.0, 0.0, 4.0])) | {"sh": sh}))
+    rgb = seen_from(scene, plain_camera()).splats().rgb
+    assert (rgb[0] == rgb[1]).all() and rgb[0, 0] == 1023 / 512 and rgb[0, 1] == 0.0
+
+
+def test_basis_functions_are_those_of_float64() -> None:
+    rng = np.random.default_rng(2)
+    d = np.concatenate([rng.normal(size=(2000, 3)), np.repeat(np.eye(3), 2, axis=0) * np.tile([[1.0], [-1.0]], (3, 1))])
+    unit = d / np.linalg.norm(d, axis=1, keepdims=True)
+    for row, (x, y, z) in zip(d, unit):
+        out = np.zeros(16, np.int64)
+        colour.basis_functions(*rounded(row, FORMATS.colour).tolist(), 3, out, FORMATS.colour)
+        exact = [
+            -_C1 * y, _C1 * z, -_C1 * x, _C2[0] * x * y, _C2[1] * y * z, _C2[2] * (3 * z * z - 1), _C2[3] * x * z, _C2[4] * (x * x - y * y),
+            _C3[0] * y * (3 * x * x - y * y), _C3[1] * x * y * z, _C3[2] * y * (5 * z * z - 1), _C3[3] * z * (5 * z * z - 3),
+            _C3[4] * x * (5 * z * z - 1), _C3[5] * z * (x * x - y * y), _C3[6] * x * (x * x - 3 * y * y),
+        ]
+        assert np.abs(out[1:] / 2048 - exact).max() < 5.0 / 2048
 
 
 def vars_of(scene: Scene) -> dict[str, np.ndarray]:

@@ -38,13 +38,16 @@ class Bench:
         names = [*self.registers, *self.inputs]
         kinds = {**self.registers, **self.inputs}
         lines = ["module datapath_bench (", "  input logic clk_i, en_i,", "  input logic [1:0] phase_i,"]
-        lines += [f"  input logic [{64 * len(names) - 1}:0] in_i,", f"  output logic [{64 * len(self.outputs) - 1}:0] out_o", ");"]
+        # Two outputs at least: an array of words in C++.
+        lines += [f"  input logic [{64 * len(names) - 1}:0] in_i,", f"  output logic [{max(64 * len(self.outputs), 128) - 1}:0] out_o", ");"]
         phase = f".phase_i(phase_i[{max((self.pipeline.interval - 1).bit_length(), 1) - 1}:0]), " if self.pipeline.interval > 1 else ""
         ports = [f".{n}_i(in_i[{64 * i + kinds[n].bits - 1}:{64 * i}])" for i, n in enumerate(names)]
         for i, (n, k) in enumerate(self.outputs.items()):
             lines.append(f"  logic {'signed ' if getattr(k, 'signed', False) else ''}[{k.bits - 1}:0] o{i};")
             lines.append(f"  assign out_o[{64 * i + 63}:{64 * i}] = 64'(o{i});")
             ports.append(f".{n}_o(o{i})")
+        if len(self.outputs) == 1:
+            lines.append("  assign out_o[127:64] = '0;")
         lines += [f"  {self.pipeline.module} i_dut (.clk_i, .en_i, {phase}{', '.join(ports)});", "endmodule", ""]
         folder = BUILD / "datapath" / self.pipeline.module
         folder.mkdir(parents=True, exist_ok=True)

@@ -29,6 +29,13 @@ extern "C" int64_t run(int64_t n, int interval, int latency, int fixed_words, co
   Vtop& model = top();
   state = seed;
   int64_t cycle = 0, clocks = 0;
+  // Phase 0 stands for a clock before the first element.
+  model.en_i = 0;
+  model.phase_i = 0;
+  model.clk_i = 1;
+  model.eval();
+  model.clk_i = 0;
+  model.eval();
   for (int64_t done = 0; done < n; clocks++) {
     const bool on = enable[clocks % enables];
     const int phase = static_cast<int>(cycle % interval);

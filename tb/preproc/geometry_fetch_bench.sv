@@ -41,7 +41,7 @@ module geometry_fetch_bench
   assign status_o = 192'({geometry_beats, header_beats, 31'b0, error});
   assign out_data_o = 1440'({out_end, group});
 
-  if ($bits(group_t) != 1377) begin : gen_check
+  if ($bits(group_t) != 1347) begin : gen_check
     $error("geometry_fetch_bench: group_t is not as test_geometry_fetch.py reads it");
   end
 

@@ -15,10 +15,10 @@ import pytest
 from datapath_bench import Bench
 from flicker_tb.runner import seed
 
-from flicker.arithmetic.ff import ff_add, ff_mul, ff_round, ff_value
-from flicker.datapath.units import SCALE_HEADER
+from flicker.arithmetic.ff import ff_round, ff_value
+from flicker.datapath.units import DEGREE_SUM, SCALE_HEADER, SCALE_STEP
 from flicker.front.view import DEMO, load_view
-from flicker.golden.front import cull, frame, reach, splat
+from flicker.golden.front import colour, cull, frame, reach, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
 from flicker.scene.packed import PackedFormat, PackedScene
@@ -142,8 +142,8 @@ def test_geometry_decode(form: PackedFormat) -> None:
     raw = np.ascontiguousarray(raw).view("<u4").reshape(SOME, -1)
     words[:, : raw.shape[1]] = raw
     c = s.packed.cluster[s.index]
-    top = SCALE_HEADER.high if chunked else 0
-    inputs = of("word", words) | of("scale_low", np.minimum(s.values.scale_low[c], top)) | of("scale_step", np.minimum(s.values.scale_step[c], top))
+    top, most = (SCALE_HEADER.high, SCALE_STEP.high) if chunked else (0, 0)
+    inputs = of("word", words) | of("scale_low", np.minimum(s.values.scale_low[c], top)) | of("scale_step", np.minimum(s.values.scale_step[c], most))
     same(bench("flk_geometry_decode")({"chunked": chunked}, **inputs), geometry(s))
 
 
@@ -289,75 +289,76 @@ def test_splat_band(box: bool) -> None:
 
 
 @numba.njit
-def _basis(d, k, M, out):
+def _basis(d, M, out):
     for j in range(len(d)):
-        splat.basis_functions(d[j, 0], d[j, 1], d[j, 2], k, 3, out[j], M)
+        colour.basis_functions(d[j, 0], d[j, 1], d[j, 2], 3, out[j], M)
 
 
 def test_colour_basis() -> None:
     s, rng = demo(PackedFormat.CHUNK), random(6)
     d = np.concatenate([seen(s)[0][:, 8:], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
-    out = np.zeros((len(d), 16))
-    _basis(d, splat.colour_constants(FORMATS), C, out)
+    out = np.zeros((len(d), 16), np.int64)
+    _basis(d, C, out)
     got = bench("flk_colour_basis")({}, **of("direction", d))
     same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)})
 
 
 @numba.njit
-def _groups(basis, coefficient, M, out):
+def _groups(basis, coefficient, first, fourth):
     for j in range(len(basis)):
         for c in range(3):
-            out[j, c] = splat.group_sum(basis[j], coefficient[j, :, c], M)
+            first[j, c], fourth[j, c] = colour.group_sums(basis[j], coefficient[j, :, c])
 
 
 @pytest.mark.parametrize("chunked", [True, False])
 def test_colour_group(chunked: bool) -> None:
     rng, n = random(7), 1000
-    basis = np.stack([wild(rng, n, C, 110, 130) for _ in range(4)], 1)
-    step = np.stack([wild(rng, n, C, 100, 140) for _ in range(12)], 1).reshape(n, 4, 3)
+    basis = rng.integers(-2048, 2048, (n, 4))
+    basis[:8], basis[8:16] = -2048, 2047
     used = rng.random((n, 4)) < 0.8
     zero = rng.integers(255, 257, n)
     if chunked:
         raw = rng.integers(0, 256, (n, 4, 3))
-        value = (2 * raw - zero[:, None, None]).astype(np.float64)
+        value = 2 * raw - zero[:, None, None]
     else:
-        half = rng.normal(size=(n, 4, 3)).astype(np.float16)
+        half = (rng.normal(size=(n, 4, 3)) * 2.0 ** rng.integers(-14, 6, (n, 4, 3))).astype(np.float16)
         half.view(np.uint16)[rng.random(half.shape) < 0.1] &= 0x83FF  # subnormal numbers
-        raw, value = half.view(np.uint16).astype(np.int64), half.astype(np.float64)
-    coefficient = np.zeros((n, 4, 3))
-    for place in np.ndindex(coefficient.shape):
-        exact = ff_round(float(value[place]), C)
-        coefficient[place] = (ff_mul(step[place], exact, C) if chunked else exact) if used[place[:2]] else 0.0
-    want = np.zeros((n, 3))
-    _groups(basis, coefficient, C, want)
-    factors = splat.colour_constants(FORMATS)
-    rows = rng.integers(0, len(demo(PackedFormat.CHUNK).values.dc_low), n)
-    dc_low, dc_step = demo(PackedFormat.CHUNK).values.dc_low[rows], demo(PackedFormat.CHUNK).values.dc_step[rows]
+        half[:4], half[4:8] = 65504.0, -65504.0
+        raw, value = half.view(np.uint16).astype(np.int64), np.vectorize(colour.half_coefficient)(half.astype(np.float64))
+        assert (np.abs(value) == 8191).sum() > 100
+    coefficient = np.where(used[:, :, None], value, 0)
+    first, fourth = np.zeros((n, 3), np.int64), np.zeros((n, 3), np.int64)
+    _groups(basis, coefficient, first, fourth)
+    raws = {f"raw_{k}{c}": raw[:, k, c] for k in range(4) for c in range(3)}
+    got = bench("flk_colour_group")({"chunked": chunked}, **of("basis", basis), **raws, **of("used", used.astype(np.int64)), zero=zero)
+    same(got, of("first", first) | of("fourth", fourth))
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_colour_constant(chunked: bool) -> None:
+    rng, n, values = random(8), 1000, demo(PackedFormat.CHUNK).values
+    rows = rng.integers(0, len(values.dc_low), n)
+    low, step = values.dc_low[rows], values.dc_step[rows]
+    low[:9], step[:9] = rng.choice([-(1 << 19), (1 << 19) - 1], (9, 3)), rng.choice([1.0, -1.0], (9, 3))  # saturated terms on top
     dc = rng.integers(0, 256, (n, 3)) if chunked else rng.normal(size=(n, 3)).astype(np.float16).view(np.uint16).astype(np.int64)
     number = dc.astype(np.float64) if chunked else dc.astype(np.uint16).view(np.float16).astype(np.float64)
-    constant = np.zeros((n, 3))
-    for j, c in np.ndindex(n, 3):
-        a, b = (dc_low[j, c], dc_step[j, c]) if chunked else (0.5, factors[0])
-        constant[j, c] = ff_add(a, ff_mul(b, ff_round(float(number[j, c]), C), C), C)
-    raws = {f"raw_{k}{c}": raw[:, k, c] for k in range(4) for c in range(3)}
-    steps = {f"step_{k}{c}": step[:, k, c] for k in range(4) for c in range(3)}
-    got = bench("flk_colour_group")(
-        {"chunked": chunked}, **of("basis", basis), **raws, **steps, **of("used", used.astype(np.int64)), zero=zero, **of("dc", dc),
-        **of("dc_low", dc_low), **of("dc_step", dc_step),
-    )
-    same(got, of("sum", want) | of("constant", constant))
+    want = np.zeros((n, 3), np.int64)
+    for place in np.ndindex(n, 3):
+        a, b = (low[place], step[place]) if chunked else (4096, colour.constant_factor(FORMATS))
+        want[place] = colour.constant_part(a, b, ff_round(float(number[place]), C), C)
+    got = bench("flk_colour_constant")({"chunked": chunked}, **of("dc", dc), **of("low", low), **of("step", step))
+    same(got, of("constant", want))
 
 
-def test_colour_total() -> None:
-    rng, n = random(8), 1000
-    constant = wild(rng, n, C, 115, 130)
-    sums = np.stack([wild(rng, n, C, 110, 130) for _ in range(4)], 1)
-    colour = np.array([splat.total(constant[j], *sums[j], C) for j in range(n)])
-    fixed = np.floor(colour * (1 << frame.COLOUR_FRACTION) + 0.5).astype(np.int64)
-    clipped = fixed > frame.COLOUR_LIMIT
-    assert clipped.any() and (colour == 0).any() and not clipped.all()
-    got = bench("flk_colour_total")({}, constant=constant, **of("sum", sums))
-    same(got, {"clipped": clipped.astype(np.int64), "code": np.minimum(fixed, frame.COLOUR_LIMIT)})
+@pytest.mark.parametrize("chunked", [True, False])
+def test_colour_term(chunked: bool) -> None:
+    rng, n = random(9), 1500
+    sums = (rng.normal(size=n) * 2.0 ** rng.integers(0, 22, n)).astype(np.int64).clip(DEGREE_SUM.low, DEGREE_SUM.high)
+    sums[:2] = DEGREE_SUM.low, DEGREE_SUM.high
+    step = wild(rng, n, C, 105, 130)
+    want = np.array([colour.term(v, s if chunked else frame.FP16_STEP, C) for v, s in zip(sums.tolist(), step.tolist())])
+    assert chunked != ((np.abs(want) < (1 << 19) - 1).all())
+    same(bench("flk_colour_term")({"chunked": chunked}, sum=sums, step=step), {"term": want})
 
 
 def test_units_are_named_in_this_file() -> None:
@@ -365,4 +366,5 @@ def test_units_are_named_in_this_file() -> None:
     from flicker.datapath.units import PIPELINES
 
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
-        "cluster_test", "cluster_header", "geometry_decode", "projection", "splat_bounds", "splat_band", "colour_basis", "colour_group", "colour_total")}
+        "cluster_test", "cluster_header", "geometry_decode", "projection", "splat_bounds", "splat_band", "colour_basis", "colour_group", "colour_constant",
+        "colour_term")}

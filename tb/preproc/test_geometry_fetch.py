@@ -16,7 +16,8 @@ from flicker_tb.runner import seed
 
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import cull
-from flicker.golden.front.frame import cluster_values
+from flicker.golden.front.colour import TERM_BITS
+from flicker.golden.front.frame import SCALE_STEP_BITS, cluster_values
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
 from flicker.scene.demo import demo_cameras
 from flicker.scene.packed import TABLE_ENTRY, PackedFormat, PackedScene
@@ -29,7 +30,8 @@ P, C = FORMATS.position, FORMATS.colour
 # group_t, the last field lowest: name, fields of it, bits of each.
 LAYOUT = [
     ("word", 20, 32), ("used", 1, 4), ("group", 1, 6), ("last", 1, 1), ("first", 1, 1),
-    ("sh_step", 9, 9 + C), ("dc_step", 3, 9 + C), ("dc_low", 3, 9 + C), ("scale_step", 3, 27), ("scale_low", 3, 27), ("step", 3, 9 + P), ("low", 3, 9 + P),
+    ("sh_step", 9, 9 + C), ("dc_step", 3, 9 + C), ("dc_low", 3, TERM_BITS), ("scale_step", 3, SCALE_STEP_BITS), ("scale_low", 3, 27),
+    ("step", 3, 9 + P), ("low", 3, 9 + P),
     ("sh_zero", 1, 9), ("colour", 1, 32), ("degree", 1, 2), ("count", 1, 8), ("slots", 1, 20), ("index", 1, 24), ("end", 1, 1),
 ]
 
@@ -112,13 +114,14 @@ def expected(packed: PackedScene, setup: FrameSetup, kept: np.ndarray) -> dict[s
     word = np.zeros((len(c), 4, 5), np.int64)
     word[:, :, :words] = np.ascontiguousarray(packed.geometry).view("<u4").reshape(-1, words)[slot]
     word[np.arange(4) >= left[:, None]] = -1  # anything
-    fixed = lambda a: a & (1 << 27) - 1  # noqa: E731
+    fixed = lambda a, bits=27: a & (1 << bits) - 1  # noqa: E731
     column = lambda a: np.asarray(a, np.int64)[:, None]  # noqa: E731
     return {
         "word": word.reshape(len(c), 20), "used": column((1 << np.minimum(left, 4)) - 1), "group": column(group),
         "last": column(left <= 4), "first": column(group == 0), "end": np.zeros((len(c), 1), np.int64),
-        "sh_step": codes_of(v.sh_step, C).reshape(-1, 9)[c], "dc_step": codes_of(v.dc_step, C)[c], "dc_low": codes_of(v.dc_low, C)[c],
-        "scale_step": fixed(v.scale_step)[c], "scale_low": fixed(v.scale_low)[c], "step": codes_of(v.step, P)[c], "low": codes_of(v.low, P)[c],
+        "sh_step": codes_of(v.sh_step, C).reshape(-1, 9)[c], "dc_step": codes_of(v.dc_step, C)[c], "dc_low": fixed(v.dc_low, TERM_BITS)[c],
+        "scale_step": fixed(v.scale_step, SCALE_STEP_BITS)[c], "scale_low": fixed(v.scale_low)[c],
+        "step": codes_of(v.step, P)[c], "low": codes_of(v.low, P)[c],
         "sh_zero": column(h["sh_zero"][c] if chunked else np.zeros(len(c))), "colour": column(h["colour"][c]),
         "degree": column(t["flags"][c] & 3), "count": column(t["last"][c]), "slots": column(t["first"][c]), "index": column(c),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from dataclasses import dataclass
 
 from .graph import BOOL, Ff, Graph, Int, Value
 from .schedule import Schedule, Unit, needed, schedule
@@ -40,8 +41,7 @@ class _Writer:
         assert k >= 0, (self.names[v], cycle)
         if k == 0:
             return self.names[v]
-        row, deepest = self.rows[v]
-        text = f"{self.names[v]}_q[{k - 1}]" if k <= row else f"{self.names[v]}_end"
+        text = f"{self.names[v]}_q[{k - 1}]" if k <= self.rows[v].front else f"{self.names[v]}_end{'_q' if self.rows[v].last else ''}"
         return f"$signed({text})" if isinstance(v.kind, Int) and v.kind.signed else text
 
     def begin(self, v: Value) -> int:
@@ -66,6 +66,9 @@ def _expression(w: _Writer, v: Value) -> str:
     operands = [w.operand(o, cycle) for o in v.operands]
     text = v.operator.text
     integers = all(isinstance(o.kind, Int) for o in v.operands) and isinstance(v.kind, Int)
+    if v.operator.wide:
+        operands = [_widened(o, value, v.operator.wide, True) for o, value in zip(operands, v.operands)]
+        return f"{v.kind.bits}'({text.format(*operands)})"
     arithmetic = integers and re.search(r"[-+*<>=]", text) and "[" not in text
     if arithmetic:
         kinds = [o.kind for o in v.operands]
@@ -111,18 +114,37 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
             unit = turns[v]
             if id(unit) not in made:
                 made.add(id(unit))
-                wires.append(f"  {w.type_of(v)} {_unit_name(w, unit)};")
-                body += _unit(w, plan, unit)
+                declared, lines = _unit(w, plan, unit)
+                bits = dict(v.operator.parameters).get("OutBits", 0)
+                wires += [f"  logic signed [{bits - 1}:0] {_unit_name(w, unit)};" if bits else f"  {w.type_of(v)} {_unit_name(w, unit)};", *declared]
+                body += lines
         elif v.operator.module:
             body += _instance(w, v, w.names[v])
         else:
             body.append(f"  assign {w.names[v]} = {_expression(w, v)};")
+    if wrapped := _wrapped(graph, live):
+        wires.append("  logic unused_wrapped;")
+        body.append(f"  assign unused_wrapped = ^{{{', '.join(w.names[v] for v in wrapped)}}};")
+    if any("next_odd" in line for line in body):
+        wires.insert(0, "  logic next_odd;  // the phase of the next cycle")
+        body.insert(0, "  assign next_odd = phase_i ^ en_i;")
     outputs = [f"  assign {n}_o = {w.operand(v, plan.latency)};" for n, v in graph.outputs.items()]
     text = "\n".join([
         *_comment(_head(head, name, plan)), f"module {name} (", *_ports(w, plan), ");", "", *_tables(graph), *wires,
         *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
     ])
     return text, plan
+
+
+def _wrapped(graph: Graph, live: set[Value]) -> list[Value]:
+    """Values of which only low bits are used."""
+    users: dict[Value, list[Value]] = {}
+    for v in graph.values:
+        if v in live:
+            for o in v.operands:
+                users.setdefault(o, []).append(v)
+    narrow = lambda v, o: v.operator.wiring and re.fullmatch(r"\d+'\(\{0\}\)", v.operator.text) and v.kind.bits < o.kind.bits  # noqa: E731
+    return [o for o, found in users.items() if o not in graph.outputs.values() and all(narrow(v, o) for v in found)]
 
 
 def _head(head: str, name: str, plan: Schedule) -> str:
@@ -194,54 +216,103 @@ def _unit_name(w: _Writer, unit: Unit) -> str:
     return f"u_{w.names[unit.turns[min(unit.turns)]]}"
 
 
-def _unit(w: _Writer, plan: Schedule, unit: Unit) -> list[str]:
-    """A unit, its operands by phase, and the results by name."""
+SLICE = 10  # bits of an operand that share the register of their multiplexer
+
+
+def _unit(w: _Writer, plan: Schedule, unit: Unit) -> tuple[list[str], list[str]]:
+    """Wires; a unit, its operands by phase, and the results by name."""
     turns = dict(sorted(unit.turns.items()))
     first = next(iter(turns.values()))
-    name = _unit_name(w, unit)
-    wires, out = [], []
-    for k in range(len(first.operands)):
-        texts = []
-        for v in turns.values():
-            text = w.operand(v.operands[k], plan.begin[v])
-            if v.negated[k]:
-                top = v.operands[k].kind.bits - 1
-                inner = text
-                text = f"{{!{inner}[{top}], {inner}[{top - 1}:0]}}" if "'" not in inner else f"({inner} ^ {{1'b1, {top}'b0}})"
-            texts.append(text)
-        if len(set(texts)) == 1:
-            wires.append(texts[0])
-        else:
-            phases = list(turns)
-            text = texts[-1]
-            for p, other in list(zip(phases, texts))[-2::-1]:
-                text = f"phase_i == {max((plan.interval - 1).bit_length(), 1)}'d{p} ? {other} : {text}"
-            wires.append(text)
     assert first.operator is not None
-    if first.operator.module == "flk_ff_exp2":
-        parameters = dict(first.operator.parameters)
-        wires[0] = f"{parameters['IntBits'] + parameters['FracBits']}'({wires[0]})"
-    out += _text(first, [*wires, name], name, True)
+    name = _unit_name(w, unit)
+    declared, body, ports, held = [], [], [], []
+    parameters = dict(first.operator.parameters)
+    for k in range(len(first.operands)):
+        texts = [_turn(w, plan, v, k) for v in turns.values()]
+        bits = first.operands[k].kind.bits
+        if first.operator.module == "flk_fixed_mul":
+            bits = (parameters["ABits"], parameters["BBits"])[k]
+        port = first.operator.ports[k].removesuffix("_i")
+        if len(set(texts)) == 1:
+            text = texts[0]
+        elif plan.interval == 2 and not first.operator.held and first.operator.module not in QUICK:
+            text = f"{name}_{port}"
+            declared += [f"  logic [{bits - 1}:0] {text}, {text}_even, {text}_odd;"]
+            body += [f"  assign {text}_even = {texts[0]};", f"  assign {text}_odd = {texts[1]};"]
+            slices = -(-bits // SLICE)
+            for i in range(slices):
+                low, high = bits * i // slices, bits * (i + 1) // slices - 1
+                part = f"[{high}:{low}]"
+                body += [
+                    f"  flk_phase_mux #(.Width({high - low + 1})) i_{text}_{i} (.clk_i, .odd_i(next_odd), .a_i({text}_even{part}), .b_i({text}_odd{part}), "
+                    f".y_o({text}{part}));"
+                ]
+        else:
+            text = texts[-1]
+            for p, other in list(zip(turns, texts))[-2::-1]:
+                text = f"phase_i == {_phase_bits(plan)}'d{p} ? {other} : {text}"
+        if first.operator.held:
+            held.append((f"{name}_{port}_q", bits, text))
+            text = held[-1][0]
+        if first.operator.module == "flk_ff_exp2":
+            text = f"{parameters['IntBits'] + parameters['FracBits']}'({text})"
+        ports.append(text)
+    if held:
+        declared += [f"  logic [{bits - 1}:0] {register};" for register, bits, _ in held]
+        loads = [f"      {register} <= {text};" for register, _, text in held]
+        body += ["  always_ff @(posedge clk_i) begin", "    if (en_i) begin", *loads, "    end", "  end"]
+    body += _text(first, [*ports, name], name, True)
+    result = parameters.get("OutBits", 0)
     for v in turns.values():
-        out.append(f"  assign {w.names[v]} = {name};")
-    return out
+        body.append(f"  assign {w.names[v]} = {f'{v.kind.bits}({name})'.replace('(', chr(39) + '(') if result > v.kind.bits else name};")
+    return declared, body
+
+
+QUICK = ("flk_ff_to_fixed",)  # have time for a multiplexer and its choice in front of them
+
+
+def _turn(w: _Writer, plan: Schedule, v: Value, k: int) -> str:
+    """An operand of a turn."""
+    text = w.operand(v.operands[k], plan.begin[v])
+    if v.operator is not None and v.operator.module == "flk_fixed_mul":
+        parameters = dict(v.operator.parameters)
+        return _widened(text, v.operands[k], (parameters["ABits"], parameters["BBits"])[k], True)
+    if not v.negated[k]:
+        return text
+    top = v.operands[k].kind.bits - 1
+    return f"{{!{text}[{top}], {text}[{top - 1}:0]}}" if "'" not in text else f"({text} ^ {{1'b1, {top}'b0}})"
 
 
 LONG = 8  # registers in a row that become a memory
 
 
-def _rows(plan: Schedule) -> dict[Value, tuple[int, int]]:
-    """Registers behind each value, and with the memory behind them: where the last user alone is far away, a memory takes what lies between."""
+@dataclass(frozen=True)
+class _Row:
+    """Registers behind a value: front of flip-flops, then a memory of so many places, then a last flip-flop if logic uses what comes out."""
+
+    front: int
+    memory: int = 0
+    last: int = 0
+
+
+def _rows(plan: Schedule) -> dict[Value, _Row]:
+    """Registers behind each value: where the last user alone is far away, a memory takes what lies between."""
     taps: dict[Value, set[int]] = {}
-    users = [(o, plan.begin[v]) for v in plan.begin for o in v.operands] + [(v, plan.latency) for v in plan.graph.outputs.values()]
-    for v, cycle in users:
-        if v.constant is None and (k := plan.registers(v, cycle)) > 0:
+    logic: dict[Value, int] = {}
+    for v in plan.begin:
+        for o in v.operands:
+            if o.constant is None and (k := plan.registers(o, plan.begin[v])) > 0:
+                taps.setdefault(o, set()).add(k)
+                logic[o] = max(logic.get(o, 0), k)
+    for v in plan.graph.outputs.values():
+        if v.constant is None and (k := plan.registers(v, plan.latency)) > 0:
             taps.setdefault(v, set()).add(k)
     rows = {}
     for v, found in taps.items():
         *inner, deepest = sorted(found)
-        row = max(inner, default=0)
-        rows[v] = (row if deepest - row >= LONG else deepest, deepest)
+        front, last = max(inner, default=0), int(logic.get(v, 0) == deepest)
+        memory = deepest - front - last
+        rows[v] = _Row(front, memory, last) if memory >= LONG else _Row(deepest)
     return rows
 
 
@@ -254,22 +325,31 @@ def _registers(w: _Writer, plan: Schedule) -> list[str]:
         if v not in w.rows:
             continue
         bits, name, phase = v.kind.bits, w.names[v], plan.ready(v) % plan.interval
-        row, deepest = w.rows[v]
-        if deepest > row:
-            rings.setdefault((phase, deepest - row), []).append(v)
+        row = w.rows[v]
+        if row.memory:
+            rings.setdefault((phase, row.memory), []).append(v)
             out.append(f"  logic [{bits - 1}:0] {name}_end;")
-        if row:
-            out.append(f"  logic [{row - 1}:0][{bits - 1}:0] {name}_q;")
-            shift = f"{{{name}_q[{row - 2}:0], {name}}}" if row > 1 else name
+        if row.last:
+            out.append(f"  logic [{bits - 1}:0] {name}_end_q;")
+            loads.setdefault(phase, []).append(f"      {name}_end_q <= {name}_end;")
+        if row.front:
+            out.append(f"  logic [{row.front - 1}:0][{bits - 1}:0] {name}_q;")
+            shift = f"{{{name}_q[{row.front - 2}:0], {name}}}" if row.front > 1 else name
             loads.setdefault(phase, []).append(f"      {name}_q <= {shift};")
     out.append("")
-    wide = max((plan.interval - 1).bit_length(), 1)
-    enable = lambda phase: "en_i" if plan.interval == 1 else f"en_i && phase_i == {wide}'d{phase}"  # noqa: E731
     for phase, lines in sorted(loads.items()):
-        out += ["  always_ff @(posedge clk_i) begin", f"    if ({enable(phase)}) begin", *lines, "    end", "  end", ""]
+        out += ["  always_ff @(posedge clk_i) begin", f"    if ({_enable(plan, phase)}) begin", *lines, "    end", "  end", ""]
     for (phase, depth), values in sorted(rings.items()):
-        begins = ", ".join(f"{w.names[v]}_q[{w.rows[v][0] - 1}]" if w.rows[v][0] else w.names[v] for v in values)
+        begins = ", ".join(f"{w.names[v]}_q[{w.rows[v].front - 1}]" if w.rows[v].front else w.names[v] for v in values)
         ends = ", ".join(f"{w.names[v]}_end" for v in values)
         out += [f"  flk_delay_ram #(.Width({sum(v.kind.bits for v in values)}), .Depth({depth})) i_ring_{phase}_{depth} (",
-                f"    .clk_i, .en_i({enable(phase)}), .d_i({{{begins}}}), .q_o({{{ends}}})", "  );", ""]
+                f"    .clk_i, .en_i({_enable(plan, phase)}), .d_i({{{begins}}}), .q_o({{{ends}}})", "  );", ""]
     return out
+
+
+def _phase_bits(plan: Schedule) -> int:
+    return max((plan.interval - 1).bit_length(), 1)
+
+
+def _enable(plan: Schedule, phase: int) -> str:
+    return "en_i" if plan.interval == 1 else f"en_i && phase_i == {_phase_bits(plan)}'d{phase}"

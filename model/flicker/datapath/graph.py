@@ -53,6 +53,7 @@ class Int:
 
 
 BOOL = Int(0, 1)
+LARGE = 170  # bits by bits of a product of whole numbers that is too slow for one cycle
 Kind = Ff | Int
 
 
@@ -74,6 +75,8 @@ class Operator:
     clocked: bool = True
     text: str = ""
     wiring: bool = False
+    wide: int = 0  # bits in which an expression of whole numbers is computed, if more than its operands and result have
+    held: bool = False  # registers behind the multiplexers of its operands; they are in the latency
 
 
 @dataclass(eq=False)
@@ -88,6 +91,7 @@ class Value:
     name: str = ""
     constant: int | None = None  # bits
     register: bool = False
+    late: bool = False  # stands late in its cycle: registered before it is used
 
     @property
     def range(self) -> Int:
@@ -126,6 +130,9 @@ class Value:
         b = self.graph.integer(other)
         if b.constant is not None and b.range.low > 0 and b.range.low & (b.range.low - 1) == 0:
             return self << (b.range.low.bit_length() - 1)
+        if b.constant is None and self.kind.bits * b.kind.bits > LARGE and not b.range.signed:
+            low = b.kind.bits - b.kind.bits // 2  # in two parts, each with a register behind it
+            return self * self.graph.slice(b, 0, low) + (self * self.graph.slice(b, low, b.kind.bits - low) << low)
         ends = lambda p, q: [x * y for x in (p.low, p.high) for y in (q.low, q.high)]  # noqa: E731
         return self._int(b, "{0} * {1}", lambda p, q: (min(ends(p, q)), max(ends(p, q))))
 
@@ -197,17 +204,17 @@ class Graph:
 
     # ---- ends --------------------------------------------------------------------------------------
 
-    def input(self, name: str, kind: Kind, register: bool = False) -> Value:
-        value = Value(self, kind, name=name, register=register)
+    def input(self, name: str, kind: Kind, register: bool = False, late: bool = False) -> Value:
+        value = Value(self, kind, name=name, register=register, late=late)
         self.values.append(value)
         return value
 
-    def inputs(self, name: str, kind: Kind, shape: Sequence[int], register: bool = False) -> Any:
+    def inputs(self, name: str, kind: Kind, shape: Sequence[int], register: bool = False, late: bool = False) -> Any:
         """Nested lists of inputs: name_0, name_1 or name_00, name_01."""
         if not shape:
-            return self.input(name, kind, register)
+            return self.input(name, kind, register, late)
         join = name if name[-1:].isdigit() else f"{name}_"
-        return [self.inputs(f"{join}{i}", kind, shape[1:], register) for i in range(shape[0])]
+        return [self.inputs(f"{join}{i}", kind, shape[1:], register, late) for i in range(shape[0])]
 
     def output(self, name: str, value: Value) -> None:
         if value.constant is None and not value.name:
@@ -301,6 +308,32 @@ class Graph:
         parameters = (("Bits", i.kind.bits), ("FracBits", frac_bits), ("ManBits", M), ("Stages", 2))
         return self.make(Ff(M), Operator("flk_ff_from_fixed", parameters, ("x_i", "y_o"), 2, True), (i,))
 
+    def fixed_mul(self, a: Value, b: Value, drop: int) -> Value:
+        """The wider operand last, and wider than the first, so that products of numbers of nearly the same width share units."""
+        if a.kind.bits > b.kind.bits:
+            a, b = b, a
+        wide = max(b.kind.bits, a.kind.bits + 1)
+        ends = [x * y for x in (a.range.low, a.range.high) for y in (b.range.low, b.range.high)]
+        half = 1 << (drop - 1)
+        kind = Int(min((min(ends) + half) >> drop, -1), (max(ends) + half) >> drop)
+        out = max(a.kind.bits + wide - drop - 1, kind.bits)
+        parameters = (("ABits", a.kind.bits), ("BBits", wide), ("Drop", drop), ("OutBits", out), ("Stages", 1))
+        return self.make(kind, Operator("flk_fixed_mul", parameters, ("a_i", "b_i", "y_o"), 1, True), (a, b))
+
+    def fixed_mix(self, a: Any, factor_a: int, b: Any, factor_b: int, offset: int, drop: int) -> Value:
+        operands = [(v, f) for v, f in ((a, factor_a), (b, factor_b)) if f]
+        rest = offset + ((1 << drop) >> 1)
+        low = sum(min(v.range.low * f, v.range.high * f) for v, f in operands) + rest
+        high = sum(max(v.range.low * f, v.range.high * f) for v, f in operands) + rest
+        kind, wide = Int(min(low >> drop, -1), high >> drop), Int(min(low, -1), high).bits + 1
+        text = " ".join(f"{'-' if digit < 0 else '+'} ({{{k}}} <<< {place})" for k, (_, f) in enumerate(operands) for digit, place in signed_digits(f))
+        if rest:
+            text += f" {'-' if rest < 0 else '+'} {wide}'sd{abs(rest)}"
+        return self.make(kind, Operator(text=f"({text.removeprefix('+ ')}) >>> {drop}", wide=wide), tuple(v for v, _ in operands))
+
+    def fixed_wrap(self, x: Value, bits: int) -> Value:
+        return self.wire(f"{bits}'({{0}})", Int(-(1 << (bits - 1)), (1 << (bits - 1)) - 1), (x,))
+
     def exp2_fixed(self, L: Value, frac_bits: int, M: int) -> Value:
         count = stages("flk_ff_exp2", M)
         parameters = (("ManBits", M), ("IntBits", max(L.kind.bits - frac_bits, 2)), ("FracBits", frac_bits), ("Stages", count))
@@ -343,6 +376,23 @@ class Graph:
         return self.expression("{0} < {1} ? {1} : {0}" if largest else "{1} < {0} ? {1} : {0}", bounds, (a, b))
 
 
+def _sum_kind(*values: Value) -> Int:
+    return Int(sum(v.range.low for v in values), sum(v.range.high for v in values))
+
+
+def signed_digits(value: int) -> list[tuple[int, int]]:
+    """Digits 1 and -1 and their places, as few as there can be, the largest first: canonical signed digits."""
+    digits, place = [], 0
+    while value:
+        if value & 1:
+            digit = 2 - (value & 3)
+            digits.append((digit, place))
+            value -= digit
+        value >>= 1
+        place += 1
+    return digits[::-1]
+
+
 def _symbolic() -> dict[str, Any]:
     """What stands in for the ff operations and Python's own."""
 
@@ -375,6 +425,10 @@ def _symbolic() -> dict[str, Any]:
         "ff_from_fixed": lambda i, frac_bits, M: i.graph.from_fixed(i, frac_bits, M),
         "ff_from_int": lambda i, M: i.graph.from_fixed(i, 0, M),
         "ff_exp2_fixed": lambda L, frac_bits, M: L.graph.exp2_fixed(L, frac_bits, M),
+        "fixed_mul": lambda a, b, drop: graph_of(a, b).fixed_mul(a, b, drop),
+        "fixed_mix": lambda a, factor_a, b, factor_b, offset, drop: graph_of(a, b).fixed_mix(a, factor_a, b, factor_b, offset, drop),
+        "fixed_sum": lambda a, b, c: graph_of(a).expression("{0} + {1} + {2}", _sum_kind(a, b, c), (a, b, c)),
+        "fixed_wrap": lambda x, bits: x.graph.fixed_wrap(x, bits),
         "pick": lambda condition, a, b: graph_of(condition).pick(condition, a, b),
         "min": extreme(False),
         "max": extreme(True),

@@ -8,7 +8,7 @@ that load once an interval: the k-th holds it in the cycles r + (k - 1) interval
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -17,6 +17,7 @@ from .graph import Graph, Operator, Value
 
 REACH = 12  # cycles by which a move may go
 SWEEPS = 20
+WIDE = 28  # bits of a whole number that several sums take out of a register of its own
 
 
 @dataclass(eq=False)
@@ -59,8 +60,10 @@ def _ready(value: Value, begin: dict[Value, int]) -> int:
 
 
 def _settle(value: Value) -> int:
-    """Cycles between a value and its first use: expressions end in a register."""
+    """Cycles between a value and its first use: expressions end in a register, and late inputs, and wide numbers."""
     operator = value.operator
+    if value.late:
+        return 1
     return 1 if operator is not None and operator.latency == 0 and not operator.wiring else 0
 
 
@@ -165,8 +168,29 @@ def needed(graph: Graph) -> set[Value]:
     return reached
 
 
+# Operators whose first stage leaves no time for a multiplexer in front: their operands are held in registers behind it. Name, least mantissa bits.
+SLOW = {"flk_ff_add": 15, "flk_ff_mul": 15}
+
+
+def _hold(graph: Graph, interval: int) -> None:
+    """Mark what is slow where units take turns: operations with registers in front, wide whole numbers with one behind."""
+    counts: dict[Operator, int] = defaultdict(int)
+    live = needed(graph)
+    for v in graph.values:
+        if v in live and v.operator is not None and _shared(v):
+            counts[v.operator] += 1
+    for v in graph.values:
+        operator = v.operator
+        if operator is None or interval == 1 or counts[operator] < 2:
+            continue
+        v.late = operator.module == "flk_ff_to_fixed" and v.kind.bits >= WIDE
+        if dict(operator.parameters).get("ManBits", 0) >= SLOW.get(operator.module, 99):
+            v.operator = replace(operator, latency=operator.latency + 1, held=True)
+
+
 def schedule(graph: Graph, interval: int) -> Schedule:
     """Begin of each operation that an output needs, and the units."""
+    _hold(graph, interval)
     s = _Scheduler(graph, interval)
     s.first()
     end = max((_ready(v, s.begin) + _settle(v) for v in s.ends), default=0)

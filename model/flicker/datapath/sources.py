@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..golden.front import colour
 from ..golden.front.setup import FORMATS, FrontFormats
 from .emit import module
-from .units import PIPELINES
+from .units import BASIS, CONSTANT, DEGREE_SUM, GROUP_FIRST, GROUP_FOURTH, PIPELINES, TERM
 
 PACKAGE = "preproc/flk_front_pkg.sv"
 
@@ -35,6 +36,11 @@ def _package(formats: FrontFormats, latencies: dict[str, int]) -> str:
     lines.append("")
     for name, bits in (("position", formats.position), ("shape", formats.shape), ("colour", formats.colour), ("cluster", 23)):
         lines.append(f"  typedef logic [{8 + bits}:0] {name}_t;")
+    lines += ["", "  // Spherical harmonics, sums of products with coefficients, and what they add to a colour"]
+    lines += [f"  localparam int unsigned TERM_FRACTION = {colour.TERM_FRACTION};"]
+    kinds = {"basis": BASIS, "group_first": GROUP_FIRST, "group_fourth": GROUP_FOURTH, "degree_sum": DEGREE_SUM, "term": TERM, "constant": CONSTANT}
+    for name, kind in kinds.items():
+        lines.append(f"  typedef logic signed [{kind.bits - 1}:0] {name}_t;")
     lines += ["", "  // Cycles from an element to its outputs"]
     lines += [f"  localparam int unsigned {name.removeprefix('flk_').upper()}_LATENCY = {latency};" for name, latency in latencies.items()]
     return "\n".join([*lines, "", "endpackage", ""])

@@ -9,17 +9,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..arithmetic.ff import ff_add, ff_mul, ff_round, ff_sub
-from ..golden.front import cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
+from ..arithmetic.ff import ff_round, ff_sub
+from ..golden.front import colour, cull, frame, reach, splat
+from ..golden.front.setup import CLUSTER_M, FORMATS, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
 from ..params import SUBTILE
-from .graph import BOOL, Ff, Graph, Int, Value, retrace
+from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
 MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
 REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
-SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end and step of log2 scales
+SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end of log2 scales
+SCALE_STEP = Int(0, (1 << frame.SCALE_STEP_BITS) - 1)
 BANDS = MAX_PICTURE // SUBTILE
+BASIS = Int(-(1 << (colour.BASIS_BITS - 1)), (1 << (colour.BASIS_BITS - 1)) - 1)
+TERM = Int(-(1 << (colour.TERM_BITS - 1)), (1 << (colour.TERM_BITS - 1)) - 1)
 
 
 @dataclass(frozen=True)
@@ -68,16 +71,17 @@ def cluster_header(formats: FrontFormats) -> Graph:
     g, kind = Graph(), Ff(CLUSTER_M)
     P, C = formats.position, formats.colour
     origin, step, position = g.inputs("origin", kind, (3,)), g.inputs("step", kind, (3,)), g.inputs("position", kind, (3,), register=True)
-    scale = {n: g.inputs(n, kind, (3,)) for n in ("scale_low", "scale_step")}
-    colour = {n: g.inputs(n, kind, (3,)) for n in ("dc_low", "dc_step")}
+    scale_low, scale_step = (g.inputs(n, kind, (3,)) for n in ("scale_low", "scale_step"))
+    dc_low, dc_step = (g.inputs(n, kind, (3,)) for n in ("dc_low", "dc_step"))
     sh = g.inputs("sh_step", kind, (3, 3))  # by degree and channel
     for k in range(3):
         g.output(f"low_{k}", _symbolic(lambda a, b: ff_round(ff_sub(a, b, CLUSTER_M), P))(origin[k], position[k]))
         g.output(f"step_{k}", g.ff_round(step[k], P))
-        for name, values in scale.items():
-            g.output(f"{name}_{k}", g.to_fixed(values[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
-        for name, values in colour.items():
-            g.output(f"{name}_{k}", g.ff_round(values[k], C))
+        g.output(f"scale_low_{k}", g.to_fixed(scale_low[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
+        signed = g.to_fixed(scale_step[k], frame.SCALE_HEADER_FRACTION, SCALE_STEP.bits + 1, True)
+        g.output(f"scale_step_{k}", g.wire(f"{SCALE_STEP.bits}'({{0}} & ~({{0}} >>> {SCALE_STEP.bits}))", SCALE_STEP, (signed,)))
+        g.output(f"dc_low_{k}", g.to_fixed(dc_low[k], colour.TERM_FRACTION, colour.TERM_BITS, True))
+        g.output(f"dc_step_{k}", g.ff_round(dc_step[k], C))
         for degree in range(3):
             g.output(f"sh_step_{degree}{k}", g.ff_round(sh[degree][k], C))
     return g
@@ -88,7 +92,7 @@ def geometry_decode(formats: FrontFormats) -> Graph:
     g = Graph()
     P, S = formats.position, formats.shape
     chunked, words = g.input("chunked", BOOL, register=True), g.inputs("word", WORD, (5,))
-    low, step = (g.inputs(n, SCALE_HEADER, (3,)) for n in ("scale_low", "scale_step"))
+    low, step = g.inputs("scale_low", SCALE_HEADER, (3,)), g.inputs("scale_step", SCALE_STEP, (3,))
     halves = [g.slice(words[k // 2], 16 * (k % 2), 16) for k in range(10)]
     codes = [g.slice(words[0], at, bits) for at, bits in ((21, 11), (11, 10), (0, 11))]
     for k in range(3):
@@ -184,52 +188,69 @@ def _bits(g: Graph, value: Value) -> Value:
 
 
 def colour_basis(formats: FrontFormats) -> Graph:
-    """Spherical harmonics in a direction."""
+    """Spherical harmonics in a direction, which comes out of a memory."""
     g, C = Graph(), formats.colour
-    d = g.inputs("direction", Ff(C), (3,))
-    factors = splat.colour_constants(formats).tolist()
+    d = g.inputs("direction", Ff(C), (3,), late=True)
     out: list[Any] = [None] * 16
-    retrace(splat.basis_functions)(*d, factors, 3, out, C)
+    retrace(colour.basis_functions)(*d, 3, out, C)
     for k in range(1, 16):
         g.output(f"basis_{k}", out[k])
     return g
 
 
+def _coefficient(g: Graph, chunked: Value, used: Value, raw: Value, zero: Value) -> Value:
+    """A coefficient as it stands in the image, as a whole number."""
+    top = (1 << (colour.COEFFICIENT_BITS - 1)) - 1
+    operator = Operator("flk_coefficient", ports=("chunked_i", "used_i", "raw_i", "zero_i", "y_o"), clocked=False)
+    return g.make(Int(-top, top), operator, (chunked, used, raw, zero))
+
+
 def colour_group(formats: FrontFormats) -> Graph:
-    """Four coefficients of three channels, with the sum of their products for each channel; and the constant part of the colour."""
-    g, C = Graph(), formats.colour
+    """Four coefficients of three channels times their functions."""
+    g = Graph()
     chunked = g.input("chunked", BOOL, register=True)
-    dc, low, step_0 = g.inputs("dc", HALF, (3,)), g.inputs("dc_low", Ff(C), (3,)), g.inputs("dc_step", Ff(C), (3,))
-    factors = splat.colour_constants(formats).tolist()
-    basis = g.inputs("basis", Ff(C), (4,))
+    basis = g.inputs("basis", BASIS, (4,))
     raw = g.inputs("raw", HALF, (4, 3))  # code of a chunk, or FP16
-    step = g.inputs("step", Ff(C), (4, 3))
-    zero = g.input("zero", Int(0, 511))
+    zero = g.input("zero", Int(0, 511), late=True)
     used = g.inputs("used", BOOL, (4,))
     for c in range(3):
-        coefficients = []
-        for k in range(4):
-            code = g.from_fixed((g.slice(raw[k][c], 0, 8) << 1) - zero, 0, C)
-            value = g.pick(used[k], g.pick(chunked, code, g.from_fp16(raw[k][c], C)), 0.0)
-            coefficients.append(_symbolic(lambda a, b: ff_mul(a, b, C))(g.pick(chunked, step[k][c], 1.0), value))
-        g.output(f"sum_{c}", retrace(splat.group_sum)(basis, coefficients, C))
+        first, fourth = retrace(colour.group_sums)(basis, [_coefficient(g, chunked, used[k], raw[k][c], zero) for k in range(4)])
+        g.output(f"first_{c}", first)
+        g.output(f"fourth_{c}", fourth)
+    return g
+
+
+def colour_constant(formats: FrontFormats) -> Graph:
+    """The constant part of the colour."""
+    g, C = Graph(), formats.colour
+    chunked = g.input("chunked", BOOL, register=True)
+    dc = g.inputs("dc", HALF, (3,))
+    low, step = g.inputs("low", TERM, (3,), late=True), g.inputs("step", Ff(C), (3,), late=True)
     for k in range(3):
         code = g.pick(chunked, g.from_fixed(g.slice(dc[k], 0, 8), 0, C), g.from_fp16(dc[k], C))
-        a, b = g.pick(chunked, low[k], 0.5), g.pick(chunked, step_0[k], factors[0])
-        g.output(f"constant_{k}", _symbolic(lambda a, b, code: ff_add(a, ff_mul(b, code, C), C))(a, b, code))
+        a, b = g.pick(chunked, low[k], 1 << (colour.TERM_FRACTION - 1)), g.pick(chunked, step[k], colour.constant_factor(formats))
+        g.output(f"constant_{k}", retrace(colour.constant_part)(a, b, code, C))
     return g
 
 
-def colour_total(formats: FrontFormats) -> Graph:
-    """A channel from the constant one and the sums of the groups, as a record's 10 bits."""
+def colour_term(formats: FrontFormats) -> Graph:
+    """What a degree adds to a channel."""
     g, C = Graph(), formats.colour
-    dc, sums = g.input("constant", Ff(C)), g.inputs("sum", Ff(C), (4,))
-    colour = retrace(splat.total)(dc, *sums, C)
-    fixed = g.to_fixed(colour, frame.COLOUR_FRACTION, 24, True)
-    g.output("clipped", fixed > frame.COLOUR_LIMIT)
-    g.output("code", g.wire("10'({0})", Int(0, 1023), (g.extreme(fixed, frame.COLOUR_LIMIT, False),)))
+    chunked = g.input("chunked", BOOL, register=True)
+    sum_, step = g.input("sum", DEGREE_SUM), g.input("step", Ff(C), late=True)
+    g.output("term", retrace(colour.term)(sum_, g.pick(chunked, step, frame.FP16_STEP), C))
     return g
 
+
+def _sums() -> tuple[Int, Int]:
+    """What a group's sum of three products and its fourth may be."""
+    outputs = colour_group(FORMATS).outputs
+    return outputs["first_0"].range, outputs["fourth_0"].range
+
+
+GROUP_FIRST, GROUP_FOURTH = _sums()
+DEGREE_SUM = Int(2 * (GROUP_FIRST.low + GROUP_FOURTH.low), 2 * (GROUP_FIRST.high + GROUP_FOURTH.high))  # of two groups
+CONSTANT = Int(2 * TERM.low, 2 * TERM.high)
 
 PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
@@ -239,6 +260,7 @@ PIPELINES = [
     Pipeline("flk_splat_bounds", 2, bounds, "Opacity code and bounds of a splat."),
     Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
     Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction."),
-    Pipeline("flk_colour_group", 1, colour_group, "Sums of four products of basis and coefficient for three channels, and the constant part of the colour."),
-    Pipeline("flk_colour_total", 1, colour_total, "A channel from its constant part and the sums of groups, in a record's 10 bits."),
+    Pipeline("flk_colour_group", 1, colour_group, "Four products of basis and coefficient for three channels: the sum of the first three, and the fourth."),
+    Pipeline("flk_colour_constant", 1, colour_constant, "Constant part of a colour, three channels."),
+    Pipeline("flk_colour_term", 1, colour_term, "What a degree of spherical harmonics adds to a channel: its sum of products times the cluster's step."),
 ]

@@ -32,7 +32,7 @@ FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 MEMORY = "flk_sram"  # a macro where it is a part of another unit
 
 # Operators that the pipelines of the front end are put together from.
-FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_delay_ram"]
+FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_fixed_mul", "flk_phase_mux", "flk_delay_ram"]
 
 # Units that are put together from their synthesised parts instead of being flattened: module -> parts.
 COMPOSED: dict[str, list[str]] = {
@@ -54,8 +54,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
     "flk_preprocessing_core": [
-        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis", "flk_colour_group", "flk_colour_total",
-        "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
+        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
+        "flk_colour_group", "flk_colour_constant", "flk_colour_term", "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
@@ -205,6 +205,8 @@ def _ff() -> list[Unit]:
         if bits > min(FF_MAN_BITS):
             units.append(unit("flk_ff_narrow", f"{bits} to {bits - 4} bit", FromBits=bits, ManBits=bits - 4))
         units += [unit("flk_ff_ldexp", f"{bits} bit", ManBits=bits), unit("flk_ff_from_fp16", f"{bits} bit", ManBits=bits)]
+    units.append(unit("flk_fixed_mul", "13 x 14 bit", ABits=13, BBits=14, Drop=12, OutBits=14, Stages=1))
+    units.append(unit("flk_phase_mux", "10 bit", Width=10))
     units.append(unit("flk_ff_rom", "recip, 19 bit", Function=0, Group=2))
     units.append(unit("flk_ff_poly", "rsqrt, 19 bit, 3 stages", Function=1, ManBits=19, Stages=3))
     return units
@@ -267,7 +269,7 @@ def _stage() -> list[Unit]:
 def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
-        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
+        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 8", Depth=8),

@@ -14,22 +14,37 @@ from enum import Enum
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_exp2_fixed, ff_ldexp, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round, pick
+from ...arithmetic.ff import ff_exp2_fixed, ff_ldexp, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round, pick
 from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
+from .colour import (
+    COEFFICIENT_FRACTION,
+    COLOUR_LIMIT,
+    TERM_BITS,
+    TERM_FRACTION,
+    basis_functions,
+    colour_code,
+    constant_factor,
+    constant_part,
+    group_sums,
+    half_coefficient,
+    term,
+)
 from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
-from .record import COLOUR_FRACTION, COLOUR_LIMIT, RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
+from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
-from .splat import basis_functions, colour_constants, constants, largest_component, pixels, place_largest, project_one, shade
+from .splat import constants, largest_component, pixels, place_largest, project_one
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
-SCALE_HEADER_BITS = 27  # of them, saturated
+SCALE_HEADER_BITS = 27  # of the low end, saturated
+SCALE_STEP_BITS = 17  # of the step, saturated, not negative: up to 1/8
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
 OPACITY_LIMIT = 255
+FP16_STEP = 2.0**-COEFFICIENT_FRACTION  # in place of a header's
 
 
 class ListKind(str, Enum):
@@ -55,7 +70,8 @@ Outcome_NEAR, Outcome_OUTSIDE, Outcome_FAINT, Outcome_MISSED, Outcome_LISTED = r
 # What the lanes take from memory, by Gaussian. q: ff numbers of the mean (codes or FP16). s: log2 scale codes (chunks) or FP16 scales. quat: FP16
 # quaternion, or (largest, three codes).
 Lanes = namedtuple("Lanes", "chunked cluster q s quat opacity dc sh count")
-# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 of 27 bits are fraction. dc_low, dc_step, sh_step: colour format.
+# By cluster. low: of the mean less the camera, step. scale_low, scale_step: fixed point, 20 fraction bits. dc_low: fixed point, 13 of 20 bits are
+# fraction. dc_step, sh_step: colour format.
 ClusterValues = namedtuple("ClusterValues", "low step scale_low scale_step dc_low dc_step sh_step")
 
 
@@ -77,13 +93,13 @@ def lanes_of(packed: PackedScene) -> Lanes:
 
 
 @numba.njit(cache=True)
-def _cluster_values(origin, step, position, dc, sh, M, P, C, out_low, out_step, out_dc, out_sh):
+def _cluster_values(origin, step, position, dc, sh, M, P, C, out_low, out_step, out_dc_low, out_dc_step, out_sh):
     for i in range(origin.shape[0]):
         for k in range(3):
             out_low[i, k] = ff_round(ff_sub(origin[i, k], position[k], M), P)
             out_step[i, k] = ff_round(step[i, k], P)
-            out_dc[i, k, 0] = ff_round(dc[i, k, 0], C)
-            out_dc[i, k, 1] = ff_round(dc[i, k, 1], C)
+            out_dc_low[i, k] = ff_to_fixed_round(dc[i, k, 0], TERM_FRACTION, TERM_BITS)
+            out_dc_step[i, k] = ff_round(dc[i, k, 1], C)
             for d in range(3):
                 out_sh[i, d, k] = ff_round(sh[i, d, k], C)
 
@@ -92,19 +108,20 @@ def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
     """What the lanes need of each cluster's header."""
     f, h = setup.formats, packed.headers
     n = len(packed.table)
-    low, step, dc, sh = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 2)), np.empty((n, 3, 3))
+    low, step, dc_low, dc_step, sh = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3), np.int64), np.empty((n, 3)), np.empty((n, 3, 3))
     fixed, top = np.zeros((2, n, 3), np.int64), 1 << (SCALE_HEADER_BITS - 1)
+    limits = ((-top, top - 1), (0, (1 << SCALE_STEP_BITS) - 1))
     if packed.format is PackedFormat.CHUNK:
         wide = {name: image_floats(h[name]) for name in ("position_low", "position_step", "scale_low", "scale_step", "dc_low", "dc_step", "sh_step")}
         origin, given = wide["position_low"], wide["position_step"]
         given_dc, given_sh = np.stack([wide["dc_low"], wide["dc_step"]], axis=2), wide["sh_step"]
         for k, name in enumerate(("scale_low", "scale_step")):
-            fixed[k] = np.clip(np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5), -top, top - 1).astype(np.int64)
+            fixed[k] = np.clip(np.floor(np.ldexp(wide[name], SCALE_HEADER_FRACTION) + 0.5), *limits[k]).astype(np.int64)
     else:
         origin, given = image_floats(h["origin"]), np.ones((n, 3))
         given_dc, given_sh = np.zeros((n, 3, 2)), np.ones((n, 3, 3))
-    _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, low, step, dc, sh)
-    return ClusterValues(low, step, fixed[0], fixed[1], np.ascontiguousarray(dc[:, :, 0]), np.ascontiguousarray(dc[:, :, 1]), sh)
+    _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, low, step, dc_low, dc_step, sh)
+    return ClusterValues(low, step, fixed[0], fixed[1], dc_low, dc_step, sh)
 
 
 @numba.njit
@@ -163,26 +180,34 @@ def opacity_code(chunked, opacity, M):
 
 
 @numba.njit
-def colour_lane(i, lanes, values, p, k, M, rgb):
-    """Colour of Gaussian i into rgb (3,), ff (M bits), not negative."""
-    c = lanes.cluster[i]
-    count = lanes.count[i]
-    basis, coefficient = np.zeros(17), np.zeros(17)
+def colour_lane(i, lanes, values, p, factor, M, basis, coefficient, rgb):
+    """Colour of Gaussian i into rgb (3,), whole numbers of 13 fraction bits; it may be negative. factor: of the constant function. basis, coefficient:
+    (17,) of whole numbers, overwritten."""
+    c, count = lanes.cluster[i], lanes.count[i]
+    basis[:], coefficient[:] = 0, 0
     degree = 0 if count == 1 else (1 if count == 4 else (2 if count == 9 else 3))
     if degree:
-        basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), k, degree, basis, M)
+        basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), degree, basis, M)
     for channel in range(3):
-        low, step = pick(lanes.chunked, values.dc_low[c, channel], 0.5), pick(lanes.chunked, values.dc_step[c, channel], k[0])
-        dc = ff_add(low, ff_mul(step, ff_round(lanes.dc[i, channel], M), M), M)
+        low = pick(lanes.chunked, values.dc_low[c, channel], 1 << (TERM_FRACTION - 1))
+        step = pick(lanes.chunked, values.dc_step[c, channel], factor)
+        total = constant_part(low, step, ff_round(lanes.dc[i, channel], M), M)
         for j in range(1, count):
-            step = values.sh_step[c, 0 if j < 4 else (1 if j < 9 else 2), channel]
-            coefficient[j] = ff_mul(step, ff_round(np.float64(lanes.sh[i, j - 1, channel]), M), M)
-        rgb[channel] = shade(dc, basis, coefficient, M)
+            value = np.float64(lanes.sh[i, j - 1, channel])
+            coefficient[j] = np.int64(value) if lanes.chunked else half_coefficient(value)
+        a, b = group_sums(basis[1:5], coefficient[1:5])
+        e, f = group_sums(basis[5:9], coefficient[5:9])
+        g, h = group_sums(basis[9:13], coefficient[9:13])
+        k, l = group_sums(basis[13:17], coefficient[13:17])  # noqa: E741
+        sums = (a, b + e + f, g + h + k + l)
+        for d in range(degree):
+            total += term(sums[d], pick(lanes.chunked, values.sh_step[c, d, channel], FP16_STEP), M)
+        rgb[channel] = total
 
 
 @numba.njit(parallel=True, cache=True)
 def _splats(
-    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, colours, logs, sigmas, cut, inverse, box, conic,
+    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, factor, logs, sigmas, cut, inverse, box, conic,
     shift, key_low, P, S, C, outcome, key, words, halves, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
@@ -209,13 +234,14 @@ def _splats(
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
         key[j] = depth_key(p.t2, shift, key_low, P)
         flags[j, 0] = p.far
-        rgb = np.empty(3)
-        colour_lane(i, lanes, values, p, colours, C, rgb)
+        rgb = np.empty(3, np.int64)
+        colour_lane(i, lanes, values, p, factor, C, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
         if conic:
             a = ff_mul(p.rdet, p.rdet, S)
             halves[j, 0], halves[j, 1], halves[j, 2] = 0.5 * ff_mul(p.yy, a, S), -ff_mul(p.xy, a, S), 0.5 * ff_mul(p.xx, a, S)
             halves[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
-            halves[j, 4:7] = rgb
+            for k in range(3):
+                halves[j, 4 + k] = max(rgb[k], 0) / (1 << TERM_FRACTION)
             words[j, 0], words[j, 1] = p.x, p.y
             flags[j, 2] = p.spiky
             continue
@@ -226,7 +252,7 @@ def _splats(
         low |= np.uint64(l1 & 15) << np.uint64(60)
         high = np.uint64(l1 >> 4) | np.uint64(p.l1 < 0.0) << np.uint64(10) | np.uint64(l2) << np.uint64(11) | np.uint64(code) << np.uint64(25)
         for k in range(3):
-            v = ff_to_fixed_round(rgb[k], COLOUR_FRACTION, 24)
+            v = colour_code(rgb[k])
             if v > COLOUR_LIMIT:
                 v = COLOUR_LIMIT
                 flags[j, 1] = True
@@ -331,7 +357,7 @@ def run_front(
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
-        index, lanes, values, *registers, colour_constants(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C,
+        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C,
         outcome, key, words, halves, entries, flags, places, numbers,
     )
     kept = np.flatnonzero(outcome >= Outcome.FAINT)

@@ -12,14 +12,13 @@ import numpy as np
 
 from ...arithmetic.ff import ff_round
 from ...params import SUBTILE, Form
+from .colour import COLOUR_FRACTION
 from .setup import MEAN_FRACTION
 
 MEAN_FIELD = 20
 MEAN_EXPONENTS = 8
 SHAPE_MANTISSA = 9
 SHAPE_BIAS = 30
-COLOUR_FRACTION = 9
-COLOUR_LIMIT = 1023
 
 
 class RecordKind(str, Enum):

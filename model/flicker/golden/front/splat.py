@@ -1,4 +1,4 @@
-"""One Gaussian, from the numbers in the image to its splat: projection, covariance, shape, bounds, colour. Every intermediate value has a name.
+"""One Gaussian, from the numbers in the image to its splat: projection, covariance, shape, bounds. Every intermediate value has a name.
 
 Source: as `flicker.front.projection` (Kerbl et al. 2023, Sec. 4). Differences that save hardware, none of which changes the result in exact
 arithmetic: focal lengths
@@ -19,7 +19,7 @@ import numba
 import numpy as np
 
 from ...arithmetic.ff import ff_add, ff_from_int, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round, pick
-from ...front.projection import _C0, _C1, _C2, _C3, DILATION, NEAR
+from ...front.projection import DILATION, NEAR
 from ...params import SPIKY_AXIS_RATIO
 from .setup import MEAN_FRACTION, FrontFormats, rounded
 
@@ -34,11 +34,6 @@ def constants(formats: FrontFormats) -> np.ndarray:
     """float64: constants of `project_one`, as ff numbers of their formats."""
     shape = rounded([SHAPE_SCALE, DILATION, DILATION**2, _TRACE_FACTOR], formats.shape)
     return np.concatenate([rounded([NEAR], formats.position), shape])
-
-
-def colour_constants(formats: FrontFormats) -> np.ndarray:
-    """float64 (16,): factors of the spherical harmonics, ff numbers of the colour format; the first is that of the constant one."""
-    return rounded([_C0, _C1, _C1, _C1, *_C2, *_C3], formats.colour)
 
 
 @numba.njit
@@ -154,56 +149,6 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
 @numba.njit
 def pixels(centre, reach, size):
     """First and last pixel centre of 0..size - 1 within centre +- reach, both in 1/128 pixel; the first is past the last where there is none."""
-    one = 1 << MEAN_FRACTION
-    first = (centre - reach + one - 1) >> MEAN_FRACTION
+    first = -((reach - centre) >> MEAN_FRACTION)  # rounded up
     last = (centre + reach) >> MEAN_FRACTION
     return max(first, 0), min(last, size - 1)
-
-
-@numba.njit
-def basis_functions(d0, d1, d2, k, degree, out, M):
-    """Spherical harmonics 1 to (degree + 1)^2 - 1 in the direction d, ff (M bits), into out (16,). k: `colour_constants`."""
-    rn = ff_rsqrt(_dot3(d0, d1, d2, d0, d1, d2, M), M)
-    x, y, z = ff_mul(d0, rn, M), ff_mul(d1, rn, M), ff_mul(d2, rn, M)
-    out[1], out[2], out[3] = ff_neg(ff_mul(k[1], y, M)), ff_mul(k[2], z, M), ff_neg(ff_mul(k[3], x, M))
-    if degree < 2:
-        return
-    xx, yy, zz = ff_mul(x, x, M), ff_mul(y, y, M), ff_mul(z, z, M)
-    xy, yz, xz = ff_mul(x, y, M), ff_mul(y, z, M), ff_mul(x, z, M)
-    less = ff_sub(xx, yy, M)
-    out[4], out[5], out[7] = ff_mul(k[4], xy, M), ff_mul(k[5], yz, M), ff_mul(k[7], xz, M)
-    out[6] = ff_mul(k[6], ff_sub(ff_mul(3.0, zz, M), 1.0, M), M)  # 2 zz - xx - yy, the direction having length 1
-    out[8] = ff_mul(k[8], less, M)
-    if degree < 3:
-        return
-    five = ff_mul(5.0, zz, M)
-    out[9] = ff_mul(k[9], ff_mul(y, ff_sub(ff_mul(3.0, xx, M), yy, M), M), M)
-    out[10] = ff_mul(k[10], ff_mul(xy, z, M), M)
-    out[11] = ff_mul(k[11], ff_mul(y, ff_sub(five, 1.0, M), M), M)  # 4 zz - xx - yy
-    out[12] = ff_mul(k[12], ff_mul(z, ff_sub(five, 3.0, M), M), M)  # 2 zz - 3 xx - 3 yy
-    out[13] = ff_mul(k[13], ff_mul(x, ff_sub(five, 1.0, M), M), M)
-    out[14] = ff_mul(k[14], ff_mul(z, less, M), M)
-    out[15] = ff_mul(k[15], ff_mul(x, ff_sub(xx, ff_mul(3.0, yy, M), M), M), M)
-
-
-@numba.njit
-def group_sum(basis, coefficient, M):
-    """Products of four coefficients: (p0 + p1) + (p2 + p3)."""
-    p0, p1 = ff_mul(basis[0], coefficient[0], M), ff_mul(basis[1], coefficient[1], M)
-    p2, p3 = ff_mul(basis[2], coefficient[2], M), ff_mul(basis[3], coefficient[3], M)
-    return ff_add(ff_add(p0, p1, M), ff_add(p2, p3, M), M)
-
-
-@numba.njit
-def total(dc, s0, s1, s2, s3, M):
-    """A channel from the constant one and the sums of the groups, not negative."""
-    return max(ff_add(dc, ff_add(ff_add(s0, s1, M), ff_add(s2, s3, M), M), M), 0.0)
-
-
-@numba.njit
-def shade(dc, basis, coefficient, M):
-    """A channel: the constant one, and products of basis and coefficient 1 to 15, four a group: dc + ((s0 + s1) + (s2 + s3)); what is missing is 0."""
-    return total(
-        dc, group_sum(basis[1:5], coefficient[1:5], M), group_sum(basis[5:9], coefficient[5:9], M), group_sum(basis[9:13], coefficient[9:13], M),
-        group_sum(basis[13:17], coefficient[13:17], M), M,
-    )
