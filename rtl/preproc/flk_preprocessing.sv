@@ -556,7 +556,7 @@ module flk_preprocessing
   logic [3:0][NUMBER_BITS+27:0] merged;
 
   flk_entry_merge #(
-    .Depth(8)
+    .Depth(32)
   ) i_merge (
     .clk_i,
     .rst_ni,
