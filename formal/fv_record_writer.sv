@@ -200,10 +200,13 @@ module fv_record_writer
   logic [3:0][Beats-1:0]                      there;
   logic [3:0][Beats-1:0][RecordBits-1:0]      stored;
   logic                                       fetched;
+  logic [PLACE_BEAT_BITS:0]                   used;
   logic [PLACE_BEAT_BITS-1:0]                 follow_at;
 
   assign fetched   = dut.i_beats.out_valid_q;
-  assign waiting   = CountBits'(dut.i_beats.used_q) + CountBits'(fetched);
+  assign used      = {dut.i_beats.write_round_q, dut.i_beats.write_q} -
+                     {dut.i_beats.read_round_q, dut.i_beats.read_q};
+  assign waiting   = CountBits'(used) + CountBits'(fetched);
   assign items     = waiting + CountBits'(out_valid);
   assign follow_at = head + PLACE_BEAT_BITS'(ahead_q) - PLACE_BEAT_BITS'(out_valid);
 
@@ -239,9 +242,7 @@ module fv_record_writer
       l_head: assert (dut.head_q == head);
       l_waiting: assert (waiting == known_q - CountBits'(freed));
       l_items: assert (entries == items);
-      l_usage: assert (CountBits'(dut.i_beats.used_q) <= CountBits'(Beats));
-      l_write: assert (dut.i_beats.write_q ==
-                       dut.i_beats.read_q + PLACE_BEAT_BITS'(dut.i_beats.used_q));
+      l_usage: assert (CountBits'(used) <= CountBits'(Beats));
       if (watching) begin
         if (out_valid && beat_ahead == '0) begin
           l_shown: assert ({out_beat, out_strobe} == watched);
