@@ -114,23 +114,19 @@ module fv_entry_merge
 
   // What waits in the bank's queues, oldest first.
 
-  localparam int unsigned PtrBits = $clog2(Depth);
+  localparam int unsigned UsedBits = $clog2(Depth + 1);
   localparam int unsigned ItemBits = 42 + NUMBER_BITS;
 
   logic [LANES-1:0][2:0]                          usage;
   logic [LANES-1:0]                               head, fetched, holds, pop;
-  logic [LANES-1:0][PtrBits:0]                    used;  // words of the memory
+  logic [LANES-1:0][UsedBits-1:0]                 used;  // words of the memory
   logic [LANES-1:0][Places-1:0][NUMBER_BITS-1:0]  queued;
   logic [LANES-1:0][Places-1:0][SEQ_BITS-1:0]     seq;
   logic [LANES-1:0][SEQ_BITS-1:0]                 head_seq;
   logic [LANES-1:0]                               free, past, empty;
 
   for (genvar k = 0; k < LANES; k++) begin : gen_see
-    logic [PtrBits-1:0] read;
-    assign read        = dut.gen_bank[Bank].gen_queue[k].i_store.read_q;
-    assign used[k]     = {dut.gen_bank[Bank].gen_queue[k].i_store.write_round_q,
-                          dut.gen_bank[Bank].gen_queue[k].i_store.write_q} -
-                         {dut.gen_bank[Bank].gen_queue[k].i_store.read_round_q, read};
+    assign used[k]     = dut.gen_bank[Bank].gen_queue[k].i_store.used_q;
     assign head[k]     = dut.gen_bank[Bank].gen_queue[k].head_valid_q;
     assign fetched[k]  = dut.gen_bank[Bank].gen_queue[k].i_store.out_valid_q;
     assign usage[k]    = 3'(head[k]) + 3'(fetched[k]) + 3'(used[k]);
@@ -142,14 +138,12 @@ module fv_entry_merge
     assign empty[k]    = used[k] == '0 && !fetched[k];
     for (genvar d = 0; d < Places; d++) begin : gen_place
       logic [2:0]                   at;    // behind the head
-      logic [PtrBits-1:0]           word;
       logic [SEQ_BITS+ItemBits-1:0] data;
       assign at   = 3'(d) - 3'(head[k]);
-      assign word = read + PtrBits'(at) - PtrBits'(fetched[k]);
       assign data = head[k] && d == 0
           ? {head_seq[k], dut.gen_bank[Bank].gen_queue[k].head_q}
-          : fetched[k] && at == '0 ? dut.gen_bank[Bank].gen_queue[k].i_store.i_storage.rd_data_q
-          : dut.gen_bank[Bank].gen_queue[k].i_store.i_storage.storage_q[word];
+          : fetched[k] && at == '0 ? dut.gen_bank[Bank].gen_queue[k].i_store.out_q
+          : dut.gen_bank[Bank].gen_queue[k].i_store.words_q[1'(at - 3'(fetched[k]))];
       assign queued[k][d] = data[4+:NUMBER_BITS];
       assign seq[k][d]    = data[ItemBits+:SEQ_BITS];
     end
@@ -317,7 +311,7 @@ module fv_entry_merge
           a_order: assert (queued[k][0][AbsBits-1:0] >= left_q);
           a_earliest: assert (queued[k][0][AbsBits-1:0] == earliest && !held);
         end
-        l_usage: assert (used[k] <= (PtrBits + 1)'(Depth));
+        l_usage: assert (used[k] <= UsedBits'(Depth));
         l_late: assert (!holds[k] || head[k] || fetched[k]);
         if (!head[k] && holds[k]) begin
           l_held: assert (front_q[k] <= queued[k][0][AbsBits-1:0]);

@@ -29,7 +29,7 @@ module flk_sram_fifo #(
   // Where the next word goes and the oldest one lies, each with a bit that says how often it has gone round: what
   // moves a pointer is then only its enable, and no sum of both.
 
-  localparam int unsigned PtrBits = $clog2(Depth);
+  localparam int unsigned PtrBits = Depth > 1 ? $clog2(Depth) : 1;
   localparam logic [PtrBits-1:0] LAST = PtrBits'(Depth - 1);
 
   logic [PtrBits-1:0] write_d, write_q;

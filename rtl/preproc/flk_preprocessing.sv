@@ -104,7 +104,7 @@ module flk_preprocessing
   logic   start, cull_idle, geometry_idle, front_idle, back_idle;
   logic   merge_idle, records_idle, write_idle;
   logic   colour_idle, ended_q, lists_end, arbiter_empty;
-  logic [LANES-1:0] lane_idle;
+  logic [LANES-1:0] lane_idle, queued_empty;
   logic [3:0]       list_idle, list_failed;
 
   assign start  = state_q == IDLE && start_i;
@@ -532,7 +532,7 @@ module flk_preprocessing
 
   // Lanes that want the same quarter take turns; two records of each wait, so that no lane's colours stand for
   // another's record, nor for the time of that choice.
-  logic   [LANES-1:0]        queued_valid, queued_ready, queued_empty;
+  logic   [LANES-1:0]        queued_valid, queued_ready;
   place_t [LANES-1:0]        queued_place;
   logic   [LANES-1:0][127:0] queued_record;
 
