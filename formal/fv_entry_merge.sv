@@ -12,6 +12,8 @@ module fv_entry_merge
 #(
   parameter  int unsigned Depth     = 2,
   parameter  int unsigned Bank      = 0,
+  parameter  bit          Stream    = 1,  // a lane's entries, and
+  parameter  bit          Order     = 1,  // all lanes' order and the end: each proved without the other
   localparam int unsigned AbsBits   = NUMBER_BITS - 1,
   localparam int unsigned Places    = Depth + 2,  // of a queue: head, read register, memory
   localparam int unsigned CountBits = $clog2(Places + 2)
@@ -93,24 +95,28 @@ module fv_entry_merge
   logic       watching;
   logic [NUMBER_BITS-1:0] watched;
 
-  fv_stream #(
-    .Width   (NUMBER_BITS),
-    .Capacity(Places + 1)
-  ) i_stream (
-    .clk_i,
-    .rst_ni     (rst_n),
-    .clear_i    (1'b0),
-    .pick_i,
-    .push_i     (push[lane_q]),
-    .in_data_i  ({in_value_i[lane_q], in_abs_i[lane_q]}),
-    .out_valid_i(out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q),
-    .out_ready_i(out_ready_i[Bank]),
-    .out_data_i (out_number),
-    .inside_o   (entries),
-    .watching_o (watching),
-    .ahead_o    (ahead),
-    .watched_o  (watched)
-  );
+  if (Stream) begin : gen_stream
+    fv_stream #(
+      .Width   (NUMBER_BITS),
+      .Capacity(Places + 1)
+    ) i_stream (
+      .clk_i,
+      .rst_ni     (rst_n),
+      .clear_i    (1'b0),
+      .pick_i,
+      .push_i     (push[lane_q]),
+      .in_data_i  ({in_value_i[lane_q], in_abs_i[lane_q]}),
+      .out_valid_i(out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q),
+      .out_ready_i(out_ready_i[Bank]),
+      .out_data_i (out_number),
+      .inside_o   (entries),
+      .watching_o (watching),
+      .ahead_o    (ahead),
+      .watched_o  (watched)
+    );
+  end else begin : gen_none
+    assign {entries, watching, ahead, watched} = '0;
+  end
 
   // What waits in the bank's queues, oldest first.
 
@@ -266,32 +272,24 @@ module fv_entry_merge
   end
 
   always_comb begin
-    if (rst_n) begin
+    if (rst_n && Order) begin
       // The specification.
       a_goes: assert (!(head != '0 && !held && (!out_valid[Bank] || out_ready_i[Bank])) || pop != '0);
       a_late: assert ((holds & ~head & late_q) == '0);
       a_one: assert ((pop & (pop - 1'b1)) == '0);
       if (out_valid[Bank] && out_end[Bank]) begin
-        a_end: assert (end_i && entries == '0 && !ended_q && !waiting);
+        a_end: assert (end_i && !ended_q && !waiting);
       end
       if (idle && running_q && !first_q) begin
         a_ended: assert (ended_q);
       end
 
       // Links.
-      l_inside: assert (entries == CountBits'(usage[lane_q]) + CountBits'(out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q));
       l_running: assert (running_q || !waiting && !out_valid[Bank] && dut.gen_bank[Bank].ended_q && !ending_q);
       l_ended: assert (!running_q || dut.gen_bank[Bank].ended_q == (ended_q || out_valid[Bank] && out_end[Bank]));
       l_over: assert (!(ended_q || out_valid[Bank] && out_end[Bank]) || ending_q);
       l_ending: assert (!ending_q || offered_q == '0);
       l_quiet: assert (!(running_q && ended_q) || !waiting && !out_valid[Bank]);
-      if (watching) begin
-        if (ahead != '0 || !(out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q)) begin
-          l_kept: assert (queued[lane_q][ahead - CountBits'(out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q)] == watched);
-        end else begin
-          l_shown: assert (out_number == watched);
-        end
-      end
       if (first_q) begin
         l_first: assert (!waiting && left_q == '0);
       end
@@ -299,20 +297,40 @@ module fv_entry_merge
         l_left: assert (out_number[AbsBits-1:0] == left_q);
       end
 
-      c_around: cover (left_q >= AbsBits'(9) && watching && ahead != '0);
+      c_around: cover (left_q >= AbsBits'(9) && holds != '0);
       c_end: cover (ended_q && left_q != '0);
+    end
+  end
+
+  logic shown;  // the output holds an entry of the lane
+
+  assign shown = out_fire && lane_of(out_number[AbsBits-1:0]) == lane_q;
+
+  always_comb begin
+    if (rst_n && Stream) begin
+      l_inside: assert (entries == CountBits'(usage[lane_q]) + CountBits'(shown));
+      if (watching) begin
+        if (ahead != '0 || !shown) begin
+          l_kept: assert (queued[lane_q][ahead - CountBits'(shown)] == watched);
+        end else begin
+          l_shown: assert (out_number == watched);
+        end
+      end
+      c_behind: cover (watching && ahead >= CountBits'(3));
     end
   end
 
   for (genvar k = 0; k < LANES; k++) begin : gen_check
     always_comb begin
       if (rst_n) begin
+        l_usage: assert (used[k] <= UsedBits'(Depth));
+        l_late: assert (!holds[k] || head[k] || fetched[k]);
+      end
+      if (rst_n && Order) begin
         if (pop[k]) begin
           a_order: assert (queued[k][0][AbsBits-1:0] >= left_q);
           a_earliest: assert (queued[k][0][AbsBits-1:0] == earliest && !held);
         end
-        l_usage: assert (used[k] <= UsedBits'(Depth));
-        l_late: assert (!holds[k] || head[k] || fetched[k]);
         if (!head[k] && holds[k]) begin
           l_held: assert (front_q[k] <= queued[k][0][AbsBits-1:0]);
         end
@@ -333,6 +351,8 @@ module fv_entry_merge
       always_comb begin
         if (rst_n && 3'(d) < usage[k]) begin
           l_lane: assert (lane_of(queued[k][d][AbsBits-1:0]) == 2'(k));
+        end
+        if (rst_n && Order && 3'(d) < usage[k]) begin
           l_seq: assert (seq[k][d] == queued[k][d][SEQ_BITS-1:0]);
           l_after: assert (queued[k][d][AbsBits-1:0] >= left_q);
           l_last: assert (queued[k][d][AbsBits-1:0] <= in_last_q[k]);
