@@ -35,6 +35,7 @@ module fv_list_writer (
   logic [15:0] out_data;
   logic        picked_q;
   logic [1:0]  delivered_q;
+  logic [5:0]  list_base_q;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -153,6 +154,7 @@ module fv_list_writer (
       if (start_i && idle) begin
         picked_q    <= 1'b0;
         delivered_q <= 2'd0;
+        list_base_q <= list_base_i;
       end else begin
         if (in_valid_i && in_ready && !in_end_i && tag) begin
           picked_q <= 1'b1;
@@ -170,7 +172,7 @@ module fv_list_writer (
 
   logic [5:0] list_at, pointer_at;
 
-  assign list_at    = out_address - dut.list_base_q;
+  assign list_at    = out_address - list_base_q;
   assign pointer_at = out_address - dut.pointer_base_q;
 
   // An open line is still to be closed.
@@ -212,8 +214,18 @@ module fv_list_writer (
       if (state == CLEAR || state == IDLE) begin
         l_quiet: assert (!out_valid);
       end
-      l_walk: assert (!(dut.walk_q || dut.walk_last_q) || state == POINTERS || state == LAST);
+      l_walk: assert (!(dut.walk_q || dut.walk_last_q || dut.e_walk_q || dut.e_walk_last_q) || state == POINTERS || state == LAST);
       l_walk_last: assert (!dut.walk_last_q || dut.walk_q && dut.walk_list_q[0]);
+      l_walk_last_e: assert (!dut.e_walk_last_q || dut.e_walk_q && !failed);
+      if (dut.e_walk_q) begin
+        l_walk_at: assert (dut.e_at_q[1:0] == dut.writer_q && dut.e_at_q[5:2] < 4'd2);
+      end
+      if (state == ENTRIES || state == OPEN_LINES || state == DRAIN) begin
+        l_base: assert (dut.base_q == list_base_q);
+      end
+      if (dut.walk_q || dut.e_walk_q || state == LAST) begin
+        l_base_then: assert (dut.base_q == dut.pointer_base_q);
+      end
       if (dut.walk_q) begin
         l_walked: assert (state == POINTERS ? 3'(dut.walk_list_q) + 3'd1 == dut.step_q : dut.walk_list_q == 2'd3);
       end
@@ -236,9 +248,15 @@ module fv_list_writer (
       end
       if (dut.e_event_q) begin
         l_counted_e: assert (dut.e_full_q ? dut.e_entry_q && dut.e_count_q == 2'd2 : dut.e_count_q == 2'd1);
-        l_lists: assert (!dut.d_event_q || dut.d_list_q != dut.e_list_q);
+        l_sends: assert (dut.e_sends_q || failed);
+      end
+      if (dut.e_sends_q) begin
+        l_at: assert (dut.e_event_q && 4'(dut.e_at_q >> 3) < 4'(taken) && dut.e_at_q[2:1] == dut.writer_q);
+      end
+      if (dut.d_event_q) begin
+        l_lists: assert (!(dut.b_valid_q && dut.c_event) || dut.c_list != dut.d_list_q);
         l_pointer: assert (dut.pointer.used <= 2'd2 && (dut.pointer.used == 2'd0 || 3'(dut.pointer.chunk) < taken));
-        l_pointer_is: assert (dut.pointer == {pointer_used[dut.e_list_q], pointer_chunk[dut.e_list_q]});
+        l_pointer_is: assert (dut.pointer == {pointer_used[dut.d_list_q], pointer_chunk[dut.d_list_q]});
       end
       if (dut.e_entry_q) begin
         l_column_e: assert (dut.e_column_q == 2'(dut.e_event_q && dut.e_full_q));

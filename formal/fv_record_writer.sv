@@ -200,18 +200,18 @@ module fv_record_writer
   logic [3:0][Beats-1:0]                      there;
   logic [3:0][Beats-1:0][RecordBits-1:0]      stored;
   logic                                       fetched;
+  logic [PLACE_BEAT_BITS:0]                   used;
   logic [PLACE_BEAT_BITS-1:0]                 follow_at;
 
   assign fetched   = dut.i_beats.out_valid_q;
-  assign waiting   = CountBits'(dut.i_beats.used_q) + CountBits'(fetched);
+  assign used      = (PLACE_BEAT_BITS + 1)'(dut.i_beats.used_q);
+  assign waiting   = CountBits'(used) + CountBits'(fetched);
   assign items     = waiting + CountBits'(out_valid);
   assign follow_at = head + PLACE_BEAT_BITS'(ahead_q) - PLACE_BEAT_BITS'(out_valid);
 
   for (genvar i = 0; i <= Beats; i++) begin : gen_item
-    logic [PLACE_BEAT_BITS-1:0] at;
-    assign at = dut.i_beats.read_q + PLACE_BEAT_BITS'(i) - PLACE_BEAT_BITS'(fetched);
-    assign item[i] = fetched && i == 0 ? dut.i_beats.i_storage.rd_data_q
-                                       : dut.i_beats.i_storage.storage_q[at];
+    assign item[i] = fetched && i == 0 ? dut.i_beats.out_q
+                   : dut.i_beats.words_q[PLACE_BEAT_BITS'(i) - PLACE_BEAT_BITS'(fetched)];
   end
   for (genvar q = 0; q < 4; q++) begin : gen_stored
     assign there[q] = dut.gen_quarter[q].there_q;
@@ -231,17 +231,12 @@ module fv_record_writer
         a_idle: assert (!follow_q && entries == '0);
       end
       a_freed: assert (!freed || known_q != '0);
-      a_beats: assert (!(dut.i_beats.push && dut.i_beats.fetch) ||
-                       dut.i_beats.write_q != dut.i_beats.read_q);
-
       // Links.
       l_counts: assert (known_q <= assigned_q && assigned_q <= CountBits'(Beats));
       l_head: assert (dut.head_q == head);
       l_waiting: assert (waiting == known_q - CountBits'(freed));
       l_items: assert (entries == items);
-      l_usage: assert (CountBits'(dut.i_beats.used_q) <= CountBits'(Beats));
-      l_write: assert (dut.i_beats.write_q ==
-                       dut.i_beats.read_q + PLACE_BEAT_BITS'(dut.i_beats.used_q));
+      l_usage: assert (CountBits'(used) <= CountBits'(Beats));
       if (watching) begin
         if (out_valid && beat_ahead == '0) begin
           l_shown: assert ({out_beat, out_strobe} == watched);

@@ -26,54 +26,64 @@ module flk_sram_fifo #(
     $error("flk_sram_fifo: Width must be at least 1, Depth at least 2");
   end
 
-  // Pointers and number of words in the memory
+  // Where the next word goes and the oldest one lies, each with a bit that says how often it has gone round: what
+  // moves a pointer is then only its enable, and no sum of both.
 
   localparam int unsigned PtrBits = Depth > 1 ? $clog2(Depth) : 1;
-  localparam int unsigned UsedBits = $clog2(Depth + 1);
   localparam logic [PtrBits-1:0] LAST = PtrBits'(Depth - 1);
 
-  logic [PtrBits-1:0]  write_d, write_q;
-  logic [PtrBits-1:0]  read_d, read_q;
-  logic [UsedBits-1:0] used_d, used_q;
-  logic                out_valid_d, out_valid_q;
-  logic                push, fetch;
+  logic [PtrBits-1:0] write_d, write_q;
+  logic [PtrBits-1:0] read_d, read_q;
+  logic               write_round_d, write_round_q;
+  logic               read_round_d, read_round_q;
+  logic               same, nothing;  // no word in the memory
+  logic               out_valid_d, out_valid_q;
+  logic               push, fetch;
 
-  assign empty_o    = used_q == '0 && !out_valid_q;
-  assign in_ready_o = used_q != UsedBits'(Depth);
+  assign same       = write_q == read_q;
+  assign nothing    = same && write_round_q == read_round_q;
+  assign empty_o    = nothing && !out_valid_q;
+  assign in_ready_o = !same || write_round_q == read_round_q;
   assign push       = in_valid_i && in_ready_o;
-  // A word that is written in this cycle is not counted yet: no word is read as it is written.
-  assign fetch      = used_q != '0 && (!out_valid_q || out_ready_i);
+  // A word that is written in this cycle is not there yet: no word is read as it is written.
+  assign fetch      = !nothing && (!out_valid_q || out_ready_i);
 
   always_comb begin
-    write_d     = write_q;
-    read_d      = read_q;
-    used_d      = used_q + UsedBits'(push) - UsedBits'(fetch);
-    out_valid_d = fetch || (out_valid_q && !out_ready_i);
+    write_d       = write_q;
+    write_round_d = write_round_q;
+    read_d        = read_q;
+    read_round_d  = read_round_q;
+    out_valid_d   = fetch || (out_valid_q && !out_ready_i);
     if (push) begin
-      write_d = write_q == LAST ? '0 : write_q + 1'b1;
+      write_d       = write_q == LAST ? '0 : write_q + 1'b1;
+      write_round_d = write_round_q ^ (write_q == LAST);
     end
     if (fetch) begin
-      read_d = read_q == LAST ? '0 : read_q + 1'b1;
+      read_d       = read_q == LAST ? '0 : read_q + 1'b1;
+      read_round_d = read_round_q ^ (read_q == LAST);
     end
     if (clear_i) begin
-      write_d     = '0;
-      read_d      = '0;
-      used_d      = '0;
-      out_valid_d = 1'b0;
+      write_d       = '0;
+      write_round_d = 1'b0;
+      read_d        = '0;
+      read_round_d  = 1'b0;
+      out_valid_d   = 1'b0;
     end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      write_q     <= '0;
-      read_q      <= '0;
-      used_q      <= '0;
-      out_valid_q <= 1'b0;
+      write_q       <= '0;
+      write_round_q <= 1'b0;
+      read_q        <= '0;
+      read_round_q  <= 1'b0;
+      out_valid_q   <= 1'b0;
     end else begin
-      write_q     <= write_d;
-      read_q      <= read_d;
-      used_q      <= used_d;
-      out_valid_q <= out_valid_d;
+      write_q       <= write_d;
+      write_round_q <= write_round_d;
+      read_q        <= read_d;
+      read_round_q  <= read_round_d;
+      out_valid_q   <= out_valid_d;
     end
   end
 
@@ -95,7 +105,8 @@ module flk_sram_fifo #(
   assign out_valid_o = out_valid_q;
 
 `ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) used_q <= UsedBits'(Depth))
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      write_round_q == read_round_q ? write_q >= read_q : write_q <= read_q)
   else $error("flk_sram_fifo: more words than Depth");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)

@@ -383,6 +383,7 @@ module flk_cluster_cull
   logic signed [8:0]  shift_span;
   logic signed [7:0]  shift;
   logic signed [7:0]  shift_q;
+  position_t          key_low, key_low_q;
   logic [31:0]        clusters_q, gaussians_q;
 
   // Depths here are at least NEAR, so that their codes compare as numbers do.
@@ -433,7 +434,8 @@ module flk_cluster_cull
 
   always_ff @(posedge clk_i) begin
     if (state_q == BOUNDS && step_q == 3'd4) begin
-      shift_q <= shift;
+      shift_q   <= shift;
+      key_low_q <= key_low;
     end
   end
 
@@ -442,7 +444,7 @@ module flk_cluster_cull
     .ManBits (POSITION_MAN_BITS)
   ) i_low (
     .x_i(nearest_q),
-    .y_o(key_low_o)
+    .y_o(key_low)
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -489,6 +491,7 @@ module flk_cluster_cull
   assign error_o            = error_q;
   assign bounds_valid_o     = bounds_valid_q;
   assign key_shift_o        = shift_q;
+  assign key_low_o          = key_low_q;
   assign culled_clusters_o  = clusters_q;
   assign culled_gaussians_o = gaussians_q;
 

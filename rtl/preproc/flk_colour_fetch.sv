@@ -7,8 +7,8 @@
 // nothing is under way it follows exit_i, the cluster whose groups are coming now.
 // A frame: start_i while idle_o; registers stay until idle_o after the last survivors. An error of
 // the memory: error_o rises and stays until the next start; parts come, but mean nothing.
-// Throughput: a beat a cycle, a part a cycle and lane, a group every cycle. Latency is the memory's
-// and 8. Combinational: ar_ready_i to the requests, r_*_i to the buffer's write port.
+// Throughput: a beat a cycle, a part a cycle and lane, a group every two cycles. Latency is the
+// memory's and 10. Combinational: ar_ready_i to the requests, r_*_i to the buffer's write port.
 module flk_colour_fetch
   import flk_preproc_pkg::*;
 #(
@@ -59,6 +59,8 @@ module flk_colour_fetch
   localparam int unsigned BYTE_BITS = 15;  // of an offset in a cluster's colours: 256 x 100 bytes
   localparam int unsigned AT_BITS = BYTE_BITS - 6;
   localparam int unsigned BeatBits = 5;
+  localparam int unsigned LowBits = BEAT_BITS / 2;  // an address is added up in two halves
+  localparam int unsigned HighBits = BEAT_BITS - LowBits;
 
   typedef struct packed {
     cluster_index_t     cluster;
@@ -83,15 +85,21 @@ module flk_colour_fetch
   logic [LANES-1:0]                  a_alive_q;
   logic [LANES-1:0][BYTE_BITS-1:0]   a_start_q;
   logic [6:0]                        in_stride, a_stride_q;
+  logic                              b_valid_q, b_move;
+  cluster_index_t                    b_cluster_q;
+  logic [LowBits:0]                  b_low_q;    // of the beat where the cluster's colours begin
+  logic [HighBits-1:0]               b_high_q;
+  logic [AT_BITS-1:0]                b_first_q;  // beats that hold colours of survivors
+  logic [AT_BITS-1:0]                b_last_q;
 
   assign in_stride  = stride(chunked_i, in_data_i.degree);
-  assign in_ready_o = !a_valid_q || a_move;
+  assign in_ready_o = !a_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       a_valid_q <= 1'b0;
-    end else if (in_ready_o) begin
-      a_valid_q <= in_valid_i && in_data_i.alive != '0;
+    end else begin
+      a_valid_q <= a_valid_q ? !a_move : in_valid_i && in_data_i.alive != '0;
     end
   end
 
@@ -108,15 +116,10 @@ module flk_colour_fetch
     end
   end
 
-  // First byte of the first and last byte of the last survivor, the beats that are still to be read.
+  // First byte of the first and last byte of the last survivor. Their lanes are told before the beats are asked for.
 
   logic [AT_BITS-1:0]   lowest;
   logic [BYTE_BITS-1:0] highest;
-  logic [AT_BITS-1:0]   first, last;
-  logic                 known_q;  // beats up to reached_q of the cluster have been asked for
-  cluster_index_t       asked_q;
-  logic [AT_BITS-1:0]   reached_q;
-  logic                 same, nothing, request, request_ready, lanes_ready;
   logic [LANES-1:0]     lane_ready;
 
   always_comb begin
@@ -135,29 +138,69 @@ module flk_colour_fetch
     highest = highest + BYTE_BITS'(a_stride_q) - 1'b1;
   end
 
-  assign same        = known_q && asked_q == a_cluster_q;
-  assign last        = highest[BYTE_BITS-1:6];
-  assign first       = same && reached_q >= lowest ? reached_q + 1'b1 : lowest;
-  assign nothing     = same && reached_q >= last;
-  assign lanes_ready = &(lane_ready | ~a_alive_q);
-  assign request     = a_valid_q && lanes_ready && !nothing;
-  assign a_move      = a_valid_q && lanes_ready && (nothing || request_ready);
+  assign a_move = a_valid_q && (&(lane_ready | ~a_alive_q)) && !b_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      known_q <= 1'b0;
-    end else if (start_i) begin
-      known_q <= 1'b0;
-    end else if (a_move) begin
-      known_q <= 1'b1;
+      b_valid_q <= 1'b0;
+    end else begin
+      b_valid_q <= a_move || (b_valid_q && !b_move);
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (a_move) begin
-      asked_q <= a_cluster_q;
+      b_cluster_q <= a_cluster_q;
+      b_low_q     <= {1'b0, colours_i[LowBits-1:0]} + {1'b0, a_colour_q[LowBits-1:0]};
+      b_high_q    <= colours_i[BEAT_BITS-1:LowBits] + HighBits'(a_colour_q[31:LowBits]);
+      b_first_q   <= lowest;
+      b_last_q    <= highest[BYTE_BITS-1:6];
+    end
+  end
+
+  // The beats that are still to be read.
+
+  logic                 known_q;  // beats up to reached_q of the cluster have been asked for
+  cluster_index_t       asked_q;
+  logic [AT_BITS-1:0]   reached_q, first;
+  logic                 same, nothing, request_ready;
+  logic                 c_valid_q;
+  cluster_index_t       c_cluster_q;
+  logic [LowBits-1:0]   c_low_q;
+  logic [HighBits-1:0]  c_high_q, c_next_q;  // of the address, without and with a carry from below
+  logic [LowBits:0]     c_low;
+  logic [BEAT_BITS-1:0] c_beat;
+  logic [AT_BITS-1:0]   c_first_q;
+  logic [BeatBits-1:0]  c_beats_q;
+
+  assign same    = known_q && asked_q == b_cluster_q;
+  assign first   = same && reached_q >= b_first_q ? reached_q + 1'b1 : b_first_q;
+  assign nothing = same && reached_q >= b_last_q;
+  assign c_low   = {1'b0, c_low_q} + (LowBits + 1)'(c_first_q);
+  assign c_beat  = {c_low[LowBits] ? c_next_q : c_high_q, c_low[LowBits-1:0]};
+  assign b_move  = b_valid_q && (nothing || !c_valid_q);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      known_q   <= 1'b0;
+      c_valid_q <= 1'b0;
+    end else begin
+      known_q   <= !start_i && (known_q || b_move);
+      c_valid_q <= c_valid_q ? !request_ready : b_move && !nothing;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (b_move) begin
+      asked_q <= b_cluster_q;
       if (!nothing) begin
-        reached_q <= last;
+        reached_q   <= b_last_q;
+        c_cluster_q <= b_cluster_q;
+        c_low_q     <= b_low_q[LowBits-1:0];
+        c_high_q    <= b_high_q + HighBits'(b_low_q[LowBits]);
+        c_next_q    <= b_high_q + HighBits'(b_low_q[LowBits]) + 1'b1;
+        c_first_q   <= first;
+        c_beats_q   <= BeatBits'(b_last_q - first) + 1'b1;
       end
     end
   end
@@ -167,7 +210,7 @@ module flk_colour_fetch
   logic             fetch_idle, fetch_valid, fetch_error, beat_valid, beat_ready, beat_move, empty;
   logic [Width-1:0] fetch_data, beat_data;
   mark_t            fetch_tag, fetch_mark, tag_q, mark_q, beat_mark;
-  logic             following_q, unused_ready;
+  logic             following_q, freed_q, unused_ready;
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
@@ -184,13 +227,13 @@ module flk_colour_fetch
     .rst_ni,
     .stop_i     (1'b0),
     .idle_o     (fetch_idle),
-    .in_valid_i (request),
+    .in_valid_i (c_valid_q),
     .in_ready_o (request_ready),
-    .in_beat_i  (colours_i + BEAT_BITS'(a_colour_q) + BEAT_BITS'(first)),
-    .in_beats_i (BeatBits'(last - first) + 1'b1),
-    .in_tag_i   ({a_cluster_q, first}),
+    .in_beat_i  (c_beat),
+    .in_beats_i (c_beats_q),
+    .in_tag_i   ({c_cluster_q, c_first_q}),
     .in_placed_i(1'b0),
-    .freed_i    (beat_move),
+    .freed_i    (freed_q),
     .out_valid_o(fetch_valid),
     .out_data_o (fetch_data),
     .out_tag_o  (fetch_tag),
@@ -249,6 +292,14 @@ module flk_colour_fetch
 
   assign beat_move = beat_valid && beat_ready;
 
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      freed_q <= 1'b0;
+    end else begin
+      freed_q <= beat_move;
+    end
+  end
+
   // ---- the beat that all lanes see --------------------------------------------------------------------
 
   // It goes on when the next one is there and no lane needs it (any more). The next one is asked for
@@ -297,8 +348,11 @@ module flk_colour_fetch
   cluster_index_t [LANES-1:0] lane_cluster;  // of the oldest that is not given yet
 
   for (genvar k = 0; k < LANES; k++) begin : gen_lanes
-    logic  item_valid, item_ready, item_empty;
-    item_t item;
+    logic                 item_valid, item_empty;
+    item_t                item;
+    logic                 next_take, next_free, next_valid_q, none;
+    item_t                next_q;
+    logic [AT_BITS-1:0]   next_last_q;  // beat of its last byte
 
     flk_sram_fifo #(
       .Width($bits(item_t)),
@@ -311,45 +365,45 @@ module flk_colour_fetch
       .in_ready_o (lane_ready[k]),
       .in_data_i  ({a_cluster_q, a_degree_q, a_start_q[k]}),
       .out_valid_o(item_valid),
-      .out_ready_i(item_ready),
+      .out_ready_i(next_free),
       .out_data_o (item),
       .empty_o    (item_empty)
     );
 
-    // The part that is wanted next
+    assign next_free = !next_valid_q || next_take;
+    assign none      = item_empty && !next_valid_q;
 
-    logic                 want_d, want_q;
-    cluster_index_t       cluster_d, cluster_q;
-    logic [1:0]           degree_d, degree_q, part_d, part_q;
-    logic [BYTE_BITS-1:0] from_d, from_q;  // first byte of the part
-    logic [BYTE_BITS-1:0] end_d, end_q;    // last byte of the Gaussian
-    logic                 more, fire, straddles, final_part;
-    logic [BYTE_BITS-1:0] reach;
-    logic [AT_BITS-1:0]   last_beat;
-
-    assign final_part = degree_q == 2'd3 ? part_q == 2'd3 : degree_q != 2'd2 || part_q == 2'd1;
-    assign more       = want_q && !final_part;
-    assign item_ready = !want_q || (fire && final_part);
-
-    always_comb begin
-      want_d    = want_q;
-      cluster_d = cluster_q;
-      degree_d  = degree_q;
-      part_d    = part_q;
-      from_d    = from_q;
-      end_d     = end_q;
-      if (fire && more) begin
-        part_d = part_q + 1'b1;
-        from_d = from_q + (chunked_i ? BYTE_BITS'(12) : BYTE_BITS'(24));
-      end else if (item_ready) begin
-        want_d    = item_valid;
-        cluster_d = item.cluster;
-        degree_d  = item.degree;
-        part_d    = '0;
-        from_d    = item.start;
-        end_d     = item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1;
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        next_valid_q <= 1'b0;
+      end else if (next_free) begin
+        next_valid_q <= item_valid;
       end
     end
+
+    always_ff @(posedge clk_i) begin
+      if (next_free && item_valid) begin
+        next_q      <= item;
+        next_last_q <= AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1)
+                                >> 6);
+      end
+    end
+
+    // The part that is wanted now
+
+    logic                 want_d, want_q;
+    cluster_index_t       cluster_q;
+    logic [1:0]           degree_q, part_q;
+    logic [BYTE_BITS-1:0] from_q;  // first byte of the part
+    logic [AT_BITS-1:0]   last_q;  // beat of the Gaussian's last byte
+    logic [BYTE_BITS-1:0] further;
+    logic                 more, fire, straddles, final_part;
+
+    assign final_part = degree_q == 2'd3 ? part_q == 2'd3 : degree_q != 2'd2 || part_q == 2'd1;
+    assign more       = fire && !final_part;
+    assign next_take  = !want_q || (fire && final_part);
+    assign want_d     = next_take ? next_valid_q : want_q;
+    assign further    = from_q + (chunked_i ? BYTE_BITS'(12) : BYTE_BITS'(24));
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -360,72 +414,85 @@ module flk_colour_fetch
     end
 
     always_ff @(posedge clk_i) begin
-      cluster_q <= cluster_d;
-      degree_q  <= degree_d;
-      part_q    <= part_d;
-      from_q    <= from_d;
-      end_q     <= end_d;
+      if (next_take) begin
+        cluster_q <= next_q.cluster;
+        degree_q  <= next_q.degree;
+        part_q    <= '0;
+        from_q    <= next_q.start;
+        last_q    <= next_last_q;
+      end else if (more) begin
+        part_q <= part_q + 1'b1;
+        from_q <= further;
+      end
     end
 
     // Two beats of the lane's own: the one in which the part begins, and the next that is needed.
 
     logic                  l0_valid_d, l0_valid_q, l1_valid_d, l1_valid_q;
-    mark_t                 l0_q, l1_q, wanted;
+    mark_t                 l0_q, l1_q;
     logic [31:0][31:0]     window_q;  // words of both
-    logic                  needed, passed, shift, take, has, drop;
-    logic [AT_BITS-1:0]    item_last;
+    logic                  here, needed, passed, shift, second, take, has, drop;
 
-    // It reaches 16 bytes of a chunk's Gaussian, 32 of FP16's, or to the Gaussian's end.
-    assign reach     = from_q + (chunked_i ? BYTE_BITS'(15) : BYTE_BITS'(31));
-    assign last_beat = reach < end_q ? reach[BYTE_BITS-1:6] : end_q[BYTE_BITS-1:6];
-    assign straddles = last_beat != from_q[BYTE_BITS-1:6];
-    assign fire      = want_q && l0_valid_q && l0_q == {cluster_q, from_q[BYTE_BITS-1:6]} &&
-                       (!straddles || l1_valid_q) && (!out_valid_o[k] || out_ready_i[k]);
-
+    // It reaches 16 bytes of a chunk's Gaussian, 32 of FP16's, or to the Gaussian's end; it begins at a word.
+    assign straddles = (chunked_i ? from_q[5:4] == '1 && from_q[3:2] != '0
+                                  : from_q[5] && from_q[4:2] != '0) &&
+                       from_q[BYTE_BITS-1:6] != last_q;
+    assign here      = l0_q == {cluster_q, from_q[BYTE_BITS-1:6]};
+    assign fire      = want_q && l0_valid_q && here && (!straddles || l1_valid_q) &&
+                       (!out_valid_o[k] || out_ready_i[k]);
 
     function automatic logic later(input cluster_index_t a, input cluster_index_t b);
       return a != b && CLUSTER_BITS'(a - b) <= CLUSTER_BITS'(COLOUR_CLUSTERS);
     endfunction
 
     // Whether the beat that all see is needed by the Gaussian in work or the next, or by none that is known.
-    assign item_last = AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1)
-                                >> 6);
-
     always_comb begin
       needed = 1'b0;
       passed = 1'b0;
       if (!want_q) begin
-        passed = item_empty;
+        passed = none;
       end else if (later(cluster_q, seen_q.cluster) ||
                    (cluster_q == seen_q.cluster && seen_q.at < from_q[BYTE_BITS-1:6])) begin
         passed = 1'b1;
-      end else if (cluster_q == seen_q.cluster && seen_q.at <= end_q[BYTE_BITS-1:6]) begin
+      end else if (cluster_q == seen_q.cluster && seen_q.at <= last_q) begin
         needed = 1'b1;
-      end else if (!item_valid) begin
-        passed = item_empty;
-      end else if (later(item.cluster, seen_q.cluster) ||
-                   (item.cluster == seen_q.cluster && seen_q.at < item.start[BYTE_BITS-1:6])) begin
+      end else if (!next_valid_q) begin
+        passed = none;
+      end else if (later(next_q.cluster, seen_q.cluster) ||
+                   (next_q.cluster == seen_q.cluster &&
+                    seen_q.at < next_q.start[BYTE_BITS-1:6])) begin
         passed = 1'b1;
       end else begin
-        needed = item.cluster == seen_q.cluster && seen_q.at <= item_last;
+        needed = next_q.cluster == seen_q.cluster && seen_q.at <= next_last_q;
       end
     end
 
     assign has            = (l0_valid_q && l0_q == seen_q) || (l1_valid_q && l1_q == seen_q);
     assign take           = seen_valid_q && needed && !has && (!l0_valid_q || !l1_valid_q || shift);
     assign lane_served[k] = passed || (needed && (has || take));
-    assign lane_empty[k]  = item_empty && !want_q;
+    assign lane_empty[k]  = none && !want_q;
     // Beats of a cluster that is over for a lane without work must not be taken for a later one's.
     assign drop           = lane_empty[k] && seen_valid_q && l0_q.cluster != seen_q.cluster;
-    assign wanted         = {cluster_d, from_d[BYTE_BITS-1:6]};
-    assign shift          = want_d && l0_valid_q && l0_q != wanted;
+
+    // The first of the two is not the beat in which the part that is wanted in the next cycle begins; the second is.
+    mark_t then_at, beyond;  // of the next Gaussian, of the next part
+    logic  other, idle_other, fire_other;
+
+    assign then_at     = {next_q.cluster, next_q.start[BYTE_BITS-1:6]};
+    assign beyond     = {cluster_q, further[BYTE_BITS-1:6]};
+    assign other      = next_valid_q && l0_q != then_at;
+    assign idle_other = want_q ? !here : other;
+    assign fire_other = final_part ? other : l0_q != beyond;
+    assign shift      = l0_valid_q && (fire ? fire_other : idle_other);
+    assign second     = l1_valid_q && l1_q == (more ? beyond : next_take ? then_at
+                                               : {cluster_q, from_q[BYTE_BITS-1:6]});
 
     always_comb begin
       l0_valid_d = l0_valid_q;
       l1_valid_d = l1_valid_q;
       if (shift) begin
-        l0_valid_d = l1_valid_q || take;
-        l1_valid_d = l1_valid_q && take;
+        l0_valid_d = second || take;
+        l1_valid_d = second && take;
       end else if (!l0_valid_q) begin
         l0_valid_d = take;
       end else begin
@@ -448,9 +515,9 @@ module flk_colour_fetch
     end
 
     always_ff @(posedge clk_i) begin
-      if (shift ? l1_valid_q || take : !l0_valid_q && take) begin
-        l0_q           <= shift && l1_valid_q ? l1_q : seen_q;
-        window_q[15:0] <= shift && l1_valid_q ? window_q[31:16] : seen_data_q;
+      if (shift ? second || take : !l0_valid_q && take) begin
+        l0_q           <= shift && second ? l1_q : seen_q;
+        window_q[15:0] <= shift && second ? window_q[31:16] : seen_data_q;
       end
       if (take) begin
         l1_q            <= seen_q;
@@ -524,7 +591,7 @@ module flk_colour_fetch
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        fire && straddles |-> l1_q == {cluster_q, last_beat})
+        fire && straddles |-> l1_q == {cluster_q, AT_BITS'(from_q[BYTE_BITS-1:6] + 1'b1)})
     else $error("flk_colour_fetch: a part that ends in another beat than the next one kept");
 `endif
   end
@@ -533,7 +600,6 @@ module flk_colour_fetch
 
   cluster_index_t oldest_d, oldest_q, least;
   logic           error_q;
-  logic [31:0]    beats_q;
 
   // Of the clusters that lanes are working on, the oldest.
   always_comb begin
@@ -559,22 +625,26 @@ module flk_colour_fetch
     if (!rst_ni) begin
       oldest_q <= '0;
       error_q  <= 1'b0;
-      beats_q  <= '0;
     end else if (start_i) begin
       oldest_q <= '0;
       error_q  <= 1'b0;
-      beats_q  <= '0;
     end else begin
       oldest_q <= oldest_d;
       error_q  <= error_q || (fetch_valid && fetch_error);
-      beats_q  <= beats_q + 32'(fetch_valid);
     end
   end
 
+  flk_event_counter i_beats (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start_i),
+    .count_i(fetch_valid),
+    .value_o(beats_o)
+  );
+
   assign oldest_o = oldest_q;
   assign error_o  = error_q;
-  assign beats_o  = beats_q;
-  assign idle_o   = !a_valid_q && (&lane_empty) && fetch_idle && empty && out_valid_o == '0;
+  assign idle_o   = !a_valid_q && !b_valid_q && !c_valid_q && (&lane_empty) && fetch_idle && empty && out_valid_o == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o && !in_valid_i)

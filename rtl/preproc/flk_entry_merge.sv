@@ -4,23 +4,25 @@
 // 52 bits of an entry, {key, number, mask}. A bank's entries leave in order of seq, those of one seq
 // (which all come from one lane) as they came. progress_i[k]: no entry with a seq before it will be
 // taken from lane k any more; modulo 2^SEQ_BITS, all seqs that are under way or offered, and all
-// progress, within half of the range. The earliest entry waiting for a bank leaves when each other
+// progress, within half of the range, what left in the last cycle with them. The earliest entry waiting for a bank leaves when each other
 // lane has a later one waiting for this bank, or none and its progress is not before it. So that
 // nothing stands still, a lane without work has a progress beyond all work that others have.
 // end_i: all lanes have finished, their progress beyond all entries, and nothing more will be
 // offered; each bank then gives one element with out_end_o, which carries no entry, after its last.
 // start_i, for a cycle while idle_o, begins a frame; progress_i is that of the frame from the next
 // cycle on.
-// Latency 2: one for the queue, one for the output register. Throughput: an entry a cycle and lane,
-// an entry a cycle and bank. in_ready_o depends combinationally on in_data_i, the queues and their
-// heads on out_ready_i; no other path.
+// Latency 2 through an empty queue: one for its head, one for the output register. Throughput: an
+// entry a cycle and lane, an entry a cycle and bank. in_ready_o depends combinationally on
+// in_data_i, the queues and their heads on out_ready_i; no other path.
 //
-// A queue's head of seqs is a register of its own; while the queue is empty it follows progress_i.
-// So the choice is one comparison of registers for each pair of lanes, and a gate.
+// A queue is its head, in registers, and behind it a memory (flk_sram_fifo), which an entry that finds
+// the queue empty goes past. While the queue is empty its seq follows progress_i; while its next entry is on
+// its way from the memory it stays that of the last one, which is not later. So the choice is one comparison
+// of registers for each pair of lanes, and a gate.
 module flk_entry_merge
   import flk_preproc_pkg::*;
 #(
-  parameter int unsigned Depth = 4  // of a lane's queue for a bank
+  parameter int unsigned Depth = 32  // words of the memory of a lane's queue for a bank
 ) (
   input  logic                            clk_i,
   input  logic                            rst_ni,
@@ -42,8 +44,6 @@ module flk_entry_merge
   output logic [3:0][NUMBER_BITS+27:0]    out_entry_o
 );
 
-  localparam int unsigned UsageBits = $clog2(Depth + 1);
-
   typedef struct packed {
     logic [6:0]             u;
     logic [6:0]             v;
@@ -64,68 +64,72 @@ module flk_entry_merge
   end
 
   for (genvar b = 0; b < 4; b++) begin : gen_bank
-    logic  [LANES-1:0]               waits, wins, pop;
-    logic  [LANES-1:0][SEQ_BITS-1:0] seq;  // of the entry that waits, else the lane's progress
+    logic  [LANES-1:0]               waits, stored, wins, pop;
+    logic  [LANES-1:0][SEQ_BITS-1:0] seq;  // not later than what the lane has for this bank
     item_t [LANES-1:0]               item;
-    logic                            room, out_valid_q, out_end_q, ended_q, finish;
+    logic                            room, nothing, out_valid_q, out_end_q, ended_q, finish;
     item_t                           chosen, out_q;
 
     for (genvar k = 0; k < LANES; k++) begin : gen_queue
-      logic                            push, unused_full, empty;
-      item_t                           item_in;
-      logic [UsageBits-1:0]            usage, left;
-      logic [Depth-1:0][SEQ_BITS-1:0]  seq_d, seq_q;
+      logic                push, past, free, head_valid_q, store_valid, store_empty;
+      item_t               item_in, store, head_q;
+      logic [SEQ_BITS-1:0] store_seq, seq_d, seq_q;
 
-      assign push    = in_valid_i[k] && queue_ready[k][b] &&
-                       {in_data_i[k].row[0], in_data_i[k].column[0]} == 2'(b);
       assign item_in = '{
         u: in_data_i[k].column[7:1], v: in_data_i[k].row[7:1], key: in_data_i[k].key,
         number: in_data_i[k].number, mask: in_data_i[k].mask
       };
+      assign push    = in_valid_i[k] && queue_ready[k][b] &&
+                       {in_data_i[k].row[0], in_data_i[k].column[0]} == 2'(b);
+      assign free    = !head_valid_q || pop[k];
+      assign past    = push && store_empty && free;
 
-      flk_fifo #(
-        .Width($bits(item_t)),
+      flk_sram_fifo #(
+        .Width(SEQ_BITS + $bits(item_t)),
         .Depth(Depth)
-      ) i_items (
+      ) i_store (
         .clk_i,
         .rst_ni,
         .clear_i    (1'b0),
-        .in_valid_i (push),
+        .in_valid_i (push && !past),
         .in_ready_o (queue_ready[k][b]),
-        .in_data_i  (item_in),
-        .out_valid_o(waits[k]),
-        .out_ready_i(pop[k]),
-        .out_data_o (item[k]),
-        .usage_o    (usage),
-        .full_o     (unused_full),
-        .empty_o    (empty)
+        .in_data_i  ({in_data_i[k].seq, item_in}),
+        .out_valid_o(store_valid),
+        .out_ready_i(free),
+        .out_data_o ({store_seq, store}),
+        .empty_o    (store_empty)
       );
 
-      assign left = usage - UsageBits'(pop[k]);
+      always_ff @(posedge clk_i or negedge rst_ni) begin
+        if (!rst_ni) begin
+          head_valid_q <= 1'b0;
+        end else if (free) begin
+          head_valid_q <= store_valid || past;
+        end
+      end
 
       always_comb begin
         seq_d = seq_q;
-        if (pop[k]) begin
-          seq_d = seq_q >> SEQ_BITS;
-        end
-        if (left == '0) begin
-          seq_d[0] = progress_i[k];
-        end
-        for (int unsigned d = 0; d < Depth; d++) begin
-          if (push && left == UsageBits'(d)) begin
-            seq_d[d] = in_data_i[k].seq;
-          end
+        if (free && store_valid) begin
+          seq_d = store_seq;
+        end else if (past) begin
+          seq_d = in_data_i[k].seq;
+        end else if (free && store_empty) begin
+          seq_d = progress_i[k];
         end
       end
 
       always_ff @(posedge clk_i) begin
         seq_q <= seq_d;
+        if ((free && store_valid) || past) begin
+          head_q <= store_valid ? store : item_in;
+        end
       end
 
-      assign seq[k] = seq_q[0];
-
-      logic unused_empty;
-      assign unused_empty = empty;
+      assign waits[k]  = head_valid_q;
+      assign stored[k] = !store_empty;
+      assign item[k]   = head_q;
+      assign seq[k]    = seq_q;
 
 `ifndef SYNTHESIS
       logic [SEQ_BITS-1:0] ahead;
@@ -162,7 +166,8 @@ module flk_entry_merge
       end
     end
 
-    assign finish = end_i && !ended_q && waits == '0;
+    assign nothing = waits == '0 && stored == '0;
+    assign finish  = end_i && !ended_q && nothing;
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -188,7 +193,7 @@ module flk_entry_merge
       end
     end
 
-    assign bank_idle[b]   = waits == '0 && !out_valid_q && ended_q;
+    assign bank_idle[b]   = nothing && !out_valid_q && ended_q;
     assign out_valid_o[b] = out_valid_q;
     assign out_end_o[b]   = out_end_q;
     assign out_u_o[b]     = out_q.u;

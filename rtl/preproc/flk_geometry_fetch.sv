@@ -124,18 +124,24 @@ module flk_geometry_fetch
 
   // ---- requests -------------------------------------------------------------------------------------
 
-  // Of a cluster first its header, then its geometry.
+  // Of a cluster first its header, then its geometry; before that two cycles for the addresses, their
+  // lower halves and their upper ones.
+  localparam int unsigned LowBits = BEAT_BITS / 2;
+  localparam int unsigned HighBits = BEAT_BITS - LowBits;
+
   logic                 queue_room, request_q, second_q, request_ready, take;
+  logic [1:0]           sum_q;
   logic [23:0]          index_q;
   logic [22:0]          offset_q;  // beats
   logic [6:0]           beats_d, beats_q;
   logic [3:0]           unused_part;  // 16ths of a beat
   logic [22:0]          first_more;
   logic [10:0]          last_more;
-  logic [BEAT_BITS-1:0] header_beat;
+  logic [BEAT_BITS-1:0] header_at, header_beat_q, geometry_at, geometry_beat_q;
+  logic                 header_carry_q, geometry_carry_q;
 
   assign in_ready_o = (state_q == RUN || state_q == FAILED) && !end_taken_q &&
-                      (state_q == FAILED || (queue_room && !request_q));
+                      (state_q == FAILED || (queue_room && sum_q == '0 && !request_q));
   assign take = in_valid_i && in_ready_o;
 
   // A Gaussian is 3 or 5 words of a beat's 16, and 16 slots are as many beats.
@@ -147,15 +153,17 @@ module flk_geometry_fetch
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       end_taken_q <= 1'b0;
+      sum_q       <= '0;
       request_q   <= 1'b0;
       second_q    <= 1'b0;
     end else begin
       end_taken_q <= !start && (end_taken_q || (take && in_end_i));
+      sum_q       <= state_q == FAILED ? '0 : {sum_q[0], take && !in_end_i};
       if (state_q == FAILED) begin
         request_q <= 1'b0;
         second_q  <= 1'b0;
-      end else if (take) begin
-        request_q <= !in_end_i;
+      end else if (sum_q[1]) begin
+        request_q <= 1'b1;
       end else if (request_q && request_ready) begin
         request_q <= !second_q;
         second_q  <= !second_q;
@@ -171,11 +179,27 @@ module flk_geometry_fetch
     end
   end
 
-  assign header_beat = headers_i + (chunked_i ? BEAT_BITS'(index_q) << 1 : BEAT_BITS'(index_q));
+  assign header_at   = chunked_i ? BEAT_BITS'(index_q) << 1 : BEAT_BITS'(index_q);
+  assign geometry_at = BEAT_BITS'(offset_q);
+
+  always_ff @(posedge clk_i) begin
+    if (sum_q[0]) begin
+      {header_carry_q, header_beat_q[LowBits-1:0]} <=
+          {1'b0, headers_i[LowBits-1:0]} + {1'b0, header_at[LowBits-1:0]};
+      {geometry_carry_q, geometry_beat_q[LowBits-1:0]} <=
+          {1'b0, geometry_i[LowBits-1:0]} + {1'b0, geometry_at[LowBits-1:0]};
+    end
+    if (sum_q[1]) begin
+      header_beat_q[BEAT_BITS-1:LowBits]   <= headers_i[BEAT_BITS-1:LowBits] +
+          header_at[BEAT_BITS-1:LowBits] + HighBits'(header_carry_q);
+      geometry_beat_q[BEAT_BITS-1:LowBits] <= geometry_i[BEAT_BITS-1:LowBits] +
+          geometry_at[BEAT_BITS-1:LowBits] + HighBits'(geometry_carry_q);
+    end
+  end
 
   logic             beat_valid, beat_is_header, beat_error;
   logic [Width-1:0] beat_data;
-  logic             line_valid, line_pop;
+  logic             line_valid, line_pop, freed_q;
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
@@ -193,11 +217,11 @@ module flk_geometry_fetch
     .idle_o     (fetch_idle),
     .in_valid_i (request_q),
     .in_ready_o (request_ready),
-    .in_beat_i  (second_q ? geometry_i + BEAT_BITS'(offset_q) : header_beat),
+    .in_beat_i  (second_q ? geometry_beat_q : header_beat_q),
     .in_beats_i (second_q ? beats_q : chunked_i ? 7'd2 : 7'd1),
     .in_tag_i   (!second_q),
     .in_placed_i(!second_q),  // as many headers as clusters under way
-    .freed_i    (line_valid && line_pop),
+    .freed_i    (freed_q),
     .out_valid_o(beat_valid),
     .out_data_o (beat_data),
     .out_tag_o  (beat_is_header),
@@ -216,6 +240,14 @@ module flk_geometry_fetch
     .r_resp_i,
     .r_last_i
   );
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      freed_q <= 1'b0;
+    end else begin
+      freed_q <= line_valid && line_pop && state_q != FAILED;
+    end
+  end
 
   logic header_beat_comes, geometry_beat_comes;
 
@@ -579,23 +611,25 @@ module flk_geometry_fetch
 
   // ---- counts ---------------------------------------------------------------------------------------
 
-  logic [31:0] header_beats_q, geometry_beats_q;
+  flk_event_counter i_header_beats (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start),
+    .count_i(header_beat_comes),
+    .value_o(header_beats_o)
+  );
 
-  always_ff @(posedge clk_i) begin
-    if (start) begin
-      header_beats_q   <= '0;
-      geometry_beats_q <= '0;
-    end else begin
-      header_beats_q   <= header_beats_q + 32'(header_beat_comes);
-      geometry_beats_q <= geometry_beats_q + 32'(geometry_beat_comes);
-    end
-  end
+  flk_event_counter i_geometry_beats (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start),
+    .count_i(geometry_beat_comes),
+    .value_o(geometry_beats_o)
+  );
 
   assign idle_o           = state_q == IDLE;
   assign done_o           = done_q;
   assign error_o          = error_q;
-  assign header_beats_o   = header_beats_q;
-  assign geometry_beats_o = geometry_beats_q;
   assign out_valid_o      = out_valid_q;
   assign out_end_o        = out_end_q;
   assign out_group_o      = out_group_q;

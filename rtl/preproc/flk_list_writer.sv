@@ -10,8 +10,8 @@
 // in_ready_o depends combinationally on out_ready_i; no other path.
 //
 // Pipeline, moving as a whole when the output register is free: A entry taken, number of its list;
-// B row of the set is read; C hit, free way or the way in turn, row written; D line and pointer are
-// read if a line has to go; E entry written to its line, pointer updated, line put together; F
+// B row of the set is read; C hit, free way or the way in turn, row written, pointer read; D pointer
+// updated, line read if it has to go; E entry written to its line, line and address put together; F
 // output register. What stage E (C) writes while D (B) reads the same line (row) is taken from
 // registers, not from the memory; pointers need none, since two lines of a list never follow each
 // other in neighbouring stages.
@@ -103,7 +103,7 @@ module flk_list_writer #(
   logic [CoordBits:0]     columns_q;
   logic [LinesBits-1:0]   pointer_lines_q;
   logic [ChunkBits:0]     chunks_q;
-  logic [AddressBits-1:0] list_base_q, pointer_base_q;
+  logic [AddressBits-1:0] base_q, pointer_base_q;  // base_q: of lists, then of pointers
 
   assign start    = state_q == IDLE && start_i;
   assign take     = in_valid_i && in_ready_o && !in_end_i;
@@ -179,8 +179,12 @@ module flk_list_writer #(
       columns_q       <= columns_i;
       pointer_lines_q <= pointer_lines_i;
       chunks_q        <= chunks_i;
-      list_base_q     <= list_base_i;
       pointer_base_q  <= pointer_base_i;
+    end
+    if (start) begin
+      base_q <= list_base_i;
+    end else if (walking) begin
+      base_q <= pointer_base_q;
     end
   end
 
@@ -279,59 +283,70 @@ module flk_list_writer #(
 
   // ---- C: the way -----------------------------------------------------------------------------------
 
+  // What becomes of each way is known before which one is meant: the row is a loop of one cycle.
+  logic [Ways-1:0]      c_hits, c_frees, c_one;  // c_one: the way that is meant
   logic [WayBits-1:0]   c_way;
-  logic                 c_hit, c_free, c_evict, c_full, c_event;
-  logic [CountBits-1:0] c_column;  // of the entry
+  logic                 c_hit, c_evict, c_full, c_event;
+  logic [CountBits-1:0] c_count, c_column;       // of the way; of the entry
 
   assign row = row_kept_q ? row_q : row_read;
 
+  for (genvar w = 0; w < Ways; w++) begin : gen_ways
+    localparam logic [Ways-1:0] LOWER = Ways'((1 << w) - 1);
+    assign c_hits[w]  = row.way[w].count != '0 && row.way[w].list == b_list_q;
+    assign c_frees[w] = row.way[w].count == '0;
+    assign c_one[w]   = b_flush_q ? b_way_q == WayBits'(w)
+                      : c_hits[w] || (!c_hit && (c_frees == '0 ? row.turn == WayBits'(w)
+                                                 : c_frees[w] && (c_frees & LOWER) == '0));
+  end
+
   always_comb begin
-    c_hit  = 1'b0;
-    c_free = 1'b0;
-    c_way  = row.turn;
-    for (int unsigned w = Ways; w > 0; w--) begin
-      if (row.way[w-1].count == '0) begin
-        c_free = 1'b1;
-        c_way  = WayBits'(w - 1);
-      end
-    end
+    c_way   = '0;
+    c_count = '0;
     for (int unsigned w = 0; w < Ways; w++) begin
-      if (row.way[w].count != '0 && row.way[w].list == b_list_q) begin
-        c_hit = 1'b1;
-        c_way = WayBits'(w);
-      end
-    end
-    if (b_flush_q) begin
-      c_way = b_way_q;
+      c_way   |= c_one[w] ? WayBits'(w) : '0;
+      c_count |= c_one[w] ? row.way[w].count : '0;
     end
   end
 
-  assign c_evict   = !b_flush_q && !c_hit && !c_free;
-  assign c_column  = c_hit ? row.way[c_way].count : '0;
+  assign c_hit     = c_hits != '0;
+  assign c_evict   = !b_flush_q && !c_hit && c_frees == '0;
+  assign c_column  = c_hit ? c_count : '0;
   assign c_full    = !b_flush_q && c_column == CountBits'(LineEntries - 1);
-  assign c_event   = c_evict || c_full || (b_flush_q && row.way[c_way].count != '0);
+  assign c_event   = c_evict || c_full || (b_flush_q && c_count != '0);
   assign row_write = advance && b_valid_q;
 
   always_comb begin
     row_d = row;
-    if (b_flush_q) begin
-      row_d.way[c_way].count = '0;
-      row_d.turn             = '0;
-    end else begin
-      row_d.way[c_way].count = c_full ? '0 : c_column + 1'b1;
-      row_d.way[c_way].list  = b_list_q;
-      if (c_evict) begin
-        row_d.turn = row.turn + 1'b1;
+    for (int unsigned w = 0; w < Ways; w++) begin
+      if (c_one[w]) begin
+        row_d.way[w].list  = b_list_q;
+        row_d.way[w].count = CountBits'(1);
+        if (b_flush_q || (c_hits[w] && row.way[w].count == CountBits'(LineEntries - 1))) begin
+          row_d.way[w].count = '0;
+        end else if (c_hits[w]) begin
+          row_d.way[w].count = row.way[w].count + 1'b1;
+        end
       end
+    end
+    if (b_flush_q) begin
+      row_d.turn = '0;
+    end else if (c_evict) begin
+      row_d.turn = row.turn + 1'b1;
     end
   end
 
-  // ---- D: line and pointer are read -----------------------------------------------------------------
+  // ---- D: pointer; the line is read -----------------------------------------------------------------
+
+  typedef struct packed {
+    logic [UsedBits-1:0]  used;  // 0: the list is empty
+    logic [ChunkBits-1:0] chunk;
+  } pointer_t;
 
   logic                 d_entry_q, d_event_q, d_full_q;
   logic [PlaceBits-1:0] d_place_q;
   logic [CountBits-1:0] d_column_q, d_count_q;  // d_count_q: entries of the line that goes
-  logic [ListBits-1:0]  d_list_q;               // its list
+  logic [ListBits-1:0]  c_list, d_list_q;       // its list
   logic [EntryBits-1:0] d_word_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -349,42 +364,108 @@ module flk_list_writer #(
       d_full_q   <= c_full;
       d_place_q  <= PlaceBits'({b_set_q, c_way});
       d_column_q <= c_column;
-      d_count_q  <= c_full ? CountBits'(LineEntries) : row.way[c_way].count;
-      d_list_q   <= c_full ? b_list_q : row.way[c_way].list;
+      d_count_q  <= c_full ? CountBits'(LineEntries) : c_count;
+      d_list_q   <= c_list;
       d_word_q   <= b_entry_q;
     end
   end
 
-  // ---- E: line and pointer --------------------------------------------------------------------------
+  // Pointers are read for every entry, by the list of the line that may have to go, and in turn at the end, when each is
+  // cleared behind its reading.
+  pointer_t            pointer, pointer_d;
+  logic                walk_q, walk_last_q, walk_clear;
+  logic [ListBits-1:0] walk_list_q;
+  logic                pointer_write, begins, enough, sends;
+  logic [ChunkBits:0]  taken_d, taken_q, taken_more;
+  logic                failed_d, failed_q;
 
-  typedef struct packed {
-    logic [UsedBits-1:0]  used;  // 0: the list is empty
-    logic [ChunkBits-1:0] chunk;
-  } pointer_t;
+  always_comb begin
+    c_list = '0;
+    for (int unsigned w = 0; w < Ways; w++) begin
+      c_list |= c_one[w] ? row.way[w].list : '0;
+    end
+    if (!b_flush_q && !c_evict) begin
+      c_list = b_list_q;
+    end
+  end
 
-  logic                                  e_entry_q, e_event_q, e_full_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      walk_q      <= 1'b0;
+      walk_last_q <= 1'b0;
+    end else if (advance) begin
+      walk_q      <= walking;
+      walk_last_q <= walking && (&step_q[PerLineBits-1:0]);
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && walking) begin
+      walk_list_q <= ListBits'(step_q);
+    end
+  end
+
+  flk_sram #(
+    .Width($bits(pointer_t)),
+    .Depth(Pointers)
+  ) i_pointers (
+    .clk_i,
+    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear),
+    .wr_addr_i(state_q == CLEAR ? ListBits'(step_q) : walk_clear ? walk_list_q : d_list_q),
+    .wr_data_i(state_q == CLEAR || walk_clear ? '0 : pointer_d),
+    .rd_en_i  (advance && (b_valid_q || walking)),
+    .rd_addr_i(walking ? ListBits'(step_q) : c_list),
+    .rd_data_o(pointer)
+  );
+
+  assign walk_clear    = advance && walk_q;
+  assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
+  assign enough        = !begins || taken_q != chunks_q;
+  assign sends         = d_event_q && enough && !failed_q;
+  assign pointer_write = advance && sends;
+  assign failed_d      = failed_q || (d_event_q && !enough);
+  assign taken_more    = taken_q + 1'b1;
+  assign taken_d       = sends && begins ? taken_more : taken_q;
+
+  always_comb begin
+    pointer_d.chunk = begins ? ChunkBits'(taken_q) : pointer.chunk;
+    pointer_d.used  = begins ? UsedBits'(1) : pointer.used + 1'b1;
+  end
+
+  // ---- E: line, and where it goes -------------------------------------------------------------------
+
+  logic                                  e_entry_q, e_event_q, e_sends_q, e_full_q;
   logic [PlaceBits-1:0]                  e_place_q;
   logic [CountBits-1:0]                  e_column_q, e_count_q;
-  logic [ListBits-1:0]                   e_list_q;
   logic [EntryBits-1:0]                  e_word_q;
   logic [LineEntries-1:0][EntryBits-1:0] line_read;
   // What stage E wrote when D read.
   logic                                  was_entry_q;
   logic [CountBits-1:0]                  was_column_q;
   logic [EntryBits-1:0]                  was_word_q;
+  // The pointer as it was, and whether the line begins a chunk.
+  pointer_t                              e_pointer_q;
+  logic                                  e_begins_q;
+  logic                                  e_walk_q, e_walk_last_q;
+  logic [AddressBits-1:0]                e_at_d, e_at_q;  // from the first line of lists, or of pointers
 
-  pointer_t                              pointer, pointer_d;
-  logic                                  pointer_write, begins, enough, sends;
-  logic [ChunkBits:0]                    taken_d, taken_q;
-  logic                                  failed_d, failed_q;
+  assign e_at_d = walk_q ? AddressBits'({walk_list_q >> PerLineBits, writer_q})
+                : AddressBits'({pointer_d.chunk, writer_q,
+                                $clog2(ChunkLines)'(begins ? '0 : pointer.used)});
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      e_entry_q <= 1'b0;
-      e_event_q <= 1'b0;
+      e_entry_q     <= 1'b0;
+      e_event_q     <= 1'b0;
+      e_sends_q     <= 1'b0;
+      e_walk_q      <= 1'b0;
+      e_walk_last_q <= 1'b0;
     end else if (advance) begin
-      e_entry_q <= d_entry_q;
-      e_event_q <= d_event_q;
+      e_entry_q     <= d_entry_q;
+      e_event_q     <= d_event_q;
+      e_sends_q     <= sends;
+      e_walk_q      <= walk_q;
+      e_walk_last_q <= walk_last_q && !failed_q;
     end
   end
 
@@ -394,11 +475,15 @@ module flk_list_writer #(
       e_place_q    <= d_place_q;
       e_column_q   <= d_column_q;
       e_count_q    <= d_count_q;
-      e_list_q     <= d_list_q;
       e_word_q     <= d_word_q;
       was_entry_q  <= e_entry_q && e_place_q == d_place_q;
       was_column_q <= e_column_q;
       was_word_q   <= e_word_q;
+    end
+    if (advance && (d_event_q || walk_q)) begin
+      e_pointer_q <= pointer;
+      e_begins_q  <= begins;
+      e_at_q      <= e_at_d;
     end
   end
 
@@ -418,37 +503,6 @@ module flk_list_writer #(
   end
 
   logic [LineBits-1:0]    line;
-  logic [AddressBits-1:0] chunk_number, address, walk_address;
-
-  // Pointers are read by the list of a line, and in turn at the end, when each is cleared behind its reading.
-  logic                walk_q, walk_last_q, walk_clear;
-  logic [ListBits-1:0] walk_list_q;
-
-  flk_sram #(
-    .Width($bits(pointer_t)),
-    .Depth(Pointers)
-  ) i_pointers (
-    .clk_i,
-    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear),
-    .wr_addr_i(state_q == CLEAR ? ListBits'(step_q) : walk_clear ? walk_list_q : e_list_q),
-    .wr_data_i(state_q == CLEAR || walk_clear ? '0 : pointer_d),
-    .rd_en_i  (advance && (d_event_q || walking)),
-    .rd_addr_i(walking ? ListBits'(step_q) : d_list_q),
-    .rd_data_o(pointer)
-  );
-
-  assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
-  assign enough        = !begins || taken_q != chunks_q;
-  assign sends         = e_event_q && enough && !failed_q;
-  assign pointer_write = advance && sends;
-  assign failed_d      = failed_q || (e_event_q && !enough);
-  assign taken_d       = taken_q + (ChunkBits + 1)'(sends && begins);
-
-  always_comb begin
-    pointer_d.chunk = begins ? ChunkBits'(taken_q) : pointer.chunk;
-    pointer_d.used  = begins ? UsedBits'(1) : pointer.used + 1'b1;
-  end
-
   always_comb begin
     line = '0;
     for (int unsigned i = 0; i < LineEntries; i++) begin
@@ -463,65 +517,33 @@ module flk_list_writer #(
       line[(LineEntries-1)*EntryBits+:EntryBits] = e_word_q;
     end
     line[HeaderAt+:HeaderCount] = HeaderCount'(e_count_q);
-    if (begins && pointer.used != '0) begin
-      line[HeaderAt+HeaderCount+:ChunkBits+1] = {1'b1, pointer.chunk};
+    if (e_begins_q && e_pointer_q.used != '0) begin
+      line[HeaderAt+HeaderCount+:ChunkBits+1] = {1'b1, e_pointer_q.chunk};
     end
   end
-
-  assign chunk_number = (AddressBits'(pointer_d.chunk) << 2) + AddressBits'(writer_q);
-  assign address      = list_base_q + (chunk_number << $clog2(ChunkLines)) +
-                        AddressBits'(pointer_d.used - 1'b1);
-
-  // ---- pointers at the end --------------------------------------------------------------------------
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      walk_q      <= 1'b0;
-      walk_last_q <= 1'b0;
-    end else if (advance) begin
-      walk_q      <= walking;
-      walk_last_q <= walking && (&step_q[PerLineBits-1:0]);
-    end
-  end
-
-  always_ff @(posedge clk_i) begin
-    if (advance && walking) begin
-      walk_list_q <= ListBits'(step_q);
-    end
-  end
-
-  assign walk_clear   = advance && walk_q;
-  assign walk_address = pointer_base_q + (AddressBits'(walk_list_q >> PerLineBits) << 2) +
-                        AddressBits'(writer_q);
 
   // ---- F: output register ---------------------------------------------------------------------------
 
-  logic                   out_valid_d, out_valid_q;
+  logic                   out_valid_q;
   logic [AddressBits-1:0] address_q;
   logic [LineBits-1:0]    data_q;
 
-  assign advance     = !out_valid_q || out_ready_i;
-  assign out_valid_d = sends || (walk_last_q && !failed_q);
-  assign busy        = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
-                       walk_q || out_valid_q;
+  assign advance = !out_valid_q || out_ready_i;
+  assign busy    = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
+                   walk_q || e_walk_q || out_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       out_valid_q <= 1'b0;
     end else if (advance) begin
-      out_valid_q <= out_valid_d;
+      out_valid_q <= e_sends_q || e_walk_last_q;
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (advance && (e_event_q || walk_q)) begin
-      if (walk_q) begin
-        data_q    <= {PointerBits'(pointer), data_q[LineBits-1:PointerBits]};
-        address_q <= walk_address;
-      end else begin
-        data_q    <= line;
-        address_q <= address;
-      end
+    if (advance && (e_event_q || e_walk_q)) begin
+      data_q    <= e_walk_q ? {PointerBits'(e_pointer_q), data_q[LineBits-1:PointerBits]} : line;
+      address_q <= base_q + e_at_q;
     end
   end
 
@@ -531,41 +553,53 @@ module flk_list_writer #(
 
   // ---- counters -------------------------------------------------------------------------------------
 
-  logic        done_q;
-  logic [31:0] entries_q, lines_q, evicted_q;
+  logic done_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      done_q    <= 1'b0;
-      failed_q  <= 1'b0;
-      taken_q   <= '0;
-      entries_q <= '0;
-      lines_q   <= '0;
-      evicted_q <= '0;
+      done_q   <= 1'b0;
+      failed_q <= 1'b0;
+      taken_q  <= '0;
     end else begin
       done_q <= state_q == LAST && !busy;
       if (start) begin
-        failed_q  <= 1'b0;
-        taken_q   <= '0;
-        entries_q <= '0;
-        lines_q   <= '0;
-        evicted_q <= '0;
+        failed_q <= 1'b0;
+        taken_q  <= '0;
       end else if (advance) begin
-        failed_q  <= failed_d;
-        taken_q   <= taken_d;
-        entries_q <= entries_q + 32'(take);
-        lines_q   <= lines_q + 32'(sends);
-        evicted_q <= evicted_q + 32'(b_valid_q && c_evict);
+        failed_q <= failed_d;
+        taken_q  <= taken_d;
       end
     end
   end
 
+  flk_event_counter i_entries (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start),
+    .count_i(take),
+    .value_o(entries_o)
+  );
+
+  // The last line leaves stage D at least four cycles before done_o.
+  flk_event_counter i_lines (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start),
+    .count_i(advance && sends),
+    .value_o(lines_o)
+  );
+
+  flk_event_counter i_evicted (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start),
+    .count_i(advance && b_valid_q && c_evict),
+    .value_o(evicted_o)
+  );
+
   assign idle_o    = state_q == IDLE;
   assign done_o    = done_q;
   assign failed_o  = failed_q;
-  assign entries_o = entries_q;
-  assign lines_o   = lines_q;
-  assign evicted_o = evicted_q;
   assign taken_o   = taken_q;
 
 `ifndef SYNTHESIS
@@ -591,7 +625,7 @@ module flk_list_writer #(
 
   // A list has one open line, so after a line of it another entry comes before the next line.
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      d_event_q && e_event_q |-> d_list_q != e_list_q)
+      d_event_q && b_valid_q && c_event |-> c_list != d_list_q)
   else $error("flk_list_writer: two lines of a list in neighbouring stages");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) e_event_q |-> e_count_q != '0)

@@ -104,7 +104,7 @@ module flk_preprocessing
   logic   start, cull_idle, geometry_idle, front_idle, back_idle;
   logic   merge_idle, records_idle, write_idle;
   logic   colour_idle, ended_q, lists_end, arbiter_empty;
-  logic [LANES-1:0] lane_idle;
+  logic [LANES-1:0] lane_idle, queued_empty;
   logic [3:0]       list_idle, list_failed;
 
   assign start  = state_q == IDLE && start_i;
@@ -129,7 +129,7 @@ module flk_preprocessing
         end
       end
       default: begin  // lists are closed, all is written
-        if (merge_idle && (&list_idle) && records_idle && arbiter_empty && write_idle) begin
+        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty && write_idle) begin
           state_d = IDLE;
         end
       end
@@ -531,14 +531,43 @@ module flk_preprocessing
   logic [Width-1:0]     line_data;
   logic [3:0]           line_strobe;
 
+  // Lanes that want the same quarter take turns; two records of each wait, so that no lane's colours stand for
+  // another's record, nor for the time of that choice.
+  logic   [LANES-1:0]        queued_valid, queued_ready;
+  place_t [LANES-1:0]        queued_place;
+  logic   [LANES-1:0][127:0] queued_record;
+
+  for (genvar k = 0; k < LANES; k++) begin : gen_records
+    logic       unused_full;
+    logic [1:0] unused_usage;
+
+    flk_fifo #(
+      .Width($bits(place_t) + 128),
+      .Depth(2)
+    ) i_queue (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (record_valid[k]),
+      .in_ready_o (record_ready[k]),
+      .in_data_i  ({record_place[k], record[k]}),
+      .out_valid_o(queued_valid[k]),
+      .out_ready_i(queued_ready[k]),
+      .out_data_o ({queued_place[k], queued_record[k]}),
+      .usage_o    (unused_usage),
+      .full_o     (unused_full),
+      .empty_o    (queued_empty[k])
+    );
+  end
+
   flk_record_writer i_records (
     .clk_i,
     .rst_ni,
     .idle_o      (records_idle),
-    .in_valid_i  (record_valid),
-    .in_ready_o  (record_ready),
-    .in_place_i  (record_place),
-    .in_record_i (record),
+    .in_valid_i  (queued_valid),
+    .in_ready_o  (queued_ready),
+    .in_place_i  (queued_place),
+    .in_record_i (queued_record),
     .beat_valid_i(beat_valid),
     .beat_ready_o(beat_ready),
     .beat_data_i (told),
@@ -557,7 +586,7 @@ module flk_preprocessing
   logic [3:0][NUMBER_BITS+27:0] merged;
 
   flk_entry_merge #(
-    .Depth(8)
+    .Depth(32)
   ) i_merge (
     .clk_i,
     .rst_ni,
@@ -767,65 +796,71 @@ module flk_preprocessing
 
   // ---- errors and counters --------------------------------------------------------------------------
 
-  logic        write_error_q;
-  logic [31:0] near_q, outside_q, survivors_q, records_q;
-  logic [31:0] saturated_q, clipped_q, faint_q, unlisted_q;
-  logic [31:0] cycles_q;
+  localparam int unsigned Events = 8;
 
-  function automatic logic [31:0] sum(input logic [LANES-1:0] bits);
-    sum = '0;
-    for (int unsigned k = 0; k < LANES; k++) begin
-      sum = sum + 32'(bits[k]);
+  logic                            write_error_q;
+  logic [31:0]                     cycles_q;
+  logic [Events-1:0][LANES-1:0]    events_q;  // by lane
+  logic [Events-1:0][31:0]         totals;
+
+  // What happens in the lanes is counted a few cycles later; after a frame's last event comes the end of its lists.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      events_q <= '0;
+    end else begin
+      events_q[0] <= go ? side.used & lane_near : '0;
+      events_q[1] <= go ? side.used & ~lane_near & lane_outside : '0;
+      events_q[2] <= go ? alive : '0;
+      events_q[3] <= saturated;
+      events_q[4] <= clipped;
+      events_q[5] <= faint;
+      events_q[6] <= unlisted;
+      events_q[7] <= LANES'(line_valid && line_ready);
     end
-  endfunction
+  end
+
+  for (genvar e = 0; e < Events; e++) begin : gen_events
+    logic [2:0] many;
+
+    always_comb begin
+      many = '0;
+      for (int unsigned k = 0; k < LANES; k++) begin
+        many = many + 3'(events_q[e][k]);
+      end
+    end
+
+    flk_event_counter #(
+      .CountBits(3)
+    ) i_total (
+      .clk_i,
+      .rst_ni,
+      .clear_i(start),
+      .count_i(many),
+      .value_o(totals[e])
+    );
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       write_error_q <= 1'b0;
-      near_q        <= '0;
-      outside_q     <= '0;
-      survivors_q   <= '0;
-      saturated_q   <= '0;
-      clipped_q     <= '0;
-      faint_q       <= '0;
-      unlisted_q    <= '0;
-      records_q     <= '0;
       cycles_q      <= '0;
     end else if (start) begin
       write_error_q <= 1'b0;
-      near_q        <= '0;
-      outside_q     <= '0;
-      survivors_q   <= '0;
-      saturated_q   <= '0;
-      clipped_q     <= '0;
-      faint_q       <= '0;
-      unlisted_q    <= '0;
-      records_q     <= '0;
       cycles_q      <= '0;
     end else if (state_q != IDLE) begin
       write_error_q <= write_error_q || (write_answer && write_failed);
-      if (go) begin
-        near_q      <= near_q + sum(side.used & lane_near);
-        outside_q   <= outside_q + sum(side.used & ~lane_near & lane_outside);
-        survivors_q <= survivors_q + 32'(count);
-      end
-      saturated_q <= saturated_q + sum(saturated);
-      clipped_q   <= clipped_q + sum(clipped);
-      faint_q     <= faint_q + sum(faint);
-      unlisted_q  <= unlisted_q + sum(unlisted);
-      records_q   <= records_q + 32'(line_valid && line_ready);
-      cycles_q    <= cycles_q + 1'b1;
+      cycles_q      <= cycles_q + 1'b1;
     end
   end
 
-  assign counters_o.too_near       = near_q;
-  assign counters_o.outside      = outside_q;
-  assign counters_o.survivors    = survivors_q;
-  assign counters_o.saturated    = saturated_q;
-  assign counters_o.clipped      = clipped_q;
-  assign counters_o.faint        = faint_q;
-  assign counters_o.unlisted     = unlisted_q;
-  assign counters_o.record_beats = records_q;
+  assign counters_o.too_near     = totals[0];
+  assign counters_o.outside      = totals[1];
+  assign counters_o.survivors    = totals[2];
+  assign counters_o.saturated    = totals[3];
+  assign counters_o.clipped      = totals[4];
+  assign counters_o.faint        = totals[5];
+  assign counters_o.unlisted     = totals[6];
+  assign counters_o.record_beats = totals[7];
   assign counters_o.cycles       = cycles_q;
   assign counters_o.entries      = list_entries;
   assign counters_o.lines        = list_lines;

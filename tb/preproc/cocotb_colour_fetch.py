@@ -12,7 +12,7 @@ from flicker.chip.dram import DramConfig
 from flicker.scene.packed import PackedFormat
 from flicker.sim.memory import Memory, PortConfig
 
-BASE, SIZE = 0x40_0000, 0x8_0000
+BASE, SIZE = 0x7F_F000, 0x8_0000  # beats from below a multiple of 2^17, where the halves of an address meet
 CLUSTERS = 8  # whose colours may be under way
 PART = (("cluster", 4), ("first", 1), ("last", 1), ("part", 2), ("used", 4), ("opacity", 16), ("dc", 48), ("raw", 192))
 USED = {0: [0], 1: [7], 2: [15, 15], 3: [15, 15, 15, 7]}

@@ -48,7 +48,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_list_writer": [MEMORY],
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
-    "flk_entry_merge": ["flk_fifo"],
+    "flk_entry_merge": ["flk_sram_fifo"],
     "flk_axi_fetch": ["flk_axi_read"],
     "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_ff_add", "flk_fifo"],
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
@@ -59,7 +59,7 @@ COMPOSED: dict[str, list[str]] = {
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
-        "flk_stream_arbiter", "flk_sram_fifo", "flk_axi_write", "flk_delay",
+        "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_axi_write", "flk_delay",
     ],
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
@@ -272,7 +272,7 @@ def _front() -> list[Unit]:
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
-        unit("flk_entry_merge", "queues of 8", Depth=8),
+        unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
     ]

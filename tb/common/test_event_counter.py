@@ -1,0 +1,16 @@
+"""Counter of events: one and several a cycle, carries into the upper bits, clear with events on their way. Not covered: counts of more than 2^13."""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test, refused
+
+
+@pytest.mark.parametrize("bits", [1, 3])
+def test_event_counter(bits: int) -> None:
+    build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": bits})
+
+
+def test_illegal_parameters() -> None:
+    with refused("CountBits must be 1 to 8"):
+        build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": 9})
