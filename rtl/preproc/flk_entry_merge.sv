@@ -4,9 +4,10 @@
 // 52 bits of an entry, {key, number, mask}. A bank's entries leave in order of seq, those of one seq
 // (which all come from one lane) as they came. progress_i[k]: no entry with a seq before it will be
 // taken from lane k any more; modulo 2^SEQ_BITS, all seqs that are under way or offered, and all
-// progress, within half of the range, what left in the last cycle with them. The earliest entry waiting for a bank leaves when each other
-// lane has a later one waiting for this bank, or none and its progress is not before it. So that
-// nothing stands still, a lane without work has a progress beyond all work that others have.
+// progress, within half of the range, what left in the last cycle with them. The earliest entry
+// waiting for a bank leaves when each other lane has a later one waiting for this bank, or none and
+// its progress is not before it. So that nothing stands still, a lane without work has a progress
+// beyond all work that others have.
 // end_i: all lanes have finished, their progress beyond all entries, and nothing more will be
 // offered; each bank then gives one element with out_end_o, which carries no entry, after its last.
 // start_i, for a cycle while idle_o, begins a frame; progress_i is that of the frame from the next

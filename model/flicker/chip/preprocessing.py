@@ -30,7 +30,7 @@ GROUP_CYCLES = 2  # a group of four enters the front
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
 WAITING = 128  # survivors of a lane between front and entries
-MERGE_DEPTH = 8  # entries of a lane that wait for a list writer
+MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
 GATHER = 256  # lines that are written together
 
 
