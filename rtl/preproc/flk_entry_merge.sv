@@ -16,10 +16,10 @@
 // entry a cycle and lane, an entry a cycle and bank. in_ready_o depends combinationally on
 // in_data_i, the queues and their heads on out_ready_i; no other path.
 //
-// A queue is its head, in registers, and behind it a memory (flk_sram_fifo), which an entry that finds
-// the queue empty goes past. While the queue is empty its seq follows progress_i; while its next entry is on
-// its way from the memory it stays that of the last one, which is not later. So the choice is one comparison
-// of registers for each pair of lanes, and a gate.
+// A queue is its head, in registers, and behind it a memory (flk_sram_fifo), which an entry that
+// finds the queue empty goes past. While the queue is empty its seq follows progress_i; while
+// its next entry is on its way from the memory it stays that of the last one, which is not
+// later. So the choice is one comparison of registers for each pair of lanes, and a gate.
 module flk_entry_merge
   import flk_preproc_pkg::*;
 #(

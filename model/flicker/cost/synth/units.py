@@ -137,6 +137,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         bits = [f"in_addr_i[{bit}]" for bit in range(beat)]
         if axi:
             bits += [*(f"{axi[0]}[{bit}]" for bit in range(parameters.get("IdBits", 4))), f"{axi[1]}[0]"]
+        if not parameters.get("Tagged", 1):
+            bits.append("in_tag_i[0]")
     # What a combinational operator does not use.
     if top in PIPES and parameters.get("Stages", 1) == 0:
         bits = [*bits, "clk_i[0]", "en_i[0]"]
