@@ -158,8 +158,8 @@ def verilator(shapes: Sequence[Shape], *options: str) -> list[object]:
     top = FOLDER / hashlib.sha256(text.encode()).hexdigest()[:16] / f"{TOP}.sv"
     top.parent.mkdir(parents=True, exist_ok=True)
     top.write_text(text)
-    needed = {source for module in {shape.module for shape in shapes} for source in sources_of(module)}
-    sources = [source for source in toolchain.filelist() if source in needed]
+    needed = {source.stem: source for module in {shape.module for shape in shapes} for source in sources_of(module)}
+    sources = [needed[source.stem] for source in toolchain.filelist() if source.stem in needed]
     return ["verilator", "-Wall", "--quiet-build", *options, "--top-module", TOP, "lint/waiver.vlt", *(path.relative_to(ROOT) for path in [*sources, top])]
 
 
@@ -234,11 +234,11 @@ def run(command: list[object], *unhashed: object, keep: Callable[[], str] = str)
 
 
 def unseen(outputs: list[str]) -> list[str]:
-    """Outputs that say something new: a module's warning comes again under every top above it."""
+    """Outputs that say something new: a warning comes again with every instance, and under every group that holds the module."""
     seen: set[str] = set()
     kept = []
     for output in outputs:
-        said = set(re.findall(r"^%(?!Error: Exiting).*$|^rtl/.*$", output, re.M))
+        said = set(re.findall(r"^%\S+ rtl/\S+?:\d+|^%(?!Error: Exiting)(?!\S+ rtl/).*$|^rtl/.*$", output, re.M))
         if not said or said - seen:
             kept.append(output)
         seen |= said
