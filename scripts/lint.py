@@ -1,18 +1,29 @@
 #!/usr/bin/env python3
-"""Lint: Verilator with every module as top, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
+"""Lint: Verilator on every module, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
 
-Exits 1 on any warning, and if a generated source is not current (`make generate`). Each module is linted with its default parameters (or SMALLER ones) and
-with those of VARIANTS, as synthesised (SYNTHESIS defined) and, where one of its sources looks at SYNTHESIS, as simulated, with assertions.
+Exits 1 on any warning, and if a generated source is not current (`make generate`). A shape is a module with its default parameters (or SMALLER ones)
+or with those of VARIANTS. All shapes are instances of one generated top, in which Verilator elaborates each once, wherever it stands. Two steps:
+
+1. elaboration (`--json-only`), as synthesised (SYNTHESIS defined) and as simulated, with assertions. Gives all warnings for which Verilator looks at
+   one module: widths, signals without use or driver, ports, names, order of statements.
+2. flattening (`--lint-only`), as synthesised. Gives the rest: latches, loops, several drivers, incomplete cases, resets of two kinds. Only the shapes
+   that elaboration has found in no other module are instances here, in groups; all others are inside them.
+
 Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules; rules of ruff and mypy: pyproject.toml.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from flicker import toolchain
@@ -20,7 +31,8 @@ from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 RTL = ROOT / "rtl"
-VERSIONS = (ROOT / "requirements.lock").read_text()
+FOLDER = toolchain.BUILD / "lint"
+VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text()
 
 # Parameters in place of the defaults, where these only make more of a part that is linted by itself: the stage hands the number of VRUs to its cores.
 SMALLER: dict[str, dict[str, int]] = {"flk_render_stage": {"VrusPerChannel": 1}}
@@ -71,15 +83,28 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     ],
 }
 
-
-# Checks beside those of the hardware, the longest last: programs of the environment, and scripts that compare what they have written.
+# Checks beside those of the hardware, the longest first: programs of the environment, and scripts that compare what they have written.
 CHECKS: list[list[object]] = [
-    [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
-    [Path(sys.executable).parent / "lint-imports"],
-    [sys.executable, "scripts/mutants.py", "--check"],
-    [sys.executable, "scripts/gen_manifests.py", "--check"],
     [sys.executable, "-m", "mypy"],
+    [sys.executable, "scripts/gen_params.py", "--check"],
+    [sys.executable, "scripts/gen_manifests.py", "--check"],
+    [sys.executable, "scripts/mutants.py", "--check"],
+    [Path(sys.executable).parent / "lint-imports"],
+    [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
 ]
+
+TOP = "flk_lint_top"  # the generated top
+GROUP = 400  # instances, at all depths, of the shapes of a group; more take more than proportionally longer
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A module with parameters; `name` is its instance's."""
+
+    name: str
+    module: str
+    parameters: Mapping[str, int]
+    outputs: tuple[str, ...]
 
 
 def check_filelist(listed: list[Path]) -> list[str]:
@@ -96,30 +121,125 @@ def check_filelist(listed: list[Path]) -> list[str]:
     return findings
 
 
-def run(command: list[object]) -> str:
-    """Output of a lint tool if it found anything, else an empty string. What has passed is not run again on equal files."""
+def shapes_of(listed: Sequence[Path]) -> list[Shape]:
+    """All shapes, in the order of the file list."""
+    found = []
+    for path in listed:
+        module = path.stem
+        if module.endswith("_pkg"):
+            continue
+        header = re.search(rf"^module\s+{module}\b.*?^\);", re.sub(r"//.*", "", path.read_text()), re.M | re.S)
+        if header is None:
+            raise FlickerError(f"{path.relative_to(ROOT)}: no header of {module} that ends with a line `);`")
+        outputs = tuple(re.findall(r"\boutput\b[^,;]*?(\w+)\s*(?=,|\n\))", header[0]))
+        for number, parameters in enumerate([SMALLER.get(module, {}), *VARIANTS.get(module, [])]):
+            found.append(Shape(f"{module}_{number}", module, parameters, outputs))
+    return found
+
+
+def top_text(shapes: Sequence[Shape]) -> str:
+    """SystemVerilog of a top with every shape. Inputs stay open; outputs are looked at, or Verilator would take away what leads to them."""
+    lines = []
+    for number, shape in enumerate(shapes):
+        values = ", ".join(f".{name}({value})" for name, value in shape.parameters.items())
+        outputs = ", ".join(f"{shape.name}.{output}" for output in shape.outputs)
+        lines.append(f"  {shape.module} {f'#({values}) ' if values else ''}{shape.name} ();")
+        lines.append(f"  assign seen_o[{number}] = {f'^{{{outputs}}}' if outputs else chr(39) + '0'};")
+    return "\n".join([f"module {TOP} (output logic [{len(shapes) - 1}:0] seen_o);", *lines, "endmodule", ""])
+
+
+@cache
+def sources_of(module: str) -> list[Path]:
+    return toolchain.sources_of(module)
+
+
+def verilator(shapes: Sequence[Shape], *options: str) -> list[object]:
+    """Verilator on the generated top of shapes, with the sources that they need."""
+    text = top_text(shapes)
+    top = FOLDER / hashlib.sha256(text.encode()).hexdigest()[:16] / f"{TOP}.sv"
+    top.parent.mkdir(parents=True, exist_ok=True)
+    top.write_text(text)
+    needed = {source.stem: source for module in {shape.module for shape in shapes} for source in sources_of(module)}
+    sources = [needed[source.stem] for source in toolchain.filelist() if source.stem in needed]
+    return ["verilator", "-Wall", "--quiet-build", *options, "--top-module", TOP, "lint/waiver.vlt", *(path.relative_to(ROOT) for path in [*sources, top])]
+
+
+def elaborate(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, int]]:
+    """Findings of step 1, and the shapes that no other one holds with their number of instances at all depths (empty after findings)."""
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree.json"
+        out, kept = run(
+            verilator(shapes, "--json-only", *defines),
+            "--json-only-output", tree, "--json-only-meta-output", Path(folder) / "meta.json", "-Mdir", folder,
+            keep=lambda: json.dumps(outermost(json.loads(tree.read_text())["modulesp"])) if defines else "{}",
+        )
+    return out, json.loads(kept or "{}")
+
+
+def outermost(modules: list[dict]) -> dict[str, int]:
+    """Instances of the top, one of each elaborated module that is instantiated by no other, with the number of instances below."""
+    cells = {module["addr"]: list(_cells(module)) for module in modules}
+    top = next(module["addr"] for module in modules if module["name"] == TOP)
+    inner = {below for module, found in cells.items() if module != top for _, below in found}
+
+    @cache
+    def size(module: str) -> int:
+        return 1 + sum(size(below) for _, below in cells[module])
+
+    names = {module: name for name, module in reversed(cells[top]) if module not in inner}
+    return {name: size(module) for module, name in names.items()}
+
+
+def _cells(node: dict) -> list[tuple[str, str]]:
+    """Instances anywhere below a node of Verilator's tree: name and elaborated module."""
+    found = [(node["name"], node["modp"])] if node.get("type") == "CELL" else []
+    for children in node.values():
+        if isinstance(children, list):
+            found += [cell for child in children for cell in _cells(child)]
+    return found
+
+
+def groups_of(shapes: Sequence[Shape], sizes: Mapping[str, int]) -> list[list[Shape]]:
+    """Shapes of `sizes` in groups, the largest first."""
+    groups: list[tuple[int, list[Shape]]] = []
+    for shape in sorted((shape for shape in shapes if shape.name in sizes), key=lambda shape: -sizes[shape.name]):
+        size, group = next((entry for entry in groups if entry[0] + sizes[shape.name] <= GROUP), (0, []))
+        if group:
+            groups.remove((size, group))
+        groups.append((size + sizes[shape.name], [*group, shape]))
+    return [group for _, group in sorted(groups, key=lambda entry: -entry[0])]
+
+
+def run(command: list[object], *unhashed: object, keep: Callable[[], str] = str) -> tuple[str, str]:
+    """Output of a lint tool if it found anything, else an empty string; and what `keep` makes of a run that passed.
+
+    What has passed is not run again on equal files. unhashed: further arguments, of no influence on what is found.
+    """
     words = [str(word) for word in command]
     files = [ROOT / word for word in words if word.endswith((".sv", ".vlt", ".rules", ".waiver"))]
     key = hashlib.sha256("\0".join([*words, VERSIONS, *(file.read_text() for file in files)]).encode()).hexdigest()
-    passed = toolchain.BUILD / "lint" / key
+    passed = FOLDER / key
     if files and passed.exists():
-        return ""
+        return "", passed.read_text()
     done = subprocess.run(
-        words, cwd=ROOT, env=toolchain.environment(), text=True,
+        [*words, *map(str, unhashed)], cwd=ROOT, env=toolchain.environment(), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )
-    if files and not done.returncode:
+    if done.returncode:
+        return f"$ {' '.join(words)}\n{done.stdout}", ""
+    kept = keep()
+    if files:
         passed.parent.mkdir(parents=True, exist_ok=True)
-        passed.touch()
-    return f"$ {' '.join(words)}\n{done.stdout}" if done.returncode else ""
+        passed.write_text(kept)
+    return "", kept
 
 
 def unseen(outputs: list[str]) -> list[str]:
-    """Outputs that say something new: a module's warning comes again under every top above it."""
+    """Outputs that say something new: a warning comes again with every instance, and under every group that holds the module."""
     seen: set[str] = set()
     kept = []
     for output in outputs:
-        said = set(re.findall(r"^%(?!Error: Exiting).*$|^rtl/.*$", output, re.M))
+        said = set(re.findall(r"^%\S+ rtl/\S+?:\d+|^%(?!Error: Exiting)(?!\S+ rtl/).*$|^rtl/.*$", output, re.M))
         if not said or said - seen:
             kept.append(output)
         seen |= said
@@ -129,38 +249,28 @@ def unseen(outputs: list[str]) -> list[str]:
 def main() -> int:
     listed = toolchain.filelist()
     findings = check_filelist(listed)
-    findings += run([sys.executable, "scripts/gen_params.py", "--check"]).splitlines()[1:]
-
-    commands: list[list[object]] = []
-    for path in listed:
-        top = path.stem
-        if top.endswith("_pkg"):
-            continue
-        sources = [source.relative_to(ROOT) for source in toolchain.sources_of(top)]
-        # Without a word of SYNTHESIS both passes read the same text, and the one of synthesis has fewer waivers.
-        simulated = any("SYNTHESIS" in (ROOT / source).read_text() for source in sources)
-        for parameters in [SMALLER.get(top, {}), *VARIANTS.get(top, [])]:
-            for define in ([], ["-DSYNTHESIS"]) if simulated else (["-DSYNTHESIS"],):
-                commands.append(
-                    ["verilator", "--lint-only", "-Wall", "--quiet", *define, "--top-module", top,
-                     *(f"-G{name}={value}" for name, value in parameters.items()),
-                     "lint/waiver.vlt", *sources]
-                )
-    tools = Path(sys.executable).parent
-    commands.append(
-        [tools / "verible-verilog-lint", "--rules_config", "lint/verible.rules",
-         "--waiver_files", "lint/verible.waiver",
-         *(path.relative_to(ROOT) for path in listed)]
-    )
-    commands += CHECKS
+    shapes = shapes_of(listed)
+    verible: list[object] = [
+        Path(sys.executable).parent / "verible-verilog-lint", "--rules_config", "lint/verible.rules",
+        "--waiver_files", "lint/verible.waiver",
+        *(path.relative_to(ROOT) for path in listed),
+    ]
     with ThreadPoolExecutor(2) as pool:
-        outputs = [*pool.map(run, reversed(commands))]  # the long ones begin first
-    findings += unseen([output for output in reversed(outputs) if output])
+        jobs: list[Future[tuple[str, object]]] = [pool.submit(run, CHECKS[0])]
+        jobs.append(pool.submit(elaborate, shapes, "-DSYNTHESIS"))
+        out, sizes = jobs[-1].result()
+        # Shapes that do not elaborate are not flattened either: the findings would be the same.
+        groups = [] if out else groups_of(shapes, sizes)
+        jobs += [pool.submit(run, verilator(group, "--lint-only", "-DSYNTHESIS")) for group in groups]
+        jobs.append(pool.submit(elaborate, shapes))
+        jobs += [pool.submit(run, command) for command in [*CHECKS[1:], verible]]
+        outputs = [job.result()[0] for job in jobs]
+    findings += unseen([output for output in outputs if output])
 
     for finding in findings:
         print(finding.rstrip())
-    modules = sum(not path.stem.endswith("_pkg") for path in listed)
-    print(f"lint: {modules} modules, {len(commands)} checks, {len(findings)} findings")
+    modules = len({shape.module for shape in shapes})
+    print(f"lint: {modules} modules in {len(shapes)} shapes, {len(jobs)} checks, {len(findings)} findings")
     return 1 if findings else 0
 
 

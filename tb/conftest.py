@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import os
 import sys
 from pathlib import Path
@@ -15,6 +17,21 @@ from flicker_tb import progress, runner  # noqa: E402
 
 from flicker import toolchain  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
+from flicker.scene import demo  # noqa: E402
+
+
+def _made_once(generate):
+    """`generate`, which takes seconds, with a copy of what it has made in this process before."""
+    made = functools.cache(generate)
+
+    @functools.wraps(generate)
+    def copied(seed: int = 1):
+        return copy.deepcopy(made(seed))
+
+    return copied
+
+
+demo.generate = _made_once(demo.generate)  # before a test module takes it
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

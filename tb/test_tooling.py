@@ -13,6 +13,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import lint
 import pytest
 import yaml
 from flicker_tb import runner, signal_view
@@ -224,6 +225,57 @@ def test_what_yosys_reads(tmp_path: Path) -> None:
     assert shown == {"read_verilog -sv": ["00000000"] * 2, "read_slang": [f"{0x34:08b}", f"{0x12:08b}"]}
     done = command(sys.executable, "-c", YOSYS, f"read_verilog -sv {' '.join(map(str, filelist()))}")
     assert done.returncode and re.search(r"flk_\w+_pkg\.sv:\d+: ERROR: syntax error", done.stdout), done.stdout[-500:]
+
+
+# ---- lint ---------------------------------------------------------------------------------------
+
+# Something wrong in a module, and what is said of it: by elaboration, by flattening.
+FAULTS = {
+    "width": ("endmodule", "logic [2:0] unused_narrow; assign unused_narrow = 4'(clk_i);\nendmodule", "WIDTHTRUNC"),
+    "unused": ("endmodule", "logic useless; assign useless = clk_i;\nendmodule", "UNUSEDSIGNAL"),
+    "simulated": ("endmodule", "`ifndef SYNTHESIS\nlogic useless; assign useless = clk_i;\n`endif\nendmodule", "UNUSEDSIGNAL"),
+    "latch": ("endmodule", "logic unused_latch; always_comb if (clk_i) unused_latch = rst_ni;\nendmodule", "LATCH"),
+    "loop": ("= out_valid_o && out_ready_i", "= out_valid_o && out_ready_i && !pop", "UNOPTFLAT"),
+    "drivers": ("= out_valid_o && out_ready_i", "= out_valid_o;\nassign pop = out_ready_i", "MULTIDRIVEN"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("module", ["flk_fifo", "flk_axi_read"])
+def test_lint_finds(fault: str, module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fault in a module inside another and in the outer one; `seen` of the generated top keeps what leads to outputs alone."""
+    old, new, rule = FAULTS[fault]
+    source = next(path for path in filelist() if path.stem == module)
+    assert source.read_text().count(old) == 1
+    wrong = toolchain.BUILD / "lint-faults" / f"{fault}-{module}" / source.name
+    wrong.parent.mkdir(parents=True, exist_ok=True)
+    wrong.write_text(source.read_text().replace(old, new))
+    right = toolchain.sources_of
+    monkeypatch.setattr(lint, "sources_of", lambda name: [wrong if path == source else path for path in right(name)])
+    assert rule in said_of("flk_axi_read")
+
+
+def said_of(module: str) -> str:
+    """Findings of lint on the shapes of a module."""
+    shapes = [shape for shape in lint.shapes_of(filelist()) if shape.module == module]
+    out, sizes = lint.elaborate(shapes, "-DSYNTHESIS")
+    out += lint.elaborate(shapes)[0]
+    return out + "".join(lint.run(lint.verilator(group, "--lint-only", "-DSYNTHESIS"))[0] for group in lint.groups_of(shapes, sizes))
+
+
+def test_lint_flattens_every_shape_once() -> None:
+    """A shape that another one holds is left to it; others of the same module are not."""
+    assert said_of("flk_axi_read") == ""
+    outer, default, *_ = (shape for shape in lint.shapes_of(filelist()) if shape.module in ("flk_axi_read", "flk_fifo") and not shape.parameters)
+    if outer.module == "flk_fifo":
+        outer, default = default, outer
+    inner = lint.Shape("inner", "flk_fifo", {"Width": 2, "Depth": 8}, default.outputs)  # as flk_axi_read has it with its default parameters
+    _, sizes = lint.elaborate([inner, outer, default], "-DSYNTHESIS")
+    assert sizes.keys() == {outer.name, default.name} and sizes[outer.name] > 2 and sizes[default.name] == 1
+    _, sizes = lint.elaborate([inner, default], "-DSYNTHESIS")
+    assert sizes == {inner.name: 1, default.name: 1}
+    groups = lint.groups_of([inner, outer, default], {"inner": lint.GROUP, outer.name: 2 * lint.GROUP, default.name: 1})
+    assert groups == [[outer], [inner], [default]]
 
 
 # ---- manifests for other tools ------------------------------------------------------------------

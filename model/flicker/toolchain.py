@@ -30,6 +30,8 @@ BUILD = ROOT / "build"
 
 # The wheel's makefiles were configured without a compiler: what they lack.
 _MAKE_FIXES = ("CFG_CXXFLAGS_PCH_I=-include", "AR=ar")
+# Of every build, programs too, so that all share one run-time library.
+_CFLAGS = "-fPIC -std=c++17"
 # Environment variable: folder of notes on what is under way, for whoever shows progress.
 PROGRESS = "FLICKER_PROGRESS"
 _FST_HEADERS = {"lz4.h": "liblz4-dev", "zlib.h": "zlib1g-dev"}
@@ -187,7 +189,7 @@ def verilate(
         args: further arguments of verilator.
         cpp, depends: C++ files compiled in, and files they include (only hashed).
         settings: Verilator configuration files (.vlt).
-        cflags, ldflags, opt: flags of compiler and linker; ``opt`` optimises the model.
+        cflags, ldflags, opt: flags of compiler and linker beside C++17; ``opt`` optimises the model.
         shared: make a shared library (for ctypes) instead of a program.
         kind, name: the build goes to ``build/<kind>/<name>-<hash>``; name defaults to top.
         jobs: parallel compiler processes.
@@ -197,13 +199,13 @@ def verilate(
     sources = sources_of(top, extra) if sources is None else [Path(p) for p in sources]
     cpp = [Path(path).resolve() for path in cpp]
     if shared:
-        cflags, ldflags = f"-fPIC {cflags}".strip(), f"-shared {ldflags}".strip()
+        ldflags = f"-shared {ldflags}".strip()
+    cflags = f"{_CFLAGS} {cflags}".strip()
     options = [
         *args,
         *(f"-G{key}={_literal(value)}" for key, value in (parameters or {}).items()),
+        "-CFLAGS", cflags,
     ]
-    if cflags:
-        options += ["-CFLAGS", cflags]
     if ldflags:
         options += ["-LDFLAGS", ldflags]
     settings = [Path(path).resolve() for path in settings]
@@ -234,8 +236,8 @@ def verilate(
             )
             make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
                     f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
-            _share_runtime(folder, make, log, jobs)
-            _run([*make, *_share_headers(folder, make, log), f"-j{jobs}"], log)
+            _share_runtime(folder, make, cflags, log, jobs)
+            _run([*make, *_share_headers(folder, make, cflags, log), f"-j{jobs}"], log)
         stamp.touch()
     return product
 
@@ -293,35 +295,47 @@ def _build_environment() -> dict[str, str]:
     return env
 
 
-def _share_runtime(folder: Path, make: Sequence[object], log: Path, jobs: int) -> None:
+def _runtime_flags(cflags: str) -> str:
+    """Those of a build's flags that matter to Verilator's own sources: not the names and folders that a harness is compiled with."""
+    return " ".join(dict.fromkeys(word for word in cflags.split() if word.startswith("-DVL_") or not word.startswith(("-D", "-I"))))
+
+
+def _share_runtime(folder: Path, make: Sequence[object], cflags: str, log: Path, jobs: int) -> None:
     """Put the compiled run-time library of Verilator into a build folder, from the cache."""
     classes = (folder / "Vtop_classes.mk").read_text()
     found = re.findall(r"VM_GLOBAL_(?:FAST|SLOW) \+= \\\n((?:  \S+ \\\n)*)", classes)
     objects = [f"{word}.o" for word in "".join(found).replace("\\", "").split()]
+    make = [*make, f"VM_USER_CFLAGS={_runtime_flags(cflags)}"]
     dry = subprocess.run(
         [str(word) for word in [*make, "-n", "--no-print-directory", *objects]],
         env=_build_environment(), capture_output=True, text=True,
     )
-    key = _digest(_versions(), dry.stdout.replace(str(folder), ""))
-    cache = BUILD / "verilator-runtime" / key
+    commands = {name: line for line in dry.stdout.replace(str(folder), "").splitlines() for name in objects if f" -o {name} " in line}
+    cache = BUILD / "verilator-runtime"
+    cached = {name: cache / f"{_digest(_versions(), commands.get(name, dry.stdout))}-{name}" for name in objects}
     with locked(cache.with_suffix(".lock")):
-        if not all((cache / name).exists() for name in objects):
-            _run([*make, f"-j{jobs}", *objects], log)
+        missing = [name for name in objects if not cached[name].exists()]
+        if missing:
+            _run([*make, f"-j{jobs}", *missing], log)
             cache.mkdir(exist_ok=True)
-            for name in objects:
-                shutil.copy(folder / name, cache / name)
+            for name in missing:
+                shutil.copy(folder / name, cached[name].with_suffix(".new"))
+                os.replace(cached[name].with_suffix(".new"), cached[name])
     for name in objects:
-        shutil.copy(cache / name, folder / name)
+        shutil.copy(cached[name], folder / name)
 
 
-def _share_headers(folder: Path, make: Sequence[object], log: Path) -> list[str]:
+def _share_headers(folder: Path, make: Sequence[object], cflags: str, log: Path) -> list[str]:
     """What to tell make so that a small build reads the headers of Verilator's run-time library compiled, from the cache.
 
     A small model is one piece of C++ (a large one brings precompiled headers of its own), and reading those headers takes most of its time.
     """
     if not re.search(r"^VM_PARALLEL_BUILDS = 0$", (folder / "Vtop_classes.mk").read_text(), re.M):
         return []
-    dry = subprocess.run([*map(str, make), "-n", "--no-print-directory", "Vtop__ALL.o"], env=_build_environment(), capture_output=True, text=True)
+    dry = subprocess.run(
+        [*map(str, make), f"VM_USER_CFLAGS={_runtime_flags(cflags)}", "-n", "--no-print-directory", "Vtop__ALL.o"],
+        env=_build_environment(), capture_output=True, text=True,
+    )
     found = re.search(rf"^{re.escape(compiler())} (.*) -c -o Vtop__ALL\.o Vtop__ALL\.cpp$", dry.stdout, re.M)
     if not found:
         return []

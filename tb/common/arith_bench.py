@@ -41,7 +41,6 @@ class Harness:
             # One piece of C++ compiles in a third of the time.
             args=[f"-GFormats={len(FORMATS)}", f"-GTable={10 * len(FORMATS)}'h{table:x}", "--output-split", "0"],
             cpp=[HERE / "arith_harness.cpp"],
-            cflags="-std=c++17",
             shared=True,
             name="arith",
         )

@@ -321,7 +321,7 @@ class Harness:
         path = verilate(
             "ff_harness", extra=[HERE / "ff_harness.sv"],
             args=[f"-GFormats={len(FORMATS)}", f"-GManBitsOf={8 * len(FORMATS)}'h{table:x}", "--output-split", "0"],
-            cpp=[HERE / "ff_harness.cpp"], cflags="-std=c++17", shared=True, name="ff",
+            cpp=[HERE / "ff_harness.cpp"], shared=True, name="ff",
         )
         self._lib = ctypes.CDLL(str(path))
         self._lib.ff_reset()

@@ -1,12 +1,13 @@
 """Whole frames: the verilated rendering stage equals the golden model, pixel for pixel and count for count, and without stalls the cycle model, in
-cycles and every counter. The three designs that matter most (default, faithful, without CTU) are built with their assertions; the harness also
-changes mode_i inside every frame and checks idle_o.
+cycles and every counter. The default design is built with its assertions, which make a build take three times as long (with SLOW=1 also the two others
+that matter most, faithful and without CTU; an assertion that fails: test_plugs.py); the harness also changes mode_i inside every frame and checks idle_o.
 
-State space: the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and back-pressure; channels of one
-and of four VRUs (SLOW=1), each at another FIFO depth; the stage without a contribution test (mask generator `all`); frames aborted at random times;
-an assertion broken on purpose; one view of two real scenes at 320x180 when FLICKER_SCENES names their folder (with SLOW=1 of all four), and with
-SLOW=1 view 0 of flowers at 1280x720. Builds of the remaining precisions, one of each form, on a small frame. Not covered: pictures above 1280x720;
-frames that follow each other without a pause.
+State space: every third splat of the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and
+back-pressure; all of it at 320x180 (with SLOW=1 at 640x360); channels of one and of four VRUs (SLOW=1), each at another FIFO depth; the stage without
+a contribution test (mask generator `all`); frames aborted at random times; one view of two real scenes at 320x180 when FLICKER_SCENES names their
+folder (with SLOW=1 of all four), and with SLOW=1 view 0 of flowers at 1280x720. Builds of the remaining precisions, one of each form, on a small frame,
+and of FIFOs of 1 and 128 places (FP8 and one place in one build; the others with SLOW=1).
+Not covered: pictures above 1280x720; frames that follow each other without a pause.
 """
 
 from __future__ import annotations
@@ -36,13 +37,11 @@ from flicker.params import (
 )
 from flicker.scene.demo import demo_cameras, generate
 from flicker.scene.real import REAL_VIEWS, real_scenes
-from flicker.sim.render_stage import build, render_rtl
-from flicker.toolchain import BUILD, ROOT
+from flicker.sim.render_stage import render_rtl
 
 DEFAULT = RenderConfig()
 NO_CTU = RenderConfig(cat=CatMode.OFF, mask_generator="all")
-# Builds that run with assertions; with them a build compiles three times as long, so the others, whose units run with them in tests of their own, do without.
-WITH_ASSERTIONS = [config.rtl_parameters() for config in (DEFAULT, FAITHFUL, NO_CTU)]
+SHALLOW = RenderConfig(form=Form.CONIC, precision=Precision.FP8, fifo_depth=1)  # tb/model/test_cli.py takes this build, too
 SLOW = pytest.mark.slow  # each is a build of its own, a minute or more
 
 
@@ -53,11 +52,19 @@ def demo(width: int, height: int):
     return project(generate(), camera), camera
 
 
-def compare(projected, camera, config: RenderConfig, **stalls):
-    """Render with both engines and compare everything that does not depend on timing."""
+def some(width: int, height: int):
+    """Every third splat of it: a small picture has as many splats as a large one, and they are what a frame takes its time for."""
+    projected, camera = demo(width, height)
+    return type(projected)(**{f.name: getattr(projected, f.name)[::3] for f in dataclasses.fields(projected)}), camera
+
+
+def compare(projected, camera, config: RenderConfig, checks: bool | None = None, **stalls):
+    """Render with both engines and compare everything that does not depend on timing. checks: with assertions, by default in the default build only."""
     lists = build_lists(projected, camera, config)
     golden = render_golden(lists, config)
-    rtl = render_rtl(lists, config, checks=config.rtl_parameters() in WITH_ASSERTIONS, **stalls)
+    if checks is None:
+        checks = config.rtl_parameters() == DEFAULT.rtl_parameters()
+    rtl = render_rtl(lists, config, checks=checks, **stalls)
     wrong = np.argwhere((golden.pixels != rtl.pixels).any(axis=2))
     assert not len(wrong), f"{len(wrong)} pixels differ, first: sub-tile {wrong[0][0]} pixel {wrong[0][1]}: " \
         f"golden {golden.pixels[tuple(wrong[0])]}, RTL {rtl.pixels[tuple(wrong[0])]}"
@@ -109,34 +116,32 @@ def random_splats(seed: int, count: int, size: int):
 @pytest.mark.parametrize("base", [DEFAULT, FAITHFUL], ids=["default", "faithful"])
 def test_demo_modes(base, cat):
     """Every mode on a small frame of the demo scene, with stalls; one seed per mode."""
-    projected, camera = demo(160, 90)
-    compare(projected, camera, base.with_(cat=cat), seed=int(cat) + 1, idle=0.2, stall=0.3)
+    compare(*some(160, 90), base.with_(cat=cat), seed=int(cat) + 1, idle=0.2, stall=0.3)
 
 
 @pytest.mark.parametrize("cat", list(CatMode), ids=lambda m: m.name.lower())
 @pytest.mark.parametrize("base", [DEFAULT, FAITHFUL], ids=["default", "faithful"])
 def test_cycle_model(base, cat):
     """Every mode without stalls, cycle for cycle: a small frame, and random streams with few and with thousands of splats per sub-tile."""
-    compare(*demo(96, 54), base.with_(cat=cat))
+    compare(*some(96, 54), base.with_(cat=cat))
     compare(*random_splats(int(cat), 200, 64), base.with_(cat=cat))
     compare(*random_splats(10 + int(cat), 4000, 24), base.with_(cat=cat))
 
 
-@pytest.mark.parametrize("form,precision", [
-    (Form.CONIC, Precision.FP8), pytest.param(Form.FACTORED, Precision.FP16, marks=SLOW), pytest.param(Form.FACTORED, Precision.MIXED, marks=SLOW),
-])
-def test_demo_formats(form, precision):
+@pytest.mark.parametrize("config", [
+    SHALLOW, pytest.param(RenderConfig(precision=Precision.FP16), marks=SLOW), pytest.param(RenderConfig(precision=Precision.MIXED), marks=SLOW),
+], ids=lambda c: f"{c.precision.name.lower()}-{c.form.name.lower()}")
+def test_demo_formats(config):
     """Builds of the other precisions, one of each form."""
-    projected, camera = demo(160, 90)
-    compare(projected, camera, RenderConfig(form=form, precision=precision))
+    compare(*some(160, 90), config)
 
 
-@pytest.mark.parametrize("fifo_depth", [1, pytest.param(128, marks=SLOW)])
-def test_fifo_depth(fifo_depth):
+@pytest.mark.parametrize("config", [SHALLOW, *(pytest.param(DEFAULT.with_(fifo_depth=n), marks=SLOW) for n in (1, 128))], ids=lambda c: str(c.fifo_depth))
+def test_fifo_depth(config):
     """Shallowest and deepest feature FIFO: the same picture, and the cycles of the model."""
-    compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth))
-    compare(*random_splats(fifo_depth, 4000, 24), DEFAULT.with_(fifo_depth=fifo_depth))
-    compare(*demo(96, 54), DEFAULT.with_(fifo_depth=fifo_depth), stall=0.1)
+    compare(*some(96, 54), config)
+    compare(*random_splats(config.fifo_depth, 4000, 24), config)
+    compare(*some(96, 54), config, stall=0.1)
 
 
 @pytest.mark.parametrize("vrus,fifo_depth", [pytest.param(4, 7, marks=SLOW), pytest.param(1, 16, marks=SLOW)])
@@ -154,10 +159,10 @@ def test_vrus_per_channel(vrus, fifo_depth):
 def test_no_ctu(vrus):
     """Mask generator `all`: the picture of the test switched off, cycles and counters of the model; other latencies than the CTU's."""
     config = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
-    for scene in (demo(96, 54), random_splats(3, 200, 64), random_splats(17, 4000, 24)):
+    for scene in (some(96, 54), random_splats(3, 200, 64), random_splats(17, 4000, 24)):
         golden, rtl = compare(*scene, config)
         assert (rtl.core_counter("minitiles_tested") == CHANNELS * rtl.core_counter("gaussians_in")).all()
-    compare(*demo(96, 54), config, idle=0.2, stall=0.3)
+    compare(*some(96, 54), config, idle=0.2, stall=0.3)
     with pytest.raises(FlickerError, match="cat must be off with mask_generator all"):
         config.with_(cat=CatMode.SMOOTH)
 
@@ -176,31 +181,24 @@ def test_aborted_frames(base):
         compare(*scene, base, aborts=aborts, **({"seed": seed} | stalls if stalls else {}))
 
 
-def test_broken_assertion_is_reported():
-    """A design that breaks an assertion: the run ends with an error that names the place."""
-    path = ROOT / "rtl" / "ctu" / "flk_ctu.sv"
-    good = "assign space   = (taken_q != UsageBits'(CtuFifoDepth));"
-    assert path.read_text().count(good) == 1
-    mutant = BUILD / "mutants" / "frames" / path.name
-    mutant.parent.mkdir(parents=True, exist_ok=True)
-    mutant.write_text(path.read_text().replace(good, "assign space   = 1'b1;"))
-    config = DEFAULT.with_(ctu_fifo_depth=2, vrus_per_channel=1)
-    library = build(config, checks=True, replaced={"flk_ctu": mutant})
-    projected, camera = demo(96, 54)
-    with pytest.raises(FlickerError, match="assertion failed at .*flk_ctu.sv:[0-9]+"):
-        render_rtl(build_lists(projected, camera, config), config, library=library)
+@SLOW
+@pytest.mark.parametrize("base", [FAITHFUL.with_(cat=CatMode.AUTO), NO_CTU], ids=["faithful", "no ctu"])
+def test_assertions(base):
+    """The other builds that matter most, with their assertions."""
+    compare(*demo(160, 90), base, checks=True, idle=0.2, stall=0.3)
+    compare(*random_splats(3, 400, 32), base, checks=True, aborts=[(20, 1), (300, 3)])
 
 
-def test_demo_full():
-    """The demo picture at its own size."""
-    projected, camera = demo(640, 360)
-    golden, rtl = compare(projected, camera, DEFAULT)
+@pytest.mark.parametrize("width,height", [(320, 180), pytest.param(640, 360, marks=SLOW)])
+def test_demo_full(width, height):
+    """The demo picture with all its splats; with SLOW=1 at its own size."""
+    golden, rtl = compare(*demo(width, height), DEFAULT)
     assert golden.image().std() > 0.05  # not a flat picture
 
 
 def test_stalls_do_not_change_the_picture():
     """Automatic mode under different stall patterns: same pixels, same decisions, other cycle counts."""
-    projected, camera = demo(160, 90)
+    projected, camera = some(160, 90)
     config = DEFAULT.with_(cat=CatMode.AUTO)
     frames = [compare(projected, camera, config, seed=s, idle=i, stall=o)[1] for s, i, o in ((1, 0, 0), (2, 0.5, 0), (3, 0, 0.8))]
     assert len({f.cycles for f in frames}) == len(frames)

@@ -2,13 +2,16 @@
 project; `make generate` does the rest.
 
 State space: a stage that takes its lists and gives background pixels, rendered by the harness; a generator with masks of pixels, all ones, which
-must give the picture and the cycles of `all`. Not covered: a stage with another record than the splat's (layout.RECORDS then has one more).
+must give the picture and the cycles of `all`; an assertion of the stage that fails. Not covered: a stage with another record than the splat's
+(layout.RECORDS then has one more).
 """
 
 from __future__ import annotations
 
 import json
 import os
+import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +19,11 @@ from pathlib import Path
 
 import pytest
 
+from flicker.front.projection import project
+from flicker.front.records import build_lists
+from flicker.golden.render import render_golden
+from flicker.params import CatMode, RenderConfig
+from flicker.scene.demo import demo_cameras, generate
 from flicker.toolchain import BUILD, ROOT
 
 STUB = """// Rendering stage that takes its lists and gives background pixels.
@@ -82,6 +90,7 @@ module flk_stub_stage
         end
       end
     end
+    assert property (@(posedge clk_i) disable iff (!rst_ni) !busy_q |-> index_q == '0);
     always_ff @(posedge clk_i) if (events.token) subtile_q <= subtile_t'(in_elem_i[k].splat.feature[$bits(subtile_t)-1:0]);
     flk_perf_counters i_counters (
       .clk_i, .rst_ni, .clear_i(clear_counters_i), .hold_i(hold_counters_i), .generator_events_i(events), .dispatch_events_i('0),
@@ -94,45 +103,61 @@ STAGE_ENTRY = 'STAGES["stub"] = Stage("flk_stub_stage", "splat_elem", "core_pixe
 GENERATOR_ENTRY = (
     'MASK_GENERATORS["pixels"] = MaskGenerator("flk_mask_pixels", SUBTILE_PIXELS, {}, lambda config: 1, one_token=False, tests=False, note="ones")\n'
 )
+# Runs in the copy. Lists and golden pixels come from outside: the copy's kernels are not compiled.
 RENDER = """
-import json, sys
+import json, pickle, sys
+from pathlib import Path
 import numpy as np
 from flicker import params
-from flicker.front.projection import project
-from flicker.front.records import build_lists
-from flicker.golden.render import render_golden
-from flicker.scene.demo import demo_cameras, generate
-from flicker.sim.render_stage import render_rtl
+from flicker.errors import FlickerError
+from flicker.sim.render_stage import build, render_rtl
 
-camera = demo_cameras()[0].resized(64, 48)
+changes, inputs, module, wrong = json.loads(sys.argv[1])
 config = params.RenderConfig(cat=params.CatMode.OFF, mask_generator="all")
-lists = build_lists(project(generate(), camera), camera, config)
+lists, golden = pickle.loads(Path(inputs).read_bytes())
 found = {"file": params.__file__, "elements": len(lists.entry), "subtiles": lists.cols * lists.rows}
-for change in json.loads(sys.argv[1]):
+for change in changes:
     frame = render_rtl(lists, config.with_(**change), checks=True, aborts=[(300, 2)])
     background = (0.25, 0.5, 0.75)
     found[json.dumps(change)] = {
-        "cycles": frame.cycles, "golden": bool((frame.pixels == render_golden(lists, config).pixels).all()),
+        "cycles": frame.cycles, "golden": bool((frame.pixels == golden).all()),
         "background": bool((frame.image(background) == np.array(background, np.float32)).all()), "counters": frame.counters.tolist(),
     }
+if wrong:
+    config = config.with_(**changes[0])
+    try:
+        render_rtl(lists, config, library=build(config, checks=True, replaced={module: Path(wrong)}))
+    except FlickerError as error:
+        found["error"] = str(error)
 print(json.dumps(found))
 """
 
 
-def plug(name: str, files: dict[str, str], entry: str, changes: list[dict[str, str]]) -> dict:
-    """Copy the project, add files and a line of params.py, generate, render; asserts that nothing else was touched by hand."""
+def plug(name: str, module: str, file: str, text: str, entry: str, changes: list[dict[str, str]], wrong: str = "") -> dict:
+    """Copy the project, add a module and a line of params.py, generate, render; asserts that nothing else was touched by hand.
+
+    wrong: another text of the module, which is rendered, too; `error` of the result is what was said.
+    """
     copy = BUILD / "plugs" / name
     shutil.rmtree(copy, ignore_errors=True)
     for folder in ("rtl", "model", "scripts"):
         shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
     (copy / "build").symlink_to(BUILD)
-    for path, text in files.items():
-        (copy / path).write_text(text)
+    (copy / file).write_text(text)
     params = copy / "model" / "flicker" / "params.py"
     params.write_text(params.read_text() + entry)
+    inputs, other = copy / "inputs.pickle", copy / "wrong" / Path(file).name
+    camera = demo_cameras()[0].resized(64, 48)
+    config = RenderConfig(cat=CatMode.OFF, mask_generator="all")
+    lists = build_lists(project(generate(), camera), camera, config)
+    inputs.write_bytes(pickle.dumps((lists, render_golden(lists, config).pixels)))
+    if wrong:
+        other.parent.mkdir()
+        other.write_text(wrong)
     environment = {**os.environ, "PYTHONPATH": str(copy / "model"), "NUMBA_CACHE_DIR": str(BUILD / "plugs" / "numba")}
     subprocess.run([sys.executable, copy / "scripts" / "gen_params.py"], env=environment, check=True)
-    done = subprocess.run([sys.executable, "-c", RENDER, json.dumps(changes)], env=environment, capture_output=True, text=True)
+    arguments = json.dumps([changes, str(inputs), module, str(other) if wrong else ""])
+    done = subprocess.run([sys.executable, "-c", RENDER, arguments], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout.splitlines()[-1])
     assert Path(found["file"]).is_relative_to(copy), "the copy was not used"
@@ -148,10 +173,14 @@ def touched(name: str) -> set[str]:
 
 
 def test_stub_stage() -> None:
-    """A new rendering stage: its module, and one line by hand elsewhere."""
+    """A new rendering stage: its module, and one line by hand elsewhere. A frame that breaks an assertion ends with an error that names the place."""
     change = {"stage": "stub"}
-    found = plug("stage", {"rtl/render/flk_stub_stage.sv": STUB}, STAGE_ENTRY, [change])
+    good = "index_q != '1;"
+    assert STUB.count(good) == 1
+    found = plug("stage", "flk_stub_stage", "rtl/render/flk_stub_stage.sv", STUB, STAGE_ENTRY, [change], wrong=STUB.replace(good, "index_q != 6'd40;"))
     assert found[json.dumps(change)]["background"] and not found[json.dumps(change)]["golden"]
+    line = 1 + STUB[:STUB.index("assert property")].count("\n")
+    assert re.search(rf"assertion failed at .*wrong/flk_stub_stage.sv:{line}\b", found["error"])
     counters = found[json.dumps(change)]["counters"]
     assert sum(core[2] for core in counters) == found["elements"] and sum(core[1] for core in counters) == found["subtiles"]
     assert touched("stage") == {"rtl/render/flk_stub_stage.sv", "model/flicker/params.py", "rtl/flk.f"}  # the last one is generated
@@ -163,7 +192,7 @@ def test_pixel_mask_generator() -> None:
     source = (ROOT / "rtl" / "render" / "flk_mask_all.sv").read_text()
     source = source.replace("flk_mask_all", "flk_mask_pixels").replace("MaskBits       = CHANNELS,", "MaskBits       = SUBTILE * SUBTILE,")
     changes = [{"mask_generator": "all"}, {"mask_generator": "pixels"}]
-    found = plug("generator", {"rtl/render/flk_mask_pixels.sv": source}, GENERATOR_ENTRY, changes)
+    found = plug("generator", "flk_mask_pixels", "rtl/render/flk_mask_pixels.sv", source, GENERATOR_ENTRY, changes)
     four, pixels = (found[json.dumps(change)] for change in changes)
     assert pixels["golden"] and not pixels["background"]
     assert pixels == four

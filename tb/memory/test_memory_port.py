@@ -33,7 +33,7 @@ def simulate(
     """State (1: done, 0: not in time, -1: a rule is broken), result, first error."""
     library = ctypes.CDLL(str(verilate(
         "axi_traffic", [source], parameters={"Width": config.data_bits, "IdBits": config.id_bits, "Bursts": BURSTS, "MaxBeats": MAX_BEATS},
-        cpp=[HERE / "axi_traffic_harness.cpp"], depends=HEADERS, cflags=f"-std=c++17 -I{FOLDER}", shared=True, kind="sim",
+        cpp=[HERE / "axi_traffic_harness.cpp"], depends=HEADERS, cflags=f"-I{FOLDER}", shared=True, kind="sim",
     )))
     library.traffic_run.argtypes = [
         ctypes.POINTER(Timing), ctypes.c_int, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_uint64, ctypes.c_void_p,

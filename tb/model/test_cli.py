@@ -35,9 +35,9 @@ def test_engines_and_files(demo, tmp_path):
     """Golden and RTL give the same picture and counts; the reference is what they are compared with."""
     stats, pictures = {}, {}
     for engine in ("reference", "golden", "rtl"):
-        # A FIFO of one place: the build that tb/frames makes, too.
-        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--fifo-depth", 1, "--compare", "reference",
-                      "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
+        # The build SHALLOW of tb/frames/test_frames.py.
+        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--form", "conic", "--precision", "fp8", "--fifo-depth", 1,
+                      "--compare", "reference", "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
         assert run.returncode == 0, run.stderr
         stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
         pictures[engine] = load_picture(tmp_path / f"{engine}.png")

@@ -56,7 +56,7 @@ class Bench:
             wrapper.write_text("\n".join(lines))
         words = f"-DIN_WORDS={2 * len(names)} -DOUT_WORDS={2 * len(self.outputs)}"
         path = verilate("datapath_bench", extra=[wrapper], args=["-Wno-WIDTH", "-Wno-UNUSED"], cpp=[HERE / "datapath_harness.cpp"],
-                        cflags=f"-std=c++17 {words}", shared=True, name=f"bench_{self.pipeline.module}")
+                        cflags=words, shared=True, name=f"bench_{self.pipeline.module}")
         return ctypes.CDLL(str(path))
 
     def __call__(self, registers: Mapping[str, float], stall: float = 0.3, **inputs: np.ndarray) -> dict[str, np.ndarray]:

@@ -56,7 +56,7 @@ class FetchBench:
     def __post_init__(self) -> None:
         path = verilate(
             self.top, extra=[HERE / f"{self.top}.sv"], parameters=self.parameters, args=["--assert", "--x-assign", "unique", "--x-initial", "unique"],
-            cpp=[HERE / "fetch_harness.cpp"], depends=HEADERS, cflags=f"-std=c++17 -I{FOLDER} -DOUT_WORDS={self.out_words}", shared=True, kind="sim",
+            cpp=[HERE / "fetch_harness.cpp"], depends=HEADERS, cflags=f"-I{FOLDER} -DOUT_WORDS={self.out_words}", shared=True, kind="sim",
         )
         self.library = ctypes.CDLL(str(path))
         self.library.bench_open.argtypes = [ctypes.POINTER(Timing), ctypes.c_int, ctypes.c_void_p, ctypes.c_uint64]

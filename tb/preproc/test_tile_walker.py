@@ -51,7 +51,7 @@ def random(stream: int) -> np.random.Generator:
 
 @cache
 def walker(**parameters: int) -> ctypes.CDLL:
-    flags = f"-std=c++17 -DVL_USER_STOP -DIN_WORDS={IN_WORDS} -DOUT_WORDS={OUT_WORDS} -DIN_MASK={(1 << BITS % 32) - 1}u -DSEED={seed() % (2**31 - 1) or 1}"
+    flags = f"-DVL_USER_STOP -DVL_USER_FATAL -DIN_WORDS={IN_WORDS} -DOUT_WORDS={OUT_WORDS} -DIN_MASK={(1 << BITS % 32) - 1}u -DSEED={seed() % (2**31 - 1) or 1}"
     path = verilate("flk_tile_walker", parameters=parameters, args=["--assert", "--x-assign", "unique", "--x-initial", "unique"],
                     cpp=[HERE / "walker_harness.cpp"], cflags=flags, shared=True)
     library = ctypes.CDLL(str(path))

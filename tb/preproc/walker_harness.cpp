@@ -1,5 +1,7 @@
 // flk_tile_walker: splats in, entries out, with the patterns of idle and back-pressure cycles of the test (test_tile_walker.py).
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 
@@ -30,6 +32,11 @@ uint32_t noise() {
 
 void vl_stop(const char* file, int line, const char*) VL_MT_UNSAFE {
   if (failure.empty()) failure = std::string("assertion failed at ") + file + ":" + std::to_string(line);
+}
+
+void vl_fatal(const char* file, int line, const char*, const char* message) VL_MT_UNSAFE {
+  std::fprintf(stderr, "%s:%d: %s\n", file, line, message);
+  std::abort();
 }
 
 extern "C" const char* error() { return failure.c_str(); }

@@ -143,7 +143,7 @@ def build(pointers: int = SMALL_POINTERS, *, checks: bool = True) -> Path:
         cpp=[HERE / "preprocessing_harness.cpp"],
         depends=HEADERS,
         settings=[HERE / "preprocessing.vlt"],
-        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -std=c++17 -I{HERE} " + " ".join(f"-D{k}={v}" for k, v in words.items()),
+        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -I{HERE} " + " ".join(f"-D{k}={v}" for k, v in words.items()),
         opt="-O1" if checks else "-O2",
         shared=True,
         kind="sim",
