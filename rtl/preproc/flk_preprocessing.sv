@@ -348,6 +348,9 @@ module flk_preprocessing
   logic                              freed, full, partial, colour_room, record_room;
   logic [3:0]                        fill;
   logic                              beat_valid, beat_ready, telling;
+  logic                              told_full_q, left_q, told_partial_q;
+  logic                              gone_q, last_q;
+  logic [2:0]                        count_q;
   record_beat_t                      told;
   place_of_cluster_t                 of;
   logic [LANES-1:0][NUMBER_BITS-1:0] number;
@@ -420,16 +423,21 @@ module flk_preprocessing
       ring_q   <= '0;
       taken_q  <= '0;
       exit_q   <= '0;
+      gone_q   <= 1'b0;
     end else begin
       taken_q <= taken_q + (PLACE_BEAT_BITS + 1)'(told_full_q || told_partial_q) -
                  (PLACE_BEAT_BITS + 1)'(freed);
+      gone_q  <= go;
       if (start) begin
         exit_q <= '0;
       end else if (go) begin
-        exit_q   <= side.cluster;
-        issued_q <= issued_q + SEQ_BITS'(count);
-        rank_q   <= side.last ? '0 : rank_q + 9'(count);
-        ring_q   <= ring_q + PLACE_BEAT_BITS'(full) + PLACE_BEAT_BITS'(partial);
+        exit_q <= side.cluster;
+      end
+      // The next group comes two cycles after this one.
+      if (gone_q) begin
+        issued_q <= issued_q + SEQ_BITS'(count_q);
+        rank_q   <= last_q ? '0 : rank_q + 9'(count_q);
+        ring_q   <= ring_q + PLACE_BEAT_BITS'(told_full_q) + PLACE_BEAT_BITS'(left_q);
       end
     end
   end
@@ -439,7 +447,7 @@ module flk_preprocessing
   localparam int unsigned LowBits = BEAT_BITS / 2;
   localparam int unsigned HighBits = BEAT_BITS - LowBits;
 
-  logic                 left_q, told_full_q, told_partial_q, after_full_q;
+  logic                 after_full_q;
   logic [1:0]           fill_q;
   logic [19:0]          first_q;
   logic [6:0]           row_q;
@@ -469,6 +477,8 @@ module flk_preprocessing
       fill_q  <= fill[1:0];
       first_q <= of.first;
       row_q   <= rank_q[8:2];
+      count_q <= count;
+      last_q  <= side.last;
     end
     after_full_q  <= told_full_q;
     offset_q      <= {first_q, 2'b0} + 22'(row_q) + 22'(told_partial_q && after_full_q);
@@ -941,8 +951,8 @@ module flk_preprocessing
   else $error("flk_preprocessing: a beat of records without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      left_q |-> !go && !(told_full_q && told_partial_q))
-  else $error("flk_preprocessing: two beats of records in one cycle");
+      gone_q |-> !go && !told_partial_q)
+  else $error("flk_preprocessing: a group in the cycle after another");
 `endif
 
 endmodule
