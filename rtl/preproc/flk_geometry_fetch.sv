@@ -141,7 +141,8 @@ module flk_geometry_fetch
   logic                 header_carry_q, geometry_carry_q;
 
   assign in_ready_o = (state_q == RUN || state_q == FAILED) && !end_taken_q &&
-                      (state_q == FAILED || (queue_room && sum_q == '0 && (!request_q || second_q)));
+                      (state_q == FAILED ||
+                       (queue_room && sum_q == '0 && (!request_q || second_q)));
   assign take = in_valid_i && in_ready_o;
   assign hold = request_q && !request_ready;
 

@@ -129,7 +129,8 @@ module flk_preprocessing
         end
       end
       default: begin  // lists are closed, all is written
-        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty && write_idle) begin
+        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty &&
+            write_idle) begin
           state_d = IDLE;
         end
       end
