@@ -349,7 +349,7 @@ module fv_entry_merge
     end
     for (genvar d = 0; d < Places; d++) begin : gen_queued
       always_comb begin
-        if (rst_n && 3'(d) < usage[k]) begin
+        if (rst_n && Stream && 3'(d) < usage[k]) begin
           l_lane: assert (lane_of(queued[k][d][AbsBits-1:0]) == 2'(k));
         end
         if (rst_n && Order && 3'(d) < usage[k]) begin

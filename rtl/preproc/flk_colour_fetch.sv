@@ -591,7 +591,8 @@ module flk_colour_fetch
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        fire && straddles |-> l1_q == {cluster_q, AT_BITS'(from_q[BYTE_BITS-1:6] + 1'b1)})
+        fire && straddles |-> l1_q == {cluster_q,
+        AT_BITS'(from_q[BYTE_BITS-1:6] + 1'b1)})
     else $error("flk_colour_fetch: a part that ends in another beat than the next one kept");
 `endif
   end
@@ -644,7 +645,8 @@ module flk_colour_fetch
 
   assign oldest_o = oldest_q;
   assign error_o  = error_q;
-  assign idle_o   = !a_valid_q && !b_valid_q && !c_valid_q && (&lane_empty) && fetch_idle && empty && out_valid_o == '0;
+  assign idle_o   = !a_valid_q && !b_valid_q && !c_valid_q && (&lane_empty) && fetch_idle &&
+                    empty && out_valid_o == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o && !in_valid_i)

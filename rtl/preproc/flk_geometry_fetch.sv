@@ -125,15 +125,15 @@ module flk_geometry_fetch
   // ---- requests -------------------------------------------------------------------------------------
 
   // Of a cluster first its header, then its geometry; before that two cycles for the addresses, their
-  // lower halves and their upper ones.
+  // lower halves and their upper ones. The next cluster is taken while geometry is being asked for.
   localparam int unsigned LowBits = BEAT_BITS / 2;
   localparam int unsigned HighBits = BEAT_BITS - LowBits;
 
-  logic                 queue_room, request_q, second_q, request_ready, take;
+  logic                 queue_room, request_q, second_q, request_ready, take, hold;
   logic [1:0]           sum_q;
   logic [23:0]          index_q;
   logic [22:0]          offset_q;  // beats
-  logic [6:0]           beats_d, beats_q;
+  logic [6:0]           beats_d, beats_q, request_beats_q;
   logic [3:0]           unused_part;  // 16ths of a beat
   logic [22:0]          first_more;
   logic [10:0]          last_more;
@@ -141,8 +141,10 @@ module flk_geometry_fetch
   logic                 header_carry_q, geometry_carry_q;
 
   assign in_ready_o = (state_q == RUN || state_q == FAILED) && !end_taken_q &&
-                      (state_q == FAILED || (queue_room && sum_q == '0 && !request_q));
+                      (state_q == FAILED ||
+                       (queue_room && sum_q == '0 && (!request_q || second_q)));
   assign take = in_valid_i && in_ready_o;
+  assign hold = request_q && !request_ready;
 
   // A Gaussian is 3 or 5 words of a beat's 16, and 16 slots are as many beats.
   assign first_more = chunked_i ? 23'(in_cluster_i.first) << 1 : 23'(in_cluster_i.first) << 2;
@@ -158,8 +160,9 @@ module flk_geometry_fetch
       second_q    <= 1'b0;
     end else begin
       end_taken_q <= !start && (end_taken_q || (take && in_end_i));
-      sum_q       <= state_q == FAILED ? '0 : {sum_q[0], take && !in_end_i};
+      sum_q       <= {sum_q[0] && !hold, (take && !in_end_i) || (sum_q[0] && hold)};
       if (state_q == FAILED) begin
+        sum_q     <= '0;
         request_q <= 1'b0;
         second_q  <= 1'b0;
       end else if (sum_q[1]) begin
@@ -183,13 +186,14 @@ module flk_geometry_fetch
   assign geometry_at = BEAT_BITS'(offset_q);
 
   always_ff @(posedge clk_i) begin
-    if (sum_q[0]) begin
+    if (sum_q[0] && !hold) begin
       {header_carry_q, header_beat_q[LowBits-1:0]} <=
           {1'b0, headers_i[LowBits-1:0]} + {1'b0, header_at[LowBits-1:0]};
       {geometry_carry_q, geometry_beat_q[LowBits-1:0]} <=
           {1'b0, geometry_i[LowBits-1:0]} + {1'b0, geometry_at[LowBits-1:0]};
     end
     if (sum_q[1]) begin
+      request_beats_q                      <= beats_q;
       header_beat_q[BEAT_BITS-1:LowBits]   <= headers_i[BEAT_BITS-1:LowBits] +
           header_at[BEAT_BITS-1:LowBits] + HighBits'(header_carry_q);
       geometry_beat_q[BEAT_BITS-1:LowBits] <= geometry_i[BEAT_BITS-1:LowBits] +
@@ -218,7 +222,7 @@ module flk_geometry_fetch
     .in_valid_i (request_q),
     .in_ready_o (request_ready),
     .in_beat_i  (second_q ? geometry_beat_q : header_beat_q),
-    .in_beats_i (second_q ? beats_q : chunked_i ? 7'd2 : 7'd1),
+    .in_beats_i (second_q ? request_beats_q : chunked_i ? 7'd2 : 7'd1),
     .in_tag_i   (!second_q),
     .in_placed_i(!second_q),  // as many headers as clusters under way
     .freed_i    (freed_q),

@@ -447,7 +447,7 @@ module flk_list_writer #(
   pointer_t                              e_pointer_q;
   logic                                  e_begins_q;
   logic                                  e_walk_q, e_walk_last_q;
-  logic [AddressBits-1:0]                e_at_d, e_at_q;  // from the first line of lists, or of pointers
+  logic [AddressBits-1:0]                e_at_d, e_at_q;  // from the first line of its kind
 
   assign e_at_d = walk_q ? AddressBits'({walk_list_q >> PerLineBits, writer_q})
                 : AddressBits'({pointer_d.chunk, writer_q,

@@ -129,7 +129,8 @@ module flk_preprocessing
         end
       end
       default: begin  // lists are closed, all is written
-        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty && write_idle) begin
+        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty &&
+            write_idle) begin
           state_d = IDLE;
         end
       end
@@ -345,11 +346,12 @@ module flk_preprocessing
   logic [8:0]                        rank_q;  // survivors of the cluster so far
   logic [PLACE_BEAT_BITS-1:0]        ring_q;  // beat that is open
   logic [PLACE_BEAT_BITS:0]          taken_q; // beats told to the writer and not freed
-  logic                              freed, full, partial, partial_q, colour_room, record_room;
+  logic                              freed, full, partial, colour_room, record_room;
   logic [3:0]                        fill;
-  logic [BEAT_BITS-1:0]              beat, partial_beat_q;
-  logic [3:0]                        partial_quarters_q;
-  logic                              beat_valid, beat_ready;
+  logic                              beat_valid, beat_ready, telling;
+  logic                              told_full_q, left_q, told_partial_q;
+  logic                              gone_q, last_q;
+  logic [2:0]                        count_q;
   record_beat_t                      told;
   place_of_cluster_t                 of;
   logic [LANES-1:0][NUMBER_BITS-1:0] number;
@@ -373,23 +375,41 @@ module flk_preprocessing
   assign fill    = 4'(rank_q[1:0]) + 4'(count);  // of the open beat, before it goes
   assign full    = fill[2];
   assign partial = side.last && fill[1:0] != '0;
-  assign beat    = registers_i.records_beat + BEAT_BITS'({of.first, 2'b0}) +
-                   BEAT_BITS'(rank_q[8:2]);
+
+  // What a lane's survivor gets is known for each number of survivors before it; that number comes late.
+  logic [LANES-1:0][NUMBER_BITS-1:0] numbers;
+  place_t [LANES-1:0]                places;
+  logic [LANES-1:0][SEQ_BITS-1:0]    seqs;
 
   for (genvar k = 0; k < LANES; k++) begin : gen_numbers
     logic [2:0] at;
-    assign at               = 3'(rank_q[1:0]) + ahead[k];
-    assign number[k]        = {of.first, 4'b0} + NUMBER_BITS'(rank_q) + NUMBER_BITS'(ahead[k]);
-    assign place[k].beat    = ring_q + PLACE_BEAT_BITS'(at[2]);
-    assign place[k].quarter = at[1:0];
-    assign seq[k]           = issued_q + SEQ_BITS'(ahead[k]);
+    assign at                = 3'(rank_q[1:0]) + 3'(k);
+    assign numbers[k]        = {of.first, 4'b0} + NUMBER_BITS'(rank_q) + NUMBER_BITS'(k);
+    assign places[k].beat    = ring_q + PLACE_BEAT_BITS'(at[2]);
+    assign places[k].quarter = at[1:0];
+    assign seqs[k]           = issued_q + SEQ_BITS'(k);
+  end
+
+  always_comb begin
+    for (int unsigned k = 0; k < LANES; k++) begin
+      number[k] = numbers[0];
+      place[k]  = places[0];
+      seq[k]    = seqs[0];
+      for (int unsigned n = 1; n <= k; n++) begin
+        if (ahead[k] == 3'(n)) begin
+          number[k] = numbers[n];
+          place[k]  = places[n];
+          seq[k]    = seqs[n];
+        end
+      end
+    end
   end
 
   // Two more beats may be needed, and the open one has a place too.
   assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - 3);
   assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
   assign front_en     = !exit_valid || go;
-  assign front_idle   = front_valid_q == '0 && !partial_q;
+  assign front_idle   = front_valid_q == '0 && !telling;
 
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
@@ -397,39 +417,83 @@ module flk_preprocessing
   assign survivors.group   = side.group;
   assign survivors.alive   = alive;
 
-  // The beat that is full is told with its group, the one that a cluster leaves open a cycle later.
-  assign beat_valid    = (go && full) || partial_q;
-  assign told.beat     = partial_q ? partial_beat_q : beat;
-  assign told.quarters = partial_q ? partial_quarters_q : '1;
-
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      issued_q  <= '0;
-      rank_q    <= '0;
-      ring_q    <= '0;
-      taken_q   <= '0;
-      partial_q <= 1'b0;
-      exit_q    <= '0;
+      issued_q <= '0;
+      rank_q   <= '0;
+      ring_q   <= '0;
+      taken_q  <= '0;
+      exit_q   <= '0;
+      gone_q   <= 1'b0;
     end else begin
-      taken_q   <= taken_q + (PLACE_BEAT_BITS + 1)'(beat_valid) - (PLACE_BEAT_BITS + 1)'(freed);
-      partial_q <= go && partial;
+      taken_q <= taken_q + (PLACE_BEAT_BITS + 1)'(told_full_q || told_partial_q) -
+                 (PLACE_BEAT_BITS + 1)'(freed);
+      gone_q  <= go;
       if (start) begin
         exit_q <= '0;
       end else if (go) begin
-        exit_q   <= side.cluster;
-        issued_q <= issued_q + SEQ_BITS'(count);
-        rank_q   <= side.last ? '0 : rank_q + 9'(count);
-        ring_q   <= ring_q + PLACE_BEAT_BITS'(full) + PLACE_BEAT_BITS'(partial);
+        exit_q <= side.cluster;
       end
+      // The next group comes two cycles after this one.
+      if (gone_q) begin
+        issued_q <= issued_q + SEQ_BITS'(count_q);
+        rank_q   <= last_q ? '0 : rank_q + 9'(count_q);
+        ring_q   <= ring_q + PLACE_BEAT_BITS'(told_full_q) + PLACE_BEAT_BITS'(left_q);
+      end
+    end
+  end
+
+  // The beat that is full is told in the cycle after its group, the one that a cluster leaves open in the next, which is before
+  // the next group; where they lie is added up on the way to the writer, the lower half of the address first.
+  localparam int unsigned LowBits = BEAT_BITS / 2;
+  localparam int unsigned HighBits = BEAT_BITS - LowBits;
+
+  logic                 after_full_q;
+  logic [1:0]           fill_q;
+  logic [19:0]          first_q;
+  logic [6:0]           row_q;
+  logic [2:0]           tell_q;  // stages with a beat
+  logic [2:0][3:0]      quarters_q;
+  logic [21:0]          offset_q;  // of a beat among those of records
+  logic [LowBits:0]     low_q;
+  logic [21-LowBits:0]  offset_high_q;
+  logic [BEAT_BITS-1:0] told_beat_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      told_full_q    <= 1'b0;
+      left_q         <= 1'b0;
+      told_partial_q <= 1'b0;
+      tell_q         <= '0;
+    end else begin
+      told_full_q    <= go && full;
+      left_q         <= go && partial;
+      told_partial_q <= left_q;
+      tell_q         <= {tell_q[1:0], told_full_q || told_partial_q};
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (go) begin
-      partial_beat_q     <= beat + BEAT_BITS'(full);
-      partial_quarters_q <= (4'd1 << fill[1:0]) - 4'd1;
+      fill_q  <= fill[1:0];
+      first_q <= of.first;
+      row_q   <= rank_q[8:2];
+      count_q <= count;
+      last_q  <= side.last;
     end
+    after_full_q  <= told_full_q;
+    offset_q      <= {first_q, 2'b0} + 22'(row_q) + 22'(told_partial_q && after_full_q);
+    low_q         <= {1'b0, registers_i.records_beat[LowBits-1:0]} + {1'b0, offset_q[LowBits-1:0]};
+    offset_high_q <= offset_q[21:LowBits];
+    told_beat_q   <= {registers_i.records_beat[BEAT_BITS-1:LowBits] + HighBits'(offset_high_q) +
+                      HighBits'(low_q[LowBits]), low_q[LowBits-1:0]};
+    quarters_q    <= {quarters_q[1:0], told_partial_q ? (4'd1 << fill_q) - 4'd1 : 4'hf};
   end
+
+  assign telling       = told_full_q || left_q || told_partial_q || tell_q != '0;
+  assign beat_valid    = tell_q[2];
+  assign told.beat     = told_beat_q;
+  assign told.quarters = quarters_q[2];
 
   // ---- colours --------------------------------------------------------------------------------------
 
@@ -849,7 +913,10 @@ module flk_preprocessing
       cycles_q      <= '0;
     end else if (state_q != IDLE) begin
       write_error_q <= write_error_q || (write_answer && write_failed);
-      cycles_q      <= cycles_q + 1'b1;
+      cycles_q[7:0] <= cycles_q[7:0] + 1'b1;
+      if (&cycles_q[7:0]) begin
+        cycles_q[31:8] <= cycles_q[31:8] + 1'b1;
+      end
     end
   end
 
@@ -884,8 +951,9 @@ module flk_preprocessing
   assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> beat_ready)
   else $error("flk_preprocessing: a beat of records without a place");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni) partial_q |-> !(go && full))
-  else $error("flk_preprocessing: two beats of records in one cycle");
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      gone_q |-> !go && !told_partial_q)
+  else $error("flk_preprocessing: a group in the cycle after another");
 `endif
 
 endmodule
