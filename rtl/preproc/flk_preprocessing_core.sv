@@ -476,7 +476,7 @@ module flk_preprocessing_core
   // ---- colour ---------------------------------------------------------------------------------------
 
   localparam int unsigned TermCycles = 1 + COLOUR_TERM_LATENCY;  // behind the group's sums
-  localparam int unsigned TotalBits = $bits(term_t) + 3;         // the constant part and three terms
+  localparam int unsigned TotalBits = $bits(term_t) + 3;        // the constant part and three terms
   localparam int unsigned Drop = TERM_FRACTION - 9;              // a record has 9 fraction bits
 
   typedef struct packed {
