@@ -374,6 +374,26 @@ module flk_geometry_fetch
     .empty_o    (unused_fifo_empty[1])
   );
 
+  // Steps of colours are narrowed before they meet a register: they stand in one behind the memory.
+  logic                steps_valid_q;
+  cluster_t [2:0]      dc_step_q;
+  cluster_t [2:0][2:0] sh_step_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      steps_valid_q <= 1'b0;
+    end else begin
+      steps_valid_q <= colour_valid && !header_take && state_q != FAILED;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (colour_valid && !steps_valid_q) begin
+      dc_step_q <= colour.dc_step;
+      sh_step_q <= colour.sh_step;
+    end
+  end
+
   // Headers go through while they can; one at the output stops all until it is used.
 
   localparam int unsigned Interval = 4;  // of flk_cluster_header
@@ -388,8 +408,8 @@ module flk_geometry_fetch
   assign at_output    = phase_q == OUT_PHASE && inside_q[Inside-1];
   assign header_ready = at_output && !used_q;
   assign move         = !header_ready && (phase_q != '0 || inside_q != '0 ||
-                                          (shape_valid && colour_valid));
-  assign header_take  = move && phase_q == '0 && shape_valid && colour_valid;
+                                          (shape_valid && steps_valid_q));
+  assign header_take  = move && phase_q == '0 && shape_valid && steps_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -441,18 +461,18 @@ module flk_geometry_fetch
     .dc_low_0_i    (colour.dc_low[0]),
     .dc_low_1_i    (colour.dc_low[1]),
     .dc_low_2_i    (colour.dc_low[2]),
-    .dc_step_0_i   (colour.dc_step[0]),
-    .dc_step_1_i   (colour.dc_step[1]),
-    .dc_step_2_i   (colour.dc_step[2]),
-    .sh_step_00_i  (colour.sh_step[0][0]),
-    .sh_step_01_i  (colour.sh_step[0][1]),
-    .sh_step_02_i  (colour.sh_step[0][2]),
-    .sh_step_10_i  (colour.sh_step[1][0]),
-    .sh_step_11_i  (colour.sh_step[1][1]),
-    .sh_step_12_i  (colour.sh_step[1][2]),
-    .sh_step_20_i  (colour.sh_step[2][0]),
-    .sh_step_21_i  (colour.sh_step[2][1]),
-    .sh_step_22_i  (colour.sh_step[2][2]),
+    .dc_step_0_i   (dc_step_q[0]),
+    .dc_step_1_i   (dc_step_q[1]),
+    .dc_step_2_i   (dc_step_q[2]),
+    .sh_step_00_i  (sh_step_q[0][0]),
+    .sh_step_01_i  (sh_step_q[0][1]),
+    .sh_step_02_i  (sh_step_q[0][2]),
+    .sh_step_10_i  (sh_step_q[1][0]),
+    .sh_step_11_i  (sh_step_q[1][1]),
+    .sh_step_12_i  (sh_step_q[1][2]),
+    .sh_step_20_i  (sh_step_q[2][0]),
+    .sh_step_21_i  (sh_step_q[2][1]),
+    .sh_step_22_i  (sh_step_q[2][2]),
     .low_0_o       (header.low[0]),
     .step_0_o      (header.step[0]),
     .scale_low_0_o (header.scale_low[0]),
