@@ -558,8 +558,32 @@ module flk_preprocessing_core
     assign clipped[c] = clipped_q;
   end
 
-  assign rgb_valid = rgb_valid_q;
-  assign colour_en = !rgb_valid || rgb_ready;
+  // Opacity codes come through the bounds' pipeline, which is longer: colours wait for them here, not
+  // in their pipeline, which would stand.
+  logic            rgb_room, colour_clipped;
+  logic [2:0][9:0] colour;
+  logic [3:0]      unused_usage_rgb;
+  logic            unused_full_rgb, unused_empty_rgb;
+
+  assign colour_en = !rgb_valid_q || rgb_room;
+
+  flk_fifo #(
+    .Width(31),
+    .Depth(8)
+  ) i_rgb (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (rgb_valid_q),
+    .in_ready_o (rgb_room),
+    .in_data_i  ({|clipped, rgb}),
+    .out_valid_o(rgb_valid),
+    .out_ready_i(rgb_ready),
+    .out_data_o ({colour_clipped, colour}),
+    .usage_o    (unused_usage_rgb),
+    .full_o     (unused_full_rgb),
+    .empty_o    (unused_empty_rgb)
+  );
 
   // ---- bounds ---------------------------------------------------------------------------------------
 
@@ -869,9 +893,9 @@ module flk_preprocessing_core
   assign record_valid_o = rgb_valid && fields_valid && code_valid;
   assign rgb_ready      = record_ready_i && fields_valid && code_valid;
   assign record_place_o = fields.place;
-  assign record_o       = {fields.spiky, rgb[2], rgb[1], rgb[0], record_code, fields.l2, fields.l1,
+  assign record_o       = {fields.spiky, colour, record_code, fields.l2, fields.l1,
                            fields.l0, fields.y, fields.x};
-  assign clipped_o      = record_valid_o && record_ready_i && (|clipped);
+  assign clipped_o      = record_valid_o && record_ready_i && colour_clipped;
 
   assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty &&
                   !recorded_valid_q &&
