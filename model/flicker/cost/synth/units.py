@@ -271,7 +271,8 @@ def _stage() -> list[Unit]:
 def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
-        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
+        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_event_counter"),
+        unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
