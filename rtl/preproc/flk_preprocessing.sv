@@ -350,7 +350,7 @@ module flk_preprocessing
   logic [3:0]                        fill;
   logic                              beat_valid, beat_ready, telling;
   logic                              told_full_q, left_q, told_partial_q;
-  logic                              gone_q, last_q;
+  logic                              gone_q, last_q, cut;
   logic [2:0]                        count_q;
   record_beat_t                      told;
   place_of_cluster_t                 of;
@@ -409,7 +409,9 @@ module flk_preprocessing
   assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - 3);
   assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
   assign front_en     = !exit_valid || go;
-  assign front_idle   = front_valid_q == '0 && !telling;
+  assign front_idle   = front_valid_q == '0 && !telling && !gone_q && rank_q == '0;
+  // Groups end within a cluster where its geometry could not be read: the beat that it leaves open is told.
+  assign cut          = ended_q && front_valid_q == '0 && !telling && !gone_q && rank_q != '0;
 
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
@@ -428,7 +430,7 @@ module flk_preprocessing
     end else begin
       taken_q <= taken_q + (PLACE_BEAT_BITS + 1)'(told_full_q || told_partial_q) -
                  (PLACE_BEAT_BITS + 1)'(freed);
-      gone_q  <= go;
+      gone_q  <= go || cut;
       if (start) begin
         exit_q <= '0;
       end else if (go) begin
@@ -467,19 +469,21 @@ module flk_preprocessing
       tell_q         <= '0;
     end else begin
       told_full_q    <= go && full;
-      left_q         <= go && partial;
+      left_q         <= (go && partial) || (cut && rank_q[1:0] != '0);
       told_partial_q <= left_q;
       tell_q         <= {tell_q[1:0], told_full_q || told_partial_q};
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (go) begin
-      fill_q  <= fill[1:0];
-      first_q <= of.first;
+    if (go || cut) begin
+      fill_q  <= go ? fill[1:0] : rank_q[1:0];
       row_q   <= rank_q[8:2];
-      count_q <= count;
-      last_q  <= side.last;
+      count_q <= go ? count : '0;
+      last_q  <= cut || side.last;
+    end
+    if (go) begin
+      first_q <= of.first;
     end
     after_full_q  <= told_full_q;
     offset_q      <= {first_q, 2'b0} + 22'(row_q) + 22'(told_partial_q && after_full_q);

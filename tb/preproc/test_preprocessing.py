@@ -24,7 +24,7 @@ from flicker.golden.lists import ListError
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
-from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.memory import PortConfig
@@ -171,22 +171,28 @@ def test_out_of_list_memory() -> None:
     assert np.array_equal(np.delete(rtl.memory, lines, axis=0), np.delete(rtl.before[1], lines, axis=0))
 
 
-@pytest.mark.parametrize("part", ["table", "headers", "geometry", "colour", "records", "lists", "pointers"])
+@pytest.mark.parametrize("part", ["table", "headers", "geometry", "geometry's end", "colour", "colour's end", "records", "lists", "pointers"])
 def test_errors_of_the_memory(part: str) -> None:
-    """The frame ends, with a code; nothing is written outside of the regions, which the memory would refuse."""
+    """The frame ends, with a code; nothing is written outside of the regions, which the memory would refuse. The next frame, of a mended memory, is right."""
     packed = pack(some(1500), PackedFormat.CHUNK).packed
     camera = plain_camera()
-    chunks = front_memory(run_front(packed, camera)).lists.chunks
+    golden = front_memory(run_front(packed, camera))
+    chunks = golden.lists.chunks
     regions = Regions.of(packed, camera, chunks)
-    names = ("table", "headers", "geometry", "colour")
-    at = regions.image + 256
-    for name, data in zip(names, packed.sections().values()):
-        if name == part:
-            break
+    name, _, end = part.partition("'")
+    base = {"records": regions.records, "lists": regions.lists, "pointers": regions.pointers}
+    at = regions.image + HEADER_BYTES
+    for section, data in zip(("table", "headers", "geometry", "colour"), packed.sections().values()):
+        base[section] = at + (-(-len(data) // 64) * 64 - 2048 if end else 0)
         at += len(data)
-    base = {"records": regions.records, "lists": regions.lists, "pointers": regions.pointers}.get(part, at)
-    rtl = front_rtl(packed, camera, chunks=chunks, memory=MemoryOptions(fail=[(base, 2048)]), seed=seed())
-    assert rtl.error == 1 << ERRORS.index("a read failed" if part in names else "a write failed")
+    memory = MemoryOptions(fail=[(base[name], 2048)], mended=True)
+    rtl = front_rtl(packed, camera, chunks=chunks, memory=memory, frames=2, seed=seed())
+    assert rtl.errors == [1 << ERRORS.index("a write failed" if name in ("records", "lists", "pointers") else "a read failed"), 0]
+    assert np.array_equal(rtl.records[golden.written], golden.records[golden.written])
+    lines = np.unique(np.concatenate(golden.lists.writes))
+    assert np.array_equal(rtl.memory[lines], golden.lists.memory[lines])
+    assert np.array_equal(rtl.pointers, golden.lists.pointers)
+    assert rtl.counters["survivors"] == golden.written.sum()
 
 
 def test_records_beyond_their_region() -> None:

@@ -199,6 +199,7 @@ class AxiPort {
   void purpose(uint64_t base, uint64_t size, uint32_t number) { purposes_.push_back({base, base + (size - 1), number}); }
   // Bursts that touch a range, or the nth of their kind (from 0), are answered with `resp`; a write that fails changes nothing.
   void fail_range(uint64_t base, uint64_t size, bool reads, bool writes, Resp resp = SLVERR) { fails_.push_back({base, base + (size - 1), reads, writes, resp}); }
+  void mend_ranges() { fails_.clear(); }
   void fail_read(uint64_t nth, Resp resp = SLVERR) { fail_read_[nth] = resp; }
   void fail_write(uint64_t nth, Resp resp = SLVERR) { fail_write_[nth] = resp; }
 

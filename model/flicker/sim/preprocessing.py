@@ -123,10 +123,14 @@ class RtlFront:
     memory: np.ndarray
     pointers: np.ndarray
     counters: dict[str, int | np.ndarray]
-    error: int
+    errors: list[int]  # of each frame
     traffic: dict[str, PurposeCounts]
     efficiency: float
     before: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def error(self) -> int:
+        return self.errors[-1]
 
     @property
     def cycles(self) -> int:
@@ -162,6 +166,7 @@ def _library(path: Path) -> ctypes.CDLL:
         ("load", ctypes.c_int, pointer, u64, u64, pointer, u64, ctypes.c_uint32),
         ("read", ctypes.c_int, pointer, u64, u64, pointer),
         ("fail", None, pointer, u64, u64),
+        ("mend", None, pointer),
         ("frame", ctypes.c_int, pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer),
         ("cycle", u64, pointer),
         ("efficiency", ctypes.c_double, pointer),
@@ -175,11 +180,13 @@ def _library(path: Path) -> ctypes.CDLL:
 
 @dataclass(frozen=True)
 class MemoryOptions:
-    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error."""
+    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error; mended: no longer in the last
+    frame."""
 
     timing: Timing | None = None
     ports: Mapping[str, PortConfig] = field(default_factory=dict)
     fail: Sequence[tuple[int, int]] = ()
+    mended: bool = False
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -238,12 +245,16 @@ def front_rtl(
         out = np.zeros(-(-counter_bits // 32), np.uint32)
         error = ctypes.c_uint32()
         before = _records(lib, sim, regions), _lines(lib, sim, regions)
-        for _ in range(frames):
+        errors = []
+        for frame in range(frames):
+            if memory.mended and frame == frames - 1:
+                lib.flk_front_mend(sim)
             done = lib.flk_front_frame(sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
             if done < 0:
                 raise FlickerError(f"front end: {lib.flk_front_failure().decode()} (seed {seed})")
             if not done:
                 raise FlickerError(f"front end: no end within {limit} cycles (seed {seed})")
+            errors.append(error.value)
         traffic = {}
         for number, name in enumerate(PURPOSES):
             counts = PurposeCounts()
@@ -252,7 +263,7 @@ def front_rtl(
         return RtlFront(
             _records(lib, sim, regions), _lines(lib, sim, regions),
             _read(lib, sim, regions.pointers, regions.pointer_bytes).view(np.uint32),
-            _counters(out), error.value, traffic, lib.flk_front_efficiency(sim), before,
+            _counters(out), errors, traffic, lib.flk_front_efficiency(sim), before,
         )
     finally:
         lib.flk_front_delete(sim)

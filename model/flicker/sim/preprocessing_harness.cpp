@@ -114,6 +114,10 @@ void flk_front_fail(Sim* sim, uint64_t base, uint64_t size) {
   for (auto& port : sim->ports) port->fail_range(base, size, true, true, flk::SLVERR);
 }
 
+void flk_front_mend(Sim* sim) {
+  for (auto& port : sim->ports) port->mend_ranges();
+}
+
 // A frame: 1 done, 0 not within `limit` cycles, -1: a rule was broken (flk_front_failure). counters: words of counters_o; error: error_o.
 int flk_front_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limit, uint32_t* counters, int counter_words, uint32_t* error) {
   try {
