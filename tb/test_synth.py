@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import pyosys
+import numpy as np
 import pytest
 
 from flicker.cost.synth import run
@@ -68,10 +69,10 @@ def test_liberty_errors(tmp_path: Path) -> None:
         Library(path)
 
 
-def module(cells: dict[str, tuple[str, dict[str, int]]], ports: dict[str, tuple[str, int]]) -> dict:
+def module(cells: dict[str, tuple[str, dict[str, int]]], ports: dict[str, tuple[str, int | list[int]]]) -> dict:
     """A netlist as `write_json` gives it."""
     return {
-        "ports": {name: {"direction": direction, "bits": [bit]} for name, (direction, bit) in ports.items()},
+        "ports": {name: {"direction": direction, "bits": np.atleast_1d(bit).tolist()} for name, (direction, bit) in ports.items()},
         "netnames": {f"n{bit}": {"hide_name": 0, "bits": [bit]} for bit in range(20)},
         "cells": {
             name: {"type": kind, "connections": {pin: [bit] for pin, bit in pins.items()}}
@@ -171,7 +172,7 @@ def test_interface_adds_up(library: Library) -> None:
         {"i": ("INV_X1", {"A": 0, "Y": 1}), "j": ("INV_X1", {"A": 1, "Y": 2})}, {"a": ("input", 0), "y": ("output", 2)}
     )
     face = Timing(inner, library, {}).interface()
-    assert face["inputs"]["a"]["loads"] == [1] and face["inputs"]["a"]["capture"] is None
+    assert face["inputs"]["a"]["loads"] == [1] and face["inputs"]["a"]["captures"] == [None]
     assert face["outputs"]["y"]["through"] == {"a": pytest.approx(10 + 10 + 10)}
     cells = {
         "a": ("DFF", {"D": 5, "CK": 19, "Q": 0}), "box": ("box", {"a": 0, "y": 2}), "b": ("DFF", {"D": 2, "CK": 19, "Q": 3})
@@ -179,6 +180,22 @@ def test_interface_adds_up(library: Library) -> None:
     timing = Timing(module(cells, {"d": ("input", 5), "q": ("output", 3)}), library, {"box": face})
     path = next(path for path in timing.paths() if path.target == "n3" and not path.port)
     assert path.delay == pytest.approx(60 + 10 + 30 + 10 + 50)
+
+
+def test_bits_of_a_box_have_their_own_times(library: Library) -> None:
+    """A late signal at a bit that goes straight to a register does not meet the long path of another bit of its port."""
+    inner = module(
+        {
+            "i": ("INV_X1", {"A": 0, "Y": 4}), "j": ("INV_X1", {"A": 4, "Y": 5}), "r": ("DFF", {"D": 5, "CK": 19, "Q": 6}),
+            "s": ("DFF", {"D": 1, "CK": 19, "Q": 7}), "k": ("INV_X1", {"A": 6, "Y": 8}),
+        },
+        {"a": ("input", [0, 1]), "y": ("output", [7, 8])},
+    )
+    face = Timing(inner, library, {}).interface()
+    through, straight = (delay for delay, _ in face["inputs"]["a"]["captures"])
+    assert straight == pytest.approx(50) and through == pytest.approx(10 + 10 + 10 + 10 + 50)
+    plain, inverted = (delay for delay, _ in face["outputs"]["y"]["launches"])
+    assert inverted > plain
 
 
 def test_units_cover_the_design() -> None:

@@ -104,7 +104,7 @@ module flk_colour_fetch
   end
 
   always_ff @(posedge clk_i) begin
-    if (in_valid_i && in_ready_o) begin
+    if (in_ready_o) begin  // in_valid_i comes late
       a_cluster_q <= in_data_i.cluster;
       a_colour_q  <= in_data_i.colour;
       a_degree_q  <= in_data_i.degree;

@@ -222,10 +222,10 @@ def macro(job: dict) -> dict:
     widths = {"clk_i": 1, "wr_en_i": 1, "wr_addr_i": address, "wr_data_i": width, "rd_en_i": 1, "rd_addr_i": address, "rd_data_o": width}
     load = max(library.flip_flop.loads.values())
     inputs = {
-        name: {"loads": [load] * bits, "capture": None if name == "clk_i" else (MACRO_SETUP * library.fo4, "storage")}
+        name: {"loads": [load] * bits, "captures": [None if name == "clk_i" else (MACRO_SETUP * library.fo4, "storage")] * bits}
         for name, bits in widths.items() if name != "rd_data_o"
     }
-    outputs = {"rd_data_o": {"launch": (MACRO_ACCESS * library.fo4, "storage"), "through": {}}}
+    outputs = {"rd_data_o": {"launches": [(MACRO_ACCESS * library.fo4, "storage")] * width, "through": {}}}
     return {
         "top": job["top"], "parameters": job["parameters"], "mem_bits": 0, "sram_bits": width * depth, "children": {}, "ge_seq": 0.0, "ge_comb": 0.0,
         "ge_drivers": 0.0, "ff": 0, "cells": {}, "paths": [], "interface": {"inputs": inputs, "outputs": outputs}, "widths": widths, "seconds": 0.0,

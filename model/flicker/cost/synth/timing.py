@@ -5,7 +5,7 @@ inverters' is driven directly; a larger one through the chain of inverters that 
 have one size, clocks and resets are ideal.
 
 Modules inside a module (black boxes of a composed unit) appear with their interface: arrival at their outputs, delay beyond
-their inputs, and delays between ports, each as the worst over the bits of a port.
+their inputs, bit by bit, and delays between ports, each as the worst over their bits.
 """
 
 from __future__ import annotations
@@ -102,16 +102,16 @@ class Timing:
             if kind in blocks:
                 block = blocks[kind]
                 for port, face in block["inputs"].items():
-                    for bit, load in zip(pins[port], face["loads"]):
+                    for bit, load, capture in zip(pins[port], face["loads"], face["captures"]):
                         self.load[bit] += load
                         pending.append((bit, (name, port), 0.0, 0.0))
-                    if face["capture"]:
-                        delay, end = face["capture"]
-                        self.capture.append(((name, port), delay, f"{name}.{end}"))
+                        if capture:
+                            delay, end = capture
+                            self.capture.append((bit, delay, f"{name}.{end}"))
                 for port, face in block["outputs"].items():
-                    for bit in pins[port]:
-                        if face["launch"]:
-                            delay, start = face["launch"]
+                    for bit, launch in zip(pins[port], face["launches"]):
+                        if launch:
+                            delay, start = launch
                             self.launch.append((bit, delay, unit, f"{name}.{start}"))
                         for source, delay in face["through"].items():
                             pending.append(((name, source), bit, delay, unit))
@@ -191,6 +191,21 @@ class Timing:
                 at[net] = best
         return at
 
+    def remaining(self) -> dict[object, tuple[float, str]]:
+        """Longest delay from every net to a register: time and name of the end."""
+        left: dict[object, tuple[float, str]] = {}
+        for net, setup, name in self.capture:
+            if net not in left or setup > left[net][0]:
+                left[net] = (setup, name)
+        for net, sources in reversed(self.order):
+            after = left.get(net)
+            if after is None:
+                continue
+            for source, delay in sources:
+                if source not in left or after[0] + delay > left[source][0]:
+                    left[source] = (after[0] + delay, after[1])
+        return left
+
     def _captured(self, at: dict[object, tuple[float, str]]) -> list[Path]:
         paths = []
         for net, setup, name in self.capture:
@@ -232,14 +247,12 @@ class Timing:
     def interface(self) -> dict:
         """What a module that contains this one needs to know of it (see the module's docstring)."""
         inputs, outputs = {}, {}
-        at = self.arrive(self.starts)
+        at, left = self.arrive(self.starts), self.remaining()
         for name, bits in self._directed("output"):
-            reached = [at[bit] for bit in bits if bit in at]
-            outputs[name] = {"launch": max(reached) if reached else None, "through": {}}
+            outputs[name] = {"launches": [at.get(bit) for bit in bits], "through": {}}
         for name, bits in self._directed("input"):
+            inputs[name] = {"loads": [self.load[bit] for bit in bits], "captures": [left.get(bit) for bit in bits]}
             at = self.arrive({bit: (0.0, name) for bit in bits})
-            ends = [(path.delay, path.target) for path in self._captured(at)]
-            inputs[name] = {"loads": [self.load[bit] for bit in bits], "capture": max(ends) if ends else None}
             for target, target_bits in self._directed("output"):
                 reached = [at[bit][0] for bit in target_bits if bit in at]
                 if reached:
