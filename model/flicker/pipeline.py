@@ -110,9 +110,9 @@ def bit_true_front(view: View, config: RenderConfig, front: Front, options: Fron
         with steps.step("preprocessing with the golden model"):
             return run_front(packed, view.camera, options.lists, kind), {}
     with steps.step("building the front end's simulator (once)"):
-        build_front(checks=False)
+        build_front()
     with steps.step("preprocessing with the RTL"):
-        frame, rtl = front_frame(packed, view.camera, options.lists, checks=False)
+        frame, rtl = front_frame(packed, view.camera, options.lists)
     return frame, {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 

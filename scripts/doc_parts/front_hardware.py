@@ -29,7 +29,7 @@ VIEWS = ("demo", "flowers")
 
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
-    build(checks=False)
+    build()
     for title, view in titled_views(say):
         if not title.startswith(VIEWS):
             continue
@@ -40,7 +40,7 @@ def tables(say: Say) -> dict[str, str]:
         for name, memory in MEMORIES.items():
             say(f"{title}: {name}")
             begin = time.perf_counter()
-            rtl = front_rtl(packed, view.camera, chunks=due.lists.chunks, memory=memory, checks=False)
+            rtl = front_rtl(packed, view.camera, chunks=due.lists.chunks, memory=memory)
             seconds = time.perf_counter() - begin
             if not (np.array_equal(rtl.records[due.written], due.records[due.written]) and np.array_equal(rtl.memory[lines], due.lists.memory[lines])
                     and np.array_equal(rtl.pointers, due.lists.pointers)):
