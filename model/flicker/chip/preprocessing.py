@@ -1,8 +1,8 @@
 """Preprocessing as the RTL does it (`flk_preprocessing`): what it moves, to the byte, and an estimate of its cycles.
 
-Traffic follows from the golden front end alone. Cycles are those of the slower of two: the units, simulated cycle by cycle from a group of Gaussians at the
-front to an entry at a list writer (`unit_cycles`), and the DRAM with all streams in the order in which they come (`simulate`). docs/chip_model.md has both
-beside the RTL.
+Traffic follows from the golden front end alone. The units are simulated cycle by cycle from a group of Gaussians at the front to an entry at a list writer
+(`unit_cycles`), the DRAM with all streams in the order in which they come (`simulate`). One waits for the other by phases: between the points at which one more
+queue of survivors (`WAITING` a lane) has left the front, a frame takes the longer of both (`phases`). docs/front_end.md has the estimate beside the RTL.
 """
 
 from __future__ import annotations
@@ -152,12 +152,13 @@ def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER
 
 @numba.njit(cache=True)
 def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency):
-    """Cycles until the last entry is with its list writer.
+    """Cycles until the last entry is with its list writer; and when each survivor left the front.
 
     Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the colour stage), first entry (S + 1,),
     bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
     """
     survivors = len(group)
+    went = np.zeros(survivors, np.int64)
     own = np.empty((4, survivors), np.int64)  # survivors of each lane
     count = np.zeros(4, np.int64)
     for s in range(survivors):
@@ -223,14 +224,26 @@ def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency)
                 free[k] = max(free[k], clock) + busy[next_survivor]
                 ready[next_survivor] = free[k] + latency
                 out[k] += 1
+                went[next_survivor] = clock
                 next_survivor += 1
         if left == len(bank) and next_survivor == survivors:
             break
         clock += 1
-    return clock
+    return clock, went
 
 
-def unit_cycles(frame: FrontFrame) -> int:
+@dataclass(frozen=True, eq=False)
+class UnitCycles:
+    """A frame if the memory were perfect. first_pass: over the table. place: float64 (S,), Gaussians that entered the front with a survivor; went: int64 (S,),
+    the cycle after the first pass in which it left it. all: until the last entry."""
+
+    first_pass: int
+    place: np.ndarray
+    went: np.ndarray
+    all: int
+
+
+def unit_cycles(frame: FrontFrame) -> UnitCycles:
     """Cycles of a frame if the memory were perfect."""
     packed = frame.packed
     keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)).keep)
@@ -238,7 +251,9 @@ def unit_cycles(frame: FrontFrame) -> int:
     start = np.concatenate([[0], np.cumsum(groups)])
     cluster = packed.cluster[frame.gaussian]
     within = frame.gaussian - packed.start[cluster]
-    group = start[np.searchsorted(keep, cluster)] + within // LANES
+    slot = np.searchsorted(keep, cluster)
+    group = start[slot] + within // LANES
+    place = np.concatenate([[0], np.cumsum(packed.counts[keep])])[slot] + within
     degree = packed.degrees[cluster]
     lane = within % LANES
     cols = -(-frame.camera.width // TILE)
@@ -248,24 +263,36 @@ def unit_cycles(frame: FrontFrame) -> int:
     half = np.stack([(frame.entry_mask & 3) > 0, (frame.entry_mask & 12) > 0], axis=1)
     band = (frame.entry_splat.astype(np.int64)[:, None] << 20 | y[:, None].astype(np.int64) << 1 | np.arange(2))[half]
     bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
-    front = _unit_cycles(
+    front, went = _unit_cycles(
         group, lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, WAITING, MERGE_DEPTH, LATENCY,
     )
-    return int(max(front, GROUP_CYCLES * start[-1])) + CLUSTER_CYCLES * len(packed.table)
+    first_pass = CLUSTER_CYCLES * len(packed.table)
+    return UnitCycles(first_pass, place.astype(np.float64), went, int(max(front, GROUP_CYCLES * start[-1])) + first_pass)
+
+
+def phases(units: UnitCycles, beats: Sequence[Beats], dram: int) -> int:
+    """Cycles of a frame whose traffic takes the DRAM `dram` cycles, beats at an even rate."""
+    step = WAITING * LANES
+    bounds = np.arange(step, len(units.went), step)  # the first survivor of each phase but the first
+    unit = np.diff(np.concatenate([[0], units.went[bounds], [units.all - units.first_pass]]))
+    due = np.concatenate([b.due for b in beats])
+    phase = np.searchsorted(units.place[bounds], due, side="right") if len(bounds) else np.zeros(len(due), np.int64)
+    first = sum(len(b.beat) for b in beats if b.name == "table") // 2  # of the first pass
+    count = np.bincount(phase, minlength=len(unit))
+    count[0] -= first
+    each = dram / max(len(due), 1)
+    return round(max(units.first_pass, each * first) + np.maximum(unit, each * count).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Preprocessing:
-    """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each alone."""
+    """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each alone; cycles: of both together."""
 
     beats: Sequence[Beats]
     used: dict[str, int]
     units: int
     dram: int
-
-    @property
-    def cycles(self) -> int:
-        return max(self.units, self.dram)
+    cycles: int
 
     @property
     def bytes(self) -> dict[str, int]:
@@ -285,4 +312,6 @@ def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None) ->
     used = {b.name: b.bytes for b in beats}
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    return Preprocessing(beats, used, unit_cycles(frame), dram_cycles(beats, config) if config else 0)
+    units = unit_cycles(frame)
+    dram = dram_cycles(beats, config) if config else 0
+    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram))
