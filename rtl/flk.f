@@ -56,10 +56,12 @@ ctu/flk_prtu.sv
 render/flk_blend_pipe.sv
 render/flk_channel.sv
 render/flk_fifo_monitor.sv
+render/flk_frame_writer.sv
 render/flk_mask_all.sv
 render/flk_mask_generator.sv
 render/flk_perf_counters.sv
 render/flk_pixel_drain.sv
+render/flk_pixel_out.sv
 render/flk_pixel_state.sv
 render/flk_record_to_splat.sv
 render/flk_rendering_core.sv

@@ -9,12 +9,14 @@ from ...arithmetic.ff_stages import STAGES
 from ...datapath.units import PIPELINES
 from ...params import (
     CHANNELS,
+    CORES,
     FAITHFUL,
     FIXED_FRAC_BITS,
     FIXED_INT_BITS,
     MASK_GENERATORS,
     MINITILE,
     PIXELS_PER_VRU,
+    SUBTILE_COORD_BITS,
     SUBTILE_PIXELS,
     VRU_COUNTS,
     VRUS_PER_CHANNEL,
@@ -46,6 +48,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_sram_fifo": [MEMORY],
     "flk_delay_ram": [MEMORY],
     "flk_list_writer": [MEMORY],
+    "flk_frame_writer": [MEMORY, "flk_pixel_out"],
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
@@ -123,6 +126,11 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
         # Zeros fill a record of 32 bytes.
         "flk_record_to_splat": [] if factored else [f"in_record_i[{bit}]" for bit in range(177, 256)],
+        # Where a sub-tile lies: of core 0 all but its place in the tile, of the others only which tile of the pair.
+        "flk_frame_writer": [
+            f"in_data_i[{layout.place('core_pixel', 'subtile').at + bit + k * layout.bits('core_pixel')}]"
+            for k in range(CORES) for bit in range(2 * SUBTILE_COORD_BITS) if bit != 1 and (k or bit in (0, SUBTILE_COORD_BITS))
+        ],
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
@@ -277,6 +285,7 @@ def _front() -> list[Unit]:
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
+        unit("flk_pixel_out"), unit("flk_frame_writer"),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
     ]
 

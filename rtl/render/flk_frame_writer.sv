@@ -1,0 +1,402 @@
+// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/frame_writer.md).
+//
+// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other, the 64 of a sub-tile in any order,
+// all cores in the same order of tiles, which comes in pairs: an even column, then the one right of it. A pair of tiles, 32 x 16
+// pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in RGBA16F, whole bursts of
+// 32 bytes. Two pairs are held; a core that is further ahead waits. Pixel formats: golden/frame_buffer.py.
+//
+// Frame: start_i while idle_o; rgba_i, background_i, base_i (in beats of 64 bytes), stride_i (of a row of pixels, in 32 bytes) and
+// pairs_i (of the frame, at least 1) stay until done_o, high for the cycle after the last line has left. clear_i aborts: as after
+// reset in the next cycle, a line that is offered may be withdrawn.
+// Lines: a beat of memory, out_strobe_o a bit for each 16 bytes; the others hold anything. Throughput: a pixel a cycle and core in;
+// four pixels a cycle out, 128 cycles a pair and 4 between pairs; done_o 141 cycles after the last pixel.
+// in_ready_o comes from registers; out_ready_i goes to register enables and the memories' read enables.
+module flk_frame_writer
+  import flk_pkg::*;
+  import flk_param_pkg::*;
+#(
+  parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
+  parameter int unsigned StrideBits = 12
+) (
+  input  logic                    clk_i,
+  input  logic                    rst_ni,
+  input  logic                    clear_i,
+  // Frame
+  input  logic                    start_i,
+  output logic                    idle_o,
+  input  logic                    rgba_i,
+  input  logic [2:0][7:0]         background_i,  // red lowest
+  input  logic [BeatBits-1:0]     base_i,
+  input  logic [StrideBits-1:0]   stride_i,
+  input  logic [15:0]             pairs_i,
+  output logic                    done_o,
+  // Pixels
+  input  logic        [CORES-1:0] in_valid_i,
+  output logic        [CORES-1:0] in_ready_o,
+  input  core_pixel_t [CORES-1:0] in_data_i,
+  // Lines
+  output logic                    out_valid_o,
+  input  logic                    out_ready_i,
+  output logic [BeatBits-1:0]     out_beat_o,
+  output logic [3:0]              out_strobe_o,
+  output logic [511:0]            out_data_o
+);
+
+  localparam int unsigned PairBits = SUBTILE_COORD_BITS - 2;  // of a pair's column
+  localparam int unsigned TileBits = SUBTILE_COORD_BITS - 1;  // of a tile's row
+  localparam int unsigned HalfBits = BeatBits + 1;  // addresses in 32 bytes
+  localparam int unsigned LowBits = HalfBits / 2;  // they are added up in two halves
+  localparam int unsigned HighBits = HalfBits - LowBits;
+
+  // ---- pixels come ----------------------------------------------------------------------------------
+
+  logic [CORES-1:0]                taken, complete;  // a pixel; a whole pair is there
+  logic [CORES-1:0][6:0]           count_q;  // pixels of the pair that comes
+  logic [CORES-1:0]                into_q;   // buffer that it goes to
+  logic [CORES-1:0][1:0]           full_q;   // pairs that are there
+  logic                            from_q, freed;  // buffer that leaves; it has
+  logic [1:0][PairBits-1:0]        columns_q;
+  logic [1:0][TileBits-1:0]        rows_q;
+  logic                            running_q;
+
+  // Reads: 8 columns of each core's sub-tile, of which one core's four are used.
+  logic                            en, read;
+  logic [3:0]                      line_q;   // row of pixels
+  logic [2:0]                      group_q;  // four pixels of it
+  pixel_t [CORES-1:0][7:0]         pixel;
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_core
+    logic [1:0] unused_row;
+    logic [4:0] place;
+
+    // Buffer, tile of the pair, row.
+    assign place = {into_q[k], in_data_i[k].subtile.col[1], in_data_i[k].minitile[1],
+                    in_data_i[k].index[3:2]};
+    assign unused_row = in_data_i[k].subtile.row[1:0];
+
+    for (genvar x = 0; x < 8; x++) begin : gen_column
+      flk_sram #(
+        .Width($bits(pixel_t)),
+        .Depth(32)
+      ) i_pixels (
+        .clk_i,
+        .wr_en_i  (taken[k] && {in_data_i[k].minitile[0], in_data_i[k].index[1:0]} == 3'(x)),
+        .wr_addr_i(place),
+        .wr_data_i(in_data_i[k].pixel),
+        .rd_en_i  (en && read),
+        .rd_addr_i({from_q, group_q[2], line_q[2:0]}),
+        .rd_data_o(pixel[k][x])
+      );
+    end
+
+    assign in_ready_o[k] = running_q && !full_q[k][1];
+    assign taken[k]      = in_valid_i[k] && in_ready_o[k];
+    assign complete[k]   = full_q[k] != '0;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        count_q[k] <= '0;
+        into_q[k]  <= 1'b0;
+        full_q[k]  <= '0;
+      end else if (clear_i || start_i) begin
+        count_q[k] <= '0;
+        into_q[k]  <= 1'b0;
+        full_q[k]  <= '0;
+      end else begin
+        count_q[k] <= count_q[k] + 7'(taken[k]);
+        into_q[k]  <= into_q[k] ^ (taken[k] && (&count_q[k]));
+        full_q[k]  <= full_q[k] + 2'(taken[k] && (&count_q[k])) - 2'(freed);
+      end
+    end
+
+`ifndef SYNTHESIS
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        taken[k] |-> in_data_i[k].subtile.col[1] == count_q[k][6])
+    else $error("flk_frame_writer: tiles do not come in pairs");
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        taken[k] |-> in_data_i[k].subtile.col[0] == 1'(k) &&
+                     in_data_i[k].subtile.row[0] == 1'(k / 2))
+    else $error("flk_frame_writer: a sub-tile from another core");
+`endif
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (taken[0]) begin
+      columns_q[into_q[0]] <= in_data_i[0].subtile.col[SUBTILE_COORD_BITS-1:2];
+      rows_q[into_q[0]]    <= in_data_i[0].subtile.row[SUBTILE_COORD_BITS-1:1];
+    end
+  end
+
+  // ---- a pair leaves --------------------------------------------------------------------------------
+
+  typedef enum logic [2:0] {WAIT, ROWS, LOW, HIGH, READ} state_e;
+
+  state_e                             state_q;
+  logic [15:0]                        left_q;  // pairs of the frame
+  logic [PairBits-1:0]                column_q;
+  logic [TileBits-1:0]                row_q;
+  logic [TileBits+StrideBits-1:0]     down_q;
+  logic [PairBits+3:0]                across_q;
+  logic [HalfBits-1:0]                half_q, next_q;  // where the row begins, and the next one
+  logic [HalfBits-1:0]                rows;
+  logic [1:0]                         carry_q;
+  logic                               last_group, flow, drained;
+
+  assign read       = state_q == READ;
+  assign last_group = read && (&group_q);
+  assign freed      = en && last_group && (&line_q);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q <= WAIT;
+      left_q  <= '0;
+      from_q  <= 1'b0;
+      line_q  <= '0;
+      group_q <= '0;
+    end else if (clear_i || start_i) begin
+      state_q <= WAIT;
+      left_q  <= clear_i ? '0 : pairs_i;
+      from_q  <= 1'b0;
+      line_q  <= '0;
+      group_q <= '0;
+    end else if (en) begin
+      unique case (state_q)
+        WAIT: begin
+          if (&complete) begin
+            state_q <= ROWS;
+          end
+        end
+        ROWS: state_q <= LOW;
+        LOW:  state_q <= HIGH;
+        HIGH: state_q <= READ;
+        default: begin
+          if (freed) begin
+            state_q <= WAIT;
+            left_q  <= left_q - 1'b1;
+            from_q  <= !from_q;
+          end
+        end
+      endcase
+      if (read) begin
+        group_q <= group_q + 1'b1;
+        line_q  <= line_q + 4'(last_group);
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (en) begin
+      if (state_q == WAIT) begin
+        row_q    <= rows_q[from_q];
+        column_q <= columns_q[from_q];
+      end
+      if (state_q == ROWS) begin
+        down_q   <= (TileBits + StrideBits)'(row_q) * (TileBits + StrideBits)'(stride_i);
+        across_q <= rgba_i ? {1'b0, column_q, 3'b0}
+                           : (PairBits + 4)'(column_q) + (PairBits + 4)'({column_q, 1'b0});
+      end
+      if (state_q == LOW) begin
+        {carry_q, half_q[LowBits-1:0]} <= (LowBits + 2)'({base_i[LowBits-2:0], 1'b0}) +
+            (LowBits + 2)'(rows[LowBits-1:0]) + (LowBits + 2)'(across_q);
+      end
+      if (state_q == HIGH) begin
+        half_q[HalfBits-1:LowBits] <= base_i[BeatBits-1:LowBits-1] + rows[HalfBits-1:LowBits] +
+                                      HighBits'(carry_q);
+      end
+      if (read && group_q == 3'd1) begin
+        {carry_q[0], next_q[LowBits-1:0]} <= {1'b0, half_q[LowBits-1:0]} + (LowBits + 1)'(stride_i);
+      end
+      if (read && group_q == 3'd2) begin
+        next_q[HalfBits-1:LowBits] <= half_q[HalfBits-1:LowBits] + HighBits'(carry_q[0]);
+      end
+      if (last_group) begin
+        half_q <= next_q;
+      end
+    end
+  end
+
+  assign rows = HalfBits'({down_q, 4'b0});
+
+  // ---- four pixels become bytes -----------------------------------------------------------------
+
+  localparam int unsigned STAGES = 5;  // memory, choice, pixels' three
+
+  // half: where the row begins, then the burst that the group fills.
+  typedef struct packed {
+    logic [2:0]          group;
+    logic                carry;
+    logic [HalfBits-1:0] half;
+  } mark_t;
+
+  logic  [STAGES-1:0] valid_q;
+  mark_t [STAGES-1:0] mark_q;
+  logic  [2:0]        number;  // of the burst in its row
+  logic  [1:0]        core_q;
+  pixel_t [3:0]       four_q;
+  logic  [3:0][2:0][7:0]  rgb;
+  logic  [3:0][3:0][15:0] rgba;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      valid_q <= '0;
+    end else if (clear_i) begin
+      valid_q <= '0;
+    end else if (en) begin
+      valid_q <= {valid_q[STAGES-2:0], read};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (en) begin
+      core_q  <= {line_q[3], group_q[1]};
+      mark_q[0] <= '{group: group_q, carry: 1'b0, half: half_q};
+      for (int unsigned s = 1; s < STAGES; s++) begin
+        mark_q[s] <= mark_q[s-1];
+      end
+      {mark_q[2].carry, mark_q[2].half[LowBits-1:0]} <=
+          {1'b0, mark_q[1].half[LowBits-1:0]} + (LowBits + 1)'(number);
+      mark_q[3].half[HalfBits-1:LowBits] <=
+          mark_q[2].half[HalfBits-1:LowBits] + HighBits'(mark_q[2].carry);
+      four_q <= mark_q[0].group[0] ? pixel[core_q][7:4] : pixel[core_q][3:0];
+    end
+  end
+
+  assign number = rgba_i ? mark_q[1].group
+                         : {1'b0, &mark_q[1].group, mark_q[1].group == 3'd5};
+
+  for (genvar i = 0; i < 4; i++) begin : gen_out
+    flk_pixel_out i_out (
+      .clk_i,
+      .en_i        (en),
+      .background_i,
+      .pixel_i     (four_q[i]),
+      .rgb8_o      (rgb[i]),
+      .rgba_o      (rgba[i])
+    );
+  end
+
+  // ---- bytes become bursts of 32 ----------------------------------------------------------------
+
+  // RGB8: groups of 12 bytes; the third, the sixth and the last fill a burst, what is over goes into the next one.
+  mark_t         now;
+  logic          now_valid, fills, burst_valid_q, burst_last_q;
+  logic [4:0]    at;
+  logic [351:0]  wide;
+  logic [255:0]  held, held_q, burst_q;
+  logic [HalfBits-1:0] burst_half_q;
+
+  assign now       = mark_q[STAGES-1];
+  assign now_valid = valid_q[STAGES-1];
+
+  always_comb begin
+    unique case (now.group)
+      3'd0: at = 5'd0;
+      3'd1: at = 5'd12;
+      3'd2: at = 5'd24;
+      3'd3: at = 5'd4;
+      3'd4: at = 5'd16;
+      3'd5: at = 5'd28;
+      3'd6: at = 5'd8;
+      default: at = 5'd20;
+    endcase
+  end
+
+  assign held = now.group == '0 ? '0 : held_q;
+  assign wide = 352'(rgb) << {at, 3'b0} | 352'(held);
+
+  assign fills = rgba_i || now.group == 3'd2 || now.group == 3'd5 || (&now.group);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      burst_valid_q <= 1'b0;
+    end else if (clear_i) begin
+      burst_valid_q <= 1'b0;
+    end else if (en) begin
+      burst_valid_q <= now_valid && fills;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (en) begin
+      burst_q      <= rgba_i ? rgba : wide[255:0];
+      burst_last_q <= &now.group;
+      burst_half_q <= now.half;
+      if (now_valid) begin
+        held_q <= fills ? 256'(wide[351:256]) : wide[255:0];
+      end
+    end
+  end
+
+  // ---- bursts become lines ------------------------------------------------------------------------
+
+  logic [255:0]        low_q;
+  logic                low_valid_q, out_valid_q, send;
+  logic [BeatBits-1:0] out_beat_q;
+  logic [3:0]          out_strobe_q;
+  logic [511:0]        out_data_q;
+
+  assign send = burst_valid_q && (burst_half_q[0] || burst_last_q);
+  assign en   = !out_valid_q || out_ready_i;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      low_valid_q <= 1'b0;
+      out_valid_q <= 1'b0;
+    end else if (clear_i) begin
+      low_valid_q <= 1'b0;
+      out_valid_q <= 1'b0;
+    end else if (en) begin
+      out_valid_q <= send;
+      if (burst_valid_q) begin
+        low_valid_q <= !send;
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (en && burst_valid_q) begin
+      low_q        <= burst_q;
+      out_beat_q   <= burst_half_q[HalfBits-1:1];
+      out_strobe_q <= {{2{burst_half_q[0]}}, {2{low_valid_q || !burst_half_q[0]}}};
+      out_data_q   <= burst_half_q[0] ? {burst_q, low_q} : {256'b0, burst_q};
+    end
+  end
+
+  assign out_valid_o  = out_valid_q;
+  assign out_beat_o   = out_beat_q;
+  assign out_strobe_o = out_strobe_q;
+  assign out_data_o   = out_data_q;
+
+  // ---- frame ----------------------------------------------------------------------------------------
+
+  logic done_q;
+
+  assign flow    = valid_q != '0 || burst_valid_q || out_valid_q;
+  assign drained = running_q && left_q == '0 && !flow;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      running_q <= 1'b0;
+      done_q    <= 1'b0;
+    end else begin
+      running_q <= !clear_i && (start_i || (running_q && !drained));
+      done_q    <= !clear_i && drained;
+    end
+  end
+
+  assign idle_o = !running_q;
+  assign done_o = done_q;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
+  else $error("flk_frame_writer: start while a frame is under way");
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      start_i |-> pairs_i != '0)
+  else $error("flk_frame_writer: a frame without tiles");
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i && !clear_i |=>
+      out_valid_o && $stable(out_beat_o) && $stable(out_data_o) && $stable(out_strobe_o))
+  else $error("flk_frame_writer: output changed before its transfer");
+`endif
+
+endmodule

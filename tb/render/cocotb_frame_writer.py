@@ -1,0 +1,168 @@
+"""cocotb tests of flk_frame_writer: pixels of a grid of tiles in, a memory of bytes out, compared with the golden frame buffer."""
+
+from __future__ import annotations
+
+import cocotb
+import numpy as np
+from cocotb.triggers import RisingEdge
+from flicker_tb import stalls
+from flicker_tb.bench import Bench
+
+from flicker.golden.frame_buffer import PAIR, PixelFormat, frame_buffer, least_stride
+from flicker.params import SUBTILE_COORD_BITS, TILE
+
+CORES = 4
+PIXEL_BITS = 64 + 4 + 2 + 2 * SUBTILE_COORD_BITS
+SPECIAL = np.array([0, 0x8000, 1, 0x3FF, 0x400, 0x3BFF, 0x3C00, 0x3C01, 0x3FFF, 0x4000, 0x7BFF, 0x7C00, 0xB800, 0xBC00, 0x1C00, 0x1C04], np.uint16)
+
+
+class Writer:
+    """The design between cores and memory."""
+
+    def __init__(self, dut) -> None:
+        self.dut, self.bench = dut, Bench(dut)
+        self.rng = self.bench.rng
+        self.numbers = np.random.default_rng(self.rng.getrandbits(32))
+        for name in ("clear", "start", "rgba", "background", "base", "stride", "pairs", "in_valid", "in_data", "out_ready"):
+            getattr(dut, f"{name}_i").value = 0
+
+    def pixels(self, cols: int, rows: int) -> np.ndarray:
+        """uint16 (S, 64, 4) of a grid of sub-tiles: a tenth special values, the rest as pictures have them."""
+        shape = (cols * rows, 64, 4)
+        plain = self.numbers.random(shape).astype(np.float16).view(np.uint16)
+        out = np.where(self.numbers.random(shape) < 0.1, self.numbers.choice(SPECIAL, shape), plain)
+        out[..., 0] = np.where(out[..., 0] > 0x3C00, 0x3C00, out[..., 0])  # transmittance is never above 1, nor negative
+        return out
+
+    async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0) -> int:
+        """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle."""
+        dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
+        across, down = -(-cols * 8 // PAIR), -(-rows * 8 // TILE)
+        cols, rows = 4 * across, 2 * down
+        pixels = self.pixels(cols, rows)
+        width, height = 8 * cols, 8 * rows
+        stride = least_stride(width, form) + 32 * gap
+        background = [rng.choice((0, 255, rng.randrange(256))) for _ in range(3)]
+        base = rng.randrange(1 << 20)
+        pairs = [(x, y) for y in range(down) for x in range(across)]
+        if walk == "any":
+            rng.shuffle(pairs)
+        work: list[list[int]] = [[] for _ in range(CORES)]
+        for x, y in pairs:
+            for tile in range(2):
+                for k in range(CORES):
+                    col, row = 4 * x + 2 * tile + k % 2, 2 * y + k // 2
+                    order = list(range(64))
+                    rng.shuffle(order)
+                    for i in order:
+                        t, r, g, b = (int(v) for v in pixels[row * cols + col, i])
+                        position = row << SUBTILE_COORD_BITS | col
+                        work[k].append(position << 70 | i << 64 | t << 48 | r << 32 | g << 16 | b)
+        expected = frame_buffer(pixels, cols, rows, width, height, form, stride, background)
+        memory = np.zeros(expected.size + 64, np.uint8)
+        written = np.zeros(memory.size, np.bool_)
+        dut.rgba_i.value, dut.base_i.value = int(form is PixelFormat.RGBA16F), base
+        dut.background_i.value = background[0] | background[1] << 8 | background[2] << 16
+        dut.stride_i.value, dut.pairs_i.value = stride // 32, len(pairs)
+        assert int(dut.idle_o.value) == 1
+        dut.start_i.value = 1
+        await edge
+        dut.start_i.value = 0
+        idles, stalled = [stalls.make(p, rng) for p in idle], stalls.make(stall, rng)
+        at, offered = [0] * CORES, [False] * CORES
+        cycle, first, held = 0, -1, None
+        while True:
+            valid = data = 0
+            for k in range(CORES):
+                offered[k] = offered[k] or (at[k] < len(work[k]) and not next(idles[k]))
+                valid |= offered[k] << k
+                data |= (work[k][at[k]] if offered[k] else rng.getrandbits(PIXEL_BITS)) << PIXEL_BITS * k
+            ready = not next(stalled)
+            dut.in_valid_i.value, dut.in_data_i.value, dut.out_ready_i.value = valid, data, int(ready)
+            await edge
+            cycle += 1
+            taken = valid & int(dut.in_ready_o.value)
+            for k in range(CORES):
+                if taken >> k & 1:
+                    offered[k] = False
+                    at[k] += 1
+                    first = cycle if first < 0 else first
+            if int(dut.out_valid_o.value):
+                got = (int(dut.out_beat_o.value), int(dut.out_strobe_o.value), int(dut.out_data_o.value))
+                assert held in (None, got), "line changed before its transfer"
+                held = None if ready else got
+                if ready:
+                    where = (got[0] - base) * 64
+                    assert got[1] in (3, 12, 15), "not whole bursts"
+                    for q in range(4):
+                        if got[1] >> q & 1:
+                            part = slice(where + 16 * q, where + 16 * q + 16)
+                            assert not written[part].any(), "written twice"
+                            written[part] = True
+                            memory[part] = np.frombuffer((got[2] >> 128 * q & (1 << 128) - 1).to_bytes(16, "little"), np.uint8)
+            else:
+                assert held is None, "valid fell"
+            if stop and cycle >= stop:
+                dut.clear_i.value = 1
+                dut.in_valid_i.value = 0
+                await edge
+                dut.clear_i.value = 0
+                await edge
+                assert int(dut.idle_o.value) == 1 and int(dut.out_valid_o.value) == 0
+                return cycle
+            if int(dut.done_o.value):
+                break
+            assert cycle < 2000 + 3000 * len(pairs), f"stands still with {at} of {len(work[0])} pixels"
+        dut.in_valid_i.value = 0
+        assert at == [len(w) for w in work] and int(dut.idle_o.value) == 1
+        row = least_stride(width, form)
+        mask = np.zeros(expected.shape, np.bool_)
+        mask[:, :row] = True
+        assert np.array_equal(written[: expected.size], mask.ravel()) and not written[expected.size :].any()
+        assert np.array_equal(memory[: expected.size][mask.ravel()], expected.ravel()[mask.ravel()])
+        return cycle - first
+
+
+@cocotb.test()
+@cocotb.parametrize(("form", list(PixelFormat)), ("kind", ["never never", "half half", "heavy never", "never heavy", "bursts bursts", "mixed"]))
+async def bytes_of_frames(dut, form, kind):
+    """Frames of several sizes one after the other, rows with and without a gap."""
+    test = Writer(dut)
+    await test.bench.reset()
+    for cols, rows in ((1, 1), (5, 3), (12, 2)):
+        pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
+        idle, stall = ([pick() for _ in range(CORES)], pick()) if kind == "mixed" else ([kind.split()[0]] * CORES, kind.split()[1])
+        await test.frame(cols, rows, form, idle, stall, gap=test.rng.randrange(3), walk=test.rng.choice(("rows", "any")))
+
+
+@cocotb.test()
+@cocotb.parametrize(("form", list(PixelFormat)))
+async def one_core_late(dut, form):
+    """Three cores run ahead as far as they may, the fourth comes seldom."""
+    test = Writer(dut)
+    await test.bench.reset()
+    for late in range(CORES):
+        await test.frame(8, 2, form, ["heavy" if k == late else "never" for k in range(CORES)], "half")
+
+
+@cocotb.test()
+@cocotb.parametrize(("form", list(PixelFormat)))
+async def rate(dut, form):
+    """A pair every 132 cycles; the last one is out 141 cycles after its last pixel."""
+    test = Writer(dut)
+    await test.bench.reset()
+    one = await test.frame(4, 2, form, ["never"] * CORES, "never")
+    many = await test.frame(40, 2, form, ["never"] * CORES, "never")
+    assert many - one == 9 * 132, (one, many)
+    assert one == 127 + 141, one
+
+
+@cocotb.test()
+async def abort(dut):
+    """clear_i at any time; the next frame is right."""
+    test = Writer(dut)
+    await test.bench.reset()
+    for _ in range(12):
+        form = test.rng.choice(list(PixelFormat))
+        await test.frame(8, 2, form, ["half"] * CORES, "half", stop=test.rng.randrange(1, 700))
+        await test.frame(4, 2, form, ["never"] * CORES, "half")
