@@ -1,13 +1,14 @@
-// List reader: the lines of tiles' lists from DRAM, list by list in the order of the tiles (docs/list_layout.md, docs/list_reader.md).
+// List reader: the lines of tiles' lists from DRAM, list by list in the order of the tiles
+// (docs/list_layout.md, docs/list_reader.md).
 //
 // Tiles come as columns and rows of the picture. Of each the lines of its list are given: the newest
 // chunk first, lines of a chunk in ascending order, entries as they lie there; the last line is
 // marked. An empty list is one element with count 0. After the last line the reader asks what next
 // (next_again_i): the same list from its beginning, or the next one.
 // Pointers of Ahead tiles are fetched before there is a place for their lists. Contexts lists are
-// under way at once; each has Places lines of the line memory, and a chunk is asked for when the line
-// with its link has arrived and all of it has a place there: no list waits for another's places, and
-// the port never waits.
+// under way at once; a chunk is asked for when the line with its link has arrived and a slot of the
+// line memory is free for it, so that the port never waits. Earlier lists come first, and the last two
+// slots are for the list that is being given: it never waits for the others.
 // Faults: an error of the memory; a pointer with 0 or more than ChunkLines lines used, or with a chunk
 // beyond chunks_i; a line with 0 or more than LineEntries entries; a header with other bits than it
 // may have; a link that does not go to a lower chunk, as a writer's always do (so a chain ends). The
@@ -16,13 +17,13 @@
 // start_i while idle_o. Bases, columns_i and chunks_i stay until idle_o after the last tile; idle_o is
 // high whenever nothing is inside. clear_i forgets all lists; what is under way is read and dropped,
 // then idle_o rises; tiles are not taken until then.
-// Latency: 9 cycles and a read of the memory to an empty list, 16 and two reads to a list of one line;
-// 6 and a read from a line with a link to the first line of its chunk.
+// Latency, L the memory's: 11 + L cycles from a tile to an empty list, 17 + 2 L to the first line of
+// another; 12 + L from a line with a link to the first line of its chunk.
 // Throughput: a line a cycle, a tile every second one, a list every third one. Combinational:
 // out_ready_i to the line memory's read port, ar_ready_i to the requests, r_*_i to its write port.
 module flk_list_reader #(
   parameter  int unsigned Contexts    = 4,   // lists under way
-  parameter  int unsigned Places      = 16,  // lines of a list
+  parameter  int unsigned Slots       = 32,  // chunks in the line memory
   parameter  int unsigned Ahead       = 4,   // pointers beyond those
   parameter  int unsigned CoordBits   = 8,   // of a tile's column and row
   parameter  int unsigned ChunkLines  = 8,
@@ -81,8 +82,11 @@ module flk_list_reader #(
 );
 
   localparam int unsigned CtxBits = $clog2(Contexts);
-  localparam int unsigned PlaceBits = $clog2(Places);
-  localparam int unsigned CountBits = $clog2(Places + 1);       // 0 to Places
+  localparam int unsigned SlotBits = $clog2(Slots);
+  localparam int unsigned HeldBits = $clog2(Slots + 1);
+  localparam int unsigned AtBits = $clog2(ChunkLines);
+  localparam int unsigned CountBits = $clog2(Slots * ChunkLines + 1);
+  localparam int unsigned PendingBits = $clog2(2 * ChunkLines + 1);
   localparam int unsigned LinesBits = $clog2(ChunkLines + 1);   // 0 to ChunkLines
   localparam int unsigned AheadBits = $clog2(Ahead + 1);
   localparam int unsigned PerLine = Width / PointerBits;
@@ -92,13 +96,14 @@ module flk_list_reader #(
   localparam int unsigned EntriesBits = LineEntries * EntryBits;
   localparam int unsigned HeaderCount = 4;
   localparam int unsigned RestBits = Width - EntriesBits - HeaderCount - ChunkBits - 1;
-  localparam int unsigned WhichBits = WordBits + 2 > CtxBits ? WordBits + 2 : CtxBits;
+  localparam int unsigned ChunkTag = SlotBits + CtxBits;
+  localparam int unsigned WhichBits = WordBits + 2 > ChunkTag ? WordBits + 2 : ChunkTag;
 
   if (Contexts < 2 || Contexts != 1 << CtxBits) begin : gen_check_contexts
     $error("flk_list_reader: Contexts must be a power of two, at least 2");
   end
-  if (Places < 2 * ChunkLines || Places != 1 << PlaceBits) begin : gen_check_places
-    $error("flk_list_reader: Places must be a power of two, at least two chunks' lines");
+  if (Slots < 4) begin : gen_check_slots
+    $error("flk_list_reader: Slots must be at least 4");
   end
   if (ChunkLines < 2 || ChunkLines != 1 << $clog2(ChunkLines)) begin : gen_check_chunk
     $error("flk_list_reader: ChunkLines must be a power of two, at least 2");
@@ -110,7 +115,7 @@ module flk_list_reader #(
 
   typedef struct packed {
     logic                 pointer;
-    logic [WhichBits-1:0] which;    // writer and word of the line, or context
+    logic [WhichBits-1:0] which;    // writer and word of the line, or slot and context
   } tag_t;
 
   // ---- clear ----------------------------------------------------------------------------------------
@@ -164,15 +169,37 @@ module flk_list_reader #(
 
   // ---- lists under way --------------------------------------------------------------------------------
 
-  // Of each: its pointer, the chunk asked for last or to be asked for, how many of its lines are on their way or in the
-  // memory, how many are in the memory and free of faults, and whether more of these will come.
+  // Of each: its pointer, the chunk asked for last or to be asked for, how many of its lines are on their way, how many
+  // are in the memory and free of faults, and whether more of these will come; its slots, as a chain.
   logic [Contexts-1:0]                valid_q, want_q, ended_q;
   logic [Contexts-1:0][1:0]           writer_q;
   logic [Contexts-1:0][ChunkBits-1:0] newest_q, chunk_q;
   logic [Contexts-1:0][LinesBits-1:0] used_q, lines_q;
-  logic [Contexts-1:0][CountBits-1:0] reserved_q, good_q;
-  logic [Contexts-1:0][PlaceBits-1:0] write_q, read_q;
+  logic [Contexts-1:0][PendingBits-1:0] pending_q;
+  logic [Contexts-1:0][CountBits-1:0] good_q;
+  logic [Contexts-1:0]                begun_q;            // a chunk has been asked for
+  logic [Contexts-1:0][SlotBits-1:0]  first_slot_q, last_slot_q;
+  logic [Contexts-1:0][HeldBits-1:0]  held_q;             // slots
   logic [CtxBits-1:0]                 head_q, free_q;  // whose lines are given; the next to be used
+
+  // ---- slots ------------------------------------------------------------------------------------------
+
+  logic [Slots-1:0]               busy_q;
+  logic [Slots-1:0][CtxBits-1:0]  owner_q;
+  logic [Slots-1:0][SlotBits-1:0] following_q;  // the list's slot after this one
+  logic [SlotBits-1:0]            spare;        // a free one
+  logic [HeldBits-1:0]            free_slots_q;
+  logic                           take_slot, leave_slot;
+  logic [SlotBits-1:0]            read_slot;
+
+  always_comb begin
+    spare = '0;
+    for (int unsigned s = Slots; s > 0; s--) begin
+      if (!busy_q[s-1]) begin
+        spare = SlotBits'(s - 1);
+      end
+    end
+  end
 
   // ---- requests ---------------------------------------------------------------------------------------
 
@@ -187,7 +214,8 @@ module flk_list_reader #(
   logic [LinesBits-1:0]   c_lines_q, d_lines_q;
 
   for (genvar k = 0; k < Contexts; k++) begin : gen_asks
-    assign asks[k] = valid_q[k] && want_q[k] && 32'(reserved_q[k]) <= Places - ChunkLines;
+    assign asks[k] = valid_q[k] && want_q[k] &&
+                     free_slots_q > (head_q == CtxBits'(k) ? HeldBits'(0) : HeldBits'(2));
   end
 
   // A pointer, else the list that comes first.
@@ -205,9 +233,10 @@ module flk_list_reader #(
   assign choose  = !c_valid_q && !stop && (pick_pointer || asks != '0);
   assign t_asked = choose && pick_pointer;
   assign c_move  = c_valid_q && !d_valid_q;
+  assign take_slot = choose && !pick_pointer;
 
   for (genvar k = 0; k < Contexts; k++) begin : gen_asked
-    assign asked[k] = choose && !pick_pointer && pick == CtxBits'(k);
+    assign asked[k] = take_slot && pick == CtxBits'(k);
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -234,7 +263,7 @@ module flk_list_reader #(
     if (choose) begin
       c_tag_q.pointer <= pick_pointer;
       c_tag_q.which   <= pick_pointer ? WhichBits'({t_writer_q, t_list_q[WordBits-1:0]})
-                         : WhichBits'(pick);
+                         : WhichBits'({spare, pick});
       c_base_q        <= pick_pointer ? pointer_base_i : list_base_i;
       c_offset_q      <= pick_pointer ? OffsetBits'({t_list_q >> WordBits, t_writer_q})
                          : {chunk_q[pick], writer_q[pick], $clog2(ChunkLines)'(0)};
@@ -299,7 +328,7 @@ module flk_list_reader #(
     logic [HeaderCount-1:0] count;
   } header_t;
 
-  logic                   first_q;  // the next beat is a request's first
+  logic [AtBits-1:0]      at_q;  // of the next beat in its request
   logic                   h_valid_q, h_first_q, h_last_q, h_error_q;
   tag_t                   h_tag_q;
   header_t                h_q;
@@ -309,11 +338,11 @@ module flk_list_reader #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      first_q   <= 1'b1;
+      at_q      <= '0;
       h_valid_q <= 1'b0;
     end else begin
       if (beat_valid) begin
-        first_q <= beat_last;
+        at_q <= beat_last ? '0 : at_q + 1'b1;
       end
       h_valid_q <= beat_valid && !stop;
     end
@@ -321,7 +350,7 @@ module flk_list_reader #(
 
   always_ff @(posedge clk_i) begin
     if (beat_valid) begin
-      h_first_q <= first_q;
+      h_first_q <= at_q == '0;
       h_last_q  <= beat_last;
       h_error_q <= beat_error;
       h_tag_q   <= beat_tag;
@@ -399,25 +428,90 @@ module flk_list_reader #(
   logic [EntriesBits+HeaderCount-1:0] out_line;
 
   assign move      = !out_valid_q || out_ready_i;
-  assign give      = valid_q[head_q] && !given_q && (ended_q[head_q] || good_q[head_q] > CountBits'(1));
+  assign give      = valid_q[head_q] && !given_q &&
+                     (ended_q[head_q] || good_q[head_q] > CountBits'(1));
   assign give_last = good_q[head_q] <= CountBits'(1);
   assign read      = give && move && good_q[head_q] != '0;
 
+  // Where the next line lies: of a list that begins, in its first slot.
+  // A list begins; in its first chunk; the last line of its chunk.
+  logic                read_new_q, read_first_q, read_end;
+  logic [SlotBits-1:0] read_slot_q;
+  logic [AtBits-1:0]   read_at_q;
+
+  assign read_slot  = read_new_q ? first_slot_q[head_q] : read_slot_q;
+  assign read_end   = read_at_q == AtBits'(read_first_q ? used_q[head_q] - 1'b1
+                                           : LinesBits'(ChunkLines - 1));
+  assign leave_slot = read && read_end;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      read_new_q   <= 1'b1;
+      read_first_q <= 1'b1;
+      read_at_q    <= '0;
+    end else if (stop || next) begin
+      read_new_q   <= 1'b1;
+      read_first_q <= 1'b1;
+      read_at_q    <= '0;
+    end else if (read) begin
+      read_new_q   <= 1'b0;
+      read_first_q <= read_first_q && !read_end;
+      read_at_q    <= read_end ? '0 : read_at_q + 1'b1;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (read) begin
+      read_slot_q <= read_end ? following_q[read_slot] : read_slot;
+    end
+  end
+
+  // Slots are free when their last line has been read, and all of a list's when it is over.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      busy_q       <= '0;
+      free_slots_q <= HeldBits'(Slots);
+    end else if (stop) begin
+      busy_q       <= '0;
+      free_slots_q <= HeldBits'(Slots);
+    end else begin
+      for (int unsigned s = 0; s < Slots; s++) begin
+        if (take_slot && spare == SlotBits'(s)) begin
+          busy_q[s] <= 1'b1;
+        end else if ((leave_slot && read_slot == SlotBits'(s)) ||
+                     (next && owner_q[s] == head_q)) begin
+          busy_q[s] <= 1'b0;
+        end
+      end
+      free_slots_q <= free_slots_q + (next ? held_q[head_q] : HeldBits'(leave_slot))
+                      - HeldBits'(take_slot);
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (take_slot) begin
+      owner_q[spare] <= pick;
+    end
+    if (take_slot && begun_q[pick]) begin
+      following_q[last_slot_q[pick]] <= spare;
+    end
+  end
+
   flk_sram #(
     .Width(EntriesBits + HeaderCount),
-    .Depth(Contexts * Places)
+    .Depth(Slots * ChunkLines)
   ) i_lines (
     .clk_i,
     .wr_en_i  (write),
-    .wr_addr_i({beat_tag.which[CtxBits-1:0], write_q[beat_tag.which[CtxBits-1:0]]}),
+    .wr_addr_i({beat_tag.which[CtxBits+:SlotBits], at_q}),
     .wr_data_i({beat_data[EntriesBits+:HeaderCount], beat_data[EntriesBits-1:0]}),
     .rd_en_i  (read),
-    .rd_addr_i({head_q, read_q[head_q]}),
+    .rd_addr_i({read_slot, read_at_q}),
     .rd_data_o(out_line)
   );
 
   // All that was asked for must have come before a context is used again.
-  assign next_ready_o = over_q && reserved_q[head_q] == '0;
+  assign next_ready_o = over_q && pending_q[head_q] == '0;
   assign next         = next_valid_i && next_ready_o;
   assign again        = next && next_again_i;
   assign done         = next && !next_again_i;
@@ -453,32 +547,33 @@ module flk_list_reader #(
   // ---- the contexts -------------------------------------------------------------------------------------
 
   for (genvar k = 0; k < Contexts; k++) begin : gen_context
-    logic here, mine, begins, comes, leaves, spoilt, ends, follows;
-    logic [CountBits-1:0] freed;
+    logic here, mine, begins, comes, leaves, ends, follows;
 
     assign here    = load && free_q == CtxBits'(k);                    // a list enters
     assign mine    = head_q == CtxBits'(k);
     assign begins  = here || (again && mine);
     assign comes   = line && h_ctx == CtxBits'(k);
     assign leaves  = read && mine;
-    assign spoilt  = comes && !good;                                   // its place is free again
     assign ends    = comes && !dropped && (wrong || (h_last_q && !h_linked));
     assign follows = comes && good && h_first_q && h_q.linked;
-    assign freed   = CountBits'(leaves) + CountBits'(spoilt);
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
         valid_q[k]    <= 1'b0;
         want_q[k]     <= 1'b0;
         ended_q[k]    <= 1'b0;
-        reserved_q[k] <= '0;
+        pending_q[k]  <= '0;
         good_q[k]     <= '0;
+        held_q[k]     <= '0;
+        begun_q[k]    <= 1'b0;
       end else if (stop) begin
         valid_q[k]    <= 1'b0;
         want_q[k]     <= 1'b0;
         ended_q[k]    <= 1'b0;
-        reserved_q[k] <= '0;
+        pending_q[k]  <= '0;
         good_q[k]     <= '0;
+        held_q[k]     <= '0;
+        begun_q[k]    <= 1'b0;
       end else begin
         if (here) begin
           valid_q[k] <= 1'b1;
@@ -495,7 +590,14 @@ module flk_list_reader #(
           want_q[k]  <= (want_q[k] && !asked[k] && !ends) || follows;
           ended_q[k] <= ended_q[k] || ends;
         end
-        reserved_q[k] <= reserved_q[k] + (asked[k] ? CountBits'(lines_q[k]) : '0) - freed;
+        pending_q[k] <= pending_q[k] + (asked[k] ? PendingBits'(lines_q[k]) : '0)
+                        - PendingBits'(comes);
+        begun_q[k]   <= !begins && (begun_q[k] || asked[k]);
+        if (next && mine) begin
+          held_q[k] <= '0;
+        end else begin
+          held_q[k] <= held_q[k] + HeldBits'(asked[k]) - HeldBits'(leave_slot && mine);
+        end
         if (comes && good && !leaves) begin
           good_q[k] <= good_q[k] + 1'b1;
         end else if (leaves && !(comes && good)) begin
@@ -517,28 +619,25 @@ module flk_list_reader #(
         chunk_q[k] <= h_q.link;
         lines_q[k] <= LinesBits'(ChunkLines);
       end
-      if (begins) begin
-        write_q[k] <= '0;
-      end else if (write && beat_tag.which[CtxBits-1:0] == CtxBits'(k)) begin
-        write_q[k] <= write_q[k] + 1'b1;
+      if (asked[k]) begin
+        last_slot_q[k] <= spare;
       end
-      if (begins) begin
-        read_q[k] <= '0;
-      end else if (leaves) begin
-        read_q[k] <= read_q[k] + 1'b1;
+      if (asked[k] && !begun_q[k]) begin
+        first_slot_q[k] <= spare;
       end
     end
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        32'(reserved_q[k]) <= Places && good_q[k] <= reserved_q[k])
-    else $error("flk_list_reader: more lines than places");
+        asked[k] |-> 32'(pending_q[k]) <= ChunkLines && 32'(free_slots_q) != 0)
+    else $error("flk_list_reader: a chunk without a slot");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        comes && !stop |-> valid_q[k] && reserved_q[k] > good_q[k])
+        comes && !stop |-> valid_q[k] && pending_q[k] != '0)
     else $error("flk_list_reader: a line that nobody asked for");
 
-    assert property (@(posedge clk_i) disable iff (!rst_ni) begins |-> reserved_q[k] == '0)
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        begins && !stop |-> pending_q[k] == '0 && good_q[k] == '0)
     else $error("flk_list_reader: a list begins before the last one's lines are through");
 `endif
   end
@@ -575,6 +674,10 @@ module flk_list_reader #(
                    !h_valid_q && p_empty && valid_q == '0;
 
 `ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      free_slots_q == HeldBits'($countones(~busy_q)))
+  else $error("flk_list_reader: number of free slots");
+
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
   else $error("flk_list_reader: start while lists are under way");
 

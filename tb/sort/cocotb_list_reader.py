@@ -235,18 +235,14 @@ async def clear(dut):
         await reader.start(frame, frame.walk(rng))
         await reader.bench.cycles(rng.choice([1, 3, rng.randrange(60), rng.randrange(600)]))
         dut.clear_i.value = 1
-        if turn % 2:  # what the design is told while it stops is the user's matter
-            dut.rst_ni.value = 1
         await RisingEdge(dut.clk_i)
-        reader.due.clear()
-        reader.plan.clear()
         dut.clear_i.value = 0
-        reader.tiles._queue.clear()
-        reader.next._queue.clear()
-        dut.tile_valid_i.value = dut.next_valid_i.value = 0
         reader.tiles._task.cancel()
         reader.next._task.cancel()
-        await RisingEdge(dut.clk_i)
+        dut.tile_valid_i.value = dut.next_valid_i.value = 0
+        await RisingEdge(dut.clk_i)  # what was taken in the cycle of the clear has been seen
+        reader.due.clear()
+        reader.plan.clear()
         await RisingEdge(dut.clk_i)
         asked = reader.beats.total()
         await reader.bench.until(lambda: int(dut.idle_o.value) == 1, 400, "idle after clear")

@@ -46,6 +46,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_sram_fifo": [MEMORY],
     "flk_delay_ram": [MEMORY],
     "flk_list_writer": [MEMORY],
+    "flk_list_reader": [MEMORY, "flk_axi_read"],
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
@@ -277,7 +278,8 @@ def _front() -> list[Unit]:
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
-        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
+        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
+        unit("flk_preprocessing_core"), unit("flk_preprocessing"),
     ]
 
 
