@@ -273,7 +273,8 @@ module flk_delivery #(
       end
 
 `ifndef SYNTHESIS
-      assert property (@(posedge clk_i) disable iff (!rst_ni) push[c][s] && !stop |-> unused_ready[c][s])
+      assert property (@(posedge clk_i) disable iff (!rst_ni)
+          push[c][s] && !stop |-> unused_ready[c][s])
       else $error("flk_delivery: a record without a place");
 
       assert property (@(posedge clk_i) disable iff (!rst_ni)

@@ -71,6 +71,8 @@ module flk_record_cache #(
   localparam int unsigned WayBits = $clog2(Ways);
   localparam int unsigned KeyBits = LineBits - BankBits - SetBits;
   localparam int unsigned PlaceBits = SetBits + WayBits;
+  localparam int unsigned LowBits = LineBits / 2 + 4;  // of an address, less than a line number's
+  localparam int unsigned HighBits = AddrBits - Shift - LowBits;
 
   if (RecordBits * PerLine != Width || PerLine > 2) begin : gen_check_record
     $error("flk_record_cache: RecordBits must be 128 or 256");
@@ -257,7 +259,7 @@ module flk_record_cache #(
       if (take[c]) begin
         is_kept_q[c] <= 1'b0;
         for (int unsigned o = 0; o < 2; o++) begin
-          if (miss[o] && b_line_q[o][BankBits+SetBits-1:0] == in_line[c][BankBits+SetBits-1:0]) begin
+          if (miss[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]}) begin
             is_kept_q[c] <= 1'b1;
             kept_q[c]    <= row_d[o];
           end
@@ -294,13 +296,15 @@ module flk_record_cache #(
 
   // ---- lines from memory ------------------------------------------------------------------------------
 
-  logic                      unused_full, sent_q, fetch_valid_q, fetch_ready;
+  logic                      unused_full, sent_q, sum_valid_q, sum_move, fetch_valid_q, fetch_ready;
   logic [2:0]                unused_usage;
-  logic [LineBits-1:0]       fetch_line_q;
+  logic [LineBits-1:0]       sum_line_q;
+  logic [LowBits:0]          fetch_low_q;
+  logic [HighBits-1:0]       fetch_high_q;  // without the carry from below
   logic                      beat_valid, beat_error, unused_tag, unused_ready;
   logic                      line_valid, line_pop, line_empty, freed_q;
   logic [Width-1:0]          beat_data, line_data;
-  logic                      fetch_load;
+  logic                      sum_load;
 
   flk_fifo #(
     .Width($bits(missed)),
@@ -320,28 +324,37 @@ module flk_record_cache #(
     .empty_o    (miss_empty)
   );
 
-  // The first channel's line, then the second's.
-  assign fetch_load = miss_valid && (!fetch_valid_q || fetch_ready);
-  assign miss_pop   = fetch_load && (sent_q || !(next[0].valid && next[1].valid));
+  // The first channel's line, then the second's; its address, added up in two halves.
+  assign sum_move = sum_valid_q && (!fetch_valid_q || fetch_ready);
+  assign sum_load = miss_valid && (!sum_valid_q || sum_move);
+  assign miss_pop = sum_load && (sent_q || !(next[0].valid && next[1].valid));
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      sum_valid_q   <= 1'b0;
       fetch_valid_q <= 1'b0;
       sent_q        <= 1'b0;
     end else if (stop) begin
+      sum_valid_q   <= 1'b0;
       fetch_valid_q <= 1'b0;
       sent_q        <= 1'b0;
     end else begin
-      fetch_valid_q <= fetch_load || (fetch_valid_q && !fetch_ready);
-      if (fetch_load) begin
+      sum_valid_q   <= sum_load || (sum_valid_q && !sum_move);
+      fetch_valid_q <= sum_move || (fetch_valid_q && !fetch_ready);
+      if (sum_load) begin
         sent_q <= !miss_pop;
       end
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (fetch_load) begin
-      fetch_line_q <= next[0].valid && !sent_q ? next[0].line : next[1].line;
+    if (sum_load) begin
+      sum_line_q <= next[0].valid && !sent_q ? next[0].line : next[1].line;
+    end
+    if (sum_move) begin
+      fetch_low_q  <= {1'b0, record_base_i[LowBits-1:0]} + (LowBits + 1)'(sum_line_q[LowBits-1:0]);
+      fetch_high_q <= record_base_i[AddrBits-Shift-1:LowBits]
+                      + HighBits'(sum_line_q[LineBits-1:LowBits]);
     end
   end
 
@@ -362,7 +375,7 @@ module flk_record_cache #(
     .idle_o     (fetch_idle),
     .in_valid_i (fetch_valid_q),
     .in_ready_o (fetch_ready),
-    .in_beat_i  (record_base_i + (AddrBits - Shift)'(fetch_line_q)),
+    .in_beat_i  ({fetch_high_q + HighBits'(fetch_low_q[LowBits]), fetch_low_q[LowBits-1:0]}),
     .in_beats_i (2'd1),
     .in_tag_i   (1'b0),
     .in_placed_i(1'b0),
@@ -510,7 +523,8 @@ module flk_record_cache #(
   );
 
   assign error_o = error_q;
-  assign idle_o  = state_q == READY && b_valid_q == '0 && wait_empty && miss_empty && !fetch_valid_q &&
+  assign idle_o  = state_q == READY && b_valid_q == '0 && wait_empty && miss_empty &&
+                   !sum_valid_q && !fetch_valid_q &&
                    fetch_idle && line_empty && d_valid_q == '0;
 
 `ifndef SYNTHESIS
@@ -525,7 +539,8 @@ module flk_record_cache #(
   else $error("flk_record_cache: two elements of a bank");
 
   for (genvar c = 0; c < 2; c++) begin : gen_check
-    assert property (@(posedge clk_i) disable iff (!rst_ni) b_valid_q[c] |-> $onehot0(hits[c]) || b_skip_q[c])
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        b_valid_q[c] && !b_skip_q[c] |-> $onehot0(hits[c]))
     else $error("flk_record_cache: a line in two ways");
   end
 `endif

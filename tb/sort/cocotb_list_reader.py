@@ -13,7 +13,7 @@ from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.list_reader import Line, pointer_line, read_tile
-from flicker.golden.lists import HEADER_AT, writer_columns, write_lists
+from flicker.golden.lists import HEADER_AT, write_lists, writer_columns
 from flicker.sim.memory import Memory, PortConfig
 
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts")]
@@ -91,7 +91,7 @@ class Reader:
         line, tile, reading = self.due.popleft()
         entries, count, last = item
         where = f"tile {tile}, reading {reading}"
-        assert (count, last) == (line.count, line.last), f"{where}: count {count}, last {last}; due {line.count}, {line.last}"
+        assert (count, last) == (line.used, line.last), f"{where}: count {count}, last {last}; due {line.used}, {line.last}"
         assert not count or entries == line.entries, f"{where}: entries {entries:#x}, due {line.entries:#x}"
         if last:
             self.next.send([int(self.plan.popleft())])
@@ -280,13 +280,14 @@ async def faults(dut, stall):
     reader = Reader(dut, stall, stall, latency=9, share=0.2)
     rng = reader.rng
     await reader.bench.reset()
-    kinds = ["used none", "used many", "used high", "chunk", "pool", "memory", "pointer memory", "none", "many", "rest", "link", "link", "rest", "none", "first"]
+    kinds = ["used none", "used many", "used high", "chunk", "pool", "memory", "pointer memory",
+             "none", "many", "rest", "link", "link", "rest", "none", "first"]
     for slot, kind in enumerate(kinds):
         frame = make(reader, 4, 4, sizes_of(rng, 16), slot, aligned=slot % 2 == 0)
         tiles = [t for t in range(16) if frame.read(t % 4, t // 4).requests]
         tile = max(tiles, key=lambda t: len(frame.read(t % 4, t // 4).lines)) if slot % 3 else rng.choice(tiles)
         x, y = tile % 4, tile // 4
-        place = next(i for i in range(len(frame.pointers)) if i // 16 == pointer_line(x, y, 4) and i % 16 == ((y >> 1) * 2 + (x >> 1)) % 16)
+        place = 16 * pointer_line(x, y, 4) + ((y >> 1) * 2 + (x >> 1)) % 16
         lines = [first + k for first, used in frame.read(x, y).requests for k in range(used)]
         if kind == "used none":
             frame.pointers[place] = frame.pointers[place] & 0xFFFFFF | 1

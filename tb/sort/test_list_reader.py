@@ -49,5 +49,6 @@ def test_frame(scene: str, limit: int, tmp_path: Path) -> None:
     file = tmp_path / "lists.npz"
     np.savez(file, memory=lists.memory, pointers=lists.pointers, cols=lists.cols, rows=lists.rows, chunks=lists.chunks)
     build_and_test(
-        "list_readers_bench", "cocotb_list_readers", extra=[Path(__file__).parent / "list_readers_bench.sv"], config={"lists": str(file), "limit": limit}, opt="-O1",
+        "list_readers_bench", "cocotb_list_readers", extra=[Path(__file__).parent / "list_readers_bench.sv"],
+        config={"lists": str(file), "limit": limit}, opt="-O1",
     )

@@ -1,7 +1,7 @@
 """Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads (docs/delivery.md).
 
-An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order of the
-list, tile by tile, and behind them the end of the list. The cache holds lines of 32 bytes; its contents depend on the order of the lookups alone.
+An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order
+of the list, tile by tile, and behind them the end of the list. The cache holds lines of 32 bytes; its contents depend on the order of the lookups alone.
 """
 
 from __future__ import annotations

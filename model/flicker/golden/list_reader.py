@@ -1,7 +1,7 @@
 """Reading of tile lists, bit for bit: what `flk_list_reader` gives for a tile, and the bytes it reads for it (docs/list_reader.md).
 
-A list is read from its newest chunk to its oldest, the lines of a chunk in ascending order; each line is an element with its entries as they lie there. The last
-element is marked; an empty list is one element without entries. A list that breaks the layout ends before the line with the fault.
+A list is read from its newest chunk to its oldest, the lines of a chunk in ascending order; each line is an element with its entries as they lie there.
+The last element is marked; an empty list is one element without entries. A list that breaks the layout ends before the line with the fault.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ CHUNK_BYTES = CHUNK_LINES * LINE_BYTES
 
 
 class Line(NamedTuple):
-    """An element: bits of all nine entries, entries used, last of its list."""
+    """An element: bits of all nine entries, how many are used, last of its list."""
 
     entries: int
-    count: int
+    used: int
     last: bool
 
 
@@ -46,9 +46,9 @@ def read_tile(
 ) -> ReadTile:
     """The list of the tile in column x, row y.
 
-    memory: uint64 (lines, 8), pointers: uint32, as in `ListImage`; chunks: of each writer. fails, pointer_fails: whether the memory answers a line of the lists,
-    of the pointer table, with an error. Faults are all that `read_lists` refuses, but a chunk that belongs to two lists; instead a chain has to go to lower
-    numbers, as writers make it, so that it ends.
+    memory: uint64 (lines, 8), pointers: uint32, as in `ListImage`; chunks: of each writer. fails, pointer_fails: whether the memory answers a line of the
+    lists, of the pointer table, with an error. Faults are all that `read_lists` refuses, but a chunk that belongs to two lists; instead a chain has to go to
+    lower numbers, as writers make it, so that it ends.
     """
     nothing = Line(0, 0, True)
     pointer = int(pointers[int(pointer_place(x + cols * y, cols))])
