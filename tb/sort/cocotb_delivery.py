@@ -166,7 +166,7 @@ class Delivery:
 
     async def run(self, tiles: list[Tile]) -> int:
         self.give(tiles)
-        limit = 4000 + 16 * sum(len(t) + 1 for t in tiles)
+        limit = 4000 + 60 * sum(len(t) + 1 for t in tiles)
         cycles = await self.bench.until(lambda: not any(self.due) and not any(unit.lists for unit in self.units), limit, "last end")
         await self.bench.cycles(3)
         await self.ready()
