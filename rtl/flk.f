@@ -70,6 +70,9 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+sort/flk_delivery.sv
+sort/flk_list_reader.sv
+sort/flk_record_cache.sv
 preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv

@@ -49,6 +49,9 @@ COMPOSED: dict[str, list[str]] = {
     "flk_delay_ram": [MEMORY],
     "flk_list_writer": [MEMORY],
     "flk_frame_writer": [MEMORY, "flk_pixel_out"],
+    "flk_list_reader": [MEMORY, "flk_axi_read"],
+    "flk_record_cache": [MEMORY, "flk_sram_fifo", "flk_axi_fetch"],
+    "flk_delivery": ["flk_record_cache", "flk_sram_fifo"],
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
@@ -286,7 +289,8 @@ def _front() -> list[Unit]:
         unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_pixel_out"), unit("flk_frame_writer"),
-        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
+        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
+        unit("flk_record_cache"), unit("flk_delivery"), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
     ]
 
 

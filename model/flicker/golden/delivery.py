@@ -1,0 +1,54 @@
+"""Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads (docs/delivery.md).
+
+An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order
+of the list, tile by tile, and behind them the end of the list. The cache holds lines of 32 bytes; its contents depend on the order of the lookups alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+CORES, CHANNELS, UNITS = 4, 2, 4
+LINE_BYTES = 32
+END = None  # of a list
+
+
+def channel_of(tile: int) -> int:
+    """The channel that serves the tile of this place in the walk."""
+    return tile % CHANNELS
+
+
+def unit_of(tile: int) -> int:
+    """The sorting unit that gives its entries."""
+    return tile % UNITS
+
+
+def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int) -> list[int | None]:
+    """Record numbers that a core gets, `END` behind each tile's. tiles: sorted entries (record, mask) of each tile of the walk."""
+    out: list[int | None] = []
+    for entries in tiles:
+        out += [record for record, mask in entries if mask >> core & 1]
+        out.append(END)
+    return out
+
+
+class RecordCache:
+    """Lines held. banks, sets (of a bank), ways: powers of two. A line that is not there takes the way whose turn it is in its set: the oldest one goes."""
+
+    def __init__(self, banks: int = 4, sets: int = 64, ways: int = 4, record_bytes: int = 16) -> None:
+        self.banks, self.sets, self.ways, self.per_line = banks, sets, ways, LINE_BYTES // record_bytes
+        self._held: list[list[int | None]] = [[None] * ways for _ in range(banks * sets)]
+        self._turn = [0] * (banks * sets)
+
+    def bank(self, record: int) -> int:
+        return record // self.per_line % self.banks
+
+    def lookup(self, record: int) -> tuple[int, bool]:
+        """The line of a record, and whether it has to be read."""
+        line = record // self.per_line
+        at = line % (self.banks * self.sets)
+        if line in self._held[at]:
+            return line, False
+        self._held[at][self._turn[at]] = line
+        self._turn[at] = (self._turn[at] + 1) % self.ways
+        return line, True

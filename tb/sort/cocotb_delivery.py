@@ -1,0 +1,276 @@
+"""cocotb tests of flk_delivery: what each core gets against flicker.golden.delivery."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import cocotb
+from cocotb.triggers import RisingEdge
+from flicker_tb.axi import MemoryPort
+from flicker_tb.bench import Bench
+
+from flicker.chip.dram import DramConfig
+from flicker.golden.delivery import CORES, END, LINE_BYTES, UNITS, core_records
+from flicker.sim.memory import Memory, PortConfig
+
+BASE, RECORDS = 0x7_6543_2100 // LINE_BYTES * LINE_BYTES, 1 << 12
+Tile = list[tuple[int, int]]
+
+
+class Unit:
+    """What stands for a sorting unit: its tiles' entries, an end behind each; the rest of a list is dropped when finish_o says so."""
+
+    def __init__(self) -> None:
+        self.lists: deque[tuple[int, deque[tuple[int, int]]]] = deque()  # number of the tile, entries left
+        self.offered = False
+
+    @property
+    def item(self) -> tuple[int, int, int]:
+        """End, record, mask."""
+        entries = self.lists[0][1]
+        return (0, *entries[0]) if entries else (1, 0, 0)
+
+    def move(self) -> None:
+        self.offered = False
+        if self.lists[0][1]:
+            self.lists[0][1].popleft()
+        else:
+            self.lists.popleft()
+
+
+class Delivery:
+    """The design with its memory, units and cores. finish: share of the tiles that a core finishes early; pace: of each core, cycles from record to record."""
+
+    def __init__(self, dut, idle="never", stall="never", latency=5, pauses=0.0, finish=0.0, pace=(1, 1, 1, 1), perfect=True):
+        self.dut, self.bench, self.finish, self.pace = dut, Bench(dut), finish, pace
+        rng = self.rng = self.bench.rng
+        self.bytes = len(dut.out_record_o) // 32
+        memory = Memory(DramConfig().timing, perfect)
+        memory.allocate(BASE, RECORDS * self.bytes, rng.getrandbits(30))
+        data = memory.read(BASE, RECORDS * self.bytes)
+        self.data = [int.from_bytes(data[k : k + self.bytes], "little") for k in range(0, len(data), self.bytes)]
+        self.port = MemoryPort(dut, memory, PortConfig(
+            data_bits=256, latency=latency, max_reads=256, max_beats=1, stall={"AR": pauses, "R": pauses}, seed=rng.getrandbits(30),
+        ), writes=False)
+        self.idle = [self.bench.stall(idle) for _ in range(UNITS)]
+        self.stall = [self.bench.stall(stall) for _ in range(CORES)]
+        for name in ("start", "in_valid", "in_end", "in_entry", "out_ready", "finished"):
+            getattr(dut, f"{name}_i").value = 0
+        dut.record_base_i.value = BASE // LINE_BYTES
+        self.reset()
+        cocotb.start_soon(self._run())
+
+    def reset(self) -> None:
+        self.tiles: list[Tile] = []
+        self.units = [Unit() for _ in range(UNITS)]
+        self.due: list[deque[int | None]] = [deque() for _ in range(CORES)]
+        self.tile = [0] * CORES  # that the core is taking
+        self.got = [0] * CORES  # its records
+        self.rest = [0] * CORES  # cycles until it takes the next one
+        self.finished = [False] * CORES
+        self.finishes: list[list[int | None]] = [[] for _ in range(CORES)]  # by tile: records after which the core is finished
+        self.after = [0] * CORES  # records since
+        self.finish_seen = 0
+        self.records = 0
+        self.late = 0
+
+    def give(self, tiles: list[Tile]) -> None:
+        """Tiles of a frame, in the order of the walk."""
+        first = len(self.tiles)
+        assert first % UNITS == 0
+        self.tiles += tiles
+        for k, entries in enumerate(tiles):
+            self.units[k % UNITS].lists.append((first + k, deque(entries)))
+        for s in range(CORES):
+            self.due[s].extend(core_records(tiles, s))
+            self.finishes[s] += [self.rng.choice([0, 0, 1, self.rng.randrange(1, 60)]) if self.rng.random() < self.finish else None for _ in tiles]
+
+    async def _run(self) -> None:
+        dut, edge = self.dut, RisingEdge(self.dut.clk_i)
+        bits, number = 8 * self.bytes, len(dut.in_entry_i) // 4
+        ready = 0
+        told: list[set[int]] = [set() for _ in range(CORES)]
+        while True:
+            await edge
+            if dut.rst_ni.value != 1:
+                continue
+            if dut.r_valid_i.value == 1:
+                assert dut.r_ready_o.value == 1, "the port waits"
+            if not self.tiles:
+                told = [set() for _ in range(CORES)]
+            if dut.clear_i.value == 1:
+                ready = 0
+                continue
+            # Units
+            moved, finish = int(dut.in_ready_o.value), int(dut.finish_o.value)
+            for u, unit in enumerate(self.units):
+                if finish >> u & 1:
+                    assert unit.lists, f"finish_o of unit {u}, which has no list"
+                    tile = unit.lists[0][0]
+                    assert all(tile in told[s] for s in range(CORES)), f"finish_o of unit {u} for tile {tile}"
+                    self.finish_seen += 1
+                if unit.offered and moved >> u & 1:
+                    unit.move()
+                elif finish >> u & 1 and unit.lists:  # the rest of the list is dropped but for what is offered
+                    entries = unit.lists[0][1]
+                    while len(entries) > (1 if unit.offered else 0):
+                        entries.pop()
+                if not unit.offered and unit.lists and not next(self.idle[u]):
+                    unit.offered = True
+            # Cores
+            valid, ends = int(dut.out_valid_o.value), int(dut.out_end_o.value)
+            moved = valid & ready
+            record = int(dut.out_record_o.value) if moved else 0
+            for s in range(CORES):
+                if self.rest[s]:
+                    self.rest[s] -= 1
+                if moved >> s & 1:
+                    self._element(s, bool(ends >> s & 1), record >> bits * s & (1 << bits) - 1)
+                if not self.finished[s] and self.tile[s] < len(self.tiles):
+                    limit = self.finishes[s][self.tile[s]]
+                    self.finished[s] = limit is not None and self.got[s] >= limit
+                if self.finished[s]:
+                    told[s].add(self.tile[s])
+            ready = sum((not self.rest[s] and not next(self.stall[s])) << s for s in range(CORES))
+            dut.out_ready_i.value = ready
+            dut.finished_i.value = sum(f << s for s, f in enumerate(self.finished))
+            items = [unit.item if unit.offered else (self.rng.getrandbits(1), self.rng.getrandbits(number - 4), 15) for unit in self.units]
+            dut.in_valid_i.value = sum(unit.offered << u for u, unit in enumerate(self.units))
+            dut.in_end_i.value = sum(item[0] << u for u, item in enumerate(items))
+            dut.in_entry_i.value = sum((item[1] << 4 | item[2]) << number * u for u, item in enumerate(items))
+
+    def _element(self, s: int, end: bool, record: int) -> None:
+        due = self.due[s]
+        where = f"core {s}, tile {self.tile[s]}, record {self.got[s]}"
+        assert due, f"core {s}: an element too many"
+        if end:
+            if self.finished[s]:
+                while due[0] is not END:
+                    due.popleft()
+            assert due[0] is END, f"{where}: end"
+            due.popleft()
+            self.tile[s], self.got[s], self.finished[s], self.after[s] = self.tile[s] + 1, 0, False, 0
+            return
+        number = due.popleft()
+        assert number is not END, f"{where}: no end"
+        assert record == self.data[number], f"{where}: {record:#x}, due {number}: {self.data[number]:#x}"
+        self.got[s] += 1
+        self.records += 1
+        self.after[s] += self.finished[s]
+        self.late += self.finished[s]
+        assert self.after[s] <= int(self.dut.Queue.value) + 2, f"{where}: {self.after[s]} records since it is finished"
+        self.rest[s] = self.pace[s] - 1
+
+    async def ready(self) -> None:
+        await self.bench.until(lambda: int(self.dut.idle_o.value) == 1, 2000, "idle")
+
+    async def run(self, tiles: list[Tile]) -> int:
+        self.give(tiles)
+        limit = 4000 + 60 * sum(len(t) + 1 for t in tiles)
+        cycles = await self.bench.until(lambda: not any(self.due) and not any(unit.lists for unit in self.units), limit, "last end")
+        await self.bench.cycles(3)
+        await self.ready()
+        return cycles
+
+
+def make(rng, count: int, longest: int = 60) -> list[Tile]:
+    """Lists of tiles that share records with the ones before."""
+    tiles: list[Tile] = []
+    recent = [rng.randrange(RECORDS) for _ in range(100)]
+    for _ in range(count):
+        n = rng.choice([0, 1, rng.randrange(longest), rng.randrange(longest), longest])
+        kind = rng.randrange(4)
+        masks = [15, 1 << rng.randrange(4), 0, 0][kind]
+        tile = [(rng.choice(recent) if rng.random() < 0.7 else rng.randrange(RECORDS), masks or rng.randrange(1, 16)) for _ in range(n)]
+        recent = (recent + [r for r, _ in tile])[-300:]
+        tiles.append(tile)
+    return tiles
+
+
+PATTERNS = [("never", "never", 3, 0.0), ("half", "half", 10, 0.3), ("never", "heavy", 1, 0.0), ("bursts", "never", 80, 0.0), ("rare", "bursts", 20, 0.2)]
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall", "latency", "pauses"), PATTERNS))
+async def tiles(dut, idle, stall, latency, pauses):
+    """Every core gets all its records."""
+    test = Delivery(dut, idle, stall, latency, pauses)
+    await test.bench.reset()
+    await test.ready()
+    await test.run(make(test.rng, 40))
+    assert test.records > 500 and dut.error_o.value == 0
+
+
+FINISHING = [("never", "never", 5, 0.3), ("never", "half", 40, 0.9), ("half", "never", 10, 0.97), ("rare", "bursts", 1, 0.6)]
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall", "latency", "share"), FINISHING))
+async def finishing(dut, idle, stall, latency, share):
+    """Cores finish early: what they get is the beginning of their list."""
+    test = Delivery(dut, idle, stall, latency, finish=share)
+    await test.bench.reset()
+    await test.ready()
+    await test.run(make(test.rng, 60, 200))
+    assert test.records > 200 and (share < 0.9 or test.finish_seen)
+
+
+@cocotb.test()
+@cocotb.parametrize(slow=[0, 3])
+async def pace(dut, slow):
+    """One core takes a record every eight cycles: the others go on until they are a tile ahead."""
+    test = Delivery(dut, pace=tuple(8 if s == slow else 1 for s in range(CORES)), finish=0.1)
+    await test.bench.reset()
+    await test.ready()
+    await test.run(make(test.rng, 12, 120))
+
+
+@cocotb.test()
+async def all_finished(dut):
+    """All cores finished with their tiles at once: of long lists no more is looked up than the queues of a core that is not there yet hold."""
+    test = Delivery(dut, latency=30)
+    await test.bench.reset()
+    await test.ready()
+    lists = [[(test.rng.randrange(RECORDS), 15) for _ in range(300)] for _ in range(8)]
+    test.finish = 1.0
+    test.rng.choice = lambda _: 0
+    await test.run(lists)
+    assert int(dut.lines_o.value) < 8 * 68, f"{int(dut.lines_o.value)} lines"
+    assert test.finish_seen >= 8
+
+
+@cocotb.test()
+async def rate(dut):
+    """Two entries a cycle, nearly, for cores that take all; records in the cache."""
+    test = Delivery(dut)
+    await test.bench.reset()
+    await test.ready()
+    # Entries of one core each, in turn, and lines of different banks.
+    lists = [[((2 * k + t % 2) % 64 * 2, 1 << k % 4) for k in range(400)] for t in range(8)]
+    await test.run(lists[:4])
+    cycles = await test.run(lists)
+    assert cycles < 8 * 400 * 0.55 + 100, f"{cycles} cycles"
+
+
+@cocotb.test()
+async def clear(dut):
+    """Clear at any time; the next frame is right."""
+    test = Delivery(dut, "rare", "rare", 30, 0.1, finish=0.3)
+    await test.bench.reset()
+    await test.ready()
+    for turn in range(10):
+        test.give(make(test.rng, 16))
+        await test.bench.cycles(test.rng.randrange(20, 400))
+        dut.clear_i.value = 1
+        await RisingEdge(dut.clk_i)
+        dut.clear_i.value = 0
+        for name in ("in_valid", "out_ready", "finished"):
+            getattr(dut, f"{name}_i").value = 0
+        test.reset()
+        await RisingEdge(dut.clk_i)
+        test.stall, stall = [iter(lambda: True, None)] * CORES, test.stall
+        await test.ready()
+        assert test.port.port.idle
+        test.stall = stall
+        if turn % 3 == 0:
+            await test.run(make(test.rng, 16))

@@ -1,0 +1,249 @@
+"""cocotb tests of flk_record_cache: records against the bytes in memory, requests against flicker.golden.delivery."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import cocotb
+from cocotb.triggers import RisingEdge
+from flicker_tb.axi import MemoryPort
+from flicker_tb.bench import Bench
+
+from flicker.chip.dram import DramConfig
+from flicker.golden.delivery import LINE_BYTES, RecordCache
+from flicker.sim.memory import Memory, PortConfig
+
+BASE, RECORDS = 0x1_2345_6780, 1 << 13
+Element = tuple[int, int, int]  # skip, record, tag
+
+
+class Cache:
+    """The design with its memory; `queue`: elements for each channel."""
+
+    def __init__(self, dut, idle: str = "never", latency: int = 5, pauses: float = 0.0, perfect: bool = True, fail: int | None = None):
+        self.dut, self.bench = dut, Bench(dut)
+        self.bytes = len(dut.out_record_o) // 16
+        rng = self.rng = self.bench.rng
+        self.base = BASE // LINE_BYTES * LINE_BYTES
+        memory = Memory(DramConfig().timing, perfect)
+        memory.allocate(self.base, RECORDS * self.bytes, rng.getrandbits(30))
+        self.data = memory.read(self.base, RECORDS * self.bytes)
+        self.port = MemoryPort(dut, memory, PortConfig(
+            data_bits=256, latency=latency, max_reads=256, max_beats=1, stall={"AR": pauses, "R": pauses}, run={"AR": 4, "R": 3}, seed=rng.getrandbits(30),
+        ), writes=False)
+        if fail is not None:
+            self.port.port.fail_range(self.base + fail * LINE_BYTES, 1)
+        size = {name: int(getattr(dut, name).value) for name in ("Banks", "Sets", "Ways")}
+        self.model = lambda: RecordCache(size["Banks"], size["Sets"], size["Ways"], self.bytes)
+        self.golden = self.model()
+        self.idle = [self.bench.stall(idle) for _ in range(2)]
+        self.queue: list[deque[Element]] = [deque(), deque()]
+        self.due: list[deque[Element]] = [deque(), deque()]
+        self.lines: deque[int] = deque()  # to be asked for
+        self.asked = self.taken = self.hits = 0
+        dut.start_i.value = dut.in_valid_i.value = 0
+        dut.record_base_i.value = self.base // LINE_BYTES
+        cocotb.start_soon(self._run())
+
+    async def _run(self) -> None:
+        dut, edge = self.dut, RisingEdge(self.dut.clk_i)
+        tag_bits, number_bits = len(dut.in_tag_i) // 2, len(dut.in_record_i) // 2
+        offered = 0
+        while True:
+            await edge
+            if dut.rst_ni.value != 1:
+                continue
+            self._requests()
+            self._outputs(tag_bits)
+            moved = offered & int(dut.in_ready_o.value)
+            stopped = int(dut.start_i.value) | int(dut.clear_i.value)
+            for c in range(2):
+                if moved >> c & 1:
+                    skip, record, tag = self.queue[c].popleft()
+                    if stopped:
+                        continue
+                    self.taken += 1
+                    self.due[c].append((skip, record, tag))
+                    if not skip:
+                        line, miss = self.golden.lookup(record)
+                        self.hits += not miss
+                        if miss:
+                            self.lines.append(line)
+            if stopped:
+                self.forget()
+            offered = sum((bool(self.queue[c]) and ((offered & ~moved) >> c & 1 or not next(self.idle[c]))) << c for c in range(2))
+            heads = [self.queue[c][0] if offered >> c & 1 else (self.rng.getrandbits(1), self.rng.getrandbits(number_bits), 0) for c in range(2)]
+            dut.in_valid_i.value = offered
+            dut.in_skip_i.value = sum(heads[c][0] << c for c in range(2))
+            dut.in_record_i.value = sum(heads[c][1] << number_bits * c for c in range(2))
+            dut.in_tag_i.value = sum(heads[c][2] << tag_bits * c for c in range(2))
+
+    def forget(self) -> None:
+        self.golden = self.model()
+        for c in range(2):
+            self.due[c].clear()
+        self.lines.clear()
+        self.asked = 0
+
+    def _requests(self) -> None:
+        dut = self.dut
+        if dut.ar_valid_o.value == 1 and dut.ar_ready_i.value == 1:
+            assert int(dut.ar_len_o.value) == 0
+            if self.watching:
+                assert self.lines, "a line that nobody needs"
+                line = self.lines.popleft()
+                assert int(dut.ar_addr_o.value) == self.base + line * LINE_BYTES, f"line {(int(dut.ar_addr_o.value) - self.base) // LINE_BYTES}, due {line}"
+                self.asked += 1
+        if dut.r_valid_i.value == 1:
+            assert dut.r_ready_o.value == 1, "the port waits"
+
+    watching = True
+    wrong = False  # data may be: errors
+
+    def _outputs(self, tag_bits: int) -> None:
+        dut = self.dut
+        valid = int(dut.out_valid_o.value)
+        for c in range(2):
+            if valid >> c & 1:
+                assert self.due[c], f"channel {c}: an element too many"
+                skip, record, tag = self.due[c].popleft()
+                got = int(dut.out_tag_o.value) >> tag_bits * c & (1 << tag_bits) - 1
+                assert got == tag, f"channel {c}: tag {got}, due {tag}"
+                if not skip and not self.wrong:
+                    data = int(dut.out_record_o.value) >> 8 * self.bytes * c & (1 << 8 * self.bytes) - 1
+                    want = int.from_bytes(self.data[record * self.bytes : (record + 1) * self.bytes], "little")
+                    assert data == want, f"channel {c}: record {record}: {data:#x}, due {want:#x}"
+
+    async def ready(self) -> None:
+        await self.bench.until(lambda: int(self.dut.idle_o.value) == 1, 2000, "idle")
+
+    async def through(self, limit: int = 60_000) -> int:
+        cycles = await self.bench.until(lambda: not any(self.queue) and not any(self.due), limit, "last record")
+        await self.bench.cycles(4)
+        await self.ready()
+        assert not self.lines and int(self.dut.lines_o.value) == self.asked
+        return cycles
+
+
+def elements(rng, count: int, tag_bits: int) -> list[Element]:
+    """Runs of records: one line, one set, neighbours, anywhere; some again soon."""
+    out: list[int] = []
+    while len(out) < count:
+        first, n = rng.randrange(RECORDS), rng.randrange(1, 20)
+        kind = rng.randrange(5)
+        if kind == 0:
+            out += [first ^ rng.getrandbits(1) for _ in range(n)]
+        elif kind == 1:
+            out += [(first + 512 * rng.randrange(16)) % RECORDS for _ in range(n)]
+        elif kind == 2:
+            out += [(first + k) % RECORDS for k in range(n)]
+        elif kind == 3 and out:
+            out += [rng.choice(out[-100:]) for _ in range(2 * n)]
+        else:
+            out += [rng.randrange(RECORDS) for _ in range(n)]
+    return [(int(rng.random() < 0.05), record, rng.getrandbits(tag_bits)) for record in out[:count]]
+
+
+def fill(cache: Cache, count: int) -> None:
+    bits = len(cache.dut.in_tag_i) // 2
+    one = elements(cache.rng, count, bits)
+    cache.queue[0].extend(one)
+    # The other channel wants much of the same, a little later or earlier.
+    other = elements(cache.rng, count // 2, bits)
+    for k in range(0, count, 10):
+        other[k % len(other) : k % len(other)] = one[k : k + 5]
+    cache.queue[1].extend(other)
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "pauses", "latency"), [("never", 0.0, 1), ("half", 0.4, 10), ("never", 0.0, 100), ("bursts", 0.2, 30), ("heavy", 0.0, 3)]))
+async def records(dut, idle, pauses, latency):
+    """Both channels."""
+    cache = Cache(dut, idle, latency, pauses)
+    await cache.bench.reset()
+    await cache.ready()
+    fill(cache, 1500)
+    await cache.through()
+    assert cache.hits > 100
+
+
+@cocotb.test()
+async def rate(dut):
+    """Lookups that hit: two a cycle, but for those of one bank."""
+    cache = Cache(dut)
+    await cache.bench.reset()
+    await cache.ready()
+    step = 32 // cache.bytes
+    banks = int(dut.Banks.value)
+    warm = [(0, step * k, 0) for k in range(banks)]
+    cache.queue[0].extend(warm)
+    await cache.through()
+    for shift, limit in ((1, 1.05), (0, 2.05)):
+        for c in range(2):
+            cache.queue[c].extend((0, step * ((k + shift * c) % banks), k % 4) for k in range(400))
+        cycles = await cache.through()
+        assert cycles < 400 * limit + 20, f"{cycles} cycles"
+
+
+@cocotb.test()
+async def dram(dut):
+    """DRAM timing."""
+    cache = Cache(dut, "rare", 30, perfect=False)
+    await cache.bench.reset()
+    await cache.ready()
+    fill(cache, 800)
+    await cache.through()
+
+
+@cocotb.test()
+async def stops(dut):
+    """start_i when idle, clear_i at any time: nothing is in the cache afterwards, nothing of before comes."""
+    cache = Cache(dut, "rare", 40, 0.1)
+    rng = cache.rng
+    await cache.bench.reset()
+    await cache.ready()
+    for turn in range(12):
+        fill(cache, rng.choice([10, 100, 300]))
+        if turn % 3 == 0:
+            await cache.through()
+            dut.start_i.value = 1
+        else:
+            await cache.bench.cycles(rng.randrange(250))
+            dut.clear_i.value = 1
+            for queue in cache.queue:
+                while len(queue) > 1:
+                    queue.pop()
+        cache.watching = False
+        await RisingEdge(dut.clk_i)
+        dut.start_i.value = dut.clear_i.value = 0
+        await RisingEdge(dut.clk_i)
+        assert dut.idle_o.value == 0
+        for queue in cache.queue:
+            queue.clear()
+        await cache.bench.until(lambda: int(dut.idle_o.value) == 1, 3000, "idle")
+        assert cache.port.port.idle
+        cache.forget()
+        cache.watching = True
+    fill(cache, 200)
+    await cache.through()
+
+
+@cocotb.test()
+async def errors(dut):
+    """An error of the memory is told until the next start, and nothing hangs."""
+    cache = Cache(dut, latency=10, fail=5)
+    cache.wrong = True
+    await cache.bench.reset()
+    await cache.ready()
+    per = 32 // cache.bytes
+    cache.queue[0].extend((0, per * k, 0) for k in range(5))
+    await cache.through()
+    assert dut.error_o.value == 0
+    cache.queue[1].extend((0, per * k, 0) for k in range(8))
+    await cache.through()
+    assert dut.error_o.value == 1
+    dut.start_i.value = 1
+    await RisingEdge(dut.clk_i)
+    dut.start_i.value = 0
+    await cache.bench.cycles(2)
+    assert dut.error_o.value == 0

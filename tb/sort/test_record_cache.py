@@ -1,0 +1,25 @@
+"""Record cache: records of both channels in order, and exactly the lines read that the golden model says for the order of the lookups.
+
+State space: records of one line, of one set, near each other and anywhere; ends between them; both channels in one bank; idle patterns on each channel,
+memory with and without pauses, latency 1 to 100; errors; start and clear at any time. Parameter space: the default, a small cache with short queues, records
+of 32 bytes.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test, refused
+
+SMALL = {"Banks": 2, "Sets": 4, "Ways": 2, "Depth": 8, "Places": 4}
+
+
+@pytest.mark.parametrize("parameters", [{}, SMALL, {"RecordBits": 256, "Sets": 16}])
+def test_record_cache(parameters: dict[str, int]) -> None:
+    tests = [] if parameters in ({}, SMALL) else ["records"]
+    build_and_test("flk_record_cache", "cocotb_record_cache", parameters=parameters, tests=tests)
+
+
+@pytest.mark.parametrize(("parameters", "message"), [({"RecordBits": 96}, "RecordBits must be 128 or 256"), ({"Ways": 3}, "must be powers of two")])
+def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
+    with refused(message):
+        build_and_test("flk_record_cache", "cocotb_record_cache", parameters=parameters)
