@@ -12,8 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pyosys
 import numpy as np
+import pyosys
 import pytest
 
 from flicker.cost.synth import run

@@ -278,18 +278,20 @@ module flk_frame_writer
   // ---- bytes become bursts of 32 ----------------------------------------------------------------
 
   // RGB8: groups of 12 bytes; the third, the sixth and the last fill a burst, what is over goes into the next one.
-  mark_t         now;
+  logic [2:0]          now_group;
+  logic [HalfBits-1:0] now_half;
+  logic                unused_carry;
   logic          now_valid, fills, burst_valid_q, burst_last_q;
   logic [4:0]    at;
   logic [351:0]  wide;
   logic [255:0]  held, held_q, burst_q;
   logic [HalfBits-1:0] burst_half_q;
 
-  assign now       = mark_q[STAGES-1];
+  assign {now_group, unused_carry, now_half} = mark_q[STAGES-1];
   assign now_valid = valid_q[STAGES-1];
 
   always_comb begin
-    unique case (now.group)
+    unique case (now_group)
       3'd0: at = 5'd0;
       3'd1: at = 5'd12;
       3'd2: at = 5'd24;
@@ -301,10 +303,10 @@ module flk_frame_writer
     endcase
   end
 
-  assign held = now.group == '0 ? '0 : held_q;
+  assign held = now_group == '0 ? '0 : held_q;
   assign wide = 352'(rgb) << {at, 3'b0} | 352'(held);
 
-  assign fills = rgba_i || now.group == 3'd2 || now.group == 3'd5 || (&now.group);
+  assign fills = rgba_i || now_group == 3'd2 || now_group == 3'd5 || (&now_group);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -319,8 +321,8 @@ module flk_frame_writer
   always_ff @(posedge clk_i) begin
     if (en) begin
       burst_q      <= rgba_i ? rgba : wide[255:0];
-      burst_last_q <= &now.group;
-      burst_half_q <= now.half;
+      burst_last_q <= &now_group;
+      burst_half_q <= now_half;
       if (now_valid) begin
         held_q <= fills ? 256'(wide[351:256]) : wide[255:0];
       end

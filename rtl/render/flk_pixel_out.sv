@@ -46,6 +46,7 @@ module flk_pixel_out
     logic                 negative;
     logic [FracBits+8:0]  own_q, behind_q;  // 255 colour, transmittance times background
     logic [SumBits-1:0]   sum;
+    logic                 unused_rest;
     logic [7:0]           byte_q;
 
     flk_fp_to_fixed #(
@@ -58,6 +59,8 @@ module flk_pixel_out
     );
 
     assign sum = SumBits'(own_q) + SumBits'(behind_q) + SumBits'(1 << (FracBits - 1));
+
+    assign unused_rest = ^sum[FracBits-1:0];
 
     always_ff @(posedge clk_i) begin
       if (en_i) begin

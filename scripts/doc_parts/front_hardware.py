@@ -53,7 +53,8 @@ def tables(say: Say) -> dict[str, str]:
                         f"{64 * sum(c.read_beats + c.write_beats for c in rtl.traffic.values()) / 1e6:.2f}"))
     return {
         "cycles": table(
-            ["view", "memory", "Gaussians", "list entries", "cycles", "of the memory's peak rate", "chip model", "off by", "simulated cycles a second of processor time"], rows,
+            ["view", "memory", "Gaussians", "list entries", "cycles", "of the memory's peak rate", "chip model", "off by",
+             "simulated cycles a second of processor time"], rows,
         ),
         "traffic": table(["view, MB", *PURPOSES, "all"], traffic),
     }

@@ -286,7 +286,8 @@ def phases(units: UnitCycles, beats: Sequence[Beats], dram: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Preprocessing:
-    """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each alone; cycles: of both together."""
+    """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each
+    alone; cycles: of both together."""
 
     beats: Sequence[Beats]
     used: dict[str, int]

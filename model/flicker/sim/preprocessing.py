@@ -183,8 +183,8 @@ def _library(path: Path) -> ctypes.CDLL:
 
 @dataclass(frozen=True)
 class MemoryOptions:
-    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error; mended: no longer in the last
-    frame."""
+    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error; mended: no
+    longer in the last frame."""
 
     timing: Timing | None = None
     ports: Mapping[str, PortConfig] = field(default_factory=dict)
