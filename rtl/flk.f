@@ -68,6 +68,9 @@ render/flk_stage_control.sv
 render/flk_vru.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
+sort/flk_sort_merge.sv
+sort/flk_sort_runs.sv
+sort/flk_sorting_unit.sv
 preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv
