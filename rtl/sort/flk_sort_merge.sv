@@ -22,7 +22,7 @@ module flk_sort_merge #(
   parameter  int unsigned Depth       = Run,  // entries of a memory: Run, 2 Run, 4 Run, ...
   parameter  int unsigned KeyBits     = 48,
   parameter  int unsigned PayloadBits = 4,
-  parameter  int unsigned Lists       = 4,
+  parameter  int unsigned Lists       = 8,
   parameter  bit          Select      = 1'b0,
   localparam int unsigned EntryBits   = KeyBits + PayloadBits
 ) (

@@ -22,7 +22,7 @@
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,
   parameter  int unsigned Stages      = 7,
-  parameter  int unsigned Lists       = 4,  // whole lists waiting in a step, at most
+  parameter  int unsigned Lists       = 8,  // whole lists waiting in a step, at most
   parameter  int unsigned LineEntries = 9,
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
