@@ -5,7 +5,7 @@
 // heads leaves, by the upper KeyBits (unsigned). A run without a second leaves as it is, once the
 // list's end or in_flag_i with one of its entries says that none comes; out_flag_o says the same of
 // the output's runs. Behind the list that leaves up to Lists whole lists and the one that arrives wait.
-// Throughput: an entry a cycle. Latency: an entry is at its memory's output two cycles after it was
+// Throughput: an entry a cycle. Latency: an entry is at its side's head three cycles after it was
 // taken. Handshakes: in_ready_o comes from registers; out_valid_o from registers, drop_i and closed_i;
 // out_ready_i reaches the memories' read ports. clear_i (synchronous) empties it.
 // drop_i: what there is of the list that leaves is left out, its end leaves; drop_o: what arrives at
@@ -74,14 +74,16 @@ module flk_sort_merge #(
   typedef enum logic [1:0] {NONE, COUNT, MOVE} cut_e;
 
   // A is 0, B is 1.
-  place_t [1:0]              head_at_q, head_next, head_passed;  // of the entry that stands at the memory's output or is to be read next
-  place_t [1:0]              head_at_d, write_at_d, write_at_q, limit_at_d, limit_at_q;  // limit: behind the present run
-  logic   [1:0]              head_valid_d, head_valid_q;
-  logic   [1:0][EntryBits-1:0] head;
-  logic   [1:0]              at_limit, at_end, over, there, chosen, pop, fetch, write;
+  place_t [1:0] head_at_d, head_at_q, head_passed;  // of the head, or of what becomes it
+  place_t [1:0] fetch_at_d, fetch_at_q;             // of what is read next
+  place_t [1:0] write_at_d, write_at_q;
+  place_t [1:0] limit_at_d, limit_at_q;             // behind the present run
+  logic   [1:0] head_valid_d, head_valid_q, read_valid_d, read_valid_q;
+  logic   [1:0][EntryBits-1:0] head_q, read;        // the head; behind it the memory's read register
+  logic   [1:0]              at_limit, at_end, over, pop, load, fetch, write;
   logic                      complete, finish_pop, finish_ready, finish_empty;
   finish_t                   finish;
-  logic                      pair_done, list_done, less, may, drop;
+  logic                      pair_done, list_done, less, prefer_b, may, can, move, drop;
   cut_e                      cut_d, cut_q;
   logic [RunBits-1:0]        counted_d, counted_q;
   logic                      counted_all, begins;
@@ -152,7 +154,7 @@ module flk_sort_merge #(
 
     if (Select && s == 0) begin : gen_back
       assign write_data = cut_q == MOVE ? out_entry_o : in_entry_i;
-      assign write[s]   = (take && !side_q) || (cut_q == MOVE && pop != '0);
+      assign write[s]   = (take && !side_q) || (cut_q == MOVE && move);
     end else begin : gen_in
       assign write_data = in_entry_i;
       assign write[s]   = take && side_q == 1'(s);
@@ -167,14 +169,20 @@ module flk_sort_merge #(
       .wr_addr_i(write_at_q[s][SlotBits-1:0]),
       .wr_data_i(write_data),
       .rd_en_i  (fetch[s]),
-      .rd_addr_i(head_next[s][SlotBits-1:0]),
-      .rd_data_o(head[s])
+      .rd_addr_i(fetch_at_q[s][SlotBits-1:0]),
+      .rd_data_o(read[s])
     );
 
     // A word that is written in this cycle is not there yet.
     assign head_passed[s] = head_at_q[s] + 1'b1;
-    assign head_next[s]   = head_valid_q[s] ? head_passed[s] : head_at_q[s];
-    assign fetch[s]       = write_at_q[s] != head_next[s] && (!head_valid_q[s] || pop[s]);
+    assign load[s]        = read_valid_q[s] && (!head_valid_q[s] || pop[s]);
+    assign fetch[s]       = write_at_q[s] != fetch_at_q[s] && (!read_valid_q[s] || load[s]);
+
+    always_ff @(posedge clk_i) begin
+      if (load[s]) begin
+        head_q[s] <= read[s];
+      end
+    end
 
     assign at_limit[s] = head_at_q[s] == limit_at_q[s];
     assign at_end[s]   = complete && head_at_q[s] == finish.place[s];
@@ -185,27 +193,23 @@ module flk_sort_merge #(
   // Both runs have left: the next two begin in the same cycle. over: the run has left, or there is none.
   assign pair_done = at_limit == '1;
   assign list_done = at_end == '1;
+  assign less      = head_q[1][EntryBits-1:PayloadBits] < head_q[0][EntryBits-1:PayloadBits];
   assign over[0]   = at_end[0] || (at_limit[0] && !pair_done);
   assign over[1]   = at_end[1] || (at_limit[1] && !pair_done) || (!complete && only_q);
-  assign there     = head_valid_q & ~over;
-  assign less      = head[1][EntryBits-1:PayloadBits] < head[0][EntryBits-1:PayloadBits];
-  assign chosen[0] = there[0] && (over[1] || (there[1] && !less));
-  assign chosen[1] = there[1] && (over[0] || (there[0] && less));
   assign may       = !Select || complete || closed_i;
   assign drop      = drop_i && !list_done && (!Select || cut_q == NONE);
 
-  always_comb begin
-    if (Select && cut_q != NONE) begin
-      pop = cut_q == MOVE && pair_done ? '0 : chosen;
-    end else begin
-      pop = chosen & {2{may && !drop && out_ready_i}};
-    end
-  end
+  // What does not wait for the comparison: there is an entry to choose, and it is taken.
+  assign can       = (head_valid_q | over) == '1 && over != '1;
+  assign prefer_b  = over[0] || (less && !over[1]);
+  assign move      = can && (Select && cut_q != NONE ? cut_q == COUNT || !pair_done
+                                                     : may && !drop && out_ready_i);
+  assign pop       = {move && prefer_b, move && !prefer_b};
 
   assign finish_pop  = list_done && out_ready_i;
-  assign out_valid_o = (!Select || cut_q == NONE) && (list_done || (chosen != '0 && may && !drop));
+  assign out_valid_o = (!Select || cut_q == NONE) && (list_done || (can && may && !drop));
   assign out_end_o   = list_done;
-  assign out_entry_o = chosen[1] ? head[1] : head[0];
+  assign out_entry_o = prefer_b ? head_q[1] : head_q[0];
 
   // B had nothing of this list.
   logic second_d, second_q;
@@ -218,14 +222,14 @@ module flk_sort_merge #(
 
   assign begins      = Select && cut_q == NONE && cut_i && !closed_i && !drop_i && !complete &&
                        write_at_q == limit_at_q;
-  assign counted_all = Select && cut_q == COUNT && pop != '0 && counted_q == '1;
+  assign counted_all = Select && cut_q == COUNT && move && counted_q == '1;
   assign busy_o      = Select && cut_q != NONE;
   assign limit_o     = counted_all;
   assign done_o      = Select && cut_q == MOVE && pair_done;
 
   always_comb begin
     cut_d     = cut_q;
-    counted_d = cut_q == COUNT && pop != '0 ? counted_q + 1'b1 : counted_q;
+    counted_d = cut_q == COUNT && move ? counted_q + 1'b1 : counted_q;
     if (begins) begin
       cut_d     = COUNT;
       counted_d = '0;
@@ -241,11 +245,15 @@ module flk_sort_merge #(
   always_comb begin
     for (int unsigned s = 0; s < 2; s++) begin
       head_at_d[s]    = pop[s] ? head_passed[s] : head_at_q[s];
-      head_valid_d[s] = fetch[s] || (head_valid_q[s] && !pop[s]);
+      fetch_at_d[s]   = fetch[s] ? fetch_at_q[s] + 1'b1 : fetch_at_q[s];
+      read_valid_d[s] = fetch[s] || (read_valid_q[s] && !load[s]);
+      head_valid_d[s] = load[s] || (head_valid_q[s] && !pop[s]);
       write_at_d[s]   = write[s] ? write_at_q[s] + 1'b1 : write_at_q[s];
       limit_at_d[s]   = limit_at_q[s];
       if (drop) begin
         head_at_d[s]    = complete ? finish.place[s] : write_at_q[s];
+        fetch_at_d[s]   = head_at_d[s];
+        read_valid_d[s] = 1'b0;
         head_valid_d[s] = 1'b0;
       end
       if (finish_pop) begin
@@ -256,12 +264,16 @@ module flk_sort_merge #(
       if (counted_all) begin
         // Back to the run's beginning; what was not counted is no more.
         head_at_d[s]    = limit_at_q[s] - place_t'(Run);
+        fetch_at_d[s]   = head_at_d[s];
+        read_valid_d[s] = 1'b0;
         head_valid_d[s] = 1'b0;
         limit_at_d[s]   = pop[s] ? head_passed[s] : head_at_q[s];
         write_at_d[s]   = pop[s] ? head_passed[s] : head_at_q[s];
       end
       if (clear_i) begin
         head_at_d[s]    = '0;
+        fetch_at_d[s]   = '0;
+        read_valid_d[s] = 1'b0;
         head_valid_d[s] = 1'b0;
         write_at_d[s]   = '0;
         limit_at_d[s]   = place_t'(Run);
@@ -275,6 +287,8 @@ module flk_sort_merge #(
       taken_q      <= '0;
       only_q       <= 1'b0;
       head_at_q    <= '0;
+      fetch_at_q   <= '0;
+      read_valid_q <= '0;
       head_valid_q <= '0;
       write_at_q   <= '0;
       limit_at_q   <= {2{place_t'(Run)}};
@@ -286,6 +300,8 @@ module flk_sort_merge #(
       taken_q      <= taken_d;
       only_q       <= only_d;
       head_at_q    <= head_at_d;
+      fetch_at_q   <= fetch_at_d;
+      read_valid_q <= read_valid_d;
       head_valid_q <= head_valid_d;
       write_at_q   <= write_at_d;
       limit_at_q   <= limit_at_d;
@@ -305,7 +321,7 @@ module flk_sort_merge #(
     assert property (@(posedge clk_i) disable iff (!rst_ni) 32'(held) <= Depth)
     else $error("flk_sort_merge: more entries than Depth");
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        fetch[s] && write[s] |-> write_at_q[s][SlotBits-1:0] != head_next[s][SlotBits-1:0])
+        fetch[s] && write[s] |-> write_at_q[s][SlotBits-1:0] != fetch_at_q[s][SlotBits-1:0])
     else $error("flk_sort_merge: read where it is written");
   end
 `endif

@@ -371,7 +371,7 @@ module flk_sorting_unit #(
   // ---- counters -------------------------------------------------------------------------------------
 
   // Taken: what a reading has at its end, and what a finished list is not asked for in its first reading.
-  logic [15:0] more_taken;
+  logic [15:0] more_taken, more_taken_q;
   logic [16:0] taken_low_d;
   logic [15:0] taken_low_q, taken_high_q, less_low_q, less_high_q;
   logic        carry_q, borrow_q;
@@ -386,10 +386,11 @@ module flk_sorting_unit #(
     end
   end
 
-  assign taken_low_d = {1'b0, taken_low_q} + 17'(more_taken);
+  assign taken_low_d = {1'b0, taken_low_q} + 17'(more_taken_q);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      more_taken_q <= '0;
       taken_low_q  <= '0;
       carry_q      <= 1'b0;
       taken_high_q <= '0;
@@ -397,12 +398,14 @@ module flk_sorting_unit #(
       borrow_q     <= 1'b0;
       less_high_q  <= '0;
     end else begin
+      more_taken_q            <= more_taken;
       taken_low_q             <= taken_low_d[15:0];
       carry_q                 <= taken_low_d[16];
       taken_high_q            <= taken_high_q + 16'(carry_q);
       {borrow_q, less_low_q}  <= {1'b0, taken_low_q} - {1'b0, delivered[15:0]};
       less_high_q             <= taken_high_q - delivered[31:16] - 16'(borrow_q);
       if (start_i || clear_i) begin
+        more_taken_q <= '0;
         taken_low_q  <= '0;
         carry_q      <= 1'b0;
         taken_high_q <= '0;

@@ -129,6 +129,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
         "flk_projection": ["width_i[12]", "height_i[12]"],
+        # Only the last step selects.
+        "flk_sort_merge": [] if parameters.get("Select", 0) else ["closed_i[0]", "cut_i[0]"],
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
