@@ -1,6 +1,6 @@
-// flk_sort_merge: what goes into one of its two memories leaves once, unchanged and in order (fv_stream),
-// for lists of any lengths and any stalls; entries leave only when there are any; a list's end leaves when
-// all entries before it have left. Without drop_i and selection.
+// flk_sort_merge: what goes into one of its two memories leaves once, unchanged and in order,
+// for lists of any lengths and any stalls; nothing leaves that is not inside, and one entry at a time.
+// Without drop_i and selection.
 //
 // The assertions l_* link registers and chosen element, which induction needs.
 module fv_sort_merge #(
@@ -63,24 +63,35 @@ module fv_sort_merge #(
   assign offered = out_valid && !out_end && dut.prefer_b == 1'(Side);
   assign leaves  = dut.pop[Side];
 
-  fv_stream #(
-    .Width   (Bits),
-    .Capacity(Run)
-  ) i_stream (
-    .clk_i,
-    .rst_ni     (rst_n),
-    .clear_i,
-    .pick_i,
-    .push_i     (push),
-    .in_data_i  (in_entry_i),
-    .out_valid_i(offered),
-    .out_ready_i,
-    .out_data_i (out_entry),
-    .inside_o   (entries),
-    .watching_o (watching),
-    .ahead_o    (ahead),
-    .watched_o  (watched)
-  );
+  // One entry, whichever pick_i chooses when it is taken, is followed: `ahead` must leave before it.
+  logic [CountBits-1:0] entries_q, ahead_q;
+  logic                 watching_q;
+  logic [Bits-1:0]      watched_q;
+
+  always_ff @(posedge clk_i or negedge rst_n) begin
+    if (!rst_n) begin
+      entries_q  <= '0;
+      watching_q <= 1'b0;
+    end else if (clear_i) begin
+      entries_q  <= '0;
+      watching_q <= 1'b0;
+    end else begin
+      entries_q <= entries_q + CountBits'(push) - CountBits'(leaves);
+      if (!watching_q && push && pick_i) begin
+        watching_q <= 1'b1;
+        ahead_q    <= entries_q - CountBits'(leaves);
+        watched_q  <= in_entry_i;
+      end else if (leaves) begin
+        watching_q <= watching_q && ahead_q != '0;
+        ahead_q    <= ahead_q - 1'b1;
+      end
+    end
+  end
+
+  assign entries  = entries_q;
+  assign ahead    = ahead_q;
+  assign watching = watching_q;
+  assign watched  = watched_q;
 
   // Where the chosen entry is: at the head, in the memory's read register, or in the memory.
   logic [PlaceBits-1:0] head_at, fetch_at, write_at, place;
@@ -110,12 +121,17 @@ module fv_sort_merge #(
       a_taken: assert (leaves == (offered && out_ready_i));
       a_inside: assert (!leaves || entries != '0);
 
+      if (leaves && watching && ahead == '0) begin
+        a_entry: assert (out_entry == watched);
+      end
+
       l_inside: assert (PlaceBits'(entries) == PlaceBits'(write_at - head_at));
       l_most: assert (entries <= CountBits'(Run));
       l_fetch: assert (PlaceBits'(fetch_at - head_at) == PlaceBits'(head_valid) + PlaceBits'(read_valid));
       l_behind: assert (PlaceBits'(write_at - fetch_at) <= PlaceBits'(Run) &&
                         CountBits'(head_valid) + CountBits'(read_valid) <= entries);
       if (watching) begin
+        l_ahead: assert (ahead < entries);
         l_word: assert (word == watched);
       end
       c_full: cover (entries == CountBits'(Run) && watching);

@@ -28,7 +28,6 @@ module fv_sorting_unit #(
   logic [1:0][Bits-1:0] line;
   logic [1:0] count;
   logic [Bits-1:0] out_entry;
-  logic [1:0] lists_q;
   logic found, different;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
@@ -86,7 +85,6 @@ module fv_sorting_unit #(
       asked_q   <= 1'b0;
       at_q      <= '0;
       out_q     <= '0;
-      lists_q   <= '0;
     end else begin
       offered_q <= in_valid_i && !asked_q && !in_ready;
       if (in_valid_i && !asked_q && in_ready) begin
@@ -97,7 +95,6 @@ module fv_sorting_unit #(
       end
       if (out_valid && out_ready_i) begin
         out_q   <= out_end ? '0 : out_q + 1'b1;
-        lists_q <= lists_q + 2'(out_end && lists_q != '1);
       end
     end
   end
@@ -143,7 +140,7 @@ module fv_sorting_unit #(
       if (out_valid && out_end) begin
         a_end: assert (out_q == length_q);
       end
-      c_again: cover (next_valid && next_again);
+      c_again: cover (next_valid && (next_again || !Last));
       c_list: cover (out_valid && out_end && length_q == CountBits'(Most));
     end
   end

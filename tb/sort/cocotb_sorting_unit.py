@@ -319,6 +319,12 @@ async def rate(dut):
         await test.run(jobs)
         got, most = jobs[-1].ended - jobs[0].ended, perf.back_to_back(lengths, CELLS, STAGES)
         assert got <= most, f"{lengths}: {got} cycles, {most} by the model"
+    # Lengths of a geometric distribution, with the mean of a real frame.
+    jobs = [test.job(1024), *(test.job(min(int(test.rng.expovariate(1 / 261)), CAPACITY), "random", None, True) for _ in range(150))]
+    await test.run(jobs)
+    got, least = jobs[-1].ended - jobs[0].ended, sum(perf.list_cycles(len(j.entries)) for j in jobs[1:])
+    dut._log.info(f"150 lists: {got} cycles, {got / least:.3f} of one an entry and one a list")
+    assert got <= 1.12 * least, (got, least)
 
 
 @cocotb.test()
