@@ -53,8 +53,11 @@ module flk_sort_merge #(
   output logic                 done_o
 );
 
-  if (Run < 2 || (Run & (Run - 1)) != 0 || Depth < Run || (Depth & (Depth - 1)) != 0) begin : gen_check
-    $error("flk_sort_merge: Run and Depth must be powers of two, Depth at least Run, Run at least 2");
+  if (Run < 2 || (Run & (Run - 1)) != 0) begin : gen_check
+    $error("flk_sort_merge: Run must be a power of two, at least 2");
+  end
+  if (Depth < Run || (Depth & (Depth - 1)) != 0) begin : gen_check_depth
+    $error("flk_sort_merge: Depth must be a power of two, at least Run");
   end
   if (Select && Depth != Run) begin : gen_check_select
     $error("flk_sort_merge: with Select, Depth must be Run");
@@ -79,7 +82,7 @@ module flk_sort_merge #(
   place_t [1:0] write_at_d, write_at_q;
   place_t [1:0] limit_at_d, limit_at_q;             // behind the present run
   logic   [1:0] head_valid_d, head_valid_q, read_valid_d, read_valid_q;
-  logic   [1:0][EntryBits-1:0] head_q, read;        // the head; behind it the memory's read register
+  logic   [1:0][EntryBits-1:0] head_q, read;  // the head; behind it the memory's register
   logic   [1:0]              at_limit, at_end, over, pop, load, fetch, write;
   logic                      complete, finish_pop, finish_ready, finish_empty;
   finish_t                   finish;
@@ -104,6 +107,9 @@ module flk_sort_merge #(
   assign take       = in_valid_i && in_ready_o && !in_end_i;
   assign take_end   = in_valid_i && in_ready_o && in_end_i;
 
+  logic [$clog2(Lists+1)-1:0] unused_usage;
+  logic                       unused_full;
+
   // The list that leaves is whole when its end is here.
   flk_fifo #(
     .Width($bits(finish_t)),
@@ -118,8 +124,8 @@ module flk_sort_merge #(
     .out_valid_o(complete),
     .out_ready_i(finish_pop),
     .out_data_o (finish),
-    .usage_o    (),
-    .full_o     (),
+    .usage_o    (unused_usage),
+    .full_o     (unused_full),
     .empty_o    (finish_empty)
   );
 

@@ -44,7 +44,8 @@ module flk_sort_runs #(
   // has no other run.
   logic [Cells-1:0] used_d, used_q, used_left;
   logic [Cells-1:0] whole_d, whole_q, whole_left;
-  logic [Cells-1:0] ends_d, ends_q, ends_left, flags_d, flags_q, flags_left, only_d, only_q, only_left;
+  logic [Cells-1:0] ends_d, ends_q, ends_left, flags_d, flags_q, flags_left;
+  logic [Cells-1:0] only_d, only_q, only_left;
   logic             end_d, end_q, flag_d, flag_q, end_left, flag_left;  // an end at the output
   logic             first_d, first_q;  // the run that is gathered is its list's first one
   logic             pop, push, take_end, full_run;

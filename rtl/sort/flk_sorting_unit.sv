@@ -74,7 +74,8 @@ module flk_sorting_unit #(
   entry_t [LineEntries-1:0]     line_q;
   logic [CountBits-1:0]         line_left_d, line_left_q;  // entries, then the end of a last line
   logic [CountBits-1:0]         line_at_d, line_at_q;
-  logic                         line_take, line_entry, line_end, line_done, line_drop, early;
+  logic                         line_take, line_entry, line_one, line_end, line_done;
+  logic                         line_drop, early;
   logic                         next_valid_q, next_again_q;
   logic                         x_valid_d, x_valid_q, x_end_q, x_told_q, x_go, x_free;
   entry_t                       x_q;
@@ -82,8 +83,8 @@ module flk_sorting_unit #(
   assign line_entry = line_valid_q && line_left_q != '0;
   assign line_end   = line_valid_q && line_left_q == '0;
   assign x_free     = !x_valid_q || x_go;
-  assign line_done  = line_entry ? !line_last_q && (line_drop || (x_free && line_left_q == CountBits'(1)))
-                                 : x_free;
+  assign line_done  = line_entry ? !line_last_q && (line_drop || (x_free && line_one)) : x_free;
+  assign line_one   = line_left_q == CountBits'(1);
   assign in_ready_o = !line_valid_q || line_done;
   assign line_take  = in_valid_i && in_ready_o;
 
@@ -139,7 +140,8 @@ module flk_sorting_unit #(
 
   // ---- the gate -----------------------------------------------------------------------------------
 
-  logic                  bounded_q, limited_q, pass, full, more, drop_here, cut, cutting, cut_done, limit_set;
+  logic                  bounded_q, limited_q, pass, full, more, drop_here;
+  logic                  cut, cutting, cut_done, limit_set;
   key_t                  bound_q, limit_q, limit;
   logic [GatherBits-1:0] gathered_q;
   logic                  runs_valid, runs_ready, runs_end, runs_empty;

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import cocotb
@@ -212,7 +211,9 @@ async def many(dut, which):
     test = Unit(dut)
     await test.bench.reset()
     rng = test.rng
-    jobs = [test.job(rng.choice((0, 0, 1, rng.randrange(2 * CELLS), rng.randrange(4 * CELLS), rng.randrange(CELLS << 3))), rng.choice(KINDS)) for _ in range(60)]
+    jobs = []
+    for _ in range(60):
+        jobs.append(test.job(rng.choice((0, 0, 1, rng.randrange(2 * CELLS), rng.randrange(4 * CELLS), rng.randrange(CELLS << 3))), rng.choice(KINDS)))
     await test.run(jobs, STALLS[which])
     test.counted(jobs)
 
@@ -282,7 +283,10 @@ async def clear_in_the_middle(dut, which):
     await test.bench.reset()
     rng = test.rng
     for _ in range(4 if CAPACITY > 256 else 30):
-        jobs = [test.job(rng.choice((rng.randrange(CELLS << 2), CAPACITY // 2 + 3, CAPACITY + CAPACITY // 2)), finish=rng.choice((None, (3, 2)))) for _ in range(6)]
+        jobs = []
+        for _ in range(6):
+            n = rng.choice((rng.randrange(CELLS << 2), CAPACITY // 2 + 3, CAPACITY + CAPACITY // 2))
+            jobs.append(test.job(n, finish=rng.choice((None, (3, 2)))))
         await test.run(jobs, STALLS[which], stop=rng.randrange(1, 4 * CAPACITY))
         for name in ("in_valid", "next_ready", "finish"):
             getattr(dut, f"{name}_i").value = 0

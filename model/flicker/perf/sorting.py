@@ -1,8 +1,8 @@
 """Cycles of a sorting unit without stalls (rtl/sort/flk_sorting_unit.sv; held against it by tb/sort/test_sorting_unit.py).
 
-The steps merge while their runs arrive, so lists follow each other at an entry a cycle and one cycle a list; what a list alone takes longer is latency. Step k
-waits for its first run, Cells << k entries; the step behind the last one that has two runs of the list waits for its end. A step whose first memory is full when
-the next run comes holds it up for up to three cycles, by the order of the entries: never in ascending lists, seldom in others.
+The steps merge while their runs arrive, so lists follow each other at an entry a cycle and one cycle a list; what a list alone takes longer is latency.
+Step k waits for its first run, Cells << k entries; the step behind the last one that has two runs of the list waits for its end. A step whose first memory
+is full when the next run comes holds it up for up to three cycles, by the order of the entries: never in ascending lists, seldom in others.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def latency(n: int, cells: int = CELLS, stages: int = STAGES) -> int:
 
 
 def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES) -> int:
-    """Cycles of a list of n <= cells << stages entries alone, from its first line to its end: exactly, if it is in ascending order; else n / ORDER more at most."""
+    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly in ascending order; else n / ORDER more at most."""
     return n + latency(n, cells, stages)
 
 
@@ -37,7 +37,7 @@ def list_cycles(n: int) -> int:
 
 
 def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES) -> int:
-    """Cycles from the end of the first list to that of the last, at most, for few lists: where a list has a longer latency than those before it, this shows once."""
+    """Cycles from the end of the first list to that of the last, at most, for few lists: a longer latency than the lists' before shows once."""
     delays = [latency(n, cells, stages) for n in lengths]
     return sum(list_cycles(n) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0]
 
