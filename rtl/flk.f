@@ -73,6 +73,9 @@ sort/flk_compare_exchange.sv
 sort/flk_delivery.sv
 sort/flk_list_reader.sv
 sort/flk_record_cache.sv
+sort/flk_sort_merge.sv
+sort/flk_sort_runs.sv
+sort/flk_sorting_unit.sv
 preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv

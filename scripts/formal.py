@@ -127,8 +127,8 @@ def read_proofs(path: Path = PROOFS) -> list[Proof]:
         wrong |= {key for mutant in entry.get("mutant", []) for key in set(mutant) - MUTANT_KEYS}
         if wrong:
             raise FlickerError(f"{path}: proof {name}: unknown key {min(wrong)}")
-        if entry.get("method") not in ("induction", "combinational"):
-            raise FlickerError(f"{path}: proof {name}: method must be induction or combinational")
+        if entry.get("method") not in ("induction", "bounded", "combinational"):
+            raise FlickerError(f"{path}: proof {name}: method must be induction, bounded or combinational")
         if not entry.get("mutant"):
             raise FlickerError(f"{path}: proof {name}: no mutant")
         sets = entry.pop("parameters", [{}])
@@ -189,7 +189,7 @@ def configuration(task: Task, files: Mapping[str, str]) -> str:
     proof = task.proof
     combinational = proof.method == "combinational"
     mode, depth = {
-        "proof": ("bmc", 1) if combinational else ("prove", proof.steps),
+        "proof": ("bmc", 1) if combinational else ("prove" if proof.method == "induction" else "bmc", proof.steps),
         "cover": ("cover", proof.cover_depth),
         "mutant": ("bmc", task.mutant.depth if task.mutant else 1),
     }[task.kind]

@@ -55,6 +55,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
+    "flk_sort_merge": [MEMORY],
+    "flk_sorting_unit": ["flk_sort_runs", "flk_sort_merge"],
     "flk_axi_fetch": ["flk_axi_read"],
     "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_ff_add", "flk_fifo"],
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
@@ -138,6 +140,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
         "flk_projection": ["width_i[12]", "height_i[12]"],
+        # Only the last step selects.
+        "flk_sort_merge": [] if parameters.get("Select", 0) else ["closed_i[0]", "cut_i[0]"],
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
@@ -287,6 +291,8 @@ def _front() -> list[Unit]:
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
+        unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),
+        unit("flk_sort_merge", "runs of 1024, selection", Run=1024, Lists=8, Select=1), unit("flk_sorting_unit"),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_pixel_out"), unit("flk_frame_writer"),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),

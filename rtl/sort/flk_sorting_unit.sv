@@ -1,0 +1,496 @@
+// Sorting unit: the lines of a tile's list in, its entries in order out (docs/sorting_unit.md).
+//
+// Entries are {key 24, record 24, mask 4}; order is that of the upper 48 bits, unsigned, which are
+// distinct within a list. Lines hold in_count_i entries, the lowest, in any order; 0 only in the one line
+// of an empty list. After the line with in_last_i the unit says on next_* whether it wants the same
+// list again (1) or the next one (0); it takes no line before that is taken. Out come {record, mask},
+// then an element with out_end_o that carries no entry.
+// finish_i, from any cycle until the end of the list at the output is taken: what there is of this
+// list is left out, its end follows; a reading under way is let run out and not repeated.
+// start_i, while idle_o, sets the counters to 0. entries_o: delivered. readings_o: lists read,
+// each reading. dropped_o: entries taken of finished lists, but not delivered; both entries_o and
+// dropped_o while idle_o. clear_i (synchronous) empties the unit.
+//
+// Structure: a line's entries one by one, dropped at or below the bound of what was delivered and above
+// the limit; runs of Cells by insertion (flk_sort_runs); Stages steps that merge them two by two
+// (flk_sort_merge), each while its runs arrive, so that an entry a cycle goes through all of them,
+// whatever the lengths of the lists. The last step holds Capacity = Cells << Stages entries. When
+// one more comes it keeps the nearest half, and the limit is the largest of these. At the end of a
+// reading what it has leaves; if there was a limit, it is the bound of the next reading.
+// Throughput: a list of n <= Capacity entries in n + 1 cycles, back to back. Latency: docs/sorting_unit.md.
+// Combinational paths: none from an input to a handshake output; outputs of out_* and next_* are registers.
+module flk_sorting_unit #(
+  parameter  int unsigned Cells       = 16,
+  parameter  int unsigned Stages      = 7,
+  parameter  int unsigned Lists       = 8,  // whole lists waiting in a step, at most
+  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned EntryBits   = 52,
+  parameter  int unsigned MaskBits    = 4,
+  parameter  int unsigned OutBits     = 28,
+  localparam int unsigned CountBits   = $clog2(LineEntries + 1)
+) (
+  input  logic                                  clk_i,
+  input  logic                                  rst_ni,
+  input  logic                                  clear_i,
+  // Frame
+  input  logic                                  start_i,
+  output logic                                  idle_o,
+  output logic [31:0]                           entries_o,
+  output logic [31:0]                           readings_o,
+  output logic [31:0]                           dropped_o,
+  // Lines
+  input  logic                                  in_valid_i,
+  output logic                                  in_ready_o,
+  input  logic [LineEntries-1:0][EntryBits-1:0] in_entries_i,
+  input  logic [CountBits-1:0]                  in_count_i,
+  input  logic                                  in_last_i,
+  // What to read next
+  output logic                                  next_valid_o,
+  input  logic                                  next_ready_i,
+  output logic                                  next_again_o,
+  // Sorted entries
+  output logic                                  out_valid_o,
+  input  logic                                  out_ready_i,
+  output logic                                  out_end_o,
+  output logic [OutBits-1:0]                    out_entry_o,
+  input  logic                                  finish_i
+);
+
+  localparam int unsigned KeyBits  = EntryBits - MaskBits;
+  localparam int unsigned Capacity = Cells << Stages;
+  localparam int unsigned GatherBits = $clog2(Capacity + 1);
+  localparam int unsigned EndsBits = $clog2((Lists + 1) * Stages + 3);
+
+  if (Stages < 1 || Cells < 2 || (Cells & (Cells - 1)) != 0) begin : gen_check
+    $error("flk_sorting_unit: Cells must be a power of two, at least 2, Stages at least 1");
+  end
+
+  typedef logic [EntryBits-1:0] entry_t;
+  typedef logic [KeyBits-1:0] key_t;
+
+  // ---- a line -------------------------------------------------------------------------------------
+
+  logic                         line_valid_d, line_valid_q, line_last_q, line_told_q;
+  entry_t [LineEntries-1:0]     line_q;
+  logic [CountBits-1:0]         line_left_d, line_left_q;  // entries, then the end of a last line
+  logic [CountBits-1:0]         line_at_d, line_at_q;
+  logic                         line_take, line_entry, line_one, line_end, line_done;
+  logic                         line_drop, early;
+  logic                         next_valid_q, next_again_q;
+  logic                         x_valid_d, x_valid_q, x_end_q, x_told_q, x_go, x_free;
+  entry_t                       x_q;
+
+  assign line_entry = line_valid_q && line_left_q != '0;
+  assign line_end   = line_valid_q && line_left_q == '0;
+  assign x_free     = !x_valid_q || x_go;
+  assign line_done  = line_entry ? !line_last_q && (line_drop || (x_free && line_one)) : x_free;
+  assign line_one   = line_left_q == CountBits'(1);
+  assign in_ready_o = !line_valid_q || line_done;
+  assign line_take  = in_valid_i && in_ready_o;
+
+  always_comb begin
+    line_valid_d = line_take || (line_valid_q && !line_done);
+    line_left_d  = line_left_q;
+    line_at_d    = line_at_q;
+    if (line_take) begin
+      line_left_d = in_count_i;
+      line_at_d   = '0;
+    end else if (line_drop) begin
+      line_left_d = '0;
+    end else if (line_entry && x_free) begin
+      line_left_d = line_left_q - 1'b1;
+      line_at_d   = line_at_q + 1'b1;
+    end
+    x_valid_d = x_free ? (line_entry && !line_drop) || line_end : 1'b1;
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      line_valid_q <= 1'b0;
+      x_valid_q    <= 1'b0;
+    end else begin
+      line_valid_q <= line_valid_d && !clear_i;
+      x_valid_q    <= x_valid_d && !clear_i;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    line_left_q <= line_left_d;
+    line_at_q   <= line_at_d;
+    if (line_take) begin
+      line_q      <= in_entries_i;
+      line_last_q <= in_last_i;
+      line_told_q <= early && in_last_i;
+    end
+    if (x_free && line_valid_q) begin
+      x_end_q  <= line_end;
+      x_told_q <= line_told_q;
+    end
+    if (x_free && line_entry) begin
+      x_q <= line_q[line_at_q];
+    end
+  end
+
+  logic              first_ready, first_drop;  // of the first step
+  logic              final_valid, final_end, final_flag, out_free, out_drop;  // of the last one
+  entry_t            final_entry;
+  logic [Stages-1:0] empty;
+  logic              closed;  // the end of the list in the last step is on its way
+  logic              ends_less;
+
+  // ---- the gate -----------------------------------------------------------------------------------
+
+  logic                  bounded_q, limited_q, pass, full, more, drop_here;
+  logic                  cut, cutting, cut_done, limit_set;
+  key_t                  bound_q, limit_q, limit;
+  logic [GatherBits-1:0] gathered_q;
+  logic                  runs_valid, runs_ready, runs_end, runs_empty;
+  logic                  x_ends;  // the list's end goes on
+
+  assign pass       = (!bounded_q || x_q[EntryBits-1:MaskBits] > bound_q) &&
+                      (!limited_q || x_q[EntryBits-1:MaskBits] <= limit_q);
+  assign full       = gathered_q[GatherBits-1];
+  // While the last step cuts, nothing moves: the limit is changing.
+  assign runs_valid = x_valid_q && (x_end_q || (pass && !full && !drop_here)) && !cutting;
+  assign x_go       = x_valid_q && !cutting && (x_end_q ? runs_ready
+                                                : drop_here || !pass || (!full && runs_ready));
+  assign cut        = x_valid_q && !x_end_q && pass && full && !drop_here;
+  assign x_ends     = x_end_q && x_go;
+  assign more       = limited_q && !drop_here;
+  // What is behind an end in x is of the next list.
+  assign line_drop  = drop_here && line_entry && !(x_valid_q && x_end_q);
+  // The list ends, and what is on its way fits.
+  assign early      = !limited_q && 32'(gathered_q) + LineEntries + 3 < Capacity;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      bounded_q    <= 1'b0;
+      limited_q    <= 1'b0;
+      gathered_q   <= '0;
+      next_valid_q <= 1'b0;
+      next_again_q <= 1'b0;
+    end else if (clear_i) begin
+      bounded_q    <= 1'b0;
+      limited_q    <= 1'b0;
+      gathered_q   <= '0;
+      next_valid_q <= 1'b0;
+    end else begin
+      if (x_ends) begin
+        bounded_q <= more;
+      end
+      if (x_ends) begin
+        limited_q <= 1'b0;
+      end else if (cut_done) begin
+        limited_q <= 1'b1;
+      end
+      if (x_ends) begin
+        gathered_q <= '0;
+      end else if (cut_done) begin
+        gathered_q <= GatherBits'(Capacity / 2);
+      end else if (x_go && runs_valid) begin
+        gathered_q <= gathered_q + 1'b1;
+      end
+      if (line_take && in_last_i && early) begin
+        next_valid_q <= 1'b1;
+        next_again_q <= 1'b0;
+      end else if (x_ends && !x_told_q) begin
+        next_valid_q <= 1'b1;
+        next_again_q <= more;
+      end else if (next_ready_i) begin
+        next_valid_q <= 1'b0;
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (limit_set) begin
+      limit_q <= limit;
+    end
+    if (x_ends && more) begin
+      bound_q <= limit_q;
+    end
+  end
+
+  assign next_valid_o = next_valid_q;
+  assign next_again_o = next_again_q;
+
+  // ---- runs and their merging -----------------------------------------------------------------------
+
+
+  logic   runs_out_valid, runs_out_end, runs_out_flag;
+  entry_t runs_out_entry;
+
+  flk_sort_runs #(
+    .Cells      (Cells),
+    .KeyBits    (KeyBits),
+    .PayloadBits(MaskBits)
+  ) i_runs (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .in_valid_i (runs_valid),
+    .in_ready_o (runs_ready),
+    .in_end_i   (x_end_q),
+    .in_flag_i  (more),
+    .in_entry_i (x_q),
+    .out_valid_o(runs_out_valid),
+    .out_ready_i(first_ready),
+    .out_end_o  (runs_out_end),
+    .out_flag_o (runs_out_flag),
+    .out_entry_o(runs_out_entry),
+    .end_o      (runs_end),
+    .empty_o    (runs_empty)
+  );
+
+  for (genvar i = 0; i < Stages; i++) begin : gen_step
+    localparam int unsigned Run  = Cells << i;
+    localparam bit          Last = i == Stages - 1;
+
+    logic   in_valid, in_ready, in_end, in_flag, valid, ready, is_end, flag, drop_in, drop_out;
+    logic   busy, limit_now, done;
+    entry_t in_entry, entry;
+
+    if (i == 0) begin : gen_first
+      assign {in_valid, in_end, in_flag} = {runs_out_valid, runs_out_end, runs_out_flag};
+      assign in_entry    = runs_out_entry;
+      assign first_ready = in_ready;
+      assign first_drop  = drop_out;
+    end else begin : gen_later
+      assign in_valid = gen_step[i-1].valid;
+      assign in_end   = gen_step[i-1].is_end;
+      assign in_flag  = gen_step[i-1].flag;
+      assign in_entry = gen_step[i-1].entry;
+    end
+
+    if (Last) begin : gen_last
+      assign ready       = out_free;
+      assign drop_in     = out_drop;
+      assign final_valid = valid;
+      assign final_end   = is_end;
+      assign final_flag  = flag;
+      assign final_entry = entry;
+      assign cutting     = busy;
+      assign limit_set   = limit_now;
+      assign cut_done    = done;
+      assign ends_less   = in_valid && in_ready && in_end;
+    end else begin : gen_earlier
+      logic unused_cut;
+      assign unused_cut = &{busy, limit_now, done, 1'b0};
+      assign ready      = gen_step[i+1].in_ready;
+      assign drop_in    = gen_step[i+1].drop_out;
+    end
+
+    // A memory of Run entries costs two cycles now and then, when the first of the next run find it
+    // full: not to be felt in long runs, and short ones have room for two.
+    flk_sort_merge #(
+      .Run        (Run),
+      .Depth      (Run <= 32 && !Last ? 2 * Run : Run),
+      .KeyBits    (KeyBits),
+      .PayloadBits(MaskBits),
+      .Lists      (Lists),
+      .Select     (Last)
+    ) i_merge (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .in_valid_i (in_valid),
+      .in_ready_o (in_ready),
+      .in_end_i   (in_end),
+      .in_flag_i  (in_flag),
+      .in_entry_i (in_entry),
+      .out_valid_o(valid),
+      .out_ready_i(ready),
+      .out_end_o  (is_end),
+      .out_flag_o (flag),
+      .out_entry_o(entry),
+      .drop_i     (drop_in),
+      .drop_o     (drop_out),
+      .empty_o    (empty[i]),
+      .closed_i   (closed),
+      .cut_i      (cut),
+      .busy_o     (busy),
+      .limit_o    (limit_now),
+      .done_o     (done)
+    );
+  end
+
+  assign limit     = final_entry[EntryBits-1:MaskBits];
+  assign drop_here = first_drop && !runs_end;
+
+  // Ends between the gate and the last step.
+  logic [EndsBits-1:0] ends_q;
+
+  assign closed    = ends_q != '0;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      ends_q <= '0;
+    end else if (clear_i) begin
+      ends_q <= '0;
+    end else if (x_ends != ends_less) begin
+      ends_q <= x_ends ? ends_q + 1'b1 : ends_q - 1'b1;
+    end
+  end
+
+  // ---- output -------------------------------------------------------------------------------------
+
+  logic               out_valid_q, out_end_q, finish_q, end_sent;
+  logic [OutBits-1:0] out_q;
+
+  // An end that is followed by another reading of the list is none.
+  assign out_free = !out_valid_q || out_ready_i;
+  assign end_sent = out_valid_q && out_end_q && out_ready_i;
+  assign out_drop = finish_q && !(out_valid_q && out_end_q);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      out_valid_q <= 1'b0;
+      out_end_q   <= 1'b0;
+      finish_q    <= 1'b0;
+    end else begin
+      if (out_free) begin
+        out_valid_q <= final_valid && !(final_end && final_flag);
+        out_end_q   <= final_end;
+      end
+      finish_q <= (finish_q || finish_i) && !end_sent;
+      if (clear_i) begin
+        out_valid_q <= 1'b0;
+        finish_q    <= 1'b0;
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (out_free && final_valid) begin
+      out_q <= final_entry[OutBits-1:0];
+    end
+  end
+
+  assign out_valid_o = out_valid_q;
+  assign out_end_o   = out_end_q;
+  assign out_entry_o = out_q;
+
+  // ---- counters -------------------------------------------------------------------------------------
+
+  // Taken: what a reading has at its end, and what a finished list is not asked for in its first reading.
+  logic [15:0] more_taken, more_taken_q;
+  logic [16:0] taken_low_d;
+  logic [15:0] taken_low_q, taken_high_q, less_low_q, less_high_q;
+  logic        carry_q, borrow_q;
+  logic [31:0] delivered;
+
+  always_comb begin
+    more_taken = '0;
+    if (x_ends) begin
+      more_taken = 16'(gathered_q);
+    end else if (drop_here && !bounded_q) begin
+      more_taken = 16'(line_drop ? line_left_q : '0) + 16'(x_valid_q && !x_end_q);
+    end
+  end
+
+  assign taken_low_d = {1'b0, taken_low_q} + 17'(more_taken_q);
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      more_taken_q <= '0;
+      taken_low_q  <= '0;
+      carry_q      <= 1'b0;
+      taken_high_q <= '0;
+      less_low_q   <= '0;
+      borrow_q     <= 1'b0;
+      less_high_q  <= '0;
+    end else begin
+      more_taken_q            <= more_taken;
+      taken_low_q             <= taken_low_d[15:0];
+      carry_q                 <= taken_low_d[16];
+      taken_high_q            <= taken_high_q + 16'(carry_q);
+      {borrow_q, less_low_q}  <= {1'b0, taken_low_q} - {1'b0, delivered[15:0]};
+      less_high_q             <= taken_high_q - delivered[31:16] - 16'(borrow_q);
+      if (start_i || clear_i) begin
+        more_taken_q <= '0;
+        taken_low_q  <= '0;
+        carry_q      <= 1'b0;
+        taken_high_q <= '0;
+      end
+    end
+  end
+
+  flk_event_counter i_entries (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start_i || clear_i),
+    .count_i(out_valid_q && out_ready_i && !out_end_q),
+    .value_o(delivered)
+  );
+
+  flk_event_counter i_readings (
+    .clk_i,
+    .rst_ni,
+    .clear_i(start_i || clear_i),
+    .count_i(line_take && in_last_i),
+    .value_o(readings_o)
+  );
+
+  assign entries_o = delivered;
+  assign dropped_o = {less_high_q, less_low_q};
+
+  // The counters are a few cycles behind.
+  logic [5:0] quiet_q;
+  logic       quiet, reading_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      reading_q <= 1'b0;
+      quiet_q   <= '1;
+    end else begin
+      if (clear_i) begin
+        reading_q <= 1'b0;
+      end else if (line_take) begin
+        reading_q <= 1'b1;
+      end else if (x_ends && !line_valid_q && !more) begin
+        reading_q <= 1'b0;
+      end
+      quiet_q <= {quiet_q[4:0], quiet};
+    end
+  end
+
+  assign quiet  = !line_valid_q && !x_valid_q && !reading_q && !next_valid_q && runs_empty &&
+                  (&empty) && !out_valid_q && !closed;
+  assign idle_o = (&quiet_q) && quiet;
+
+`ifndef SYNTHESIS
+  logic asked_q;  // after a list's last line, until what to read next is taken
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      asked_q <= 1'b0;
+    end else if (clear_i) begin
+      asked_q <= 1'b0;
+    end else if (line_take && in_last_i) begin
+      asked_q <= 1'b1;
+    end else if (next_valid_o && next_ready_i) begin
+      asked_q <= 1'b0;
+    end
+  end
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) asked_q |-> !in_valid_i)
+  else $error("flk_sorting_unit: a line before what to read next was taken");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      in_valid_i |-> 32'(in_count_i) <= LineEntries && (in_count_i != '0 || in_last_i))
+  else $error("flk_sorting_unit: a line without entries");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
+  else $error("flk_sorting_unit: start while not idle");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i && !clear_i |=>
+      out_valid_o && $stable({out_end_o, out_entry_o}))
+  else $error("flk_sorting_unit: output changed before its transfer");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      next_valid_o && !next_ready_i && !clear_i |=> next_valid_o && $stable(next_again_o))
+  else $error("flk_sorting_unit: what to read next changed before its transfer");
+`endif
+
+endmodule

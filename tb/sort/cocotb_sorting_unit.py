@@ -1,0 +1,341 @@
+"""cocotb tests of flk_sorting_unit; a reader gives the lists' lines as often as they are asked for, what comes out is compared with the golden model."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import cocotb
+import numpy as np
+from cocotb.triggers import RisingEdge
+from flicker_tb import stalls
+from flicker_tb.bench import Bench, config
+
+from flicker.golden.sorting import SortedList, sort_list
+from flicker.perf import sorting as perf
+
+CELLS, STAGES = config().get("cells", 16), config().get("stages", 7)
+CAPACITY = CELLS << STAGES
+LINE, ENTRY, OUT = 9, 52, (1 << 28) - 1
+KINDS = ("random", "few", "equal", "ascending", "descending", "extremes")
+STALLS = (("never", "never", "never"), ("half", "half", "half"), ("never", "rare", "heavy"), ("heavy", "half", "never"), ("bursts", "alternate", "bursts"),
+          ("rare", "never", "half"))
+
+
+def make_list(rng, count: int, kind: str) -> np.ndarray:
+    """Entries with distinct (key, record), in the order of their records or, where the kind says so, of their keys."""
+    low = [rng.getrandbits(24) for _ in range(count)]
+    keys = {
+        "random": lambda: low, "few": lambda: [k & 3 for k in low], "equal": lambda: [low[0]] * count, "ascending": lambda: sorted(low),
+        "descending": lambda: sorted(low, reverse=True), "extremes": lambda: [(0, (1 << 24) - 1)[k & 1] for k in low],
+    }[kind]() if count else []
+    records = rng.sample(range(1 << 24), count)
+    if kind in ("ascending", "equal"):
+        records.sort()
+    elif kind == "descending" or (kind == "few" and rng.random() < 0.5):
+        records.sort(reverse=True)
+    if kind == "extremes" and count > 1:
+        records[0], records[-1] = 0, (1 << 24) - 1
+        records[1:-1] = [min(max(r, 1), (1 << 24) - 2) for r in records[1:-1]]
+    return np.array([key << 28 | record << 4 | rng.randrange(16) for key, record in zip(keys, records)], np.uint64)
+
+
+def lines_of(entries: np.ndarray, rng, full: bool) -> list[tuple[int, int, int]]:
+    """Lines (entries, count, last); what is above the count is random."""
+    lines, at = [], 0
+    while True:
+        count = min(LINE if full or rng.random() < 0.6 else rng.randrange(1, LINE + 1), len(entries) - at)
+        word = rng.getrandbits(LINE * ENTRY) >> count * ENTRY << count * ENTRY
+        for i in range(count):
+            word |= int(entries[at + i]) << i * ENTRY
+        at += count
+        lines.append((word, count, int(at == len(entries))))
+        if at == len(entries):
+            return lines
+
+
+@dataclass
+class Job:
+    """A list. finish: delivered entries after which, and cycles after which, it is finished; or None."""
+
+    entries: np.ndarray
+    lines: list[tuple[int, int, int]]
+    golden: SortedList
+    finish: tuple[int, int] | None = None
+    told: list[int] = field(default_factory=list)
+    out: list[int] = field(default_factory=list)
+    finished: bool = False
+    ended: int = -1  # cycle of its end
+    first: int = -1  # of its first line
+    all_read: int = -1  # when the last 0 was told
+
+
+class Unit:
+    def __init__(self, dut) -> None:
+        self.dut, self.bench = dut, Bench(dut)
+        self.rng = self.bench.rng
+        for name in ("start", "in_valid", "in_entries", "in_count", "in_last", "next_ready", "out_ready", "finish"):
+            getattr(dut, f"{name}_i").value = 0
+
+    def job(self, count: int, kind: str = "random", finish: tuple[int, int] | None = None, full: bool = False) -> Job:
+        entries = make_list(self.rng, count, kind)
+        return Job(entries, lines_of(entries, self.rng, full), sort_list(entries, CAPACITY), finish)
+
+    async def run(self, jobs: list[Job], patterns: tuple[str, str, str] = STALLS[0], stop: int = 0) -> int:
+        """The lists one after the other; patterns of lines, `next` and output. stop: cycles after which to return. Cycles that it took."""
+        dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
+        idle, wait, stall = (stalls.make(p, rng) for p in patterns)
+        reading, out = 0, 0  # the list that is read, the one at the output
+        lines: deque[tuple[int, int, int]] = deque(jobs[0].lines)
+        asked, offered = False, False  # a last line was taken
+        finish_at = -1
+        held: tuple[int, int] | None = None
+        limit = 4000 + sum(14 * (len(j.entries) * len(j.golden.readings) + 3 * CAPACITY * sum(len(r.limits) for r in j.golden.readings) + 60) for j in jobs)
+        cycle = 0
+        while out < len(jobs):
+            offered = offered or (not asked and bool(lines) and not next(idle))
+            word, count, last = lines[0] if offered else (rng.getrandbits(LINE * ENTRY), rng.randrange(16), rng.randrange(2))
+            job = jobs[out]
+            if job.finish is not None and len(job.out) >= job.finish[0] and finish_at < 0:
+                finish_at = cycle + job.finish[1]
+            finish = int(0 <= finish_at <= cycle)
+            job.finished = job.finished or bool(finish)
+            hear, ready = int(not next(wait)), int(not next(stall))
+            dut.in_valid_i.value, dut.in_entries_i.value, dut.in_count_i.value, dut.in_last_i.value = int(offered), word, count, last
+            dut.next_ready_i.value, dut.out_ready_i.value, dut.finish_i.value = hear, ready, finish
+            await edge
+            if offered and int(dut.in_ready_o.value):
+                if jobs[reading].first < 0:
+                    jobs[reading].first = cycle
+                lines.popleft()
+                offered, asked = False, bool(last)
+            if int(dut.next_valid_o.value) and hear:
+                assert asked, "what to read next without a last line"
+                asked = False
+                again = int(dut.next_again_o.value)
+                jobs[reading].told.append(again)
+                if not again:
+                    jobs[reading].all_read = cycle
+                    reading += 1
+                lines = deque(jobs[reading].lines if reading < len(jobs) else [])
+            if int(dut.out_valid_o.value):
+                got = (int(dut.out_end_o.value), int(dut.out_entry_o.value))
+                if got[0]:
+                    got = (1, 0)
+                assert held in (None, got), "output changed before its transfer"
+                held = None if ready else got
+                if ready:
+                    self.check(out, job, got)
+                    if got[0]:
+                        job.ended, finish_at, out = cycle, -1, out + 1
+            else:
+                assert held is None, "valid fell"
+            cycle += 1
+            assert cycle < limit, f"stands still: list {out} of {len(jobs)}, {len(job.out)} of {len(job.entries)} entries, reading {reading}"
+            if stop and cycle >= stop:
+                return cycle
+        dut.finish_i.value = 0
+        dut.in_valid_i.value = 0
+        dut.next_ready_i.value = 1
+        for _ in range(16):  # what was told last may be heard after the last end
+            await edge
+            if int(dut.next_valid_o.value):
+                jobs[reading].told.append(int(dut.next_again_o.value))
+                reading += 1
+            assert int(dut.out_valid_o.value) == 0
+        assert int(dut.idle_o.value) == 1 and reading == len(jobs)
+        for n, job in enumerate(jobs):
+            want = [1] * (len(job.golden.readings) - 1) + [0]
+            assert job.told == want or (job.finished and job.told[-1] == 0 and job.told[:-1] == want[: len(job.told) - 1]), f"list {n}: told {job.told}"
+        return cycle
+
+    def check(self, n: int, job: Job, got: tuple[int, int]) -> None:
+        at, place = len(job.out), f"list {n}, element {len(job.out)}"
+        if got[0]:
+            assert job.finished or at == len(job.entries), f"{place}: end of {len(job.entries)} entries"
+            return
+        assert at < len(job.entries), f"{place}: an entry after the last"
+        want = int(job.golden.order[at]) & OUT
+        assert got[1] == want, f"{place}: {got[1]:#x}, due {want:#x}"
+        job.out.append(got[1])
+
+    async def start(self) -> None:
+        """Counters to zero."""
+        assert int(self.dut.idle_o.value) == 1
+        self.dut.start_i.value = 1
+        await RisingEdge(self.dut.clk_i)
+        self.dut.start_i.value = 0
+        for _ in range(10):
+            await RisingEdge(self.dut.clk_i)
+        assert [int(getattr(self.dut, f"{name}_o").value) for name in ("entries", "readings", "dropped")] == [0, 0, 0]
+
+    def counted(self, jobs: list[Job]) -> None:
+        """The counters are those of these lists."""
+        entries, readings, dropped = (int(getattr(self.dut, f"{name}_o").value) for name in ("entries", "readings", "dropped"))
+        assert entries == sum(len(j.out) for j in jobs)
+        assert readings == sum(len(j.told) for j in jobs)
+        # Of a list that was finished before it was read a second time all entries count, but those that a cut left out.
+        once = [j for j in jobs if len(j.golden.readings) == 1]
+        least = sum(len(j.entries) - len(j.out) for j in once)
+        most = least + sum(len(j.entries) - len(j.out) for j in jobs if len(j.golden.readings) > 1 and j.finished)
+        assert least <= dropped <= most, (least, dropped, most)
+
+
+def sizes() -> list[int]:
+    around = [n + d for n in (CELLS, CELLS << STAGES // 2, CAPACITY) for d in (-1, 0, 1)]
+    return sorted({0, 1, 8, 9, *around})
+
+
+@cocotb.test()
+@cocotb.parametrize(("which", [0, 1, 2, 3, 4, 5]))
+async def lists(dut, which):
+    """All lengths and kinds of keys, back to back."""
+    test = Unit(dut)
+    await test.bench.reset()
+    few = CAPACITY > 256
+    for k, kind in enumerate(KINDS):
+        if few and (k + which) % 3:
+            continue
+        jobs = [test.job(n, kind) for n in sizes()]
+        test.rng.shuffle(jobs)
+        await test.bench.cycles(16)
+        await test.start()
+        await test.run(jobs, STALLS[which])
+        test.counted(jobs)
+
+
+@cocotb.test()
+@cocotb.parametrize(("which", [0, 1, 2, 3, 4, 5]))
+async def many(dut, which):
+    """Short lists, many of them; lengths in turn near to each other and far apart."""
+    test = Unit(dut)
+    await test.bench.reset()
+    rng = test.rng
+    jobs = []
+    for _ in range(60):
+        jobs.append(test.job(rng.choice((0, 0, 1, rng.randrange(2 * CELLS), rng.randrange(4 * CELLS), rng.randrange(CELLS << 3))), rng.choice(KINDS)))
+    await test.run(jobs, STALLS[which])
+    test.counted(jobs)
+
+
+@cocotb.test()
+@cocotb.parametrize(("which", [0, 1, 2, 3, 4, 5]))
+async def long_lists(dut, which):
+    """Lists that do not fit, in every order, and short ones between them."""
+    test = Unit(dut)
+    await test.bench.reset()
+    rng = test.rng
+    jobs = []
+    for k, kind in enumerate(KINDS):
+        if CAPACITY > 256 and (k + which) % 6:
+            continue
+        for n in (CAPACITY * 3259 // 2048, *((CAPACITY * 4 + 3, 2 * CAPACITY) if CAPACITY <= 256 else ())):
+            jobs += [test.job(n, kind), test.job(rng.randrange(3 * CELLS), kind)]
+    await test.run(jobs, STALLS[which])
+    test.counted(jobs)
+
+
+@cocotb.test()
+@cocotb.parametrize(("which", [0, 1, 2, 3, 4, 5]))
+async def finished(dut, which):
+    """finish_i before the first entry, at some entry, some cycles later, at the last one, for lists of all lengths."""
+    test = Unit(dut)
+    await test.bench.reset()
+    rng = test.rng
+    for _ in range(2 if CAPACITY > 256 else 8):
+        jobs = []
+        for _ in range(14 if CAPACITY > 256 else 40):
+            n = rng.choice((0, 1, rng.randrange(2 * CELLS), rng.randrange(CAPACITY >> 2), CAPACITY // 2 + rng.randrange(CAPACITY // 2 + 1),
+                            CAPACITY + rng.randrange(1, CAPACITY)) if rng.random() < 0.4 else (rng.randrange(CELLS << 2), rng.randrange(CAPACITY >> 2)))
+            after = rng.choice((0, n, max(n - 1, 0), rng.randrange(n + 1), rng.randrange(n + 1)))
+            finish = (after, rng.choice((0, 1, 2, rng.randrange(60)))) if rng.random() < 0.7 else None
+            jobs.append(test.job(n, rng.choice(KINDS), finish))
+        await test.bench.cycles(16)
+        await test.start()
+        await test.run(jobs, STALLS[which])
+        test.counted(jobs)
+
+
+@cocotb.test()
+async def finish_is_quick(dut):
+    """After finish_i the end comes soon where the list was read."""
+    test = Unit(dut)
+    await test.bench.reset()
+    for n in (CAPACITY, CAPACITY // 2 + 1, CAPACITY // 4, CAPACITY // 8 + 3):
+        for delivered in (1, n // 3):
+            jobs = [test.job(n, "random", (delivered, 0), True), test.job(CELLS)]
+            await test.run(jobs)
+            # Of the list no more than what is under way in the first step may be to come.
+            seen = jobs[0].all_read
+            assert jobs[0].ended - seen < n + 2 * CAPACITY, (n, jobs[0])
+            jobs = [test.job(n, "ascending", (delivered, 0), True), test.job(0)]
+            base = [test.job(n, "ascending", None, True), test.job(0)]
+            cycles, whole = await test.run(jobs), await test.run(base)
+            saved = whole - cycles
+            assert saved >= n - delivered - CELLS - 2 * (n - n // 2) // 2 - 60, (n, delivered, saved)
+
+
+@cocotb.test()
+@cocotb.parametrize(("which", [0, 1, 4]))
+async def clear_in_the_middle(dut, which):
+    """After clear_i nothing is left of the lists before."""
+    test = Unit(dut)
+    await test.bench.reset()
+    rng = test.rng
+    for _ in range(4 if CAPACITY > 256 else 30):
+        jobs = []
+        for _ in range(6):
+            n = rng.choice((rng.randrange(CELLS << 2), CAPACITY // 2 + 3, CAPACITY + CAPACITY // 2))
+            jobs.append(test.job(n, finish=rng.choice((None, (3, 2)))))
+        await test.run(jobs, STALLS[which], stop=rng.randrange(1, 4 * CAPACITY))
+        for name in ("in_valid", "next_ready", "finish"):
+            getattr(dut, f"{name}_i").value = 0
+        await test.bench.clear()
+        await test.bench.cycles(12)
+        await test.start()
+        jobs = [test.job(n) for n in (rng.randrange(CELLS << 1), 0, CAPACITY // 2 + 1 + rng.randrange(CELLS))]
+        await test.run(jobs, STALLS[which])
+        test.counted(jobs)
+
+
+@cocotb.test()
+async def rate(dut):
+    """Cycles without stalls: of a list alone as the model says, back to back one an entry and one a list."""
+    test = Unit(dut)
+    await test.bench.reset()
+    for n in (*sizes(), CELLS * 2, CELLS * 3 + 1, CAPACITY // 4 + 5, CAPACITY // 2 + 1):
+        for kind in ("ascending", "random", "descending"):
+            if n > CAPACITY:
+                continue
+            jobs = [test.job(n, kind, None, True)]
+            await test.run(jobs)
+            want, got = perf.unit_cycles(n, CELLS, STAGES), jobs[0].ended - jobs[0].first
+            most = want if kind == "ascending" else want + n // perf.ORDER
+            assert want <= got <= most, f"{n} entries, {kind}: {got} cycles, {want} by the model"
+    for n in (CAPACITY + 1, CAPACITY * 3259 // 2048):
+        jobs = [test.job(n, "random", None, True)]
+        await test.run(jobs)
+        want, got = perf.long_cycles(jobs[0].golden, CELLS, STAGES), jobs[0].ended - jobs[0].first
+        assert abs(got - want) < want // 20, f"{n} entries: {got} cycles, {want} by the model"
+    for lengths in ([CAPACITY // 8 + 5] * 12, [CAPACITY] * 3, [CELLS] * 40, [CELLS + 1] * 40, [CELLS // 4] * 40,
+                    [CAPACITY // 8 + 5, CELLS + 3, CAPACITY // 4 + 1, 1, CAPACITY // 16] * 4):
+        jobs = [test.job(n, "random", None, True) for n in lengths]
+        await test.run(jobs)
+        got, most = jobs[-1].ended - jobs[0].ended, perf.back_to_back(lengths, CELLS, STAGES)
+        assert got <= most, f"{lengths}: {got} cycles, {most} by the model"
+    # Lengths of a geometric distribution, with the mean of a real frame.
+    jobs = [test.job(1024), *(test.job(min(int(test.rng.expovariate(1 / 261)), CAPACITY), "random", None, True) for _ in range(150))]
+    await test.run(jobs)
+    got, least = jobs[-1].ended - jobs[0].ended, sum(perf.list_cycles(len(j.entries)) for j in jobs[1:])
+    dut._log.info(f"150 lists: {got} cycles, {got / least:.3f} of one an entry and one a list")
+    assert got <= 1.12 * least, (got, least)
+
+
+@cocotb.test()
+async def a_long_one(dut):
+    """20,000 entries."""
+    test = Unit(dut)
+    await test.bench.reset()
+    jobs = [test.job(20_000), test.job(100)]
+    await test.run(jobs)
+    test.counted(jobs)

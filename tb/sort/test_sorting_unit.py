@@ -1,0 +1,35 @@
+"""Sorting unit: every list in order, read as often as the golden model says, whatever the timing; lists finished early; clear; counters; cycles.
+
+State space: lists empty, of one entry, around the lengths of runs, around the capacity and beyond it; keys random, few, equal, ascending, descending, extreme;
+idle and back-pressure patterns on lines, answers and output; finish_i at every place; clear_i at random times. Parameter space: the unit as it is (16 cells, 7
+steps) and small ones, in which lists that do not fit are many and short. SLOW=1: a list of 20,000 entries. Not covered: counters of more than 2**16.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from flicker_tb.runner import build_and_test, refused
+
+SMALL = ["lists", "many", "long_lists", "finished", "clear_in_the_middle"]
+
+
+@pytest.mark.parametrize(("cells", "stages"), [(4, 3), (2, 1)])
+def test_small(cells: int, stages: int) -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": cells, "Stages": stages, "Lists": 2 if stages == 1 else 4},
+                   config={"cells": cells, "stages": stages}, tests=SMALL, opt="-O1", seeds=2)
+
+
+def test_sorting_unit() -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=[*SMALL, "finish_is_quick", "rate"], opt="-O1")
+
+
+@pytest.mark.skipif(not os.environ.get("SLOW"), reason="SLOW=1")
+def test_20000() -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=["a_long_one"], opt="-O1")
+
+
+def test_illegal_parameters() -> None:
+    with refused("Cells must be a power of two"):
+        build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": 12})
