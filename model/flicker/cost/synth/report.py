@@ -27,6 +27,13 @@ PAPER = {
     "Feature buffer and others (288 KB)": 1.50,
 }
 
+# Units that a component of it is here. The cores are part of the front end.
+OWN = {
+    "Preprocessing core x4": {"preprocessing_core": 4},
+    "Sorting unit x4": {"sorting_unit": 4},
+    "Feature buffer and others (288 KB)": {"preprocessing": 1, "preprocessing_core": -4, "list_reader": 4, "delivery": 1, "frame_writer": 1},
+}
+
 CSV_COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff", "fo4")
 
 Results = dict[Unit, dict]
@@ -189,7 +196,7 @@ class Comparison:
                 "Contribution test unit x4": [4 * self.ge("ctu", "conic mixed"), 4 * self.ge("ctu", "factored fixed")],
                 "Rendering core x4": [4 * self.ge("rendering_core", form) for form in FORMS],
             }.get(name)
-            cells = [f"{ge * UM2_PER_GE / 1e6:.2f}" for ge in ours] if ours else ["", ""]
+            cells = [f"{ge * UM2_PER_GE / 1e6:.2f}" for ge in ours] if ours else ["", self._with_memories(OWN[name])]
             rows.append([name, f"{area:.2f}", f"{area / total:.0%}", *cells])
         ratio = [
             self.ge("ctu", config) / self.ge("rendering_core", form)
@@ -199,9 +206,15 @@ class Comparison:
         return Sheet(
             "Beside the paper's Table 2 (mm2 in 28 nm)",
             ["component", "paper", "share", "here, conic mixed (estimate)", "here, factored fixed (estimate)"], rows,
-            f"Estimate: {UM2_PER_GE} um2 per GE, cells only. The paper's numbers are from Design Compiler and a memory compiler; "
-            "the other components are not built here.",
+            f"Estimate: {UM2_PER_GE} um2 per GE + {UM2_PER_BIT:.3f} um2 per bit of SRAM, nothing for wires. The paper's numbers are from Design Compiler and a "
+            "memory compiler. Others here: what the front end has beside its cores, list readers, delivery with its cache, frame writer; no top yet.",
         )
+
+    def _with_memories(self, units: dict[str, int]) -> str:
+        """Logic + SRAM of so many of each unit, mm2, and the SRAM's size."""
+        results = [(self.by_name[name, "default"], count) for name, count in units.items()]
+        ge, bits = (sum(count * result[key] for result, count in results) for key in ("ge", "sram_bits"))
+        return f"{ge * UM2_PER_GE / 1e6:.2f} + {bits * UM2_PER_BIT / 1e6:.2f} ({bits / 8192:.0f} KB)"
 
     def summary(self) -> Sheet:
         """For the README: area and longest path of the main units, default and as in the paper."""
