@@ -159,7 +159,8 @@ def plug(name: str, module: str, file: str, text: str, entry: str, changes: list
     arguments = json.dumps([changes, str(inputs), module, str(other) if wrong else ""])
     done = subprocess.run([sys.executable, "-c", RENDER, arguments], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
-    found = json.loads(done.stdout.splitlines()[-1])
+    # The simulator's own message of the broken assertion may come behind it.
+    found = json.loads(next(line for line in reversed(done.stdout.splitlines()) if line.startswith("{")))
     assert Path(found["file"]).is_relative_to(copy), "the copy was not used"
     return found
 
