@@ -22,6 +22,7 @@ module flk_rendering
   parameter  int unsigned Slots          = 16,   // chunks in a list reader's memory
   parameter  int unsigned Queue          = 64,   // records of each core and channel
   parameter  int unsigned Gather         = 64,   // lines that are written together
+  parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
   parameter  int unsigned IdBits         = 4,
   localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
 ) (
@@ -321,15 +322,45 @@ module flk_rendering
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
-  logic        [CORES-1:0] splat_valid, splat_ready, pixel_valid, pixel_ready;
+  logic        [CORES-1:0] splat_valid, splat_ready, pixel_valid;
+  logic                    pair_freed;
   splat_elem_t [CORES-1:0] splat;
   core_pixel_t [CORES-1:0] pixel;
   logic [COUNTER_BITS-1:0] unused_counter;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic                       unused_done;
+    logic                       unused_done, open, next;
+    logic                       valid, ready, is_end;
+    logic [RecordBits-1:0]      own;
     logic [TILE_COORD_BITS-1:0] x, y;
     subtile_t                   subtile;
+    logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
+
+    // The frame writer has a place for what the core is given.
+    assign open            = 32'(begun_q) < Pairs;
+    assign next            = valid && open && ready && is_end;
+
+    flk_pipe_reg #(
+      .Width(1 + RecordBits)
+    ) i_record (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (record_valid[k]),
+      .in_ready_o (record_ready[k]),
+      .in_data_i  ({record_end[k], record[k]}),
+      .out_valid_o(valid),
+      .out_ready_i(open && ready),
+      .out_data_o ({is_end, own})
+    );
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        begun_q <= '0;
+      end else begin
+        begun_q <= begun_q + ($clog2(Pairs + 1))'(next && x[0]) - ($clog2(Pairs + 1))'(pair_freed);
+      end
+    end
 
     flk_tile_walk #(
       .CoordBits(TILE_COORD_BITS)
@@ -337,7 +368,7 @@ module flk_rendering
       .clk_i,
       .rst_ni,
       .start_i (start),
-      .next_i  (record_valid[k] && record_ready[k] && record_end[k]),
+      .next_i  (next),
       .pairs_i (registers_i.pairs),
       .rows_i  (registers_i.rows),
       .done_o  (unused_done),
@@ -354,10 +385,10 @@ module flk_rendering
       .clk_i,
       .rst_ni,
       .clear_i     (1'b0),
-      .in_valid_i  (record_valid[k]),
-      .in_ready_o  (record_ready[k]),
-      .in_eos_i    (record_end[k]),
-      .in_record_i (record[k]),
+      .in_valid_i  (valid && open),
+      .in_ready_o  (ready),
+      .in_eos_i    (is_end),
+      .in_record_i (own),
       .in_subtile_i(subtile),
       .out_valid_o (splat_valid[k]),
       .out_ready_i (splat_ready[k]),
@@ -382,7 +413,7 @@ module flk_rendering
     .in_ready_o      (splat_ready),
     .in_elem_i       (splat),
     .out_valid_o     (pixel_valid),
-    .out_ready_i     (pixel_ready),
+    .out_ready_i     ('1),
     .out_data_o      (pixel),
     .clear_counters_i(start),
     .hold_counters_i (1'b0),
@@ -398,6 +429,7 @@ module flk_rendering
   logic [511:0]        line_data;
 
   flk_frame_writer #(
+    .Pairs     (Pairs),
     .BeatBits  (BeatBits),
     .StrideBits(STRIDE_BITS)
   ) i_frame (
@@ -412,8 +444,8 @@ module flk_rendering
     .stride_i    (registers_i.stride),
     .pairs_i     (registers_i.all_pairs),
     .done_o      (unused_done),
+    .freed_o     (pair_freed),
     .in_valid_i  (pixel_valid),
-    .in_ready_o  (pixel_ready),
     .in_data_i   (pixel),
     .out_valid_o (line_valid),
     .out_ready_i (line_ready),

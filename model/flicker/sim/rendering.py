@@ -73,13 +73,13 @@ def rendering_rtl(
     format_: PixelFormat = PixelFormat.RGB8,
     background: tuple[int, int, int] = (0, 0, 0),
     stride: int | None = None,
-    memory: MemoryOptions = MemoryOptions(),
+    memory: MemoryOptions | None = None,
     frames: int = 1,
     seed: int = 1,
     limit: int = 20_000_000,
 ) -> RtlRendering:
     """Run frames of one memory through the RTL. FlickerError where one does not end within `limit` cycles, an assertion fails or a rule of AXI is broken."""
-    lib = _library(build(config))
+    lib, memory = _library(build(config)), memory or MemoryOptions()
     configs = (_Config * len(PORTS))()
     for k, name in enumerate(PORTS):
         port = memory.ports.get(name, PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False, data_bits=256 if name == "record" else 512))
