@@ -3,11 +3,13 @@
 common/flk_ff_table_pkg.sv
 common/flk_param_pkg.sv
 common/flk_pkg.sv
+common/flk_rendering_pkg.sv
 common/flk_table_pkg.sv
 preproc/flk_front_pkg.sv
 preproc/flk_preproc_pkg.sv
 common/flk_axi_fetch.sv
 common/flk_axi_read.sv
+common/flk_axi_read_mux.sv
 common/flk_axi_split.sv
 common/flk_axi_write.sv
 common/flk_delay.sv
@@ -39,6 +41,7 @@ common/flk_fp_convert.sv
 common/flk_fp_mul.sv
 common/flk_fp_mul_pipe.sv
 common/flk_fp_to_fixed.sv
+common/flk_line_writer.sv
 common/flk_log_opacity.sv
 common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
@@ -76,6 +79,7 @@ sort/flk_record_cache.sv
 sort/flk_sort_merge.sv
 sort/flk_sort_runs.sv
 sort/flk_sorting_unit.sv
+sort/flk_tile_walk.sv
 preproc/flk_cluster_cull.sv
 preproc/flk_cluster_header.sv
 preproc/flk_cluster_test.sv
@@ -99,3 +103,4 @@ preproc/flk_splat_band.sv
 preproc/flk_splat_bounds.sv
 preproc/flk_tile_walker.sv
 flk_render_stage.sv
+flk_rendering.sv

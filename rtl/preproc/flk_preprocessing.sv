@@ -729,15 +729,9 @@ module flk_preprocessing
 
   // ---- writes ---------------------------------------------------------------------------------------
 
-  logic                   chosen_valid, chosen_ready;
-  line_t                  chosen;
-  logic [3:0]             write_strobe;
-  logic [Width-1:0]       write_data;
-  logic                   address_room, address_valid, address_ready, address_empty;
-  logic                   data_room, data_valid, data_ready, data_empty;
-  logic [BEAT_BITS-1:0]   write_beat;
-  logic                   write_answer, write_failed, unused_tag;
-  logic [2:0]             unused_index;
+  logic       chosen_valid, chosen_ready, lines_empty, write_failed;
+  line_t      chosen;
+  logic [2:0] unused_index;
 
   flk_stream_arbiter #(
     .Inputs(5),
@@ -755,95 +749,25 @@ module flk_preprocessing
     .out_index_o(unused_index)
   );
 
-  // Lines are gathered and written together, so that the memory's bus turns rarely. A burst's data wait
-  // for its length: addresses and data go their own ways.
-  logic [$clog2(Gather+1)-1:0] gathered_q;  // lines that wait
-  logic [6:0]                  waited_q;    // cycles since the last one came
-  logic                        drain_q, gather, left;
+  assign arbiter_empty = !chosen_valid && lines_empty;
 
-  assign gather        = chosen_valid && chosen_ready;
-  assign left          = data_valid && data_ready;
-  assign chosen_ready  = address_room && data_room;
-  assign arbiter_empty = !chosen_valid && address_empty && data_empty;
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      gathered_q <= '0;
-      waited_q   <= '0;
-      drain_q    <= 1'b0;
-    end else begin
-      gathered_q <= gathered_q + ($clog2(Gather + 1))'(gather) - ($clog2(Gather + 1))'(left);
-      waited_q   <= gather ? '0 : waited_q + 7'(!(&waited_q));
-      drain_q    <= drain_q ? gathered_q != '0
-                            : 32'(gathered_q) >= Gather - 2 || (&waited_q) || lists_end;
-    end
-  end
-
-  flk_sram_fifo #(
-    .Width(BEAT_BITS),
-    .Depth(Gather)
-  ) i_addresses (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (chosen_valid && data_room),
-    .in_ready_o (address_room),
-    .in_data_i  (chosen.beat),
-    .out_valid_o(address_valid),
-    .out_ready_i(address_ready && drain_q),
-    .out_data_o (write_beat),
-    .empty_o    (address_empty)
-  );
-
-  flk_sram_fifo #(
-    .Width(Width + 4),
-    .Depth(Gather)
-  ) i_lines (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (chosen_valid && address_room),
-    .in_ready_o (data_room),
-    .in_data_i  ({chosen.strobe, chosen.data}),
-    .out_valid_o(data_valid),
-    .out_ready_i(data_ready),
-    .out_data_o ({write_strobe, write_data}),
-    .empty_o    (data_empty)
-  );
-
-  logic [Bytes-1:0] strobes;
-
-  always_comb begin
-    for (int unsigned q = 0; q < 4; q++) begin
-      strobes[q*(Bytes/4)+:Bytes/4] = {Bytes / 4{write_strobe[q]}};
-    end
-  end
-
-  flk_axi_write #(
-    .AddrBits(AddrBits),
-    .BeatBits(1),
-    .TagBits (1),
-    .Width   (Width),
-    .MaxBeats(1),
+  flk_line_writer #(
+    .Gather  (Gather),
     .Bursts  (256),
-    .Tagged  (1'b0),
+    .BeatBits(BEAT_BITS),
     .IdBits  (IdBits)
   ) i_write (
     .clk_i,
     .rst_ni,
-    .idle_o      (write_idle),
-    .in_valid_i  (address_valid && drain_q),
-    .in_ready_o  (address_ready),
-    .in_addr_i   ({write_beat, 6'b0}),
-    .in_beats_i  (1'b1),
-    .in_tag_i    (1'b0),
-    .data_valid_i(data_valid),
-    .data_ready_o(data_ready),
-    .data_data_i (write_data),
-    .data_strb_i (strobes),
-    .done_valid_o(write_answer),
-    .done_error_o(write_failed),
-    .done_tag_o  (unused_tag),
+    .empty_o    (lines_empty),
+    .idle_o     (write_idle),
+    .flush_i    (lists_end),
+    .failed_o   (write_failed),
+    .in_valid_i (chosen_valid),
+    .in_ready_o (chosen_ready),
+    .in_beat_i  (chosen.beat),
+    .in_strobe_i(chosen.strobe),
+    .in_data_i  (chosen.data),
     .aw_valid_o,
     .aw_ready_i,
     .aw_id_o,
@@ -916,7 +840,7 @@ module flk_preprocessing
       write_error_q <= 1'b0;
       cycles_q      <= '0;
     end else if (state_q != IDLE) begin
-      write_error_q <= write_error_q || (write_answer && write_failed);
+      write_error_q <= write_error_q || write_failed;
       cycles_q[7:0] <= cycles_q[7:0] + 1'b1;
       if (&cycles_q[7:0]) begin
         cycles_q[31:8] <= cycles_q[31:8] + 1'b1;
@@ -946,7 +870,7 @@ module flk_preprocessing
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,
                     unused_bounds, unused_cull_done, unused_geometry_done, unused_done,
-                    unused_index, unused_tag, fill[3]};
+                    unused_index, fill[3]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

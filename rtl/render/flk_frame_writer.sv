@@ -1,20 +1,23 @@
 // Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/frame_writer.md).
 //
-// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other, the 64 of a sub-tile in any order,
-// all cores in the same order of tiles, which comes in pairs: an even column, then the one right of it. A pair of tiles, 32 x 16
-// pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in RGBA16F, whole bursts of
-// 32 bytes. Two pairs are held; a core that is further ahead waits. Pixel formats: golden/frame_buffer.py.
+// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Its mini-tiles go on by themselves,
+// the 16 pixels of each in any order. All have the same order of tiles, which come in pairs: an even column, then the one right of
+// it. A pair of tiles, 32 x 16 pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in
+// RGBA16F, whole bursts of 32 bytes. Pixel formats: golden/frame_buffer.py.
+// Pairs of tiles are held, and no pixel waits: who gives a core its tiles keeps at most so many pairs begun there that were not
+// freed (freed_o, high for a cycle: the oldest is on its way out). A mini-tile that is ahead would else stop those behind.
 //
 // Frame: start_i while idle_o; rgba_i, background_i, base_i (in beats of 64 bytes), stride_i (of a row of pixels, in 32 bytes) and
 // pairs_i (of the frame, at least 1) stay until done_o, high for the cycle after the last line has left. clear_i aborts: as after
 // reset in the next cycle, a line that is offered may be withdrawn.
-// Lines: a beat of memory, out_strobe_o a bit for each 16 bytes; the others hold anything. Throughput: a pixel a cycle and core in;
+// Lines: a beat of memory, out_strobe_o a bit for each 16 bytes; the others hold anything. Throughput: a pixel a cycle and core in, always;
 // four pixels a cycle out, 128 cycles a pair and 4 between pairs; done_o 141 cycles after the last pixel.
-// in_ready_o comes from registers; out_ready_i goes to register enables and the memories' read enables.
+// out_ready_i goes to register enables and the memories' read enables.
 module flk_frame_writer
   import flk_pkg::*;
   import flk_param_pkg::*;
 #(
+  parameter int unsigned Pairs      = 4,   // of tiles that are held: 2, 4 or 8
   parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
   parameter int unsigned StrideBits = 12
 ) (
@@ -30,9 +33,9 @@ module flk_frame_writer
   input  logic [StrideBits-1:0]   stride_i,
   input  logic [15:0]             pairs_i,
   output logic                    done_o,
+  output logic                    freed_o,
   // Pixels
   input  logic        [CORES-1:0] in_valid_i,
-  output logic        [CORES-1:0] in_ready_o,
   input  core_pixel_t [CORES-1:0] in_data_i,
   // Lines
   output logic                    out_valid_o,
@@ -42,6 +45,10 @@ module flk_frame_writer
   output logic [511:0]            out_data_o
 );
 
+  if (Pairs != 2 && Pairs != 4 && Pairs != 8) begin : gen_check_pairs
+    $error("flk_frame_writer: Pairs must be 2, 4 or 8");
+  end
+
   localparam int unsigned PairBits = SUBTILE_COORD_BITS - 2;  // of a pair's column
   localparam int unsigned TileBits = SUBTILE_COORD_BITS - 1;  // of a tile's row
   localparam int unsigned HalfBits = BeatBits + 1;  // addresses in 32 bytes
@@ -50,37 +57,40 @@ module flk_frame_writer
 
   // ---- pixels come ----------------------------------------------------------------------------------
 
-  logic [CORES-1:0]                taken, complete;  // a pixel; a whole pair is there
-  logic [CORES-1:0][6:0]           count_q;  // pixels of the pair that comes
-  logic [CORES-1:0]                into_q;   // buffer that it goes to
-  logic [CORES-1:0][1:0]           full_q;   // pairs that are there
-  logic                            from_q, freed;  // buffer that leaves; it has
-  logic [1:0][PairBits-1:0]        columns_q;
-  logic [1:0][TileBits-1:0]        rows_q;
-  logic                            running_q;
+  localparam int unsigned IndexBits = $clog2(Pairs);
+  localparam int unsigned FullBits = $clog2(Pairs + 1);
+
+  logic [CORES-1:0][3:0]            complete;  // by core and mini-tile: a whole pair is there
+  logic [IndexBits-1:0]             from_q;    // buffer that leaves
+  logic [IndexBits-1:0]             first_into;
+  logic                             freed, running_q;
+  logic [Pairs-1:0][PairBits-1:0]   columns_q;
+  logic [Pairs-1:0][TileBits-1:0]   rows_q;
 
   // Reads: 8 columns of each core's sub-tile, of which one core's four are used.
-  logic                            en, read;
-  logic [3:0]                      line_q;   // row of pixels
-  logic [2:0]                      group_q;  // four pixels of it
-  pixel_t [CORES-1:0][7:0]         pixel;
+  logic                             en, read;
+  logic [3:0]                       line_q;   // row of pixels
+  logic [2:0]                       group_q;  // four pixels of it
+  pixel_t [CORES-1:0][7:0]          pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic [1:0] unused_row;
-    logic [4:0] place;
+    logic [3:0][4:0]           count_q;  // pixels of a mini-tile in the pair that comes
+    logic [3:0][IndexBits-1:0] into_q;   // buffer that it goes to
+    logic [3:0][FullBits-1:0]  full_q;   // pairs that are there
+    logic [1:0]                m;
+    logic [IndexBits+3:0]      place;
 
     // Buffer, tile of the pair, row.
-    assign place = {into_q[k], in_data_i[k].subtile.col[1], in_data_i[k].minitile[1],
-                    in_data_i[k].index[3:2]};
-    assign unused_row = in_data_i[k].subtile.row[1:0];
+    assign m     = in_data_i[k].minitile;
+    assign place = {into_q[m], in_data_i[k].subtile.col[1], m[1], in_data_i[k].index[3:2]};
 
     for (genvar x = 0; x < 8; x++) begin : gen_column
       flk_sram #(
         .Width($bits(pixel_t)),
-        .Depth(32)
+        .Depth(16 * Pairs)
       ) i_pixels (
         .clk_i,
-        .wr_en_i  (taken[k] && {in_data_i[k].minitile[0], in_data_i[k].index[1:0]} == 3'(x)),
+        .wr_en_i  (in_valid_i[k] && {m[0], in_data_i[k].index[1:0]} == 3'(x)),
         .wr_addr_i(place),
         .wr_data_i(in_data_i[k].pixel),
         .rd_en_i  (en && read),
@@ -89,41 +99,55 @@ module flk_frame_writer
       );
     end
 
-    assign in_ready_o[k] = running_q && !full_q[k][1];
-    assign taken[k]      = in_valid_i[k] && in_ready_o[k];
-    assign complete[k]   = full_q[k] != '0;
+    for (genvar i = 0; i < 4; i++) begin : gen_minitile
+      logic taken, last;
 
-    always_ff @(posedge clk_i or negedge rst_ni) begin
-      if (!rst_ni) begin
-        count_q[k] <= '0;
-        into_q[k]  <= 1'b0;
-        full_q[k]  <= '0;
-      end else if (clear_i || start_i) begin
-        count_q[k] <= '0;
-        into_q[k]  <= 1'b0;
-        full_q[k]  <= '0;
-      end else begin
-        count_q[k] <= count_q[k] + 7'(taken[k]);
-        into_q[k]  <= into_q[k] ^ (taken[k] && (&count_q[k]));
-        full_q[k]  <= full_q[k] + 2'(taken[k] && (&count_q[k])) - 2'(freed);
+      assign taken          = in_valid_i[k] && m == 2'(i);
+      assign last           = taken && (&count_q[i]);
+      assign complete[k][i] = full_q[i] != '0;
+
+      always_ff @(posedge clk_i or negedge rst_ni) begin
+        if (!rst_ni) begin
+          count_q[i] <= '0;
+          into_q[i]  <= '0;
+          full_q[i]  <= '0;
+        end else if (clear_i || start_i) begin
+          count_q[i] <= '0;
+          into_q[i]  <= '0;
+          full_q[i]  <= '0;
+        end else begin
+          count_q[i] <= count_q[i] + 5'(taken);
+          into_q[i]  <= into_q[i] + IndexBits'(last);
+          full_q[i]  <= full_q[i] + FullBits'(last) - FullBits'(freed);
+        end
       end
+
+`ifndef SYNTHESIS
+      assert property (@(posedge clk_i) disable iff (!rst_ni)
+          taken |-> running_q && 32'(full_q[i]) < Pairs)
+      else $error("flk_frame_writer: a pixel of a pair that has no place");
+      assert property (@(posedge clk_i) disable iff (!rst_ni)
+          taken |-> in_data_i[k].subtile.col[1] == count_q[i][4])
+      else $error("flk_frame_writer: tiles do not come in pairs");
+`endif
+    end
+
+    if (k == 0) begin : gen_first
+      assign first_into = into_q[m];
     end
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        taken[k] |-> in_data_i[k].subtile.col[1] == count_q[k][6])
-    else $error("flk_frame_writer: tiles do not come in pairs");
-    assert property (@(posedge clk_i) disable iff (!rst_ni)
-        taken[k] |-> in_data_i[k].subtile.col[0] == 1'(k) &&
-                     in_data_i[k].subtile.row[0] == 1'(k / 2))
+        in_valid_i[k] |-> in_data_i[k].subtile.col[0] == 1'(k) &&
+                          in_data_i[k].subtile.row[0] == 1'(k / 2))
     else $error("flk_frame_writer: a sub-tile from another core");
 `endif
   end
 
   always_ff @(posedge clk_i) begin
-    if (taken[0]) begin
-      columns_q[into_q[0]] <= in_data_i[0].subtile.col[SUBTILE_COORD_BITS-1:2];
-      rows_q[into_q[0]]    <= in_data_i[0].subtile.row[SUBTILE_COORD_BITS-1:1];
+    if (in_valid_i[0]) begin
+      columns_q[first_into] <= in_data_i[0].subtile.col[SUBTILE_COORD_BITS-1:2];
+      rows_q[first_into]    <= in_data_i[0].subtile.row[SUBTILE_COORD_BITS-1:1];
     end
   end
 
@@ -145,18 +169,19 @@ module flk_frame_writer
   assign read       = state_q == READ;
   assign last_group = read && (&group_q);
   assign freed      = en && last_group && (&line_q);
+  assign freed_o    = freed;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q <= WAIT;
       left_q  <= '0;
-      from_q  <= 1'b0;
+      from_q  <= '0;
       line_q  <= '0;
       group_q <= '0;
     end else if (clear_i || start_i) begin
       state_q <= WAIT;
       left_q  <= clear_i ? '0 : pairs_i;
-      from_q  <= 1'b0;
+      from_q  <= '0;
       line_q  <= '0;
       group_q <= '0;
     end else if (en) begin
@@ -173,7 +198,7 @@ module flk_frame_writer
           if (freed) begin
             state_q <= WAIT;
             left_q  <= left_q - 1'b1;
-            from_q  <= !from_q;
+            from_q  <= from_q + 1'b1;
           end
         end
       endcase

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
@@ -12,6 +14,7 @@ from flicker.golden.frame_buffer import PAIR, PixelFormat, frame_buffer, least_s
 from flicker.params import SUBTILE_COORD_BITS, TILE
 
 CORES = 4
+PAIRS = 4  # that the design holds
 PIXEL_BITS = 64 + 4 + 2 + 2 * SUBTILE_COORD_BITS
 SPECIAL = np.array([0, 0x8000, 1, 0x3FF, 0x400, 0x3BFF, 0x3C00, 0x3C01, 0x3FFF, 0x4000, 0x7BFF, 0x7C00, 0xB800, 0xBC00, 0x1C00, 0x1C04], np.uint16)
 
@@ -34,8 +37,10 @@ class Writer:
         out[..., 0] = np.where(out[..., 0] > 0x3C00, 0x3C00, out[..., 0])  # transmittance is never above 1, nor negative
         return out
 
-    async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0) -> int:
-        """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle."""
+    async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0,
+                    order: str = "any") -> int:
+        """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle.
+        order: of a core's mini-tiles, any, ahead (as far apart as they may be) or pairs (one pair after the other)."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         across, down = -(-cols * 8 // PAIR), -(-rows * 8 // TILE)
         cols, rows = 4 * across, 2 * down
@@ -47,17 +52,19 @@ class Writer:
         pairs = [(x, y) for y in range(down) for x in range(across)]
         if walk == "any":
             rng.shuffle(pairs)
-        work: list[list[int]] = [[] for _ in range(CORES)]
-        for x, y in pairs:
+        # By core and mini-tile: pair and pixel, in order; a core's stream takes from any of its four.
+        work: list[list[deque[tuple[int, int]]]] = [[deque() for _ in range(4)] for _ in range(CORES)]
+        for number, (x, y) in enumerate(pairs):
             for tile in range(2):
                 for k in range(CORES):
                     col, row = 4 * x + 2 * tile + k % 2, 2 * y + k // 2
-                    order = list(range(64))
-                    rng.shuffle(order)
-                    for i in order:
-                        t, r, g, b = (int(v) for v in pixels[row * cols + col, i])
-                        position = row << SUBTILE_COORD_BITS | col
-                        work[k].append(position << 70 | i << 64 | t << 48 | r << 32 | g << 16 | b)
+                    for m in range(4):
+                        places = list(range(16 * m, 16 * m + 16))
+                        rng.shuffle(places)
+                        for i in places:
+                            t, r, g, b = (int(v) for v in pixels[row * cols + col, i])
+                            position = row << SUBTILE_COORD_BITS | col
+                            work[k][m].append((number, position << 70 | i << 64 | t << 48 | r << 32 | g << 16 | b))
         expected = frame_buffer(pixels, cols, rows, width, height, form, stride, background)
         memory = np.zeros(expected.size + 64, np.uint8)
         written = np.zeros(memory.size, np.bool_)
@@ -69,24 +76,24 @@ class Writer:
         await edge
         dut.start_i.value = 0
         idles, stalled = [stalls.make(p, rng) for p in idle], stalls.make(stall, rng)
-        at, offered = [0] * CORES, [False] * CORES
-        cycle, first, held = 0, -1, None
+        cycle, first, freed, held = 0, -1, 0, None
         while True:
             valid = data = 0
             for k in range(CORES):
-                offered[k] = offered[k] or (at[k] < len(work[k]) and not next(idles[k]))
-                valid |= offered[k] << k
-                data |= (work[k][at[k]] if offered[k] else rng.getrandbits(PIXEL_BITS)) << PIXEL_BITS * k
+                open_ = [m for m in range(4) if work[k][m] and work[k][m][0][0] < freed + PAIRS]
+                if order == "ahead":
+                    open_ = open_[:1]
+                elif order == "pairs":
+                    open_ = sorted(open_, key=lambda m: work[k][m][0][0])[:1]
+                give = bool(open_) and not next(idles[k])
+                valid |= give << k
+                data |= (work[k][rng.choice(open_)].popleft()[1] if give else rng.getrandbits(PIXEL_BITS)) << PIXEL_BITS * k
+            first = cycle + 1 if first < 0 and valid else first
             ready = not next(stalled)
             dut.in_valid_i.value, dut.in_data_i.value, dut.out_ready_i.value = valid, data, int(ready)
             await edge
             cycle += 1
-            taken = valid & int(dut.in_ready_o.value)
-            for k in range(CORES):
-                if taken >> k & 1:
-                    offered[k] = False
-                    at[k] += 1
-                    first = cycle if first < 0 else first
+            freed += int(dut.freed_o.value)
             if int(dut.out_valid_o.value):
                 got = (int(dut.out_beat_o.value), int(dut.out_strobe_o.value), int(dut.out_data_o.value))
                 assert held in (None, got), "line changed before its transfer"
@@ -112,9 +119,9 @@ class Writer:
                 return cycle
             if int(dut.done_o.value):
                 break
-            assert cycle < 2000 + 3000 * len(pairs), f"stands still with {at} of {len(work[0])} pixels"
+            assert cycle < 2000 + 3000 * len(pairs), f"stands still after {freed} of {len(pairs)} pairs"
         dut.in_valid_i.value = 0
-        assert at == [len(w) for w in work] and int(dut.idle_o.value) == 1
+        assert freed == len(pairs) and not any(any(w) for w in work) and int(dut.idle_o.value) == 1
         row = least_stride(width, form)
         mask = np.zeros(expected.shape, np.bool_)
         mask[:, :row] = True
@@ -132,7 +139,8 @@ async def bytes_of_frames(dut, form, kind):
     for cols, rows in ((1, 1), (5, 3), (12, 2)):
         pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
         idle, stall = ([pick() for _ in range(CORES)], pick()) if kind == "mixed" else ([kind.split()[0]] * CORES, kind.split()[1])
-        await test.frame(cols, rows, form, idle, stall, gap=test.rng.randrange(3), walk=test.rng.choice(("rows", "any")))
+        walk, order = test.rng.choice(("rows", "any")), test.rng.choice(("any", "ahead", "pairs"))
+        await test.frame(cols, rows, form, idle, stall, gap=test.rng.randrange(3), walk=walk, order=order)
 
 
 @cocotb.test()
@@ -142,7 +150,7 @@ async def one_core_late(dut, form):
     test = Writer(dut)
     await test.bench.reset()
     for late in range(CORES):
-        await test.frame(8, 2, form, ["heavy" if k == late else "never" for k in range(CORES)], "half")
+        await test.frame(24, 2, form, ["heavy" if k == late else "never" for k in range(CORES)], "half")
 
 
 @cocotb.test()
@@ -151,8 +159,8 @@ async def rate(dut, form):
     """A pair every 132 cycles; the last one is out 141 cycles after its last pixel."""
     test = Writer(dut)
     await test.bench.reset()
-    one = await test.frame(4, 2, form, ["never"] * CORES, "never")
-    many = await test.frame(40, 2, form, ["never"] * CORES, "never")
+    one = await test.frame(4, 2, form, ["never"] * CORES, "never", order="pairs")
+    many = await test.frame(40, 2, form, ["never"] * CORES, "never", order="pairs")
     assert many - one == 9 * 132, (one, many)
     assert one == 127 + 141, one
 
@@ -164,5 +172,5 @@ async def abort(dut):
     await test.bench.reset()
     for _ in range(12):
         form = test.rng.choice(list(PixelFormat))
-        await test.frame(8, 2, form, ["half"] * CORES, "half", stop=test.rng.randrange(1, 700))
+        await test.frame(24, 2, form, ["half"] * CORES, "half", stop=test.rng.randrange(1, 700))
         await test.frame(4, 2, form, ["never"] * CORES, "half")

@@ -147,7 +147,7 @@ def build(pointers: int = SMALL_POINTERS) -> Path:
         "flk_preprocessing",
         parameters={"Pointers": pointers},
         args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", "--inline-mult", "20000", "--assert"],
-        cpp=[HERE / "preprocessing_harness.cpp"],
+        cpp=[HERE / "frame_harness.cpp"],
         depends=HEADERS,
         settings=[HERE / "preprocessing.vlt"],
         cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -I{HERE} " + " ".join(f"-D{k}={v}" for k, v in words.items()),

@@ -67,7 +67,13 @@ COMPOSED: dict[str, list[str]] = {
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
-        "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_axi_write", "flk_delay",
+        "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_line_writer", "flk_delay",
+    ],
+    "flk_line_writer": ["flk_sram_fifo", "flk_axi_write"],
+    "flk_axi_read_mux": ["flk_stream_arbiter"],
+    "flk_rendering": [
+        "flk_tile_walk", "flk_list_reader", "flk_sorting_unit", "flk_axi_read_mux", "flk_delivery", "flk_record_to_splat", "flk_render_stage",
+        "flk_frame_writer", "flk_line_writer", "flk_pipe_reg",
     ],
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
@@ -136,6 +142,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
             f"in_data_i[{layout.place('core_pixel', 'subtile').at + bit + k * layout.bits('core_pixel')}]"
             for k in range(CORES) for bit in range(2 * SUBTILE_COORD_BITS) if bit != 1 and (k or bit in (0, SUBTILE_COORD_BITS))
         ],
+        "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
@@ -297,6 +304,8 @@ def _front() -> list[Unit]:
         unit("flk_pixel_out"), unit("flk_frame_writer"),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
         unit("flk_record_cache"), unit("flk_delivery"), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
+        unit("flk_tile_walk"), unit("flk_axi_read_mux"), unit("flk_line_writer"),
+        Unit("flk_rendering", "default", tuple(sorted(RenderConfig().rtl_parameters().items()))),
     ]
 
 

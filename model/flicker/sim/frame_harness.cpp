@@ -1,4 +1,5 @@
-// Runs frames of flk_preprocessing against a memory (memory.hpp); called through ctypes by sim/preprocessing.py.
+// Runs frames of flk_preprocessing, or with FLK_RENDERING of flk_rendering, against a memory (memory.hpp); called through ctypes by sim/preprocessing.py and
+// sim/rendering.py. Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o.
 #include <cstring>
 #include <memory>
 #include <string>
@@ -10,7 +11,16 @@
 
 namespace {
 
-constexpr int PORTS = 4;  // cluster table, geometry, colours, writes
+// Ports that read and write: number, prefix of their pins.
+#ifdef FLK_RENDERING
+#define FLK_READERS(X) X(0, list_) X(1, record_)
+#define FLK_WRITERS(X) X(2, )
+constexpr int PORTS = 3;
+#else
+#define FLK_READERS(X) X(0, table_) X(1, geometry_) X(2, colour_)
+#define FLK_WRITERS(X) X(3, )
+constexpr int PORTS = 4;
+#endif
 
 struct Sim {
   Sim(const flk::dram::Timing& timing, bool perfect, const flk::AxiConfig* configs, uint64_t seed) : memory(timing, perfect) {
@@ -28,18 +38,19 @@ struct Sim {
 
   ~Sim() { top->final(); }
 
+#define FLK_DRIVE_R(k, prefix) FLK_AXI_DRIVE_READ(ports[k]->reply(), *top, prefix);
+#define FLK_DRIVE_W(k, prefix) FLK_AXI_DRIVE_WRITE(ports[k]->reply(), *top, prefix);
+#define FLK_SAMPLE_R(k, prefix) FLK_AXI_SAMPLE_READ(requests[k], *top, prefix);
+#define FLK_SAMPLE_W(k, prefix) FLK_AXI_SAMPLE_WRITE(requests[k], *top, prefix);
+
   void drive() {
-    FLK_AXI_DRIVE_READ(ports[0]->reply(), *top, table_);
-    FLK_AXI_DRIVE_READ(ports[1]->reply(), *top, geometry_);
-    FLK_AXI_DRIVE_READ(ports[2]->reply(), *top, colour_);
-    FLK_AXI_DRIVE_WRITE(ports[3]->reply(), *top, );
+    FLK_READERS(FLK_DRIVE_R)
+    FLK_WRITERS(FLK_DRIVE_W)
   }
 
   void sample() {
-    FLK_AXI_SAMPLE_READ(requests[0], *top, table_);
-    FLK_AXI_SAMPLE_READ(requests[1], *top, geometry_);
-    FLK_AXI_SAMPLE_READ(requests[2], *top, colour_);
-    FLK_AXI_SAMPLE_WRITE(requests[3], *top, );
+    FLK_READERS(FLK_SAMPLE_R)
+    FLK_WRITERS(FLK_SAMPLE_W)
   }
 
   void cycle(bool reset) {

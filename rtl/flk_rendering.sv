@@ -1,0 +1,519 @@
+// Rendering: from tile lists and records in memory to a frame buffer in memory (docs/rendering.md).
+//
+// What flk_preprocessing leaves is read back list by list: four list readers and sorting units take the tiles of the walk in turn,
+// delivery fetches records and gives them to four cores, flk_record_to_splat makes the stage's splats of them, and the frame writer
+// puts finished pixels together. The walk goes row by row, in pairs of tiles; a tile that the picture lacks has an empty list.
+// A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
+// error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
+// failed; the frame goes on to its end, with what there is.
+// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3), records (read, 256 bits), frame buffer (write, 512 bits).
+// No combinational path but those of flk_axi_read_mux and flk_line_writer.
+module flk_rendering
+  import flk_pkg::*;
+  import flk_param_pkg::*;
+  import flk_rendering_pkg::*;
+#(
+  parameter  int unsigned Form           = FORM_FACTORED,
+  parameter  int unsigned Precision      = PRECISION_FIXED,
+  parameter  int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
+  parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
+  parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
+  parameter  int unsigned Slots          = 16,   // chunks in a list reader's memory
+  parameter  int unsigned Queue          = 64,   // records of each core and channel
+  parameter  int unsigned Gather         = 64,   // lines that are written together
+  parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
+  parameter  int unsigned IdBits         = 4,
+  localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
+) (
+  input  logic                 clk_i,
+  input  logic                 rst_ni,
+  input  logic                 start_i,
+  output logic                 idle_o,
+  input  rendering_registers_t registers_i,
+  output logic                 done_o,
+  output logic [2:0]           error_o,
+  output rendering_counters_t  counters_o,
+  // Lists
+  output logic                 list_ar_valid_o,
+  input  logic                 list_ar_ready_i,
+  output logic [IdBits-1:0]    list_ar_id_o,
+  output logic [AddrBits-1:0]  list_ar_addr_o,
+  output logic [7:0]           list_ar_len_o,
+  output logic [2:0]           list_ar_size_o,
+  output logic [1:0]           list_ar_burst_o,
+  input  logic                 list_r_valid_i,
+  output logic                 list_r_ready_o,
+  input  logic [IdBits-1:0]    list_r_id_i,
+  input  logic [511:0]         list_r_data_i,
+  input  logic [1:0]           list_r_resp_i,
+  input  logic                 list_r_last_i,
+  // Records
+  output logic                 record_ar_valid_o,
+  input  logic                 record_ar_ready_i,
+  output logic [IdBits-1:0]    record_ar_id_o,
+  output logic [AddrBits-1:0]  record_ar_addr_o,
+  output logic [7:0]           record_ar_len_o,
+  output logic [2:0]           record_ar_size_o,
+  output logic [1:0]           record_ar_burst_o,
+  input  logic                 record_r_valid_i,
+  output logic                 record_r_ready_o,
+  input  logic [IdBits-1:0]    record_r_id_i,
+  input  logic [255:0]         record_r_data_i,
+  input  logic [1:0]           record_r_resp_i,
+  input  logic                 record_r_last_i,
+  // Frame buffer
+  output logic                 aw_valid_o,
+  input  logic                 aw_ready_i,
+  output logic [IdBits-1:0]    aw_id_o,
+  output logic [AddrBits-1:0]  aw_addr_o,
+  output logic [7:0]           aw_len_o,
+  output logic [2:0]           aw_size_o,
+  output logic [1:0]           aw_burst_o,
+  output logic                 w_valid_o,
+  input  logic                 w_ready_i,
+  output logic [511:0]         w_data_o,
+  output logic [63:0]          w_strb_o,
+  output logic                 w_last_o,
+  input  logic                 b_valid_i,
+  output logic                 b_ready_o,
+  input  logic [IdBits-1:0]    b_id_i,
+  input  logic [1:0]           b_resp_i
+);
+
+  localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? 128 : 256;
+  localparam int unsigned BeatBits = RENDERING_BEAT_BITS;
+
+  // ---- frame ----------------------------------------------------------------------------------------
+
+  typedef enum logic [1:0] {IDLE, START, RUN} state_e;
+
+  state_e     state_q;
+  logic       start, pixels_done, lines_idle, quiet, done_q;
+  logic [3:0] reader_idle, sorter_idle, list_error;
+  logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
+
+  assign start  = state_q == START && delivery_idle;
+  assign idle_o = state_q == IDLE;
+  assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) && delivery_idle &&
+                  stage_idle;
+
+  // Delivery forgets its cache first; all others start when it has.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q       <= IDLE;
+      done_q        <= 1'b0;
+      write_error_q <= 1'b0;
+    end else begin
+      done_q <= 1'b0;
+      unique case (state_q)
+        IDLE: begin
+          if (start_i) begin
+            state_q       <= START;
+            write_error_q <= 1'b0;
+          end
+        end
+        START: begin
+          if (start) begin
+            state_q <= RUN;
+          end
+        end
+        default: begin
+          if (quiet) begin
+            state_q <= IDLE;
+            done_q  <= 1'b1;
+          end
+        end
+      endcase
+      if (write_failed) begin
+        write_error_q <= 1'b1;
+      end
+    end
+  end
+
+  assign done_o  = done_q;
+  assign error_o = {write_error_q, record_error, |list_error};
+
+  // ---- lists ----------------------------------------------------------------------------------------
+
+  logic                        walk_done, walk_next;
+  logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
+  logic [1:0]                  turn_q;
+  logic [3:0]                  tile_ready, tile_valid;
+  logic [3:0]                  ask_valid, ask_ready, beat_valid, beat_ready;
+  logic [3:0][AddrBits-1:0]    ask_addr;
+  logic [3:0][7:0]             ask_len;
+  logic [3:0][2:0]             ask_size;
+  logic [3:0][1:0]             ask_burst;
+  logic [3:0]                  sorted_valid, sorted_ready, sorted_end, finish;
+  logic [3:0][27:0]            sorted_entry;
+  logic [3:0][31:0]            entries, readings, dropped;
+
+  flk_tile_walk #(
+    .CoordBits(TILE_COORD_BITS)
+  ) i_walk (
+    .clk_i,
+    .rst_ni,
+    .start_i (start),
+    .next_i  (walk_next),
+    .pairs_i (registers_i.pairs),
+    .rows_i  (registers_i.rows),
+    .done_o  (walk_done),
+    .tile_x_o(walk_x),
+    .tile_y_o(walk_y)
+  );
+
+  assign walk_next = !walk_done && tile_ready[turn_q];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      turn_q <= '0;
+    end else begin
+      turn_q <= start ? '0 : turn_q + 2'(walk_next);
+    end
+  end
+
+  for (genvar u = 0; u < 4; u++) begin : gen_unit
+    logic              line_valid, line_ready, line_last, next_valid, next_ready, next_again;
+    logic [8:0][51:0]  line_entries;
+    logic [3:0]        line_count;
+    logic [IdBits-1:0] unused_id;
+
+    assign tile_valid[u] = !walk_done && turn_q == 2'(u);
+
+    flk_list_reader #(
+      .Slots (Slots),
+      .IdBits(IdBits),
+      .Id    (u)
+    ) i_reader (
+      .clk_i,
+      .rst_ni,
+      .start_i       (start),
+      .clear_i       (1'b0),
+      .idle_o        (reader_idle[u]),
+      .error_o       (list_error[u]),
+      .list_base_i   (registers_i.lists_beat),
+      .pointer_base_i(registers_i.pointers_beat),
+      .columns_i     (registers_i.pairs),
+      .chunks_i      (registers_i.chunks),
+      .tile_valid_i  (tile_valid[u]),
+      .tile_ready_o  (tile_ready[u]),
+      .tile_x_i      (walk_x),
+      .tile_y_i      (walk_y),
+      .out_valid_o   (line_valid),
+      .out_ready_i   (line_ready),
+      .out_entries_o (line_entries),
+      .out_count_o   (line_count),
+      .out_last_o    (line_last),
+      .next_valid_i  (next_valid),
+      .next_ready_o  (next_ready),
+      .next_again_i  (next_again),
+      .ar_valid_o    (ask_valid[u]),
+      .ar_ready_i    (ask_ready[u]),
+      .ar_id_o       (unused_id),
+      .ar_addr_o     (ask_addr[u]),
+      .ar_len_o      (ask_len[u]),
+      .ar_size_o     (ask_size[u]),
+      .ar_burst_o    (ask_burst[u]),
+      .r_valid_i     (beat_valid[u]),
+      .r_ready_o     (beat_ready[u]),
+      .r_id_i        (list_r_id_i),
+      .r_data_i      (list_r_data_i),
+      .r_resp_i      (list_r_resp_i),
+      .r_last_i      (list_r_last_i)
+    );
+
+    flk_sorting_unit i_sorter (
+      .clk_i,
+      .rst_ni,
+      .clear_i     (1'b0),
+      .start_i     (start),
+      .idle_o      (sorter_idle[u]),
+      .entries_o   (entries[u]),
+      .readings_o  (readings[u]),
+      .dropped_o   (dropped[u]),
+      .in_valid_i  (line_valid),
+      .in_ready_o  (line_ready),
+      .in_entries_i(line_entries),
+      .in_count_i  (line_count),
+      .in_last_i   (line_last),
+      .next_valid_o(next_valid),
+      .next_ready_i(next_ready),
+      .next_again_o(next_again),
+      .out_valid_o (sorted_valid[u]),
+      .out_ready_i (sorted_ready[u]),
+      .out_end_o   (sorted_end[u]),
+      .out_entry_o (sorted_entry[u]),
+      .finish_i    (finish[u])
+    );
+  end
+
+  flk_axi_read_mux #(
+    .Managers(4),
+    .AddrBits(AddrBits),
+    .IdBits  (IdBits)
+  ) i_lists (
+    .clk_i,
+    .rst_ni,
+    .ar_valid_i(ask_valid),
+    .ar_ready_o(ask_ready),
+    .ar_addr_i (ask_addr),
+    .ar_len_i  (ask_len),
+    .ar_size_i (ask_size),
+    .ar_burst_i(ask_burst),
+    .r_valid_o (beat_valid),
+    .r_ready_i (beat_ready),
+    .ar_valid_o(list_ar_valid_o),
+    .ar_ready_i(list_ar_ready_i),
+    .ar_id_o   (list_ar_id_o),
+    .ar_addr_o (list_ar_addr_o),
+    .ar_len_o  (list_ar_len_o),
+    .ar_size_o (list_ar_size_o),
+    .ar_burst_o(list_ar_burst_o),
+    .r_valid_i (list_r_valid_i),
+    .r_ready_o (list_r_ready_o),
+    .r_id_i    (list_r_id_i)
+  );
+
+  // ---- records --------------------------------------------------------------------------------------
+
+  logic [CORES-1:0]                 record_valid, record_ready, record_end;
+  logic [CORES-1:0][RecordBits-1:0] record;
+  logic [31:0]                      cache_lines;
+
+  flk_delivery #(
+    .RecordBits(RecordBits),
+    .Queue     (Queue),
+    .AddrBits  (AddrBits),
+    .IdBits    (IdBits)
+  ) i_delivery (
+    .clk_i,
+    .rst_ni,
+    .start_i      (state_q == IDLE && start_i),
+    .clear_i      (1'b0),
+    .idle_o       (delivery_idle),
+    .error_o      (record_error),
+    .lines_o      (cache_lines),
+    .record_base_i({registers_i.records_beat, 1'b0}),
+    .in_valid_i   (sorted_valid),
+    .in_ready_o   (sorted_ready),
+    .in_end_i     (sorted_end),
+    .in_entry_i   (sorted_entry),
+    .finish_o     (finish),
+    .out_valid_o  (record_valid),
+    .out_ready_i  (record_ready),
+    .out_end_o    (record_end),
+    .out_record_o (record),
+    .finished_i   ('0),
+    .ar_valid_o   (record_ar_valid_o),
+    .ar_ready_i   (record_ar_ready_i),
+    .ar_id_o      (record_ar_id_o),
+    .ar_addr_o    (record_ar_addr_o),
+    .ar_len_o     (record_ar_len_o),
+    .ar_size_o    (record_ar_size_o),
+    .ar_burst_o   (record_ar_burst_o),
+    .r_valid_i    (record_r_valid_i),
+    .r_ready_o    (record_r_ready_o),
+    .r_id_i       (record_r_id_i),
+    .r_data_i     (record_r_data_i),
+    .r_resp_i     (record_r_resp_i),
+    .r_last_i     (record_r_last_i)
+  );
+
+  // ---- pixels ---------------------------------------------------------------------------------------
+
+  logic        [CORES-1:0] splat_valid, splat_ready, pixel_valid;
+  logic                    pair_freed;
+  splat_elem_t [CORES-1:0] splat;
+  core_pixel_t [CORES-1:0] pixel;
+  logic [COUNTER_BITS-1:0] unused_counter;
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_core
+    logic                       unused_done, open, next;
+    logic                       valid, ready, is_end;
+    logic [RecordBits-1:0]      own;
+    logic [TILE_COORD_BITS-1:0] x, y;
+    subtile_t                   subtile;
+    logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
+
+    // The frame writer has a place for what the core is given.
+    assign open            = 32'(begun_q) < Pairs;
+    assign next            = valid && open && ready && is_end;
+
+    flk_pipe_reg #(
+      .Width(1 + RecordBits)
+    ) i_record (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (record_valid[k]),
+      .in_ready_o (record_ready[k]),
+      .in_data_i  ({record_end[k], record[k]}),
+      .out_valid_o(valid),
+      .out_ready_i(open && ready),
+      .out_data_o ({is_end, own})
+    );
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        begun_q <= '0;
+      end else begin
+        begun_q <= begun_q + ($clog2(Pairs + 1))'(next && x[0]) - ($clog2(Pairs + 1))'(pair_freed);
+      end
+    end
+
+    flk_tile_walk #(
+      .CoordBits(TILE_COORD_BITS)
+    ) i_walk (
+      .clk_i,
+      .rst_ni,
+      .start_i (start),
+      .next_i  (next),
+      .pairs_i (registers_i.pairs),
+      .rows_i  (registers_i.rows),
+      .done_o  (unused_done),
+      .tile_x_o(x),
+      .tile_y_o(y)
+    );
+
+    assign subtile.col = SUBTILE_COORD_BITS'({x, 1'(k)});
+    assign subtile.row = SUBTILE_COORD_BITS'({y, 1'(k / 2)});
+
+    flk_record_to_splat #(
+      .Form(Form)
+    ) i_splat (
+      .clk_i,
+      .rst_ni,
+      .clear_i     (1'b0),
+      .in_valid_i  (valid && open),
+      .in_ready_o  (ready),
+      .in_eos_i    (is_end),
+      .in_record_i (own),
+      .in_subtile_i(subtile),
+      .out_valid_o (splat_valid[k]),
+      .out_ready_i (splat_ready[k]),
+      .out_elem_o  (splat[k])
+    );
+  end
+
+  flk_render_stage #(
+    .Form          (Form),
+    .Precision     (Precision),
+    .FifoDepth     (FifoDepth),
+    .CtuFifoDepth  (CtuFifoDepth),
+    .VrusPerChannel(VrusPerChannel),
+    .MaskGenerator (MaskGenerator)
+  ) i_stage (
+    .clk_i,
+    .rst_ni,
+    .clear_i         (1'b0),
+    .idle_o          (stage_idle),
+    .mode_i          (registers_i.mode),
+    .in_valid_i      (splat_valid),
+    .in_ready_o      (splat_ready),
+    .in_elem_i       (splat),
+    .out_valid_o     (pixel_valid),
+    .out_ready_i     ('1),
+    .out_data_o      (pixel),
+    .clear_counters_i(start),
+    .hold_counters_i (1'b0),
+    .counter_addr_i  ('0),
+    .counter_data_o  (unused_counter)
+  );
+
+  // ---- frame buffer ---------------------------------------------------------------------------------
+
+  logic                line_valid, line_ready, writer_idle, unused_empty, unused_done;
+  logic [BeatBits-1:0] line_beat;
+  logic [3:0]          line_strobe;
+  logic [511:0]        line_data;
+
+  flk_frame_writer #(
+    .Pairs     (Pairs),
+    .BeatBits  (BeatBits),
+    .StrideBits(STRIDE_BITS)
+  ) i_frame (
+    .clk_i,
+    .rst_ni,
+    .clear_i     (1'b0),
+    .start_i     (start),
+    .idle_o      (writer_idle),
+    .rgba_i      (registers_i.rgba),
+    .background_i(registers_i.background),
+    .base_i      (registers_i.frame_beat),
+    .stride_i    (registers_i.stride),
+    .pairs_i     (registers_i.all_pairs),
+    .done_o      (unused_done),
+    .freed_o     (pair_freed),
+    .in_valid_i  (pixel_valid),
+    .in_data_i   (pixel),
+    .out_valid_o (line_valid),
+    .out_ready_i (line_ready),
+    .out_beat_o  (line_beat),
+    .out_strobe_o(line_strobe),
+    .out_data_o  (line_data)
+  );
+
+  assign pixels_done = writer_idle;
+
+  flk_line_writer #(
+    .Gather  (Gather),
+    .Bursts  (Gather),
+    .BeatBits(BeatBits),
+    .IdBits  (IdBits)
+  ) i_lines (
+    .clk_i,
+    .rst_ni,
+    .empty_o    (unused_empty),
+    .idle_o     (lines_idle),
+    .flush_i    (writer_idle),
+    .failed_o   (write_failed),
+    .in_valid_i (line_valid),
+    .in_ready_o (line_ready),
+    .in_beat_i  (line_beat),
+    .in_strobe_i(line_strobe),
+    .in_data_i  (line_data),
+    .aw_valid_o,
+    .aw_ready_i,
+    .aw_id_o,
+    .aw_addr_o,
+    .aw_len_o,
+    .aw_size_o,
+    .aw_burst_o,
+    .w_valid_o,
+    .w_ready_i,
+    .w_data_o,
+    .w_strb_o,
+    .w_last_o,
+    .b_valid_i,
+    .b_ready_o,
+    .b_id_i,
+    .b_resp_i
+  );
+
+  // ---- counters -------------------------------------------------------------------------------------
+
+  logic [31:0] cycles_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      cycles_q <= '0;
+    end else if (idle_o) begin
+      cycles_q <= start_i ? '0 : cycles_q;
+    end else begin
+      cycles_q <= cycles_q + 1'b1;
+    end
+  end
+
+  assign counters_o.cycles   = cycles_q;
+  assign counters_o.entries  = entries;
+  assign counters_o.readings = readings;
+  assign counters_o.dropped  = dropped;
+  assign counters_o.lines    = cache_lines;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
+  else $error("flk_rendering: start while a frame is under way");
+`endif
+
+endmodule
