@@ -14,9 +14,14 @@ from .common import Say
 TOP = "flk_render_stage"
 
 
-def elaborate(extra: str = "") -> tuple[list[str], dict[str, pyslang.ast.InstanceSymbol]]:
-    """Errors of slang and top modules by name; ``extra`` is SystemVerilog text behind the sources of rtl/flk.f."""
-    compilation = pyslang.ast.Compilation()
+def elaborate(extra: str = "", tops: set[str] | None = None) -> tuple[list[str], dict[str, pyslang.ast.InstanceSymbol]]:
+    """Errors of slang and top modules by name.
+
+    extra: SystemVerilog text behind the sources of rtl/flk.f. tops: None: modules that no other has inside.
+    """
+    options = pyslang.ast.CompilationOptions()
+    options.topModules = tops or set()
+    compilation = pyslang.ast.Compilation(pyslang.Bag([options]))
     for path in filelist():
         compilation.addSyntaxTree(pyslang.syntax.SyntaxTree.fromFile(str(path)))
     if extra:
@@ -33,7 +38,7 @@ def _padded(rows: list[tuple[str, ...]]) -> list[str]:
 
 def template() -> str:
     """Declarations of the signals of ``TOP`` and its instance with every parameter at its default."""
-    errors, tops = elaborate()
+    errors, tops = elaborate(tops={TOP})
     if errors:
         raise FlickerError(f"rtl/flk.f: slang finds {errors[0]}")
     body = tops[TOP].body
