@@ -14,8 +14,9 @@ from flicker.golden.front.memory import front_memory
 from flicker.markdown import table
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
+from flicker.sim.half import BEAT, MemoryOptions
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import BEAT, PORTS, PURPOSES, MemoryOptions, build, front_rtl
+from flicker.sim.preprocessing import PORTS, PURPOSES, build, front_rtl
 
 from .common import Say, titled_views
 

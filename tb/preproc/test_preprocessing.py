@@ -27,8 +27,9 @@ from flicker.scene.files import Scene
 from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import ERRORS, PORTS, MemoryOptions, Regions, RtlFront, front_frame
+from flicker.sim.preprocessing import ERRORS, PORTS, Regions, RtlFront, front_frame
 from flicker.sim.preprocessing import front_rtl as any_front_rtl
 
 QUICK = MemoryOptions()

@@ -7,8 +7,6 @@ steps) and small ones, in which lists that do not fit are many and short. SLOW=1
 
 from __future__ import annotations
 
-import os
-
 import pytest
 from flicker_tb.runner import build_and_test, refused
 
@@ -25,7 +23,7 @@ def test_sorting_unit() -> None:
     build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=[*SMALL, "finish_is_quick", "rate"], opt="-O1")
 
 
-@pytest.mark.skipif(not os.environ.get("SLOW"), reason="SLOW=1")
+@pytest.mark.slow
 def test_20000() -> None:
     build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=["a_long_one"], opt="-O1")
 

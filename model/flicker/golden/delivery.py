@@ -8,19 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-CORES, CHANNELS, UNITS = 4, 2, 4
+CORES, UNITS = 4, 4
 LINE_BYTES = 32
 END = None  # of a list
-
-
-def channel_of(tile: int) -> int:
-    """The channel that serves the tile of this place in the walk."""
-    return tile % CHANNELS
-
-
-def unit_of(tile: int) -> int:
-    """The sorting unit that gives its entries."""
-    return tile % UNITS
 
 
 def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int) -> list[int | None]:

@@ -1,5 +1,5 @@
-// Runs frames of flk_preprocessing, or with FLK_RENDERING of flk_rendering, against a memory (memory.hpp); called through ctypes by sim/preprocessing.py and
-// sim/rendering.py. Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o.
+// Runs frames of flk_preprocessing, or with FLK_RENDERING of flk_rendering, against a memory (memory.hpp); called through ctypes by sim/half.py.
+// Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o.
 #include <cstring>
 #include <memory>
 #include <string>
@@ -93,9 +93,9 @@ void vl_fatal(const char* file, int line, const char*, const char* text) VL_MT_U
 
 extern "C" {
 
-const char* flk_front_failure() { return g_failure.c_str(); }
+const char* flk_half_failure() { return g_failure.c_str(); }
 
-Sim* flk_front_new(const flk::dram::Timing* timing, int perfect, const flk::AxiConfig* configs, uint64_t seed) {
+Sim* flk_half_new(const flk::dram::Timing* timing, int perfect, const flk::AxiConfig* configs, uint64_t seed) {
   try {
     return new Sim(*timing, perfect != 0, configs, seed);
   } catch (const std::exception& e) {
@@ -104,33 +104,33 @@ Sim* flk_front_new(const flk::dram::Timing* timing, int perfect, const flk::AxiC
   }
 }
 
-void flk_front_delete(Sim* sim) { delete sim; }
+void flk_half_delete(Sim* sim) { delete sim; }
 
 // Allocates a range, filled with bytes that look random, and puts `size` bytes at its beginning.
-int flk_front_load(Sim* sim, uint64_t base, uint64_t allocated, const uint8_t* bytes, uint64_t size, uint32_t purpose) {
+int flk_half_load(Sim* sim, uint64_t base, uint64_t allocated, const uint8_t* bytes, uint64_t size, uint32_t purpose) {
   if (!sim->memory.store.allocate(base, allocated, 0x5eed)) return 0;
   if (size) std::memcpy(sim->memory.store.find(base, size), bytes, size);
   for (auto& port : sim->ports) port->purpose(base, allocated, purpose);
   return 1;
 }
 
-int flk_front_read(Sim* sim, uint64_t base, uint64_t size, uint8_t* bytes) {
+int flk_half_read(Sim* sim, uint64_t base, uint64_t size, uint8_t* bytes) {
   const uint8_t* at = sim->memory.store.find(base, size);
   if (!at) return 0;
   std::memcpy(bytes, at, size);
   return 1;
 }
 
-void flk_front_fail(Sim* sim, uint64_t base, uint64_t size) {
+void flk_half_fail(Sim* sim, uint64_t base, uint64_t size) {
   for (auto& port : sim->ports) port->fail_range(base, size, true, true, flk::SLVERR);
 }
 
-void flk_front_mend(Sim* sim) {
+void flk_half_mend(Sim* sim) {
   for (auto& port : sim->ports) port->mend_ranges();
 }
 
-// A frame: 1 done, 0 not within `limit` cycles, -1: a rule was broken (flk_front_failure). counters: words of counters_o; error: error_o.
-int flk_front_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limit, uint32_t* counters, int counter_words, uint32_t* error) {
+// A frame: 1 done, 0 not within `limit` cycles, -1: a rule was broken (flk_half_failure). counters: words of counters_o; error: error_o.
+int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limit, uint32_t* counters, int counter_words, uint32_t* error) {
   try {
     std::memcpy(&sim->top->registers_i[0], registers, sizeof(uint32_t) * words);
     const uint64_t begin = sim->memory.cycle;
@@ -157,11 +157,10 @@ int flk_front_frame(Sim* sim, const uint32_t* registers, int words, uint64_t lim
   }
 }
 
-uint64_t flk_front_cycle(Sim* sim) { return sim->memory.cycle; }
-double flk_front_efficiency(Sim* sim) { return sim->memory.efficiency(); }
+double flk_half_efficiency(Sim* sim) { return sim->memory.efficiency(); }
 
 // AxiCounts of a purpose over all ports, as uint64.
-void flk_front_counts(Sim* sim, uint32_t purpose, uint64_t* out) {
+void flk_half_counts(Sim* sim, uint32_t purpose, uint64_t* out) {
   constexpr int N = sizeof(flk::AxiCounts) / sizeof(uint64_t);
   std::memset(out, 0, sizeof(flk::AxiCounts));
   for (auto& port : sim->ports) {

@@ -6,10 +6,7 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +21,11 @@ from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, pointer_lines, read
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
-from ..toolchain import verilate
-from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
+from . import half
+from .half import BEAT, PAGE, Fields, Half, MemoryOptions
+from .memory import PortConfig, PurposeCounts
 
-HERE = Path(__file__).parent
-BEAT = 64
 RECORD_BYTES = 16
-PAGE = 4096  # regions begin at a multiple of it
 PORTS = ("table", "geometry", "colour", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
@@ -71,8 +66,8 @@ class Regions:
         return Regions(image, records, slots * RECORD_BYTES, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 
-def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int) -> int:
-    """The bits of front_registers_t."""
+def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int) -> Fields:
+    """The fields of front_registers_t."""
     setup = FrameSetup.of(camera)
     f = setup.formats
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
@@ -97,18 +92,7 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
         (len(packed.table), 24), (regions.records // BEAT, 34), (regions.record_bytes // BEAT, 23), (regions.lists // BEAT, 34), (chunks, 25),
         (regions.pointers // BEAT, 34), (pointer_lines(cols, rows) // WRITERS, 11), (writer_columns(cols), 8),
     ]
-    word = 0
-    for value, width in bits:
-        assert 0 <= value < 1 << width
-        word = word << width | value
-    return word
-
-
-def _register_bits() -> int:
-    f = FORMATS
-    cull = (3 + 15 + 5 + 5) * (9 + CLUSTER_M)
-    lane = 28 + 11 * (9 + f.position) + 14 * (9 + f.shape)
-    return cull + lane + 4 * 34 + 24 + 34 + 23 + 34 + 25 + 34 + 11 + 8
+    return bits
 
 
 @dataclass(eq=False)
@@ -142,54 +126,7 @@ def build(pointers: int = SMALL_POINTERS) -> Path:
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
-    words = {"REGISTER_WORDS": -(-_register_bits() // 32)}
-    return verilate(
-        "flk_preprocessing",
-        parameters={"Pointers": pointers},
-        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", "--inline-mult", "20000", "--assert"],
-        cpp=[HERE / "frame_harness.cpp"],
-        depends=HEADERS,
-        settings=[HERE / "preprocessing.vlt"],
-        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL -I{HERE} " + " ".join(f"-D{k}={v}" for k, v in words.items()),
-        opt="-O1",
-        shared=True,
-        kind="sim",
-        name="preprocessing",
-    )
-
-
-@cache
-def _library(path: Path) -> ctypes.CDLL:
-    lib = ctypes.CDLL(str(path))
-    u64, pointer = ctypes.c_uint64, ctypes.c_void_p
-    for name, result, *arguments in (
-        ("failure", ctypes.c_char_p),
-        ("new", pointer, pointer, ctypes.c_int, pointer, u64),
-        ("delete", None, pointer),
-        ("load", ctypes.c_int, pointer, u64, u64, pointer, u64, ctypes.c_uint32),
-        ("read", ctypes.c_int, pointer, u64, u64, pointer),
-        ("fail", None, pointer, u64, u64),
-        ("mend", None, pointer),
-        ("frame", ctypes.c_int, pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer),
-        ("cycle", u64, pointer),
-        ("efficiency", ctypes.c_double, pointer),
-        ("counts", None, pointer, ctypes.c_uint32, pointer),
-    ):
-        function = getattr(lib, f"flk_front_{name}")
-        function.restype = result
-        function.argtypes = arguments
-    return lib
-
-
-@dataclass(frozen=True)
-class MemoryOptions:
-    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name (`PORTS`). fail: (first byte, bytes) that answer with an error; mended: no
-    longer in the last frame."""
-
-    timing: Timing | None = None
-    ports: Mapping[str, PortConfig] = field(default_factory=dict)
-    fail: Sequence[tuple[int, int]] = ()
-    mended: bool = False
+    return half.build("flk_preprocessing", {"Pointers": pointers}, half.HERE / "preprocessing.vlt", ["--inline-mult", "20000"])
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -201,7 +138,7 @@ def front_rtl(
     lists: ListKind = ListKind.ELLIPSE,
     *,
     chunks: int,
-    memory: MemoryOptions = MemoryOptions(),
+    memory: MemoryOptions | None = None,
     regions: Regions | None = None,
     image: bytes | None = None,
     frames: int = 1,
@@ -216,59 +153,27 @@ def front_rtl(
     regions = regions or Regions.of(packed, camera, chunks)
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     own = writer_columns(cols) * -(-rows // 2)
-    lib = _library(build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS))
-    configs = (_Config * len(PORTS))()
-    for k, name in enumerate(PORTS):
-        configs[k] = memory.ports.get(name, PORT).structure()  # type: ignore[call-overload]
-    timing = memory.timing or Timing(*[1] * len(Timing._fields_))
-    sim = lib.flk_front_new(ctypes.byref(timing), memory.timing is None, configs, seed)
-    if not sim:
-        raise FlickerError(f"front end: {lib.flk_front_failure().decode()}")
-    try:
+    library = build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS)
+    with Half("front end", library, dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         data = image or packed.image()
         at = regions.image
         sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
         purposes = [len(PURPOSES), 0, 1, 2, 3]  # the image header has none
         for size, purpose in zip(sizes, purposes):
             offset = at - regions.image
-            _load(lib, sim, at, size, data[offset : offset + size], purpose)
+            sim.load(at, size, data[offset : offset + size], purpose)
             at += size
         for base, size, purpose in (
             (regions.records, regions.record_bytes, 4), (regions.lists, max(regions.chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES, 5),
             (regions.pointers, regions.pointer_bytes, 6),
         ):
-            _load(lib, sim, base, size, b"", purpose)
-        for base, size in memory.fail:
-            lib.flk_front_fail(sim, base, size)
-        word = registers(packed, camera, lists, regions, chunks)
-        count = -(-_register_bits() // 32)
-        given = np.frombuffer(word.to_bytes(4 * count, "little"), np.uint32).copy()
-        counter_bits = sum(width * n for _, width, n in _COUNTERS)
-        out = np.zeros(-(-counter_bits // 32), np.uint32)
-        error = ctypes.c_uint32()
-        before = _records(lib, sim, regions), _lines(lib, sim, regions)
-        errors = []
-        for frame in range(frames):
-            if memory.mended and frame == frames - 1:
-                lib.flk_front_mend(sim)
-            done = lib.flk_front_frame(sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
-            if done < 0:
-                raise FlickerError(f"front end: {lib.flk_front_failure().decode()} (seed {seed})")
-            if not done:
-                raise FlickerError(f"front end: no end within {limit} cycles (seed {seed})")
-            errors.append(error.value)
-        traffic = {}
-        for number, name in enumerate(PURPOSES):
-            counts = PurposeCounts()
-            lib.flk_front_counts(sim, number, ctypes.byref(counts))
-            traffic[name] = counts
+            sim.load(base, size, b"", purpose)
+        before = _records(sim, regions), _lines(sim, regions)
+        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), _COUNTERS, frames, limit)
         return RtlFront(
-            _records(lib, sim, regions), _lines(lib, sim, regions),
-            _read(lib, sim, regions.pointers, regions.pointer_bytes).view(np.uint32),
-            _counters(out), errors, traffic, lib.flk_front_efficiency(sim), before,
+            _records(sim, regions), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
+            sim.traffic(PURPOSES), sim.efficiency, before,
         )
-    finally:
-        lib.flk_front_delete(sim)
 
 
 def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE) -> tuple[FrontFrame, RtlFront]:
@@ -299,33 +204,9 @@ def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.
     return frame, rtl
 
 
-def _load(lib: ctypes.CDLL, sim: int, base: int, allocated: int, data: bytes, purpose: int) -> None:
-    if not lib.flk_front_load(sim, base, allocated, data, len(data), purpose):
-        raise FlickerError(f"front end: {allocated} bytes at {base:#x} overlap others")
+def _records(sim: Half, regions: Regions) -> np.ndarray:
+    return sim.read(regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES)
 
 
-def _read(lib: ctypes.CDLL, sim: int, base: int, size: int) -> np.ndarray:
-    out = np.zeros(size, np.uint8)
-    if size and not lib.flk_front_read(sim, base, size, out.ctypes.data):
-        raise FlickerError(f"front end: {size} bytes at {base:#x} are not there")
-    return out
-
-
-def _records(lib: ctypes.CDLL, sim: int, regions: Regions) -> np.ndarray:
-    return _read(lib, sim, regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES)
-
-
-def _lines(lib: ctypes.CDLL, sim: int, regions: Regions) -> np.ndarray:
-    return _read(lib, sim, regions.lists, regions.chunks * WRITERS * CHUNK_LINES * LINE_BYTES).view(np.uint64).reshape(-1, 8)
-
-
-def _counters(words: np.ndarray) -> dict[str, int | np.ndarray]:
-    word = int.from_bytes(words.tobytes(), "little")
-    out: dict[str, int | np.ndarray] = {}
-    for name, width, n in reversed(_COUNTERS):
-        values = []
-        for _ in range(n):
-            values.append(word & (1 << width) - 1)
-            word >>= width
-        out[name] = values[0] if n == 1 else np.array(values, np.int64)
-    return out
+def _lines(sim: Half, regions: Regions) -> np.ndarray:
+    return sim.read(regions.lists, regions.chunks * WRITERS * CHUNK_LINES * LINE_BYTES).view(np.uint64).reshape(-1, 8)

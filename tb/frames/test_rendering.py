@@ -8,6 +8,7 @@ Not covered: early end of tiles (delivery is not told yet), resets within a fram
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,58 +18,83 @@ from flicker_tb.runner import seed
 from flicker.chip.dram import DramConfig
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
-from flicker.golden.frame_buffer import PixelFormat, least_stride
+from flicker.golden.frame_buffer import PAIR, PixelFormat, least_stride
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
-from flicker.params import CatMode, RenderConfig
+from flicker.golden.list_reader import read_tile
+from flicker.golden.lists import ENTRY_BITS
+from flicker.golden.sorting import sort_list
+from flicker.params import TILE, CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
 from flicker.scene.packed import PackedFormat
 from flicker.scene.packing import pack
+from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import MemoryOptions
-from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, rendering_rtl
+from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, regions, rendering_rtl
 
 LIMIT = 1_000_000  # a frame that hangs says so within minutes
 CONFIG = RenderConfig()
 
 
 @cache
-def view_of(width: int, height: int, demo: bool = False) -> tuple[FrontFrame, FrontImage]:
-    """The demo scene, whose splats are as many at any size, or 500 Gaussians."""
+def view_of(width: int, height: int, demo: bool = False, behind: bool = False) -> tuple[FrontFrame, FrontImage]:
+    """The demo scene, whose splats are as many at any size, or 500 Gaussians, in front of the camera or behind it."""
     if demo:
         view = load_view(DEMO, 0, (width, height))
         front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
     else:
         rng, n = np.random.default_rng(seed()), 500
         scene = Scene(
-            means=np.stack([*rng.uniform(-1.5, 1.5, (2, n)), rng.uniform(1.0, 6.0, n)], axis=1),
+            means=np.stack([*rng.uniform(-1.5, 1.5, (2, n)), rng.uniform(1.0, 6.0, n) * (-1 if behind else 1)], axis=1),
             scales=rng.uniform(0.01, 0.1, (n, 3)), quats=rng.normal(size=(n, 4)), opacities=rng.uniform(0.01, 1.0, n), sh=rng.normal(scale=0.3, size=(n, 4, 3)),
         )
         front = run_front(pack(scene, PackedFormat.CHUNK).packed, Camera(width, height, 80.0, 80.0, np.zeros(3), np.eye(3)))
     return front, front_memory(front)
 
 
-def port(name: str, **options) -> PortConfig:
-    return PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False, data_bits=256 if name == "record" else 512, **options)
+def paused(shares: dict[str, float], first: int = 0) -> dict[str, PortConfig]:
+    """Ports that pause on every channel, each with a seed of its own."""
+    return {name: replace(config, stall=shares, seed=seed() + first + k) for k, (name, config) in enumerate(PORTS.items())}
+
+
+def lists_read(image: FrontImage) -> tuple[int, int]:
+    """Readings of all lists of the picture, and lines read for them: a list of more than 2,048 entries is read more than once."""
+    lists = image.lists
+    readings = lines = 0
+    for y in range(lists.rows):
+        for x in range(lists.cols):
+            elements = read_tile(lists.memory, lists.pointers, lists.cols, x, y, lists.chunks).lines
+            entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in elements for k in range(line.used)]
+            times = len(sort_list(entries).readings)
+            readings += times
+            lines += times * len(elements) if entries else 0
+    return readings, lines
 
 
 def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8, gap: int = 0, background=(0, 0, 0),
-          demo: bool = False, **options) -> RtlRendering:
+          demo: bool = False, behind: bool = False, **options) -> RtlRendering:
     """A frame of both, compared, with what it moves."""
-    front, image = view_of(*size, demo)
+    front, image = view_of(*size, demo, behind)
     row = least_stride(size[0], format_)
     golden = render_chip(front.subtile_lists(), config, format_, background, row + 32 * gap)
     rtl = rendering_rtl(image, front.camera, config, format_=format_, background=background, stride=row + 32 * gap, seed=seed(), limit=LIMIT, **options)
     assert rtl.errors[-1] == 0
     assert np.array_equal(rtl.buffer[:, :row], golden.buffer[:, :row])
-    frames = options.get("frames", 1)
+    if len(front.entry_tile):
+        assert np.ptp(golden.buffer[:, :row].reshape(-1, row), axis=0).any(), "a picture of one colour"
     if not options.get("memory", MemoryOptions()).fail:
+        frames, pairs, rows = options.get("frames", 1), -(-size[0] // PAIR), -(-size[1] // TILE)
+        tiles = 2 * pairs * rows
+        readings, lines = lists_read(image)
+        starts = np.arange(rows * TILE) * (golden.buffer.shape[1] // 32) % 2  # a row of RGBA16F that begins within a beat has one more
+        written = pairs * (2 * len(starts) if format_ is PixelFormat.RGB8 else (4 + starts).sum())
         assert rtl.counters["entries"].sum() == len(front.entry_tile) and not rtl.counters["dropped"].any()
-        traffic = {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items()}
-        assert traffic["records"] == (frames * rtl.counters["lines"], 0)
-        assert traffic["lists"][0] % frames == 0 and traffic["lists"][1] == 0
+        assert rtl.counters["readings"].sum() == readings + tiles - image.lists.cols * image.lists.rows
+        assert {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items()} == {
+            "lists": (frames * lines, 0), "pointers": (frames * tiles, 0), "records": (frames * rtl.counters["lines"], 0), "frame": (0, frames * written),
+        }
         assert rtl.traffic["frame"].dram_masked_bytes == 0
     return rtl
 
@@ -88,6 +114,12 @@ def test_odd_number_of_tiles() -> None:
     check((80, 40), background=(1, 2, 3))
 
 
+def test_nothing_visible() -> None:
+    """All Gaussians behind the camera: no list, no record, a picture of the background."""
+    rtl = check((80, 40), background=(7, 8, 9), behind=True)
+    assert (rtl.buffer.reshape(-1, 3) == (7, 8, 9)).all() and rtl.counters["lines"] == 0
+
+
 def test_modes() -> None:
     """Every mode of the contribution test, the automatic one over sub-tiles that the picture lacks too."""
     for mode in CatMode:
@@ -97,7 +129,7 @@ def test_modes() -> None:
 def test_pauses_and_dram() -> None:
     """DRAM behind ports that pause; two frames one after the other."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
-    memory = MemoryOptions(DramConfig().timing, {n: port(n, stall=shares, seed=seed() + k) for k, n in enumerate(PORTS)})
+    memory = MemoryOptions(DramConfig().timing, paused(shares))
     check((96, 54), memory=memory, frames=2)
 
 
@@ -105,12 +137,7 @@ def test_pauses_and_dram() -> None:
 def test_errors_of_the_memory(part: str) -> None:
     """The frame ends with a code; the next one, of a mended memory, is right."""
     _, image = view_of(96, 54)
-    sizes = {"lists": image.lists.memory.nbytes, "pointers": image.lists.pointers.nbytes, "records": image.records.nbytes}
-    base = 1 << 28
-    for name in PURPOSES:
-        if name == part:
-            break
-        base += -(-sizes[name] // 4096) * 4096
+    base = regions(image, 0)[part]
     rtl = check((96, 54), memory=MemoryOptions(fail=[(base, 2048)], mended=True), frames=2)
     code = {"lists": 0, "pointers": 0, "records": 1, "frame": 2}[part]
     assert rtl.errors == [1 << code, 0], ERRORS[code]
@@ -121,5 +148,4 @@ def test_demo_scene_larger() -> None:
     """At 320x180 with five seeds of pauses."""
     for k in range(5):
         shares = {"AR": 0.1 * k, "R": 0.1 * k, "AW": 0.3, "W": 0.1 * k, "B": 0.3}
-        ports = {n: port(n, stall=shares, seed=seed() + 10 * k + i) for i, n in enumerate(PORTS)}
-        check((320, 180), demo=True, memory=MemoryOptions(None, ports))
+        check((320, 180), demo=True, memory=MemoryOptions(None, paused(shares, 10 * k)))

@@ -1,0 +1,164 @@
+"""One half of the chip, verilated, with a memory behind its AXI ports (frame_harness.cpp): what simulations of front end and rendering half share."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FlickerError
+from ..toolchain import verilate
+from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
+
+HERE = Path(__file__).parent
+BEAT = 64
+PAGE = 4096  # regions begin at a multiple of it
+
+Fields = Sequence[tuple[int, int]]  # value and width, the highest first
+
+
+@dataclass(frozen=True)
+class MemoryOptions:
+    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name. fail: (first byte, bytes) that answer with an error; mended: no longer in
+    the last frame."""
+
+    timing: Timing | None = None
+    ports: Mapping[str, PortConfig] = field(default_factory=dict)
+    fail: Sequence[tuple[int, int]] = ()
+    mended: bool = False
+
+
+def build(top: str, parameters: Mapping[str, int], settings: Path, args: Sequence[str] = (), define: str = "") -> Path:
+    """Shared library of a half's simulator, with the design's assertions; cached by content. define: for the harness, which ports there are."""
+    return verilate(
+        top,
+        parameters=parameters,
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", *args, "--assert"],
+        cpp=[HERE / "frame_harness.cpp"],
+        depends=HEADERS,
+        settings=[settings],
+        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{HERE}",
+        opt="-O1",
+        shared=True,
+        kind="sim",
+        name=top.removeprefix("flk_"),
+    )
+
+
+@cache
+def _library(path: Path) -> ctypes.CDLL:
+    lib = ctypes.CDLL(str(path))
+    u64, pointer = ctypes.c_uint64, ctypes.c_void_p
+    for name, result, *arguments in (
+        ("failure", ctypes.c_char_p),
+        ("new", pointer, pointer, ctypes.c_int, pointer, u64),
+        ("delete", None, pointer),
+        ("load", ctypes.c_int, pointer, u64, u64, pointer, u64, ctypes.c_uint32),
+        ("read", ctypes.c_int, pointer, u64, u64, pointer),
+        ("fail", None, pointer, u64, u64),
+        ("mend", None, pointer),
+        ("frame", ctypes.c_int, pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer),
+        ("efficiency", ctypes.c_double, pointer),
+        ("counts", None, pointer, ctypes.c_uint32, pointer),
+    ):
+        function = getattr(lib, f"flk_half_{name}")
+        function.restype = result
+        function.argtypes = arguments
+    return lib
+
+
+class Half:
+    """A simulator and its memory. Use as a context. ports: by name, in the harness's order.
+
+    Every method raises FlickerError that begins with `name`.
+    """
+
+    def __init__(self, name: str, library: Path, ports: Mapping[str, PortConfig], memory: MemoryOptions, seed: int) -> None:
+        self.name, self.memory, self.seed = name, memory, seed
+        self._lib = _library(library)
+        configs = (_Config * len(ports))()
+        for k, (port, default) in enumerate(ports.items()):
+            configs[k] = memory.ports.get(port, default).structure()  # type: ignore[call-overload]
+        timing = memory.timing or Timing(*[1] * len(Timing._fields_))
+        self._sim = self._lib.flk_half_new(ctypes.byref(timing), memory.timing is None, configs, seed)
+        if not self._sim:
+            raise self._failure()
+
+    def __enter__(self) -> Half:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._lib.flk_half_delete(self._sim)
+
+    def _failure(self, text: str = "") -> FlickerError:
+        return FlickerError(f"{self.name}: {text or self._lib.flk_half_failure().decode()} (seed {self.seed})")
+
+    def load(self, base: int, allocated: int, data: bytes, purpose: int) -> None:
+        """Allocate a range, filled with noise, with data at its beginning."""
+        if not self._lib.flk_half_load(self._sim, base, allocated, data, len(data), purpose):
+            raise self._failure(f"{allocated} bytes at {base:#x} overlap others")
+
+    def read(self, base: int, size: int) -> np.ndarray:
+        """uint8 (size,)."""
+        out = np.zeros(size, np.uint8)
+        if size and not self._lib.flk_half_read(self._sim, base, size, out.ctypes.data):
+            raise self._failure(f"{size} bytes at {base:#x} are not there")
+        return out
+
+    def run(self, registers: Fields, counters: Sequence[tuple[str, int, int]], frames: int, limit: int) -> tuple[dict[str, int | np.ndarray], list[int]]:
+        """Frames one after the other: counters of the last by name, int or int64 (n,), and error_o of each.
+
+        counters: name, width, how many; the highest first. Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a
+        rule of AXI is broken.
+        """
+        for base, size in self.memory.fail:
+            self._lib.flk_half_fail(self._sim, base, size)
+        word = 0
+        for value, width in registers:
+            assert 0 <= value < 1 << width
+            word = word << width | value
+        count = -(-sum(width for _, width in registers) // 32)
+        given = np.frombuffer(word.to_bytes(4 * count, "little"), np.uint32).copy()
+        out = np.zeros(-(-sum(width * n for _, width, n in counters) // 32), np.uint32)
+        error = ctypes.c_uint32()
+        errors = []
+        for frame in range(frames):
+            if self.memory.mended and frame == frames - 1:
+                self._lib.flk_half_mend(self._sim)
+            done = self._lib.flk_half_frame(self._sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
+            if done < 0:
+                raise self._failure()
+            if not done:
+                raise self._failure(f"no end within {limit} cycles")
+            errors.append(error.value)
+        return _counters(out, counters), errors
+
+    def traffic(self, purposes: Sequence[str]) -> dict[str, PurposeCounts]:
+        """By the purposes that `load` numbered, of all frames."""
+        out = {}
+        for number, name in enumerate(purposes):
+            counts = PurposeCounts()
+            self._lib.flk_half_counts(self._sim, number, ctypes.byref(counts))
+            out[name] = counts
+        return out
+
+    @property
+    def efficiency(self) -> float:
+        """Share of the memory's peak rate."""
+        return self._lib.flk_half_efficiency(self._sim)
+
+
+def _counters(words: np.ndarray, counters: Sequence[tuple[str, int, int]]) -> dict[str, int | np.ndarray]:
+    word = int.from_bytes(words.tobytes(), "little")
+    out: dict[str, int | np.ndarray] = {}
+    for name, width, n in reversed(counters):
+        values = []
+        for _ in range(n):
+            values.append(word & (1 << width) - 1)
+            word >>= width
+        out[name] = values[0] if n == 1 else np.array(values, np.int64)
+    return out

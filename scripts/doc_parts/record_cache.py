@@ -1,0 +1,100 @@
+"""`make docs PART=record_cache`: lines that the record cache reads for whole lists, by its size and by the order of the tiles, in docs/delivery.md."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from flicker.golden.delivery import LINE_BYTES
+from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.markdown import table
+from flicker.params import TILE
+from flicker.pipeline import packed_scene
+from flicker.scene.packed import PackedFormat
+
+from .common import Say, titled_views
+
+DEFAULT = (1024, 4)  # lines, ways
+SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (2048, 4))
+VIEWS = ("demo", "flowers")
+
+
+@numba.njit(cache=True)
+def _both_channels(record, place):
+    """Lookups in order: the channels (even and odd places of the walk) in turn, neither more than a tile ahead of the other."""
+    mine = [np.flatnonzero(place % 2 == c) for c in range(2)]
+    at = np.zeros(2, np.int64)
+    out = np.empty(len(record), np.int64)
+    n = 0
+    while n < len(record):
+        for c in range(2):
+            if at[c] < len(mine[c]) and (
+                at[1 - c] == len(mine[1 - c]) or place[mine[c][at[c]]] <= place[mine[1 - c][at[1 - c]]] + 1
+            ):
+                out[n] = record[mine[c][at[c]]]
+                at[c] += 1
+                n += 1
+    return out
+
+
+@numba.njit(cache=True)
+def _lines(line, sets, ways):
+    """Lines read: as `flicker.golden.delivery.RecordCache`, whose banks are low bits of the set."""
+    held = np.full((sets, ways), -1, np.int64)
+    turn = np.zeros(sets, np.int64)
+    n = 0
+    for k in range(len(line)):
+        s = line[k] % sets
+        if not (held[s] == line[k]).any():
+            held[s, turn[s]] = line[k]
+            turn[s] = (turn[s] + 1) % ways
+            n += 1
+    return n
+
+
+def _walks(cols: int, rows: int) -> dict[str, np.ndarray]:
+    """Tiles, row by row in the picture, in the order in which they are taken."""
+    y, x = np.divmod(np.arange(cols * rows), cols)
+    spread = lambda v: sum((v >> b & 1) << 2 * b for b in range(8))  # noqa: E731
+    return {
+        "row by row": np.arange(cols * rows),
+        **{f"bands of {h} rows, column by column": np.lexsort((y % h, x, y // h)) for h in (2, 4)},
+        "Z curve": np.argsort(spread(x) | spread(y) << 1, kind="stable"),
+    }
+
+
+def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Record number and tile of every list entry, lists sorted."""
+    number = front.number[front.entry_splat]
+    order = np.lexsort((number, front.key[front.entry_splat], front.entry_tile))
+    return number[order], front.entry_tile[order].astype(np.int64)
+
+
+def tables(say: Say) -> dict[str, str]:
+    sizes: dict[tuple[int, int] | str, list[str]] = {key: [] for key in (*SIZES, "two")}
+    walks: dict[str, list[str]] = {}
+    titles = []
+    for title, view in titled_views(say):
+        if not title.startswith(VIEWS):
+            continue
+        front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
+        number, tile = _entries(front)
+        per_line = LINE_BYTES // front.kind.bytes
+        titles.append(f"{title}: {len(number):,} entries, {len(np.unique(number // per_line)):,} lines")
+        lookups = _both_channels(number, tile)
+        for lines, ways in SIZES:
+            sizes[lines, ways].append(f"{_lines(lookups // per_line, lines // ways, ways):,}")
+        lines, ways = DEFAULT
+        apart = (_lines(number[tile % 2 == c] // per_line, lines // 2 // ways, ways) for c in range(2))
+        sizes["two"].append(f"{sum(apart):,}")
+        cols, rows = (-(-n // TILE) for n in (view.camera.width, view.camera.height))
+        for name, walk in _walks(cols, rows).items():
+            place = np.argsort(walk)[tile]
+            order = np.argsort(place, kind="stable")
+            walks.setdefault(name, []).append(f"{_lines(_both_channels(number[order], place[order]) // per_line, lines // ways, ways):,}")
+    apart_too = [f"two of {DEFAULT[0] // 2}, one for each channel", str(DEFAULT[1])]
+    named = {key: [f"{key[0]:,}", str(key[1])] if isinstance(key, tuple) else apart_too for key in sizes}
+    return {
+        "sizes": table(["lines", "ways", *titles], [[*named[key], *cells] for key, cells in sizes.items()]),
+        "walks": table(["tiles", *titles], [[name, *cells] for name, cells in walks.items()]),
+    }
