@@ -37,8 +37,10 @@ FORCE:
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-generate: $(STAMP) ## write the generated sources of rtl/ (packages, mask generators, file list)
+generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists)
+	@$(BIN)/python scripts/gen_registers.py
 	@$(BIN)/python scripts/gen_params.py
+	@$(BIN)/python scripts/gen_manifests.py
 
 test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
 	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) --dist worksteal tb

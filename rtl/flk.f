@@ -7,11 +7,16 @@ common/flk_rendering_pkg.sv
 common/flk_table_pkg.sv
 preproc/flk_front_pkg.sv
 preproc/flk_preproc_pkg.sv
+regs/flk_registers_pkg.sv
+top/flk_top_pkg.sv
+common/flk_axi_arbiter.sv
 common/flk_axi_fetch.sv
+common/flk_axi_lane.sv
 common/flk_axi_read.sv
 common/flk_axi_read_mux.sv
 common/flk_axi_split.sv
 common/flk_axi_write.sv
+common/flk_clock_gate.sv
 common/flk_delay.sv
 common/flk_delay_ram.sv
 common/flk_event_counter.sv
@@ -47,6 +52,7 @@ common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
 common/flk_phase_mux.sv
 common/flk_pipe_reg.sv
+common/flk_priority_arbiter.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
 common/flk_sram_fifo.sv
@@ -102,5 +108,10 @@ preproc/flk_shape_field.sv
 preproc/flk_splat_band.sv
 preproc/flk_splat_bounds.sv
 preproc/flk_tile_walker.sv
+regs/flk_registers.sv
+top/flk_descriptor.sv
+top/flk_frame_control.sv
+top/flk_frame_counters.sv
 flk_render_stage.sv
 flk_rendering.sv
+flk_top.sv

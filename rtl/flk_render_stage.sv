@@ -10,11 +10,15 @@
 // clear_i (any number of cycles) aborts: nothing is taken while it is high, pixels that have not left are gone, and in the cycle after it the
 // stage is as after reset, except for the counters.
 //
+// finished_o: of each core, about the sub-tile of the element that in_* takes: its splats change no picture any more, up to the token
+// they need not come. It rises some cycles after the last pixel has finished, and is low in the cycle after the token was taken until it
+// holds for the next sub-tile. In the automatic mode of the CTU it stays low: all splats of a list count in its decisions.
+//
 // Counters: one is read at a time, COUNTER_LATENCY cycles after its address (core, then index CNT_*). They stand still while
 // hold_counters_i is high.
 //
 // Combinational paths: in_ready_o depends on in_elem_i, in_valid_i of the same core, mode_i, clear_i and, in some builds, on nothing else;
-// out_valid_o, out_data_o, idle_o and counter_data_o come from registers.
+// out_valid_o, out_data_o, idle_o, finished_o and counter_data_o come from registers.
 module flk_render_stage
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -35,6 +39,7 @@ module flk_render_stage
   input  logic        [CORES-1:0] in_valid_i,
   output logic        [CORES-1:0] in_ready_o,
   input  splat_elem_t [CORES-1:0] in_elem_i,
+  output logic        [CORES-1:0] finished_o,
   // finished pixels
   output logic        [CORES-1:0] out_valid_o,
   input  logic        [CORES-1:0] out_ready_i,
@@ -67,8 +72,14 @@ module flk_render_stage
 
   localparam int unsigned MaskBits = 32'(MASK_BITS[MaskGenerator]);
   localparam int unsigned MaskedElemBits = MaskBits + FEATURE_ELEM_BITS;
+  // Tokens in a mask generator: the CTU's pipeline holds one, its FIFO any number; a register slice two.
+  localparam int unsigned TokenBits = $clog2(CtuFifoDepth + 4);
 
   logic [2:0] mode;
+  logic all_count;  // splats of a finished sub-tile count in what becomes of later ones
+
+  assign all_count = MaskGenerator == MASK_GENERATOR_CTU && mode == CAT_AUTO;
+
   logic [CORES-1:0] valid, ready, core_idle, in_eos;
   logic [CORES-1:0][COUNTER_BITS-1:0] counter;
 
@@ -97,9 +108,26 @@ module flk_render_stage
     generator_events_t generator_events;
     dispatch_events_t dispatch_events;
     channel_events_t [CHANNELS-1:0] channel_events;
+    logic core_finished, token_in, token_out;
+    logic [TokenBits-1:0] tokens_q;  // in the mask generator
 
     assign in_eos[k]    = in_elem_i[k].eos;
     assign core_idle[k] = generator_idle && rendering_idle;
+
+    // The core speaks of the sub-tile at its own input, which is that of in_* when no token lies between.
+    assign token_in      = valid[k] && ready[k] && in_elem_i[k].eos;
+    assign token_out     = masked_valid && masked_ready && masked[FEATURE_ELEM_BITS-1];  // eos
+    assign finished_o[k] = core_finished && tokens_q == '0 && !all_count;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        tokens_q <= '0;
+      end else if (clear_i) begin
+        tokens_q <= '0;
+      end else begin
+        tokens_q <= tokens_q + TokenBits'(token_in) - TokenBits'(token_out);
+      end
+    end
 
     flk_mask_generator #(
       .MaskGenerator(MaskGenerator),
@@ -137,6 +165,7 @@ module flk_render_stage
       .in_ready_o       (masked_ready),
       .in_data_i        (masked),
       .stall_o          (stall),
+      .finished_o       (core_finished),
       .out_valid_o      (out_valid_o[k]),
       .out_ready_i      (out_ready_i[k]),
       .out_data_o       (out_data_o[k]),
@@ -161,6 +190,10 @@ module flk_render_stage
         in_valid_i[k] && !in_ready_o[k] && !clear_i |=>
         clear_i || (in_valid_i[k] && $stable(in_elem_i[k])))
     else $error("flk_render_stage: element changed before its transfer");
+
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        !clear_i |-> (tokens_q != '0 || !token_out) && (!(&tokens_q) || !token_in || token_out))
+    else $error("flk_render_stage: number of tokens");
 `endif
   end
 

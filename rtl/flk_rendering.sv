@@ -7,6 +7,8 @@
 // error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
 // Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3), records (read, 256 bits), frame buffer (write, 512 bits).
+// A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four cores of a tile say so the
+// sorting unit drops the list (not in the automatic mode, flk_render_stage).
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
 module flk_rendering
   import flk_pkg::*;
@@ -34,6 +36,9 @@ module flk_rendering
   output logic                 done_o,
   output logic [2:0]           error_o,
   output rendering_counters_t  counters_o,
+  // The stage's counters of the last frame (flk_render_stage)
+  input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
+  output logic [COUNTER_BITS-1:0]      counter_data_o,
   // Lists
   output logic                 list_ar_valid_o,
   input  logic                 list_ar_ready_i,
@@ -279,6 +284,7 @@ module flk_rendering
 
   logic [CORES-1:0]                 record_valid, record_ready, record_end;
   logic [CORES-1:0][RecordBits-1:0] record;
+  logic [CORES-1:0]                 finished;
   logic [31:0]                      cache_lines;
 
   flk_delivery #(
@@ -304,7 +310,7 @@ module flk_rendering
     .out_ready_i  (record_ready),
     .out_end_o    (record_end),
     .out_record_o (record),
-    .finished_i   ('0),
+    .finished_i   (finished),
     .ar_valid_o   (record_ar_valid_o),
     .ar_ready_i   (record_ar_ready_i),
     .ar_id_o      (record_ar_id_o),
@@ -322,11 +328,10 @@ module flk_rendering
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
-  logic        [CORES-1:0] splat_valid, splat_ready, pixel_valid;
+  logic        [CORES-1:0] splat_valid, splat_ready, splat_finished, pixel_valid;
   logic                    pair_freed;
   splat_elem_t [CORES-1:0] splat;
   core_pixel_t [CORES-1:0] pixel;
-  logic [COUNTER_BITS-1:0] unused_counter;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
     logic                       unused_done, open, next;
@@ -335,10 +340,25 @@ module flk_rendering
     logic [TILE_COORD_BITS-1:0] x, y;
     subtile_t                   subtile;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
+    logic                       end_in, end_out;
+    logic [2:0]                 ends_q;   // between delivery and the stage
 
     // The frame writer has a place for what the core is given.
     assign open            = 32'(begun_q) < Pairs;
     assign next            = valid && open && ready && is_end;
+
+    // The stage speaks of the sub-tile that it takes, which is the one that delivery gives when no end lies between.
+    assign end_in      = record_valid[k] && record_ready[k] && record_end[k];
+    assign end_out     = splat_valid[k] && splat_ready[k] && splat[k].eos;
+    assign finished[k] = splat_finished[k] && ends_q == '0;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        ends_q <= '0;
+      end else begin
+        ends_q <= ends_q + 3'(end_in) - 3'(end_out);
+      end
+    end
 
     flk_pipe_reg #(
       .Width(1 + RecordBits)
@@ -406,19 +426,20 @@ module flk_rendering
   ) i_stage (
     .clk_i,
     .rst_ni,
-    .clear_i         (1'b0),
+    .clear_i         (start),  // the automatic mode begins anew
     .idle_o          (stage_idle),
     .mode_i          (registers_i.mode),
     .in_valid_i      (splat_valid),
     .in_ready_o      (splat_ready),
     .in_elem_i       (splat),
+    .finished_o      (splat_finished),
     .out_valid_o     (pixel_valid),
     .out_ready_i     ('1),
     .out_data_o      (pixel),
     .clear_counters_i(start),
-    .hold_counters_i (1'b0),
-    .counter_addr_i  ('0),
-    .counter_data_o  (unused_counter)
+    .hold_counters_i (state_q == IDLE),
+    .counter_addr_i,
+    .counter_data_o
   );
 
   // ---- frame buffer ---------------------------------------------------------------------------------
@@ -514,6 +535,12 @@ module flk_rendering
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
   else $error("flk_rendering: start while a frame is under way");
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_check
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        (gen_core[k].ends_q != '0 || !gen_core[k].end_out) && !(&gen_core[k].ends_q))
+    else $error("flk_rendering: number of ends");
+  end
 `endif
 
 endmodule

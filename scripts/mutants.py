@@ -5,8 +5,9 @@
 
 Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
 survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
-Prints a table, writes build/mutants/results.csv (finished mutants are not run again while what their unit's tests use stays as it is); exits 1 when fewer than
-KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table into docs/mutants.md.
+Prints a table, writes tb/mutants/results.csv, which is kept with the sources (finished mutants are not run again while what their unit's tests use stays
+as it is); exits 1 when fewer than KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table
+into docs/mutants.md, with the mutants that were run on sources or tests that have changed since, and says how many these are.
 """
 
 from __future__ import annotations
@@ -37,11 +38,13 @@ from flicker.errors import FlickerError
 ROOT = toolchain.ROOT
 LISTS = ROOT / "tb" / "mutants"
 FOLDER = toolchain.BUILD / "mutants"
-RESULTS = FOLDER / "results.csv"
-COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint", "formal")
+RESULTS = LISTS / "results.csv"
+COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint", "formal", "sw")
 LEVELS = (("rendering_core",), ("render_stage",), ("frames",))  # who may notice what a unit's own tests do not, from below
 KILLED_AT_HOME = 0.95
 TIMEOUT = 900  # seconds of a test run, on a busy machine
+# Modules that build, show and report: no outcome hangs on them.
+HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 KEYS = {"file", "find", "replace", "unit", "note", "survives"}
 
 
@@ -64,11 +67,12 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """killer: unit whose tests failed, "" if none did. wrong: why the mutant is none."""
+    """killer: unit whose tests failed, "" if none did. wrong: why the mutant is none. key: of what it was run on; "": of what is there now."""
 
     mutant: Mutant
     killer: str = ""
     wrong: str = ""
+    key: str = ""
 
     @property
     def at_home(self) -> bool:
@@ -181,15 +185,15 @@ def _modules(text: str) -> set[Path]:
     found: set[str] = set()
     for module, names in re.findall(r"from (flicker[\w.]*) import ([\w, ]+)", text):
         found |= {name for name in (module, *(f"{module}.{word}" for word in re.findall(r"\w+", names))) if name in graph.modules}
-    for module in list(found):
+    for module in found - HOUSEHOLD:
         found |= graph.find_upstream_modules(module)
-    places = [ROOT / "model" / module.replace(".", "/") for module in found]
+    places = [ROOT / "model" / module.replace(".", "/") for module in found - HOUSEHOLD]
     return {path for place in places for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()}
 
 
 @cache
 def _used(unit: str) -> tuple[Path, ...]:
-    """Files that the outcome of a unit's tests depends on: its tests, the modules that they name with all below these, the test library, the model."""
+    """Files that the outcome of a unit's tests depends on: its tests, the modules that they name with all below these, the model's that they import."""
     (test,) = (ROOT / "tb").rglob(f"test_{unit}.py")
     beside: dict[str, list[Path]] = {}
     for path in test.parent.iterdir():
@@ -204,7 +208,7 @@ def _used(unit: str) -> tuple[Path, ...]:
             pending += [other for word in set(re.findall(r"\w+", path.read_text())) & beside.keys() for other in beside[word]]
     named = set(re.findall(r"\bflk_\w+", " ".join(path.read_text() for path in own)))
     tops = [top for top in sorted(named) if any((ROOT / "rtl").rglob(f"{top}.sv"))]
-    files = {*own, ROOT / "tb" / "conftest.py", *(ROOT / "tb" / "flicker_tb").glob("*.py"), *(source for top in tops for source in toolchain.sources_of(top))}
+    files = {*own, *(source for top in tops for source in toolchain.sources_of(top))}
     python = " ".join(path.read_text() for path in files if path.suffix == ".py")
     return tuple(sorted(files | _modules(python)))
 
@@ -221,34 +225,39 @@ def _key(mutant: Mutant) -> str:
     return hashlib.sha256("\0".join((*parts, mutant.file, mutant.find, mutant.replace, mutant.unit)).encode()).hexdigest()[:16]
 
 
-def _earlier(mutants: list[Mutant]) -> dict[int, Outcome]:
+def _kept() -> dict[int, Outcome]:
+    """Outcomes of mutants that are still in the lists, by number."""
     if not RESULTS.exists():
         return {}
     with RESULTS.open(newline="") as file:
-        rows = {row["key"]: row for row in csv.DictReader(file)}
+        rows = {(row["file"], row["find"], row["replace"], row["unit"]): row for row in csv.DictReader(file)}
     found = {}
-    for mutant in mutants:
-        if (row := rows.get(_key(mutant))) is not None and not row["wrong"]:
-            found[mutant.number] = Outcome(mutant, row["killer"])
+    for m in load():
+        if (row := rows.get((m.file, m.find, m.replace, m.unit))) is not None and not row["wrong"]:
+            found[m.number] = Outcome(m, row["killer"], key=row["key"])
     return found
+
+
+def _current(outcome: Outcome) -> bool:
+    """Nothing that the outcome depends on has changed since."""
+    return outcome.key in ("", _key(outcome.mutant))
 
 
 def _write(outcomes: list[Outcome]) -> None:
     with RESULTS.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["key", "file", "find", "replace", "unit", "killer", "wrong", "note"])
-        for o in outcomes:
+        writer.writerow(["key", "file", "find", "replace", "unit", "killer", "wrong"])
+        for o in sorted(outcomes, key=lambda o: o.mutant.number):
             m = o.mutant
-            writer.writerow([_key(m), m.file, m.find, m.replace, m.unit, o.killer, o.wrong, m.note])
+            writer.writerow([o.key or _key(m), m.file, m.find, m.replace, m.unit, o.killer, o.wrong])
 
 
 def results() -> list[Outcome]:
-    """Outcomes of the mutants that have been run on sources and tests as they are. FlickerError when none has."""
-    mutants = load()
-    found = _earlier(mutants)
+    """Outcomes of all mutants that have been run. FlickerError when none has."""
+    found = _kept()
     if not found:
-        raise FlickerError("build/mutants holds no result of this RTL and these tests; run make mutants first")
-    return [found[m.number] for m in mutants if m.number in found]
+        raise FlickerError(f"{RESULTS.relative_to(ROOT)} holds no result; run make mutants first")
+    return [found[number] for number in sorted(found)]
 
 
 def summary(outcomes: list[Outcome]) -> str:
@@ -263,7 +272,8 @@ def summary(outcomes: list[Outcome]) -> str:
     home = sum(o.at_home for o in outcomes)
     rows.append(("all", str(len(outcomes)), f"{home} ({home / len(outcomes):.0%})", str(sum(bool(o.killer) and not o.at_home for o in outcomes)),
                  str(sum(not o.killer for o in outcomes))))
-    text = f"{len(outcomes)} mutants run{f', {left} not yet' if left else ''}.\n\n"
+    changed = sum(not _current(o) for o in outcomes)
+    text = f"{len(outcomes)} mutants run{f', {left} not yet' if left else ''}; sources or tests of {changed} have changed since.\n\n"
     text += markdown.table(["unit", "mutants", "killed by its own tests", "killed above", "survived"], rows)
     others = [o for o in outcomes if not o.at_home]
     if others:
@@ -291,9 +301,8 @@ def main() -> int:
         return 0
     FOLDER.mkdir(parents=True, exist_ok=True)
     console = Console()
-    outcomes = _earlier(mutants)
-    chosen = {m.number for m in mutants}
-    kept = [o for o in _earlier(load()).values() if o.mutant.number not in chosen]
+    kept = _kept()
+    outcomes = {m.number: kept[m.number] for m in mutants if m.number in kept and _current(kept[m.number])}
     left = [m for m in mutants if m.number not in outcomes]
     console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {args.seed}")
     copies = Copies(args.jobs) if left else None
@@ -305,7 +314,7 @@ def main() -> int:
             bar.update(task, advance=1, description=outcome.mutant.title)
             if not console.is_terminal:
                 print(f"{outcome.killer or outcome.wrong or 'SURVIVED':<16} {outcome.mutant.title}", flush=True)
-            _write([*kept, *(outcomes[m.number] for m in mutants if m.number in outcomes)])
+            _write(list((kept | outcomes).values()))
     found = [outcomes[m.number] for m in mutants]
     table = Table()
     for column in ("unit", "mutant", "killed by", "note"):

@@ -40,12 +40,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _simulates(path: Path) -> bool:
-    """Whether a test file simulates hardware: those in the folders of tb/ but tb/model do."""
-    return path.parent != TB and not path.is_relative_to(TB / "model")
+    """Whether a test file simulates hardware: those in the folders of tb/ but tb/model and tb/sw do."""
+    return path.parent != TB and not any(path.is_relative_to(TB / folder) for folder in ("model", "sw"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "sim: simulates hardware (folders of tb/, tb/model excepted)")
+    config.addinivalue_line("markers", "sim: simulates hardware (folders of tb/, tb/model and tb/sw excepted)")
     if toolchain.ROOT != TB.parent:
         raise pytest.UsageError(
             f"{TB.parent}: the flicker package comes from another checkout, {toolchain.ROOT}, whose RTL would be tested; run 'make setup' here"

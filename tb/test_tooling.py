@@ -90,10 +90,10 @@ def test_unit_that_does_not_simulate(unit: str, says: str) -> None:
 
 
 def test_every_named_unit_has_simulations() -> None:
-    """One collection of all: each test file outside tb/model gives tests under ``-m sim``, and only these."""
+    """One collection of all: each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these."""
     done = command(sys.executable, "-m", "pytest", "-m", "sim", "--collect-only", "-q", "tb")
     files = {line.split("::")[0] for line in done.stdout.splitlines() if "::" in line}
-    assert files == {path.relative_to(ROOT).as_posix() for path in (ROOT / "tb").glob("*/test_*.py") if path.parent.name != "model"}
+    assert files == {path.relative_to(ROOT).as_posix() for path in (ROOT / "tb").glob("*/test_*.py") if path.parent.name not in ("model", "sw")}
 
 
 # ---- progress -----------------------------------------------------------------------------------

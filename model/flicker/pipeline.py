@@ -33,6 +33,13 @@ class Engine(str, Enum):
     REFERENCE = "reference"  # float64, vanilla rules
     GOLDEN = "golden"  # bit-true model
     RTL = "rtl"  # verilated rendering stage
+    CHIP_GOLDEN = "chip-golden"  # bit-true model of the whole chip
+    CHIP = "chip"  # verilated chip, from a packed scene in memory to a frame buffer in memory
+
+    @property
+    def whole(self) -> bool:
+        """The engine has a front end of its own."""
+        return self in (Engine.CHIP_GOLDEN, Engine.CHIP)
 
 
 class Front(str, Enum):
@@ -125,13 +132,40 @@ def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[Subtil
     return lists, {"visible": len(projected.depth), "adjusted": lists.adjusted}
 
 
-def _golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
+def golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
+    """Lists of a bit-true front end and its statistics."""
     with steps.step("building sub-tile lists"):
         lists = front.subtile_lists()
     return lists, {
         "visible": front.outcomes["listed"], "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
         "clusters": len(front.packed.table), "clusters_kept": front.clusters_kept, "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
     }
+
+
+def basic_stats(view: View, engine: Engine, front: Front, config: RenderConfig) -> dict[str, Any]:
+    """What was rendered, and how."""
+    return {
+        "scene": str(view.scene.path),
+        "view": view.number,
+        "width": view.camera.width,
+        "height": view.camera.height,
+        "engine": engine.value,
+        "front": front.value,
+        "form": config.form.name.lower(),
+        "precision": config.precision.name.lower(),
+        "cat": config.cat.name.lower(),
+        "fifo_depth": config.fifo_depth,
+        "coords": config.coords.name.lower(),
+        "gaussians": len(view.scene.means),
+        "gaussians_left_out": dict(view.scene.rejected),
+    }
+
+
+def compared(view: View, image: np.ndarray, steps: Steps) -> dict[str, float | None]:
+    """Distance from the float64 reference; None when the pictures are equal."""
+    with steps.step("rendering the float64 reference"):
+        value = psnr(image, view.reference)
+    return {"psnr_db": value if np.isfinite(value) else None}
 
 
 def render_view(
@@ -146,34 +180,19 @@ def render_view(
 ) -> Rendered:
     """Render a view of a scene.
 
-    front, options: who preprocesses, and how. With a bit-true front end the engine `reference` blends its records in float64.
+    front, options: who preprocesses, and how. With a bit-true front end the engine `reference` blends its records in float64. Engines of the whole chip:
+    `chip.run.render_on_chip`.
     compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
     """
     steps = steps or Steps()
-    scene, camera = view.scene, view.camera
+    camera = view.camera
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
-        lists, more = _golden_lists(frame_in, steps)
+        lists, more = golden_lists(frame_in, steps)
         more |= simulated
     else:
         lists, more = _float_lists(view, config, steps)
-    stats: dict[str, Any] = {
-        "scene": str(scene.path),
-        "view": view.number,
-        "width": camera.width,
-        "height": camera.height,
-        "engine": engine.value,
-        "front": front.value,
-        "form": config.form.name.lower(),
-        "precision": config.precision.name.lower(),
-        "cat": config.cat.name.lower(),
-        "fifo_depth": config.fifo_depth,
-        "coords": config.coords.name.lower(),
-        "gaussians": len(scene.means),
-        "gaussians_left_out": dict(scene.rejected),
-        "tile_pairs": lists.tile_pairs,
-        "subtile_pairs": len(lists.entry),
-    } | more
+    stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
     if engine is Engine.RTL:
         with steps.step("building the simulator (once per configuration)"):
             build(config)
@@ -197,17 +216,14 @@ def render_view(
             "ctu_cycles": frame.total("test_cycles"),
             "subtiles_fallen": frame.total("fallen"),
         }
-    if compare or (engine is Engine.REFERENCE and front is Front.FLOAT):
-        with steps.step("rendering the float64 reference"):
-            reference = view.reference
     if engine is Engine.REFERENCE:
         if front is not Front.FLOAT:
             with steps.step("blending the records in float64"):
                 image = blend_records(frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height, view.background)
         else:
-            image = reference
+            with steps.step("rendering the float64 reference"):
+                image = view.reference
         stats |= {"minitiles_sent": None, "pixel_pairs": None}
     if compare:
-        value = psnr(image, reference)
-        stats["psnr_db"] = value if np.isfinite(value) else None
+        stats |= compared(view, image, steps)
     return Rendered(image, stats)

@@ -242,14 +242,16 @@ def verilate(
     return product
 
 
-def compile_library(name: str, cpp: Sequence[Path], *, depends: Sequence[Path] = (), flags: Sequence[str] = ("-O2",)) -> Path:
-    """Build a shared library (for ctypes) of C++ alone and return it; Verilator is not needed.
+def compile_library(
+    name: str, cpp: Sequence[Path], *, depends: Sequence[Path] = (), flags: Sequence[str] = ("-O2",), language: str = "c++", standard: str = "c++17",
+) -> Path:
+    """Build a shared library (for ctypes) of C++, or C, alone and return it; Verilator is not needed.
 
     cpp, depends: files compiled, and files they include (only hashed). The build goes to ``build/cpp/<name>-<hash>``.
     Raises FlickerError with the first error and the log's path if the compiler fails.
     """
     cpp = [Path(path).resolve() for path in cpp]
-    options = ["-std=c++17", "-shared", "-fPIC", "-pthread", "-Wall", "-Wextra", *flags]
+    options = ["-x", language, f"-std={standard}", "-shared", "-fPIC", "-pthread", "-Wall", "-Wextra", *flags]
     contents = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in (*cpp, *depends)]
     folder = BUILD / "cpp" / f"{name}-{_digest(_version(compiler()), *options, '--', *contents)}"
     product, stamp = folder / f"lib{name}.so", folder / "done"

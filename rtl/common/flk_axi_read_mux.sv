@@ -1,8 +1,9 @@
 // Read managers that share an AXI4 port: addresses in turn, answers by identifier.
 //
 // Manager k uses the identifier k alone, in the low bits, and is ready for its beats whenever they come (it asks only for what has a
-// place), so no manager waits for another one's beats. An address that is offered stays until it is taken. Latency of addresses 1;
-// beats pass combinationally: r_* to all managers, valid only for the one that is meant. r_ready_o is 1.
+// place), so no manager waits for another one's beats. An address that is offered stays until it is taken. Latency 0: addresses pass
+// combinationally, ar_ready_i to ar_ready_o too, in turn while several ask; beats go to all managers, valid only for the one that is
+// meant. r_ready_o is 1.
 module flk_axi_read_mux #(
   parameter  int unsigned Managers = 4,
   parameter  int unsigned AddrBits = 40,

@@ -5,6 +5,8 @@
 //     VRU; mini-tiles and sub-tiles interleave, since channels run independently.
 // stall_o (to the mask generator) is high while any feature FIFO is full. in_ready_o depends combinationally on mask and token.
 // clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no element and no pixel is inside.
+// finished_o is about the sub-tile of the element that in_* takes: all its pixels are finished, so that its splats change no pixel any
+// more. It comes from a register, rises some cycles late and is low in the cycle after a token was taken.
 module flk_rendering_core
   import flk_pkg::*;
   import flk_param_pkg::*;
@@ -24,6 +26,7 @@ module flk_rendering_core
   output logic                           in_ready_o,
   input  logic      [MaskedElemBits-1:0] in_data_i,  // masked_elem_t
   output logic                           stall_o,
+  output logic                           finished_o,
   // finished pixels
   output logic                           out_valid_o,
   input  logic                           out_ready_i,
@@ -61,6 +64,20 @@ module flk_rendering_core
   logic [$clog2(CHANNELS)-1:0] out_channel;
 
   assign idle_o = &idle;
+
+  // Each channel says it of the sub-tile at its own input: the one at in_*, for a token goes to all of them at once.
+  logic finished_q, token_in;
+
+  assign token_in   = in_valid_i && in_ready_o && in_masked.elem.eos;
+  assign finished_o = finished_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      finished_q <= 1'b0;
+    end else begin
+      finished_q <= (&finished) && !token_in && !clear_i;
+    end
+  end
 
   flk_fifo_monitor #(
     .MaskBits(MaskBits)

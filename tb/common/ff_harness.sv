@@ -11,7 +11,7 @@ module ff_harness #(
   input  logic               en_i,
   input  logic [       31:0] a_i,
   input  logic [       31:0] b_i,
-  output logic [       31:0] y_o [Formats][5][12]
+  output logic [       31:0] y_o [Formats][5][13]
 );
 
   for (genvar f = 0; f < Formats; f++) begin : gen_format
@@ -75,9 +75,12 @@ module ff_harness #(
     end
 
     logic lt;
+    logic [Width-1:0] half;
+    flk_ff_from_fp16 #(.ManBits(ManBits)) i_half (.x_i(b_q[15:0]), .y_o(half));
     flk_ff_cmp #(.ManBits(ManBits)) i_cmp (.a_i(a), .b_i(b), .lt_o(lt));
     for (genvar s = 0; s < 5; s++) begin : gen_lt
       assign y_o[f][s][11] = 32'(lt);
+      assign y_o[f][s][12] = 32'(half);
     end
   end
 

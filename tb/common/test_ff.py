@@ -289,13 +289,13 @@ def test_function_exponents(M: int) -> None:
 # ---- units -------------------------------------------------------------------------------------
 
 FORMATS = (10, 11, 15, 19, 23)  # mantissas of ff_harness.sv: the ends of the range, and each group of tables
-UNITS = ("add", "mul", "recip", "rsqrt", "sqrt", "exp2", "exp2 wide", "from 24.8", "from 11.0", "floor to 14.6", "round to 7.14", "lt")
+UNITS = ("add", "mul", "recip", "rsqrt", "sqrt", "exp2", "exp2 wide", "from 24.8", "from 11.0", "floor to 14.6", "round to 7.14", "lt", "from FP16")
 
 
 @numba.njit
 def _model(a, b, M):
     """What ff_harness.sv gives for operand patterns: (n, units), uint32."""
-    out = np.empty((a.size, 12), np.uint32)
+    out = np.empty((a.size, 13), np.uint32)
     for i in range(a.size):
         x, y, word = ff.ff_value(a[i] & ((1 << (9 + M)) - 1), M), ff.ff_value(b[i] & ((1 << (9 + M)) - 1), M), np.int64(b[i])
         out[i, 0] = ff.ff_bits(ff.ff_add(x, y, M), M)
@@ -310,6 +310,9 @@ def _model(a, b, M):
         out[i, 9] = np.uint32(ff.ff_to_fixed_floor(x, 6, 20) & 0xFFFFFFFF)
         out[i, 10] = np.uint32(ff.ff_to_fixed_round(x, 14, 21) & 0xFFFFFFFF)
         out[i, 11] = np.uint32(ff.ff_lt(x, y))
+        exponent, mantissa = word >> 10 & 31, word & 1023
+        half = mantissa * 2.0**-24 if exponent == 0 else (1024 + mantissa) * 2.0 ** (exponent - 25)
+        out[i, 12] = ff.ff_bits(-half if word >> 15 & 1 and half else half, M)
     return out
 
 
@@ -388,6 +391,8 @@ def test_functions(harness: Harness, M: int) -> None:
     for exponent in (1, 126, 127, 128, 252, 253, 254):
         a = (m | exponent << M).astype(np.uint32)
         check(harness, M, f"exponent {exponent}", a, np.full_like(a, 127 << M))
+    halves = np.arange(1 << 16, dtype=np.uint32)
+    check(harness, M, "FP16", np.full_like(halves, 127 << M), halves | np.uint32(128 << M))
     words = np.arange(1 << 21, dtype=np.uint32)
     words = words[((words >> M) & 255 != 255) & ((words >> M != 0) | (words == 0))]
     check(harness, M, "exp2", np.full_like(words, 127 << M), words)

@@ -13,7 +13,7 @@ from cocotb.triggers import RisingEdge
 from cocotbext.axi import AxiRamRead, AxiRamWrite
 from cocotbext.axi.axi_channels import AxiARBus, AxiAWBus, AxiBBus, AxiRBus, AxiReadBus, AxiWBus, AxiWriteBus
 
-from flicker.sim.memory import MAX_WORDS, Memory, Port, PortConfig
+from flicker.sim.memory import MAX_WORDS, Memory, Port, PortConfig, Request
 
 ADDRESS = ("valid", "id", "addr", "len", "size", "burst")
 
@@ -21,7 +21,8 @@ ADDRESS = ("valid", "id", "addr", "len", "size", "burst")
 class MemoryPort:
     """A port of a memory on the pins of a design, from the first edge on; fails the test when the design breaks a rule.
 
-    reads, writes: which half there is. ``tick``: this port moves the memory's time; one port of a memory does.
+    reads, writes: which half there is. ``tick``: this port moves the memory's time; one port of a memory does. ``off``: the memory's side is in reset,
+    and does not look at what the design drives.
     """
 
     def __init__(
@@ -29,14 +30,14 @@ class MemoryPort:
     ) -> None:
         self.dut, self.memory, self.port, self.tick = dut, memory, Port(memory, config), tick
         self.words = config.data_bits // 32
+        self.off = False
         self._inputs: list[tuple[Any, str]] = []
-        self._address: list[tuple[Any, Any, list[tuple[Any, str]]]] = []
+        self._address: list[tuple[str, Any, list[tuple[Any, str]]]] = []
         self._reads, self._writes = reads, writes
         self._pins = lambda name: getattr(dut, prefix + name)
-        request = self.port.request
         for channel, present in (("ar", reads), ("aw", writes)):
             if present:
-                self._address.append((getattr(request, channel), self._pins(f"{channel}_valid_o"), [(self._pins(f"{channel}_{x}_o"), x) for x in ADDRESS[1:]]))
+                self._address.append((channel, self._pins(f"{channel}_valid_o"), [(self._pins(f"{channel}_{x}_o"), x) for x in ADDRESS[1:]]))
         if reads:
             self._inputs += [(self._pins(f"{x}_i"), x) for x in ("ar_ready", "r_valid", "r_id", "r_resp", "r_last")]
         if writes:
@@ -45,9 +46,14 @@ class MemoryPort:
         self._drive()
         cocotb.start_soon(self._run())
 
+    def restart(self, config: PortConfig) -> None:
+        """Behind ``off``: the memory's side with other options."""
+        self.port, self.off = Port(self.memory, config), False
+
     def _sample(self) -> None:
         q = self.port.request
-        for to, valid, fields in self._address:
+        for channel, valid, fields in self._address:
+            to = getattr(q, channel)
             to.valid = int(valid.value)
             if to.valid:
                 for pin, name in fields:
@@ -81,7 +87,10 @@ class MemoryPort:
             if self.tick:
                 self.memory.tick()
             self._sample()
-            if self.dut.rst_ni.value != 1:
+            if self.off:
+                self.port.request = Request()
+                self.port.reset()
+            elif self.dut.rst_ni.value != 1:
                 self.port.reset()
             else:
                 self.port.step()

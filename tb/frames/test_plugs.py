@@ -39,6 +39,7 @@ module flk_stub_stage
   input  logic             [CORES-1:0] in_valid_i,
   output logic             [CORES-1:0] in_ready_o,
   input  splat_elem_t      [CORES-1:0] in_elem_i,
+  output logic             [CORES-1:0] finished_o,
   output logic             [CORES-1:0] out_valid_o,
   input  logic             [CORES-1:0] out_ready_i,
   output core_pixel_t      [CORES-1:0] out_data_o,

@@ -1,7 +1,7 @@
 """AXI4 ports of the memory for simulations (`flicker.sim.memory`): contents, order, answers, errors, what is counted, rules that are checked.
 
 A manager written here drives ports cycle by cycle; a Python dictionary of bytes is the golden memory. Random bursts under random pauses on all
-channels, every order of answers and of addresses and data, widths of 32 to 512 bits, perfect memory and LPDDR4. The DRAM's own times: test_chip.py.
+channels, every order of answers and of addresses and data, widths of 32 to 512 bits, perfect memory and LPDDR4. The DRAM's own times: tb/model/test_chip.py.
 Not covered here: connection to the pins of a verilated design (tb/memory).
 """
 
@@ -366,7 +366,7 @@ GOOD = {"ar_valid": 1, "ar_addr": BASE + 4096 - 128, "ar_len": 1, "ar_size": 6, 
     ({}, None),
     ({"ar_len": 2}, "crosses a 4 KB boundary"),
     ({"ar_addr": BASE, "ar_len": 16}, "more than 16 beats"),
-    ({"ar_size": 5}, "only whole beats"),
+    ({"ar_size": 7}, "size 7, "),
     ({"ar_burst": 2}, "only INCR"),
     ({"ar_addr": BASE + 32}, "not a multiple of 64"),
     ({"ar_id": 16}, "more than 4 bits"),
@@ -378,6 +378,48 @@ def test_rules_of_addresses(change, message):
             assert found == []
         else:
             assert len(found) == 1 and message in found[0] and f"{channel.upper()} 0x" in found[0]
+
+
+def test_narrow():
+    """Reads may be narrower than the port, at multiples of their size; writes may not."""
+    narrow = {"valid": 1, "addr": BASE + 4096 - 64, "len": 1, "size": 5, "burst": INCR}
+    for addr, length, message in ((BASE + 4096 - 64, 1, None), (BASE + 4096 - 64, 2, "crosses a 4 KB boundary"), (BASE + 16, 0, "not a multiple of 32")):
+        found = violations(**{f"ar_{name}": value for name, value in (narrow | {"addr": addr, "len": length}).items()})
+        assert [message in e for e in found] == ([True] if message else [])
+    found = violations(**{f"aw_{name}": value for name, value in narrow.items()})
+    assert len(found) == 1 and "only whole beats" in found[0]
+
+
+@pytest.mark.parametrize(("bits", "perfect", "order"), [(512, True, Order.BY_ID), (512, False, Order.INTERLEAVED), (128, False, Order.IN_ORDER)])
+def test_narrow_reads(bits, perfect, order):
+    """Each beat in its lanes, noise in the others; the DRAM moves whole bursts, the counts are of what is asked for."""
+    m, port = memory(perfect, data_bits=bits, id_bits=3, order=order, stall={"R": 0.3, "AR": 0.3}, seed=seed())
+    manager = Manager(port)
+    rng, whole = manager.rng, manager.size
+    reads, elsewhere, moved = [], 0, 0
+    for _ in range(60):
+        size = manager.size = rng.randint(0, whole)
+        beats = rng.randint(1, 16)
+        first = BASE + 4096 * rng.randrange(SIZE // 4096) + (rng.randrange(4096 // (1 << size) - beats + 1) << size)
+        b = manager.read(Burst(first, beats, rng.randrange(8)))
+        reads.append((b, 1 << size))
+        while manager.ar:  # `size` is that of the address that waits
+            manager.step()
+    manager.run()
+    for b, step in reads:
+        assert len(b.got) == b.beats
+        for k, (data, resp) in enumerate(b.got):
+            at = b.addr + k * step
+            lane = at % manager.width
+            assert resp == Resp.OKAY and data[lane : lane + step] == m.read(at, step), hex(at)
+            around = m.read(at - lane, manager.width)
+            elsewhere += step < manager.width and data != around
+        moved += b.beats * step
+    assert port.errors == [] and port.idle
+    assert elsewhere > 100
+    assert sum(port.counts(k).read_bytes for k in range(8)) == moved
+    in_dram = sum(port.counts(k).dram_read_bytes for k in range(8))
+    assert in_dram == (0 if perfect else sum(b.beats * max(32, step) for b, step in reads))
 
 
 def test_last_is_checked():

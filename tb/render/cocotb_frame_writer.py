@@ -8,13 +8,13 @@ import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, config
 
 from flicker.golden.frame_buffer import PAIR, PixelFormat, frame_buffer, least_stride
 from flicker.params import SUBTILE_COORD_BITS, TILE
 
 CORES = 4
-PAIRS = 4  # that the design holds
+PAIRS = config().get("pairs", 4)  # that the design holds
 PIXEL_BITS = 64 + 4 + 2 + 2 * SUBTILE_COORD_BITS
 SPECIAL = np.array([0, 0x8000, 1, 0x3FF, 0x400, 0x3BFF, 0x3C00, 0x3C01, 0x3FFF, 0x4000, 0x7BFF, 0x7C00, 0xB800, 0xBC00, 0x1C00, 0x1C04], np.uint16)
 

@@ -30,7 +30,7 @@ MODE = CatMode.OFF if config()["MaskGenerator"] else CatMode.SMOOTH
 
 
 class StageTest:
-    """Drives the four input streams from queues, takes pixels, compares them with the golden models; checks idle_o in every cycle."""
+    """Drives the four input streams from queues, takes pixels, compares them with the golden models; checks idle_o and finished_o in every cycle."""
 
     def __init__(self, dut) -> None:
         self.dut, self.bench = dut, Bench(dut)
@@ -44,6 +44,8 @@ class StageTest:
         self.ctu = [CtuModel(FORM, PRECISION, MODE) for _ in range(CORES)]
         self.pixels = [SubtileModel(FORM) for _ in range(CORES)]
         self.output = True
+        self.finished: list[set[int]] = [set() for _ in range(CORES)]  # lists that a core said to be finished
+        self.lists = [0] * CORES  # whose token was taken
         dut.mode_i.value = int(MODE)
         for port in (dut.in_valid_i, dut.in_elem_i, dut.out_ready_i, dut.clear_counters_i, dut.hold_counters_i, dut.counter_addr_i):
             port.value = 0
@@ -52,6 +54,7 @@ class StageTest:
     def _take(self, k: int, word: int) -> None:
         self.taken[k] += 1
         self.begun[k] = not word & splats.SPLAT_EOS
+        self.lists[k] += not self.begun[k]
         for element, mask in self.ctu[k].take(word):
             if element & splats.FEATURE_EOS:
                 place = element & (1 << layout.bits("subtile")) - 1
@@ -77,6 +80,11 @@ class StageTest:
                 if dut.idle_o.value == 1:
                     assert not any(self.begun), "idle_o is high, but a list has begun"
                     assert len(self.got) == len(self.expected), "idle_o is high, but pixels are inside"
+                finished = int(dut.finished_o.value)
+                for k in range(CORES):
+                    if finished >> k & 1:
+                        assert all(self.pixels[k].finished(m) for m in range(CHANNELS)), f"finished_o of core {k}, but not of the list at its input"
+                        self.finished[k].add(self.lists[k])
                 taken, given = int(dut.in_ready_o.value), int(dut.out_valid_o.value) & ready
                 data = int(dut.out_data_o.value)
                 for k in range(CORES):
@@ -141,6 +149,29 @@ async def pixels_and_counters(dut):
     for k in range(CORES):
         found = await test.counters(k)
         assert found["cycles"] < 400 and sum(found.values()) == found["cycles"] + found["ctu_idle"], f"core {k} after the clear: {found}"
+
+
+@cocotb.test()
+async def finished(dut):
+    """Lists that begin with opaque splats: each core says so before their token, also behind lists of tokens alone and at full rate."""
+    test = StageTest(dut)
+    test.gap = 20
+    await test.bench.reset()
+    kinds = [splats.opaque, splats.mixed, None, None, splats.opaque, None, splats.opaque]
+    for k in range(CORES):
+        for n, kind in enumerate(kinds):
+            test.queues[k] += [splats.splat_elem(kind(test.bench.rng, FORM)) for _ in range(30 if kind else 0)] + [token(n)]
+    total = CORES * len(kinds) * SUBTILE_PIXELS
+    await test.bench.until(lambda: len(test.got) == total, 60_000, "last pixel")
+    opaque = {n for n, kind in enumerate(kinds) if kind is splats.opaque}
+    assert all(seen >= opaque and not seen & {2, 3, 5} for seen in test.finished), test.finished
+    test.gap = 0
+    for k in range(CORES):
+        for n in range(6):
+            test.queues[k] += [splats.splat_elem(splats.opaque(test.bench.rng, FORM)) for _ in range(60)] + [token(len(kinds) + n)]
+    total += CORES * 6 * SUBTILE_PIXELS
+    await test.bench.until(lambda: len(test.got) == total, 60_000, "last pixel")
+    assert all(seen >= set(range(len(kinds), len(kinds) + 6)) for seen in test.finished), test.finished
 
 
 @cocotb.test()

@@ -22,7 +22,7 @@ OUT = layout.fields("core_pixel")
 
 
 class CoreTest:
-    """Drives a core; checks pixels and counts against the golden model, idle_o in every cycle."""
+    """Drives a core; checks pixels and counts against the golden model, idle_o and finished_o in every cycle."""
 
     def __init__(self, dut) -> None:
         self.dut, self.bench = dut, Bench(dut)
@@ -42,6 +42,7 @@ class CoreTest:
         """Start: nothing was sent."""
         self.model.clear()
         self.aborted = False  # what was expected is known to be wrong
+        self.finished_seen = 0
         self.expected: dict[tuple, tuple] = {}
         self.got: dict[tuple, tuple] = {}
         self.want = {"bits": 0, "sent": [0] * CHANNELS, "finished": [0] * CHANNELS}
@@ -71,6 +72,9 @@ class CoreTest:
             await FallingEdge(self.dut.clk_i)
             if self.dut.rst_ni.value == 1 and self.dut.clear_i.value == 0 and int(self.dut.idle_o.value) and not self.aborted:
                 assert len(self.got) == len(self.expected), "idle_o is high, but pixels are inside"
+            if self.dut.rst_ni.value == 1 and int(self.dut.finished_o.value) and not self.aborted:
+                assert all(self.model.finished(m) for m in range(CHANNELS)), "finished_o is high, but not for the sub-tile at the input"
+                self.finished_seen += 1
 
     def items(self, made: list[list[splats.Splat]]) -> list[int]:
         """Elements of lists with random masks, each list with its token."""
@@ -111,6 +115,7 @@ async def compare(test: CoreTest) -> None:
     handled = sum(c.total["vru_busy"] for c in test.channels) / PIXELS + sum(c.total["discarded"] for c in test.channels)
     assert handled >= count["delivered"], "splats lost between FIFO and VRUs"
     assert count["filtered"] > 0, "no splat was left out for a finished mini-tile"
+    assert test.finished_seen > 0, "no sub-tile was ever told to be finished"
     assert sum(c.total["fifo_full"] for c in test.channels) > 0, "no FIFO was ever full"
 
 
@@ -136,7 +141,7 @@ async def clear_forgets(dut):
         await FallingEdge(dut.clk_i)
         test.model.clear()
         test.got.clear()
-        assert dut.idle_o.value == 1 and dut.out_valid_o.value == 0 and dut.stall_o.value == 0, "something is left after clear_i"
+        assert dut.idle_o.value == 1 and dut.finished_o.value == 0 and dut.out_valid_o.value == 0 and dut.stall_o.value == 0, "something is left after clear_i"
         await test.bench.until(lambda: test.source.pending == 0, 50_000, "rest of the lists")
         await test.bench.clear()
         await FallingEdge(dut.clk_i)

@@ -13,7 +13,8 @@ from flicker.chip.dram import DramConfig
 from flicker.golden.delivery import LINE_BYTES, RecordCache
 from flicker.sim.memory import Memory, PortConfig
 
-BASE, RECORDS = 0x1_2345_6780, 1 << 13
+RECORDS = 1 << 13
+BASE = (1 << 40) - (1 << 29) - 0xABC0  # the sum of an address carries far up, behind a sixth or a third of the records
 Element = tuple[int, int, int]  # skip, record, tag
 
 

@@ -38,7 +38,7 @@ CatChoice = _choices(CatMode)
 FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
 CoordsChoice = _choices(Coords)
-EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
+EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl", "CHIP_GOLDEN": "chip-golden", "CHIP": "chip"}, type=str)
 FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
 FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
 ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
@@ -73,6 +73,16 @@ def summary(stats: dict, picture: Path | None) -> Table:
     for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
         if key in stats:
             table.add_row(label, f"{stats[key]:.1%}")
+    if "phases" in stats:
+        for name, cycles in stats["phases"].items():
+            table.add_row(f"  {name}", _number(cycles))
+        for name, (read, written) in stats["dram_bytes"].items():
+            table.add_row(f"  bytes of {name}", " + ".join(f"{_number(n)} {what}" for n, what in ((read, "read"), (written, "written")) if n))
+        table.add_row("memory", f"{sum(map(sum, stats['dram_bytes'].values())) / 1e6:.2f} MB, {stats['dram_efficiency']:.0%} of the peak rate")
+        for cause, cycles in stats["stalls"].items():
+            if cycles:
+                table.add_row(f"  stalled: {cause}", _number(cycles))
+        table.add_row("bottleneck", stats["bottleneck"])
     if stats.get("simulated_cycles_per_second"):
         table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
     for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
@@ -87,7 +97,9 @@ def render(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    front: Annotated[FrontChoice, typer.Option(help="what makes records and lists: float64 on the host, bit-true front end, its RTL")] = FrontChoice.FLOAT,
+    front: Annotated[FrontChoice | None, typer.Option(
+        help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
+    )] = None,
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
@@ -103,7 +115,10 @@ def render(
     """Render one view of a scene."""
     given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
     chosen: dict[str, object] = {"format": memory, "lists": lists}
-    if front is FrontChoice.FLOAT:
+    whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
+    if whole and front is not None:
+        raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
+    if not whole and front in (None, FrontChoice.FLOAT):
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
             raise FlickerError(f"{names}: for --front golden and rtl only")
     else:
@@ -126,6 +141,7 @@ def render(
     wanted = parse_size(size)
     steps = RichSteps()
     with steps.step("starting"):
+        from ..chip.run import render_on_chip
         from ..front.view import load_view
         from ..golden.front.frame import ListKind
         from ..pipeline import Engine, Front, FrontOptions, render_view
@@ -137,9 +153,13 @@ def render(
     )
     with steps.step(f"loading {scene_title(scene)}"):
         loaded = load_view(scene, view, wanted, cameras, up)
-    result = render_view(
-        loaded, engine=Engine(engine.value), config=config, front=Front(front.value), options=options, compare=compare is not None, steps=steps,
-    )
+    if whole:
+        result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, compare=compare is not None, steps=steps)
+    else:
+        result = render_view(
+            loaded, engine=Engine(engine.value), config=config, front=Front((front or FrontChoice.FLOAT).value), options=options, compare=compare is not None,
+            steps=steps,
+        )
     if out is not None:
         write_atomically(out, lambda path: save_png(path, result.image))
     if stats is not None:
@@ -152,12 +172,13 @@ def demo(
     folder: Annotated[Path, typer.Option("--dir", help="where scene, picture and statistics go")] = Path("build/demo"),
     seed: Annotated[int, typer.Option(help="seed of the scene")] = 1,
 ) -> None:
-    """Make the demo scene and render it through the RTL, beside the golden model and the reference."""
+    """Make the demo scene and render it on the verilated chip, beside its golden model and the reference."""
     wanted = parse_size(size)
     steps = RichSteps()
     with steps.step("starting"):
+        from ..chip.run import render_on_chip
         from ..front.view import load_view
-        from ..pipeline import Engine, render_view
+        from ..pipeline import Engine
         from ..scene.demo import write_demo
         from ..scene.image import save_png
     with steps.step(f"making the demo scene (seed {seed})"):
@@ -165,10 +186,10 @@ def demo(
     view = load_view(scene_path, 0, wanted, cameras_path)
     with steps.step("rendering the float64 reference (compiling on the first run)"):
         _ = view.reference
-    golden = render_view(view, engine=Engine.GOLDEN, compare=True, steps=steps)
-    rtl = render_view(view, engine=Engine.RTL, compare=True, steps=steps)
+    golden = render_on_chip(view, Engine.CHIP_GOLDEN, compare=True, steps=steps)
+    rtl = render_on_chip(view, Engine.CHIP, compare=True, steps=steps)
     if not (golden.image == rtl.image).all():
-        raise FlickerError("demo: the RTL's picture differs from the golden model's")
+        raise FlickerError("demo: the chip's picture differs from its golden model's")
     picture = folder / "demo.png"
     write_atomically(picture, lambda path: save_png(path, rtl.image))
     write_atomically(folder / "stats.json", lambda path: path.write_text(json.dumps(rtl.stats, indent=2) + "\n"))

@@ -1,12 +1,16 @@
 """Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads (docs/delivery.md).
 
 An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order
-of the list, tile by tile, and behind them the end of the list. The cache holds lines of 32 bytes; its contents depend on the order of the lookups alone.
+of the list, tile by tile, and behind them the end of the list. Of a finished sub-tile, whose pixels take no more, records may be missing at the end of its
+list: which, depends on timing, `may_be_given` is what holds for all of them. The cache holds lines of 32 bytes; its contents depend on the order of the
+lookups alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 CORES, UNITS = 4, 4
 LINE_BYTES = 32
@@ -20,6 +24,15 @@ def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int) -> list[
         out += [record for record, mask in entries if mask >> core & 1]
         out.append(END)
     return out
+
+
+def may_be_given(records: np.ndarray, lengths: np.ndarray, needed: np.ndarray, whole: bool) -> np.ndarray:
+    """bool (S,): whether sub-tiles whose cores got the first `records` of their lists have their pixels right.
+
+    lengths: of the lists. needed: of `golden.render.Frame`. whole: every list must come to its end, since all its records count in the decisions of the
+    automatic mode.
+    """
+    return (records <= lengths) & (records >= (lengths if whole else needed))
 
 
 class RecordCache:

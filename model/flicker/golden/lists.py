@@ -63,6 +63,12 @@ def pointer_place(tile: np.ndarray | int, cols: int) -> np.ndarray | int:
     return (number // POINTERS_PER_LINE * WRITERS + (x & 1 | (y & 1) << 1)) * POINTERS_PER_LINE + number % POINTERS_PER_LINE
 
 
+def list_chunks(width: int, height: int, entries: int) -> int:
+    """Chunks of each list writer that hold so many entries in all wherever they fall, were lines full; 64 more for lines that are not."""
+    pair = 2 * TILE
+    return min(-(-width // pair) * -(-height // pair) + entries // (CHUNK_LINES * LINE_ENTRIES) + 64, MAX_CHUNKS)
+
+
 @dataclass(eq=False)
 class ListImage:
     """What the writers leave.

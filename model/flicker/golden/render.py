@@ -86,7 +86,7 @@ def minitile(f, m, form, state, finished, col, row, e):
 
 
 @numba.njit
-def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels, counts, auto):
+def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels, counts, needed, auto):
     """Render sub-tile s. `auto` takes (base-mode test cycles, mini-tiles of the busiest channel), saturated."""
     state = np.zeros((4, 64), np.float32)
     state[0, :] = 1.0
@@ -99,6 +99,7 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
     f = np.empty(9, np.float32)
     sent = np.zeros(4, np.int64)
     base_test = 0
+    needed[s] = start[s + 1] - start[s]
     for n in range(start[s], start[s + 1]):
         i = entry[n]
         f[0] = fp16_value(mean[n, 0])
@@ -128,6 +129,8 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
             left[m] -= ended
             counts[5] += blended
             counts[6] += ended
+            if ended and left.sum() == 0:
+                needed[s] = n + 1 - start[s]
     for c in range(4):
         for p in range(64):
             pixels[p, c] = fp16_bits(state[c, p])
@@ -136,15 +139,15 @@ def _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels,
 
 
 @numba.njit(parallel=True, cache=True)
-def _render_fixed(order, gauss, spiky, start, entry, mean, mode, form, precision, pixels, counts):
+def _render_fixed(order, gauss, spiky, start, entry, mean, mode, form, precision, pixels, counts, needed):
     for k in numba.prange(len(order)):
         s = order[k]
         auto = np.zeros(2, np.int64)
-        _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels[s], counts[s], auto)
+        _subtile(s, gauss, spiky, start, entry, mean, mode, form, precision, pixels[s], counts[s], needed, auto)
 
 
 @numba.njit(parallel=True, cache=True)
-def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, precision, pixels, counts, per_vru):
+def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, precision, pixels, counts, needed, per_vru):
     for core in numba.prange(CORES):
         auto = np.zeros(2, np.int64)
         test_avg = 0
@@ -154,7 +157,7 @@ def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, prec
         for k in range(core_start[core], core_start[core + 1]):
             s = order[k]
             fall = decided
-            _subtile(s, gauss, spiky, start, entry, mean, M_SPARSE if fall else AUTO, form, precision, pixels[s], counts[s], auto)
+            _subtile(s, gauss, spiky, start, entry, mean, M_SPARSE if fall else AUTO, form, precision, pixels[s], counts[s], needed, auto)
             counts[s, 7] = fall
             test_avg += auto[0] - (test_avg >> AUTO_DECAY_SHIFT)
             sent_avg += per_vru * auto[1] - (sent_avg >> AUTO_DECAY_SHIFT)
@@ -178,11 +181,14 @@ class Frame:
 
     pixels: uint16 (S, 64, 4) FP16 bits: transmittance, red, green, blue of pixel 16 m + i of each sub-tile.
     counts: int64 (S, len(COUNTS)).
+    needed: int64 (S,), records of a list up to the one that finishes the sub-tile's last pixel, those behind change nothing there; all, where a pixel
+        stays unfinished.
     """
 
     lists: SubtileLists
     pixels: np.ndarray
     counts: np.ndarray
+    needed: np.ndarray
 
     def image(self, background=(0.0, 0.0, 0.0)) -> np.ndarray:
         """float32 (H, W, 3), unquantised."""
@@ -208,13 +214,14 @@ def render_golden(lists: SubtileLists, config: RenderConfig) -> Frame:
     n = lists.cols * lists.rows
     pixels = np.zeros((n, 64, 4), np.uint16)
     counts = np.zeros((n, N_COUNTS), np.int64)
+    needed = np.zeros(n, np.int64)
     order, core_start = stream_order(lists)
     args = (lists.gauss, lists.spiky, lists.start, lists.entry, lists.mean)
-    tail = (int(config.form), int(config.precision), pixels, counts)
+    tail = (int(config.form), int(config.precision), pixels, counts, needed)
     if config.form != lists.form:
         raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
     if config.cat == CatMode.AUTO:
         _render_auto(order, core_start, *args, *tail, config.pixels_per_vru)
     else:
         _render_fixed(order, *args, int(config.cat), *tail)
-    return Frame(lists, pixels, counts)
+    return Frame(lists, pixels, counts, needed)

@@ -74,7 +74,7 @@ class StageCycles:
 
 
 @numba.njit(cache=True)
-def _finish_events(pixel_finish, start, per_vru, last, op):
+def finish_events(pixel_finish, start, per_vru, last, op):
     """Per sub-tile and mini-tile: position of the element that finishes its last pixel (list length: none), and the operation of that
     element (pixel within its VRU) that does."""
     for s in range(len(last)):
@@ -381,7 +381,7 @@ def simulate(work: Work, config: RenderConfig) -> StageCycles:
     per_vru = config.pixels_per_vru
     finish = np.empty((work.subtiles, 4), np.int64)
     finish_op = np.empty((work.subtiles, 4), np.int64)
-    _finish_events(work.pixel_finish, work.start, per_vru, finish, finish_op)
+    finish_events(work.pixel_finish, work.start, per_vru, finish, finish_op)
     counters = np.zeros((CORES, COUNTERS_PER_CORE), np.int64)
     end = np.zeros(work.subtiles, np.int64)
     ends = np.zeros(CORES, np.int64)

@@ -1,10 +1,16 @@
-// Runs frames of flk_preprocessing, or with FLK_RENDERING of flk_rendering, against a memory (memory.hpp); called through ctypes by sim/half.py.
-// Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o.
+// Runs flk_preprocessing, with FLK_RENDERING flk_rendering, with FLK_CHIP flk_top against a memory (memory.hpp); called through ctypes by sim/half.py and
+// sim/chip.py. Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o; the chip has
+// registers behind AXI4-Lite and an interrupt.
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "Vtop.h"
+#ifdef FLK_RENDERING
+#include "Vtop___024root.h"
+#endif
 #include "memory.hpp"
 #include "verilated.h"
 #include <stdexcept>
@@ -12,7 +18,11 @@
 namespace {
 
 // Ports that read and write: number, prefix of their pins.
-#ifdef FLK_RENDERING
+#if defined(FLK_CHIP)
+#define FLK_READERS(X) X(0, )
+#define FLK_WRITERS(X) X(0, )
+constexpr int PORTS = 1;
+#elif defined(FLK_RENDERING)
 #define FLK_READERS(X) X(0, list_) X(1, record_)
 #define FLK_WRITERS(X) X(2, )
 constexpr int PORTS = 3;
@@ -30,10 +40,11 @@ struct Sim {
     top = std::make_unique<Vtop>(&context);
     top->clk_i = 0;
     top->rst_ni = 1;
-    top->start_i = 0;
+    stop();
     top->eval();
     top->rst_ni = 0;
     for (int k = 0; k < 4; ++k) cycle(true);
+    top->rst_ni = 1;
   }
 
   ~Sim() { top->final(); }
@@ -42,6 +53,18 @@ struct Sim {
 #define FLK_DRIVE_W(k, prefix) FLK_AXI_DRIVE_WRITE(ports[k]->reply(), *top, prefix);
 #define FLK_SAMPLE_R(k, prefix) FLK_AXI_SAMPLE_READ(requests[k], *top, prefix);
 #define FLK_SAMPLE_W(k, prefix) FLK_AXI_SAMPLE_WRITE(requests[k], *top, prefix);
+
+  // Nothing is asked of the design.
+  void stop() {
+#ifdef FLK_CHIP
+    top->reg_aw_valid_i = top->reg_w_valid_i = top->reg_ar_valid_i = 0;
+    top->reg_b_ready_i = top->reg_r_ready_i = 1;
+    top->reg_aw_prot_i = top->reg_ar_prot_i = 0;
+    top->reg_w_strb_i = 15;
+#else
+    top->start_i = 0;
+#endif
+  }
 
   void drive() {
     FLK_READERS(FLK_DRIVE_R)
@@ -55,15 +78,44 @@ struct Sim {
 
   void cycle(bool reset) {
     top->rst_ni = !reset;
+    settle();
+    edge(reset);
+  }
+
+  // The two halves of a cycle: outputs as the edge sees them; the edge.
+  void settle() {
     drive();
     top->clk_i = 0;
     top->eval();
+  }
+
+  void edge(bool reset = false) {
     sample();
+#ifdef FLK_RENDERING
+    count_records();
+#endif
     memory.tick();
-    for (int k = 0; k < PORTS; ++k) reset ? ports[k]->reset(requests[k]) : ports[k]->cycle(requests[k]);
+    for (int k = 0; k < PORTS; ++k) reset || away ? ports[k]->reset(requests[k], reset) : ports[k]->cycle(requests[k]);
     top->clk_i = 1;
     top->eval();
   }
+
+#ifdef FLK_RENDERING
+  // Records that delivery gives to each core, by sub-tile (rendering.vlt).
+  void count_records() {
+    const auto& root = *top->rootp;
+    const unsigned moved = root.flk_rendering__DOT__record_valid & root.flk_rendering__DOT__record_ready;
+    for (int k = 0; moved && k < CORES; ++k) {
+      if (!(moved >> k & 1)) continue;
+      if (root.flk_rendering__DOT__record_end >> k & 1) {
+        given[k].push_back(records[k]);
+        records[k] = 0;
+      } else {
+        ++records[k];
+      }
+    }
+  }
+#endif
 
   bool broken() {
     for (auto& port : ports) {
@@ -80,7 +132,11 @@ struct Sim {
   std::unique_ptr<flk::AxiPort> ports[PORTS];
   flk::AxiRequest requests[PORTS] = {};
   std::unique_ptr<Vtop> top;
+  static constexpr int CORES = 4;
+  std::vector<uint32_t> given[CORES];  // in this frame, of each list that has ended
+  uint32_t records[CORES] = {};
   std::string error;
+  bool away = false;  // the memory is in reset, the design is not
 };
 
 std::string g_failure;
@@ -126,15 +182,82 @@ void flk_half_fail(Sim* sim, uint64_t base, uint64_t size) {
 }
 
 void flk_half_mend(Sim* sim) {
-  for (auto& port : sim->ports) port->mend_ranges();
+  for (auto& port : sim->ports) {
+    port->mend_ranges();
+    port->resume();
+  }
 }
 
+#ifdef FLK_CHIP
+// A register is written, or read into *value: 1; -1: a rule was broken, or no answer within 1,000 cycles (flk_half_failure); -2: an answer other than OKAY.
+int flk_chip_register(Sim* sim, uint32_t offset, int write, uint32_t* value) {
+  try {
+    Vtop& top = *sim->top;
+    bool address = true, data = write != 0;
+    for (int n = 0; n < 1000; ++n) {
+      top.reg_aw_valid_i = write && address;
+      top.reg_w_valid_i = data;
+      top.reg_ar_valid_i = !write && address;
+      top.reg_aw_addr_i = top.reg_ar_addr_i = offset;
+      top.reg_w_data_i = *value;
+      // Ready and valid as the edge sees them: inputs have settled.
+      sim->settle();
+      const bool address_moves = address && (write ? top.reg_aw_ready_o : top.reg_ar_ready_o), data_moves = data && top.reg_w_ready_o;
+      const bool answers = write ? top.reg_b_valid_o : top.reg_r_valid_o;
+      const int answer = write ? top.reg_b_resp_o : top.reg_r_resp_o;
+      const uint32_t read = top.reg_r_data_o;
+      sim->edge();
+      address &= !address_moves;
+      data &= !data_moves;
+      if (!answers) continue;
+      sim->stop();
+      if (!write) *value = read;
+      return answer == 0 ? 1 : -2;
+    }
+    g_failure = "a register does not answer";
+  } catch (const std::exception& e) {
+    g_failure = e.what();
+  }
+  sim->stop();
+  return -1;
+}
+
+// Cycles until the interrupt is high (with `interrupt`), at most `limit`: how many; -1: a rule was broken.
+int64_t flk_chip_wait(Sim* sim, uint64_t limit, int interrupt) {
+  try {
+    uint64_t n = 0;
+    while (n < limit && !(interrupt && sim->top->irq_o)) {
+      sim->cycle(false);
+      if ((++n & 255) == 0 && sim->broken()) break;
+    }
+    if (sim->broken()) {
+      g_failure = sim->error;
+      return -1;
+    }
+    return static_cast<int64_t>(n);
+  } catch (const std::exception& e) {
+    g_failure = e.what();
+    return -1;
+  }
+}
+
+// The memory's side of the port is held in reset (1) or no more (0).
+void flk_chip_hold_memory(Sim* sim, int hold) { sim->away = hold != 0; }
+
+// Transfers of a channel since the beginning; whether nothing is under way.
+uint64_t flk_chip_transfers(Sim* sim, int channel) { return sim->ports[0]->transfers(static_cast<flk::AxiChannel>(channel)); }
+int flk_chip_quiet(Sim* sim) { return sim->ports[0]->idle(); }
+#else
 // A frame: 1 done, 0 not within `limit` cycles, -1: a rule was broken (flk_half_failure). counters: words of counters_o; error: error_o.
 int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limit, uint32_t* counters, int counter_words, uint32_t* error) {
   try {
     std::memcpy(&sim->top->registers_i[0], registers, sizeof(uint32_t) * words);
     const uint64_t begin = sim->memory.cycle;
     while (!sim->top->idle_o && sim->memory.cycle - begin < limit) sim->cycle(false);
+    for (int k = 0; k < Sim::CORES; ++k) {
+      sim->given[k].clear();
+      sim->records[k] = 0;
+    }
     sim->top->start_i = 1;
     sim->cycle(false);
     sim->top->start_i = 0;
@@ -155,6 +278,14 @@ int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limi
     g_failure = e.what();
     return -1;
   }
+}
+#endif
+
+// Records that a core got of each list of the last frame; at most `size` lists. How many lists there were.
+int flk_half_given(Sim* sim, int core, uint32_t* out, int size) {
+  const auto& lists = sim->given[core];
+  std::copy_n(lists.begin(), std::min<size_t>(lists.size(), size), out);
+  return static_cast<int>(lists.size());
 }
 
 double flk_half_efficiency(Sim* sim) { return sim->memory.efficiency(); }

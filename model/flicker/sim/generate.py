@@ -51,6 +51,7 @@ module {TOP}
 
   logic [CORES-1:0][{element - 1}:0] elem;
   logic [CORES-1:0][{pixel - 1}:0] pixel;
+  logic [CORES-1:0] unused_finished;
 {unused}
   for (genvar k = 0; k < CORES; k++) begin : gen_words
     assign {taken} = in_elem_i[k];
@@ -66,6 +67,7 @@ module {TOP}
     .in_valid_i,
     .in_ready_o,
     .in_elem_i(elem),
+    .finished_o(unused_finished),
     .out_valid_o,
     .out_ready_i,
     .out_data_o(pixel),

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class MemoryOptions:
     mended: bool = False
 
 
-def build(top: str, parameters: Mapping[str, int], settings: Path, args: Sequence[str] = (), define: str = "") -> Path:
+def build(top: str, parameters: Mapping[str, int], settings: Sequence[Path], args: Sequence[str] = (), define: str = "") -> Path:
     """Shared library of a half's simulator, with the design's assertions; cached by content. define: for the harness, which ports there are."""
     return verilate(
         top,
@@ -40,7 +41,7 @@ def build(top: str, parameters: Mapping[str, int], settings: Path, args: Sequenc
         args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", *args, "--assert"],
         cpp=[HERE / "frame_harness.cpp"],
         depends=HEADERS,
-        settings=[settings],
+        settings=settings,
         cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{HERE}",
         opt="-O1",
         shared=True,
@@ -61,13 +62,16 @@ def _library(path: Path) -> ctypes.CDLL:
         ("read", ctypes.c_int, pointer, u64, u64, pointer),
         ("fail", None, pointer, u64, u64),
         ("mend", None, pointer),
-        ("frame", ctypes.c_int, pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer),
+        ("given", ctypes.c_int, pointer, ctypes.c_int, pointer, ctypes.c_int),
         ("efficiency", ctypes.c_double, pointer),
         ("counts", None, pointer, ctypes.c_uint32, pointer),
     ):
         function = getattr(lib, f"flk_half_{name}")
         function.restype = result
         function.argtypes = arguments
+    if hasattr(lib, "flk_half_frame"):  # the chip has none
+        lib.flk_half_frame.restype = ctypes.c_int
+        lib.flk_half_frame.argtypes = [pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer]
     return lib
 
 
@@ -88,7 +92,7 @@ class Half:
         if not self._sim:
             raise self._failure()
 
-    def __enter__(self) -> Half:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_) -> None:
@@ -145,6 +149,13 @@ class Half:
             self._lib.flk_half_counts(self._sim, number, ctypes.byref(counts))
             out[name] = counts
         return out
+
+    def given(self, core: int, lists: int) -> np.ndarray:
+        """int64 (lists,): records that delivery gave to a core in the last frame, by sub-tile. Only flk_rendering has it."""
+        out = np.zeros(lists, np.uint32)
+        if self._lib.flk_half_given(self._sim, core, out.ctypes.data, lists) != lists:
+            raise self._failure(f"core {core} did not get {lists} lists")
+        return out.astype(np.int64)
 
     @property
     def efficiency(self) -> float:

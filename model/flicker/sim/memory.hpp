@@ -200,12 +200,14 @@ class AxiPort {
   // Bursts that touch a range, or the nth of their kind (from 0), are answered with `resp`; a write that fails changes nothing.
   void fail_range(uint64_t base, uint64_t size, bool reads, bool writes, Resp resp = SLVERR) { fails_.push_back({base, base + (size - 1), reads, writes, resp}); }
   void mend_ranges() { fails_.clear(); }
+  // Channels that had stopped go on.
+  void resume() { std::fill(c_.stop_after, c_.stop_after + AXI_CHANNELS, -1); }
   void fail_read(uint64_t nth, Resp resp = SLVERR) { fail_read_[nth] = resp; }
   void fail_write(uint64_t nth, Resp resp = SLVERR) { fail_write_[nth] = resp; }
 
-  // In reset: forgets what is on its way. The design's valids must be low.
-  void reset(const AxiRequest& q) {
-    if (q.aw.valid || q.w_valid || q.ar.valid) error("valid in reset");
+  // In reset: forgets what is on its way. The design's valids must be low if it is in reset too (checked).
+  void reset(const AxiRequest& q, bool checked = true) {
+    if (checked && (q.aw.valid || q.w_valid || q.ar.valid)) error("valid in reset");
     orphans_.splice(orphans_.end(), reads_);  // the DRAM has not told all of them yet
     orphan_writes_.splice(orphan_writes_.end(), writes_);
     for (auto it = memory_.pending.begin(); it != memory_.pending.end();) it = it->port == this ? memory_.pending.erase(it) : std::next(it);
@@ -299,11 +301,13 @@ class AxiPort {
     held(W, q.w_valid, q.w_last == last_.w_last && q.w_strb == last_.w_strb && std::memcmp(q.w_data, last_.w_data, bytes_) == 0);
   }
 
-  void check_address(const char* name, const AxiAddress& a) {
+  void check_address(const char* name, const AxiAddress& a, bool write) {
     const std::string what = std::string(name) + " " + show(a) + ": ";
     if (a.burst != 1) error(what + "burst type " + std::to_string(a.burst) + ", only INCR (1) is modelled");
-    if (a.size != size_) error(what + "size " + std::to_string(a.size) + ", only whole beats (" + std::to_string(size_) + ") are modelled");
-    if (a.addr % bytes_) error(what + "address is not a multiple of " + std::to_string(bytes_));
+    if (a.size > size_ || (write && a.size != size_)) {
+      error(what + "size " + std::to_string(a.size) + ", " + (write ? "only whole beats are modelled: " : "a beat has ") + std::to_string(size_));
+    }
+    if (a.addr % step(a)) error(what + "address is not a multiple of " + std::to_string(step(a)));
     if (a.len + 1 > c_.max_beats) error(what + "more than " + std::to_string(c_.max_beats) + " beats");
     if (a.id >> c_.id_bits) error(what + "id has more than " + std::to_string(c_.id_bits) + " bits");
     if (a.addr / 4096 != last_byte(a) / 4096) error(what + "crosses a 4 KB boundary");
@@ -321,12 +325,14 @@ class AxiPort {
 
   // ---- accepting ----
 
-  uint64_t last_byte(const AxiAddress& a) const { return a.addr + static_cast<uint64_t>(a.len + 1) * bytes_ - 1; }
+  // Bytes that a beat moves; reads may be narrower than the port.
+  uint64_t step(const AxiAddress& a) const { return std::min<uint64_t>(bytes_, uint64_t{1} << a.size); }
+  uint64_t last_byte(const AxiAddress& a) const { return a.addr + static_cast<uint64_t>(a.len + 1) * step(a) - 1; }
 
   Transaction begin(const AxiAddress& a, bool write, uint64_t nth) {
     Transaction t;
     t.a = a;
-    t.a.addr -= a.addr % bytes_;
+    t.a.addr -= a.addr % step(a);
     t.beats = a.len + 1;
     t.resp = OKAY;
     const auto& numbered = write ? fail_write_ : fail_read_;
@@ -349,10 +355,10 @@ class AxiPort {
   }
 
   // Bytes of a beat; nullptr when the memory has none there. No burst goes beyond the end of the address space.
-  uint8_t* bytes_of(const Transaction& t, int beat) { return memory_.store.find(t.a.addr + static_cast<uint64_t>(beat) * bytes_, bytes_); }
+  uint8_t* bytes_of(const Transaction& t, int beat) { return memory_.store.find(t.a.addr + static_cast<uint64_t>(beat) * step(t.a), step(t.a)); }
 
   void accept_read(const AxiAddress& a) {
-    check_address("AR", a);
+    check_address("AR", a, false);
     check_hazard(a, false);
     reads_.push_back(begin(a, false, read_count_++));
     Transaction& t = reads_.back();
@@ -361,20 +367,20 @@ class AxiPort {
     bool bad = t.resp != OKAY;
     for (int k = 0; k < t.beats; ++k) {
       ++count.read_beats;
-      count.read_bytes += bytes_;
+      count.read_bytes += step(a);
       const bool there = bytes_of(t, k) != nullptr;
       bad |= !there;
       if (memory_.perfect || !there || t.resp != OKAY) {
         t.ready[k] = now_ + c_.latency;
         continue;
       }
-      count.dram_read_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, ~uint64_t{0}, dram::READ, t.done[k], count);
+      count.dram_read_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * step(a), step(a), ~uint64_t{0}, dram::READ, t.done[k], count);
     }
     count.errors += bad;
   }
 
   void accept_write(const AxiAddress& a) {
-    check_address("AW", a);
+    check_address("AW", a, true);
     check_hazard(a, true);
     writes_.push_back(begin(a, true, write_count_++));
     if (filling_ == writes_.end()) filling_ = std::prev(writes_.end());
@@ -425,18 +431,18 @@ class AxiPort {
       for (uint64_t b = 0; b < bytes_; ++b) {
         if (beat.strb >> b & 1) to[b] = from[b];
       }
-      if (!memory_.perfect) count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, beat.strb, dram::WRITE, t.done[0], count);
+      if (!memory_.perfect) count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, bytes_, beat.strb, dram::WRITE, t.done[0], count);
     }
     count.errors += t.resp != OKAY;
     t.data.clear();
   }
 
-  // A beat as bursts of the DRAM; bytes moved. A write without strobes moves none, one with some of a burst's bytes is masked.
-  uint64_t to_dram(uint64_t address, uint64_t strb, int8_t kind, dram::Completion& done, AxiCounts& count) {
-    const uint64_t burst = memory_.engine.timing().burst_bytes, step = std::min(burst, bytes_);
+  // A beat of `bytes` as bursts of the DRAM; bytes moved. A write without strobes moves none, one with some of a burst's bytes is masked.
+  uint64_t to_dram(uint64_t address, uint64_t bytes, uint64_t strb, int8_t kind, dram::Completion& done, AxiCounts& count) {
+    const uint64_t burst = memory_.engine.timing().burst_bytes, step = std::min(burst, bytes);
     const uint64_t all = step < 64 ? (uint64_t{1} << step) - 1 : ~uint64_t{0};
     uint64_t moved = 0;
-    for (uint64_t at = 0; at < bytes_; at += step) {
+    for (uint64_t at = 0; at < bytes; at += step) {
       const uint64_t part = strb >> at & all;
       int8_t how = kind;
       if (kind != dram::READ) {
@@ -550,10 +556,13 @@ class AxiPort {
     reply_.r_id = t.a.id;
     reply_.r_last = t.next + 1 == t.beats;
     reply_.r_resp = t.resp != OKAY ? t.resp : from ? OKAY : DECERR;
-    if (reply_.r_resp == OKAY) {
-      std::memcpy(reply_.r_data, from, bytes_);
-    } else {
+    const uint64_t moved = step(t.a);
+    if (reply_.r_resp != OKAY || moved < bytes_) {  // lanes that the beat does not move too
       for (uint64_t i = 0; i < bytes_ / 4; ++i) reply_.r_data[i] = random_.next();
+    }
+    if (reply_.r_resp == OKAY) {
+      const uint64_t lane = (t.a.addr + static_cast<uint64_t>(t.next) * moved) % bytes_;
+      std::memcpy(reinterpret_cast<uint8_t*>(reply_.r_data) + lane, from, moved);
     }
   }
 

@@ -17,7 +17,7 @@ from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
-from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, pointer_lines, read_lists, writer_columns
+from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -126,7 +126,7 @@ def build(pointers: int = SMALL_POINTERS) -> Path:
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
-    return half.build("flk_preprocessing", {"Pointers": pointers}, half.HERE / "preprocessing.vlt", ["--inline-mult", "20000"])
+    return half.build("flk_preprocessing", {"Pointers": pointers}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -179,7 +179,7 @@ def front_rtl(
 def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE) -> tuple[FrontFrame, RtlFront]:
     """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices."""
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
-    chunks = -(-cols // 2) * -(-rows // 2) + len(packed) // 36 + 64  # two entries a Gaussian
+    chunks = list_chunks(camera.width, camera.height, 2 * len(packed))
     while (rtl := front_rtl(packed, camera, lists, chunks=chunks)).error >> LIST_ERROR & 1:
         chunks *= 4
     if rtl.error:

@@ -14,7 +14,7 @@ import numpy as np
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.front.memory import FrontImage
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS
-from ..params import TILE, RenderConfig
+from ..params import CORES, TILE, RenderConfig
 from ..scene.camera import Camera
 from . import half
 from .half import BEAT, PAGE, Half, MemoryOptions
@@ -31,12 +31,14 @@ _COUNTERS = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropp
 
 @dataclass(eq=False)
 class RtlRendering:
-    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. errors: of each frame. traffic: by purpose."""
+    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. errors: of each frame. traffic: by purpose.
+    given: int64 (S,), records that a core got of each sub-tile in the last frame; S as in `golden.chip.whole_pairs`."""
 
     buffer: np.ndarray
     counters: dict[str, int | np.ndarray]
     errors: list[int]
     traffic: dict[str, PurposeCounts]
+    given: np.ndarray
     efficiency: float
 
     @property
@@ -46,7 +48,7 @@ class RtlRendering:
 
 def build(config: RenderConfig) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content."""
-    return half.build("flk_rendering", config.rtl_parameters(), half.HERE / "render_stage.vlt", define="-DFLK_RENDERING")
+    return half.build("flk_rendering", config.rtl_parameters(), [half.HERE / name for name in ("render_stage.vlt", "rendering.vlt")], define="-DFLK_RENDERING")
 
 
 def rendering_rtl(
@@ -78,7 +80,10 @@ def rendering_rtl(
             (base["frame"] // BEAT, 34), (stride // 32, 12),
         ), _COUNTERS, frames, limit)
         buffer = sim.read(base["frame"], stride * rows * TILE).reshape(rows * TILE, stride)
-        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), sim.efficiency)
+        given = np.zeros((2 * rows, 4 * pairs), np.int64)
+        for k in range(CORES):
+            given[k // 2 :: 2, k % 2 :: 2] = sim.given(k, 2 * pairs * rows).reshape(rows, 2 * pairs)
+        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.efficiency)
 
 
 def regions(image: FrontImage, frame_bytes: int) -> dict[str, int]:

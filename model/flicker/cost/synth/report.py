@@ -28,10 +28,12 @@ PAPER = {
 }
 
 # Units that a component of it is here. The cores are part of the front end.
-OWN = {
-    "Preprocessing core x4": {"preprocessing_core": 4},
-    "Sorting unit x4": {"sorting_unit": 4},
-    "Feature buffer and others (288 KB)": {"preprocessing": 1, "preprocessing_core": -4, "list_reader": 4, "delivery": 1, "frame_writer": 1},
+OWN: dict[str, dict[tuple[str, str], int]] = {
+    "Preprocessing core x4": {("preprocessing_core", "default"): 4},
+    "Sorting unit x4": {("sorting_unit", "default"): 4},
+    "Feature buffer and others (288 KB)": {
+        ("top", "default"): 1, ("preprocessing_core", "default"): -4, ("sorting_unit", "default"): -4, ("render_stage", "factored fixed"): -1,
+    },
 }
 
 CSV_COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff", "fo4")
@@ -207,12 +209,12 @@ class Comparison:
             "Beside the paper's Table 2 (mm2 in 28 nm)",
             ["component", "paper", "share", "here, conic mixed (estimate)", "here, factored fixed (estimate)"], rows,
             f"Estimate: {UM2_PER_GE} um2 per GE + {UM2_PER_BIT:.3f} um2 per bit of SRAM, nothing for wires. The paper's numbers are from Design Compiler and a "
-            "memory compiler. Others here: what the front end has beside its cores, list readers, delivery with its cache, frame writer; no top yet.",
+            "memory compiler. Others here: all of the chip but cores, sorting units and rendering stage.",
         )
 
-    def _with_memories(self, units: dict[str, int]) -> str:
+    def _with_memories(self, units: dict[tuple[str, str], int]) -> str:
         """Logic + SRAM of so many of each unit, mm2, and the SRAM's size."""
-        results = [(self.by_name[name, "default"], count) for name, count in units.items()]
+        results = [(self.by_name[unit], count) for unit, count in units.items()]
         ge, bits = (sum(count * result[key] for result, count in results) for key in ("ge", "sram_bits"))
         return f"{ge * UM2_PER_GE / 1e6:.2f} + {bits * UM2_PER_BIT / 1e6:.2f} ({bits / 8192:.0f} KB)"
 

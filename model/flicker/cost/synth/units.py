@@ -75,6 +75,11 @@ COMPOSED: dict[str, list[str]] = {
         "flk_tile_walk", "flk_list_reader", "flk_sorting_unit", "flk_axi_read_mux", "flk_delivery", "flk_record_to_splat", "flk_render_stage",
         "flk_frame_writer", "flk_line_writer", "flk_pipe_reg",
     ],
+    "flk_axi_arbiter": ["flk_priority_arbiter", "flk_fifo"],
+    "flk_frame_counters": [MEMORY],
+    "flk_top": [
+        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_lane", "flk_preprocessing", "flk_rendering",
+    ],
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
@@ -142,7 +147,10 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
             f"in_data_i[{layout.place('core_pixel', 'subtile').at + bit + k * layout.bits('core_pixel')}]"
             for k in range(CORES) for bit in range(2 * SUBTILE_COORD_BITS) if bit != 1 and (k or bit in (0, SUBTILE_COORD_BITS))
         ],
+        # Words are addressed; protection means nothing here.
+        "flk_registers": [f"s_axil_{channel}{name}[{bit}]" for channel in ("aw", "ar") for name, bits in (("addr", 2), ("prot", 3)) for bit in range(bits)],
         "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
+        "flk_axi_lane": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
@@ -248,6 +256,7 @@ def _cells() -> list[Unit]:
         unit("flk_axi_split"),
         unit("flk_axi_read", "512 bit"),
         unit("flk_axi_write", "512 bit"),
+        unit("flk_registers"),
         # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/list_layout.md.
         unit("flk_sram", "64 x 52 bit, flip-flops", Width=52, Depth=64),
         unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, CoordBits=3),
@@ -309,5 +318,13 @@ def _front() -> list[Unit]:
     ]
 
 
+def _top() -> list[Unit]:
+    """The chip around its two halves."""
+    return [
+        unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
+        unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_top"),
+    ]
+
+
 def all_units() -> list[Unit]:
-    return _arithmetic() + _ff() + _cells() + _stage() + _front()
+    return _arithmetic() + _ff() + _cells() + _stage() + _front() + _top()

@@ -113,5 +113,8 @@ def _half_spaces(camera: Camera, limit: np.ndarray) -> tuple[np.ndarray, np.ndar
     offset = np.array([-NEAR * (1.0 - 2.0**-14), 0.0, 0.0, 0.0, 0.0])
     # The near plane's slack grows with sigma too: what is seen far off the axis has a large one.
     factor = np.array([2.0**-14, reach, reach, reach, reach]) * _SLACK
-    return np.array(normals) @ camera.rotation.T, offset, factor
+    # Sums in this order and without fused steps, which a matrix product does not promise: the driver (sw/flk.c) gives the same bits.
+    x, y, z = np.array(normals).T[:, :, None]
+    rotation = camera.rotation
+    return x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2], offset, factor
 

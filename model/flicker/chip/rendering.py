@@ -1,0 +1,510 @@
+"""Rendering as the RTL does it (`flk_rendering`): what it moves, and an estimate of its cycles, from lists in memory to the frame buffer.
+
+One pass over the records in the order in which delivery looks them up, each with the times at which it goes on: sorted by its unit, looked up when the queues
+of its cores have a place, found, taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies are
+those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are left
+out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its last reading; lines of
+records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
+
+Left out: conflicts of banks in the cache, beats that wait for each other in the memory (a lone access has its latency, and all together the peak rate), the
+order of entries within a merge, arbitration between list readers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from ..explore.generators.contribution import cat_masks
+from ..golden.chip import whole_pairs
+from ..golden.frame_buffer import PAIR, PixelFormat
+from ..golden.front.frame import FrontFrame
+from ..golden.front.memory import FrontImage
+from ..golden.list_reader import read_tile
+from ..golden.lists import CHUNK_LINES, ENTRY_BITS
+from ..golden.masked import render_masked
+from ..golden.render import stream_order
+from ..golden.sorting import CAPACITY, sort_list
+from ..params import CORES, TILE, CatMode, RenderConfig, vru_stages
+from ..perf.render_stage import finish_events
+from ..perf.sorting import latency
+from .constants import CLOCK_HZ
+from .dram import DramConfig
+
+BEAT = 64
+RECORD_LINE = 32
+UNITS = 4
+
+# Of the RTL, times in cycles.
+CLEAR = 68  # of the record cache, at the beginning of a frame
+READ = 4  # registers from a request to the port and behind it
+CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/list_reader.md)
+FIRST = 17  # a tile's first line beside two accesses
+SLOTS, CONTEXTS = 16, 4  # chunks in a list reader, lists under way
+SORTED_LISTS, SORTED_ENTRIES = 8, 2 * CAPACITY  # that a sorting unit holds
+CUT = 3 * CAPACITY // 2 + 38  # that a reading stops for
+QUEUE = 64  # records of each core and channel
+DEPTH, PLACES = 256, 128  # lookups that wait in the cache, lines on their way
+FOUND = 6  # from a lookup to its record without a miss, into the queue
+QUEUED = 3  # through a queue
+ELASTIC = 4  # registers between a queue and the stage: latency and places
+TOLD = 4  # from a sub-tile's last finished pixel to delivery
+DROPPED = 8  # from there to the end of a list that all cores have finished
+PAIRS, PAIR_CYCLES, PAIR_GAP = 4, 128, 4  # of tiles in the frame writer
+END = 60  # from the last line of a picture to its answer, beside the memory's latency
+
+NEVER = np.int64(1) << 60
+
+
+@numba.njit(cache=True)
+def _lookup(line, held, turn, ways):
+    """Whether the cache has to read a line; it has it then (`golden.delivery.RecordCache`)."""
+    at = line % held.shape[0]
+    for w in range(ways):
+        if held[at, w] == line:
+            return False
+    held[at, turn[at]] = line
+    turn[at] = (turn[at] + 1) % ways
+    return True
+
+
+@numba.njit(cache=True)
+def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
+    """The first cycle from t on in which core k's mask generator may take a batch: its pipeline moves, and no feature FIFO is full."""
+    ring, fifo = arrived.shape[1], written.shape[2]
+    moved = True
+    while moved:
+        moved = False
+        for i in range(max(count - recent, 0), count):
+            if arrived[k, i % ring] <= t < left[k, i % ring]:
+                t = left[k, i % ring]
+                moved = True
+        for c in range(4):
+            q = entries[k, c] - 1
+            while q >= 0 and q > entries[k, c] - recent and written[k, c, q % fifo] >= t:
+                q -= 1
+            if q >= depth - 1:
+                free = popped[k, c, (q - depth + 1) % fifo]
+                if free >= t:
+                    t = free + 1
+                    moved = True
+    return t
+
+
+@numba.njit(cache=True)
+def _frame(
+    tile_start, record, mask, lines_start, chunk_entries, sort_delay, reading_start, reading_size, reading_cuts, element_start, element_mask, element_cycles,
+    finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token, depth, blend,
+    out_delay, per_vru,
+):
+    """Cycles of a frame; lines of records; readings of each list (T,); records given to each core of each tile (T, 4).
+
+    Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
+    elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros.
+    """
+    tiles = len(tile_start) - 1
+    ring = 256
+    # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
+    gate_end = np.zeros(tiles, np.int64)
+    out_end = np.zeros(tiles, np.int64)
+    chunk_free = np.zeros((4, 64), np.int64)
+    chunk_count = np.zeros(4, np.int64)
+    readings = np.zeros(tiles, np.int64)
+    given = np.zeros((tiles, 4), np.int64)
+    # Channels of delivery
+    tile = np.array([0, 1])
+    at = np.zeros(2, np.int64)  # entry
+    looked = np.zeros(2, np.int64)  # the last lookup
+    begun = np.zeros(2, np.bool_)
+    ready = np.zeros(2, np.int64)  # what is left of the list's present chunk is sorted from here on
+    part = np.zeros(2, np.int64)  # chunk of a list that is read more than once
+    part_end = np.zeros(2, np.int64)  # its last entry
+    part_gate = np.zeros((2, (reading_start[1:] - reading_start[:-1]).max() + 1), np.int64)  # end of each reading
+    asked = np.zeros((2, 4), np.int64)
+    freed = np.full((2, 4, QUEUE), -1, np.int64)  # when a place was free again
+    # Queues: when found; element in its list, or -1, the end
+    found = np.zeros((2, 4, QUEUE), np.int64)
+    which = np.zeros((2, 4, QUEUE), np.int64)
+    slot = np.zeros((2, 4, QUEUE), np.int64)
+    put, got = np.zeros((2, 4), np.int64), np.zeros((2, 4), np.int64)
+    # Cache
+    held = np.full((sets, ways), -1, np.int64)
+    turn = np.zeros(sets, np.int64)
+    lookups, misses = 0, 0
+    last_found, last_line, last_ask = np.int64(0), np.int64(0), np.int64(0)
+    found_at = np.zeros(DEPTH, np.int64)
+    line_at = np.zeros(PLACES, np.int64)
+    line_used = np.zeros(PLACES, np.int64)
+    # Cores
+    core_tile = np.zeros(4, np.int64)
+    finished = np.full((4, 2), NEVER, np.int64)  # time from which delivery knows, of the core's tile, by channel
+    taken = np.zeros(4, np.int64)
+    accepted = np.zeros((4, ring), np.int64)
+    count = np.zeros(4, np.int64)  # elements that the generator has issued
+    arrived, left = np.zeros((4, ring), np.int64), np.zeros((4, ring), np.int64)
+    last_issue, last_left = np.full(4, -1, np.int64), np.full(4, -1, np.int64)
+    token_free = np.zeros(4, np.int64)
+    recent = ctu_latency + 1
+    fifo = depth + ring
+    written, popped = np.zeros((4, 4, fifo), np.int64), np.zeros((4, 4, fifo), np.int64)
+    entries = np.zeros((4, 4), np.int64)
+    vru = np.zeros((4, 4), np.int64)  # cycle after the last element has left the FIFO
+    done = np.full((4, 4), NEVER, np.int64)  # mini-tiles, of the sub-tile whose elements come
+    token_gone = np.full((4, 4), -NEVER, np.int64)
+    drained = np.zeros((4, 4), np.int64)
+    port = np.zeros(4, np.int64)
+    # Frame writer
+    pair_done = np.zeros(tiles // 2, np.int64)
+    pair_cores = np.zeros(tiles // 2, np.int64)
+    pair_free = np.full(tiles // 2, NEVER, np.int64)
+    pairs_left = 0
+    writer = np.int64(0)
+    while True:
+        # ---- cores take what has been found
+        for k in range(4):
+            while core_tile[k] < tiles:
+                t_now = core_tile[k]
+                c = t_now % 2
+                if got[c, k] == put[c, k]:
+                    break
+                if t_now // 2 >= PAIRS and pair_free[t_now // 2 - PAIRS] == NEVER:
+                    break
+                q = got[c, k] % QUEUE
+                n = count[k]
+                leave = max(found[c, k, q] + QUEUED, taken[k] + 1)
+                if n >= ELASTIC:
+                    leave = max(leave, accepted[k, (n - ELASTIC) % ring])
+                go = leave + ELASTIC
+                if t_now // 2 >= PAIRS:
+                    go = max(go, pair_free[t_now // 2 - PAIRS] + ELASTIC)
+                taken[k] = leave
+                freed[c, k, slot[c, k, q]] = leave
+                got[c, k] += 1
+                element = which[c, k, q]
+                is_end = element < 0
+                place = element_start[t_now, k] + element
+                # The mask generator takes it.
+                t = max(go, last_issue[k] + 1)
+                if is_end and one_token:
+                    t = max(t, token_free[k])
+                if ctu_fifo > 0 and n >= ctu_fifo:
+                    t = max(t, left[k, (n - ctu_fifo) % ring] + 1)
+                t = _issue(t, k, depth, recent, arrived, left, n, written, popped, entries)
+                if not is_end and element_cycles[place] == 2:
+                    t = _issue(t + 1, k, depth, recent, arrived, left, n, written, popped, entries)
+                last_issue[k] = t
+                accepted[k, n % ring] = t
+                # Its pipeline stands while the element at its end waits.
+                out = t + ctu_latency
+                for i in range(max(n - recent, 0), n):
+                    if arrived[k, i % ring] >= t:
+                        out += left[k, i % ring] - arrived[k, i % ring]
+                sent = 15 if is_end else element_mask[place]
+                x = max(out, last_left[k] + 1) if ctu_fifo > 0 else out
+                for c2 in range(4):
+                    if sent >> c2 & 1:
+                        # Mini-tiles that are known to be finished are left out.
+                        if not is_end and done[k, c2] <= x and token_gone[k, c2] + blend < x:
+                            sent &= ~(1 << c2)
+                        elif entries[k, c2] >= depth:
+                            x = max(x, popped[k, c2, (entries[k, c2] - depth) % fifo] + 1)
+                arrived[k, n % ring], left[k, n % ring] = (x, x) if ctu_fifo > 0 else (out, x)
+                if sent:
+                    last_left[k] = x
+                count[k] += 1
+                # Channels
+                for c2 in range(4):
+                    if not sent >> c2 & 1:
+                        continue
+                    start = max(x + 1, vru[k, c2])
+                    if is_end:
+                        pop = max(start, drained[k, c2])
+                        token_gone[k, c2] = pop
+                        port[k] = max(port[k], pop + out_delay) + 16
+                        drained[k, c2] = port[k]
+                    elif done[k, c2] <= start:
+                        pop = start
+                    else:
+                        pop = min(start + per_vru - 1, done[k, c2])
+                        if element == finish[t_now, k, c2]:
+                            done[k, c2] = start + finish_op[t_now, k, c2] + blend + 1
+                    vru[k, c2] = pop + 1
+                    e = entries[k, c2] % fifo
+                    written[k, c2, e], popped[k, c2, e] = x, pop
+                    entries[k, c2] += 1
+                if is_end:
+                    token_free[k] = x + 2
+                    pair = t_now // 2
+                    pair_cores[pair] += 1
+                    for c2 in range(4):
+                        pair_done[pair] = max(pair_done[pair], drained[k, c2])
+                        done[k, c2] = NEVER
+                    finished[k, c] = NEVER
+                    core_tile[k] += 1
+                    while pairs_left < len(pair_free) and pair_cores[pairs_left] == 8:
+                        writer = max(writer + PAIR_GAP, pair_done[pairs_left]) + PAIR_CYCLES
+                        pair_free[pairs_left] = writer
+                        pairs_left += 1
+                elif early:
+                    over = max(max(done[k, 0], done[k, 1]), max(done[k, 2], done[k, 3]))
+                    finished[k, c] = NEVER if over == NEVER else over + TOLD
+        if tile[0] >= tiles and tile[1] >= tiles:
+            break
+        # ---- the channel whose next lookup comes first
+        best, best_at = -1, NEVER
+        for c in range(2):
+            if tile[c] >= tiles:
+                continue
+            t_c = tile[c]
+            if not begun[c]:
+                begun[c] = True
+                at[c] = tile_start[t_c]
+                n = tile_start[t_c + 1] - tile_start[t_c]
+                u = t_c % 4
+                # Chunks of its list: asked for one after the other, in the order of the lists.
+                came = np.int64(CLEAR)
+                if t_c >= 4 * CONTEXTS:
+                    came = max(came, gate_end[t_c - 4 * CONTEXTS])
+                if t_c < 4:
+                    came += FIRST - CHAIN + read_latency
+                gate = gate_end[t_c - 4] if t_c >= 4 else np.int64(CLEAR)
+                if t_c >= 4 * SORTED_LISTS:
+                    gate = max(gate, out_end[t_c - 4 * SORTED_LISTS])
+                for j in range(lines_start[t_c], lines_start[t_c + 1]):
+                    came = max(came, chunk_free[u, chunk_count[u] % SLOTS]) + CHAIN + read_latency
+                    gate = max(gate, came) + chunk_entries[j]
+                    chunk_free[u, chunk_count[u] % SLOTS] = gate
+                    chunk_count[u] += 1
+                # What lies SORTED_ENTRIES before has left.
+                total = n
+                before = t_c - 4
+                while before >= 0 and total <= SORTED_ENTRIES:
+                    total += tile_start[before + 1] - tile_start[before]
+                    before -= 4
+                if before >= 0 and total > SORTED_ENTRIES:
+                    gate = max(gate, out_end[before + 4])
+                gate += 1
+                gate_end[t_c] = gate
+                readings[t_c] = 1
+                part[c] = 0
+                r = reading_start[t_c]
+                parts = reading_start[t_c + 1] - r
+                part_end[c] = at[c] + n
+                ready[c] = gate - n + sort_delay[t_c] - 1
+                if parts > 1:
+                    part_gate[c, 0] = gate + reading_cuts[r] * CUT
+                    part_end[c] = at[c] + reading_size[r]
+                    ready[c] = part_gate[c, 0] + sort_delay[t_c]
+                    part_gate[c, 1] = part_gate[c, 0] + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+                if t_c >= 4:
+                    ready[c] = max(ready[c], out_end[t_c - 4] + 1)
+            now = max(looked[c] + 1, ready[c])
+            if lookups >= DEPTH:
+                now = max(now, found_at[lookups % DEPTH])
+            is_end = at[c] == tile_start[t_c + 1]
+            wanted = 15 if is_end else mask[at[c]]
+            for k in range(4):
+                if not wanted >> k & 1:
+                    continue
+                room = np.int64(0)
+                if asked[c, k] >= QUEUE:
+                    room = freed[c, k, asked[c, k] % QUEUE]
+                    if room < 0:
+                        room = NEVER
+                if not is_end and core_tile[k] == t_c:
+                    room = min(room, finished[k, c])
+                now = max(now, room)
+            if now < best_at:
+                best, best_at = c, now
+        if best < 0:
+            raise RuntimeError("rendering: nothing can go on")
+        c, t, t_c = best, best_at, tile[best]
+        looked[c] = t
+        is_end = at[c] == tile_start[t_c + 1]
+        kept = 15 if is_end else mask[at[c]]
+        over = np.int64(0)
+        for k in range(4):
+            if core_tile[k] == t_c and finished[k, c] <= t:
+                over |= 1 << k
+        if not is_end:
+            kept &= ~over
+            parts = reading_start[t_c + 1] - reading_start[t_c]
+            if over == 15:
+                # The list is dropped. A reading that has begun runs out.
+                if parts > 1:
+                    r = 1
+                    while r < parts and r <= part[c] + 1 and part_gate[c, r - 1] < t + DROPPED - TOLD:
+                        r += 1
+                    readings[t_c] = r
+                    gate_end[t_c] = max(t, part_gate[c, r - 1])
+                at[c] = tile_start[t_c + 1]
+                part_end[c] = at[c] + 1
+                ready[c] = t + DROPPED
+                continue
+        if kept:
+            come = t + FOUND
+            if not is_end:
+                line = record[at[c]] // per_line
+                if _lookup(line, held, turn, ways):
+                    ask = max(t + 2, last_ask + 1)
+                    if misses >= PLACES:
+                        ask = max(ask, line_used[misses % PLACES])
+                    if misses >= reads:
+                        ask = max(ask, line_at[(misses - reads) % PLACES])
+                    last_ask = ask
+                    if refresh[0] and ask >= refresh[0] and ask % refresh[0] < refresh[1]:
+                        ask += refresh[1] - ask % refresh[0]
+                    last_line = max(ask + READ + line_latency, last_line + 1)
+                    line_at[misses % PLACES] = last_line
+                    come = max(come, last_line + 3)
+                    line_used[misses % PLACES] = max(come, last_found)
+                    misses += 1
+            come = max(come, last_found)
+            last_found = come
+            found_at[lookups % DEPTH] = come
+            lookups += 1
+            for k in range(4):
+                if not kept >> k & 1:
+                    continue
+                s = asked[c, k] % QUEUE
+                asked[c, k] += 1
+                if not is_end and core_tile[k] == t_c and finished[k, c] <= come:
+                    freed[c, k, s] = come
+                    # Its element is never taken; those behind it are not either.
+                    continue
+                freed[c, k, s] = -1
+                q = put[c, k] % QUEUE
+                found[c, k, q] = come
+                which[c, k, q] = -1 if is_end else given[t_c, k]
+                slot[c, k, q] = s
+                put[c, k] += 1
+                if not is_end:
+                    given[t_c, k] += 1
+        if is_end:
+            out_end[t_c] = t
+            if not listed[t_c]:
+                readings[t_c] = 0
+            tile[c] += 2
+            begun[c] = False
+            continue
+        at[c] += 1
+        if at[c] == part_end[c] and at[c] < tile_start[t_c + 1]:
+            # The next chunk of a list that is read again.
+            parts = reading_start[t_c + 1] - reading_start[t_c]
+            part[c] += 1
+            p = part[c]
+            r = reading_start[t_c] + p
+            n = tile_start[t_c + 1] - tile_start[t_c]
+            part_end[c] += reading_size[r]
+            ready[c] = max(ready[c], part_gate[c, p] + sort_delay[t_c])
+            readings[t_c] = p + 1
+            gate_end[t_c] = part_gate[c, p]
+            if p + 1 < parts:
+                part_gate[c, p + 1] = max(part_gate[c, p], t) + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+    return writer, misses, readings, given
+
+
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """A frame of the rendering half. bytes: by purpose. given: int64 (S,), records that a core gets of each sub-tile, in the order of `whole_pairs`."""
+
+    cycles: int
+    bytes: dict[str, int]
+    given: np.ndarray
+
+
+def tile_lists(frame: FrontFrame, cols: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sorted lists of the walk's tiles, `cols` in a row: start int64 (T + 1,), record numbers and masks of the entries."""
+    picture = -(-frame.camera.width // TILE)
+    tile = frame.entry_tile // picture * cols + frame.entry_tile % picture
+    number = frame.number[frame.entry_splat]
+    order = np.lexsort((number, frame.key[frame.entry_splat], tile))
+    rows = -(-frame.camera.height // TILE)
+    start = np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=cols * rows))])
+    return start.astype(np.int64), number[order].astype(np.int64), frame.entry_mask[order].astype(np.int64)
+
+
+def frame_beats(width: int, height: int, format_: PixelFormat, stride: int) -> int:
+    """Beats of the frame buffer that are written: whole rows of whole tiles, pair by pair."""
+    pairs, rows = -(-width // PAIR), -(-height // TILE) * TILE
+    if format_ is PixelFormat.RGB8:
+        return 2 * pairs * rows
+    return int(pairs * (4 + np.arange(rows) * (stride // 32) % 2).sum())
+
+
+def estimate(
+    frame: FrontFrame, image: FrontImage, config: RenderConfig, dram: DramConfig | None, latency_cycles: int = 20, reads: int = 64,
+    format_: PixelFormat = PixelFormat.RGB8, stride: int = 0,
+) -> Rendering:
+    """Cycles and bytes of a frame. dram: None: a perfect memory. latency_cycles, reads: of its ports, `PortConfig.latency` and `max_reads`."""
+    lists = whole_pairs(frame.subtile_lists())
+    cols, rows = lists.cols // 2, lists.rows // 2
+    order, core_start = stream_order(lists)
+    mask, cycles, _ = cat_masks(lists, config, order, core_start)
+    if config.mask_generator == "all":
+        mask, cycles = np.full_like(mask, 15), np.ones_like(cycles)
+    _, _, pixel_finish = render_masked(lists, order, mask, None)
+    finish, finish_op = np.empty((2, 4 * cols * rows, 4), np.int64)
+    finish_events(pixel_finish, lists.start, config.pixels_per_vru, finish, finish_op)
+
+    def by_tile(values: np.ndarray) -> np.ndarray:
+        """Of sub-tiles, to (T, 4, ...)."""
+        parts = values.reshape(rows, 2, cols, 2, *values.shape[1:])
+        return np.ascontiguousarray(np.moveaxis(parts, 2, 1).reshape(rows * cols, CORES, *values.shape[1:]))
+
+    start, record, entry_mask = tile_lists(frame, cols)
+    picture = -(-lists.width // TILE)
+    listed = (np.arange(rows * cols) % cols < picture).astype(np.bool_)
+    tables = image.lists
+    chunks: list[int] = []
+    chunk_start, lines = [0], np.zeros(rows * cols, np.int64)
+    reading_start, sizes, cuts = [0], [], []
+    for t in range(rows * cols):
+        length = int(start[t + 1] - start[t])
+        if length:
+            elements = read_tile(tables.memory, tables.pointers, tables.cols, t % cols, t // cols, tables.chunks).lines
+            lines[t] = len(elements)
+            used = [line.used for line in elements]
+            first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
+            chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
+            if length > CAPACITY:
+                entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in elements for k in range(line.used)]
+                found = sort_list(np.array(entries, np.uint64)).readings
+                sizes += [len(r.gathered) for r in found]
+                cuts += [len(r.limits) for r in found]
+            else:
+                sizes.append(length)
+                cuts.append(0)
+        else:
+            sizes.append(0)
+            cuts.append(0)
+        chunk_start.append(len(chunks))
+        reading_start.append(len(sizes))
+    delay = np.array([latency(min(int(n), CAPACITY)) for n in np.diff(start)])
+    # Rows stay open: an access finds another one than its own.
+    other_row = -(-dram.trp * CLOCK_HZ // (dram.rate // 2)) if dram else 0
+
+    def alone(size: int) -> int:
+        """Latency of a lone read."""
+        return latency_cycles + (dram.idle_cycles(size) + other_row if dram else 0)
+
+    refresh = tuple(clocks * CLOCK_HZ // (dram.rate // 2) for clocks in (dram.trefi, dram.trfc)) if dram and dram.refresh else (0, 0)
+    blend, last = vru_stages(config.form)
+    early = config.cat != CatMode.AUTO or config.mask_generator != "ctu"
+    clock, misses, readings, given = _frame(
+        start, record, entry_mask, np.array(chunk_start), np.array(chunks, np.int64), delay, np.array(reading_start), np.array(sizes), np.array(cuts),
+        by_tile(lists.start[:-1]), mask.astype(np.int64), cycles.astype(np.int64), by_tile(finish), by_tile(finish_op), listed,
+        RECORD_LINE // frame.kind.bytes, 256, 4, READ + alone(BEAT), alone(RECORD_LINE), refresh, reads, early, config.generator.latency(config),
+        config.ctu_fifo_depth, config.generator.one_token, config.fifo_depth, blend, last + 1, config.pixels_per_vru,
+    )
+    moved = {
+        "lists": BEAT * int((readings * lines).sum()), "pointers": BEAT * rows * cols, "records": RECORD_LINE * int(misses),
+        "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
+    }
+    total = int(clock) + END + latency_cycles
+    if dram:
+        total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
+    grid = given.reshape(rows, cols, 2, 2).transpose(0, 2, 1, 3).reshape(-1)
+    return Rendering(total, moved, grid)

@@ -1,0 +1,124 @@
+"""A view on the whole chip, verilated or its bit-true model: the picture of its frame buffer, and what the frame cost (docs/chip.md)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .. import params
+from ..errors import FlickerError
+from ..front.view import View
+from ..golden.chip import render_chip
+from ..golden.front.frame import OUTCOMES, Outcome
+from ..golden.front.record import RecordKind
+from ..params import CHANNELS, CORES, Coords, Form, RenderConfig
+from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, packed_scene
+from ..progress import Steps
+from ..scene.camera import Camera
+from ..sim.chip import LIVE, ChipFrame, ChipSession, build, pointers_for
+from ..sim.half import MemoryOptions
+from .dram import DramConfig
+
+
+def _frame_image(buffer: np.ndarray, camera: Camera) -> np.ndarray:
+    """float64 (H, W, 3) of an RGB8 frame buffer."""
+    return buffer[: camera.height, : 3 * camera.width].reshape(camera.height, camera.width, 3) / 255.0
+
+
+def render_on_chip(
+    view: View, engine: Engine, *, config: RenderConfig = RenderConfig(), options: FrontOptions | None = None, compare: bool = False,
+    steps: Steps | None = None,
+) -> Rendered:
+    """Render a view with an engine of the whole chip (`Engine.whole`); arguments as of `pipeline.render_view`."""
+    steps = steps or Steps()
+    image, more = _picture(view, engine, config, options or FrontOptions(), steps)
+    stats = basic_stats(view, engine, Front.RTL if engine is Engine.CHIP else Front.GOLDEN, config) | more
+    if compare:
+        stats |= compared(view, image, steps)
+    return Rendered(image, stats)
+
+
+def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOptions, steps: Steps) -> tuple[np.ndarray, dict[str, Any]]:
+    """The frame buffer's picture and the statistics of the chip, or of its bit-true model."""
+    if config.coords is Coords.ABSOLUTE:
+        raise FlickerError(f"coords absolute: not for --engine {engine.value}; records hold means in 1/128 pixel")
+    camera = view.camera
+    red, green, blue = (round(255 * float(v)) for v in view.background)
+    if engine is Engine.CHIP_GOLDEN:
+        front, _ = bit_true_front(view, config, Front.GOLDEN, options, steps)
+        lists, stats = golden_lists(front, steps)
+        with steps.step("rendering with the chip's golden model"):
+            golden = render_chip(lists, config, background=(red, green, blue))
+        sent = golden.frame.total("minitiles_sent")
+        stats |= {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry), "minitiles_sent": sent, "pixel_pairs": 16 * sent}
+        return _frame_image(golden.buffer, camera), stats
+    if config.form is not Form.FACTORED:
+        raise FlickerError("--engine chip: the front end in RTL writes records of 16 bytes, for --form factored; --engine chip-golden takes the conic form too")
+    with steps.step("packing the scene"):
+        packed = packed_scene(view, options.format)
+    with steps.step("building the chip's simulator (once per configuration)"):
+        build(config, pointers_for(camera))
+    with steps.bar("simulating the chip") as report, ChipSession(
+        packed, config, pointers=pointers_for(camera), memory=MemoryOptions(DramConfig().timing),
+    ) as chip:
+        began = time.process_time()
+        frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
+        stats = chip_stats(chip, frame, camera, config) | {"simulated_cycles_per_second": round(chip.live()["now"] / (time.process_time() - began))}
+    return _frame_image(frame.buffer, camera), stats
+
+
+def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: RenderConfig) -> dict[str, Any]:
+    """Of a frame that had the chip to itself: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up."""
+    front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, chip.live()
+    count = lambda name: int(np.sum(front[name]))  # noqa: E731
+    phases = {"front end": stamps["front_done"] - stamps["taken"], "rendering": stamps["rendering_done"] - stamps["rendering_start"]}
+    core = {name: frame.stage[:, k] for k, (name, _) in enumerate(params.CORE_COUNTERS)}
+    first = len(params.CORE_COUNTERS)
+    channel = {
+        name: np.stack([frame.stage[:, first + len(params.CHANNEL_COUNTERS) * c + k] for c in range(CHANNELS)])
+        for k, (name, _) in enumerate(params.CHANNEL_COUNTERS)
+    }
+    traffic = {name: (int(c.dram_read_bytes), int(c.dram_write_bytes)) for name, c in chip.purposes().items() if c.dram_read_bytes or c.dram_write_bytes}
+    tested = chip.scene.gaussians - count("culled_gaussians")
+    # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each.
+    busy = {
+        "front end": {
+            "lanes": tested / (2 * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
+            "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"],
+        },
+        "rendering": {
+            "sorting units": int(np.max(rendering["entries"])) / phases["rendering"], "record cache's port": int(rendering["lines"]) / phases["rendering"],
+            "contribution test": float(core["ctu_busy"].max() / phases["rendering"]),
+            "VRUs": float(channel["vru_busy"].sum(axis=0).max() / (CHANNELS * phases["rendering"])),
+        },
+    }
+    longest = max(phases, key=lambda name: phases[name])
+    part = max(busy[longest], key=lambda name: busy[longest][name])
+    return {
+        "format": chip.packed.format.value, "records": RecordKind.FACTORED16.value, "clusters": chip.scene.clusters,
+        "clusters_kept": chip.scene.clusters - count("culled_clusters"), "visible": count("survivors") - count("unlisted"), "list_entries": count("entries"),
+        "outcomes": {
+            OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),
+            OUTCOMES[Outcome.FAINT]: count("faint"), OUTCOMES[Outcome.MISSED]: count("unlisted") - count("faint"),
+            OUTCOMES[Outcome.LISTED]: count("survivors") - count("unlisted"),
+        },
+        "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
+        "subtile_pairs": int(core["gaussians_in"].sum()), "minitiles_sent": int(channel["minitiles_sent"].sum()),
+        "pixel_pairs": 16 * int(channel["minitiles_sent"].sum()),
+        "cycles": stamps["rendering_done"] - stamps["taken"], "phases": phases, "dram_bytes": traffic, "dram_efficiency": chip.efficiency,
+        "stalls": {
+            "contribution test": int(core["ctu_stalled"].sum()), "no records for the contribution test": int(core["ctu_idle"].sum()),
+            "feature FIFO full": int(channel["fifo_full"].sum()),
+            **{f"{name.removesuffix('_waits')}, at the port": live[name] for name in LIVE if "waits" in name},
+        },
+        "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
+        "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},
+        "vrus": CORES * CHANNELS * config.vrus_per_channel,
+    }
+
+
+def _plain(counters: Mapping[str, int | np.ndarray]) -> dict[str, int | list[int]]:
+    return {name: [int(v) for v in value] if isinstance(value, np.ndarray) else value for name, value in counters.items()}

@@ -1,0 +1,323 @@
+"""The verilated chip: a packed scene in memory, registers through the C driver, frames (docs/chip.md).
+
+    with ChipSession(packed, config) as chip:
+        frame = chip.render(camera)
+    frame.buffer  # to be compared with golden.chip.render_chip
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..chip_registers import REGISTERS, ResultError
+from ..errors import FlickerError
+from ..golden.frame_buffer import PixelFormat
+from ..golden.front.frame import ListKind
+from ..golden.lists import writer_columns
+from ..params import TILE, Form, RenderConfig
+from ..scene.camera import Camera
+from ..scene.packed import HEADER_BYTES, PackedScene
+from . import driver, half, preprocessing, rendering
+from .half import PAGE, Half, MemoryOptions
+from .memory import PortConfig, PurposeCounts
+
+PORT = PortConfig(id_bits=7, max_reads=256, max_writes=128, latency=20, hazards=False)
+PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
+IMAGE = 1 << 28  # address of the scene
+ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more
+LIMIT = 100_000_000  # cycles of a frame
+SLICE = 5_000  # cycles between looks at the progress
+
+# Where frame counters begin (flk_top_pkg), their names in the order of the words, and how many words each has.
+FRONT = [(name, 4 if n == 4 else 1) for name, _, n in preprocessing._COUNTERS]
+RENDERING = [(name, 4 if n == 4 else 1) for name, _, n in rendering._COUNTERS]
+STAMPS = ("taken", "front_done", "rendering_start", "rendering_done")
+LIVE = ("now", "record_beats", "list_beats", "colour_beats", "geometry_beats", "table_beats", "frame_written", "front_written", "record_waits", "list_waits",
+        "colour_waits", "geometry_waits", "table_waits", "frame_address_waits", "front_address_waits", "data_waits")
+COUNTER_FRONT, COUNTER_RENDERING, COUNTER_LIVE, COUNTER_STAGE = 0, 32, 64, 128
+
+
+def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content."""
+    if config.form is not Form.FACTORED:
+        raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
+    parameters = {name: value for name, value in config.rtl_parameters().items() if name != "Form"}
+    return half.build(
+        "flk_top", {**parameters, "Pointers": pointers}, [half.HERE / "preprocessing.vlt", half.HERE / "render_stage.vlt"], ["--inline-mult", "20000"],
+        define="-DFLK_CHIP",
+    )
+
+
+@dataclass(frozen=True)
+class Place:
+    """Addresses of what a frame writes, and how much there is, as the driver takes them. stride: bytes."""
+
+    region: driver.CRegion
+    frame_buffer: int
+    stride: int
+
+
+@dataclass(eq=False)
+class ChipFrame:
+    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. error: bits of ResultError.
+
+    front, rendering: counters of the halves by name, int or int64 (n,). stage: int64 (cores, 32). stamps: cycle in which the frame was taken, left the front
+    end, entered and left the rendering half.
+    """
+
+    tag: int
+    error: int
+    buffer: np.ndarray
+    front: dict[str, int | np.ndarray]
+    rendering: dict[str, int | np.ndarray]
+    stage: np.ndarray
+    stamps: dict[str, int]
+
+    @property
+    def errors(self) -> list[str]:
+        """Texts of the error's bits."""
+        return [driver.library().flk_error_text(int(bit)).decode() for bit in ResultError if self.error >> bit & 1]
+
+
+class ChipSession(Half):
+    """A chip with its memory, driven by sw/flk.c. Use as a context. FlickerError begins with "chip"."""
+
+    def __init__(
+        self, packed: PackedScene, config: RenderConfig, *, pointers: int = preprocessing.SMALL_POINTERS, memory: MemoryOptions | None = None, seed: int = 1,
+        image: bytes | None = None, port: PortConfig = PORT,
+    ) -> None:
+        super().__init__("chip", build(config, pointers), {"memory": port}, memory or MemoryOptions(), seed)
+        lib = self._lib
+        lib.flk_chip_register.argtypes = [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_int, ctypes.c_void_p]
+        lib.flk_chip_wait.argtypes = [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int]
+        lib.flk_chip_wait.restype = ctypes.c_int64
+        lib.flk_chip_hold_memory.argtypes = [ctypes.c_void_p, ctypes.c_int]
+        lib.flk_chip_quiet.argtypes = [ctypes.c_void_p]
+        self.config, self.packed = config, packed
+        self.driver = driver.library()
+        self._error: FlickerError | None = None
+        self._calls = driver.READ(self._read), driver.WRITE(self._write)  # kept alive
+        self.device, self.scene = driver.CDevice(), driver.CScene()
+        data = packed.image() if image is None else image
+        self._load_image(data)
+        self._check(self.call("flk_scene_open", ctypes.byref(self.scene), data, len(data), IMAGE, 0))
+        self._check(self.call("flk_probe", ctypes.byref(self.device), ctypes.byref(driver.CBus(*self._calls, None))))
+        self._next = IMAGE + -(-len(data) // PAGE) * PAGE
+
+    # ---- registers ------------------------------------------------------------------------------------------------------------------
+
+    def _access(self, offset: int, write: bool, value: int = 0) -> int:
+        """What a callback of the driver raises would be lost; it is kept for `_raise`."""
+        word = ctypes.c_uint32(value)
+        done = self._lib.flk_chip_register(self._sim, offset, write, ctypes.byref(word))
+        if done != 1:
+            self._error = self._error or self._failure("" if done == -1 else f"register {offset:#x} answers with an error")
+        return word.value
+
+    def _read(self, _user: int, offset: int) -> int:
+        return self._access(offset, False)
+
+    def _write(self, _user: int, offset: int, value: int) -> None:
+        self._access(offset, True, value)
+
+    def _raise(self) -> None:
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+
+    def register(self, name: str, index: int = 0) -> int:
+        """Value of a register."""
+        value = self._access(REGISTERS[name].offset + 4 * index, False)
+        self._raise()
+        return value
+
+    def set_register(self, name: str, value: int, index: int = 0) -> None:
+        self._access(REGISTERS[name].offset + 4 * index, True, value)
+        self._raise()
+
+    def field(self, register: str, name: str) -> int:
+        low, bits = REGISTERS[register].fields[name]
+        return self.register(register) >> low & (1 << bits) - 1
+
+    def call(self, function: str, *arguments: object) -> str:
+        """A function of the driver that returns a status: its name, without FLK_."""
+        status = getattr(self.driver, function)(*arguments)
+        self._raise()
+        return driver.statuses()[status]
+
+    def _check(self, status: str) -> None:
+        if status != "OK":
+            text = self.driver.flk_status_text(driver.statuses().index(status)).decode()
+            raise self._failure(text)
+
+    # ---- memory -----------------------------------------------------------------------------------------------------------------------
+
+    def _load_image(self, data: bytes) -> None:
+        at = IMAGE
+        sizes = [HEADER_BYTES, *map(len, self.packed.sections().values())]
+        for size, purpose in zip(sizes, (PURPOSES.index("image header"), 0, 1, 2, 3)):
+            offset = at - IMAGE
+            self.load(at, size, data[offset : offset + size], purpose)
+            at += size
+
+    def allocate(self, size: int, purpose: str) -> int:
+        """Address of new memory, noise at first."""
+        at = self._next
+        self.load(at, -(-max(size, 1) // 64) * 64, b"", PURPOSES.index(purpose))
+        self._next += -(-max(size, 1) // PAGE) * PAGE
+        return at
+
+    def place(self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, chunks: int | None = None, stride: int | None = None) -> Place:
+        """Memory for a frame of a camera's size."""
+        lib, width, height = self.driver, camera.width, camera.height
+        chunks = lib.flk_list_chunks(width, height, ENTRIES * self.scene.gaussians) if chunks is None else chunks
+        stride = stride or lib.flk_least_stride(width, int(format_))
+        record_bytes = lib.flk_record_bytes(ctypes.byref(self.scene))
+        region = driver.CRegion(
+            self.allocate(record_bytes, "records"), record_bytes, self.allocate(lib.flk_list_bytes(chunks), "lists"), chunks,
+            self.allocate(lib.flk_pointer_bytes(width, height), "pointers"),
+        )
+        return Place(region, self.allocate(lib.flk_frame_bytes(height, stride), "frame"), stride)
+
+    def fail(self, base: int, size: int) -> None:
+        """Bursts that touch a range are answered with an error from now on."""
+        self._lib.flk_half_fail(self._sim, base, size)
+
+    def mend(self) -> None:
+        """No range fails any more, and channels that had stopped go on."""
+        self._lib.flk_half_mend(self._sim)
+
+    def hold_memory(self, hold: bool) -> None:
+        """The memory's side of the port is in reset, or no more."""
+        self._lib.flk_chip_hold_memory(self._sim, hold)
+
+    @property
+    def quiet(self) -> bool:
+        """Nothing is under way at the memory."""
+        return bool(self._lib.flk_chip_quiet(self._sim))
+
+    # ---- frames -----------------------------------------------------------------------------------------------------------------------
+
+    def frame(
+        self, camera: Camera, place: Place, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0),
+        lists: ListKind = ListKind.ELLIPSE, tag: int = 0,
+    ) -> driver.CFrame:
+        """The driver's description of a frame."""
+        c = driver.CCamera(
+            (ctypes.c_double * 9)(*camera.rotation.ravel()), (ctypes.c_double * 3)(*camera.position), camera.fx, camera.fy, camera.width, camera.height,
+        )
+        return driver.CFrame(
+            ctypes.pointer(self.scene), c, place.region, place.frame_buffer, place.stride, int(format_), (ctypes.c_uint8 * 3)(*background),
+            int(self.config.cat), lists is ListKind.BOX, tag,
+        )
+
+    def start(self, frame: driver.CFrame, other: driver.CFrame | None = None) -> int:
+        """Write a descriptor and start it: number of the frame. other: frame that is under way."""
+        self._check(self.call("flk_frame_write", ctypes.byref(self.device), ctypes.byref(frame), ctypes.byref(other) if other else None))
+        number = ctypes.c_uint16()
+        self._check(self.call("flk_start", ctypes.byref(self.device), ctypes.byref(number)))
+        return number.value
+
+    def step(self, cycles: int) -> None:
+        """So many cycles, whatever the interrupt does."""
+        if self._lib.flk_chip_wait(self._sim, cycles, 0) < 0:
+            raise self._failure()
+
+    def wait(self, limit: int = LIMIT) -> None:
+        """Until an enabled interrupt waits. FlickerError after `limit` cycles."""
+        cycles = self._lib.flk_chip_wait(self._sim, limit, 1)
+        if cycles < 0:
+            raise self._failure()
+        if cycles == limit:
+            raise self._failure(f"no interrupt within {limit} cycles")
+
+    def _wait_with(self, progress: Callable[[int, int], None], frame: driver.CFrame, limit: int) -> None:
+        """Progress by what has been read of the geometry and written of the frame buffer."""
+        geometry = len(self.packed.sections()["geometry"])
+        picture = self.driver.flk_frame_bytes(frame.camera.height, frame.stride)
+        at = self.purposes()
+        for _ in range(0, limit, SLICE):
+            if 0 <= self._lib.flk_chip_wait(self._sim, SLICE, 1) < SLICE:
+                return
+            now = self.purposes()
+            read = min(1.0, (now["geometry"].read_bytes - at["geometry"].read_bytes) / geometry)
+            written = min(1.0, (now["frame"].write_bytes - at["frame"].write_bytes) / picture)
+            progress(round(200 * read + 800 * written), 1000)
+        self.wait(1)
+
+    def counter(self, index: int) -> int:
+        value = self.driver.flk_counter(ctypes.byref(self.device), ctypes.c_uint32(index))
+        self._raise()
+        return value
+
+    def _counters(self, base: int, names: Sequence[tuple[str, int]]) -> dict[str, int | np.ndarray]:
+        out: dict[str, int | np.ndarray] = {}
+        for name, n in names:
+            values = [self.counter(base + k) for k in range(n)]
+            out[name] = values[0] if n == 1 else np.array(values, np.int64)
+            base += n
+        return out
+
+    def live(self) -> dict[str, int]:
+        """Counters that run on, modulo 2^32: cycles; beats by manager of the memory port; cycles in which its addresses, or data, wait."""
+        return {name: self.counter(COUNTER_LIVE + k) for k, name in enumerate(LIVE)}
+
+    def finish(self, frame: driver.CFrame, limit: int = LIMIT, progress: Callable[[int, int], None] | None = None) -> ChipFrame:
+        """Wait until the next frame ends, which must be this one; read what it left and acknowledge it. progress: called with (done, all) now and then."""
+        self.driver.flk_interrupt_enable(ctypes.byref(self.device), ctypes.c_uint32(1 << REGISTERS["interrupt"].fields["frame_done"][0]))
+        if progress is None:
+            self.wait(limit)
+        else:
+            self._wait_with(progress, frame, limit)
+        buffer = self.buffer(frame)
+        front = self._counters(COUNTER_FRONT, FRONT)
+        # Two's complement of 32 bits, and of 28 in 32.
+        front["key_shift"] = int(np.int32(np.uint32(front["key_shift"])))
+        rendering_ = self._counters(COUNTER_RENDERING, RENDERING)
+        stamps = self._counters(COUNTER_RENDERING + 14, [(name, 1) for name in STAMPS])
+        stage = np.array([self.counter(COUNTER_STAGE + k) for k in range(128)], np.int64).reshape(4, 32)
+        result = self.driver.flk_result(ctypes.byref(self.device))
+        self.driver.flk_release(ctypes.byref(self.device))
+        self._raise()
+        if result.tag != frame.tag:
+            raise self._failure(f"frame {result.tag} has ended, not {frame.tag}")
+        return ChipFrame(result.tag, result.error, buffer, front, rendering_, stage, {name: int(stamps[name]) for name in STAMPS})
+
+    def buffer(self, frame: driver.CFrame) -> np.ndarray:
+        """uint8 (rows of pixels, stride)."""
+        rows = -(-frame.camera.height // TILE) * TILE
+        return self.read(frame.frame_buffer, rows * frame.stride).reshape(rows, frame.stride)
+
+    def render(
+        self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE,
+        limit: int = LIMIT, progress: Callable[[int, int], None] | None = None,
+    ) -> ChipFrame:
+        """A frame; list memory grows until it suffices. FlickerError for any other fault."""
+        chunks: int | None = None
+        while True:
+            place = self.place(camera, format_, chunks=chunks)
+            frame = self.frame(camera, place, format_, background=background, lists=lists)
+            self.start(frame)
+            done = self.finish(frame, limit, progress)
+            if not done.error >> ResultError.LIST_MEMORY & 1:
+                break
+            chunks = 4 * place.region.chunks
+        if done.error:
+            raise self._failure(", ".join(done.errors))
+        return done
+
+    def purposes(self) -> dict[str, PurposeCounts]:
+        """Traffic of all frames, by what lies there."""
+        return self.traffic(PURPOSES)
+
+
+def pointers_for(camera: Camera) -> int:
+    """Lists of a list writer that a chip must have for a picture."""
+    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
+    own = writer_columns(cols) * -(-rows // 2)
+    return preprocessing.SMALL_POINTERS if own <= preprocessing.SMALL_POINTERS else preprocessing.LARGE_POINTERS

@@ -1,0 +1,637 @@
+// The chip: from a packed scene in memory to a frame buffer in memory (docs/chip.md).
+//
+// A host writes a frame's descriptor through AXI4-Lite (docs/registers.md) and starts it; flk_preprocessing makes records and tile
+// lists of the scene, flk_rendering makes the picture of them. Both halves work at the same time, on frames that follow
+// each other (flk_frame_control). One AXI4 port for all memory: 512 bits of data, records read as narrow beats of 256 bits;
+// who waits for whom is stated in flk_axi_arbiter and flk_top_pkg.
+//
+// control.abort: nothing more is asked of the memory, what has been asked for comes, then both halves are reset and all frames
+// are forgotten. No answer of the memory for timeout.cycles: status.dead, nothing works until control.reset.
+// control.reset: the same at once; the memory's side of the port must be in reset from before the write until
+// status.aborting is 0.
+// The clock of a half stands still while it is idle and no frame is in its place (flk_clock_gate).
+// irq_o: a waiting interrupt that is enabled. Outputs come from registers; w_ready_i reaches the writers combinationally.
+module flk_top
+  import flk_param_pkg::*;
+  import flk_preproc_pkg::*;
+  import flk_rendering_pkg::*;
+  import flk_top_pkg::*;
+#(
+  parameter  int unsigned Precision      = PRECISION_FIXED,
+  parameter  int unsigned FifoDepth      = FIFO_DEPTH,
+  parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
+  parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
+  parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
+  parameter  int unsigned Pointers       = 2048,  // lists of a list writer: up to 1920x1088
+  parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
+  localparam int unsigned IdBits         = 4,
+  localparam int unsigned PortIdBits     = IdBits + 3,
+  localparam int unsigned AddrBits       = TOP_ADDR_BITS,
+  localparam int unsigned RegisterBits   = flk_registers_pkg::FLK_REGISTERS_MIN_ADDR_WIDTH
+) (
+  input  logic                    clk_i,
+  input  logic                    rst_ni,
+  output logic                    irq_o,
+  // Registers: AXI4-Lite
+  input  logic                    reg_aw_valid_i,
+  output logic                    reg_aw_ready_o,
+  input  logic [RegisterBits-1:0] reg_aw_addr_i,
+  input  logic [2:0]              reg_aw_prot_i,
+  input  logic                    reg_w_valid_i,
+  output logic                    reg_w_ready_o,
+  input  logic [31:0]             reg_w_data_i,
+  input  logic [3:0]              reg_w_strb_i,
+  output logic                    reg_b_valid_o,
+  input  logic                    reg_b_ready_i,
+  output logic [1:0]              reg_b_resp_o,
+  input  logic                    reg_ar_valid_i,
+  output logic                    reg_ar_ready_o,
+  input  logic [RegisterBits-1:0] reg_ar_addr_i,
+  input  logic [2:0]              reg_ar_prot_i,
+  output logic                    reg_r_valid_o,
+  input  logic                    reg_r_ready_i,
+  output logic [31:0]             reg_r_data_o,
+  output logic [1:0]              reg_r_resp_o,
+  // Memory: AXI4
+  output logic                    ar_valid_o,
+  input  logic                    ar_ready_i,
+  output logic [PortIdBits-1:0]   ar_id_o,
+  output logic [AddrBits-1:0]     ar_addr_o,
+  output logic [7:0]              ar_len_o,
+  output logic [2:0]              ar_size_o,
+  output logic [1:0]              ar_burst_o,
+  output logic [3:0]              ar_qos_o,
+  input  logic                    r_valid_i,
+  output logic                    r_ready_o,
+  input  logic [PortIdBits-1:0]   r_id_i,
+  input  logic [511:0]            r_data_i,
+  input  logic [1:0]              r_resp_i,
+  input  logic                    r_last_i,
+  output logic                    aw_valid_o,
+  input  logic                    aw_ready_i,
+  output logic [PortIdBits-1:0]   aw_id_o,
+  output logic [AddrBits-1:0]     aw_addr_o,
+  output logic [7:0]              aw_len_o,
+  output logic [2:0]              aw_size_o,
+  output logic [1:0]              aw_burst_o,
+  output logic [3:0]              aw_qos_o,
+  output logic                    w_valid_o,
+  input  logic                    w_ready_i,
+  output logic [511:0]            w_data_o,
+  output logic [63:0]             w_strb_o,
+  output logic                    w_last_o,
+  input  logic                    b_valid_i,
+  output logic                    b_ready_o,
+  input  logic [PortIdBits-1:0]   b_id_i,
+  input  logic [1:0]              b_resp_i
+);
+
+  localparam int unsigned Width = 512;
+
+  // ---- registers --------------------------------------------------------------------------------------
+
+  flk_registers_pkg::flk_registers__in_t  to_host;
+  flk_registers_pkg::flk_registers__out_t from_host;
+  descriptor_t                            descriptor;
+
+  flk_registers i_registers (
+    .clk_i,
+    .rst_ni,
+    .s_axil_awready(reg_aw_ready_o),
+    .s_axil_awvalid(reg_aw_valid_i),
+    .s_axil_awaddr (reg_aw_addr_i),
+    .s_axil_awprot (reg_aw_prot_i),
+    .s_axil_wready (reg_w_ready_o),
+    .s_axil_wvalid (reg_w_valid_i),
+    .s_axil_wdata  (reg_w_data_i),
+    .s_axil_wstrb  (reg_w_strb_i),
+    .s_axil_bready (reg_b_ready_i),
+    .s_axil_bvalid (reg_b_valid_o),
+    .s_axil_bresp  (reg_b_resp_o),
+    .s_axil_arready(reg_ar_ready_o),
+    .s_axil_arvalid(reg_ar_valid_i),
+    .s_axil_araddr (reg_ar_addr_i),
+    .s_axil_arprot (reg_ar_prot_i),
+    .s_axil_rready (reg_r_ready_i),
+    .s_axil_rvalid (reg_r_valid_o),
+    .s_axil_rdata  (reg_r_data_o),
+    .s_axil_rresp  (reg_r_resp_o),
+    .hwif_in       (to_host),
+    .hwif_out      (from_host)
+  );
+
+  flk_descriptor i_descriptor (
+    .registers_i (from_host),
+    .descriptor_o(descriptor)
+  );
+
+  assign irq_o = from_host.interrupt.intr;
+
+  // ---- abort, time-out, reset -----------------------------------------------------------------------
+
+  localparam int unsigned ResetCycles = 8;
+
+  typedef enum logic [1:0] {RUN, DRAIN, DEAD, RESET} state_e;
+
+  state_e                           state_q;
+  logic [$clog2(ResetCycles+1)-1:0] reset_q;
+  logic                             units_rst_nq, aborted_q, abort_q;
+  logic                             drained, stuck, forget, hold;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      state_q      <= RESET;
+      reset_q      <= '0;
+      units_rst_nq <= 1'b0;
+      aborted_q    <= 1'b0;
+      abort_q      <= 1'b0;
+    end else begin
+      aborted_q    <= 1'b0;
+      units_rst_nq <= state_q != RESET;
+      reset_q      <= state_q == RESET ? reset_q + 1'b1 : '0;
+      if (from_host.control.reset.value) begin
+        state_q <= RESET;
+        reset_q <= '0;
+        abort_q <= 1'b0;
+      end else begin
+        unique case (state_q)
+          RUN: begin
+            if (stuck) begin
+              state_q <= DEAD;
+            end else if (from_host.control.abort.value) begin
+              state_q <= DRAIN;
+              abort_q <= 1'b1;
+            end
+          end
+          DRAIN: begin
+            if (stuck) begin
+              state_q <= DEAD;
+            end else if (drained) begin
+              state_q <= RESET;
+            end
+          end
+          DEAD: ;
+          default: begin  // RESET
+            if (32'(reset_q) == ResetCycles - 1) begin
+              state_q   <= RUN;
+              aborted_q <= abort_q;
+              abort_q   <= 1'b0;
+            end
+          end
+        endcase
+      end
+    end
+  end
+
+  assign hold   = state_q != RUN;
+  assign forget = state_q == RESET;
+
+  // ---- frames -----------------------------------------------------------------------------------------
+
+  logic                 start, locked, refused, front_done, post, bank, acknowledged;
+  logic [15:0]          tag, started, finished;
+  frame_error_t         frame_error;
+  logic                 front_busy, rendering_busy;
+  logic                 front_start, front_idle, front_end;
+  logic [3:0]           front_error;
+  front_registers_t     front;
+  logic                 rendering_start, rendering_idle, rendering_end;
+  logic [2:0]           rendering_error;
+  rendering_registers_t rendering;
+  logic                 copy_front, copy_front_bank, copy_front_none, copy_front_done;
+  logic                 copy_rendering, copy_rendering_bank, copy_rendering_none;
+  logic                 copy_rendering_done, told_q;
+  logic [3:0][31:0]     stamps;
+  logic [31:0]          now_q;
+
+  assign start        = from_host.control.start.value && state_q == RUN;
+  assign acknowledged = told_q && !from_host.interrupt.frame_done.value;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      told_q <= 1'b0;
+      now_q  <= '0;
+    end else begin
+      told_q <= from_host.interrupt.frame_done.value;
+      now_q  <= now_q + 1'b1;
+    end
+  end
+
+  flk_frame_control #(
+    .Pointers(Pointers)
+  ) i_control (
+    .clk_i,
+    .rst_ni,
+    .clear_i              (hold),
+    .aborted_i            (state_q == DRAIN),
+    .timed_out_i          (state_q == DEAD),
+    .reset_i              (from_host.control.reset.value),
+    .now_i                (now_q),
+    .start_i              (start),
+    .descriptor_i         (descriptor),
+    .locked_o             (locked),
+    .refused_o            (refused),
+    .front_done_o         (front_done),
+    .post_o               (post),
+    .tag_o                (tag),
+    .error_o              (frame_error),
+    .bank_o               (bank),
+    .acknowledged_i       (acknowledged),
+    .started_o            (started),
+    .finished_o           (finished),
+    .front_busy_o         (front_busy),
+    .rendering_busy_o     (rendering_busy),
+    .front_start_o        (front_start),
+    .front_idle_i         (front_idle),
+    .front_done_i         (front_end),
+    .front_error_i        (front_error),
+    .front_o              (front),
+    .rendering_start_o    (rendering_start),
+    .rendering_idle_i     (rendering_idle),
+    .rendering_done_i     (rendering_end),
+    .rendering_error_i    (rendering_error),
+    .rendering_o          (rendering),
+    .copy_front_o         (copy_front),
+    .copy_front_bank_o    (copy_front_bank),
+    .copy_front_none_o    (copy_front_none),
+    .copy_front_done_i    (copy_front_done),
+    .copy_rendering_o     (copy_rendering),
+    .copy_rendering_bank_o(copy_rendering_bank),
+    .copy_rendering_none_o(copy_rendering_none),
+    .stamps_o             (stamps),
+    .copy_rendering_done_i(copy_rendering_done)
+  );
+
+  // ---- memory port --------------------------------------------------------------------------------------
+
+  logic [READERS-1:0]               ar_valid, ar_ready, r_valid;
+  logic [READERS-1:0][IdBits-1:0]   ar_id;
+  logic [READERS-1:0][AddrBits-1:0] ar_addr;
+  logic [READERS-1:0][7:0]          ar_len;
+  logic [READERS-1:0][2:0]          ar_size;
+  logic [READERS-1:0][1:0]          unused_ar_burst;
+  logic [READERS-1:0]               r_ready;
+  logic [IdBits-1:0]                r_id;
+  logic [Width-1:0]                 r_data;
+  logic [1:0]                       r_resp;
+  logic                             r_last;
+  logic [WRITERS-1:0]               aw_valid, aw_ready, w_valid, w_ready, b_valid, b_ready;
+  logic [WRITERS-1:0][IdBits-1:0]   aw_id;
+  logic [WRITERS-1:0][AddrBits-1:0] aw_addr;
+  logic [WRITERS-1:0][7:0]          aw_len;
+  logic [WRITERS-1:0][2:0]          aw_size;
+  logic [WRITERS-1:0][1:0]          unused_aw_burst;
+  logic [WRITERS-1:0][Width-1:0]    w_data;
+  logic [WRITERS-1:0][Width/8-1:0]  w_strb;
+  logic [WRITERS-1:0]               unused_w_last;
+  logic [IdBits-1:0]                b_id;
+  logic [1:0]                       b_resp;
+  logic [Width/2-1:0]               record_data;
+
+  flk_axi_arbiter #(
+    .Readers (READERS),
+    .Writers (WRITERS),
+    .AddrBits(AddrBits),
+    .Width   (Width),
+    .IdBits  (IdBits),
+    .Patience(Patience)
+  ) i_port (
+    .clk_i,
+    .rst_ni,
+    .hold_i    (hold),
+    .drained_o (drained),
+    .clear_i   (forget),
+    .timeout_i (from_host.timeout.cycles.value),
+    .stuck_o   (stuck),
+    .ar_valid_i(ar_valid),
+    .ar_ready_o(ar_ready),
+    .ar_id_i   (ar_id),
+    .ar_addr_i (ar_addr),
+    .ar_len_i  (ar_len),
+    .ar_size_i (ar_size),
+    .r_valid_o (r_valid),
+    .r_id_o    (r_id),
+    .r_data_o  (r_data),
+    .r_resp_o  (r_resp),
+    .r_last_o  (r_last),
+    .aw_valid_i(aw_valid),
+    .aw_ready_o(aw_ready),
+    .aw_id_i   (aw_id),
+    .aw_addr_i (aw_addr),
+    .aw_len_i  (aw_len),
+    .aw_size_i (aw_size),
+    .w_valid_i (w_valid),
+    .w_ready_o (w_ready),
+    .w_data_i  (w_data),
+    .w_strb_i  (w_strb),
+    .b_valid_o (b_valid),
+    .b_id_o    (b_id),
+    .b_resp_o  (b_resp),
+    .ar_valid_o,
+    .ar_ready_i,
+    .ar_id_o,
+    .ar_addr_o,
+    .ar_len_o,
+    .ar_size_o,
+    .ar_burst_o,
+    .ar_qos_o,
+    .r_valid_i,
+    .r_ready_o,
+    .r_id_i,
+    .r_data_i,
+    .r_resp_i,
+    .r_last_i,
+    .aw_valid_o,
+    .aw_ready_i,
+    .aw_id_o,
+    .aw_addr_o,
+    .aw_len_o,
+    .aw_size_o,
+    .aw_burst_o,
+    .aw_qos_o,
+    .w_valid_o,
+    .w_ready_i,
+    .w_data_o,
+    .w_strb_o,
+    .w_last_o,
+    .b_valid_i,
+    .b_ready_o,
+    .b_id_i,
+    .b_resp_i
+  );
+
+  flk_axi_lane #(
+    .Width   (Width / 2),
+    .AddrBits(AddrBits)
+  ) i_records (
+    .clk_i,
+    .rst_ni   (units_rst_nq),
+    .ar_move_i(ar_valid[READ_RECORDS] && ar_ready[READ_RECORDS]),
+    .ar_addr_i(ar_addr[READ_RECORDS]),
+    .r_valid_i(r_valid[READ_RECORDS]),
+    .r_data_i (r_data),
+    .r_data_o (record_data)
+  );
+
+  // ---- halves -------------------------------------------------------------------------------------------
+
+  logic front_clk, rendering_clk;
+
+  flk_clock_gate i_front_clock (
+    .clk_i,
+    .en_i (front_busy || !front_idle || !units_rst_nq),
+    .clk_o(front_clk)
+  );
+
+  flk_clock_gate i_rendering_clock (
+    .clk_i,
+    .en_i (rendering_busy || !rendering_idle || !units_rst_nq),
+    .clk_o(rendering_clk)
+  );
+
+  front_counters_t     front_counters;
+  rendering_counters_t rendering_counters;
+  logic [COUNTER_ADDR_BITS-1:0] stage_addr;
+  logic [COUNTER_BITS-1:0]      stage_data;
+
+  flk_preprocessing #(
+    .Pointers(Pointers),
+    .IdBits  (IdBits)
+  ) i_front (
+    .clk_i               (front_clk),
+    .rst_ni              (units_rst_nq),
+    .start_i             (front_start),
+    .idle_o              (front_idle),
+    .done_o              (front_end),
+    .registers_i         (front),
+    .error_o             (front_error),
+    .counters_o          (front_counters),
+    .table_ar_valid_o    (ar_valid[READ_TABLE]),
+    .table_ar_ready_i    (ar_ready[READ_TABLE]),
+    .table_ar_id_o       (ar_id[READ_TABLE]),
+    .table_ar_addr_o     (ar_addr[READ_TABLE]),
+    .table_ar_len_o      (ar_len[READ_TABLE]),
+    .table_ar_size_o     (ar_size[READ_TABLE]),
+    .table_ar_burst_o    (unused_ar_burst[READ_TABLE]),
+    .table_r_valid_i     (r_valid[READ_TABLE]),
+    .table_r_ready_o     (r_ready[READ_TABLE]),
+    .table_r_id_i        (r_id),
+    .table_r_data_i      (r_data),
+    .table_r_resp_i      (r_resp),
+    .table_r_last_i      (r_last),
+    .geometry_ar_valid_o (ar_valid[READ_GEOMETRY]),
+    .geometry_ar_ready_i (ar_ready[READ_GEOMETRY]),
+    .geometry_ar_id_o    (ar_id[READ_GEOMETRY]),
+    .geometry_ar_addr_o  (ar_addr[READ_GEOMETRY]),
+    .geometry_ar_len_o   (ar_len[READ_GEOMETRY]),
+    .geometry_ar_size_o  (ar_size[READ_GEOMETRY]),
+    .geometry_ar_burst_o (unused_ar_burst[READ_GEOMETRY]),
+    .geometry_r_valid_i  (r_valid[READ_GEOMETRY]),
+    .geometry_r_ready_o  (r_ready[READ_GEOMETRY]),
+    .geometry_r_id_i     (r_id),
+    .geometry_r_data_i   (r_data),
+    .geometry_r_resp_i   (r_resp),
+    .geometry_r_last_i   (r_last),
+    .colour_ar_valid_o   (ar_valid[READ_COLOURS]),
+    .colour_ar_ready_i   (ar_ready[READ_COLOURS]),
+    .colour_ar_id_o      (ar_id[READ_COLOURS]),
+    .colour_ar_addr_o    (ar_addr[READ_COLOURS]),
+    .colour_ar_len_o     (ar_len[READ_COLOURS]),
+    .colour_ar_size_o    (ar_size[READ_COLOURS]),
+    .colour_ar_burst_o   (unused_ar_burst[READ_COLOURS]),
+    .colour_r_valid_i    (r_valid[READ_COLOURS]),
+    .colour_r_ready_o    (r_ready[READ_COLOURS]),
+    .colour_r_id_i       (r_id),
+    .colour_r_data_i     (r_data),
+    .colour_r_resp_i     (r_resp),
+    .colour_r_last_i     (r_last),
+    .aw_valid_o          (aw_valid[WRITE_FRONT]),
+    .aw_ready_i          (aw_ready[WRITE_FRONT]),
+    .aw_id_o             (aw_id[WRITE_FRONT]),
+    .aw_addr_o           (aw_addr[WRITE_FRONT]),
+    .aw_len_o            (aw_len[WRITE_FRONT]),
+    .aw_size_o           (aw_size[WRITE_FRONT]),
+    .aw_burst_o          (unused_aw_burst[WRITE_FRONT]),
+    .w_valid_o           (w_valid[WRITE_FRONT]),
+    .w_ready_i           (w_ready[WRITE_FRONT]),
+    .w_data_o            (w_data[WRITE_FRONT]),
+    .w_strb_o            (w_strb[WRITE_FRONT]),
+    .w_last_o            (unused_w_last[WRITE_FRONT]),
+    .b_valid_i           (b_valid[WRITE_FRONT]),
+    .b_ready_o           (b_ready[WRITE_FRONT]),
+    .b_id_i              (b_id),
+    .b_resp_i            (b_resp)
+  );
+
+  flk_rendering #(
+    .Form          (FORM_FACTORED),
+    .Precision     (Precision),
+    .FifoDepth     (FifoDepth),
+    .CtuFifoDepth  (CtuFifoDepth),
+    .VrusPerChannel(VrusPerChannel),
+    .MaskGenerator (MaskGenerator),
+    .IdBits        (IdBits)
+  ) i_rendering (
+    .clk_i              (rendering_clk),
+    .rst_ni             (units_rst_nq),
+    .start_i            (rendering_start),
+    .idle_o             (rendering_idle),
+    .registers_i        (rendering),
+    .done_o             (rendering_end),
+    .error_o            (rendering_error),
+    .counters_o         (rendering_counters),
+    .counter_addr_i     (stage_addr),
+    .counter_data_o     (stage_data),
+    .list_ar_valid_o    (ar_valid[READ_LISTS]),
+    .list_ar_ready_i    (ar_ready[READ_LISTS]),
+    .list_ar_id_o       (ar_id[READ_LISTS]),
+    .list_ar_addr_o     (ar_addr[READ_LISTS]),
+    .list_ar_len_o      (ar_len[READ_LISTS]),
+    .list_ar_size_o     (ar_size[READ_LISTS]),
+    .list_ar_burst_o    (unused_ar_burst[READ_LISTS]),
+    .list_r_valid_i     (r_valid[READ_LISTS]),
+    .list_r_ready_o     (r_ready[READ_LISTS]),
+    .list_r_id_i        (r_id),
+    .list_r_data_i      (r_data),
+    .list_r_resp_i      (r_resp),
+    .list_r_last_i      (r_last),
+    .record_ar_valid_o  (ar_valid[READ_RECORDS]),
+    .record_ar_ready_i  (ar_ready[READ_RECORDS]),
+    .record_ar_id_o     (ar_id[READ_RECORDS]),
+    .record_ar_addr_o   (ar_addr[READ_RECORDS]),
+    .record_ar_len_o    (ar_len[READ_RECORDS]),
+    .record_ar_size_o   (ar_size[READ_RECORDS]),
+    .record_ar_burst_o  (unused_ar_burst[READ_RECORDS]),
+    .record_r_valid_i   (r_valid[READ_RECORDS]),
+    .record_r_ready_o   (r_ready[READ_RECORDS]),
+    .record_r_id_i      (r_id),
+    .record_r_data_i    (record_data),
+    .record_r_resp_i    (r_resp),
+    .record_r_last_i    (r_last),
+    .aw_valid_o         (aw_valid[WRITE_FRAME]),
+    .aw_ready_i         (aw_ready[WRITE_FRAME]),
+    .aw_id_o            (aw_id[WRITE_FRAME]),
+    .aw_addr_o          (aw_addr[WRITE_FRAME]),
+    .aw_len_o           (aw_len[WRITE_FRAME]),
+    .aw_size_o          (aw_size[WRITE_FRAME]),
+    .aw_burst_o         (unused_aw_burst[WRITE_FRAME]),
+    .w_valid_o          (w_valid[WRITE_FRAME]),
+    .w_ready_i          (w_ready[WRITE_FRAME]),
+    .w_data_o           (w_data[WRITE_FRAME]),
+    .w_strb_o           (w_strb[WRITE_FRAME]),
+    .w_last_o           (unused_w_last[WRITE_FRAME]),
+    .b_valid_i          (b_valid[WRITE_FRAME]),
+    .b_ready_o          (b_ready[WRITE_FRAME]),
+    .b_id_i             (b_id),
+    .b_resp_i           (b_resp)
+  );
+
+  // ---- counters -------------------------------------------------------------------------------------------
+
+  logic [FRONT_WORDS-1:0][31:0]     front_words;
+  logic [RENDERING_WORDS-1:0][31:0] rendering_words;
+  logic [LIVE_WORDS-1:0][31:0]      live_q;
+  logic [LIVE_WORDS-1:1]            event_q;
+  logic                             unused_ready;
+  logic [9:0]                       counter_index;
+  logic [31:0]                      kept_value, live_value_q;
+  logic                             live_q_chosen;
+
+  // Words of a frame: the first field of the counters' structures first.
+  assign front_words = {
+    32'(front_counters.key_low), 32'(front_counters.key_shift),
+    32'(front_counters.taken[3]), 32'(front_counters.taken[2]),
+    32'(front_counters.taken[1]), 32'(front_counters.taken[0]),
+    front_counters.evicted, front_counters.lines, front_counters.entries,
+    front_counters.record_beats, front_counters.colour_beats, front_counters.geometry_beats,
+    front_counters.header_beats, front_counters.clipped, front_counters.saturated,
+    front_counters.unlisted, front_counters.faint, front_counters.survivors,
+    front_counters.outside, front_counters.too_near, front_counters.culled_gaussians,
+    front_counters.culled_clusters, front_counters.cycles};
+  assign rendering_words = {
+    stamps, rendering_counters.lines, rendering_counters.dropped, rendering_counters.readings,
+    rendering_counters.entries, rendering_counters.cycles};
+
+  flk_frame_counters i_counters (
+    .clk_i,
+    .rst_ni,
+    .clear_i          (hold),
+    .front_valid_i    (copy_front),
+    .front_bank_i     (copy_front_bank),
+    .front_none_i     (copy_front_none),
+    .front_words_i    (front_words),
+    .front_done_o     (copy_front_done),
+    .rendering_valid_i(copy_rendering),
+    .rendering_bank_i (copy_rendering_bank),
+    .rendering_none_i (copy_rendering_none),
+    .rendering_words_i(rendering_words),
+    .counter_addr_o   (stage_addr),
+    .counter_data_i   (stage_data),
+    .rendering_done_o (copy_rendering_done),
+    .bank_i           (bank),
+    .addr_i           (counter_index[7:0]),
+    .value_o          (kept_value)
+  );
+
+  // Those that run on: cycles; beats by reader and writer; cycles in which an address waits; in which data wait.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      live_q  <= '0;
+      event_q <= '0;
+    end else begin
+      event_q   <= {w_valid_o && !w_ready_i, aw_valid & ~aw_ready, ar_valid & ~ar_ready,
+                    w_valid & w_ready, r_valid};
+      live_q[0] <= live_q[0] + 1'b1;
+      for (int unsigned k = 1; k < LIVE_WORDS; k++) begin
+        live_q[k] <= live_q[k] + 32'(event_q[k]);
+      end
+    end
+  end
+
+  assign unused_ready  = ^{r_ready, b_ready};  // 1 whenever it matters
+  assign counter_index = from_host.counter_select.index.value;
+  assign live_q_chosen = 32'(counter_index) >= COUNTER_LIVE &&
+                         32'(counter_index) < COUNTER_LIVE + LIVE_WORDS;
+
+  always_ff @(posedge clk_i) begin
+    live_value_q <= live_q[counter_index[$clog2(LIVE_WORDS)-1:0]];
+  end
+
+  // ---- to the host ------------------------------------------------------------------------------------------
+
+  assign to_host.descriptor_locked           = locked;
+  assign to_host.capability.stage.next       = 4'(MaskGenerator);
+  assign to_host.capability.form.next        = 2'(FORM_FACTORED);
+  assign to_host.capability.precision.next   = 2'(Precision);
+  assign to_host.capability.vrus.next        = 4'(VrusPerChannel);
+  assign to_host.capability.log2_lists.next  = 4'($clog2(Pointers));
+  assign to_host.capability.log2_beat.next   = 4'($clog2(Width / 8));
+  assign to_host.status.ready.next           = !locked && state_q == RUN;
+  assign to_host.status.front_busy.next      = front_busy;
+  assign to_host.status.render_busy.next     = rendering_busy;
+  assign to_host.status.aborting.next        = state_q == DRAIN || state_q == RESET;
+  assign to_host.status.dead.next            = state_q == DEAD;
+  assign to_host.interrupt.front_done.next   = front_done;
+  assign to_host.interrupt.frame_done.next   = post;
+  assign to_host.interrupt.error.next        = (post && frame_error != '0) ||
+                                               (stuck && state_q != DEAD);
+  assign to_host.interrupt.aborted.next      = aborted_q;
+  assign to_host.interrupt.refused.next      = refused || (from_host.control.start.value && !start);
+  assign to_host.result.tag.next             = tag;
+  assign to_host.result.error.next           = 16'(frame_error);
+  assign to_host.frames.started.next         = started;
+  assign to_host.frames.finished.next        = finished;
+  assign to_host.counter_value.value.next    = live_q_chosen ? live_value_q : kept_value;
+
+`ifndef SYNTHESIS
+  for (genvar k = 0; k < READERS; k++) begin : gen_check_reader
+    assert property (@(posedge clk_i) disable iff (!units_rst_nq) r_valid[k] |-> r_ready[k])
+    else $error("flk_top: a reader does not take what it asked for");
+  end
+  for (genvar k = 0; k < WRITERS; k++) begin : gen_check_writer
+    assert property (@(posedge clk_i) disable iff (!units_rst_nq) b_valid[k] |-> b_ready[k])
+    else $error("flk_top: a writer does not take its answer");
+  end
+`endif
+
+endmodule

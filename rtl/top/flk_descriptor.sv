@@ -1,0 +1,71 @@
+// The descriptor of a frame as the registers hold it: names of the register map to those of the halves.
+//
+// Combinational, no gates.
+module flk_descriptor
+  import flk_preproc_pkg::*;
+  import flk_top_pkg::*;
+(
+  input  flk_registers_pkg::flk_registers__out_t registers_i,
+  output descriptor_t                            descriptor_o
+);
+
+  assign descriptor_o.tag          = registers_i.frame.tag.value;
+  assign descriptor_o.mode         = registers_i.frame.mode.value;
+  assign descriptor_o.rgba         = registers_i.frame.rgba.value;
+  assign descriptor_o.background   = {registers_i.background.blue.value,
+                                      registers_i.background.green.value,
+                                      registers_i.background.red.value};
+  assign descriptor_o.clusters     = registers_i.clusters.value.value;
+  assign descriptor_o.record_beats = registers_i.record_beats.value.value;
+  assign descriptor_o.chunks       = registers_i.chunks.value.value;
+  assign descriptor_o.stride       = registers_i.stride.value.value;
+
+  assign descriptor_o.scene_table  = {registers_i.table_high.value.value,
+                                      registers_i.table_low.value.value};
+  assign descriptor_o.headers      = {registers_i.headers_high.value.value,
+                                      registers_i.headers_low.value.value};
+  assign descriptor_o.geometry     = {registers_i.geometry_high.value.value,
+                                      registers_i.geometry_low.value.value};
+  assign descriptor_o.colours      = {registers_i.colours_high.value.value,
+                                      registers_i.colours_low.value.value};
+  assign descriptor_o.records      = {registers_i.records_high.value.value,
+                                      registers_i.records_low.value.value};
+  assign descriptor_o.lists        = {registers_i.lists_high.value.value,
+                                      registers_i.lists_low.value.value};
+  assign descriptor_o.pointers     = {registers_i.pointers_high.value.value,
+                                      registers_i.pointers_low.value.value};
+  assign descriptor_o.frame_buffer = {registers_i.frame_buffer_high.value.value,
+                                      registers_i.frame_buffer_low.value.value};
+
+  assign descriptor_o.lane.chunked = registers_i.frame.chunked.value;
+  assign descriptor_o.lane.box     = registers_i.frame.box.value;
+  assign descriptor_o.lane.width   = registers_i.size.width.value;
+  assign descriptor_o.lane.height  = registers_i.size.height.value;
+
+  for (genvar k = 0; k < 3; k++) begin : gen_vector
+    assign descriptor_o.cull.position[k] = registers_i.position[k].value.value;
+    assign descriptor_o.lane.row_x[k]    = registers_i.row_x[k].value.value;
+    assign descriptor_o.lane.row_x_z[k]  = registers_i.row_x_z[k].value.value;
+    assign descriptor_o.lane.row_y[k]    = registers_i.row_y[k].value.value;
+    assign descriptor_o.lane.row_y_z[k]  = registers_i.row_y_z[k].value.value;
+    for (genvar i = 0; i < 3; i++) begin : gen_view
+      assign descriptor_o.lane.view[k][i] = registers_i.view[3*k+i].value.value;
+    end
+  end
+  for (genvar k = 0; k < 5; k++) begin : gen_plane
+    assign descriptor_o.cull.offset[k] = registers_i.offset[k].value.value;
+    assign descriptor_o.cull.reach[k]  = registers_i.reach[k].value.value;
+    for (genvar i = 0; i < 3; i++) begin : gen_normal
+      assign descriptor_o.cull.normal[k][i] = registers_i.normal[3*k+i].value.value;
+    end
+  end
+  for (genvar k = 0; k < 2; k++) begin : gen_axis
+    assign descriptor_o.lane.focal[k] = registers_i.focal[k].value.value;
+    assign descriptor_o.lane.limit[k] = registers_i.limit[k].value.value;
+  end
+
+  logic unused_registers;
+  assign unused_registers = ^{registers_i.control, registers_i.interrupt, registers_i.timeout,
+                              registers_i.counter_select};
+
+endmodule

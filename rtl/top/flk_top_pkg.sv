@@ -1,0 +1,64 @@
+// The chip: descriptor of a frame, errors, counters.
+package flk_top_pkg;
+  import flk_preproc_pkg::*;
+
+  localparam int unsigned TOP_ADDR_BITS = 40;
+  typedef logic [TOP_ADDR_BITS-1:0] address_t;
+
+  // A frame, as the registers describe it (docs/registers.md).
+  typedef struct packed {
+    logic [15:0]     tag;
+    logic [2:0]      mode;         // of the contribution test, CAT_*
+    logic            rgba;         // RGBA16F instead of RGB8
+    logic [2:0][7:0] background;   // red lowest
+    cull_setup_t     cull;
+    lane_setup_t     lane;
+    address_t        scene_table;  // bytes
+    address_t        headers;
+    address_t        geometry;
+    address_t        colours;
+    address_t        records;
+    address_t        lists;
+    address_t        pointers;
+    address_t        frame_buffer;
+    logic [23:0]     clusters;
+    logic [22:0]     record_beats;
+    logic [24:0]     chunks;       // of a list writer
+    logic [16:0]     stride;       // bytes
+  } descriptor_t;
+
+  // Bits of a frame's error, in the order of the enumeration error_e of rtl/regs/flk_registers.rdl.
+  typedef struct packed {
+    logic timed_out;
+    logic aborted;
+    logic descriptor;
+    logic frame_write;
+    logic record_read;
+    logic list_read;
+    logic list_memory;
+    logic record_region;
+    logic front_write;
+    logic front_read;
+  } frame_error_t;
+
+  // Counters: words of a frame, from each half, and those that run on.
+  localparam int unsigned COUNTER_FRONT = 0;
+  localparam int unsigned COUNTER_RENDERING = 32;
+  localparam int unsigned COUNTER_LIVE = 64;
+  localparam int unsigned COUNTER_STAGE = 128;
+  localparam int unsigned FRONT_WORDS = 32;
+  localparam int unsigned RENDERING_WORDS = 18;
+  localparam int unsigned LIVE_WORDS = 16;
+
+  // Managers of the memory port; the first reader and the first writer go first.
+  localparam int unsigned READERS = 5;
+  localparam int unsigned READ_RECORDS = 0;
+  localparam int unsigned READ_LISTS = 1;
+  localparam int unsigned READ_COLOURS = 2;
+  localparam int unsigned READ_GEOMETRY = 3;
+  localparam int unsigned READ_TABLE = 4;
+  localparam int unsigned WRITERS = 2;
+  localparam int unsigned WRITE_FRAME = 0;
+  localparam int unsigned WRITE_FRONT = 1;
+
+endpackage

@@ -1,0 +1,95 @@
+"""`make docs PART=chip_hardware`: frames of the verilated chip beside the chip model's halves, in docs/chip.md.
+
+An error: a frame buffer that differs from the golden model's; cycles of a frame that are more than 10 % off.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time
+
+import numpy as np
+
+from flicker.chip import preprocessing, rendering
+from flicker.chip.dram import DramConfig
+from flicker.errors import FlickerError
+from flicker.front.view import DEMO, load_view
+from flicker.golden.chip import render_chip
+from flicker.golden.front.frame import run_front
+from flicker.golden.front.memory import front_memory
+from flicker.markdown import table
+from flicker.params import RenderConfig
+from flicker.pipeline import packed_scene
+from flicker.scene.packed import PackedFormat
+from flicker.scene.real import REAL_VIEWS
+from flicker.sim.chip import PORT, ChipFrame, ChipSession, build, pointers_for
+from flicker.sim.half import MemoryOptions
+
+from .common import Say, folder_of_scenes
+
+SIZE = (640, 360)
+VIEWS = ("guitar", "stpeter")
+LIMIT = 0.1
+CHUNKS = 8000  # of a list writer: enough for these views
+PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
+
+
+def back_to_back(chip: ChipSession, camera) -> list[ChipFrame]:
+    """Three frames of one view, each started as soon as the chip takes it."""
+    places = [chip.place(camera, chunks=CHUNKS) for _ in range(2)]
+    frames = [chip.frame(camera, places[k % 2], tag=k + 1) for k in range(3)]
+    chip.start(frames[0])
+    done = []
+    for k, frame in enumerate(frames):
+        if k < 2:
+            while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
+                chip.step(500)
+            chip.start(frames[k + 1])
+        done.append(chip.finish(frame))
+    return done
+
+
+def tables(say: Say) -> dict[str, str]:
+    rows, traffic = [], []
+    config, dram = RenderConfig(), DramConfig()
+    views = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
+    for title, path, number in views:
+        view = load_view(path, number, SIZE)
+        camera = view.camera
+        build(config, pointers_for(camera))
+        packed = packed_scene(view, PackedFormat.CHUNK)
+        front = run_front(packed, camera)
+        image = front_memory(front)
+        golden = render_chip(front.subtile_lists(), config)
+        first = preprocessing.estimate(front, image, dram)
+        second = rendering.estimate(front, image, config, dram, PORT.latency, PORT.max_reads)
+        say(f"{title}: alone")
+        with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
+            begin = time.process_time()
+            alone = chip.render(camera)
+            seconds = time.process_time() - begin
+            moved = {name: c.dram_read_bytes + c.dram_write_bytes for name, c in chip.purposes().items()}
+            simulated = chip.live()["now"]
+        say(f"{title}: three frames back to back")
+        with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
+            done = back_to_back(chip, camera)
+        for frame in (alone, *done):
+            if frame.error or not np.array_equal(frame.buffer, golden.buffer):
+                raise FlickerError(f"{title}: the picture differs from the golden model's")
+        halves = [(f.stamps["front_done"] - f.stamps["taken"], f.stamps["rendering_done"] - f.stamps["rendering_start"]) for f in (alone, done[2])]
+        cycles, model = alone.stamps["rendering_done"] - alone.stamps["taken"], first.cycles + second.cycles
+        if abs(model / cycles - 1) > LIMIT:
+            raise FlickerError(f"{title}: the chip model's cycles are {model / cycles - 1:+.1%} off")
+        interval = done[2].stamps["rendering_done"] - done[1].stamps["rendering_done"]
+        rows.append((
+            title, f"{halves[0][0]:,}", f"{first.cycles / halves[0][0] - 1:+.1%}", f"{halves[0][1]:,}", f"{second.cycles / halves[0][1] - 1:+.1%}",
+            f"{cycles:,}", f"{model / cycles - 1:+.1%}", f"{interval:,}", f"{interval / max(halves[0]):.2f}", f"{simulated / seconds:,.0f}",
+        ))
+        traffic.append((title, *(f"{moved[name] / 1e6:.2f}" for name in PURPOSES), f"{sum(moved.values()) / 1e6:.2f}"))
+    return {
+        "cycles": table(
+            ["view", "front end, cycles", "model off by", "rendering, cycles", "model off by", "frame, cycles", "model off by", "interval back to back",
+             "of the slower half alone", "simulated cycles a second of processor time"], rows,
+        ),
+        "traffic": table(["view, MB of the DRAM", *PURPOSES, "all"], traffic),
+    }

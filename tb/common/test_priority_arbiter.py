@@ -1,0 +1,23 @@
+"""Priority arbiter with a bound on waiting: choice, data, ready in every cycle against a model of its counts.
+
+State space: inputs that pause, wait and give up, outputs that stall in every pattern; all inputs busy; reset while some are urgent.
+Parameter space: 2 to 8 inputs, Patience from its least value to 16. For all traces: formal/fv_priority_arbiter.sv.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build, build_and_test, refused
+
+
+@pytest.mark.parametrize("parameters", [
+    {}, {"Inputs": 2, "Patience": 1, "Width": 1}, {"Inputs": 3, "Patience": 5}, {"Inputs": 5, "Patience": 4}, {"Inputs": 8, "Patience": 9},
+], ids=str)
+def test_priority_arbiter(parameters: dict[str, int]) -> None:
+    build_and_test("flk_priority_arbiter", "cocotb_priority_arbiter", parameters=parameters)
+
+
+@pytest.mark.parametrize(("parameters", "message"), [({"Inputs": 1}, "Inputs must be"), ({"Inputs": 4, "Patience": 2}, "Patience must be")])
+def test_illegal_parameters(parameters, message):
+    with refused(message):
+        build("flk_priority_arbiter", parameters=parameters)

@@ -1,0 +1,393 @@
+"""The chip, from a packed scene in memory to a frame buffer, through registers and the C driver: every byte as in the golden model.
+
+State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
+cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
+that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
+Parameter space: the default stage. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw; with SLOW=1 real scenes and every other build of the stage.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import random
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from flicker_tb.runner import seed
+
+from flicker.chip.dram import DramConfig
+from flicker.chip_registers import ResultError
+from flicker.errors import FlickerError
+from flicker.front.view import DEMO, load_view
+from flicker.golden.chip import render_chip
+from flicker.golden.frame_buffer import PixelFormat, least_stride
+from flicker.golden.front.frame import OUTCOMES, FrontFrame, Outcome, run_front
+from flicker.params import CatMode, RenderConfig
+from flicker.pipeline import packed_scene
+from flicker.scene.camera import Camera
+from flicker.scene.files import Scene
+from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packing import pack
+from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
+from flicker.sim.chip import PORT, ChipFrame, ChipSession
+from flicker.sim.half import MemoryOptions
+from flicker.sim.memory import CHANNELS, Order, PortConfig, WriteOrder
+
+LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
+CONFIG = RenderConfig()
+BLUE = (10, 20, 200)
+
+
+def camera(width: int = 96, height: int = 54, x: float = 0.0, away: bool = False) -> Camera:
+    """Looks along z, or against it, from x."""
+    return Camera(width, height, 80.0, 80.0, np.array([x, 0.0, 0.0]), np.diag([-1.0, 1.0, -1.0]) if away else np.eye(3))
+
+
+@cache
+def small(count: int = 500) -> PackedScene:
+    rng = np.random.default_rng(seed())
+    return pack(Scene(
+        means=np.stack([*rng.uniform(-1.5, 1.5, (2, count)), rng.uniform(1.0, 6.0, count)], axis=1), scales=rng.uniform(0.01, 0.1, (count, 3)),
+        quats=rng.normal(size=(count, 4)), opacities=rng.uniform(0.01, 1.0, count), sh=rng.normal(scale=0.3, size=(count, 4, 3)),
+    ), PackedFormat.CHUNK).packed
+
+
+def golden(packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8) -> tuple[FrontFrame, np.ndarray]:
+    front = run_front(packed, view)
+    return front, render_chip(front.subtile_lists(), config, format_, BLUE).buffer
+
+
+def session(packed: PackedScene | None = None, **options) -> ChipSession:
+    return ChipSession(small() if packed is None else packed, options.pop("config", CONFIG), seed=seed(), **options)
+
+
+def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8) -> ChipFrame:
+    """A frame by itself, with its front end's counters."""
+    done = chip.render(view, format_, background=BLUE, limit=LIMIT)
+    compare(chip, view, done, format_)
+    return done
+
+
+def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> None:
+    front, buffer = golden(chip.packed, view, config, format_)
+    assert done.error == 0
+    assert np.array_equal(done.buffer, buffer)
+    counts = {name: int(np.sum(value)) for name, value in done.front.items()}
+    assert counts["entries"] == len(front.entry_tile)
+    assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
+    assert done.stamps["taken"] < done.stamps["front_done"] < done.stamps["rendering_start"] < done.stamps["rendering_done"]
+
+
+def test_demo_scene() -> None:
+    view = load_view(DEMO, 0, (160, 90))
+    packed = packed_scene(view, PackedFormat.CHUNK)
+    with session(packed) as chip:
+        done = check(chip, view.camera)
+        assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
+        traffic = chip.purposes()
+        assert traffic["table"].read_bytes and traffic["records"].write_bytes and not any(t.errors for t in traffic.values())
+        assert traffic["image header"].read_beats == 0
+        live = chip.live()
+        assert live["record_beats"] == traffic["records"].read_beats and live["table_beats"] == traffic["table"].read_beats
+        assert live["list_beats"] == traffic["lists"].read_beats + traffic["pointers"].read_beats
+        assert live["frame_written"] == traffic["frame"].write_beats
+        assert live["front_written"] == sum(traffic[name].write_beats for name in ("records", "lists", "pointers"))
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_memories(number: int) -> None:
+    """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one."""
+    rng = random.Random(f"{seed()} {number}")
+    port = replace(
+        PORT, seed=rng.getrandbits(30), latency=rng.randint(1, 60), max_reads=rng.choice([2, 9, 256]), max_writes=rng.choice([1, 5, 128]),
+        order=list(Order)[number % 3], write_order=list(WriteOrder)[number % 3],
+        stall={name: rng.choice([0.0, 0.3, 0.7]) for name in CHANNELS}, run={name: rng.randint(1, 8) for name in CHANNELS},
+    )
+    with session(port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:
+        check(chip, camera(), list(PixelFormat)[number % 2])
+        check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2])
+
+
+@pytest.mark.parametrize("overlap", [True, False])
+def test_back_to_back(overlap: bool) -> None:
+    """Four frames with cameras of their own on two regions: the front end works on the next one while one is rendered."""
+    views = [camera(x=0.3 * k) for k in range(4)]
+    with session() as chip:
+        places = [chip.place(views[0]) for _ in range(2)]
+        frames = [chip.frame(view, places[k % 2], background=BLUE, tag=7 + k) for k, view in enumerate(views)]
+        done: list[ChipFrame] = []
+        if not overlap:
+            for frame in frames:
+                chip.start(frame)
+                done.append(chip.finish(frame, LIMIT))
+        else:
+            chip.start(frames[0])
+            for k, frame in enumerate(frames):
+                if k + 1 < len(frames):
+                    while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
+                        chip.step(20)
+                    chip.start(frames[k + 1])
+                done.append(chip.finish(frame, LIMIT))
+        for view, frame in zip(views, done):
+            compare(chip, view, frame)
+        ahead = [b.stamps["taken"] < a.stamps["rendering_done"] for a, b in zip(done, done[1:])]
+        assert all(ahead) if overlap else not any(ahead)
+        assert chip.field("frames", "started") == chip.field("frames", "finished") == 4
+
+
+def test_modes_travel_with_their_frame() -> None:
+    """Two frames under way, the second one's mode, format and background written while the first is rendered."""
+    with session() as chip:
+        view = camera()
+        first = chip.frame(view, chip.place(view), background=BLUE, tag=1)
+        second = chip.frame(view, chip.place(view, PixelFormat.RGBA16F), PixelFormat.RGBA16F, tag=2)
+        second.mode = int(CatMode.OFF)
+        chip.start(first)
+        while not chip.field("status", "render_busy"):
+            chip.step(50)
+        chip.start(second, first)
+        compare(chip, view, chip.finish(first, LIMIT))
+        compare(chip, view, chip.finish(second, LIMIT), PixelFormat.RGBA16F, replace(CONFIG, cat=CatMode.OFF))
+
+
+def test_registers_in_mid_frame() -> None:
+    """What is written while a frame is under way is the next frame's; a second waiting start is refused and changes nothing."""
+    with session() as chip:
+        view = camera()
+        frames = [chip.frame(view, chip.place(view), background=BLUE, tag=k) for k in range(3)]
+        chip.start(frames[0])
+        chip.start(frames[1], frames[0])  # waits for the front end
+        assert not chip.field("status", "ready")
+        chip.set_register("size", 0)  # locked
+        chip.set_register("control", 1)
+        assert chip.field("interrupt", "refused")
+        chip.set_register("interrupt", 1 << 4)
+        compare(chip, view, chip.finish(frames[0], LIMIT))
+        for _ in range(30):  # free again: noise for a frame that is never started
+            chip.set_register("chunks", random.getrandbits(25))
+            assert 0 <= chip.register("status") < 32
+        compare(chip, view, chip.finish(frames[1], LIMIT))
+
+
+def test_nothing_to_see() -> None:
+    """Everything behind the camera: culled, a picture of the background."""
+    with session() as chip:
+        done = check(chip, camera(away=True))
+        assert (done.buffer.reshape(-1, 3) == BLUE).all() and done.rendering["lines"] == 0
+
+
+@pytest.mark.parametrize("size", [30.0, 0.02], ids=["over the whole picture", "around the camera"])
+def test_one_gaussian(size: float) -> None:
+    """One that covers every tile; one whose middle is the camera's place."""
+    at = 3.0 if size > 1 else 0.0
+    packed = pack(Scene(
+        means=np.array([[0.0, 0.0, at]]), scales=np.full((1, 3), size), quats=np.array([[1.0, 0, 0, 0]]), opacities=np.array([0.9]), sh=np.full((1, 1, 3), 0.4),
+    ), PackedFormat.CHUNK).packed
+    with session(packed) as chip:
+        done = check(chip, camera())
+        assert np.sum(done.front["entries"]) == (24 if at else 0)
+
+
+def test_growing_lists() -> None:
+    """Too little list memory is an error that names it, the frame buffer is not touched, and the next frame is right."""
+    with session() as chip:
+        view = camera()
+        place = chip.place(view, chunks=2)
+        frame = chip.frame(view, place, background=BLUE, tag=5)
+        before = chip.buffer(frame)
+        chip.start(frame)
+        done = chip.finish(frame, LIMIT)
+        assert done.error == 1 << ResultError.LIST_MEMORY and done.errors == ["out of list memory"]
+        assert np.array_equal(before, done.buffer) and not done.stage.any()
+        check(chip, view)
+
+
+def test_overflow_beside_a_good_frame() -> None:
+    """A frame without list memory between two good ones, all started back to back."""
+    with session() as chip:
+        views = [camera(x=0.2 * k) for k in range(3)]
+        frames = [chip.frame(view, chip.place(view, chunks=1 if k == 1 else None), background=BLUE, tag=k) for k, view in enumerate(views)]
+        chip.start(frames[0])
+        done = []
+        for k in range(3):
+            if k < 2:
+                while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
+                    chip.step(20)
+                chip.start(frames[k + 1])
+            done.append(chip.finish(frames[k], LIMIT))
+        assert done[1].error == 1 << ResultError.LIST_MEMORY
+        compare(chip, views[0], done[0])
+        compare(chip, views[2], done[2])
+
+
+REGION_ERRORS = {
+    "table": ResultError.FRONT_READ, "headers": ResultError.FRONT_READ, "geometry": ResultError.FRONT_READ, "colours": ResultError.FRONT_READ,
+    "records": ResultError.FRONT_WRITE, "lists": ResultError.FRONT_WRITE, "pointers": ResultError.FRONT_WRITE, "frame_buffer": ResultError.FRAME_WRITE,
+}
+
+
+@pytest.mark.parametrize("region", REGION_ERRORS)
+def test_memory_errors(region: str) -> None:
+    """An error in each region ends the frame with its bit; mended, the next one is right."""
+    with session() as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=3)
+        parts = dict(zip(("table", "headers", "geometry", "colours"), chip.scene.part))
+        at = parts.get(region) or getattr(frame.region, region, 0) or frame.frame_buffer
+        chip.fail(at, 4096 if region == "colours" else 64)  # no survivor may have the first colours
+        chip.start(frame)
+        done = chip.finish(frame, LIMIT)
+        assert done.error >> REGION_ERRORS[region] & 1, done.errors
+        chip.mend()
+        check(chip, view)
+
+
+def test_unreadable_lists_and_records() -> None:
+    """What was written becomes unreadable: the rendering half's errors. The frame ends."""
+    with session() as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=3)
+        for region, error in (("lists", ResultError.LIST_READ), ("pointers", ResultError.LIST_READ), ("records", ResultError.RECORD_READ)):
+            chip.start(frame)
+            while not chip.field("status", "render_busy"):
+                chip.step(5)
+            size = {"lists": 64 * 32 * 4 * frame.region.chunks, "pointers": 64 * 4, "records": frame.region.record_bytes}[region]
+            chip.fail(getattr(frame.region, region), size)
+            done = chip.finish(frame, LIMIT)
+            assert done.error >> error & 1, (region, done.errors)
+            chip.mend()
+        check(chip, view)
+
+
+def test_scene_that_is_not_there() -> None:
+    """Addresses without memory behind them."""
+    with session() as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE)
+        chip.scene.part[2] = 1 << 39
+        chip.start(frame)
+        assert chip.finish(frame, LIMIT).error == 1 << ResultError.FRONT_READ
+
+
+def test_refused_descriptors() -> None:
+    """Written past the driver: each ends with the error and touches nothing."""
+    with session() as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=9)
+        for register, value in (
+            ("frame_buffer_low", frame.frame_buffer + 32), ("table_low", int(chip.scene.part[0]) + 4), ("lists_low", 8), ("size", 54 << 16), ("size", 96),
+            ("size", 54 << 16 | 4097), ("size", 4096 << 16 | 4096), ("stride", 287), ("stride", 256), ("clusters", 0), ("frame", 9 | 7 << 16 | 1 << 22),
+        ):
+            chip._check(chip.call("flk_frame_write", ctypes.byref(chip.device), ctypes.byref(frame), None))
+            chip.set_register(register, value)
+            before = chip.buffer(frame)
+            chip._check(chip.call("flk_start", ctypes.byref(chip.device), None))
+            done = chip.finish(frame, LIMIT)
+            assert done.error == 1 << ResultError.DESCRIPTOR and np.array_equal(before, done.buffer), register
+            assert not any(np.any(value) for value in done.front.values()) and not any(np.any(value) for value in done.rendering.values())
+        check(chip, view)
+
+
+def test_damaged_images() -> None:
+    """The driver refuses them, and says what is wrong."""
+    data = bytearray(small().image())
+    for at, text in ((0, "magic|image"), (8, "version"), (300, "table"), (len(data) - 100, "colour")):
+        damaged = bytearray(data)
+        damaged[at] ^= 1
+        with pytest.raises(FlickerError, match=text), session(image=bytes(damaged)):
+            pass
+
+
+def test_abort_and_reset() -> None:
+    """At random times, with pauses; the frame after it is right, and memory is quiet when the abort is over."""
+    rng = random.Random(f"{seed()} abort")
+    port = replace(PORT, stall={name: 0.3 for name in CHANNELS}, seed=seed())
+    with session(port=port) as chip:
+        view = camera()
+        places = [chip.place(view) for _ in range(2)]
+        frames = [chip.frame(view, place, background=BLUE, tag=k) for k, place in enumerate(places)]
+        for turn in range(12):
+            chip.start(frames[0])
+            if turn % 3 == 0:
+                chip.start(frames[1], frames[0])
+            chip.step(rng.choice([1, 10, 300, 2000, 6000, 15000]) + rng.randrange(200))
+            if turn % 2:
+                chip.hold_memory(True)
+                chip.driver.flk_reset(ctypes.byref(chip.device))
+                chip.step(20)
+                chip.hold_memory(False)
+            else:
+                chip.driver.flk_abort(ctypes.byref(chip.device))
+                for _ in range(1000):
+                    if not chip.field("status", "aborting"):
+                        break
+                    chip.step(10)
+                assert chip.quiet and chip.field("interrupt", "aborted")
+                assert chip.field("result", "error") == 1 << ResultError.ABORTED
+                assert chip.field("frames", "started") == chip.field("frames", "finished")
+                chip.set_register("interrupt", 31)
+            assert chip.field("status", "ready") and not chip.field("status", "dead")
+            if turn % 4 == 3:
+                chip.set_register("interrupt", 31)
+                check(chip, view)
+        chip.set_register("interrupt", 31)
+        check(chip, view)
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_silent_memory(channel: str) -> None:
+    """A channel stops for good: time-out, nothing but a reset helps, and then the next frame is right."""
+    port: PortConfig = replace(PORT, stop_after={channel: 150})
+    with session(port=port) as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE)
+        chip.driver.flk_set_timeout(ctypes.byref(chip.device), ctypes.c_uint32(3000))
+        chip.start(frame)
+        with pytest.raises(FlickerError, match="no interrupt"):
+            chip.finish(frame, 15_000)
+        assert chip.field("status", "dead") and chip.field("interrupt", "error")
+        assert chip.field("result", "error") == 1 << ResultError.TIMED_OUT
+        assert chip.call("flk_ready", ctypes.byref(chip.device)) == "DEAD"
+        chip.set_register("control", 2)  # an abort does not help
+        chip.set_register("control", 1)
+        chip.step(500)
+        assert chip.field("status", "dead")
+        chip.mend()
+        chip.hold_memory(True)
+        chip.driver.flk_reset(ctypes.byref(chip.device))
+        chip.step(20)
+        chip.hold_memory(False)
+        chip.set_register("interrupt", 31)
+        check(chip, view)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("real", REAL_VIEWS, ids=lambda real: real.folder)
+@pytest.mark.parametrize("size", [(320, 180), (640, 360), (1280, 720)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_real_scenes(real: RealView, size: tuple[int, int]) -> None:
+    """With LPDDR4: all at 320x180, two at 640x360, flowers at 1280x720 (some 15 minutes)."""
+    if size[0] > 320 and real.folder not in {640: ("guitar", "stpeter"), 1280: ("flowers",)}[size[0]]:
+        pytest.skip("at this size other scenes only")
+    scenes = real_scenes()
+    if scenes is None:
+        pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
+    view = load_view(real.path(scenes), real.number, size)
+    with session(packed_scene(view, PackedFormat.CHUNK), memory=MemoryOptions(DramConfig().timing)) as chip:
+        done = chip.render(view.camera, background=BLUE)
+        compare(chip, view.camera, done)
+
+
+def test_strides_and_places() -> None:
+    """A frame buffer with a gap behind each row, which is not written; nothing beside it either."""
+    with session() as chip:
+        view = camera(80, 40)
+        row = least_stride(80, PixelFormat.RGB8)
+        place = chip.place(view, stride=row + 64)
+        frame = chip.frame(view, place, background=BLUE)
+        before = chip.buffer(frame)
+        chip.start(frame)
+        done = chip.finish(frame, LIMIT)
+        assert done.error == 0 and np.array_equal(done.buffer[:, :row], golden(chip.packed, view)[1])
+        assert np.array_equal(done.buffer[:, row:], before[:, row:])

@@ -1,0 +1,64 @@
+"""Chip model of the rendering half: what follows from the golden model holds whatever the timing. The RTL beside it: make docs PART=rendering_hardware."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from flicker.chip.dram import DramConfig
+from flicker.chip.rendering import Rendering, estimate, tile_lists
+from flicker.front.view import DEMO, load_view
+from flicker.golden.chip import render_chip
+from flicker.golden.delivery import may_be_given
+from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.front.memory import FrontImage, front_memory
+from flicker.params import CatMode, RenderConfig
+from flicker.pipeline import packed_scene
+from flicker.scene.packed import PackedFormat
+
+SIZE = (112, 54)  # four pairs of tiles in a row, the last tile of which the picture lacks
+
+
+@cache
+def frame() -> tuple[FrontFrame, FrontImage]:
+    view = load_view(DEMO, 0, SIZE)
+    front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
+    return front, front_memory(front)
+
+
+def modelled(config: RenderConfig, dram: DramConfig | None = None, **options) -> Rendering:
+    return estimate(*frame(), config, dram, **options)
+
+
+@pytest.mark.parametrize("change", [
+    {}, {"cat": CatMode.AUTO}, {"vrus_per_channel": 1}, {"ctu_fifo_depth": 16}, {"mask_generator": "all", "cat": CatMode.OFF},
+], ids=str)
+def test_records_given(change: dict) -> None:
+    """Every core gets what its pixels need; in the automatic mode all."""
+    config = RenderConfig().with_(**change)
+    found, golden = modelled(config), render_chip(frame()[0].subtile_lists(), config)
+    lengths = np.diff(golden.frame.lists.start)
+    whole = config.cat == CatMode.AUTO
+    assert may_be_given(found.given, lengths, golden.frame.needed, whole).all()
+    assert whole or found.given.sum() < 0.9 * lengths.sum()
+
+
+def test_cycles() -> None:
+    """No frame is faster than its slowest core's blending; memory and VRUs tell."""
+    perfect, slow = modelled(RenderConfig()), modelled(RenderConfig(), DramConfig())
+    assert perfect.cycles < slow.cycles < modelled(RenderConfig(), DramConfig(), latency_cycles=200).cycles
+    assert modelled(RenderConfig(vrus_per_channel=1)).cycles > 1.1 * perfect.cycles  # the test sets the pace of some sub-tiles
+    sent = render_chip(frame()[0].subtile_lists(), RenderConfig()).frame.total("minitiles_sent")
+    assert perfect.cycles > 8 * sent / 16
+
+
+def test_bytes() -> None:
+    """Pointers and frame buffer of whole pairs of tiles; lines of lists at least once each, of records at least those that lists name."""
+    found, (front, image) = modelled(RenderConfig(cat=CatMode.AUTO)), frame()
+    start, record, _ = tile_lists(front, 8)
+    assert len(start) == 8 * 4 + 1 and start[-1] == len(front.entry_tile)
+    assert found.bytes["pointers"] == 64 * 8 * 4 and found.bytes["frame"] == 64 * 2 * 4 * 64
+    assert found.bytes["records"] >= 32 * len(np.unique(record // 2))
+    assert found.bytes["lists"] >= 64 * sum(len(w) for w in image.lists.writes)

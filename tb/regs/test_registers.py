@@ -1,0 +1,78 @@
+"""Registers of the chip against their description: rtl/regs/flk_registers.rdl is compiled and walked, nothing is repeated here.
+
+State space: every register written and read in random order with random data and bytes, reads and writes at once, pauses on all five channels; every word
+of the address space that has no register; lock; commands; interrupts that come with and without clears and enables; what hardware drives; reset under way.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import gen_registers
+from flicker_tb.runner import build_and_test
+
+from flicker.chip_registers import REGISTERS, ResultError
+from flicker.toolchain import ROOT
+
+PACKAGE = ROOT / "rtl" / "regs" / "flk_registers_pkg.sv"
+
+
+def described() -> list[dict[str, Any]]:
+    """Registers in the order of their addresses, and what each field is."""
+    top, _ = gen_registers.compiled()
+    return [
+        {
+            "name": reg.inst_name, "offset": reg.raw_address_offset, "count": gen_registers.count(reg),
+            "fields": [
+                {
+                    "name": field.inst_name, "low": field.low, "width": field.width,
+                    "reset": reset if isinstance(reset := field.get_property("reset"), int) else None,
+                    "written": field.is_sw_writable, "read": field.is_sw_readable, "to_hardware": field.is_hw_readable,
+                    "from_hardware": field.is_hw_writable, "locked": bool(field.get_property("swwel")),
+                    "pulse": field.get_property("singlepulse"), "interrupt": bool(field.get_property("intr")),
+                    "clear": field.get_property("onwrite") is not None,
+                }
+                for field in reg.fields()
+            ],
+        }
+        for reg in top.registers(unroll=False)
+    ]
+
+
+def places(struct: str) -> dict[str, tuple[int, int]]:
+    """Lowest bit and bits of every leaf of a packed struct of the package, by path, as `position[0].value.value`."""
+    found = {name: body for body, name in re.findall(r"typedef struct packed \{(.*?)\} (\w+);", PACKAGE.read_text(), re.S)}
+
+    def walk(struct: str, path: str, at: int) -> int:
+        """The bit above."""
+        for kind, high, name in reversed(re.findall(r"^\s*(\w+)\s*(?:\[(\d+):0\])?\s*(\w+);", found[struct], re.M)):
+            size = int(high or 0) + 1
+            if kind == "logic":
+                out[f"{path}{name}"] = at, size
+                at += size
+            else:
+                for i in range(size):
+                    at = walk(kind, f"{path}{name}{f'[{i}]' if high else ''}.", at)
+        return at
+
+    out: dict[str, tuple[int, int]] = {}
+    walk(struct, "", 0)
+    return out
+
+
+def test_registers() -> None:
+    config = {"registers": described(), "in": places("flk_registers__in_t"), "out": places("flk_registers__out_t")}
+    build_and_test("flk_registers", "cocotb_registers", config=config, seeds=2)
+
+
+def test_python_module_is_the_description() -> None:
+    assert {reg["name"]: (reg["offset"], reg["count"], {f["name"]: (f["low"], f["width"]) for f in reg["fields"]}) for reg in described()} == {
+        name: (register.offset, register.count, register.fields) for name, register in REGISTERS.items()
+    }
+    assert len({int(error) for error in ResultError}) == len(ResultError) and all(0 <= error < REGISTERS["result"].fields["error"][1] for error in ResultError)
+
+
+def test_registers_do_not_overlap() -> None:
+    words = [register.offset + 4 * i for register in REGISTERS.values() for i in range(register.count)]
+    assert len(set(words)) == len(words) and all(word % 4 == 0 for word in words)

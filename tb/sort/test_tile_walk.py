@@ -1,0 +1,15 @@
+"""Walk over the tiles: every tile once, row by row in whole pairs, then done; a start at any time begins anew.
+
+State space: pictures of one pair or row up to the largest, all small sizes, random pauses, starts in the middle of a walk and behind its end. Parameter space:
+coordinates of 8 bits, and of 3, whose ends all come.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test
+
+
+@pytest.mark.parametrize("bits", [8, 3])
+def test_tile_walk(bits: int) -> None:
+    build_and_test("flk_tile_walk", "cocotb_tile_walk", parameters={"CoordBits": bits})
