@@ -10,7 +10,8 @@
 // control.reset: the same at once; the memory's side of the port must be in reset from before the write until
 // status.aborting is 0.
 // The clock of a half stands still while it is idle and no frame is in its place (flk_clock_gate).
-// irq_o: a waiting interrupt that is enabled. Outputs come from registers; w_ready_i reaches the writers combinationally.
+// irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone, but for reg_*_ready_o, which follow the ready of
+// the register port's answers; w_ready_i and b_* reach the writers combinationally.
 module flk_top
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;

@@ -43,7 +43,7 @@ COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint",
 LEVELS = (("rendering_core",), ("render_stage",), ("frames",))  # who may notice what a unit's own tests do not, from below
 KILLED_AT_HOME = 0.95
 TIMEOUT = 900  # seconds of a test run, on a busy machine
-# Modules that build, show and report: no outcome hangs on them.
+# Modules that build, simulate memory, show and report. Outcomes are not run anew when they change: what kills a mutant is not in them.
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 KEYS = {"file", "find", "replace", "unit", "note", "survives"}
 

@@ -347,4 +347,52 @@
   [9] = "time-out: neither half moved for so many cycles as timeout says", \
 }
 
+/* Performance counters (counter_select). */
+#define FLK_COUNTER_FRONT_CYCLES 0  /* cycles of the front end, start to end */
+#define FLK_COUNTER_CULLED_CLUSTERS 1  /* clusters culled */
+#define FLK_COUNTER_CULLED_GAUSSIANS 2  /* Gaussians in them */
+#define FLK_COUNTER_TOO_NEAR 3  /* Gaussians nearer than the near plane */
+#define FLK_COUNTER_OUTSIDE 4  /* Gaussians outside of the picture */
+#define FLK_COUNTER_SURVIVORS 5  /* Gaussians that got a record */
+#define FLK_COUNTER_FAINT 6  /* of these, fainter than 1/255 everywhere: in no list */
+#define FLK_COUNTER_UNLISTED 7  /* of the survivors, in no list */
+#define FLK_COUNTER_SATURATED 8  /* means beyond 2^22 pixels, saturated */
+#define FLK_COUNTER_CLIPPED 9  /* colours above 2, clipped */
+#define FLK_COUNTER_HEADER_BEATS 10  /* beats of cluster headers read */
+#define FLK_COUNTER_GEOMETRY_BEATS 11  /* beats of geometry read */
+#define FLK_COUNTER_COLOUR_BEATS 12  /* beats of colours read */
+#define FLK_COUNTER_RECORD_BEATS 13  /* beats of records written */
+#define FLK_COUNTER_LIST_ENTRIES 14  /* entries written, of each of 4 list writers */
+#define FLK_COUNTER_LIST_LINES 18  /* lines written, of each of 4 list writers */
+#define FLK_COUNTER_LIST_EVICTED 22  /* lines written for another tile's sake, of each of 4 list writers */
+#define FLK_COUNTER_LIST_TAKEN 26  /* chunks taken, of each of 4 list writers */
+#define FLK_COUNTER_KEY_SHIFT 30  /* depth keys: shift of the frame, two's complement */
+#define FLK_COUNTER_KEY_LOW 31  /* depth keys: least depth of the frame */
+#define FLK_COUNTER_RENDERING_CYCLES 32  /* cycles of the rendering half, start to end */
+#define FLK_COUNTER_SORTED_ENTRIES 33  /* entries delivered, of each of 4 sorting units */
+#define FLK_COUNTER_SORTED_READINGS 37  /* readings of lists, of each of 4 sorting units */
+#define FLK_COUNTER_SORTED_DROPPED 41  /* entries of finished tiles dropped, of each of 4 sorting units */
+#define FLK_COUNTER_RECORD_LINES 45  /* lines of 32 bytes that the record cache read */
+#define FLK_COUNTER_STAMP_TAKEN 46  /* cycle (live_cycles) in which the frame was taken */
+#define FLK_COUNTER_STAMP_FRONT_DONE 47  /* cycle in which it left the front end */
+#define FLK_COUNTER_STAMP_RENDERING_START 48  /* cycle in which it entered the rendering half */
+#define FLK_COUNTER_STAMP_RENDERING_DONE 49  /* cycle in which it left the rendering half */
+#define FLK_COUNTER_LIVE_CYCLES 64  /* cycles */
+#define FLK_COUNTER_LIVE_RECORD_BEATS 65  /* beats read, of 32 bytes: records */
+#define FLK_COUNTER_LIVE_LIST_BEATS 66  /* beats read: lists and pointers */
+#define FLK_COUNTER_LIVE_COLOUR_BEATS 67  /* beats read: colours */
+#define FLK_COUNTER_LIVE_GEOMETRY_BEATS 68  /* beats read: headers and geometry */
+#define FLK_COUNTER_LIVE_TABLE_BEATS 69  /* beats read: cluster table */
+#define FLK_COUNTER_LIVE_FRAME_WRITTEN 70  /* beats written: frame buffer */
+#define FLK_COUNTER_LIVE_FRONT_WRITTEN 71  /* beats written: records, lists, pointers */
+#define FLK_COUNTER_LIVE_RECORD_WAITS 72  /* cycles in which an address waits: records */
+#define FLK_COUNTER_LIVE_LIST_WAITS 73  /* cycles in which an address waits: lists */
+#define FLK_COUNTER_LIVE_COLOUR_WAITS 74  /* cycles in which an address waits: colours */
+#define FLK_COUNTER_LIVE_GEOMETRY_WAITS 75  /* cycles in which an address waits: geometry */
+#define FLK_COUNTER_LIVE_TABLE_WAITS 76  /* cycles in which an address waits: cluster table */
+#define FLK_COUNTER_LIVE_FRAME_ADDRESS_WAITS 77  /* cycles in which an address waits: frame buffer */
+#define FLK_COUNTER_LIVE_FRONT_ADDRESS_WAITS 78  /* cycles in which an address waits: records, lists, pointers */
+#define FLK_COUNTER_LIVE_DATA_WAITS 79  /* cycles in which data to be written wait at the memory */
+#define FLK_COUNTER_STAGE 128  /* rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md) */
+
 #endif

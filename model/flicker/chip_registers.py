@@ -79,3 +79,54 @@ class ResultError(IntEnum):
     DESCRIPTOR = 7  # descriptor refused
     ABORTED = 8  # aborted
     TIMED_OUT = 9  # time-out: neither half moved for so many cycles as timeout says
+
+
+class ChipCounter(IntEnum):
+    """Numbers of the performance counters (counter_select)."""
+
+    FRONT_CYCLES = 0  # cycles of the front end, start to end
+    CULLED_CLUSTERS = 1  # clusters culled
+    CULLED_GAUSSIANS = 2  # Gaussians in them
+    TOO_NEAR = 3  # Gaussians nearer than the near plane
+    OUTSIDE = 4  # Gaussians outside of the picture
+    SURVIVORS = 5  # Gaussians that got a record
+    FAINT = 6  # of these, fainter than 1/255 everywhere: in no list
+    UNLISTED = 7  # of the survivors, in no list
+    SATURATED = 8  # means beyond 2^22 pixels, saturated
+    CLIPPED = 9  # colours above 2, clipped
+    HEADER_BEATS = 10  # beats of cluster headers read
+    GEOMETRY_BEATS = 11  # beats of geometry read
+    COLOUR_BEATS = 12  # beats of colours read
+    RECORD_BEATS = 13  # beats of records written
+    LIST_ENTRIES = 14  # entries written, of each of 4 list writers
+    LIST_LINES = 18  # lines written, of each of 4 list writers
+    LIST_EVICTED = 22  # lines written for another tile's sake, of each of 4 list writers
+    LIST_TAKEN = 26  # chunks taken, of each of 4 list writers
+    KEY_SHIFT = 30  # depth keys: shift of the frame, two's complement
+    KEY_LOW = 31  # depth keys: least depth of the frame
+    RENDERING_CYCLES = 32  # cycles of the rendering half, start to end
+    SORTED_ENTRIES = 33  # entries delivered, of each of 4 sorting units
+    SORTED_READINGS = 37  # readings of lists, of each of 4 sorting units
+    SORTED_DROPPED = 41  # entries of finished tiles dropped, of each of 4 sorting units
+    RECORD_LINES = 45  # lines of 32 bytes that the record cache read
+    STAMP_TAKEN = 46  # cycle (live_cycles) in which the frame was taken
+    STAMP_FRONT_DONE = 47  # cycle in which it left the front end
+    STAMP_RENDERING_START = 48  # cycle in which it entered the rendering half
+    STAMP_RENDERING_DONE = 49  # cycle in which it left the rendering half
+    LIVE_CYCLES = 64  # cycles
+    LIVE_RECORD_BEATS = 65  # beats read, of 32 bytes: records
+    LIVE_LIST_BEATS = 66  # beats read: lists and pointers
+    LIVE_COLOUR_BEATS = 67  # beats read: colours
+    LIVE_GEOMETRY_BEATS = 68  # beats read: headers and geometry
+    LIVE_TABLE_BEATS = 69  # beats read: cluster table
+    LIVE_FRAME_WRITTEN = 70  # beats written: frame buffer
+    LIVE_FRONT_WRITTEN = 71  # beats written: records, lists, pointers
+    LIVE_RECORD_WAITS = 72  # cycles in which an address waits: records
+    LIVE_LIST_WAITS = 73  # cycles in which an address waits: lists
+    LIVE_COLOUR_WAITS = 74  # cycles in which an address waits: colours
+    LIVE_GEOMETRY_WAITS = 75  # cycles in which an address waits: geometry
+    LIVE_TABLE_WAITS = 76  # cycles in which an address waits: cluster table
+    LIVE_FRAME_ADDRESS_WAITS = 77  # cycles in which an address waits: frame buffer
+    LIVE_FRONT_ADDRESS_WAITS = 78  # cycles in which an address waits: records, lists, pointers
+    LIVE_DATA_WAITS = 79  # cycles in which data to be written wait at the memory
+    STAGE = 128  # rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md)

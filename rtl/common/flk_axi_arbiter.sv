@@ -12,11 +12,11 @@
 // what has been asked for comes, and data that are missing are replaced by beats without strobes.
 // drained_o: nothing is under way. Managers may then be reset; hold_i may fall after that.
 // clear_i forgets what is under way, for a memory that is reset as well.
-// stuck_o: something was under way or offered and nothing moved for timeout_i cycles (0: never);
-// stays until clear_i.
+// stuck_o: a burst was under way (taken from its manager, not answered) and no channel moved for timeout_i
+// cycles (0: never); stays until clear_i.
 //
-// Latency of addresses 1 and of read beats 1; write data 1, answers 0. Combinational: w_ready_i to
-// w_ready_o, b_* through; all else comes from registers.
+// Latency of addresses 1 and of read beats 1; write data 1, answers 0. Combinational: hold_i and valid of all managers
+// to their ar_ready_o, aw_ready_o; hold_i and w_ready_i to w_ready_o; b_* through. All else depends on registers alone.
 module flk_axi_arbiter #(
   parameter  int unsigned Readers   = 5,
   parameter  int unsigned Writers   = 2,

@@ -16,7 +16,8 @@
 // says so until the next post. reset_i, with clear_i or in the cycle before it: frames count from 0.
 // A descriptor is refused where an address is no multiple of 64, the stride no multiple of 32 or less than a row of whole
 // pairs of tiles, a side 0 or beyond 4096, the mode not one of CAT_*, there is no cluster, or a list writer would have
-// more lists than Pointers. All outputs come from registers, but for start_i to refused_o.
+// more lists than Pointers.
+// Combinational: start_i to refused_o, *_idle_i to *_start_o, copy_front_done_i to front_done_o; all else depends on registers alone.
 module flk_frame_control
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;

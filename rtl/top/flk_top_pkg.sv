@@ -41,7 +41,7 @@ package flk_top_pkg;
     logic front_read;
   } frame_error_t;
 
-  // Counters: words of a frame, from each half, and those that run on.
+  // Counters: words of a frame, from each half, and those that run on. Numbers as in the enumeration counter_e of rtl/regs/flk_registers.rdl.
   localparam int unsigned COUNTER_FRONT = 0;
   localparam int unsigned COUNTER_RENDERING = 32;
   localparam int unsigned COUNTER_LIVE = 64;

@@ -68,8 +68,9 @@ def tables(say: Say) -> dict[str, str]:
             begin = time.process_time()
             alone = chip.render(camera)
             seconds = time.process_time() - begin
-            moved = {name: c.dram_read_bytes + c.dram_write_bytes for name, c in chip.purposes().items()}
-            simulated = chip.live()["now"]
+            simulated = chip.usage().live["cycles"]
+        assert alone.usage is not None
+        moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
         say(f"{title}: three frames back to back")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
             done = back_to_back(chip, camera)

@@ -17,14 +17,16 @@ import numpy as np
 import pytest
 from flicker_tb.runner import seed
 
+from flicker import params
 from flicker.chip.dram import DramConfig
 from flicker.chip_registers import ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
+from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import render_chip
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, Outcome, run_front
-from flicker.params import CatMode, RenderConfig
+from flicker.params import CHANNEL_COUNTERS, CORE_COUNTERS, CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -38,6 +40,9 @@ from flicker.sim.memory import CHANNELS, Order, PortConfig, WriteOrder
 LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
 CONFIG = RenderConfig()
 BLUE = (10, 20, 200)
+LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
+    (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders
+]
 
 
 def camera(width: int = 96, height: int = 54, x: float = 0.0, away: bool = False) -> Camera:
@@ -54,9 +59,9 @@ def small(count: int = 500) -> PackedScene:
     ), PackedFormat.CHUNK).packed
 
 
-def golden(packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8) -> tuple[FrontFrame, np.ndarray]:
+def golden(packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8) -> tuple[FrontFrame, GoldenFrame]:
     front = run_front(packed, view)
-    return front, render_chip(front.subtile_lists(), config, format_, BLUE).buffer
+    return front, render_chip(front.subtile_lists(), config, format_, BLUE)
 
 
 def session(packed: PackedScene | None = None, **options) -> ChipSession:
@@ -71,12 +76,18 @@ def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RG
 
 
 def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> None:
-    front, buffer = golden(chip.packed, view, config, format_)
+    front, want = golden(chip.packed, view, config, format_)
     assert done.error == 0
-    assert np.array_equal(done.buffer, buffer)
+    assert np.array_equal(done.buffer, want.buffer)
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
+    assert np.sum(done.rendering["entries"]) <= counts["entries"]
+    for number, (name, _) in enumerate(CHANNEL_COUNTERS):
+        if name not in ("minitiles_sent", "pixels_finished"):
+            continue
+        words = [len(CORE_COUNTERS) + len(CHANNEL_COUNTERS) * c + number for c in range(params.CHANNELS)]
+        assert done.stage[:, words].sum() == want.frame.total(name)
     assert done.stamps["taken"] < done.stamps["front_done"] < done.stamps["rendering_start"] < done.stamps["rendering_done"]
 
 
@@ -89,7 +100,9 @@ def test_demo_scene() -> None:
         traffic = chip.purposes()
         assert traffic["table"].read_bytes and traffic["records"].write_bytes and not any(t.errors for t in traffic.values())
         assert traffic["image header"].read_beats == 0
-        live = chip.live()
+        assert done.usage is not None
+        live = done.usage.live
+        assert live["record_beats"] == done.rendering["lines"]
         assert live["record_beats"] == traffic["records"].read_beats and live["table_beats"] == traffic["table"].read_beats
         assert live["list_beats"] == traffic["lists"].read_beats + traffic["pointers"].read_beats
         assert live["frame_written"] == traffic["frame"].write_beats
@@ -154,6 +167,7 @@ def test_modes_travel_with_their_frame() -> None:
 
 def test_registers_in_mid_frame() -> None:
     """What is written while a frame is under way is the next frame's; a second waiting start is refused and changes nothing."""
+    rng = random.Random(f"{seed()} registers")
     with session() as chip:
         view = camera()
         frames = [chip.frame(view, chip.place(view), background=BLUE, tag=k) for k in range(3)]
@@ -166,7 +180,7 @@ def test_registers_in_mid_frame() -> None:
         chip.set_register("interrupt", 1 << 4)
         compare(chip, view, chip.finish(frames[0], LIMIT))
         for _ in range(30):  # free again: noise for a frame that is never started
-            chip.set_register("chunks", random.getrandbits(25))
+            chip.set_register("chunks", rng.getrandbits(25))
             assert 0 <= chip.register("status") < 32
         compare(chip, view, chip.finish(frames[1], LIMIT))
 
@@ -220,6 +234,24 @@ def test_overflow_beside_a_good_frame() -> None:
         assert done[1].error == 1 << ResultError.LIST_MEMORY
         compare(chip, views[0], done[0])
         compare(chip, views[2], done[2])
+
+
+def test_too_small_a_region_of_records() -> None:
+    """A region that a cluster's records lie beyond is an error that names it, nothing behind it is written, and the next frame is right."""
+    with session() as chip:
+        view = camera()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=5)
+        chip._check(chip.call("flk_frame_write", ctypes.byref(chip.device), ctypes.byref(frame), None))
+        beats = chip.register("record_beats") // 2
+        chip.set_register("record_beats", beats)
+        size = frame.region.record_bytes
+        before = chip.read(frame.region.records, size)
+        chip._check(chip.call("flk_start", ctypes.byref(chip.device), None))
+        done = chip.finish(frame, LIMIT)
+        assert done.error == 1 << ResultError.RECORD_REGION and done.errors == ["records beyond their region"]
+        after = chip.read(frame.region.records, size)
+        assert np.array_equal(before[64 * beats :], after[64 * beats :]) and not done.stage.any()
+        check(chip, view)
 
 
 REGION_ERRORS = {
@@ -364,12 +396,9 @@ def test_silent_memory(channel: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("real", REAL_VIEWS, ids=lambda real: real.folder)
-@pytest.mark.parametrize("size", [(320, 180), (640, 360), (1280, 720)], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("real,size", LARGE, ids=lambda value: value.folder if isinstance(value, RealView) else f"{value[0]}x{value[1]}")
 def test_real_scenes(real: RealView, size: tuple[int, int]) -> None:
     """With LPDDR4: all at 320x180, two at 640x360, flowers at 1280x720 (some 15 minutes)."""
-    if size[0] > 320 and real.folder not in {640: ("guitar", "stpeter"), 1280: ("flowers",)}[size[0]]:
-        pytest.skip("at this size other scenes only")
     scenes = real_scenes()
     if scenes is None:
         pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
@@ -389,5 +418,5 @@ def test_strides_and_places() -> None:
         before = chip.buffer(frame)
         chip.start(frame)
         done = chip.finish(frame, LIMIT)
-        assert done.error == 0 and np.array_equal(done.buffer[:, :row], golden(chip.packed, view)[1])
+        assert done.error == 0 and np.array_equal(done.buffer[:, :row], golden(chip.packed, view)[1].buffer)
         assert np.array_equal(done.buffer[:, row:], before[:, row:])

@@ -112,9 +112,11 @@ def test_numbers() -> None:
         turned["low"], turned["high"] = turned["high"].copy(), turned["low"].copy()
         cases.append((turned, near))
         if n == 300:
-            # Where a subnormal number would matter: a camera next to nothing, and reaches of all sizes.
-            small = dataclasses.replace(near, position=tiny(3), reach=np.full(5, 2.0**127), offset=tiny(5))
-            cases.append((wild_table(rng, n, 0, 1), small))
+            # Where a subnormal number would matter: boxes and camera next to nothing, normals that make much of it, mostly no sigma that makes more.
+            small = dataclasses.replace(near, position=tiny(3), normal=near.normal * 2.0**60, reach=np.full(5, 2.0**127), offset=tiny(5) * 2.0**60)
+            table = wild_table(rng, n, 0, 1)
+            table["sigma"][rng.random(n) < 0.9] = 0
+            cases.append((table, small))
     data, base, places = {}, BASE, []
     for table, _ in cases:
         places.append(base)

@@ -12,7 +12,7 @@ from typing import Any
 import gen_registers
 from flicker_tb.runner import build_and_test
 
-from flicker.chip_registers import REGISTERS, ResultError
+from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
 from flicker.toolchain import ROOT
 
 PACKAGE = ROOT / "rtl" / "regs" / "flk_registers_pkg.sv"
@@ -76,3 +76,19 @@ def test_python_module_is_the_description() -> None:
 def test_registers_do_not_overlap() -> None:
     words = [register.offset + 4 * i for register in REGISTERS.values() for i in range(register.count)]
     assert len(set(words)) == len(words) and all(word % 4 == 0 for word in words)
+
+
+def test_counters_are_the_description() -> None:
+    """Where the words of flk_top_pkg begin, and how many there are, is what the numbers of the counters say."""
+    text = (ROOT / "rtl" / "top" / "flk_top_pkg.sv").read_text()
+    numbers = {name: int(value) for name, value in re.findall(r"localparam int unsigned (\w+) = (\d+);", text)}
+    bases = {
+        "COUNTER_FRONT": ChipCounter.FRONT_CYCLES, "COUNTER_RENDERING": ChipCounter.RENDERING_CYCLES, "COUNTER_LIVE": ChipCounter.LIVE_CYCLES,
+        "COUNTER_STAGE": ChipCounter.STAGE,
+    }
+    assert {name: numbers[name] for name in bases} == {name: int(base) for name, base in bases.items()}
+    ends = {
+        "FRONT_WORDS": ChipCounter.KEY_LOW - ChipCounter.FRONT_CYCLES, "RENDERING_WORDS": ChipCounter.STAMP_RENDERING_DONE - ChipCounter.RENDERING_CYCLES,
+        "LIVE_WORDS": ChipCounter.LIVE_DATA_WAITS - ChipCounter.LIVE_CYCLES,
+    }
+    assert {name: numbers[name] for name in ends} == {name: last + 1 for name, last in ends.items()}

@@ -129,13 +129,16 @@ async def pixels_and_counts(dut):
 
 @cocotb.test()
 async def clear_forgets(dut):
-    """Clear at any time: in the next cycle the core is idle, and what follows is as from a fresh one."""
+    """Clear at any time, also when a sub-tile is finished: in the next cycle the core is idle, and what follows is as from a fresh one."""
     test = CoreTest(dut)
     rng = test.bench.rng
     await test.bench.reset()
-    for _ in range(6):
-        test.source.send(test.items(lists(rng, FORM, [3, 0, rng.randrange(20), 8, 0, 5])))
-        await test.bench.cycles(rng.randrange(1, 500))
+    for turn in range(6):
+        test.source.send(test.items(lists(rng, FORM, [0, 0, 400] if turn % 2 else [3, 0, rng.randrange(20), 8, 0, 5])))
+        if turn % 2:
+            await test.bench.until(lambda: int(dut.finished_o.value) == 1, 50_000, "a finished sub-tile")
+        else:
+            await test.bench.cycles(rng.randrange(1, 500))
         test.aborted = True
         await test.bench.clear(rng.choice((1, 1, 3)))
         await FallingEdge(dut.clk_i)

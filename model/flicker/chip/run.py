@@ -18,8 +18,9 @@ from ..params import CHANNELS, CORES, Coords, Form, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, packed_scene
 from ..progress import Steps
 from ..scene.camera import Camera
-from ..sim.chip import LIVE, ChipFrame, ChipSession, build, pointers_for
+from ..sim.chip import ChipFrame, ChipSession, build, pointers_for
 from ..sim.half import MemoryOptions
+from .constants import CLOCK_HZ
 from .dram import DramConfig
 
 
@@ -61,18 +62,24 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
         packed = packed_scene(view, options.format)
     with steps.step("building the chip's simulator (once per configuration)"):
         build(config, pointers_for(camera))
+    dram = DramConfig()
     with steps.bar("simulating the chip") as report, ChipSession(
-        packed, config, pointers=pointers_for(camera), memory=MemoryOptions(DramConfig().timing),
+        packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing),
     ) as chip:
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
-        stats = chip_stats(chip, frame, camera, config) | {"simulated_cycles_per_second": round(chip.live()["now"] / (time.process_time() - began))}
+        seconds = time.process_time() - began
+        stats = chip_stats(chip, frame, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
     return _frame_image(frame.buffer, camera), stats
 
 
-def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: RenderConfig) -> dict[str, Any]:
-    """Of a frame that had the chip to itself: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up."""
-    front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, chip.live()
+def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
+    """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.
+
+    dram: the memory of the session.
+    """
+    assert frame.usage is not None
+    front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, frame.usage.live
     count = lambda name: int(np.sum(front[name]))  # noqa: E731
     phases = {"front end": stamps["front_done"] - stamps["taken"], "rendering": stamps["rendering_done"] - stamps["rendering_start"]}
     core = {name: frame.stage[:, k] for k, (name, _) in enumerate(params.CORE_COUNTERS)}
@@ -81,7 +88,9 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
         name: np.stack([frame.stage[:, first + len(params.CHANNEL_COUNTERS) * c + k] for c in range(CHANNELS)])
         for k, (name, _) in enumerate(params.CHANNEL_COUNTERS)
     }
-    traffic = {name: (int(c.dram_read_bytes), int(c.dram_write_bytes)) for name, c in chip.purposes().items() if c.dram_read_bytes or c.dram_write_bytes}
+    traffic = {name: moved for name, moved in frame.usage.traffic.items() if any(moved)}
+    cycles = stamps["rendering_done"] - stamps["taken"]
+    efficiency = sum(map(sum, traffic.values())) * CLOCK_HZ / (cycles * dram.bytes_per_second)
     tested = chip.scene.gaussians - count("culled_gaussians")
     # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each.
     busy = {
@@ -108,11 +117,11 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
         "subtile_pairs": int(core["gaussians_in"].sum()), "minitiles_sent": int(channel["minitiles_sent"].sum()),
         "pixel_pairs": 16 * int(channel["minitiles_sent"].sum()),
-        "cycles": stamps["rendering_done"] - stamps["taken"], "phases": phases, "dram_bytes": traffic, "dram_efficiency": chip.efficiency,
+        "cycles": cycles, "phases": phases, "dram_bytes": traffic, "dram_efficiency": efficiency,
         "stalls": {
             "contribution test": int(core["ctu_stalled"].sum()), "no records for the contribution test": int(core["ctu_idle"].sum()),
             "feature FIFO full": int(channel["fifo_full"].sum()),
-            **{f"{name.removesuffix('_waits')}, at the port": live[name] for name in LIVE if "waits" in name},
+            **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
         },
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
         "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},

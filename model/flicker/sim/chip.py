@@ -9,37 +9,35 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..chip_registers import REGISTERS, ResultError
+from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
 from ..golden.lists import writer_columns
-from ..params import TILE, Form, RenderConfig
+from ..params import CORES, COUNTER_INDEX_BITS, TILE, Form, RenderConfig
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
 from . import driver, half, preprocessing, rendering
 from .half import PAGE, Half, MemoryOptions
 from .memory import PortConfig, PurposeCounts
 
-PORT = PortConfig(id_bits=7, max_reads=256, max_writes=128, latency=20, hazards=False)
+PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False)
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
 IMAGE = 1 << 28  # address of the scene
 ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more
 LIMIT = 100_000_000  # cycles of a frame
 SLICE = 5_000  # cycles between looks at the progress
 
-# Where frame counters begin (flk_top_pkg), their names in the order of the words, and how many words each has.
-FRONT = [(name, 4 if n == 4 else 1) for name, _, n in preprocessing._COUNTERS]
-RENDERING = [(name, 4 if n == 4 else 1) for name, _, n in rendering._COUNTERS]
-STAMPS = ("taken", "front_done", "rendering_start", "rendering_done")
-LIVE = ("now", "record_beats", "list_beats", "colour_beats", "geometry_beats", "table_beats", "frame_written", "front_written", "record_waits", "list_waits",
-        "colour_waits", "geometry_waits", "table_waits", "frame_address_waits", "front_address_waits", "data_waits")
-COUNTER_FRONT, COUNTER_RENDERING, COUNTER_LIVE, COUNTER_STAGE = 0, 32, 64, 128
+# Names in the order of their words, and how many words each has.
+FRONT = [(name, n) for name, _, n in preprocessing.COUNTERS]
+RENDERING = [(name, n) for name, _, n in rendering.COUNTERS]
+STAMPS = [(counter.name.removeprefix("STAMP_").lower(), 1) for counter in ChipCounter if counter.name.startswith("STAMP_")]
+LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCounter if counter.name.startswith("LIVE_")]
 
 
 def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) -> Path:
@@ -62,12 +60,26 @@ class Place:
     stride: int
 
 
+@dataclass(frozen=True)
+class Usage:
+    """live: counters that run on, by name. traffic: bytes that the DRAM read and wrote, by what lies there. Since the session began, or in a frame."""
+
+    live: dict[str, int]
+    traffic: dict[str, tuple[int, int]]
+
+    def since(self, before: Usage) -> Usage:
+        return Usage(
+            {name: (value - before.live[name]) % 2**32 for name, value in self.live.items()},
+            {name: (read - before.traffic[name][0], written - before.traffic[name][1]) for name, (read, written) in self.traffic.items()},
+        )
+
+
 @dataclass(eq=False)
 class ChipFrame:
     """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. error: bits of ResultError.
 
     front, rendering: counters of the halves by name, int or int64 (n,). stage: int64 (cores, 32). stamps: cycle in which the frame was taken, left the front
-    end, entered and left the rendering half.
+    end, entered and left the rendering half. usage: of a frame that had the chip to itself (`ChipSession.render`).
     """
 
     tag: int
@@ -77,6 +89,7 @@ class ChipFrame:
     rendering: dict[str, int | np.ndarray]
     stage: np.ndarray
     stamps: dict[str, int]
+    usage: Usage | None = None
 
     @property
     def errors(self) -> list[str]:
@@ -256,6 +269,7 @@ class ChipSession(Half):
         return value
 
     def _counters(self, base: int, names: Sequence[tuple[str, int]]) -> dict[str, int | np.ndarray]:
+        """By name, from the words that begin at `base`."""
         out: dict[str, int | np.ndarray] = {}
         for name, n in names:
             values = [self.counter(base + k) for k in range(n)]
@@ -263,9 +277,10 @@ class ChipSession(Half):
             base += n
         return out
 
-    def live(self) -> dict[str, int]:
-        """Counters that run on, modulo 2^32: cycles; beats by manager of the memory port; cycles in which its addresses, or data, wait."""
-        return {name: self.counter(COUNTER_LIVE + k) for k, name in enumerate(LIVE)}
+    def usage(self) -> Usage:
+        """Of all frames until now."""
+        live = {name: int(value) for name, value in self._counters(ChipCounter.LIVE_CYCLES, LIVE).items()}
+        return Usage(live, {name: (int(c.dram_read_bytes), int(c.dram_write_bytes)) for name, c in self.purposes().items()})
 
     def finish(self, frame: driver.CFrame, limit: int = LIMIT, progress: Callable[[int, int], None] | None = None) -> ChipFrame:
         """Wait until the next frame ends, which must be this one; read what it left and acknowledge it. progress: called with (done, all) now and then."""
@@ -275,18 +290,18 @@ class ChipSession(Half):
         else:
             self._wait_with(progress, frame, limit)
         buffer = self.buffer(frame)
-        front = self._counters(COUNTER_FRONT, FRONT)
-        # Two's complement of 32 bits, and of 28 in 32.
+        front = self._counters(ChipCounter.FRONT_CYCLES, FRONT)
         front["key_shift"] = int(np.int32(np.uint32(front["key_shift"])))
-        rendering_ = self._counters(COUNTER_RENDERING, RENDERING)
-        stamps = self._counters(COUNTER_RENDERING + 14, [(name, 1) for name in STAMPS])
-        stage = np.array([self.counter(COUNTER_STAGE + k) for k in range(128)], np.int64).reshape(4, 32)
+        rendering_ = self._counters(ChipCounter.RENDERING_CYCLES, RENDERING)
+        stamps = {name: int(value) for name, value in self._counters(ChipCounter.STAMP_TAKEN, STAMPS).items()}
+        words = 1 << COUNTER_INDEX_BITS
+        stage = np.array([self.counter(ChipCounter.STAGE + k) for k in range(CORES * words)], np.int64).reshape(CORES, words)
         result = self.driver.flk_result(ctypes.byref(self.device))
         self.driver.flk_release(ctypes.byref(self.device))
         self._raise()
         if result.tag != frame.tag:
             raise self._failure(f"frame {result.tag} has ended, not {frame.tag}")
-        return ChipFrame(result.tag, result.error, buffer, front, rendering_, stage, {name: int(stamps[name]) for name in STAMPS})
+        return ChipFrame(result.tag, result.error, buffer, front, rendering_, stage, stamps)
 
     def buffer(self, frame: driver.CFrame) -> np.ndarray:
         """uint8 (rows of pixels, stride)."""
@@ -302,6 +317,7 @@ class ChipSession(Half):
         while True:
             place = self.place(camera, format_, chunks=chunks)
             frame = self.frame(camera, place, format_, background=background, lists=lists)
+            before = self.usage()
             self.start(frame)
             done = self.finish(frame, limit, progress)
             if not done.error >> ResultError.LIST_MEMORY & 1:
@@ -309,7 +325,7 @@ class ChipSession(Half):
             chunks = 4 * place.region.chunks
         if done.error:
             raise self._failure(", ".join(done.errors))
-        return done
+        return replace(done, usage=self.usage().since(before))
 
     def purposes(self) -> dict[str, PurposeCounts]:
         """Traffic of all frames, by what lies there."""

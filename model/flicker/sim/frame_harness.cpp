@@ -244,8 +244,7 @@ int64_t flk_chip_wait(Sim* sim, uint64_t limit, int interrupt) {
 // The memory's side of the port is held in reset (1) or no more (0).
 void flk_chip_hold_memory(Sim* sim, int hold) { sim->away = hold != 0; }
 
-// Transfers of a channel since the beginning; whether nothing is under way.
-uint64_t flk_chip_transfers(Sim* sim, int channel) { return sim->ports[0]->transfers(static_cast<flk::AxiChannel>(channel)); }
+// Whether nothing is under way.
 int flk_chip_quiet(Sim* sim) { return sim->ports[0]->idle(); }
 #else
 // A frame: 1 done, 0 not within `limit` cycles, -1: a rule was broken (flk_half_failure). counters: words of counters_o; error: error_o.

@@ -1,4 +1,4 @@
-"""One half of the chip, verilated, with a memory behind its AXI ports (frame_harness.cpp): what simulations of front end and rendering half share."""
+"""One half of the chip or all of it, verilated, with a memory behind its AXI ports (frame_harness.cpp): what their simulations share."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ LIST_ERROR = 3  # bit of the last
 SMALL_POINTERS, LARGE_POINTERS = 2048, 16384  # lists of a writer: pictures up to 1080p, up to 4096x4096
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
-_COUNTERS = (
+COUNTERS = (
     *((name, 32, 1) for name in (
         "cycles", "culled_clusters", "culled_gaussians", "too_near", "outside", "survivors", "faint", "unlisted", "saturated", "clipped", "header_beats",
         "geometry_beats", "colour_beats", "record_beats",
@@ -169,7 +169,7 @@ def front_rtl(
         ):
             sim.load(base, size, b"", purpose)
         before = _records(sim, regions), _lines(sim, regions)
-        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), _COUNTERS, frames, limit)
+        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), COUNTERS, frames, limit)
         return RtlFront(
             _records(sim, regions), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,

@@ -26,7 +26,7 @@ PURPOSES = ("lists", "pointers", "records", "frame")
 ERRORS = ("lists could not be read", "records could not be read", "a write failed")
 
 # Of flk_rendering_pkg, the first field in the highest bits.
-_COUNTERS = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropped", 32, 4), ("lines", 32, 1))
+COUNTERS = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropped", 32, 4), ("lines", 32, 1))
 
 
 @dataclass(eq=False)
@@ -78,7 +78,7 @@ def rendering_rtl(
             (int(config.cat), 3), (int(format_), 1), (background[0] | background[1] << 8 | background[2] << 16, 24), (pairs, 8), (rows, 9),
             (pairs * rows, 16), (base["lists"] // BEAT, 34), (chunks, 25), (base["pointers"] // BEAT, 34), (base["records"] // BEAT, 34),
             (base["frame"] // BEAT, 34), (stride // 32, 12),
-        ), _COUNTERS, frames, limit)
+        ), COUNTERS, frames, limit)
         buffer = sim.read(base["frame"], stride * rows * TILE).reshape(rows * TILE, stride)
         given = np.zeros((2 * rows, 4 * pairs), np.int64)
         for k in range(CORES):
