@@ -89,6 +89,12 @@ def test_unit_that_does_not_simulate(unit: str, says: str) -> None:
     assert {"vru", "stream_cells", "frames"} <= set(named) and not {"camera", "formal", "tooling"} & set(named)
 
 
+def test_names_of_tests_are_unique() -> None:
+    """UNIT= names a file by its stem, and pytest imports one module of a name."""
+    stems = [path.stem for path in (ROOT / "tb").rglob("*.py") if path.stem not in ("__init__", "conftest")]
+    assert len(set(stems)) == len(stems), sorted({stem for stem in stems if stems.count(stem) > 1})
+
+
 def test_every_named_unit_has_simulations() -> None:
     """One collection of all: each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these."""
     done = command(sys.executable, "-m", "pytest", "-m", "sim", "--collect-only", "-q", "tb")
