@@ -22,6 +22,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from flicker import shared_text
 from flicker.errors import FlickerError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -190,7 +191,7 @@ def verilate(
         cpp, depends: C++ files compiled in, and files they include (only hashed).
         settings: Verilator configuration files (.vlt).
         cflags, ldflags, opt: flags of compiler and linker beside C++17; ``opt`` optimises the model.
-        shared: make a shared library (for ctypes) instead of a program.
+        shared: make a shared library (for ctypes) instead of a program; instances share their text (`shared_text`).
         kind, name: the build goes to ``build/<kind>/<name>-<hash>``; name defaults to top.
         jobs: parallel compiler processes.
 
@@ -214,7 +215,8 @@ def verilate(
         part for path in files
         for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())
     ]
-    key = _digest(top, verilator_root(), _versions(), opt, *options, "--", *contents)
+    how = Path(shared_text.__file__).read_text() if shared else ""
+    key = _digest(top, verilator_root(), _versions(), opt, how, *options, "--", *contents)
 
     name = name or top
     folder = BUILD / kind / f"{name}-{key}"
@@ -234,6 +236,8 @@ def verilate(
                  "-o", product.name, *options, *settings, *cpp, *sources],
                 log,
             )
+            if shared:
+                shared_text.share(folder)
             make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
                     f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
             _share_runtime(folder, make, cflags, log, jobs)

@@ -46,7 +46,7 @@ def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) ->
         raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
     parameters = {name: value for name, value in config.rtl_parameters().items() if name != "Form"}
     return half.build(
-        "flk_top", {**parameters, "Pointers": pointers}, [half.HERE / "preprocessing.vlt", half.HERE / "render_stage.vlt"], ["--inline-mult", "20000"],
+        "flk_top", {**parameters, "Pointers": pointers}, [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "rendering")], ["--inline-mult", "20000"],
         define="-DFLK_CHIP",
     )
 

@@ -38,7 +38,7 @@ def build(top: str, parameters: Mapping[str, int], settings: Sequence[Path], arg
     return verilate(
         top,
         parameters=parameters,
-        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-table", *args, "--assert"],
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", *args, "--assert"],
         cpp=[HERE / "frame_harness.cpp"],
         depends=HEADERS,
         settings=settings,
