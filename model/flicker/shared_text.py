@@ -1,8 +1,8 @@
 """One text for all instances of a module, in the C++ that Verilator wrote.
 
-Verilator writes a function for each instance of a module that it does not inline, and keeps one where their texts agree. Concurrent assertions keep them from
-agreeing: what they sampled is a variable named after the instance, and their messages hold its name. Here such variables get one name in all instances, messages
-take the name from the object, and functions whose texts are then equal become calls of the first. What a function does stays as it was; the
+Verilator writes a function for each instance of a module that it does not inline, and keeps one where their texts agree. Concurrent assertions keep
+them from agreeing: what they sampled is a variable named after the instance, and their messages hold its name. Here such variables get one name in all
+instances, messages take the name from the object, and functions whose texts are then equal become calls of the first. What a function does stays as it was; the
 compiler has less to read, and a cycle of simulation less to fetch. Texts that agree in no other way are left alone.
 """
 

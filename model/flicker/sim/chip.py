@@ -45,9 +45,9 @@ def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) ->
     if config.form is not Form.FACTORED:
         raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
     parameters = {name: value for name, value in config.rtl_parameters().items() if name != "Form"}
+    settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "rendering")]
     return half.build(
-        "flk_top", {**parameters, "Pointers": pointers}, [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "rendering")], ["--inline-mult", "20000"],
-        define="-DFLK_CHIP",
+        "flk_top", {**parameters, "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",
     )
 
 

@@ -1,0 +1,294 @@
+"""What a scene costs on the chip, view by view, and which of its Gaussians cost more than they give (docs/scene_cost.md).
+
+    cost = scene_cost(scene, cameras)
+    cost.views[0].cycles, cost.findings(), cost.dearest(10)
+
+Cycles and bytes are those of the chip model's two halves (`chip.preprocessing`, `chip.rendering`), which are held to the RTL. What a Gaussian gives is
+counted in float64 on the front end's own records and lists, by the rules of the reference renderer: its weight is the sum over pixels of alpha T.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numba
+import numpy as np
+
+from ..explore.generators.contribution import cat_masks
+from ..golden.chip import whole_pairs
+from ..golden.front.cull import cull
+from ..golden.front.frame import FrontFrame, run_front
+from ..golden.front.memory import front_memory
+from ..golden.front.setup import MEAN_FRACTION, FrameSetup
+from ..golden.render import stream_order
+from ..params import ALPHA_MAX, ALPHA_MIN, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
+from ..progress import Steps
+from ..scene.camera import Camera
+from ..scene.gaussians import Scene
+from ..scene.packed import PackedFormat
+from ..scene.packing import Packing, pack
+from . import preprocessing, rendering
+from .constants import CLOCK_HZ
+from .dram import DramConfig
+
+ENTRY_BYTES = 64 / 9  # nine entries in a line of 64 bytes
+VRUS = 32  # pixels that the stage visits in a cycle at most
+ENORMOUS = 0.25  # share of a view's tiles that a Gaussian is listed in
+LEAST_COLOUR = 1.0 / 255.0  # change of colour below which coefficients say nothing
+# Largest absolute values of the real spherical harmonics of degree 1, 2 and 3 in the order of the coefficients, over all directions.
+SH_PEAK = np.array([
+    0.4886025, 0.4886025, 0.4886025, 0.5462742, 0.5462742, 0.6307831, 0.5462742, 0.5462742,
+    0.5900436, 0.5562984, 0.6293804, 0.7463527, 0.6293804, 0.5562984, 0.5900436,
+])
+
+
+@numba.njit(parallel=True, cache=True)
+def _give(mean, shape, opacity, start, entry, mask, cols, width, height, weight, peak, visits, visited):
+    """Of each entry: weight, largest alpha T, pixels visited in mini-tiles of its mask that are not finished. Of each pixel: how often it is visited."""
+    for s in numba.prange(len(start) - 1):
+        left, top = s % cols * SUBTILE, s // cols * SUBTILE
+        transmittance = np.ones((SUBTILE, SUBTILE))
+        done = np.zeros((SUBTILE, SUBTILE), np.bool_)
+        live = np.full(4, 16)
+        for e in range(start[s], start[s + 1]):
+            i = entry[e]
+            for m in range(4):
+                if live[m] == 0:
+                    continue
+                sent = mask[e] >> m & 1
+                visits[e] += 16 * sent
+                for p in range(16):
+                    v, u = m // 2 * 4 + p // 4, m % 2 * 4 + p % 4
+                    y, x = top + v, left + u
+                    if y < height and x < width:
+                        visited[y, x] += sent
+                    if done[v, u]:
+                        continue
+                    dx, dy = x - mean[i, 0], y - mean[i, 1]
+                    energy = (shape[i, 0] * dx + shape[i, 1] * dy) ** 2 + (shape[i, 2] * dy) ** 2
+                    alpha = min(ALPHA_MAX, opacity[i] * np.exp2(-energy))
+                    if not alpha >= ALPHA_MIN:
+                        continue
+                    before = transmittance[v, u]
+                    after = before * (1.0 - alpha)
+                    if after < TRANSMITTANCE_MIN:
+                        done[v, u] = True
+                        live[m] -= 1
+                        continue
+                    if y < height and x < width:
+                        weight[e] += alpha * before
+                        peak[e] = max(peak[e], alpha * before)
+                    transmittance[v, u] = after
+
+
+@dataclass(eq=False)
+class ViewCost:
+    """One view. cycles: of each half. bytes: by purpose.
+
+    Of each Gaussian of the scene, in its file's order: entries, tiles: int64 (N,), entries of its 8x8 sub-tiles and of 16x16 tiles; visits: int64 (N,), pixels
+    visited for it; weight, peak: float64 (N,), sum over pixels and largest of alpha T; fetched, recorded: bool (N,), its geometry was read, it got a record.
+    visited: int32 (H, W), visits of each pixel. cluster_fetched: bool (clusters,).
+    """
+
+    camera: Camera
+    cycles: dict[str, int]
+    bytes: dict[str, int]
+    entries: np.ndarray
+    tiles: np.ndarray
+    visits: np.ndarray
+    weight: np.ndarray
+    peak: np.ndarray
+    fetched: np.ndarray
+    recorded: np.ndarray
+    visited: np.ndarray
+    cluster_fetched: np.ndarray
+
+    @property
+    def interval(self) -> int:
+        """Cycles between frames that follow each other: the slower half's."""
+        return max(self.cycles.values())
+
+    @property
+    def frames_per_second(self) -> float:
+        return CLOCK_HZ / self.interval
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Gaussians with something in common. what: for people. gaussians: how many. bytes, entries, visits: a frame's mean over the views, of what could be
+    spared."""
+
+    name: str
+    what: str
+    gaussians: int
+    bytes: float
+    entries: float
+    visits: float
+
+
+@dataclass(eq=False)
+class SceneCost:
+    """A scene over views. Arrays of Gaussians are in the file's order."""
+
+    scene: Scene
+    packing: Packing
+    views: list[ViewCost]
+    config: RenderConfig
+
+    def _sum(self, name: str) -> np.ndarray:
+        return np.sum([getattr(view, name) for view in self.views], axis=0)
+
+    @cached_property
+    def peak(self) -> np.ndarray:
+        """float64 (N,): the largest alpha T of each Gaussian in any view."""
+        return np.max([view.peak for view in self.views], axis=0)
+
+    @cached_property
+    def moved(self) -> np.ndarray:
+        """float64 (N,): bytes that each Gaussian moves in a frame, mean over the views: geometry, colour; record and list entries, written and read once."""
+        form = self.packing.packed.format
+        kind, words = form.geometry
+        colour = np.array([form.colour_stride(d) for d in range(4)])[self.degree]
+        total = np.zeros(len(colour))
+        for view in self.views:
+            total += view.fetched * float(kind.itemsize * words) + view.recorded * (colour + 32.0) + 2 * ENTRY_BYTES * view.tiles
+        return total / len(self.views)
+
+    def _finding(self, name: str, what: str, which: np.ndarray) -> Finding:
+        """Gaussians that could go altogether."""
+        entries, visits = (float(self._sum(of)[which].sum() / len(self.views)) for of in ("entries", "visits"))
+        return Finding(name, what, int(which.sum()), float(self.moved[which].sum()), entries, visits)
+
+    @cached_property
+    def degree(self) -> np.ndarray:
+        """int64 (N,): SH degree of each Gaussian in memory, its cluster's; 0 for what is not packed."""
+        degree = np.zeros(len(self.scene.opacities), np.int64)
+        degree[self.packing.order] = (self.packing.packed.table["flags"] & 3)[self.packing.packed.cluster]
+        return degree
+
+    def sh_change(self) -> np.ndarray:
+        """float64 (N,): the most that coefficients beyond degree 0 can add to a colour channel, over all directions."""
+        rest = np.abs(self.scene.sh[:, 1:, :]).astype(np.float64)
+        return (rest * SH_PEAK[: rest.shape[1], None]).sum(axis=1).max(axis=1) if rest.shape[1] else np.zeros(len(self.scene.opacities))
+
+    def findings(self) -> list[Finding]:
+        """What a linter would say: Gaussians that no view needs, that cost much, whose colours say nothing; clusters that are read for little."""
+        form = self.packing.packed.format
+        packed_ = np.zeros(len(self.scene.opacities), np.bool_)
+        packed_[self.packing.order] = True
+        tiles = [-(-v.camera.width // TILE) * -(-v.camera.height // TILE) for v in self.views]
+        enormous = np.max([view.tiles / n for view, n in zip(self.views, tiles)], axis=0) > ENORMOUS
+        found = [
+            self._finding("left out", "opacity below 1/255: never packed", ~packed_),
+            self._finding("never seen", "blended in no pixel of any view", packed_ & (self.peak == 0)),
+            self._finding("hardly seen", "never more than 1/255 of a pixel", packed_ & (self.peak > 0) & (self.peak < ALPHA_MIN)),
+            self._finding("enormous", f"in more than {ENORMOUS:.0%} of a view's tiles", enormous),
+        ]
+        mute = packed_ & (self.degree > 0) & (self.sh_change() < LEAST_COLOUR)
+        saved = np.array([form.colour_stride(d) - form.colour_stride(0) for d in range(4)])[self.degree]
+        colour = float(np.mean([saved[mute & view.recorded].sum() for view in self.views]))
+        found.append(Finding("SH says nothing", "coefficients change no channel by 1/255", int(mute.sum()), colour, 0.0, 0.0))
+        cluster = np.zeros(len(packed_), np.int64)
+        cluster[self.packing.order] = self.packing.packed.cluster
+        count = np.bincount(cluster[packed_], minlength=len(self.packing.packed.table))
+        wide = np.zeros(len(count), np.bool_)
+        bytes_ = 0.0
+        kind, words = form.geometry
+        for view in self.views:
+            used = np.bincount(cluster[view.recorded], minlength=len(count))
+            idle = view.cluster_fetched & (used < 0.1 * count)
+            wide |= idle
+            bytes_ += float(((count - used) * kind.itemsize * words)[idle].sum())
+        what = "in clusters of which a view reads all and records less than a tenth"
+        found.append(Finding("wide clusters", what, int((packed_ & wide[cluster]).sum()), bytes_ / len(self.views), 0.0, 0.0))
+        return [finding for finding in found if finding.gaussians]
+
+    def dearest(self, count: int = 10) -> list[dict[str, Any]]:
+        """Gaussians that cost most for what they give: visits and entries, in cycles of a frame, over blended weight in pixels; mean over the views."""
+        n = len(self.views)
+        visits, entries, weight = self._sum("visits") / n, self._sum("entries") / n, self._sum("weight") / n
+        cycles = visits / VRUS + entries / 4  # what the VRUs take; a core takes an entry a cycle
+        order = np.argsort(-cycles / (weight + 1.0), kind="stable")[:count]
+        return [
+            {
+                "gaussian": int(i), "cycles": float(cycles[i]), "entries": float(entries[i]), "visits": float(visits[i]), "weight": float(weight[i]),
+                "peak": float(self.peak[i]), "opacity": float(self.scene.opacities[i]), "scale": float(np.max(self.scene.scales[i])),
+            }
+            for i in order if cycles[i] > 0
+        ]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain numbers."""
+        return {
+            "gaussians": len(self.scene.opacities), "format": self.packing.packed.format.value, "clusters": len(self.packing.packed.table),
+            "views": [
+                {
+                    "size": [view.camera.width, view.camera.height], "cycles": view.cycles, "interval": view.interval,
+                    "frames_per_second": view.frames_per_second,
+                    "bytes": view.bytes, "recorded": int(view.recorded.sum()), "tile_entries": int(view.tiles.sum()), "entries": int(view.entries.sum()),
+                    "visits": int(view.visits.sum()), "seen": int((view.peak > 0).sum()),
+                }
+                for view in self.views
+            ],
+            "findings": [vars(finding) for finding in self.findings()], "dearest": self.dearest(),
+        }
+
+
+def view_cost(packing: Packing, gaussians: int, camera: Camera, config: RenderConfig, dram: DramConfig) -> ViewCost:
+    """One view of a packed scene of so many Gaussians in its file."""
+    packed = packing.packed
+    front = run_front(packed, camera)
+    image = front_memory(front)
+    first = preprocessing.estimate(front, image, dram)
+    second = rendering.estimate(front, image, config, dram)
+    weight, peak, visits, visited = _entries(front, config)
+    lists = front.subtile_lists()
+    number = packing.order[front.gaussian]  # in the file, of each record
+    sums = lambda values: np.bincount(number[lists.entry], values, minlength=gaussians)  # noqa: E731
+    largest = np.zeros(gaussians)
+    np.maximum.at(largest, number[lists.entry], peak)
+    fetched, recorded = np.zeros((2, gaussians), np.bool_)
+    kept = cull(packed, FrameSetup.of(camera)).keep
+    fetched[packing.order[kept[packed.cluster]]] = True
+    recorded[number] = True
+    bytes_ = dict(first.bytes)
+    for name, more in second.bytes.items():
+        bytes_[name] = bytes_.get(name, 0) + more
+    return ViewCost(
+        camera, {"front end": first.cycles, "rendering": second.cycles}, bytes_, sums(None).astype(np.int64),
+        np.bincount(number[front.entry_splat], minlength=gaussians), sums(visits).astype(np.int64), sums(weight), largest, fetched, recorded, visited, kept,
+    )
+
+
+def _entries(front: FrontFrame, config: RenderConfig) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    lists = front.subtile_lists()
+    whole = whole_pairs(lists)
+    order, core_start = stream_order(whole)
+    mask, _, _ = cat_masks(whole, config, order, core_start)  # entries stand as in `lists`: the sub-tiles beyond are empty
+    splats = front.splats()
+    n = len(lists.entry)
+    weight, peak, visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int64)
+    height, width = front.camera.height, front.camera.width
+    visited = np.zeros((height, width), np.int32)
+    _give(
+        splats.mean / (1 << MEAN_FRACTION), splats.shape, splats.opacity, lists.start, lists.entry, mask.astype(np.int64), lists.cols, width, height,
+        weight, peak, visits, visited,
+    )
+    return weight, peak, visits, visited
+
+
+def scene_cost(
+    scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat = PackedFormat.CHUNK, config: RenderConfig = RenderConfig(), steps: Steps | None = None,
+) -> SceneCost:
+    """Pack a scene and look at it through cameras. FlickerError where it cannot be packed."""
+    steps = steps or Steps()
+    packing = pack(scene, form, steps=steps)
+    views = []
+    with steps.bar("views") as report:
+        for k, camera in enumerate(cameras):
+            report(k, len(cameras))
+            views.append(view_cost(packing, len(scene.opacities), camera, config, DramConfig()))
+    return SceneCost(scene, packing, views, config)

@@ -1,0 +1,105 @@
+"""`flicker cost`: what a scene costs on the chip, and why."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from ..errors import FlickerError
+from .options import RichSteps, console, parse_size, writable, write_atomically
+from .render import FormatChoice
+
+CHUNK = FormatChoice("chunk")
+
+
+def _picture(cost, number: int, out: Path) -> None:
+    """Visits of each pixel of a view, with a scale."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    view = cost.views[number]
+    figure, axis = plt.subplots(figsize=(view.camera.width / 100 + 1.5, view.camera.height / 100 + 0.6), layout="constrained")
+    drawn = axis.imshow(view.visited, cmap="inferno", interpolation="nearest")
+    axis.set_axis_off()
+    axis.set_title(f"Gaussians visited per pixel, {view.visited.mean():.0f} on average, {view.interval:,} cycles a frame")
+    figure.colorbar(drawn, ax=axis, fraction=0.03, pad=0.01)
+    write_atomically(out, lambda path: figure.savefig(path, dpi=100))
+    plt.close(figure)
+
+
+def _show(cost, numbers: list[int]) -> None:
+    table = Table(title="a frame of each view", title_justify="left")
+    for name in ("view", "front end, cycles", "rendering, cycles", "frames a second", "MB", "recorded", "seen", "tile entries", "visits"):
+        table.add_column(name, justify="right" if name != "view" else "left")
+    for number, view in zip(numbers, cost.views):
+        table.add_row(
+            str(number), f"{view.cycles['front end']:,}", f"{view.cycles['rendering']:,}", f"{view.frames_per_second:,.0f}",
+            f"{sum(view.bytes.values()) / 1e6:.2f}", f"{view.recorded.sum():,}", f"{(view.peak > 0).sum():,}", f"{view.tiles.sum():,}",
+            f"{view.visits.sum():,}",
+        )
+    console.print(table)
+    table = Table(title="what could be spared, a frame's mean", title_justify="left")
+    for name in ("finding", "what", "Gaussians", "share", "MB", "entries", "visits"):
+        table.add_column(name, justify="right" if name not in ("finding", "what") else "left")
+    entries, visits = (max(sum(int(getattr(view, name).sum()) for view in cost.views) / len(cost.views), 1) for name in ("entries", "visits"))
+    for f in cost.findings():
+        table.add_row(
+            f.name, f.what, f"{f.gaussians:,}", f"{f.gaussians / len(cost.scene.opacities):.1%}", f"{f.bytes / 1e6:.2f}", f"{f.entries / entries:.1%}",
+            f"{f.visits / visits:.1%}",
+        )
+    console.print(table)
+    table = Table(title="dearest Gaussians for what they give, a frame's mean", title_justify="left")
+    for name in ("number in the file", "cycles", "sub-tile entries", "visits", "blended weight, pixels", "largest weight", "opacity", "largest scale"):
+        table.add_column(name, justify="right")
+    for g in cost.dearest():
+        table.add_row(
+            str(g["gaussian"]), f"{g['cycles']:,.0f}", f"{g['entries']:,.0f}", f"{g['visits']:,.0f}", f"{g['weight']:,.1f}", f"{g['peak']:.4f}",
+            f"{g['opacity']:.3f}", f"{g['scale']:.3g}",
+        )
+    console.print(table)
+
+
+def cost(
+    scene: Annotated[str, typer.Argument(help="scene file, or demo")],
+    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    view: Annotated[int | None, typer.Option(help="number of one camera [default: --views of them, evenly spread]")] = None,
+    views: Annotated[int, typer.Option(help="how many cameras", min=1)] = 8,
+    up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
+    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
+    form: Annotated[FormatChoice, typer.Option("--format", help="of the scene in memory")] = CHUNK,
+    out: Annotated[Path | None, typer.Option(help="picture: Gaussians visited per pixel of the dearest view")] = None,
+    json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
+) -> None:
+    """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
+    from ..chip.scene_cost import scene_cost
+    from ..front.view import load_view
+    from ..scene.camera import find_cameras
+    from ..scene.demo import demo_cameras
+    from ..scene.packed import PackedFormat
+
+    writable(out, "--out")
+    writable(json_, "--json")
+    wanted = parse_size(size)
+    loaded = load_view(scene, view or 0, wanted, cameras, up)
+    found = demo_cameras() if loaded.name == "demo" and scene == "demo" else find_cameras(loaded.scene, cameras, up)
+    numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]
+    chosen = [found[n] if wanted is None else found[n].resized(*wanted) for n in numbers]
+    if not chosen:
+        raise FlickerError(f"{scene}: no cameras")
+    result = scene_cost(loaded.scene, chosen, form=PackedFormat(form.value), steps=RichSteps())
+    clusters = len(result.packing.packed.table)
+    console.print(f"{scene}: {len(loaded.scene.opacities):,} Gaussians, {form.value}, {clusters:,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
+    _show(result, numbers)
+    if out is not None:
+        dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
+        _picture(result, dearest, out)
+        console.print(f"view {numbers[dearest]}: {out}")
+    if json_ is not None:
+        text = json.dumps({"scene": scene, "numbers": numbers} | result.summary(), indent=2)
+        write_atomically(json_, lambda path: path.write_text(text + "\n"))
