@@ -8,7 +8,7 @@ from flicker_tb.runner import build_and_test
 from flicker.errors import FlickerError
 
 
-@pytest.mark.parametrize("width", [1, 2, 3, 8, 9, 11, 14])
+@pytest.mark.parametrize("width", [1, 3, 9, 14, *(pytest.param(width, marks=pytest.mark.slow) for width in (2, 8, 11))])
 def test_lzc(width: int) -> None:
     build_and_test("flk_lzc", "cocotb_lzc", parameters={"Width": width})
 

@@ -11,7 +11,8 @@ from flicker_tb.runner import build, build_and_test, refused
 
 
 @pytest.mark.parametrize("parameters", [
-    {}, {"Inputs": 2, "Patience": 1, "Width": 1}, {"Inputs": 3, "Patience": 5}, {"Inputs": 5, "Patience": 4}, {"Inputs": 8, "Patience": 9},
+    {}, {"Inputs": 2, "Patience": 1, "Width": 1}, {"Inputs": 5, "Patience": 4},
+    *(pytest.param(case, marks=pytest.mark.slow) for case in ({"Inputs": 3, "Patience": 5}, {"Inputs": 8, "Patience": 9})),
 ], ids=str)
 def test_priority_arbiter(parameters: dict[str, int]) -> None:
     build_and_test("flk_priority_arbiter", "cocotb_priority_arbiter", parameters=parameters)

@@ -13,10 +13,13 @@ from flicker_tb.runner import build_and_test
 
 from flicker.errors import FlickerError
 
-FIFO_SIZES = [(8, 1), (1, 2), (8, 3), (146, 5), (8, 16), (8, 17), (70, 128)]  # width, depth
+SLOW = pytest.mark.slow  # the same with other numbers
+FIFO_SIZES = [  # width, depth
+    (8, 1), (1, 2), (8, 3), (8, 17), *(pytest.param(*size, marks=SLOW) for size in ((146, 5), (8, 16), (70, 128))),
+]
 
 
-@pytest.mark.parametrize("width", [1, 8, 146])
+@pytest.mark.parametrize("width", [1, pytest.param(8, marks=SLOW), 146])
 def test_pipe_reg(width: int) -> None:
     build_and_test(
         "flk_pipe_reg",
@@ -26,7 +29,7 @@ def test_pipe_reg(width: int) -> None:
     )
 
 
-@pytest.mark.parametrize("width", [1, 8, 146])
+@pytest.mark.parametrize("width", [1, pytest.param(8, marks=SLOW), 146])
 def test_skid_buffer(width: int) -> None:
     build_and_test(
         "flk_skid_buffer",
@@ -46,7 +49,7 @@ def test_fifo(width: int, depth: int) -> None:
     )
 
 
-@pytest.mark.parametrize(("inputs", "width"), [(2, 1), (3, 8), (4, 80), (6, 8)])
+@pytest.mark.parametrize(("inputs", "width"), [pytest.param(2, 1, marks=SLOW), (3, 8), (4, 80), pytest.param(6, 8, marks=SLOW)])
 def test_stream_arbiter(inputs: int, width: int) -> None:
     build_and_test(
         "flk_stream_arbiter",

@@ -15,9 +15,11 @@ from flicker.arithmetic.formats import E4M3, E5M2, FP16, FloatFormat
 from flicker.errors import FlickerError
 from flicker.params import Form
 
+SLOW = pytest.mark.slow  # the same with other numbers
+
 
 @pytest.mark.parametrize(
-    ("fmt", "cols", "rows"), [(FP16, 1, 1), (FP16, 2, 2), (E4M3, 2, 2), (E4M3, 3, 1), (E5M2, 1, 1)],
+    ("fmt", "cols", "rows"), [(FP16, 1, 1), (E4M3, 2, 2), *(pytest.param(*case, marks=SLOW) for case in ((FP16, 2, 2), (E4M3, 3, 1), (E5M2, 1, 1)))],
     ids=lambda value: value.name if isinstance(value, FloatFormat) else str(value),
 )
 @pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())

@@ -42,7 +42,7 @@ def test_ctu(form: Form, precision: Precision) -> None:
     run(form, precision, 0, tests)
 
 
-@pytest.mark.parametrize("depth", [1, pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("depth", [1, *(pytest.param(depth, marks=pytest.mark.slow) for depth in (2, 3))])
 def test_fifo_depth(depth: int) -> None:
     run(Form.FACTORED, Precision.MIXED, depth, ["lists", "automatic"])
 
@@ -51,7 +51,7 @@ def test_faithful() -> None:
     run(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth, ["lists", "rate", "automatic", "rejected_drain"])
 
 
-@pytest.mark.parametrize("cycles", [4, 16])
+@pytest.mark.parametrize("cycles", [pytest.param(4, marks=pytest.mark.slow), 16])
 def test_vru_cycles(cycles: int) -> None:
     """Of a channel with four VRUs and with one: the fall compares with them."""
     run(Form.FACTORED, Precision.FIXED, 0, ["automatic"], VruCycles=cycles)

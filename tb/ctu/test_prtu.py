@@ -14,9 +14,13 @@ from flicker_tb.runner import build_and_test
 
 from flicker.params import Form, Precision
 
+SLOW = {(Form.CONIC, Precision.FIXED), (Form.CONIC, Precision.FP16), (Form.FACTORED, Precision.MIXED)}  # of each form and each precision another one stays
 
-@pytest.mark.parametrize("precision", list(Precision), ids=lambda p: p.name.lower())
-@pytest.mark.parametrize("form", list(Form), ids=lambda f: f.name.lower())
+
+@pytest.mark.parametrize(("form", "precision"), [
+    pytest.param(form, precision, id=f"{form.name}-{precision.name}".lower(), marks=[pytest.mark.slow] * ((form, precision) in SLOW))
+    for form in Form for precision in Precision
+])
 def test_prtu(form: Form, precision: Precision) -> None:
     parameters = {"Form": int(form), "Precision": int(precision)}
     build_and_test("flk_prtu", "cocotb_prtu", parameters=parameters, config=parameters, inner=True)

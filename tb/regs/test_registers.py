@@ -63,7 +63,7 @@ def places(struct: str) -> dict[str, tuple[int, int]]:
 
 def test_registers() -> None:
     config = {"registers": described(), "in": places("flk_registers__in_t"), "out": places("flk_registers__out_t")}
-    build_and_test("flk_registers", "cocotb_registers", config=config, seeds=2)
+    build_and_test("flk_registers", "cocotb_registers", config=config)
 
 
 def test_python_module_is_the_description() -> None:

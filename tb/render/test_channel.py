@@ -24,7 +24,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [pytest.param(case, marks=[pytest.mark.slow] * (case in ("depth2", "depth16"))) for case in CASES])
 def test_channel(case: str) -> None:
     form, depth, vrus, m, lengths, idle, stall = CASES[case]
     build_and_test(

@@ -10,7 +10,7 @@ import pytest
 from flicker_tb.runner import build_and_test, refused
 
 
-@pytest.mark.parametrize("pairs", [4, 2, 8])
+@pytest.mark.parametrize("pairs", [4, 2, pytest.param(8, marks=pytest.mark.slow)])
 def test_frame_writer(pairs: int) -> None:
     tests = [] if pairs == 4 else ["bytes_of_frames", "one_core_late"]
     build_and_test("flk_frame_writer", "cocotb_frame_writer", parameters={"Pairs": pairs}, config={"pairs": pairs}, tests=tests, inner=False)

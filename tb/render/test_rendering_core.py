@@ -15,8 +15,10 @@ from flicker.params import SUBTILE_PIXELS, Form
 LENGTHS = [0, 1, 40, 0, 12, 90, 0, 0, 3, 30, 25, 50]
 
 
-@pytest.mark.parametrize("idle,stall", [("never", "never"), ("half", "half"), ("never", "heavy")])
-@pytest.mark.parametrize("form,depth", [(Form.FACTORED, 16), (Form.CONIC, 1)])
+@pytest.mark.parametrize("form,depth,idle,stall", [
+    (Form.FACTORED, 16, "never", "never"), (Form.FACTORED, 16, "never", "heavy"), (Form.CONIC, 1, "half", "half"), (Form.CONIC, 1, "never", "heavy"),
+    pytest.param(Form.FACTORED, 16, "half", "half", marks=pytest.mark.slow), pytest.param(Form.CONIC, 1, "never", "never", marks=pytest.mark.slow),
+])
 def test_rendering_core(form: Form, depth: int, idle: str, stall: str) -> None:
     build_and_test(
         "flk_rendering_core", "cocotb_rendering_core",
