@@ -28,6 +28,7 @@ class LaneFormats:
 
     uv: fraction bits of u and v. guard: further fraction bits of what they are summed from. log: fraction bits of La = -log2 alpha. sum: fraction bits of h and
     S = -log2 T. mantissa: bits of a weight's mantissa with its leading one, and address bits of its table. accumulator: fraction bits of colours.
+    With 7 bits or more of log the limit log2 255 = 7.9944 stays below 8.
     pieces: h by lines, 2^pieces of them in an octave of La; 0: h by a table with an entry for every La. mask: fraction bits of u and v in the masks.
     root: address bits of the masks' table of roots.
     """
@@ -38,13 +39,13 @@ class LaneFormats:
     sum: int = 16
     mantissa: int = 10
     accumulator: int = 14
-    pieces: int = 0
-    mask: int = 8
+    pieces: int = 4
+    mask: int = 6
     root: int = 6
 
     def __post_init__(self) -> None:
         ranges = {
-            "uv": (6, 13), "guard": (5, 8), "log": (6, min(14, 2 * self.uv - 1)), "sum": (self.log, 24), "mantissa": (4, 12), "accumulator": (8, 24),
+            "uv": (6, 13), "guard": (5, 8), "log": (7, min(14, 2 * self.uv - 1)), "sum": (self.log, 24), "mantissa": (4, 12), "accumulator": (8, 24),
             "pieces": (0, 6), "mask": (4, self.uv), "root": (4, 10),
         }
         for field in fields(self):
@@ -61,9 +62,11 @@ class LaneFormats:
 
     @property
     def name(self) -> str:
-        h = f", 2^{self.pieces} lines an octave" if self.pieces else ""
-        return f"{self.uv} / {self.log} / {self.sum}{h}; {self.mantissa}; {self.accumulator}"
+        h = f"{1 << self.pieces} lines" if self.pieces else "table"
+        return f"{self.uv} / {self.log} / {self.sum}, {h}; {self.mantissa}; {self.accumulator}"
 
+
+FORMATS = LaneFormats()  # the default; docs/lanes.md says why
 
 # ints: uv, guard, place, log, sum, mantissa, accumulator, limit, clamp, x_max, h_max, s_max, top, drop, root_bits, root_shift. Arrays, int64: lo, bound,
 # mask_bound (by opacity code), h (by La), exp2 (by the top bits of a fraction), root (by significant bits), result (by fraction of S).
@@ -114,13 +117,14 @@ def h_lines(formats: LaneFormats, first: int, last: int) -> tuple[np.ndarray, np
 
 
 def h_by_line(la: int, value: np.ndarray, fall: np.ndarray, formats: LaneFormats) -> int:
-    """h of one La from the lines: La is shifted until its leading one stands at bit log + 2; below it follow the piece's number and the rest."""
+    """h of one La from the lines: La is shifted until its leading one stands at bit log + 2; below it follow the piece's number and the rest. The line is exact
+    and rounded once."""
     octave, top = la.bit_length() - 1, formats.log + 2
     shifted = la << (top - octave)
     width = top - formats.pieces
     piece, rest = shifted >> width & (1 << formats.pieces) - 1, shifted & (1 << width) - 1
-    line = int(value[octave, piece]) - (int(fall[octave, piece]) * rest >> width)
-    return max(line + (1 << LINE_GUARD - 1) >> LINE_GUARD, 0)
+    line = (int(value[octave, piece]) << width) - int(fall[octave, piece]) * rest
+    return max(line + (1 << width + LINE_GUARD - 1) >> width + LINE_GUARD, 0)
 
 
 def root_table(bits: int, places: int) -> np.ndarray:

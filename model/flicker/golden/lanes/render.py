@@ -9,7 +9,7 @@ import numpy as np
 
 from ...params import SUBTILE_PIXELS
 from ..render import assemble
-from .formats import LaneFormats, tables
+from .formats import FORMATS, LaneFormats, tables
 from .lane import FINISHED, SKIPPED, blend, colour_bits, log_alpha, pair, transmittance_bits
 from .lists import RecordLists
 from .mask import place_of, row_mask
@@ -116,7 +116,7 @@ class LaneFrame:
         return int(self.counts[:, COUNTS.index(name)].sum())
 
 
-def render_lanes(lists: RecordLists, formats: LaneFormats = LaneFormats()) -> LaneFrame:
+def render_lanes(lists: RecordLists, formats: LaneFormats = FORMATS) -> LaneFrame:
     """Render a frame, bit for bit."""
     n = lists.cols * lists.rows
     pixels, counts, needed = np.zeros((n, SUBTILE_PIXELS, 4), np.uint16), np.zeros((n, N_COUNTS), np.int64), np.zeros(n, np.int64)
@@ -124,7 +124,7 @@ def render_lanes(lists: RecordLists, formats: LaneFormats = LaneFormats()) -> La
     return LaneFrame(lists, pixels, counts, needed)
 
 
-def lane_masks(lists: RecordLists, formats: LaneFormats = LaneFormats()) -> tuple[np.ndarray, np.ndarray]:
+def lane_masks(lists: RecordLists, formats: LaneFormats = FORMATS) -> tuple[np.ndarray, np.ndarray]:
     """uint64 (E,) each: the masks of all entries, and the pixels whose pair passes the lane's own test, every pixel taken as unfinished."""
     mask, passes = np.zeros(len(lists.entry), np.int64), np.zeros(len(lists.entry), np.int64)
     _masks(lists.records, lists.start, lists.entry, lists.cols, tables(formats), mask, passes)

@@ -84,12 +84,30 @@ def splat_setup(low, high, col, row, t):
 
 
 @numba.njit(forceinline=True)
+def column_step(s, i):
+    """(i - 3.5) l0, unit 2^-place."""
+    return (2 * i - 7) * s.s0
+
+
+@numba.njit(forceinline=True)
+def row_u(s, j, t):
+    """w + (j - 3.5) l1 and half a unit 2^-uv, unit 2^-place."""
+    return s.w + (2 * j - 7) * s.s1 + (1 << (t.guard - 1))
+
+
+@numba.njit(forceinline=True)
+def row_v(s, j, t):
+    """z + (j - 3.5) l2 and half a unit 2^-uv, unit 2^-place."""
+    return s.z + (2 * j - 7) * s.s2 + (1 << (t.guard - 1))
+
+
+@numba.njit(forceinline=True)
 def u_of(s, i, j, t):
-    """u at column i, row j of the sub-tile, unit 2^-uv: exact sum, rounded once."""
-    return (s.w + (2 * i - 7) * s.s0 + (2 * j - 7) * s.s1 + (1 << (t.guard - 1))) >> t.guard
+    """u at column i, row j of the sub-tile, unit 2^-uv: exact sum, rounded once, ties upwards."""
+    return (row_u(s, j, t) + column_step(s, i)) >> t.guard
 
 
 @numba.njit(forceinline=True)
 def v_of(s, j, t):
     """v in row j, unit 2^-uv."""
-    return (s.z + (2 * j - 7) * s.s2 + (1 << (t.guard - 1))) >> t.guard
+    return row_v(s, j, t) >> t.guard
