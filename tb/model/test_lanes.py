@@ -366,6 +366,10 @@ def test_frames_are_pairs(formats, demo_lists):
     stopped = frame.needed < np.diff(demo_lists.start)
     assert stopped.any() and (frame.counts[stopped, COUNTS.index("pixels_finished")] == 64).all()
     assert np.array_equal(frame.counts[:, COUNTS.index("splats")], frame.needed)
+    ones = np.bitwise_count(lane_masks(demo_lists, formats)[0]).astype(int)
+    for s, (first, needed) in enumerate(zip(demo_lists.start, frame.needed)):
+        taken = ones[first : first + needed]
+        assert [frame.counts[s, COUNTS.index(name)] for name in ("empty", "masked")] == [(taken == 0).sum(), taken.sum()]
 
 
 def test_absurd_records_are_finite():
@@ -503,5 +507,5 @@ def test_command(tmp_path):
         (("--stage", "lanes", "--form", "conic"), "--form conic"), (("--stage", "lanes", "--faithful"), "--faithful"),
         (("--stage", "lanes", "--coords", "absolute"), "--coords"), (("--stage", "lanes", "--fifo-depth", "8"), "--fifo-depth"),
     ):
-        done = flicker("render", tmp_path / "scene.ply", "--size", "96x64", *args)
+        done = flicker("render", tmp_path / "none.ply", "--size", "96x64", *args)  # before any work, so the file is not looked for
         assert done.returncode == 2 and done.stderr.count("\n") == 1 and named in done.stderr, done.stderr
