@@ -12,7 +12,7 @@ def _compiled_code_folder() -> Path:
     """
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256()
-    folders = ("arithmetic", "front", "golden", "perf", "explore/generators", "chip")
+    folders = ("arithmetic", "front", "golden", "golden/front", "golden/lanes", "perf", "explore/generators", "chip")
     for source in sorted([here / "params.py", *(path for folder in folders for path in here.glob(f"{folder}/*.py"))]):
         digest.update(source.read_bytes())
     return here.parents[1] / "build" / "numba" / digest.hexdigest()[:16]

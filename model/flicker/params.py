@@ -150,6 +150,7 @@ TRANSMITTANCE_MIN_BITS = fp16_bits_up(TRANSMITTANCE_MIN)
 
 MAX_FIFO_DEPTH = 128
 VRU_COUNTS = (1, 2, 4)  # VRUs per channel that the RTL can have
+LANE_COUNTS = (32, 64, 128)  # lanes of all cores
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,8 @@ class RenderConfig:
     which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
     is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
-    mask_generator, stage: keys of MASK_GENERATORS and STAGES.
+    mask_generator, stage: keys of MASK_GENERATORS and STAGES. lanes: of all cores, for the stage `lanes`, which has no other parameter; its picture does not
+    depend on it.
     """
 
     form: Form = Form.FACTORED
@@ -171,7 +173,8 @@ class RenderConfig:
     coords: Coords = Coords.LOCAL
     vrus_per_channel: int = VRUS_PER_CHANNEL
     mask_generator: str = "ctu"
-    stage: str = "vru"
+    stage: str = "channels"
+    lanes: int = LANE_COUNTS[0]
 
     def __post_init__(self) -> None:
         for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES)):
@@ -187,6 +190,15 @@ class RenderConfig:
             raise FlickerError(f"configuration: ctu_fifo_depth must be 0 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
         if self.vrus_per_channel not in VRU_COUNTS:
             raise FlickerError(f"configuration: vrus_per_channel must be 1, 2 or 4, not {self.vrus_per_channel}")
+        if self.lanes not in LANE_COUNTS:
+            raise FlickerError(f"configuration: lanes must be {', '.join(map(str, LANE_COUNTS[:-1]))} or {LANE_COUNTS[-1]}, not {self.lanes}")
+        if self.by_lanes and (self.form, self.coords) != (Form.FACTORED, Coords.LOCAL):
+            raise FlickerError("configuration: stage lanes takes records of 16 bytes, so form must be factored and coords local")
+
+    @property
+    def by_lanes(self) -> bool:
+        """The stage takes raw records (`golden.lanes`)."""
+        return STAGES[self.stage].element == RECORD_ELEMENT
 
     @property
     def pixels_per_vru(self) -> int:
@@ -258,11 +270,11 @@ MASK_GENERATORS: dict[str, MaskGenerator] = {
 
 @dataclass(frozen=True)
 class Stage:
-    """A rendering stage: a module with the ports that docs/render_stage.md lists.
+    """A rendering stage: a module with the ports that docs/render_stage.md lists; an empty name where only a model exists.
 
     element, pixel: records (flicker.layout) that it takes and gives, on one stream per core. A token of `element` is its bit `eos`, with the
-    sub-tile's place in the lowest bits; `pixel` names sub-tile, mini-tile, index and pixel. parameters: those of RenderConfig.rtl_parameters()
-    that the module has.
+    sub-tile's place in the lowest bits; RECORD_ELEMENT: records as they lie in memory. `pixel` names sub-tile, mini-tile, index and pixel.
+    parameters: those of RenderConfig.rtl_parameters() that the module has.
     """
 
     module: str
@@ -272,11 +284,14 @@ class Stage:
     note: str
 
 
+RECORD_ELEMENT = "record"  # 16 bytes, no packed struct of its own yet
+
 STAGES: dict[str, Stage] = {
-    "vru": Stage(
+    "channels": Stage(
         "flk_render_stage", "splat_elem", "core_pixel",
         ("Form", "Precision", "FifoDepth", "CtuFifoDepth", "VrusPerChannel", "MaskGenerator"), "mask generators and volume rendering units",
     ),
+    "lanes": Stage("", RECORD_ELEMENT, "core_pixel", (), "lanes in the log domain (docs/lanes.md)"),
 }
 
 # The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in

@@ -15,6 +15,10 @@ from .front.view import View
 from .golden.front.blend import blend_records
 from .golden.front.frame import FrontFrame, ListKind, run_front
 from .golden.front.record import RecordKind
+from .golden.lanes.formats import FORMATS as LANE_FORMATS
+from .golden.lanes.lists import RecordLists, float_lists, front_lists
+from .golden.lanes.render import COUNTS as LANE_COUNTS
+from .golden.lanes.render import LaneFrame, render_lanes
 from .golden.render import render_golden
 from .params import CHANNELS, CORES, Coords, Form, RenderConfig
 from .progress import Steps
@@ -136,8 +140,20 @@ def golden_lists(front: FrontFrame, steps: Steps) -> tuple[SubtileLists, dict[st
     """Lists of a bit-true front end and its statistics."""
     with steps.step("building sub-tile lists"):
         lists = front.subtile_lists()
-    return lists, {
-        "visible": front.outcomes["listed"], "adjusted": lists.adjusted, "format": front.packed.format.value, "records": front.kind.value,
+    return lists, front_stats(front)
+
+
+def lane_lists(front: FrontFrame, steps: Steps) -> tuple[RecordLists, dict[str, Any]]:
+    """`golden_lists` for the lanes, which take the records as they are."""
+    with steps.step("building sub-tile lists"):
+        lists = front_lists(front)
+    return lists, front_stats(front)
+
+
+def front_stats(front: FrontFrame) -> dict[str, Any]:
+    """Statistics of a bit-true front end."""
+    return {
+        "visible": front.outcomes["listed"], "adjusted": dict(front.adjusted), "format": front.packed.format.value, "records": front.kind.value,
         "clusters": len(front.packed.table), "clusters_kept": front.clusters_kept, "outcomes": front.outcomes, "list_entries": len(front.entry_tile),
     }
 
@@ -151,13 +167,23 @@ def basic_stats(view: View, engine: Engine, front: Front, config: RenderConfig) 
         "height": view.camera.height,
         "engine": engine.value,
         "front": front.value,
+        "stage": config.stage,
         "form": config.form.name.lower(),
-        "precision": config.precision.name.lower(),
-        "cat": config.cat.name.lower(),
-        "fifo_depth": config.fifo_depth,
+        **({"formats": LANE_FORMATS.name} if config.by_lanes else {
+            "precision": config.precision.name.lower(), "cat": config.cat.name.lower(), "fifo_depth": config.fifo_depth,
+        }),
         "coords": config.coords.name.lower(),
         "gaussians": len(view.scene.means),
         "gaussians_left_out": dict(view.scene.rejected),
+    }
+
+
+def lane_stats(frame: LaneFrame, config: RenderConfig) -> dict[str, Any]:
+    """Counts of a frame by lanes, which do not depend on timing. least_cycles: what so many lanes take at least, one pixel each a cycle."""
+    counts = {name: frame.total(name) for name in LANE_COUNTS}
+    return {
+        "pixel_pairs": counts["visited"], "pairs_blended": counts["blended"], "pixels_finished": counts["pixels_finished"],
+        "lanes": {"lanes": config.lanes, **counts, "least_cycles": -(-counts["visited"] // config.lanes)},
     }
 
 
@@ -186,6 +212,8 @@ def render_view(
     """
     steps = steps or Steps()
     camera = view.camera
+    if config.by_lanes:
+        return _by_lanes(view, engine, config, front, options, compare, steps)
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = golden_lists(frame_in, steps)
@@ -224,6 +252,29 @@ def render_view(
             with steps.step("rendering the float64 reference"):
                 image = view.reference
         stats |= {"minitiles_sent": None, "pixel_pairs": None}
+    if compare:
+        stats |= compared(view, image, steps)
+    return Rendered(image, stats)
+
+
+def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, steps: Steps) -> Rendered:
+    """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once."""
+    if engine is not Engine.GOLDEN:
+        raise FlickerError(f"stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
+    if front is not Front.FLOAT:
+        frame_in, simulated = bit_true_front(view, config, front, options, steps)
+        lists, more = lane_lists(frame_in, steps)
+        more |= simulated
+    else:
+        by_splat, more = _float_lists(view, config, steps)
+        with steps.step("writing records"):
+            lists = float_lists(view.projected, by_splat)
+        more["adjusted"] = lists.adjusted
+    stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
+    with steps.step("rendering with the golden lanes"):
+        frame = render_lanes(lists)
+    image = frame.image(view.background)
+    stats |= lane_stats(frame, config)
     if compare:
         stats |= compared(view, image, steps)
     return Rendered(image, stats)

@@ -14,8 +14,9 @@ from ..front.view import View
 from ..golden.chip import render_chip
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
+from ..golden.lanes.render import LaneFrame
 from ..params import CHANNELS, CORES, Coords, Form, RenderConfig
-from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, packed_scene
+from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_scene
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..sim.chip import ChipFrame, ChipSession, build, pointers_for
@@ -50,12 +51,18 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
     red, green, blue = (round(255 * float(v)) for v in view.background)
     if engine is Engine.CHIP_GOLDEN:
         front, _ = bit_true_front(view, config, Front.GOLDEN, options, steps)
-        lists, stats = golden_lists(front, steps)
+        lists, stats = lane_lists(front, steps) if config.by_lanes else golden_lists(front, steps)
         with steps.step("rendering with the chip's golden model"):
             golden = render_chip(lists, config, background=(red, green, blue))
-        sent = golden.frame.total("minitiles_sent")
-        stats |= {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry), "minitiles_sent": sent, "pixel_pairs": 16 * sent}
+        stats |= {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)}
+        if isinstance(golden.frame, LaneFrame):
+            stats |= lane_stats(golden.frame, config)
+        else:
+            sent = golden.frame.total("minitiles_sent")
+            stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
         return _frame_image(golden.buffer, camera), stats
+    if config.by_lanes:
+        raise FlickerError(f"stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
     if config.form is not Form.FACTORED:
         raise FlickerError("--engine chip: the front end in RTL writes records of 16 bytes, for --form factored; --engine chip-golden takes the conic form too")
     with steps.step("packing the scene"):

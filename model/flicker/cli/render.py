@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from ..params import FAITHFUL, MAX_FIFO_DEPTH, CatMode, Coords, Form, Precision, RenderConfig
+from ..params import FAITHFUL, LANE_COUNTS, MAX_FIFO_DEPTH, STAGES, CatMode, Coords, Form, Precision, RenderConfig
 from .options import RichSteps, console, parse_size, writable, write_atomically
 
 
@@ -42,6 +42,7 @@ EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden
 FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
 FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
 ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
+StageChoice = Enum("StageChoice", {name.upper(): name for name in STAGES}, type=str)  # type: ignore[misc]
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
@@ -59,7 +60,9 @@ def summary(stats: dict, picture: Path | None) -> Table:
     if picture is not None:
         table.add_row("picture", str(picture))
     engine = stats["engine"]
-    if engine != "reference":
+    if "formats" in stats:
+        engine += " (lanes)"
+    elif engine != "reference":
         engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
     table.add_row("engine", engine)
     if stats.get("front") != "float":
@@ -70,6 +73,10 @@ def summary(stats: dict, picture: Path | None) -> Table:
                        ("minitiles_sent", "mini-tiles sent"), ("front_cycles", "cycles of the front end"), ("cycles", "cycles")):
         if stats.get(key) is not None:
             table.add_row(label, _number(stats[key]))
+    if "lanes" in stats:
+        lanes = stats["lanes"]
+        table.add_row("pixel visits", f"{_number(lanes['visited'])}, {lanes['skipped'] / max(lanes['visited'], 1):.1%} of them skipped")
+        table.add_row(f"cycles of {lanes['lanes']} lanes, at least", _number(lanes["least_cycles"]))
     for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
         if key in stats:
             table.add_row(label, f"{stats[key]:.1%}")
@@ -90,6 +97,17 @@ def summary(stats: dict, picture: Path | None) -> Table:
     return table
 
 
+def _check_lanes(engine: Enum, given: dict[str, object]) -> None:
+    """Refuse what the stage `lanes` does not go with."""
+    if engine not in (EngineChoice.GOLDEN, EngineChoice.CHIP_GOLDEN):
+        raise FlickerError(f"--stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
+    names = [f"--{k}" for k in ("cat", "precision", "fifo-depth", "faithful", "coords") if given[k] is not None]
+    if given["form"] is FormChoice["CONIC"]:
+        names.append("--form conic")
+    if names:
+        raise FlickerError(f"--stage lanes: takes records of 16 bytes and has no contribution test, so it cannot be combined with {', '.join(names)}")
+
+
 def render(
     scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat, .flk; a SOG folder or its meta.json")],
     cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
@@ -102,6 +120,10 @@ def render(
     )] = None,
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
+    stage: Annotated[StageChoice, typer.Option(
+        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain, a model",
+    )] = StageChoice.CHANNELS,
+    lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
@@ -126,6 +148,11 @@ def render(
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
+    by_lanes = stage is StageChoice.LANES
+    if lanes is not None and not by_lanes:
+        raise FlickerError("--lanes: for --stage lanes only")
+    if by_lanes:
+        _check_lanes(engine, {**given, "faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords})
     base = FAITHFUL if faithful else RenderConfig()
     config = base.with_(
         cat=CatMode[cat.name] if cat else base.cat,
@@ -133,6 +160,8 @@ def render(
         form=Form[form.name] if form else base.form,
         fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
         coords=Coords[coords.name],
+        stage=stage.value,
+        lanes=base.lanes if lanes is None else lanes,
     )
     if out is not None and out.suffix.lower() != ".png":
         raise FlickerError(f"--out: {out}: only .png is written")

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..front.records import SubtileLists
 from ..params import RenderConfig
 from .frame_buffer import PixelFormat, frame_buffer, least_stride
+from .lanes.lists import RecordLists
+from .lanes.render import LaneFrame, render_lanes
 from .render import Frame, render_golden
 
+Lists = TypeVar("Lists", SubtileLists, RecordLists)
 
-def whole_pairs(lists: SubtileLists) -> SubtileLists:
+
+def whole_pairs(lists: Lists) -> Lists:
     """The same with empty sub-tiles up to whole pairs of tiles, which the chip renders too; the automatic mode sees them."""
     cols, rows = -(-lists.cols // 4) * 4, -(-lists.rows // 2) * 2
     length = np.zeros((rows, cols), np.int64)
@@ -24,15 +29,18 @@ def whole_pairs(lists: SubtileLists) -> SubtileLists:
 class ChipFrame:
     """frame: of the padded grid of sub-tiles. buffer: uint8 (rows of pixels, stride)."""
 
-    frame: Frame
+    frame: Frame | LaneFrame
     buffer: np.ndarray
 
 
 def render_chip(
-    lists: SubtileLists, config: RenderConfig, format_: PixelFormat = PixelFormat.RGB8, background: tuple[int, int, int] = (0, 0, 0), stride: int | None = None,
+    lists: SubtileLists | RecordLists, config: RenderConfig, format_: PixelFormat = PixelFormat.RGB8, background: tuple[int, int, int] = (0, 0, 0),
+    stride: int | None = None,
 ) -> ChipFrame:
-    """A frame, bit for bit. stride: bytes from row to row; None: as few as a row needs."""
-    frame = render_golden(whole_pairs(lists), config)
+    """A frame, bit for bit; records of 16 bytes go to the lanes. stride: bytes from row to row; None: as few as a row needs."""
+    frame: Frame | LaneFrame = (
+        render_lanes(whole_pairs(lists)) if isinstance(lists, RecordLists) else render_golden(whole_pairs(lists), config)
+    )
     stride = stride or least_stride(lists.width, format_)
     buffer = frame_buffer(frame.pixels, frame.lists.cols, frame.lists.rows, lists.width, lists.height, format_, stride, background)
     return ChipFrame(frame, buffer)

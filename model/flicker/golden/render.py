@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -199,7 +200,16 @@ class Frame:
         return int(self.counts[:, COUNTS.index(name)].sum())
 
 
-def assemble(lists: SubtileLists, pixels: np.ndarray, background=(0.0, 0.0, 0.0)) -> np.ndarray:
+class Grid(Protocol):
+    """Size of a picture and of its grid of sub-tiles."""
+
+    width: int
+    height: int
+    cols: int
+    rows: int
+
+
+def assemble(lists: Grid, pixels: np.ndarray, background=(0.0, 0.0, 0.0)) -> np.ndarray:
     """Pixels of sub-tiles to a float32 picture (H, W, 3) over a background colour."""
     v = pixels.view(np.float16).astype(np.float32)
     rgb = v[..., 1:4] + v[..., 0:1] * np.asarray(background, np.float32)

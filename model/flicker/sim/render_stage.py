@@ -63,6 +63,8 @@ def build(config: RenderConfig, *, checks: bool = False, replaced: Mapping[str, 
     checks: with the design's assertions; without, it runs faster. replaced: files to take instead, by module.
     """
     stage = STAGES[config.stage]
+    if not stage.module:
+        raise FlickerError(f"stage {config.stage}: a model so far, there is no RTL to simulate")
     top, header = generate.write(stage)
     sources = [(replaced or {}).get(path.stem, path) for path in sources_of(generate.TOP, [top])]
     return verilate(
