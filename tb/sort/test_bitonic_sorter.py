@@ -29,7 +29,9 @@ def parameters(shape: tuple[int, int, int, int]) -> dict[str, int]:
     return dict(zip(("Lanes", "KeyWidth", "PayloadWidth", "StagesPerReg"), shape))
 
 
-@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: "-".join(map(str, shape)))
+@pytest.mark.parametrize("shape", [
+    pytest.param(shape, id="-".join(map(str, shape)), marks=[pytest.mark.slow] * (shape in ((4, 5, 3, 4), (16, 40, 9, 3)))) for shape in SHAPES
+])
 def test_sorter(shape: tuple[int, int, int, int]) -> None:
     build_and_test(
         "flk_bitonic_sorter",
