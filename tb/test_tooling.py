@@ -184,10 +184,10 @@ def test_trace_format(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_vcd_is_written() -> None:
     """A simulation with traces leaves a VCD and its view; needs no headers."""
     done = command(
-        sys.executable, "-m", "pytest", "--unit", "stream_cells", "-k", "test_skid_buffer and 8", "tb", WAVES="1", WAVES_FORMAT="vcd"
+        sys.executable, "-m", "pytest", "--unit", "stream_cells", "-k", "test_skid_buffer and 146", "tb", WAVES="1", WAVES_FORMAT="vcd"
     )
     assert done.returncode == 0, done.stdout
-    trace = ROOT / "build/waves/stream_cells/skid_buffer/test_skid_buffer_8-seed1.vcd"
+    trace = ROOT / "build/waves/stream_cells/skid_buffer/test_skid_buffer_146-seed1.vcd"
     assert "$enddefinitions" in trace.read_text()
     shown = trace.with_suffix(".gtkw").read_text().splitlines()
     assert set(signal_view.signals(trace, "flk_skid_buffer")) <= set(shown)

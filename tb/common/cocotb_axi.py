@@ -222,7 +222,7 @@ async def write(dut, idle, order, share):
     failing = range(BASE + 0x400, BASE + 0x1400)
     port.port.fail_range(BASE + 0x400, 0x1000)
     golden = bytearray(memory.read(BASE, SIZE))
-    await test.run(requests(dut, test.bench.rng, 40, apart=True), golden, BASE, failing)
+    await test.run(requests(dut, test.bench.rng, 80, apart=True), golden, BASE, failing)
     assert memory.read(BASE, SIZE) == golden and port.port.idle
     assert {error for _, error in test.done} == {0, 1}
 
