@@ -300,21 +300,27 @@ def main() -> int:
         print(f"mutants: {len(mutants)} can be made")
         return 0
     FOLDER.mkdir(parents=True, exist_ok=True)
+    with toolchain.locked(FOLDER / "lock"):  # the copies are one run's
+        return _run(mutants, args.jobs, args.seed)
+
+
+def _run(mutants: list[Mutant], jobs: int, seed: int) -> int:
+    """Run those whose outcome is not known, show all; the exit code."""
     console = Console()
     kept = _kept()
     outcomes = {m.number: kept[m.number] for m in mutants if m.number in kept and _current(kept[m.number])}
     left = [m for m in mutants if m.number not in outcomes]
-    console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {args.seed}")
-    copies = Copies(args.jobs) if left else None
+    console.print(f"mutants: {len(mutants)}, {len(outcomes)} known, seed {seed}")
+    copies = Copies(jobs) if left else None
     with Progress(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"), console=console, transient=True,
-                  disable=not console.is_terminal) as bar, ThreadPoolExecutor(args.jobs) as pool:
+                  disable=not console.is_terminal) as bar, ThreadPoolExecutor(jobs) as pool:
         task = bar.add_task("", total=len(mutants), completed=len(outcomes))
-        for outcome in pool.map(lambda m: copies.run(m, args.seed), left):
+        for outcome in pool.map(lambda m: copies.run(m, seed), left):
             outcomes[outcome.mutant.number] = outcome
             bar.update(task, advance=1, description=outcome.mutant.title)
             if not console.is_terminal:
                 print(f"{outcome.killer or outcome.wrong or 'SURVIVED':<16} {outcome.mutant.title}", flush=True)
-            _write(list((kept | outcomes).values()))
+            _write(list((_kept() | {outcome.mutant.number: outcome}).values()))
     found = [outcomes[m.number] for m in mutants]
     table = Table()
     for column in ("unit", "mutant", "killed by", "note"):
