@@ -1,4 +1,5 @@
 """ff numbers (docs/ff.md): the model against numpy's float32 and exact rationals, error bounds of the functions, units against the model.
+`flk_ff_poly` and the tables behind it, `flk_ff_rom`, run inside the units of functions (recip, rsqrt, sqrt, exp2).
 
 Not covered: mantissas other than those named in the tests; the units have no case of their own for them.
 """

@@ -1,7 +1,8 @@
 """Priority arbiter with a bound on waiting: choice, data, ready in every cycle against a model of its counts.
 
 State space: inputs that pause, wait and give up, outputs that stall in every pattern; all inputs busy; reset while some are urgent.
-Parameter space: 2 to 8 inputs, Patience from its least value to 16. For all traces: formal/fv_priority_arbiter.sv.
+Parameter space: 2, 4, 5 inputs, Patience at its least value and 16; with SLOW=1 also 3 and 8 inputs and Patience between.
+For all traces: formal/fv_priority_arbiter.sv.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Stream cells: pipe register, skid buffer, FIFO, round-robin arbiter.
 
 State space: every pair of idle and back-pressure patterns (flicker_tb.stalls), random payloads,
-random initial register values, blocked output, reset in mid-traffic. Parameter space: widths of
-one bit and of more than a machine word; FIFO depths 1, 2, powers of two, one beside them, 128;
-2 to 6 arbiter inputs. Not covered: other depths and widths (the code has no case for them).
+random initial register values, blocked output, reset in mid-traffic. Parameter space: registers
+of one bit and of more than a machine word; FIFO depths 1, 2, 3, 17; 3 and 4 arbiter inputs. With
+SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 128, 2 and 6 inputs, registers of 8 bits.
+Not covered: other depths and widths (the code has no case for them).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 State space: differences and shapes as in real scenes, thin slanted splats (terms that cancel), special numbers (zeros, subnormals, largest,
 infinities, NaN), any bits; random halts and bubbles with garbage on the inputs, the shape taken in its own cycle. Parameter space: both
-forms in FP16, E4M3 and E5M2 (IEEE-like with saturation); one pixel and 2 x 2, the two that the design has, and 3 x 1 for the numbering.
+forms, one pixel in FP16 and 2 x 2 in E4M3; with SLOW=1 also 2 x 2 in FP16, 3 x 1 in E4M3 for the numbering, E5M2 (IEEE-like with saturation).
 Not covered: other formats, which the arithmetic units' test has.
 """
 

@@ -2,9 +2,10 @@
 
 State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000 splats; all modes;
 idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it fall and return, under different
-stalls; reset and clear in mid-traffic. Parameter space: every form and precision without output FIFO, some with SLOW=1 only; output FIFOs of 1 to 3
-places and that of the faithful configuration; VRU cycles of channels with 1, 2 and 4 VRUs; illegal parameters. Not covered: a change of mode in
-mid-frame, which the contract excludes (tb/render/test_stage_control.py: the mode is latched).
+stalls; reset and clear in mid-traffic. Parameter space: without output FIFO the factored form in fixed point and FP16, the conic one in mixed precision; an
+output FIFO of one place and that of the faithful configuration; VRU cycles of channels with 1 and 2 VRUs; illegal parameters. With SLOW=1 also the
+other precisions of each form, output FIFOs of 2 and 3 places, channels with 4 VRUs. Not covered: a change of mode in mid-frame, which the contract
+excludes (tb/render/test_stage_control.py: the mode is latched).
 """
 
 from __future__ import annotations

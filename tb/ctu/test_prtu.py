@@ -3,8 +3,8 @@
 State space: random records as in real scenes, thin slanted splats (terms that cancel), covering splats, and records with special
 numbers (zeros, subnormals, largest, infinities, NaN, any bits); all leader rectangles of both sampling modes and any other
 corners; thresholds of the record's opacity and any bits; random bubbles with garbage on the inputs.
-Parameter space: both forms in all four precisions, two columns and two rows (single pixels: `make sim UNIT=weight`). Not covered: the
-space is 2^100, so arithmetic corners are the business of the arithmetic units' tests.
+Parameter space: both forms, all four precisions, every pair of them with SLOW=1 only; two columns and two rows (single pixels:
+`make sim UNIT=weight`). Not covered: the space is 2^100, so arithmetic corners are the business of the arithmetic units' tests.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 begin random.
 
 State space: entries of one tile and of tiles in turn (hits, free ways, evictions, full lines, a line closed in the cycle after its last entry), chunks begun
-and full, no entries, memory that runs out at every place, idle and back-pressure patterns, reset in a frame. Parameter space: two numbers of pointers; the
-format is fixed. Not covered: counters of more than 2**16, chunk numbers of more than 12 bits.
+and full, no entries, memory that runs out at every place, idle and back-pressure patterns, reset in a frame. Parameter space: 64 pointers; 2048 for
+whole frames and the rate only; the format is fixed. Not covered: counters of more than 2**16, chunk numbers of more than 12 bits.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Rendering stage on a few lists: pixels against the golden models, counters through their port, stall of the mask generator.
 
-State space: one short frame of random lists on four cores, random back-pressure; a stream of tokens against blocked pixels. Parameter space: the CTU
-and the generator of full masks, one VRU per channel; illegal parameters. Not covered: everything that whole frames cover (tb/frames): modes,
-aborts, other sizes, cycle counts.
+State space: one short frame of random lists on four cores, random back-pressure; a stream of tokens against blocked pixels. Parameter space: the CTU,
+with SLOW=1 also the generator of full masks, one VRU per channel; illegal parameters, most of them with SLOW=1 only. Not covered:
+everything that whole frames cover (tb/frames): modes, aborts, other sizes, cycle counts.
 """
 
 from __future__ import annotations

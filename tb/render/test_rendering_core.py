@@ -1,8 +1,9 @@
 """Rendering core: four channels behind one dispatch, against the golden model, under stalls.
 
 State space: random lists with random masks, empty sub-tiles, lists that finish early; clear in mid-traffic; idle_o in every cycle. Parameter space:
-FIFO depths 1 and 16, both forms; masks of mini-tiles, and of pixels; full rate, idle input, blocked output; illegal parameters. Not covered: other
-depths and numbers of VRUs (tb/render/test_channel.py).
+factored form with FIFOs of 16 places, conic form with one; masks of mini-tiles, and of pixels (4 places, one VRU); illegal parameters. Full rate with 16
+places and idle input with one; the other way round with SLOW=1; blocked output with both. Not covered: other depths and numbers of VRUs
+(tb/render/test_channel.py).
 """
 
 from __future__ import annotations
