@@ -1,4 +1,4 @@
-"""The chip, from a packed scene in memory to a frame buffer, through registers and the C driver: every byte as in the golden model.
+"""The chip, `flk_top`, from a packed scene in memory to a frame buffer, through registers and the C driver: every byte as in the golden model.
 
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
@@ -24,9 +24,10 @@ from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import render_chip
+from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, Outcome, run_front
-from flicker.params import CHANNEL_COUNTERS, CORE_COUNTERS, CatMode, RenderConfig
+from flicker.params import CHANNEL_COUNTERS, CORE_COUNTERS, CORES, CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -75,6 +76,12 @@ def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RG
     return done
 
 
+def of_cores(values: np.ndarray, cols: int) -> np.ndarray:
+    """Sums by core of what sub-tiles have: core k has column k % 2, row k / 2 of each tile."""
+    grid = values.reshape(-1, cols)
+    return np.array([grid[k // 2 :: 2, k % 2 :: 2].sum() for k in range(CORES)])
+
+
 def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> None:
     front, want = golden(chip.packed, view, config, format_)
     assert done.error == 0
@@ -82,7 +89,15 @@ def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelForm
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
-    assert np.sum(done.rendering["entries"]) <= counts["entries"]
+    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i is of sorting
+    # unit i mod 4, which delivers what the core that needs most of the tile's list needs.
+    taken, lists = done.stage[:, [name for name, _ in CORE_COUNTERS].index("gaussians_in")], want.frame.lists
+    lengths, needed = (of_cores(values, lists.cols) for values in (np.diff(lists.start), want.frame.needed))
+    assert may_be_given(taken, lengths, needed, config.cat == CatMode.AUTO and config.mask_generator == "ctu").all(), (taken, needed, lengths)
+    delivered = np.asarray(done.rendering["entries"])
+    least = want.frame.needed.reshape(lists.rows // 2, 2, lists.cols // 2, 2).max(axis=(1, 3)).ravel()
+    assert all(delivered[k] >= least[k::4].sum() for k in range(4)), (delivered, least)
+    assert taken.sum() <= CORES * delivered.sum() and delivered.sum() <= counts["entries"]
     for number, (name, _) in enumerate(CHANNEL_COUNTERS):
         if name not in ("minitiles_sent", "pixels_finished"):
             continue
