@@ -45,6 +45,8 @@ KILLED_AT_HOME = 0.95
 TIMEOUT = 900  # seconds of a test run, on a busy machine
 # Modules that build, simulate memory, show and report. Outcomes are not run anew when they change: what kills a mutant is not in them.
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
+# Modules whose numbers stand in a generated package: an outcome depends on that.
+PACKAGES = {"flicker.params": ROOT / "rtl/common/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/common/flk_pkg.sv"}
 KEYS = {"file", "find", "replace", "unit", "note", "survives"}
 
 
@@ -187,8 +189,9 @@ def _modules(text: str) -> set[Path]:
         found |= {name for name in (module, *(f"{module}.{word}" for word in re.findall(r"\w+", names))) if name in graph.modules}
     for module in found - HOUSEHOLD:
         found |= graph.find_upstream_modules(module)
-    places = [ROOT / "model" / module.replace(".", "/") for module in found - HOUSEHOLD]
-    return {path for place in places for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()}
+    places = [ROOT / "model" / module.replace(".", "/") for module in found - HOUSEHOLD - PACKAGES.keys()]
+    files = {path for place in places for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()}
+    return files | {PACKAGES[module] for module in found & PACKAGES.keys()}
 
 
 @cache
