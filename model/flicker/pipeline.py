@@ -23,9 +23,10 @@ from .golden.render import render_golden
 from .params import CHANNELS, CORES, Coords, Form, RenderConfig
 from .progress import Steps
 from .scene.files import scene_kind
+from .scene.gaussians import Scene
 from .scene.metrics import psnr
 from .scene.packed import PackedFormat, PackedScene, load_packed
-from .scene.packing import pack, pack_file
+from .scene.packing import Packing, pack, pack_file
 from .sim.preprocessing import build as build_front
 from .sim.preprocessing import front_frame
 from .sim.render_stage import build, render_rtl
@@ -94,17 +95,23 @@ def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
     }
 
 
-def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
-    """The memory image of a view's scene: the file itself if it is one, else made now; a file that comes in chunks keeps them."""
-    path = view.scene.path
+def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = None) -> Packing:
+    """The memory image of a scene: the file itself if it is one, else made now; a file that comes in chunks keeps them. What is kept has every Gaussian of the
+    file, those too that `load_scene` leaves out."""
+    path = scene.path
     if path is None:
-        return pack(view.scene, form or PackedFormat.CHUNK).packed
+        return pack(scene, form or PackedFormat.CHUNK, steps=steps)
     if scene_kind(path) == "image":
         packed = load_packed(path)
         if form not in (None, packed.format):
             raise FlickerError(f"{path}: is packed as {packed.format.value}, not {form.value if form else ''}")
-        return packed
-    return pack_file(path, form or PackedFormat.CHUNK).packed
+        return Packing(packed, np.arange(len(packed)))
+    return pack_file(path, form or PackedFormat.CHUNK, steps=steps)
+
+
+def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
+    """`packing_of` a view's scene."""
+    return packing_of(view.scene, form).packed
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:

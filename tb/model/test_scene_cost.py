@@ -1,8 +1,8 @@
 """Cost of a scene: what each Gaussian gives and takes, findings, the command.
 
 Covered: sums over Gaussians against pictures (blended weight against transmittance, visits against the map of visits, entries and bytes against the chip
-model's), numbers in the file's order, one scene for each finding. The cycles themselves are the chip model's: tb/model/test_chip_rendering.py. Not covered:
-that what is called never seen is never seen from elsewhere.
+model's), numbers in the file's order, scenes that come in chunks or packed, one scene for each finding. The cycles themselves are the chip model's:
+tb/model/test_chip_rendering.py. Not covered: that what is called never seen is never seen from elsewhere.
 """
 
 from __future__ import annotations
@@ -17,12 +17,18 @@ from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 
 from flicker.chip.scene_cost import ENTRY_BYTES, SH_PEAK, SceneCost, scene_cost
+from flicker.errors import FlickerError
 from flicker.front.projection import _colours
+from flicker.front.view import View
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.frame import run_front
 from flicker.params import Form
+from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
-from flicker.scene.files import Scene
+from flicker.scene.files import Scene, load_scene
+from flicker.scene.memory import decode_chunks, encode_chunks, save_chunks
+from flicker.scene.packed import PackedFormat
+from flicker.scene.packing import pack
 
 
 def camera(x: float = 0.0) -> Camera:
@@ -118,6 +124,29 @@ def test_left_out_and_wide() -> None:
     found = named(cost)
     assert found["left out"] == 20 and found["wide clusters"] == 230
     assert not cost.views[0].recorded[:20].any()
+
+
+def test_kept_chunks(tmp_path: Path) -> None:
+    """A compressed PLY keeps its chunks and a packed scene stays as it is, in the format that it has; numbers are those of the file, also of Gaussians
+    behind others that loading leaves out."""
+    chunks = encode_chunks(some(600))  # not in Morton order
+    means = decode_chunks(chunks).means
+    chunks.bounds[0, 17] = 3e38  # blue: some are beyond float32
+    path = tmp_path / "a.compressed.ply"
+    save_chunks(chunks, path)
+    scene = load_scene(path)
+    assert 0 < sum(scene.rejected.values()) == 600 - len(scene) < 256
+    cost = scene_cost(scene, [camera()])
+    assert cost.packing.kept_chunks and cost.packing.packed.image() == packed_scene(View(camera(), scene), None).image() != pack(scene).packed.image()
+    assert len(cost.scene) == len(cost.peak) == 600 and np.allclose(cost.scene.means, means, atol=1e-5)
+    assert np.corrcoef(cost.views[0].weight, scene_cost(some(600), [camera()]).views[0].weight)[0, 1] > 0.95
+    image = tmp_path / "a.flk"
+    image.write_bytes(pack(some(600), PackedFormat.FP16_LOCAL).packed.image())
+    found = scene_cost(load_scene(image), [camera()])
+    assert found.packing.packed.image() == image.read_bytes() and found.packing.packed.format is PackedFormat.FP16_LOCAL
+    assert found.views[0].weight.sum() == pytest.approx(cost.views[0].weight.sum(), rel=0.01)
+    with pytest.raises(FlickerError, match="is packed as fp16-local, not chunk"):
+        scene_cost(load_scene(image), [camera()], form=PackedFormat.CHUNK)
 
 
 def test_command(tmp_path: Path) -> None:

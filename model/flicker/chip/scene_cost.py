@@ -19,21 +19,24 @@ import numpy as np
 
 from ..explore.generators.contribution import cat_masks
 from ..golden.chip import whole_pairs
+from ..golden.front.blend import alpha_at
 from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.setup import MEAN_FRACTION, FrameSetup
 from ..golden.render import stream_order
-from ..params import ALPHA_MAX, ALPHA_MIN, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
+from ..params import ALPHA_MIN, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
+from ..pipeline import packing_of
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..scene.gaussians import Scene
-from ..scene.packed import PackedFormat
-from ..scene.packing import Packing, pack
+from ..scene.packed import PackedFormat, decode
+from ..scene.packing import Packing
 from . import preprocessing, rendering
 from .constants import CLOCK_HZ
 from .dram import DramConfig
 
+CONFIG = RenderConfig()  # of the rendering stage
 ENTRY_BYTES = 64 / 9  # nine entries in a line of 64 bytes
 VRUS = 32  # pixels that the stage visits in a cycle at most
 ENORMOUS = 0.25  # share of a view's tiles that a Gaussian is listed in
@@ -68,9 +71,8 @@ def _give(mean, shape, opacity, start, entry, mask, cols, width, height, weight,
                     if done[v, u]:
                         continue
                     dx, dy = x - mean[i, 0], y - mean[i, 1]
-                    energy = (shape[i, 0] * dx + shape[i, 1] * dy) ** 2 + (shape[i, 2] * dy) ** 2
-                    alpha = min(ALPHA_MAX, opacity[i] * np.exp2(-energy))
-                    if not alpha >= ALPHA_MIN:
+                    alpha = alpha_at(shape[i], True, opacity[i], dx, dy)
+                    if alpha == 0.0:
                         continue
                     before = transmittance[v, u]
                     after = before * (1.0 - alpha)
@@ -131,12 +133,11 @@ class Finding:
 
 @dataclass(eq=False)
 class SceneCost:
-    """A scene over views. Arrays of Gaussians are in the file's order."""
+    """A scene over views. Arrays of Gaussians are in the file's order, which is `scene`'s."""
 
     scene: Scene
     packing: Packing
     views: list[ViewCost]
-    config: RenderConfig
 
     def _sum(self, name: str) -> np.ndarray:
         return np.sum([getattr(view, name) for view in self.views], axis=0)
@@ -237,14 +238,14 @@ class SceneCost:
         }
 
 
-def view_cost(packing: Packing, gaussians: int, camera: Camera, config: RenderConfig, dram: DramConfig) -> ViewCost:
+def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig) -> ViewCost:
     """One view of a packed scene of so many Gaussians in its file."""
     packed = packing.packed
     front = run_front(packed, camera)
     image = front_memory(front)
     first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(front, image, config, dram)
-    weight, peak, visits, visited = _entries(front, config)
+    second = rendering.estimate(front, image, CONFIG, dram)
+    weight, peak, visits, visited = _entries(front)
     lists = front.subtile_lists()
     number = packing.order[front.gaussian]  # in the file, of each record
     sums = lambda values: np.bincount(number[lists.entry], values, minlength=gaussians)  # noqa: E731
@@ -263,11 +264,11 @@ def view_cost(packing: Packing, gaussians: int, camera: Camera, config: RenderCo
     )
 
 
-def _entries(front: FrontFrame, config: RenderConfig) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     lists = front.subtile_lists()
     whole = whole_pairs(lists)
     order, core_start = stream_order(whole)
-    mask, _, _ = cat_masks(whole, config, order, core_start)  # entries stand as in `lists`: the sub-tiles beyond are empty
+    mask, _, _ = cat_masks(whole, CONFIG, order, core_start)  # entries stand as in `lists`: the sub-tiles beyond are empty
     splats = front.splats()
     n = len(lists.entry)
     weight, peak, visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int64)
@@ -280,15 +281,17 @@ def _entries(front: FrontFrame, config: RenderConfig) -> tuple[np.ndarray, np.nd
     return weight, peak, visits, visited
 
 
-def scene_cost(
-    scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat = PackedFormat.CHUNK, config: RenderConfig = RenderConfig(), steps: Steps | None = None,
-) -> SceneCost:
-    """Pack a scene and look at it through cameras. FlickerError where it cannot be packed."""
+def scene_cost(scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat | None = None, steps: Steps | None = None) -> SceneCost:
+    """Look at a scene through cameras, as `packing_of` puts it into memory. form: None: that of a packed scene, else chunk. FlickerError where it cannot be
+    packed."""
     steps = steps or Steps()
-    packing = pack(scene, form, steps=steps)
+    packing = packing_of(scene, form, steps)
+    if scene.rejected and not packing.left_out:  # the file's Gaussians as they are, with those that loading left out
+        with np.errstate(over="ignore"):
+            scene = decode(packing.packed)
     views = []
     with steps.bar("views") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            views.append(view_cost(packing, len(scene.opacities), camera, config, DramConfig()))
-    return SceneCost(scene, packing, views, config)
+            views.append(view_cost(packing, len(scene), camera, DramConfig()))
+    return SceneCost(scene, packing, views)

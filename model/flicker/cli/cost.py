@@ -9,11 +9,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from ..errors import FlickerError
 from .options import RichSteps, console, parse_size, writable, write_atomically
 from .render import FormatChoice
-
-CHUNK = FormatChoice("chunk")
 
 
 def _picture(cost, number: int, out: Path) -> None:
@@ -72,13 +69,13 @@ def cost(
     views: Annotated[int, typer.Option(help="how many cameras", min=1)] = 8,
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
-    form: Annotated[FormatChoice, typer.Option("--format", help="of the scene in memory")] = CHUNK,
+    form: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory [default: chunk or as packed]")] = None,
     out: Annotated[Path | None, typer.Option(help="picture: Gaussians visited per pixel of the dearest view")] = None,
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
 ) -> None:
     """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
     from ..chip.scene_cost import scene_cost
-    from ..front.view import load_view
+    from ..front.view import DEMO, load_view
     from ..scene.camera import find_cameras
     from ..scene.demo import demo_cameras
     from ..scene.packed import PackedFormat
@@ -87,14 +84,12 @@ def cost(
     writable(json_, "--json")
     wanted = parse_size(size)
     loaded = load_view(scene, view or 0, wanted, cameras, up)
-    found = demo_cameras() if loaded.name == "demo" and scene == "demo" else find_cameras(loaded.scene, cameras, up)
+    found = demo_cameras() if scene == DEMO else find_cameras(loaded.scene, cameras, up)
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]
     chosen = [found[n] if wanted is None else found[n].resized(*wanted) for n in numbers]
-    if not chosen:
-        raise FlickerError(f"{scene}: no cameras")
-    result = scene_cost(loaded.scene, chosen, form=PackedFormat(form.value), steps=RichSteps())
-    clusters = len(result.packing.packed.table)
-    console.print(f"{scene}: {len(loaded.scene.opacities):,} Gaussians, {form.value}, {clusters:,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
+    result = scene_cost(loaded.scene, chosen, form=None if form is None else PackedFormat(form.value), steps=RichSteps())
+    packed = result.packing.packed
+    console.print(f"{scene}: {len(result.scene):,} Gaussians, {packed.format.value}, {len(packed.table):,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
     _show(result, numbers)
     if out is not None:
         dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)

@@ -12,6 +12,21 @@ from .record import Splats
 from .setup import MEAN_FRACTION
 
 
+@numba.njit
+def alpha_at(shape, factored, opacity, dx, dy):
+    """Alpha of a splat at a distance from its mean, 0 where it is below ALPHA_MIN or its weight no number of use."""
+    if factored:
+        energy = (shape[0] * dx + shape[1] * dy) ** 2 + (shape[2] * dy) ** 2
+        weight = np.exp2(-energy)
+    else:
+        energy = (shape[0] * dx + shape[1] * dy) * dx + shape[2] * dy * dy
+        weight = np.exp(-energy)
+    if not energy >= 0.0:
+        return 0.0
+    alpha = min(ALPHA_MAX, opacity * weight)
+    return 0.0 if alpha < ALPHA_MIN else alpha
+
+
 @numba.njit(parallel=True, cache=True)
 def _blend(mean, shape, factored, opacity, rgb, start, entry, cols, image, transmittance):
     height, width = transmittance.shape
@@ -30,16 +45,8 @@ def _blend(mean, shape, factored, opacity, rgb, start, entry, cols, image, trans
                     if done[y - top, x - left]:
                         continue
                     dx = x - mean[i, 0]
-                    if factored:
-                        energy = (shape[i, 0] * dx + shape[i, 1] * dy) ** 2 + (shape[i, 2] * dy) ** 2
-                        weight = np.exp2(-energy)
-                    else:
-                        energy = (shape[i, 0] * dx + shape[i, 1] * dy) * dx + shape[i, 2] * dy * dy
-                        weight = np.exp(-energy)
-                    if not energy >= 0.0:
-                        continue
-                    alpha = min(ALPHA_MAX, opacity[i] * weight)
-                    if alpha < ALPHA_MIN:
+                    alpha = alpha_at(shape[i], factored, opacity[i], dx, dy)
+                    if alpha == 0.0:
                         continue
                     before = transmittance[y, x]
                     after = before * (1.0 - alpha)
