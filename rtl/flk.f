@@ -5,6 +5,7 @@ common/flk_param_pkg.sv
 common/flk_pkg.sv
 common/flk_rendering_pkg.sv
 common/flk_table_pkg.sv
+lanes/flk_lane_pkg.sv
 preproc/flk_front_pkg.sv
 preproc/flk_preproc_pkg.sv
 regs/flk_registers_pkg.sv
@@ -77,6 +78,13 @@ render/flk_rendering_core.sv
 render/flk_shape_to_fp16.sv
 render/flk_stage_control.sv
 render/flk_vru.sv
+lanes/flk_lane.sv
+lanes/flk_lane_core.sv
+lanes/flk_lane_counters.sv
+lanes/flk_lane_queue.sv
+lanes/flk_lane_result.sv
+lanes/flk_row_mask.sv
+lanes/flk_splat_setup.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
 sort/flk_delivery.sv
@@ -112,6 +120,7 @@ regs/flk_registers.sv
 top/flk_descriptor.sv
 top/flk_frame_control.sv
 top/flk_frame_counters.sv
+flk_lane_stage.sv
 flk_render_stage.sv
 flk_rendering.sv
 flk_top.sv

@@ -28,7 +28,7 @@ def _literal(table: np.ndarray, width: int, indent: str) -> str:
         rows = [_literal(row, width, indent + "  ") for row in table[::-1]]
     else:
         words = [f"{width}'d{entry}" for entry in table[::-1]]
-        count = 8 if max(map(len, words)) <= 10 else 6
+        count = 8 if len(indent) + 8 * (max(map(len, words)) + 2) <= 98 else 6
         rows = [", ".join(words[i : i + count]) for i in range(0, len(words), count)]
     return "{\n" + ",\n".join(f"{indent}  {row}" for row in rows) + f"\n{indent}}}"
 
@@ -43,7 +43,8 @@ class Package:
         self.lines.append(f"\n  // {text}")
 
     def number(self, name: str, value: int, note: str) -> None:
-        self.lines.append(f"  localparam int unsigned {name} = {value};  // {note}")
+        line = f"  localparam int unsigned {name} = {value};"
+        self.lines += [f"{line}  // {note}"] if len(line) + len(note) <= 95 else [f"  // {note}", line]
 
     def array(self, name: str, table: np.ndarray) -> None:
         sizes = "".join(f"[{size - 1}:0]" for size in (*table.shape, _bits(table)))

@@ -52,6 +52,8 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_mask_generator": [{"MaskGenerator": 1}],
     "flk_rendering_core": [{"VrusPerChannel": 1, "MaskBits": 64}],
     "flk_render_stage": [{"VrusPerChannel": 1, "MaskGenerator": 1}],
+    "flk_lane": [{"Lanes": 16}, {"Lanes": 32}],
+    "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],
     "flk_prtu": [{"Form": f, "Precision": p} for f in (0, 1) for p in (0, 1, 2)],
     "flk_ctu": [{"Form": 0, "Precision": 1, "CtuFifoDepth": 16}, {"Precision": 0}, {"Precision": 2}],

@@ -29,15 +29,16 @@ class Field:
 
 @dataclass(frozen=True)
 class Record:
-    """A packed struct `<name>_t`, most significant field first."""
+    """A packed struct `<name>_t`, most significant field first, of a package."""
 
     name: str
     note: str
     fields: tuple[Field, ...]
+    package: str = "flk_pkg"
 
 
-def _record(name: str, note: str, *fields: tuple) -> Record:
-    return Record(name, note, tuple(Field(*field) for field in fields))
+def _record(name: str, note: str, *fields: tuple, package: str = "flk_pkg") -> Record:
+    return Record(name, note, tuple(Field(*field) for field in fields), package)
 
 
 _COORD = "flk_param_pkg::SUBTILE_COORD_BITS"
@@ -56,6 +57,10 @@ RECORDS: dict[str, Record] = {
             ("row", SUBTILE_COORD_BITS, "", _COORD), ("col", SUBTILE_COORD_BITS, "", _COORD),
         ),
         _record("splat_elem", "Stream element between sorting unit and mask generator.", ("eos", 1), ("splat", "splat")),
+        _record(
+            "record_elem", "Stream element of the lanes: a record of 16 bytes as it lies in memory, and the sub-tile whose list it is in.",
+            ("eos", 1), ("record", 128), ("subtile", "subtile"), package="flk_lane_pkg",
+        ),
         _record("feature_elem", "Stream element of a feature FIFO; a mask generator sends it below its mask.", ("eos", 1), ("feature", "feature")),
         _record("pixel", "State of one pixel.", ("transmittance", "fp16"), ("red", "fp16"), ("green", "fp16"), ("blue", "fp16")),
         _record("channel_pixel", "Finished pixel of a channel: index within the mini-tile.", ("subtile", "subtile"), ("index", 4), ("pixel", "pixel")),
@@ -164,7 +169,8 @@ def typedef(record: Record) -> str:
 
     def type_of(field: Field) -> str:
         if isinstance(field.type, str):
-            return f"{field.type}_t"
+            other = "" if field.type == "fp16" or RECORDS[field.type].package == record.package else f"{RECORDS[field.type].package}::"
+            return f"{other}{field.type}_t"
         if field.alias:
             return f"logic [{field.alias}-1:0]"
         return "logic" if field.type == 1 else f"logic [{field.type - 1}:0]"

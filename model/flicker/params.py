@@ -74,6 +74,9 @@ FP8_ADD_STAGES = 2
 FP8_SUM_STAGES = 1
 FP8_MUL_STAGES = 1
 LOG_STAGES = 3
+# Registers of the lanes' units.
+LANE_SETUP_STAGES = 4
+LANE_ROW_MASK_STAGES = 3
 EXP_STAGES = {Form.CONIC: 3, Form.FACTORED: 2}
 
 
@@ -151,6 +154,7 @@ TRANSMITTANCE_MIN_BITS = fp16_bits_up(TRANSMITTANCE_MIN)
 MAX_FIFO_DEPTH = 128
 VRU_COUNTS = (1, 2, 4)  # VRUs per channel that the RTL can have
 LANE_COUNTS = (32, 64, 128)  # lanes of all cores
+MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
 
 @dataclass(frozen=True)
@@ -161,8 +165,8 @@ class RenderConfig:
     which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
     is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
-    mask_generator, stage: keys of MASK_GENERATORS and STAGES. lanes: of all cores, for the stage `lanes`, which has no other parameter; its picture does not
-    depend on it.
+    mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `lanes` of all cores; `in_width` elements
+    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue.
     """
 
     form: Form = Form.FACTORED
@@ -175,6 +179,8 @@ class RenderConfig:
     mask_generator: str = "ctu"
     stage: str = "channels"
     lanes: int = LANE_COUNTS[0]
+    in_width: int = 2
+    slots: int = 20
 
     def __post_init__(self) -> None:
         for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES)):
@@ -192,6 +198,11 @@ class RenderConfig:
             raise FlickerError(f"configuration: vrus_per_channel must be 1, 2 or 4, not {self.vrus_per_channel}")
         if self.lanes not in LANE_COUNTS:
             raise FlickerError(f"configuration: lanes must be {', '.join(map(str, LANE_COUNTS[:-1]))} or {LANE_COUNTS[-1]}, not {self.lanes}")
+        if self.in_width not in (1, 2):
+            raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
+        for field in ("slots", "fifo_depth"):
+            if self.by_lanes and not 2 <= (value := getattr(self, field)) <= MAX_LANE_ENTRIES:
+                raise FlickerError(f"configuration: {field} must be 2 to {MAX_LANE_ENTRIES} with stage lanes, not {value}")
         if self.by_lanes and (self.form, self.coords) != (Form.FACTORED, Coords.LOCAL):
             raise FlickerError("configuration: stage lanes takes records of 16 bytes, so form must be factored and coords local")
 
@@ -219,6 +230,10 @@ class RenderConfig:
             "CtuFifoDepth": self.ctu_fifo_depth,
             "VrusPerChannel": self.vrus_per_channel,
             "MaskGenerator": list(MASK_GENERATORS).index(self.mask_generator),
+            "Lanes": self.lanes,
+            "InWidth": self.in_width,
+            "Slots": self.slots,
+            "Depth": self.fifo_depth,
         }
         return {name: values[name] for name in STAGES[self.stage].parameters}
 
@@ -270,34 +285,22 @@ MASK_GENERATORS: dict[str, MaskGenerator] = {
 
 @dataclass(frozen=True)
 class Stage:
-    """A rendering stage: a module with the ports that docs/render_stage.md lists; an empty name where only a model exists.
+    """A rendering stage: a module with the ports that docs/render_stage.md lists.
 
     element, pixel: records (flicker.layout) that it takes and gives, on one stream per core. A token of `element` is its bit `eos`, with the
     sub-tile's place in the lowest bits; RECORD_ELEMENT: records as they lie in memory. `pixel` names sub-tile, mini-tile, index and pixel.
-    parameters: those of RenderConfig.rtl_parameters() that the module has.
+    parameters: those of RenderConfig.rtl_parameters() that the module has. counters: of a core, in the order of their indices.
     """
 
     module: str
     element: str
     pixel: str
     parameters: tuple[str, ...]
+    counters: tuple[str, ...]
     note: str
 
 
-RECORD_ELEMENT = "record"  # 16 bytes, no packed struct of its own yet
-
-STAGES: dict[str, Stage] = {
-    "channels": Stage(
-        "flk_render_stage", "splat_elem", "core_pixel",
-        ("Form", "Precision", "FifoDepth", "CtuFifoDepth", "VrusPerChannel", "MaskGenerator"), "mask generators and volume rendering units",
-    ),
-    "lanes": Stage("", RECORD_ELEMENT, "core_pixel", (), "lanes in the log domain (docs/lanes.md)"),
-}
-
-# The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
-# the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
-FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
-NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}
+RECORD_ELEMENT = "record_elem"
 
 # ---- performance counters (order of the RTL's counter vector) ----------------------------------
 
@@ -321,7 +324,48 @@ CHANNEL_COUNTERS = (
     ("pixels_finished", "pixels that ended before their list did"),
 )
 COUNTERS_PER_CORE = len(CORE_COUNTERS) + CHANNELS * len(CHANNEL_COUNTERS)
+# Of a core of the lanes (rtl/lanes/flk_lane_counters.sv), behind the same read port. Sums over lanes count every lane in every cycle.
+LANE_COUNTERS = (
+    ("cycles", "cycles since the counters were cleared"),
+    ("subtiles", "end-of-sub-tile tokens taken"),
+    ("gaussians_in", "splats taken"),
+    ("gaussians_rejected", "splats whose mask came out empty"),
+    ("busy", "cycles in which something was taken"),
+    ("stalled", "cycles in which there was input that could not be taken"),
+    ("idle", "cycles without input"),
+    ("dropped", "splats whose pixels were all known to be finished"),
+    ("dispatched", "splats and tokens that took a slot of the store"),
+    ("no_slot", "cycles in which one of them waited for a slot"),
+    ("no_room", "cycles in which one waited for a lane's queue"),
+    ("entries", "entries of splats in the lanes' queues"),
+    ("visits", "pixels visited"),
+    ("skipped", "visits whose alpha is below 1/255"),
+    ("blended", "visits that were blended"),
+    ("pixels_finished", "pixels that ended before their list did"),
+    ("starved", "lanes without an entry, summed over the cycles"),
+    ("bank_waits", "lanes whose token waited for the lane's bank, summed over the cycles"),
+)
 # The read port: address {core, index}, data COUNTER_LATENCY cycles later.
 COUNTER_INDEX_BITS = (COUNTERS_PER_CORE - 1).bit_length()
 COUNTER_ADDR_BITS = (CORES - 1).bit_length() + COUNTER_INDEX_BITS
 COUNTER_LATENCY = 1
+
+# ---- rendering stages -------------------------------------------------------------------------
+
+STAGES: dict[str, Stage] = {
+    "channels": Stage(
+        "flk_render_stage", "splat_elem", "core_pixel",
+        ("Form", "Precision", "FifoDepth", "CtuFifoDepth", "VrusPerChannel", "MaskGenerator"),
+        (*(name for name, _ in CORE_COUNTERS), *(f"channel {c} {name}" for c in range(CHANNELS) for name, _ in CHANNEL_COUNTERS)),
+        "mask generators and volume rendering units",
+    ),
+    "lanes": Stage(
+        "flk_lane_stage", RECORD_ELEMENT, "core_pixel", ("Lanes", "InWidth", "Slots", "Depth"), tuple(name for name, _ in LANE_COUNTERS),
+        "lanes in the log domain (docs/lanes.md)",
+    ),
+}
+
+# The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
+# the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
+FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
+NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}

@@ -29,7 +29,7 @@ from .scene.packed import PackedFormat, PackedScene, load_packed
 from .scene.packing import Packing, pack, pack_file
 from .sim.preprocessing import build as build_front
 from .sim.preprocessing import front_frame
-from .sim.render_stage import build, render_rtl
+from .sim.render_stage import RtlFrame, build, render_rtl
 
 
 class Engine(str, Enum):
@@ -74,7 +74,7 @@ class Rendered:
     stats: dict[str, Any]
 
 
-def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
+def rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
     """Cycles, counters and utilisation of a simulated frame."""
     cores = []
     for k in range(CORES):
@@ -92,6 +92,23 @@ def rtl_stats(rtl, config: RenderConfig) -> dict[str, Any]:
         "ctu_stall_rate": float(rtl.core_counter("ctu_stalled").sum() / (cycles * CORES)),
         "vrus": CORES * CHANNELS * config.vrus_per_channel,
         "cores": cores,
+    }
+
+
+def lane_rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
+    """`rtl_stats` of the lanes: a visit is useful when it is blended or finishes its pixel."""
+    count = {name: int(rtl.core_counter(name).sum()) for name in rtl.names}
+    slots = rtl.cycles * config.lanes
+    return {
+        "pixel_pairs": count["visits"], "pairs_blended": count["blended"], "pixels_finished": count["pixels_finished"],
+        "cycles": rtl.cycles,
+        "simulated_cycles_per_second": round(rtl.cycles / rtl.seconds) if rtl.seconds else None,
+        "lane_utilisation": (count["blended"] + count["pixels_finished"]) / slots,
+        "lanes": {
+            "lanes": config.lanes, "visited": count["visits"], "skipped": count["skipped"], "blended": count["blended"],
+            "waiting": {"no entry": count["starved"] / slots, "bank taken": count["bank_waits"] / slots},
+        },
+        "cores": [{name: int(rtl.core_counter(name)[k]) for name in rtl.names} for k in range(CORES)],
     }
 
 
@@ -265,9 +282,10 @@ def render_view(
 
 
 def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, steps: Steps) -> Rendered:
-    """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once."""
-    if engine is not Engine.GOLDEN:
-        raise FlickerError(f"stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
+    """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once. The RTL
+    is fed as a chip feeds a stage that says when a sub-tile is finished: it leaves its list then, and one with an empty list is not streamed."""
+    if engine is Engine.REFERENCE:
+        raise FlickerError("stage lanes: for --engine golden, rtl and chip-golden, not reference")
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = lane_lists(frame_in, steps)
@@ -278,10 +296,18 @@ def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, op
             lists = float_lists(view.projected, by_splat)
         more["adjusted"] = lists.adjusted
     stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
-    with steps.step("rendering with the golden lanes"):
-        frame = render_lanes(lists)
+    frame: LaneFrame | RtlFrame
+    if engine is Engine.RTL:
+        with steps.step("building the simulator (once per configuration)"):
+            build(config)
+        with steps.bar("simulating the RTL") as report:
+            frame = render_rtl(lists, config, leave=True, empty=False, progress=report)
+        stats |= lane_rtl_stats(frame, config)
+    else:
+        with steps.step("rendering with the golden lanes"):
+            frame = render_lanes(lists)
+        stats |= lane_stats(frame, config)
     image = frame.image(view.background)
-    stats |= lane_stats(frame, config)
     if compare:
         stats |= compared(view, image, steps)
     return Rendered(image, stats)

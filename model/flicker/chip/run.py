@@ -62,7 +62,7 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
             stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
         return _frame_image(golden.buffer, camera), stats
     if config.by_lanes:
-        raise FlickerError(f"stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
+        raise FlickerError(f"stage lanes: for --engine golden, rtl and chip-golden, not {engine.value}")
     if config.form is not Form.FACTORED:
         raise FlickerError("--engine chip: the front end in RTL writes records of 16 bytes, for --form factored; --engine chip-golden takes the conic form too")
     with steps.step("packing the scene"):

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from ..params import FAITHFUL, LANE_COUNTS, MAX_FIFO_DEPTH, STAGES, CatMode, Coords, Form, Precision, RenderConfig
+from ..params import FAITHFUL, LANE_COUNTS, MAX_FIFO_DEPTH, MAX_LANE_ENTRIES, STAGES, CatMode, Coords, Form, Precision, RenderConfig
 from .options import RichSteps, console, parse_size, writable, write_atomically
 
 
@@ -76,8 +76,12 @@ def summary(stats: dict, picture: Path | None) -> Table:
     if "lanes" in stats:
         lanes = stats["lanes"]
         table.add_row("pixel visits", f"{_number(lanes['visited'])}, {lanes['skipped'] / max(lanes['visited'], 1):.1%} of them skipped")
-        table.add_row(f"cycles of {lanes['lanes']} lanes, at least", _number(lanes["least_cycles"]))
-    for key, label in (("vru_utilisation", "VRU utilisation"), ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
+        if "least_cycles" in lanes:
+            table.add_row(f"cycles of {lanes['lanes']} lanes, at least", _number(lanes["least_cycles"]))
+        for cause, share in lanes.get("waiting", {}).items():
+            table.add_row(f"  lanes waiting: {cause}", f"{share:.1%}")
+    for key, label in (("lane_utilisation", "lanes with a pair that counts"), ("vru_utilisation", "VRU utilisation"),
+                       ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
         if key in stats:
             table.add_row(label, f"{stats[key]:.1%}")
     if "phases" in stats:
@@ -99,9 +103,9 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
 def _check_lanes(engine: Enum, given: dict[str, object]) -> None:
     """Refuse what the stage `lanes` does not go with."""
-    if engine not in (EngineChoice.GOLDEN, EngineChoice.CHIP_GOLDEN):
-        raise FlickerError(f"--stage lanes: a model so far, for --engine golden and chip-golden, not {engine.value}")
-    names = [f"--{k}" for k in ("cat", "precision", "fifo-depth", "faithful", "coords") if given[k] is not None]
+    if engine not in (EngineChoice.GOLDEN, EngineChoice.RTL, EngineChoice.CHIP_GOLDEN):
+        raise FlickerError(f"--stage lanes: for --engine golden, rtl and chip-golden, not {engine.value}")
+    names = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
     if given["form"] is FormChoice["CONIC"]:
         names.append("--form conic")
     if names:
@@ -121,13 +125,15 @@ def render(
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
     stage: Annotated[StageChoice, typer.Option(
-        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain, a model",
+        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain",
     )] = StageChoice.CHANNELS,
     lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
-    fifo_depth: Annotated[int | None, typer.Option(help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH} [default: {_default('fifo_depth')}]")] = None,
+    fifo_depth: Annotated[int | None, typer.Option(
+        help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
+    )] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,

@@ -166,13 +166,23 @@ def _render_auto(order, core_start, gauss, spiky, start, entry, mean, form, prec
             latest = test_avg > sent_avg
 
 
-def stream_order(lists: SubtileLists) -> tuple[np.ndarray, np.ndarray]:
-    """Order in which the cores see sub-tiles: (sub-tile numbers core by core, start of each core's part).
+class Streamed(Protocol):
+    """Sub-tiles of a picture, row by row, with their lists: that of s has start[s + 1] - start[s] splats."""
+
+    cols: int
+    rows: int
+    start: np.ndarray
+
+
+def stream_order(lists: Streamed, empty: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Order in which the cores see sub-tiles: (sub-tile numbers core by core, start of each core's part). empty: with those whose list is empty.
 
     Core k has column k % 2, row k / 2 of each tile; tiles go row by row.
     """
     grid = np.arange(lists.rows * lists.cols).reshape(lists.rows, lists.cols)
     parts = [grid[k // 2 :: 2, k % 2 :: 2].ravel() for k in range(CORES)]
+    if not empty:
+        parts = [part[np.diff(lists.start)[part] > 0] for part in parts]
     return np.concatenate(parts), np.cumsum([0] + [len(p) for p in parts])
 
 

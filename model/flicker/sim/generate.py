@@ -11,22 +11,22 @@ import os
 from pathlib import Path
 
 from .. import layout, params
-from ..params import Stage
+from ..params import STAGES, RenderConfig, Stage
 from ..toolchain import BUILD
 
 TOP = "flk_sim_top"
 HEADER = "flk_sim_layout.h"
 
 
-def top_text(stage: Stage) -> str:
-    """SystemVerilog of the simulation top."""
+def top_text(stage: Stage, width: int) -> str:
+    """SystemVerilog of the simulation top; width: elements that a core takes in a cycle."""
     element, pixel = layout.bits(stage.element), layout.bits(stage.pixel)
     element_words, pixel_words = 32 * layout.words(stage.element), 32 * layout.words(stage.pixel)
     declared = ",\n".join(f"  parameter int unsigned {name} = 0" for name in stage.parameters)
     parameters = f" #(\n{declared}\n)" if stage.parameters else ""
     passed = ",\n".join(f"    .{name}({name})" for name in stage.parameters)
     settings = f" #(\n{passed}\n  )" if stage.parameters else ""
-    unused = f"  logic [CORES-1:0][{element_words - element - 1}:0] unused_elem;\n" if element_words > element else ""
+    unused = f"  logic [CORES*{width}-1:0][{element_words - element - 1}:0] unused_elem;\n" if element_words > element else ""
     taken = "{unused_elem[k], elem[k]}" if unused else "elem[k]"
     return f"""// Simulation top of {stage.module}: elements and pixels in whole 32-bit words.
 module {TOP}
@@ -37,9 +37,10 @@ module {TOP}
   input  logic clear_i,
   output logic idle_o,
   input  logic [2:0] mode_i,
-  input  logic [CORES-1:0] in_valid_i,
+  input  logic [CORES*{width}-1:0] in_valid_i,
   output logic [CORES-1:0] in_ready_o,
-  input  logic [CORES-1:0][{element_words - 1}:0] in_elem_i,
+  input  logic [CORES*{width}-1:0][{element_words - 1}:0] in_elem_i,
+  output logic [CORES-1:0] finished_o,
   output logic [CORES-1:0] out_valid_o,
   input  logic [CORES-1:0] out_ready_i,
   output logic [CORES-1:0][{pixel_words - 1}:0] out_data_o,
@@ -49,12 +50,13 @@ module {TOP}
   output logic [COUNTER_BITS-1:0] counter_data_o
 );
 
-  logic [CORES-1:0][{element - 1}:0] elem;
+  logic [CORES*{width}-1:0][{element - 1}:0] elem;
   logic [CORES-1:0][{pixel - 1}:0] pixel;
-  logic [CORES-1:0] unused_finished;
 {unused}
-  for (genvar k = 0; k < CORES; k++) begin : gen_words
+  for (genvar k = 0; k < CORES * {width}; k++) begin : gen_in
     assign {taken} = in_elem_i[k];
+  end
+  for (genvar k = 0; k < CORES; k++) begin : gen_out
     assign out_data_o[k] = {pixel_words}'(pixel[k]);
   end
 
@@ -67,7 +69,7 @@ module {TOP}
     .in_valid_i,
     .in_ready_o,
     .in_elem_i(elem),
-    .finished_o(unused_finished),
+    .finished_o,
     .out_valid_o,
     .out_ready_i,
     .out_data_o(pixel),
@@ -81,7 +83,7 @@ endmodule
 """
 
 
-def header_text(stage: Stage) -> str:
+def header_text(stage: Stage, width: int) -> str:
     """C++ of sizes and bit positions."""
     sizes = {
         "CORES": params.CORES,
@@ -89,11 +91,13 @@ def header_text(stage: Stage) -> str:
         "MINITILE_PIXELS": params.SUBTILE_PIXELS // params.CHANNELS,
         "ELEM_WORDS": layout.words(stage.element),
         "PIXEL_WORDS": layout.words(stage.pixel),
+        "IN_WIDTH": width,
+        "ELEM_SUBTILE": int("subtile" in layout.fields(stage.element)),  # every element names its sub-tile, not tokens alone
         "MODES": len(params.CatMode),
-        "COUNTERS_PER_CORE": params.COUNTERS_PER_CORE,
+        "COUNTERS_PER_CORE": len(stage.counters),
         "COUNTER_INDEX_BITS": params.COUNTER_INDEX_BITS,
         "COUNTER_LATENCY": params.COUNTER_LATENCY,
-        "COUNTER_CYCLES": [name for name, _ in params.CORE_COUNTERS].index("cycles"),
+        "COUNTER_CYCLES": stage.counters.index("cycles"),
     }
     places = {
         "ELEM_EOS": layout.place(stage.element, "eos"),
@@ -118,9 +122,11 @@ def header_text(stage: Stage) -> str:
     ])
 
 
-def write(stage: Stage) -> tuple[Path, Path]:
+def write(config: RenderConfig) -> tuple[Path, Path]:
     """Files of top and header."""
-    texts = {f"{TOP}.sv": top_text(stage), HEADER: header_text(stage)}
+    stage = STAGES[config.stage]
+    width = config.in_width if "InWidth" in stage.parameters else 1
+    texts = {f"{TOP}.sv": top_text(stage, width), HEADER: header_text(stage, width)}
     folder = BUILD / "sim-generated" / hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():

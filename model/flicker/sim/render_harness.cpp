@@ -29,6 +29,7 @@ struct Frame {
   int64_t cols;
   int64_t subtiles;
   uint16_t* pixels;  // (S, SUBTILE_PIXELS, 4): transmittance, red, green, blue
+  int64_t leave;     // not 0: a finished sub-tile leaves its list
 };
 
 // A field of up to 32 bits.
@@ -54,6 +55,11 @@ struct Random {
     s ^= s << 17;
     return (s >> 24 & 255) < per256;
   }
+};
+
+// A place in a core's stream: sub-tile (index in the order) and element of its list, or the token behind the last one.
+struct Cursor {
+  int64_t next, item;
 };
 
 class Simulation {
@@ -144,9 +150,9 @@ class Simulation {
     cycles_ = received_ = last_transfer_ = 0;
     owed_ = 0;
     for (int k = 0; k < CORES; ++k) {
-      next_[k] = frame_.core_start[k];
-      item_[k] = next_[k] < frame_.core_start[k + 1] ? frame_.start[frame_.order[next_[k]]] : 0;
-      holding_[k] = false;
+      at_[k] = {frame_.core_start[k], 0};
+      if (more(k, at_[k])) at_[k].item = frame_.start[frame_.order[at_[k].next]];
+      holding_[k] = 0;
       open_[k] = false;
     }
   }
@@ -163,32 +169,41 @@ class Simulation {
     if (!top_->idle_o) error_ = std::string("idle_o is low ") + when;
   }
 
-  bool at_token(int k) const { return item_[k] == frame_.start[frame_.order[next_[k]] + 1]; }
+  bool at_token(const Cursor& c) const { return c.item == frame_.start[frame_.order[c.next] + 1]; }
+  bool more(int k, const Cursor& c) const { return c.next < frame_.core_start[k + 1]; }
 
-  // The element at the head of core k's list, into the input words.
-  void load(int k) {
-    uint32_t* w = &top_->in_elem_i[k * ELEM_WORDS];
-    if (!at_token(k)) {
-      std::memcpy(w, &frame_.element[item_[k] * ELEM_WORDS], ELEM_WORDS * sizeof(uint32_t));
+  // The element of core k at c, into the words of input `way`. Where the element has room for it, every one names its sub-tile.
+  void load(int k, int way, const Cursor& c) {
+    uint32_t* w = &top_->in_elem_i[(k * IN_WIDTH + way) * ELEM_WORDS];
+    const bool token = at_token(c);
+    if (token) {
+      std::memset(w, 0, ELEM_WORDS * sizeof(uint32_t));
+      put(w, ELEM_EOS, 1);
+    } else {
+      std::memcpy(w, &frame_.element[c.item * ELEM_WORDS], ELEM_WORDS * sizeof(uint32_t));
+    }
+    if (token || ELEM_SUBTILE) {
+      const int64_t s = frame_.order[c.next];
+      put(w, ELEM_COL, static_cast<uint32_t>(s % frame_.cols));
+      put(w, ELEM_ROW, static_cast<uint32_t>(s / frame_.cols));
+    }
+  }
+
+  void step(int k, Cursor& c) {
+    if (!at_token(c)) {
+      ++c.item;
       return;
     }
-    const int64_t s = frame_.order[next_[k]];
-    std::memset(w, 0, ELEM_WORDS * sizeof(uint32_t));
-    put(w, ELEM_COL, static_cast<uint32_t>(s % frame_.cols));
-    put(w, ELEM_ROW, static_cast<uint32_t>(s / frame_.cols));
-    put(w, ELEM_EOS, 1);
+    ++c.next;
+    if (more(k, c)) c.item = frame_.start[frame_.order[c.next]];
   }
 
   void accepted(int k) {
-    holding_[k] = false;
-    open_[k] = !at_token(k);
-    if (open_[k]) {
-      ++item_[k];
-      return;
+    for (; holding_[k] > 0; --holding_[k]) {
+      open_[k] = !at_token(at_[k]);
+      if (!open_[k]) owed_ += SUBTILE_PIXELS;
+      step(k, at_[k]);
     }
-    owed_ += SUBTILE_PIXELS;
-    ++next_[k];
-    if (next_[k] < frame_.core_start[k + 1]) item_[k] = frame_.start[frame_.order[next_[k]]];
   }
 
   void pixel(int k) {
@@ -217,11 +232,11 @@ class Simulation {
   void offer() {
     valid_ = ready_ = 0;
     for (int k = 0; k < CORES; ++k) {
-      if (!holding_[k] && next_[k] < frame_.core_start[k + 1] && !random_(idle_)) {
-        load(k);
-        holding_[k] = true;
+      if (!holding_[k]) {
+        if (frame_.leave && open_[k] && (top_->finished_o >> k & 1)) at_[k].item = frame_.start[frame_.order[at_[k].next] + 1];
+        for (Cursor c = at_[k]; holding_[k] < IN_WIDTH && more(k, c) && !random_(idle_); step(k, c)) load(k, holding_[k]++, c);
       }
-      valid_ |= holding_[k] << k;
+      valid_ |= ((1 << holding_[k]) - 1) << (k * IN_WIDTH);
       ready_ |= !random_(stall_) << k;
     }
     top_->in_valid_i = valid_;
@@ -232,7 +247,7 @@ class Simulation {
     bool empty = owed_ == 0, offered = false;  // an offered element may have begun its test
     for (int k = 0; k < CORES; ++k) {
       empty &= !open_[k];
-      offered |= holding_[k];
+      offered |= holding_[k] > 0;
     }
     if (top_->idle_o && !empty) error_ = "idle_o is high, but something is inside";
     if (!top_->idle_o && empty && !offered) error_ = "idle_o is low, but nothing is inside";
@@ -240,7 +255,7 @@ class Simulation {
     offer();
     top_->clk_i = 0;
     top_->eval();
-    const uint8_t taken = valid_ & top_->in_ready_o;
+    const uint8_t taken = top_->in_ready_o;
     const uint8_t given = ready_ & top_->out_valid_o;
     for (int k = 0; k < CORES; ++k) {
       if (given >> k & 1) pixel(k);
@@ -248,10 +263,13 @@ class Simulation {
     top_->clk_i = 1;
     top_->eval();
     ++cycles_;
+    bool moved = given;
     for (int k = 0; k < CORES; ++k) {
-      if (taken >> k & 1) accepted(k);
+      if (!(taken >> k & 1) || !holding_[k]) continue;
+      accepted(k);
+      moved = true;
     }
-    if (taken || given) last_transfer_ = cycles_;
+    if (moved) last_transfer_ = cycles_;
   }
 
   // All counters, one after the other; they stand still meanwhile. Nothing may be in the stage.
@@ -274,7 +292,7 @@ class Simulation {
   // After the last pixel: every list must be consumed, and nothing more may come.
   bool finish() {
     for (int k = 0; k < CORES; ++k) {
-      if (next_[k] != frame_.core_start[k + 1]) error_ = "core " + std::to_string(k) + " did not take its whole list";
+      if (more(k, at_[k])) error_ = "core " + std::to_string(k) + " did not take its whole list";
     }
     top_->in_valid_i = 0;
     top_->out_ready_i = (1 << CORES) - 1;
@@ -293,8 +311,9 @@ class Simulation {
   std::unique_ptr<Vtop> top_;
   uint8_t valid_, ready_;
   int64_t owed_;  // pixels of lists that were taken as a whole
-  int64_t next_[CORES], item_[CORES];
-  bool holding_[CORES], open_[CORES];
+  Cursor at_[CORES];         // the oldest element that has not been taken
+  int holding_[CORES];       // elements that are offered
+  bool open_[CORES];
   uint64_t last_transfer_ = 0;
 };
 

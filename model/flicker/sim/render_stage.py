@@ -13,8 +13,9 @@ import numpy as np
 from .. import layout, params
 from ..errors import FlickerError
 from ..front.records import SubtileLists
+from ..golden.lanes.lists import RecordLists
 from ..golden.render import assemble, stream_order
-from ..params import CHANNELS, CORES, STAGES, SUBTILE_PIXELS, RenderConfig
+from ..params import CHANNELS, CORES, FP16_ONE_BITS, STAGES, SUBTILE_PIXELS, RenderConfig
 from ..toolchain import sources_of, verilate
 from . import generate
 
@@ -25,7 +26,7 @@ CHUNK_CYCLES = 5000  # cycles between two calls of the progress function
 class _Frame(ctypes.Structure):
     _fields_ = [
         ("element", ctypes.c_void_p), ("start", ctypes.c_void_p), ("order", ctypes.c_void_p), ("core_start", ctypes.c_void_p),
-        ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p),
+        ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p), ("leave", ctypes.c_int64),
     ]
 
 
@@ -33,22 +34,23 @@ class _Frame(ctypes.Structure):
 class RtlFrame:
     """Result of a simulated frame.
 
-    pixels as in `golden.render.Frame`; counters: uint32 (4 cores, COUNTERS_PER_CORE); seconds of simulation alone.
+    pixels as in `golden.render.Frame`; counters: uint32 (4 cores, those that `names` names); seconds of simulation alone.
     """
 
-    lists: SubtileLists
+    lists: SubtileLists | RecordLists
     pixels: np.ndarray
     counters: np.ndarray
     cycles: int
     seconds: float
+    names: tuple[str, ...]
 
     def image(self, background=(0.0, 0.0, 0.0)) -> np.ndarray:
         """float32 (H, W, 3), unquantised."""
         return assemble(self.lists, self.pixels, background)
 
     def core_counter(self, name: str) -> np.ndarray:
-        """int64 (4,): a CTU or dispatch counter of each core."""
-        return self.counters[:, [n for n, _ in params.CORE_COUNTERS].index(name)].astype(np.int64)
+        """int64 (4,): a counter of each core."""
+        return self.counters[:, self.names.index(name)].astype(np.int64)
 
     def channel_counter(self, name: str) -> np.ndarray:
         """int64 (4, 4): a counter of each core and channel."""
@@ -63,9 +65,7 @@ def build(config: RenderConfig, *, checks: bool = False, replaced: Mapping[str, 
     checks: with the design's assertions; without, it runs faster. replaced: files to take instead, by module.
     """
     stage = STAGES[config.stage]
-    if not stage.module:
-        raise FlickerError(f"stage {config.stage}: a model so far, there is no RTL to simulate")
-    top, header = generate.write(stage)
+    top, header = generate.write(config)
     sources = [(replaced or {}).get(path.stem, path) for path in sources_of(generate.TOP, [top])]
     return verilate(
         generate.TOP,
@@ -99,8 +99,10 @@ def _library(path: Path) -> ctypes.CDLL:
     return lib
 
 
-def elements(lists: SubtileLists, record: str) -> np.ndarray:
-    """uint32 (E, words): the lists' elements as records of the layout."""
+def elements(lists: SubtileLists | RecordLists, record: str) -> np.ndarray:
+    """uint32 (E, words): the lists' elements as records of the layout, without the sub-tile."""
+    if isinstance(lists, RecordLists):
+        return _records(lists, record)
     gauss = lists.gauss[lists.entry]
     names = [path.rpartition(".")[2] for path in layout.leaves("feature")][::-1]  # least significant first, as in lists.gauss
     columns = {name: gauss[:, i] for i, name in enumerate(names)}
@@ -108,14 +110,26 @@ def elements(lists: SubtileLists, record: str) -> np.ndarray:
     return layout.pack(record, columns)
 
 
+def _records(lists: RecordLists, record: str) -> np.ndarray:
+    at = layout.place(record, "record").at
+    word, shift = divmod(at, 32)
+    packed = np.zeros((len(lists.entry), layout.words(record)), np.uint32)
+    bits = lists.records[lists.entry].view(np.uint32).astype(np.uint64) << np.uint64(shift)
+    packed[:, word : word + 4] = bits.astype(np.uint32)
+    packed[:, word + 1 : word + 5] |= (bits >> np.uint64(32)).astype(np.uint32)
+    return packed
+
+
 def render_rtl(
-    lists: SubtileLists,
+    lists: SubtileLists | RecordLists,
     config: RenderConfig,
     *,
     seed: int = 1,
     idle: float = 0.0,
     stall: float = 0.0,
     aborts: Sequence[tuple[int, int]] = (),
+    leave: bool = False,
+    empty: bool = True,
     checks: bool = False,
     library: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -124,22 +138,24 @@ def render_rtl(
 
     idle, stall: share of cycles in which an input stream offers nothing, an output stream is not ready (random, by `seed`).
     aborts: (cycles, length) each: before the frame that counts, begin it, clear it after so many cycles, for `length` cycles.
+    leave: a sub-tile whose pixels are finished leaves its list (finished_o). empty: sub-tiles with an empty list are streamed, too; else they keep T = 1,
+    black.
     checks: use the build with assertions. library: one that `build` made, instead. progress: called with (pixels received, pixels in all).
     Raises FlickerError when the RTL hangs, loses, repeats or misplaces a pixel, holds idle_o wrong, or, with checks, breaks an assertion.
     """
     if config.form != lists.form:
         raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
     lib = _library(library or build(config, checks=checks))
-    order, core_start = stream_order(lists)
+    order, core_start = stream_order(lists, empty)
     subtiles = lists.cols * lists.rows
     arrays = {
         "element": elements(lists, STAGES[config.stage].element),
         "start": np.ascontiguousarray(lists.start, np.int64),
         "order": np.ascontiguousarray(order, np.int64),
         "core_start": np.ascontiguousarray(core_start, np.int64),
-        "pixels": np.zeros((subtiles, SUBTILE_PIXELS, 4), np.uint16),
+        "pixels": np.tile(np.array([FP16_ONE_BITS, 0, 0, 0], np.uint16), (subtiles, SUBTILE_PIXELS, 1)),
     }
-    frame = _Frame(cols=lists.cols, subtiles=subtiles, **{k: a.ctypes.data for k, a in arrays.items()})
+    frame = _Frame(cols=lists.cols, subtiles=subtiles, leave=leave, **{k: a.ctypes.data for k, a in arrays.items()})
     sim = lib.flk_sim_new(ctypes.byref(frame), int(config.cat), seed, round(idle * 256), round(stall * 256))
     try:
         begin = time.perf_counter()
@@ -150,13 +166,13 @@ def render_rtl(
         while state == 0:
             state = lib.flk_sim_run(sim, CHUNK_CYCLES)
             if progress is not None:
-                progress(lib.flk_sim_received(sim), subtiles * SUBTILE_PIXELS)
+                progress(lib.flk_sim_received(sim), len(order) * SUBTILE_PIXELS)
         seconds = time.perf_counter() - begin
         cycles = lib.flk_sim_cycles(sim)
         if state < 0:
             raise FlickerError(f"RTL simulation: cycle {cycles}: {lib.flk_sim_error(sim).decode()}")
-        counters = np.zeros((CORES, params.COUNTERS_PER_CORE), np.uint32)
+        counters = np.zeros((CORES, len(STAGES[config.stage].counters)), np.uint32)
         lib.flk_sim_counters(sim, counters.ctypes.data)
     finally:
         lib.flk_sim_delete(sim)
-    return RtlFrame(lists, arrays["pixels"], counters, int(cycles), seconds)
+    return RtlFrame(lists, arrays["pixels"], counters, int(cycles), seconds, STAGES[config.stage].counters)

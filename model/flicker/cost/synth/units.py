@@ -13,6 +13,7 @@ from ...params import (
     FAITHFUL,
     FIXED_FRAC_BITS,
     FIXED_INT_BITS,
+    LANE_COUNTS,
     MASK_GENERATORS,
     MINITILE,
     PIXELS_PER_VRU,
@@ -43,6 +44,9 @@ COMPOSED: dict[str, list[str]] = {
     "flk_ctu": ["flk_prtu", "flk_fifo", "flk_ctu_controller", "flk_mmu", "flk_log_opacity_pipe"],
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
     "flk_mask_all": ["flk_pipe_reg"],
+    "flk_lane_queue": ["flk_fifo"],
+    "flk_lane_core": ["flk_splat_setup", "flk_row_mask", "flk_delay", "flk_lane_queue", "flk_lane", "flk_lane_result", "flk_stream_arbiter", "flk_pipe_reg"],
+    "flk_lane_stage": ["flk_lane_core", "flk_lane_counters", "flk_stage_control"],
     "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
     **{p.module: list(FF_OPERATORS) for p in PIPELINES},
     "flk_sram_fifo": [MEMORY],
@@ -155,6 +159,10 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
         "flk_projection": ["width_i[12]", "height_i[12]"],
+        "flk_splat_setup": ["record_i[127]"],  # what is spiky the lanes do not ask
+        "flk_row_mask": [f"splat_i[{bit}]" for bit in range(30)],  # colours
+        "flk_lane_core": [f"in_elem_i[{153 * way + 151}]" for way in range(parameters.get("InWidth", 1))],  # record_i[127]
+        "flk_lane_stage": [f"mode_i[{bit}]" for bit in range(3)],  # there is one
         # Only the last step selects.
         "flk_sort_merge": [] if parameters.get("Select", 0) else ["closed_i[0]", "cut_i[0]"],
         # Neither mode nor shape of a splat matters without a test.
@@ -318,6 +326,30 @@ def _front() -> list[Unit]:
     ]
 
 
+def _lanes() -> list[Unit]:
+    """Units of the lanes in the log domain."""
+    default = RenderConfig(stage="lanes")
+    units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_counters")]
+    for lanes in LANE_COUNTS:
+        count, pixels = lanes // CORES, SUBTILE_PIXELS * CORES // lanes
+        units += [
+            unit("flk_lane", f"{pixels} pixels", Lanes=count, Lane=0, Slots=default.slots),
+            unit("flk_lane_queue", f"{pixels} pixels", Pixels=pixels, Slots=default.slots, Depth=default.fifo_depth),
+        ]
+    for config in (*(default.with_(lanes=lanes) for lanes in LANE_COUNTS), default.with_(in_width=1)):
+        ports = config.rtl_parameters()
+        units += [
+            unit("flk_lane_core", lane_config(config), **ports | {"Lanes": config.lanes // CORES}),
+            unit("flk_lane_stage", lane_config(config), **ports),
+        ]
+    return units
+
+
+def lane_config(config: RenderConfig) -> str:
+    """Name of a core or stage of lanes in the tables."""
+    return f"{config.lanes} lanes" + ("" if config.in_width == RenderConfig().in_width else f", {config.in_width} a cycle")
+
+
 def _top() -> list[Unit]:
     """The chip around its two halves."""
     return [
@@ -327,4 +359,4 @@ def _top() -> list[Unit]:
 
 
 def all_units() -> list[Unit]:
-    return _arithmetic() + _ff() + _cells() + _stage() + _front() + _top()
+    return _arithmetic() + _ff() + _cells() + _stage() + _front() + _lanes() + _top()

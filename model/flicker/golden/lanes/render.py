@@ -82,6 +82,30 @@ def _render(records, start, entry, cols, t, pixels, counts, needed):
 
 
 @numba.njit(parallel=True, cache=True)
+def _finish(records, start, entry, cols, t, mask, passes, finish):
+    for s in numba.prange(len(start) - 1):
+        total = np.zeros(SUBTILE_PIXELS, np.int64)
+        unfinished = np.int64(ALL)
+        finish[s, :] = start[s + 1] - start[s]
+        for n in range(start[s], start[s + 1]):
+            both = mask[n] & passes[n] & unfinished
+            if both == 0:
+                continue
+            i = entry[n]
+            f = splat_setup(records[i, 0], records[i, 1], s % cols, s // cols, t)
+            for p in range(SUBTILE_PIXELS):
+                if not (both >> p) & 1:
+                    continue
+                col, row = place_of(p)
+                r = pair(log_alpha(u_of(f, col, row, t), v_of(f, row, t), f.lo, t), total[p], t)
+                if r.outcome == FINISHED:
+                    unfinished &= ~(np.int64(1) << p)
+                    finish[s, p] = n - start[s]
+                else:
+                    total[p] = r.s_next
+
+
+@numba.njit(parallel=True, cache=True)
 def _masks(records, start, entry, cols, t, mask, passes):
     for s in numba.prange(len(start) - 1):
         for n in range(start[s], start[s + 1]):
@@ -129,3 +153,10 @@ def lane_masks(lists: RecordLists, formats: LaneFormats = FORMATS) -> tuple[np.n
     mask, passes = np.zeros(len(lists.entry), np.int64), np.zeros(len(lists.entry), np.int64)
     _masks(lists.records, lists.start, lists.entry, lists.cols, tables(formats), mask, passes)
     return mask.view(np.uint64), passes.view(np.uint64)
+
+
+def finish_positions(lists: RecordLists, mask: np.ndarray, passes: np.ndarray, formats: LaneFormats = FORMATS) -> np.ndarray:
+    """int64 (S, 64): position in the list of the entry that finishes each pixel 16 m + i; the list's length when none does. mask, passes: of `lane_masks`."""
+    finish = np.zeros((lists.cols * lists.rows, SUBTILE_PIXELS), np.int64)
+    _finish(lists.records, lists.start, lists.entry, lists.cols, tables(formats), mask.view(np.int64), passes.view(np.int64), finish)
+    return finish

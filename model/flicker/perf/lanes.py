@@ -1,0 +1,371 @@
+"""Cycle model of the lanes in the log domain, equal to the RTL in cycles and in every counter (rtl/flk_lane_stage.sv; docs/lanes.md).
+
+A core takes `in_width` elements a cycle through setup and masks, which move together. Dispatch gives one splat a cycle a slot of the store and each lane
+with pixels in its mask an entry in its queue; what is empty or finished is dropped beside it. Every lane visits a pixel a cycle, in the order of the list. A
+token takes a slot and an entry in every queue, waits for the lane's bank, and lets the bank leave, a pixel a cycle from all lanes of a core.
+
+The streams are offered as fast as they are taken, and pixels taken as they come. Numbers below are cycles after a visit (rtl/lanes/flk_lane.sv).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from ..golden.lanes.lists import RecordLists
+from ..golden.lanes.render import finish_positions, lane_masks
+from ..golden.render import stream_order
+from ..params import (
+    CORES,
+    LANE_COUNTERS,
+    LANE_ROW_MASK_STAGES,
+    LANE_SETUP_STAGES,
+    MINITILE,
+    SUBTILE,
+    SUBTILE_PIXELS,
+    RenderConfig,
+)
+
+STATE = 5  # the pixel's S and its finished flag are written at the end
+RELEASE = 6  # the slot is given back
+COLOUR = 8  # the token is at the end of the pipeline: the bank leaves from the next cycle on
+OUTPUT = 2  # registers behind the choice of a lane
+TOKEN = -1  # positions below are tokens
+NOTHING = -(1 << 62)
+
+(
+    CYCLES, SUBTILES, GAUSSIANS_IN, REJECTED, BUSY, STALLED, IDLE, DROPPED, DISPATCHED, NO_SLOT, NO_ROOM, ENTRIES, VISITS, SKIPPED, BLENDED, FINISHED,
+    STARVED, BANK_WAITS,
+) = range(len(LANE_COUNTERS))
+
+
+@dataclass
+class LaneWork:
+    """What a frame makes the lanes do; nothing in it depends on timing or on the number of lanes.
+
+    start: int64 (S + 1,), elements of sub-tile s, near to far. mask, passes: uint64 (E,), pixels (bit 16 m + i) of each element's mask, and those that pass the
+    lane's own test. finish: int64 (S, 64), position in the list of the element that finishes the pixel; the list's length when none does.
+    """
+
+    cols: int
+    rows: int
+    start: np.ndarray
+    mask: np.ndarray
+    passes: np.ndarray
+    finish: np.ndarray
+
+    @property
+    def contributing(self) -> int:
+        """Pairs that are blended, and those that finish a pixel."""
+        return int(_contributing(self.start, self.mask, self.passes, self.finish))
+
+
+@dataclass
+class LaneCycles:
+    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS))."""
+
+    cycles: int
+    counters: np.ndarray
+
+    def total(self, name: str) -> int:
+        """Sum of a counter over the cores."""
+        return int(self.counters[:, [n for n, _ in LANE_COUNTERS].index(name)].sum())
+
+
+@numba.njit(parallel=True, cache=True)
+def _contributing(start, mask, passes, finish):
+    total = np.zeros(len(start) - 1, np.int64)
+    for s in numba.prange(len(start) - 1):
+        for n in range(start[s], start[s + 1]):
+            both = mask[n] & passes[n]
+            for p in range(64):
+                if (both >> np.uint64(p)) & np.uint64(1) and n - start[s] <= finish[s, p]:
+                    total[s] += 1
+    return total.sum()
+
+
+def pixels_of_lanes(lanes: int) -> np.ndarray:
+    """int64 (lanes, 64 / lanes): number 16 m + i of each pixel of each lane of a core (flk_lane_pkg, lane_row and lane_column)."""
+    if lanes not in (8, 16, 32):
+        raise ValueError(f"lanes of a core: 8, 16 or 32, not {lanes}")
+    lane, p = np.arange(lanes)[:, None], np.arange(SUBTILE_PIXELS // lanes)[None, :]
+    if lanes == 8:
+        row, column = p + 0 * lane, (lane + 5 * p) % SUBTILE
+    elif lanes == 16:
+        row, column = lane // 4 + 4 * (p // 2), lane % 4 + 4 * (p % 2)
+    else:
+        row, column = lane // 8 + 4 * p, lane % 8 + 0 * p
+    minitile = row // MINITILE * (SUBTILE // MINITILE) + column // MINITILE
+    return minitile * MINITILE * MINITILE + row % MINITILE * MINITILE + column % MINITILE
+
+
+@numba.njit(cache=True)
+def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, count):
+    """One core; returns the cycles it was followed for, and that after its last pixel."""
+    lanes, per_lane = pixel.shape
+    n_sub = len(order)
+    # Setup and masks: ring of groups, the youngest at `young`; the group at dispatch is `latency` moves old.
+    pipe = np.full((latency, width), NOTHING, np.int64)
+    pipe_tokens = 0
+    young = 0
+    sent = np.zeros(width, np.bool_)
+    live = np.zeros(width, np.uint64)
+    wanted = np.zeros(width, np.bool_)
+    # Store
+    pending = np.zeros(slots, np.int64)  # lanes that have not released
+    release = np.zeros((RELEASE + 1, slots), np.int64)
+    slot_at = np.zeros(slots, np.int64)
+    # Queues
+    q_slot = np.zeros((lanes, depth), np.int64)
+    q_bits = np.zeros((lanes, depth), np.int64)
+    q_read = np.zeros(lanes, np.int64)
+    q_used = np.zeros(lanes, np.int64)
+    done = np.zeros(lanes, np.int64)
+    tokens = np.zeros(lanes, np.int64)
+    # Lanes
+    token_at = np.full(lanes, NOTHING, np.int64)  # of the last token
+    sub = np.zeros(lanes, np.int64)  # ordinal of the sub-tile that is visited
+    flags = np.zeros(lanes, np.int64)  # finished pixels, as the register has them
+    ending = np.zeros((STATE + 1, lanes), np.int64)  # flags that are set STATE cycles after a visit
+    bank = np.zeros(lanes, np.bool_)
+    full_at = np.full(lanes, -NOTHING, np.int64)
+    bank_left = np.zeros(lanes, np.int64)
+    first = 0
+    bits = np.zeros(lanes, np.int64)
+    # Input
+    sub_in, began = 0, False
+    at = start[order[0]] if n_sub else np.int64(0)
+    held = np.full(width, NOTHING, np.int64)
+    n_held = 0
+    sub_finished = False  # the register finished_o
+    pixels_left = 64 * n_sub
+    last_pixel = np.int64(0)
+    t = np.int64(0)
+    while pixels_left > 0:  # the last ones are on their way through the output's registers afterwards
+        # ---- what this cycle sees
+        for l in range(lanes):
+            if token_at[l] + STATE + 1 == t:  # the token has passed
+                flags[l] = 0
+                tokens[l] -= 1
+            flags[l] |= ending[t % (STATE + 1), l]
+            ending[t % (STATE + 1), l] = 0
+        if n_held == 0 and sub_in < n_sub:
+            if leave and began and sub_finished:
+                at = start[order[sub_in] + 1]
+            while n_held < width and sub_in < n_sub:
+                if at == start[order[sub_in] + 1]:
+                    held[n_held] = TOKEN - sub_in
+                    sub_in += 1
+                    began = False
+                    if sub_in < n_sub:
+                        at = start[order[sub_in]]
+                else:
+                    held[n_held] = at
+                    at += 1
+                    began = True
+                n_held += 1
+        # ---- dispatch: of the group at the pipeline's end
+        old = (young + 1) % latency
+        choice, any_wanted = -1, False
+        after_token = False
+        for w in range(width):
+            e = pipe[old, w]
+            wanted[w] = False
+            live[w] = np.uint64(0)
+            if e == NOTHING or sent[w]:
+                continue
+            if e <= TOKEN:
+                wanted[w] = True
+                after_token = True
+            else:
+                m = mask[e]
+                if not after_token:
+                    for l in range(lanes):
+                        if tokens[l] == 0 and flags[l]:
+                            for p in range(per_lane):
+                                if (flags[l] >> p) & 1:
+                                    m &= ~(np.uint64(1) << np.uint64(pixel[l, p]))
+                live[w] = m
+                wanted[w] = m != np.uint64(0)
+            if wanted[w] and choice < 0:
+                choice = w
+                any_wanted = True
+        dispatched = False
+        slot = -1
+        if any_wanted:
+            for s in range(slots):
+                if pending[s] == 0:
+                    slot = s
+                    break
+            token = pipe[old, choice] <= TOKEN
+            room = True
+            for l in range(lanes):
+                bits[l] = 0
+                if not token:
+                    for p in range(per_lane):
+                        bits[l] |= np.int64((live[choice] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
+                if (token or bits[l]) and q_used[l] == depth:
+                    room = False
+            if slot < 0:
+                count[NO_SLOT] += 1
+            elif not room:
+                count[NO_ROOM] += 1
+            else:
+                dispatched = True
+                count[DISPATCHED] += 1
+        move = True
+        for w in range(width):
+            if wanted[w] and not (dispatched and w == choice):
+                move = False
+        # ---- pixels leave: the registers behind take one in every cycle
+        served = -1
+        for i in range(lanes):
+            l = (first + i) % lanes
+            if full_at[l] <= t:
+                served = l
+                break
+        if served >= 0:
+            first = (served + 1) % lanes
+            pixels_left -= 1
+            last_pixel = t
+        # ---- lanes
+        for l in range(lanes):
+            taken = bank[l]
+            if served == l:
+                bank_left[l] -= 1
+                if bank_left[l] == 0:
+                    bank[l] = False
+                    full_at[l] = -NOTHING
+            if q_used[l] == 0:
+                count[STARVED] += 1
+                continue
+            r = q_read[l]
+            todo = q_bits[l, r]
+            pop = False
+            if todo == 0:
+                if taken:
+                    count[BANK_WAITS] += 1
+                else:
+                    pop = True
+                    bank[l] = True
+                    bank_left[l] = per_lane
+                    full_at[l] = t + COLOUR + 1
+                    token_at[l] = t
+                    sub[l] += 1
+            else:
+                todo &= ~done[l]
+                if t - token_at[l] > STATE:
+                    todo &= ~flags[l]
+                if todo:
+                    p = 0
+                    while not (todo >> p) & 1:
+                        p += 1
+                    e = slot_at[q_slot[l, r]]
+                    s = order[sub[l]]
+                    k = e - start[s]
+                    end = finish[s, pixel[l, p]]
+                    passed = (passes[e] >> np.uint64(pixel[l, p])) & np.uint64(1)
+                    count[VISITS] += 1
+                    if not passed:
+                        count[SKIPPED] += 1
+                    elif k < end:
+                        count[BLENDED] += 1
+                    elif k == end:
+                        count[FINISHED] += 1
+                        ending[(t + STATE + 1) % (STATE + 1), l] |= 1 << p
+                    todo &= todo - 1
+                    done[l] |= 1 << p
+                pop = todo == 0
+            if pop:
+                release[(t + RELEASE) % (RELEASE + 1), q_slot[l, r]] += 1
+                q_read[l] = (r + 1) % depth
+                q_used[l] -= 1
+                done[l] = 0
+        # ---- the end of the cycle
+        for s in range(slots):
+            pending[s] -= release[t % (RELEASE + 1), s]
+            release[t % (RELEASE + 1), s] = 0
+        all_finished = True
+        for l in range(lanes):
+            if tokens[l] > 0 or flags[l] != (1 << per_lane) - 1:
+                all_finished = False
+        sub_finished = all_finished and pipe_tokens == 0
+        if dispatched:
+            token = pipe[old, choice] <= TOKEN
+            for l in range(lanes):
+                if token or bits[l]:
+                    w = (q_read[l] + q_used[l]) % depth
+                    q_slot[l, w] = slot
+                    q_bits[l, w] = bits[l]
+                    q_used[l] += 1
+                    pending[slot] += 1
+                    if token:
+                        tokens[l] += 1
+                    else:
+                        count[ENTRIES] += 1
+            slot_at[slot] = pipe[old, choice]
+            sent[choice] = True
+        if n_held == 0:
+            count[IDLE] += 1
+        elif not move:
+            count[STALLED] += 1
+        else:
+            count[BUSY] += 1
+        if move:
+            for w in range(width):
+                e = pipe[old, w]
+                if e == NOTHING:
+                    continue
+                if e <= TOKEN:
+                    pipe_tokens -= 1
+                elif not sent[w]:
+                    if mask[e] == np.uint64(0):
+                        count[REJECTED] += 1
+                    else:
+                        count[DROPPED] += 1
+            young = old
+            for w in range(width):
+                sent[w] = False
+                pipe[young, w] = held[w] if w < n_held else NOTHING
+                if w < n_held:
+                    if held[w] <= TOKEN:
+                        count[SUBTILES] += 1
+                        pipe_tokens += 1
+                        sub_finished = False
+                    else:
+                        count[GAUSSIANS_IN] += 1
+            n_held = 0
+        t += 1
+    return t, last_pixel + OUTPUT + 1
+
+
+@numba.njit(parallel=True, cache=True)
+def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters, ends):
+    for k in numba.prange(CORES):
+        own = order[core_start[k] : core_start[k + 1]]
+        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters[k])
+
+
+def lane_work(lists: RecordLists) -> LaneWork:
+    """What a frame makes the lanes do."""
+    mask, passes = lane_masks(lists)
+    return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish_positions(lists, mask, passes))
+
+
+def simulate_lanes(work: LaneWork, config: RenderConfig, *, leave: bool = False, empty: bool = True) -> LaneCycles:
+    """Cycles of a frame. leave: a finished sub-tile leaves its list. empty: sub-tiles with an empty list are streamed, too."""
+    lanes = config.lanes // CORES
+    order, core_start = stream_order(work, empty)
+    counters, ends = np.zeros((CORES, len(LANE_COUNTERS)), np.int64), np.zeros((CORES, 2), np.int64)
+    _cores(
+        order, core_start, work.start, work.mask, work.passes, work.finish, pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES,
+        config.in_width, config.slots, config.fifo_depth, leave, counters, ends,
+    )
+    cycles = int(ends[:, 1].max())
+    # A core that has ended goes on counting: no input, no entry in any queue.
+    counters[:, CYCLES] = cycles
+    counters[:, IDLE] += cycles - ends[:, 0]
+    counters[:, STARVED] += (cycles - ends[:, 0]) * lanes
+    return LaneCycles(cycles, counters)

@@ -1,0 +1,126 @@
+// Rendering stage of lanes in the log domain (docs/lanes.md): four cores, together one 16x16 tile, with performance counters.
+//
+// Stands where flk_render_stage stands and has its ports, but that it takes records as they lie in memory (record_elem_t), up to InWidth of
+// each core in a cycle: the older lower, all that are valid together. Lanes is of all cores: 32, 64 or 128; the picture is the same.
+//
+// Core k takes the sorted lists of the sub-tiles in column k % 2, row k / 2 of each tile, one stream per core; each list ends with a
+// token. Every element carries the sub-tile's position. The cores run independently: no barrier between tiles.
+// Finished pixels leave on one stream per core.
+//
+// Frames. idle_o: every list taken is complete and all its pixels have left. There is one mode: mode_i does not matter.
+// clear_i (any number of cycles) aborts: nothing is taken while it is high, pixels that have not left are gone, and in the cycle after it the
+// stage is as after reset, except for the counters.
+// finished_o: of each core, about the sub-tile of the element that in_* takes: its splats change no picture any more, up to the token
+// they need not come. It rises some cycles after the last pixel has finished, and is low in the cycle after the token was taken until it
+// holds for the next sub-tile.
+//
+// Counters: one is read at a time, COUNTER_LATENCY cycles after its address (core, then index flk_lane_pkg::LANE_CNT_*). They stand still while
+// hold_counters_i is high.
+//
+// Combinational paths: in_ready_o depends on in_elem_i, in_valid_i of the same core and clear_i; all other outputs come from registers.
+module flk_lane_stage
+  import flk_pkg::*;
+  import flk_param_pkg::*;
+  import flk_lane_pkg::*;
+#(
+  parameter int unsigned Lanes   = 32,  // 32, 64 or 128
+  parameter int unsigned InWidth = LANE_IN_WIDTH,
+  parameter int unsigned Slots   = LANE_SLOTS,
+  parameter int unsigned Depth   = LANE_QUEUE_DEPTH
+) (
+  input  logic                                  clk_i,
+  input  logic                                  rst_ni,
+  input  logic                                  clear_i,
+  output logic                                  idle_o,
+  input  logic                            [2:0] mode_i,
+  // sorted lists
+  input  logic         [CORES-1:0][InWidth-1:0] in_valid_i,
+  output logic         [CORES-1:0]              in_ready_o,
+  input  record_elem_t [CORES-1:0][InWidth-1:0] in_elem_i,
+  output logic         [CORES-1:0]              finished_o,
+  // finished pixels
+  output logic         [CORES-1:0]              out_valid_o,
+  input  logic         [CORES-1:0]              out_ready_i,
+  output core_pixel_t  [CORES-1:0]              out_data_o,
+  // counters
+  input  logic                                  clear_counters_i,
+  input  logic                                  hold_counters_i,
+  input  logic          [COUNTER_ADDR_BITS-1:0] counter_addr_i,
+  output logic               [COUNTER_BITS-1:0] counter_data_o
+);
+
+  if (Lanes != 32 && Lanes != 64 && Lanes != 128) begin : gen_check_lanes
+    $error("flk_lane_stage: Lanes must be 32, 64 or 128");
+  end
+  if (InWidth != 1 && InWidth != 2) begin : gen_check_width
+    $error("flk_lane_stage: InWidth must be 1 or 2");
+  end
+  if (Slots < 2 || Slots > 64 || Depth < 2 || Depth > 64) begin : gen_check_store
+    $error("flk_lane_stage: Slots and Depth must be 2 to 64");
+  end
+
+  logic [CORES-1:0] first_valid, valid, ready, core_idle, in_eos;
+  logic [CORES-1:0][COUNTER_BITS-1:0] counter;
+  logic [2:0] unused_mode;
+
+  flk_stage_control i_control (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .mode_i        ('0),
+    .mode_o        (unused_mode),
+    .idle_o,
+    .in_valid_i    (first_valid),
+    .in_ready_o,
+    .in_eos_i      (in_eos),
+    .valid_o       (valid),
+    .ready_i       (ready),
+    .idle_i        (core_idle),
+    .counter_core_i(counter_addr_i[COUNTER_ADDR_BITS-1:COUNTER_INDEX_BITS]),
+    .counter_i     (counter),
+    .counter_data_o
+  );
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_core
+    lane_core_events_t events;
+
+    assign first_valid[k] = in_valid_i[k][0];
+    // Of the youngest: whether a list is open afterwards.
+    assign in_eos[k] = in_valid_i[k][InWidth-1] ? in_elem_i[k][InWidth-1].eos
+                                                : in_elem_i[k][0].eos;
+
+    flk_lane_core #(
+      .Lanes  (Lanes / CORES),
+      .InWidth(InWidth),
+      .Slots  (Slots),
+      .Depth  (Depth)
+    ) i_core (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .idle_o     (core_idle[k]),
+      .in_valid_i (valid[k] ? in_valid_i[k] : '0),
+      .in_ready_o (ready[k]),
+      .in_elem_i  (in_elem_i[k]),
+      .finished_o (finished_o[k]),
+      .out_valid_o(out_valid_o[k]),
+      .out_ready_i(out_ready_i[k]),
+      .out_data_o (out_data_o[k]),
+      .events_o   (events)
+    );
+
+    flk_lane_counters i_counters (
+      .clk_i,
+      .rst_ni,
+      .clear_i (clear_counters_i),
+      .hold_i  (hold_counters_i),
+      .events_i(events),
+      .addr_i  (counter_addr_i[COUNTER_INDEX_BITS-1:0]),
+      .data_o  (counter[k])
+    );
+  end
+
+  logic unused;
+  assign unused = ^mode_i;
+
+endmodule

@@ -1,0 +1,509 @@
+// Lane: visits one pixel of a sub-tile in every cycle, in the log domain (docs/lanes.md).
+//
+// in  a visit (visit_valid_i): pixel and shape of a splat, only pixels of its mask (flk_row_mask); or with visit_eos_i the end of the list,
+//     when bank_free_o is high, with the sub-tile in the shape's low bits. The splat's colours are asked for in cycle 6: colour_slot_o is
+//     the visit's slot, colour_i its colours. visit_last_i, with a visit or without one: the lane needs the slot no more after that;
+//     release_o says so in cycle 6, about colour_slot_o.
+// out all Pixels of the sub-tile after its end, one per cycle, in order: place in the sub-tile, S as far as the result needs it, and colours.
+//
+// | cycle | what |
+// |---|---|
+// | 0 | visit_* come |
+// | 1 | u and v |
+// | 2 | u² + v² - log2 o = La |
+// | 3 | La is shifted to its line of h |
+// | 4 | h(La) |
+// | 5 = STATE | S of the pixel is read and written: blended, finished or skipped; La + S |
+// | 6 | mantissa of 2^-(La + S) |
+// | 7 | its products with the colours |
+// | 8 = COLOUR | are shifted; colours of the pixel are read and written |
+//
+// The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token copies S at STATE and the
+// colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next sub-tile may follow at once.
+// Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
+// clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
+// to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
+// clear_i does. All outputs come from registers, out_data_o by a multiplexer.
+// Source: docs/lanes.md; the rules of 3D Gaussian Splatting's rasterizer in logarithms.
+module flk_lane
+  import flk_pkg::*;
+  import flk_lane_pkg::*;
+#(
+  parameter  int unsigned Lanes  = 8,  // of the core: 8, 16 or 32
+  parameter  int unsigned Lane   = 0,
+  parameter  int unsigned Slots  = 20,
+  localparam int unsigned Pixels = 64 / Lanes,
+  localparam int unsigned PixelW = $clog2(Pixels),
+  localparam int unsigned SlotW  = $clog2(Slots)
+) (
+  input  logic                        clk_i,
+  input  logic                        rst_ni,
+  input  logic                        clear_i,
+  // visits
+  input  logic                        visit_valid_i,
+  input  logic                        visit_eos_i,
+  input  logic                        visit_last_i,
+  input  logic           [PixelW-1:0] visit_pixel_i,
+  input  logic            [SlotW-1:0] visit_slot_i,
+  input  lane_shape_t                 visit_shape_i,
+  output logic            [SlotW-1:0] colour_slot_o,
+  input  lane_colour_t                colour_i,
+  output logic                        release_o,
+  output logic                        bank_free_o,
+  output logic                        token_o,
+  output logic                        token_done_o,
+  output logic           [Pixels-1:0] finished_o,
+  // finished pixels
+  output logic                        out_valid_o,
+  input  logic                        out_ready_i,
+  output lane_pixel_t                 out_data_o,
+  // counters
+  output lane_events_t                events_o
+);
+
+  if (Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
+    $error("flk_lane: Lanes must be 8, 16 or 32");
+  end
+  if (Lane >= Lanes) begin : gen_check_lane
+    $error("flk_lane: Lane must be below Lanes");
+  end
+
+  localparam int unsigned STATE = 5;
+  localparam int unsigned FETCH = 6;  // of the splat's colours
+  localparam int unsigned COLOUR = 8;
+  localparam int unsigned GUARD = PLACE - UV;
+  localparam int unsigned WIDE = UV_BITS + GUARD;  // sums of u and v before they are rounded
+  localparam int unsigned MAG_BITS = UV_BITS - 1;
+
+  // ---- Control: index s holds what came s cycles ago ---------------------------------------------------------
+
+  logic [STATE:1] valid_q;
+  logic [COLOUR:1] eos_q;
+  logic [FETCH:1] last_q;
+  logic [COLOUR-1:1][PixelW-1:0] pixel_q;
+  logic [FETCH:1][SlotW-1:0] slot_q;
+  logic [Pixels-1:0] select_s_q, select_c_q;  // the pixel, one bit each: at STATE and at COLOUR
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      valid_q <= '0;
+      eos_q   <= '0;
+      last_q  <= '0;
+    end else if (clear_i) begin
+      valid_q <= '0;
+      eos_q   <= '0;
+      last_q  <= '0;
+    end else begin
+      last_q  <= {last_q[FETCH-1:1], visit_last_i};
+      valid_q <= {valid_q[STATE-1:1], visit_valid_i && !visit_eos_i};
+      eos_q   <= {eos_q[COLOUR-1:1], visit_valid_i && visit_eos_i};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    pixel_q    <= {pixel_q[COLOUR-2:1], visit_pixel_i};
+    slot_q     <= {slot_q[FETCH-1:1], visit_slot_i};
+    select_s_q <= Pixels'(1) << pixel_q[STATE-1];
+    select_c_q <= Pixels'(1) << pixel_q[COLOUR-1];
+  end
+
+  assign token_o       = |eos_q[STATE:1];
+  assign token_done_o  = eos_q[STATE];
+  assign colour_slot_o = slot_q[FETCH];
+  assign release_o     = last_q[FETCH];
+
+  // ---- Cycle 1: u and v ----------------------------------------------------------------------------------------
+
+  // The splat at the pixel's place: column and row, each an odd multiple -7 to 7 of a half slope. Such a multiple is +-4 +-2 +-1, the signs being
+  // the bits of the column: 2 i - 7 = sum of 2^k (2 i_k - 1). A negative term is the inverted slope shifted, 2^k too small; all that is
+  // missing is 7 - i, which is added with the half unit of rounding.
+  lane_shape_t shape_q;
+  logic [2:0] column, row, column_q, row_q;
+  logic [WIDE-1:0] u_wide, v_wide;
+  logic unused_wide;
+
+  always_comb begin
+    column = '0;
+    row    = '0;
+    for (int unsigned p = 0; p < Pixels; p++) begin
+      if (visit_pixel_i == PixelW'(p)) begin
+        column = lane_column(Lanes, Lane, p);
+        row    = lane_row(Lanes, Lane, p);
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (visit_valid_i) begin
+      shape_q  <= visit_shape_i;
+      column_q <= column;
+      row_q    <= row;
+    end
+  end
+
+  function automatic logic [WIDE-1:0] term(logic [WIDE-1:0] slope, logic positive,
+                                           int unsigned k);
+    return (slope ^ {WIDE{!positive}}) << k;
+  endfunction
+
+  localparam int unsigned HALF = 1 << (GUARD - 1);
+  logic [4:0] off_u, off_v;
+  logic [WIDE-1:0] s0, s1, s2;
+
+  assign off_u = 5'(HALF + 14) - 5'(column_q) - 5'(row_q);
+  assign off_v = 5'(HALF + 7) - 5'(row_q);
+  assign s0 = WIDE'(shape_q.s0);
+  assign s1 = WIDE'(signed'(shape_q.s1));
+  assign s2 = WIDE'(shape_q.s2);
+
+  assign u_wide = shape_q.w + WIDE'(off_u)
+      + term(s0, column_q[0], 0) + term(s0, column_q[1], 1) + term(s0, column_q[2], 2)
+      + term(s1, row_q[0], 0) + term(s1, row_q[1], 1) + term(s1, row_q[2], 2);
+  assign v_wide = shape_q.z + WIDE'(off_v)
+      + term(s2, row_q[0], 0) + term(s2, row_q[1], 1) + term(s2, row_q[2], 2);
+  assign unused_wide = ^{u_wide[GUARD-1:0], v_wide[GUARD-1:0]};
+
+  // ---- Cycle 2: La ---------------------------------------------------------------------------------------------
+
+  localparam int unsigned DROP = 2 * UV - LOG;
+  localparam int unsigned SQUARE_BITS = 2 * MAG_BITS;
+  localparam int unsigned LA_WIDE = SQUARE_BITS + 2;
+
+  logic [UV_BITS-1:0] u_q, v_q;
+  logic [LA_BITS-1:0] lo_q;
+  logic [LA_WIDE-1:0] la_wide;
+  logic [LA_WIDE-DROP-1:0] la;
+  logic unused_la;
+
+  always_ff @(posedge clk_i) begin
+    if (valid_q[1]) begin
+      u_q  <= u_wide[WIDE-1:GUARD];
+      v_q  <= v_wide[WIDE-1:GUARD];
+      lo_q <= shape_q.lo;
+    end
+  end
+
+  // Row i of a square: the products of digit i with itself and, twice, with the higher ones. Of a negative number the inverted digits m are
+  // squared, which is 2 m + 1 too little: the last row.
+  typedef logic [MAG_BITS:0][LA_WIDE-1:0] rows_t;
+
+  function automatic rows_t square_rows(logic [UV_BITS-1:0] value);
+    rows_t rows;
+    logic negative;
+    logic [MAG_BITS-1:0] m;
+    negative = value[UV_BITS-1];
+    m        = value[MAG_BITS-1:0] ^ {MAG_BITS{negative}};
+    for (int unsigned i = 0; i < MAG_BITS; i++) begin
+      rows[i] = m[i] ? (LA_WIDE'(m >> (i + 1)) << (2 * i + 2)) | (LA_WIDE'(1) << (2 * i)) : '0;
+    end
+    rows[MAG_BITS] = negative ? LA_WIDE'({m, 1'b1}) : '0;
+    return rows;
+  endfunction
+
+  rows_t u_rows, v_rows;
+
+  assign u_rows = square_rows(u_q);
+  assign v_rows = square_rows(v_q);
+
+  always_comb begin
+    la_wide = LA_WIDE'({lo_q, DROP'(1 << (DROP - 1))});
+    for (int unsigned i = 0; i <= MAG_BITS; i++) begin
+      la_wide = la_wide + u_rows[i] + v_rows[i];
+    end
+  end
+
+  assign la        = la_wide[LA_WIDE-1:DROP];
+  assign unused_la = ^la_wide[DROP-1:0];
+
+  // ---- Cycle 3: line of h --------------------------------------------------------------------------------------
+
+  localparam int unsigned REST_BITS = LOG + 2 - PIECE_BITS;
+
+  logic skip_q, clamp_q;
+  logic [LA_BITS-1:0] la_q;
+  logic [LA_BITS-2:0] normal;  // below the leading one
+  logic [$clog2(LA_BITS+1)-1:0] zeros;
+  logic [PIECE_BITS-1:0] piece;
+
+  always_ff @(posedge clk_i) begin
+    if (valid_q[2]) begin
+      la_q    <= la[LA_BITS-1:0];
+      skip_q  <= la > (LA_WIDE - DROP)'(LIMIT);
+      clamp_q <= la <= (LA_WIDE - DROP)'(CLAMP);
+    end
+  end
+
+  flk_lzc #(
+    .Width(LA_BITS)
+  ) i_lzc (
+    .value_i(la_q),
+    .count_o(zeros)
+  );
+
+  assign normal = (LA_BITS - 1)'(la_q << zeros);
+  assign piece  = normal[REST_BITS+:PIECE_BITS];
+
+  // ---- Cycle 4: h ------------------------------------------------------------------------------------------------
+
+  localparam int unsigned VALUE_BITS = $bits(H_VALUE[0][0]);
+  localparam int unsigned FALL_BITS = $bits(H_FALL[0][0]);
+  localparam int unsigned LINE_BITS = VALUE_BITS + REST_BITS;
+
+  logic [VALUE_BITS-1:0] value_q;
+  logic [FALL_BITS-1:0] fall_q;
+  logic [REST_BITS-1:0] rest_q;
+  logic [LA_BITS-1:0] la_4_q;
+  logic skip_4_q, clamp_4_q;
+  logic [LINE_BITS-1:0] line;
+  logic unused_line;
+
+  always_ff @(posedge clk_i) begin
+    if (valid_q[3]) begin
+      value_q   <= H_VALUE[zeros][piece];
+      fall_q    <= H_FALL[zeros][piece];
+      rest_q    <= normal[REST_BITS-1:0];
+      la_4_q    <= la_q;
+      skip_4_q  <= skip_q;
+      clamp_4_q <= clamp_q;
+    end
+  end
+
+  assign line = {value_q, {REST_BITS{1'b0}}} + LINE_BITS'(1 << (REST_BITS + LINE_GUARD - 1))
+              - LINE_BITS'(fall_q) * LINE_BITS'(rest_q);
+  assign unused_line = ^line;
+
+  // ---- Cycle 5: transmittance --------------------------------------------------------------------------------------
+
+  localparam int unsigned X_BITS = LA_BITS + SUM - LOG;
+  localparam int unsigned TOTAL_BITS = EXPONENT_BITS + SUM;
+
+  logic [H_BITS-1:0] h_q;
+  logic [X_BITS-1:0] x_q;
+  logic skip_5_q;
+  logic [Pixels-1:0][S_BITS-1:0] s_q;
+  logic [Pixels-1:0] finished_q;
+  logic [S_BITS-1:0] s_now;
+  logic [S_BITS:0] s_next;
+  logic [TOTAL_BITS-1:0] total;
+  logic was_done, live, ends, blend, finish;
+  logic unused_total;
+
+  always_ff @(posedge clk_i) begin
+    if (valid_q[4]) begin
+      h_q      <= line[REST_BITS+LINE_GUARD+:H_BITS];  // the constant, too, is a line
+      x_q      <= clamp_4_q ? X_BITS'(X_MAX) : {la_4_q, {(SUM - LOG) {1'b0}}};
+      skip_5_q <= skip_4_q;
+    end
+  end
+
+  always_comb begin
+    s_now    = '0;
+    was_done = 1'b0;
+    for (int unsigned p = 0; p < Pixels; p++) begin
+      s_now    |= s_q[p] & {S_BITS{select_s_q[p]}};
+      was_done |= finished_q[p] & select_s_q[p];
+    end
+  end
+
+  assign s_next = (S_BITS + 1)'(s_now) + (S_BITS + 1)'(h_q);
+  assign total  = TOTAL_BITS'(s_now) + TOTAL_BITS'(x_q);
+  assign ends   = s_next > (S_BITS + 1)'(S_MAX);
+  assign live   = valid_q[STATE] && !skip_5_q && !was_done;
+  assign blend  = live && !ends;
+  assign finish = live && ends;
+  assign unused_total = ^total[SUM-MANTISSA-1:0];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      s_q        <= '0;
+      finished_q <= '0;
+    end else if (clear_i || eos_q[STATE]) begin
+      s_q        <= '0;
+      finished_q <= '0;
+    end else begin
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        if (blend && select_s_q[p]) begin
+          s_q[p] <= s_next[S_BITS-1:0];
+        end
+      end
+      finished_q <= finished_q | (finish ? select_s_q : '0);
+    end
+  end
+
+  assign finished_o = finished_q;
+
+  // Counted a cycle late, so that sums over lanes make no long path.
+  lane_events_t events_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      events_q <= '0;
+    end else begin
+      events_q.visited  <= valid_q[STATE];
+      events_q.skipped  <= valid_q[STATE] && skip_5_q;
+      events_q.blended  <= blend;
+      events_q.finished <= finish;
+    end
+  end
+
+  assign events_o = events_q;
+
+  // ---- Cycles 6 and 7: weight and its products with the colours ----------------------------------------------------
+
+  localparam int unsigned PRODUCT_BITS = MANTISSA + COLOUR_BITS;
+  // Places from the product to the accumulator, but for the exponent and the place that rounds.
+  localparam int unsigned SHIFT = MANTISSA + COLOUR_FRACTION - ACCUMULATOR - 1;
+  localparam int unsigned PART_BITS = PRODUCT_BITS - SHIFT;
+
+  logic [COLOUR:6] blend_q;
+  logic [MANTISSA-1:0] address_q, mantissa_q;
+  logic [COLOUR:6][EXPONENT_BITS-1:0] exponent_q;
+  lane_colour_t colour_q;
+  logic [2:0][PRODUCT_BITS-1:0] product_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      blend_q <= '0;
+    end else if (clear_i) begin
+      blend_q <= '0;
+    end else begin
+      blend_q <= {blend_q[COLOUR-1:6], blend};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    exponent_q <= {exponent_q[7:6], total[TOTAL_BITS-1:SUM]};
+    address_q  <= total[SUM-1-:MANTISSA];
+    mantissa_q <= {1'b1, EXP2[address_q]};
+    colour_q   <= colour_i;
+    for (int unsigned c = 0; c < 3; c++) begin
+      product_q[c] <= PRODUCT_BITS'(mantissa_q) * PRODUCT_BITS'(colour_q[c]);
+    end
+  end
+
+  // ---- Cycle 8: colours --------------------------------------------------------------------------------------------
+
+  logic [Pixels-1:0][2:0][C_BITS-1:0] c_q;
+  logic [2:0][C_BITS-1:0] c_now, c_next;
+  logic [2:0] unused_place;
+
+  always_comb begin
+    c_now = '0;
+    for (int unsigned p = 0; p < Pixels; p++) begin
+      c_now |= c_q[p] & {(3 * C_BITS) {select_c_q[p]}};
+    end
+    for (int unsigned c = 0; c < 3; c++) begin
+      automatic logic [PART_BITS-1:0] part;  // with the place that rounds
+      part = PART_BITS'(product_q[c] >> SHIFT >> exponent_q[COLOUR]);
+      {c_next[c], unused_place[c]} = {c_now[c], 1'b1} + (C_BITS + 1)'(part);
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      c_q <= '0;
+    end else if (clear_i || eos_q[COLOUR]) begin
+      c_q <= '0;
+    end else begin
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        if (blend_q[COLOUR] && select_c_q[p]) begin
+          c_q[p] <= c_next;
+        end
+      end
+    end
+  end
+
+  // ---- Bank that leaves --------------------------------------------------------------------------------------------
+
+  logic bank_q, full_q;  // taken, and ready to leave
+  logic [Pixels-1:0] place_q;  // the pixel that leaves, one bit each
+  subtile_t subtile_q;
+  logic [Pixels-1:0][RESULT_BITS-1:0] s_out_q;
+  logic [Pixels-1:0][2:0][C_BITS-1:0] c_out_q;
+  logic last;
+
+  assign last = out_valid_o && out_ready_i && place_q[Pixels-1];
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      bank_q  <= 1'b0;
+      full_q  <= 1'b0;
+      place_q <= Pixels'(1);
+    end else if (clear_i) begin
+      bank_q  <= 1'b0;
+      full_q  <= 1'b0;
+      place_q <= Pixels'(1);
+    end else begin
+      if (visit_valid_i && visit_eos_i) begin
+        bank_q <= 1'b1;
+      end else if (last) begin
+        bank_q <= 1'b0;
+      end
+      if (eos_q[COLOUR]) begin
+        full_q <= 1'b1;
+      end else if (last) begin
+        full_q <= 1'b0;
+      end
+      if (out_valid_o && out_ready_i) begin
+        place_q <= {place_q[Pixels-2:0], place_q[Pixels-1]};
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (visit_valid_i && visit_eos_i) begin
+      subtile_q <= visit_shape_i[$bits(subtile_t)-1:0];
+    end
+    if (eos_q[STATE]) begin
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        s_out_q[p] <= s_q[p][S_BITS-1-:RESULT_BITS];
+      end
+    end
+    if (eos_q[COLOUR]) begin
+      c_out_q <= c_q;
+    end
+  end
+
+  assign bank_free_o = !bank_q;
+  assign out_valid_o = full_q;
+
+  always_comb begin
+    out_data_o = '0;
+    for (int unsigned p = 0; p < Pixels; p++) begin
+      out_data_o.column |= lane_column(Lanes, Lane, p) & {3{place_q[p]}};
+      out_data_o.row    |= lane_row(Lanes, Lane, p) & {3{place_q[p]}};
+      out_data_o.s      |= s_out_q[p] & {RESULT_BITS{place_q[p]}};
+      out_data_o.colour |= c_out_q[p] & {(3 * C_BITS) {place_q[p]}};
+    end
+    out_data_o.subtile = subtile_q;
+  end
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      visit_valid_i && visit_eos_i && !clear_i |-> bank_free_o)
+  else $error("flk_lane: end of a list while its bank is taken");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o && !out_ready_i && !clear_i |=> out_valid_o && $stable(out_data_o))
+  else $error("flk_lane: pixel changed before its transfer");
+
+  // What flk_row_mask lets through is nearer than 3: nothing is lost above UV_BITS.
+  logic outside;
+  assign outside = u_q[UV_BITS-1-:3] inside {3'b011, 3'b100}
+                || v_q[UV_BITS-1-:3] inside {3'b011, 3'b100};
+  assert property (@(posedge clk_i) disable iff (!rst_ni) valid_q[2] |-> !outside)
+  else $error("flk_lane: a pixel outside of the splat's mask");
+
+  // Weights of a pixel add up to little more than 1, colours are below 2.
+  logic overflow;
+  always_comb begin
+    overflow = 1'b0;
+    for (int unsigned c = 0; c < 3; c++) begin
+      overflow |= c_next[c] < c_now[c];
+    end
+  end
+  assert property (@(posedge clk_i) disable iff (!rst_ni) blend_q[COLOUR] |-> !overflow)
+  else $error("flk_lane: a colour has overflowed");
+`endif
+
+endmodule

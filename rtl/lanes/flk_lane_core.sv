@@ -1,0 +1,475 @@
+// Core of the lanes: one 8x8 sub-tile after another, from records to finished pixels (docs/lanes.md).
+//
+// in  up to InWidth elements in a cycle, the older lower; all that are valid are taken together. An element is a record of 16 bytes and the
+//     sub-tile whose list it is in, or the end of that list (eos).
+// out finished pixels, one per cycle, with sub-tile, mini-tile and pixel index, in any order; all pixels of a sub-tile before any of a later
+//     one that the same lane has.
+//
+//     records ──► flk_splat_setup ──► flk_row_mask ──► dispatch ──► store of Slots splats ──► lanes ──► bank ──► flk_lane_result
+//                                                        │                                 ▲
+//                                                        └──► a queue for each lane ───────┘
+//
+// Dispatch drops a splat whose mask is empty, or holds only pixels that are known to be finished; another takes a slot of the store, one a
+// cycle, and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it.
+// The end of a list goes through all queues in order.
+// clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no list and no pixel is inside.
+// finished_o is about the sub-tile of the element that in_* takes: all its pixels are finished, so that its splats change no pixel any
+// more. It comes from a register, rises some cycles late and is low in the cycle after a token was taken.
+// in_ready_o comes from registers.
+module flk_lane_core
+  import flk_pkg::*;
+  import flk_lane_pkg::*;
+#(
+  parameter int unsigned Lanes   = 8,  // 8, 16 or 32
+  parameter int unsigned InWidth = 2,  // 1 or 2
+  parameter int unsigned Slots   = 20,
+  parameter int unsigned Depth   = 16  // of a lane's queue
+) (
+  input  logic                       clk_i,
+  input  logic                       rst_ni,
+  input  logic                       clear_i,
+  output logic                       idle_o,
+  // records
+  input  logic         [InWidth-1:0] in_valid_i,
+  output logic                       in_ready_o,
+  input  record_elem_t [InWidth-1:0] in_elem_i,
+  output logic                       finished_o,
+  // finished pixels
+  output logic                       out_valid_o,
+  input  logic                       out_ready_i,
+  output core_pixel_t                out_data_o,
+  // counters
+  output lane_core_events_t          events_o
+);
+
+  if (Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
+    $error("flk_lane_core: Lanes must be 8, 16 or 32");
+  end
+  if (InWidth != 1 && InWidth != 2) begin : gen_check_width
+    $error("flk_lane_core: InWidth must be 1 or 2");
+  end
+  if (Slots < 2 || Slots > 64 || Depth < 2 || Depth > 64) begin : gen_check_store
+    $error("flk_lane_core: Slots and Depth must be 2 to 64");
+  end
+
+  localparam int unsigned STAGES = SETUP_STAGES + ROW_MASK_STAGES;
+  localparam int unsigned Pixels = 64 / Lanes;
+  localparam int unsigned PixelW = $clog2(Pixels);
+  localparam int unsigned SlotW = $clog2(Slots);
+
+  // ---- Setup and masks: index s holds what came s moves ago ----------------------------------------------------
+
+  logic move;  // everything up to dispatch moves on
+  logic [STAGES:1][InWidth-1:0] valid_q, eos_q;
+  logic [InWidth-1:0][63:0] mask;
+  lane_shape_t [InWidth-1:0] shape;
+  lane_colour_t [InWidth-1:0] colour;
+  logic [InWidth-1:0] in_eos;
+
+  assign in_ready_o = move;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      valid_q <= '0;
+    end else if (clear_i) begin
+      valid_q <= '0;
+    end else if (move) begin
+      valid_q <= {valid_q[STAGES-1:1], in_valid_i};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (move) begin
+      eos_q <= {eos_q[STAGES-1:1], in_eos};
+    end
+  end
+
+  for (genvar w = 0; w < InWidth; w++) begin : gen_way
+    lane_splat_t splat, splat_q;
+    subtile_t subtile_q;
+
+    assign in_eos[w] = in_elem_i[w].eos;
+
+    flk_splat_setup i_setup (
+      .clk_i,
+      .en_i     (move),
+      .record_i (in_elem_i[w].record),
+      .subtile_i(in_elem_i[w].subtile),
+      .splat_o  (splat)
+    );
+
+    flk_row_mask i_mask (
+      .clk_i,
+      .en_i   (move),
+      .splat_i(splat),
+      .mask_o (mask[w])
+    );
+
+    flk_delay #(
+      .Width($bits(lane_splat_t)),
+      .Depth(ROW_MASK_STAGES)
+    ) i_splat (
+      .clk_i,
+      .en_i(move),
+      .d_i (splat),
+      .q_o (splat_q)
+    );
+
+    flk_delay #(
+      .Width($bits(subtile_t)),
+      .Depth(STAGES)
+    ) i_subtile (
+      .clk_i,
+      .en_i(move),
+      .d_i (in_elem_i[w].subtile),
+      .q_o (subtile_q)
+    );
+
+    always_comb begin
+      shape[w].w  = splat_q.w[$bits(shape[w].w)-1:0];
+      shape[w].z  = splat_q.z[$bits(shape[w].z)-1:0];
+      shape[w].s0 = splat_q.s0;
+      shape[w].s1 = splat_q.s1;
+      shape[w].s2 = splat_q.s2;
+      shape[w].lo = splat_q.lo;
+      if (eos_q[STAGES][w]) begin
+        shape[w][$bits(subtile_t)-1:0] = subtile_q;
+      end
+      colour[w] = {splat_q.red, splat_q.green, splat_q.blue};
+    end
+
+    // More of w and z than a lane takes matters to masks alone.
+    logic unused_high;
+    assign unused_high = ^{splat_q.w, splat_q.z};
+  end
+
+  // ---- Dispatch --------------------------------------------------------------------------------------------------
+
+  logic [63:0] alive;  // pixel 16 m + i: not known to be finished
+  logic [InWidth-1:0][63:0] live;
+  logic [InWidth-1:0] wanted, sent, sent_q, left;  // sent: with the one of this cycle
+  logic [Lanes-1:0][Pixels-1:0] bits;
+  logic [Lanes-1:0] need, queue_ready;
+  logic [Slots-1:0] busy;
+  logic [SlotW-1:0] slot;
+  logic slot_free, room, dispatch, choice, token;
+  logic [63:0] chosen;
+
+  always_comb begin
+    for (int unsigned w = 0; w < InWidth; w++) begin
+      live[w] = mask[w] & alive;
+    end
+    if (InWidth == 2 && valid_q[STAGES][0] && eos_q[STAGES][0] && !sent_q[0]) begin
+      live[InWidth-1] = mask[InWidth-1];  // of the next sub-tile
+    end
+    for (int unsigned w = 0; w < InWidth; w++) begin
+      wanted[w] = valid_q[STAGES][w] && !sent_q[w] && (eos_q[STAGES][w] || live[w] != '0);
+    end
+    choice = InWidth == 2 && !wanted[0];
+    chosen = live[choice];
+    token  = eos_q[STAGES][choice];
+  end
+
+  always_comb begin
+    for (int unsigned l = 0; l < Lanes; l++) begin
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        bits[l][p] = !token && chosen[lane_pixel(Lanes, l, p)];
+      end
+      need[l] = token || bits[l] != '0;
+    end
+  end
+
+  always_comb begin
+    slot = '0;
+    for (int unsigned i = Slots; i > 0; i--) begin
+      if (!busy[i-1]) begin
+        slot = SlotW'(i - 1);
+      end
+    end
+  end
+
+  assign slot_free = !(&busy);
+  assign room      = (queue_ready | ~need) == '1;
+  assign dispatch  = wanted != '0 && slot_free && room;
+
+  always_comb begin
+    left = wanted;
+    if (dispatch) begin
+      left[choice] = 1'b0;
+    end
+    move = left == '0;
+    sent = sent_q;
+    if (dispatch) begin
+      sent[choice] = 1'b1;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      sent_q <= '0;
+    end else begin
+      sent_q <= (move || clear_i) ? '0 : sent;
+    end
+  end
+
+  // ---- Store -------------------------------------------------------------------------------------------------------
+
+  lane_shape_t [Slots-1:0] shape_q;
+  lane_colour_t [Slots-1:0] colour_q;
+  logic [Slots-1:0][Lanes-1:0] pending_d, pending_q;
+  logic [Lanes-1:0] release_valid;
+  logic [Lanes-1:0][SlotW-1:0] release_slot;
+
+  always_comb begin
+    pending_d = pending_q;
+    for (int unsigned i = 0; i < Slots; i++) begin
+      busy[i] = pending_q[i] != '0;
+      for (int unsigned l = 0; l < Lanes; l++) begin
+        if (release_valid[l] && release_slot[l] == SlotW'(i)) begin
+          pending_d[i][l] = 1'b0;
+        end
+      end
+      if (dispatch && slot == SlotW'(i)) begin
+        pending_d[i] = need;
+      end
+    end
+    if (clear_i) begin
+      pending_d = '0;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      pending_q <= '0;
+    end else begin
+      pending_q <= pending_d;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    for (int unsigned i = 0; i < Slots; i++) begin
+      if (dispatch && slot == SlotW'(i)) begin
+        shape_q[i]  <= shape[choice];
+        colour_q[i] <= colour[choice];
+      end
+    end
+  end
+
+  // ---- Lanes -------------------------------------------------------------------------------------------------------
+
+  logic [Lanes-1:0] lane_idle, lane_finished, starved, waits;
+  logic [Lanes-1:0] pixel_valid, pixel_ready;
+  lane_pixel_t [Lanes-1:0] pixel;
+  lane_events_t [Lanes-1:0] lane_events;
+  logic [Lanes-1:0][Pixels-1:0] lane_alive;
+
+  for (genvar l = 0; l < Lanes; l++) begin : gen_lane
+    logic visit_valid, visit_eos, visit_last, bank_free, token_inside, token_done, queue_empty;
+    logic [PixelW-1:0] visit_pixel;
+    logic [SlotW-1:0] visit_slot;
+    logic [Pixels-1:0] finished;
+    lane_shape_t visit_shape;
+    lane_colour_t visit_colour;
+
+    // One bit for each slot selects: smaller than a multiplexer by the slot's number.
+    always_comb begin
+      visit_shape  = '0;
+      visit_colour = '0;
+      for (int unsigned i = 0; i < Slots; i++) begin
+        visit_shape  |= shape_q[i] & {$bits(lane_shape_t){visit_slot == SlotW'(i)}};
+        visit_colour |= colour_q[i] & {$bits(lane_colour_t){release_slot[l] == SlotW'(i)}};
+      end
+    end
+
+    flk_lane_queue #(
+      .Pixels(Pixels),
+      .Slots (Slots),
+      .Depth (Depth)
+    ) i_queue (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .push_i       (dispatch && need[l]),
+      .ready_o      (queue_ready[l]),
+      .push_slot_i  (slot),
+      .push_pixels_i(bits[l]),
+      .alive_o      (lane_alive[l]),
+      .empty_o      (queue_empty),
+      .finished_i   (finished),
+      .token_i      (token_inside),
+      .token_done_i (token_done),
+      .bank_free_i  (bank_free),
+      .visit_valid_o(visit_valid),
+      .visit_eos_o  (visit_eos),
+      .visit_last_o (visit_last),
+      .visit_pixel_o(visit_pixel),
+      .visit_slot_o (visit_slot),
+      .starved_o    (starved[l]),
+      .waits_o      (waits[l])
+    );
+
+    flk_lane #(
+      .Lanes(Lanes),
+      .Lane (l),
+      .Slots(Slots)
+    ) i_lane (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .visit_valid_i(visit_valid),
+      .visit_eos_i  (visit_eos),
+      .visit_last_i (visit_last),
+      .visit_pixel_i(visit_pixel),
+      .visit_slot_i (visit_slot),
+      .visit_shape_i(visit_shape),
+      .colour_slot_o(release_slot[l]),
+      .colour_i     (visit_colour),
+      .release_o    (release_valid[l]),
+      .bank_free_o  (bank_free),
+      .token_o      (token_inside),
+      .token_done_o (token_done),
+      .finished_o   (finished),
+      .out_valid_o  (pixel_valid[l]),
+      .out_ready_i  (pixel_ready[l]),
+      .out_data_o   (pixel[l]),
+      .events_o     (lane_events[l])
+    );
+
+    assign lane_idle[l]     = queue_empty && bank_free;
+    assign lane_finished[l] = lane_alive[l] == '0;
+
+    for (genvar p = 0; p < Pixels; p++) begin : gen_pixel
+      assign alive[lane_pixel(Lanes, l, p)] = lane_alive[l][p];
+    end
+  end
+
+  // ---- Finished pixels ---------------------------------------------------------------------------------------------
+
+  logic choice_valid, choice_ready, taken_valid, taken_ready;
+  lane_pixel_t choice_pixel, taken;
+  core_pixel_t converted;
+  logic [$clog2(Lanes)-1:0] unused_lane;
+
+  flk_stream_arbiter #(
+    .Inputs(Lanes),
+    .Width ($bits(lane_pixel_t))
+  ) i_arbiter (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .in_valid_i (pixel_valid),
+    .in_ready_o (pixel_ready),
+    .in_data_i  (pixel),
+    .out_valid_o(choice_valid),
+    .out_ready_i(choice_ready),
+    .out_data_o (choice_pixel),
+    .out_index_o(unused_lane)
+  );
+
+  flk_pipe_reg #(
+    .Width($bits(lane_pixel_t))
+  ) i_taken (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .in_valid_i (choice_valid),
+    .in_ready_o (choice_ready),
+    .in_data_i  (choice_pixel),
+    .out_valid_o(taken_valid),
+    .out_ready_i(taken_ready),
+    .out_data_o (taken)
+  );
+
+  flk_lane_result i_result (
+    .s_i     (taken.s),
+    .colour_i(taken.colour),
+    .pixel_o (converted.pixel)
+  );
+
+  assign converted.subtile  = taken.subtile;
+  assign converted.minitile = {taken.row[2], taken.column[2]};
+  assign converted.index    = {taken.row[1:0], taken.column[1:0]};
+
+  flk_pipe_reg #(
+    .Width(CORE_PIXEL_BITS)
+  ) i_out (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .in_valid_i (taken_valid),
+    .in_ready_o (taken_ready),
+    .in_data_i  (converted),
+    .out_valid_o,
+    .out_ready_i,
+    .out_data_o
+  );
+
+  // ---- The whole core ----------------------------------------------------------------------------------------------
+
+  logic finished_q, token_in;
+
+  assign token_in   = move && (in_valid_i & in_eos) != '0;
+  assign finished_o = finished_q;
+  assign idle_o     = valid_q == '0 && (&lane_idle) && !taken_valid && !out_valid_o;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      finished_q <= 1'b0;
+    end else begin
+      finished_q <= (&lane_finished) && (valid_q & eos_q) == '0 && !token_in && !clear_i;
+    end
+  end
+
+  // ---- Counters ------------------------------------------------------------------------------------------------------
+
+  logic [Lanes-1:0] entry_q;  // lanes that took an entry of a splat, counted a cycle late
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      entry_q <= '0;
+    end else begin
+      entry_q <= (dispatch && !token) ? need : '0;
+    end
+  end
+
+  always_comb begin
+    events_o         = '0;
+    events_o.busy    = in_valid_i != '0 && move;
+    events_o.stalled = in_valid_i != '0 && !move;
+    events_o.idle    = in_valid_i == '0;
+    for (int unsigned w = 0; w < InWidth; w++) begin
+      events_o.tokens += 2'(in_valid_i[w] && move && in_eos[w]);
+      events_o.splats += 2'(in_valid_i[w] && move && !in_eos[w]);
+      if (move && valid_q[STAGES][w] && !eos_q[STAGES][w] && !sent[w]) begin
+        events_o.rejected += 2'(mask[w] == '0);
+        events_o.dropped  += 2'(mask[w] != '0);
+      end
+    end
+    events_o.dispatched = dispatch;
+    events_o.no_slot    = wanted != '0 && !slot_free;
+    events_o.no_room    = wanted != '0 && slot_free && !room;
+    for (int unsigned l = 0; l < Lanes; l++) begin
+      events_o.entries  += 6'(entry_q[l]);
+      events_o.visits   += 6'(lane_events[l].visited);
+      events_o.skipped  += 6'(lane_events[l].skipped);
+      events_o.blended  += 6'(lane_events[l].blended);
+      events_o.finished += 6'(lane_events[l].finished);
+      events_o.starved  += 6'(starved[l]);
+      events_o.waits    += 6'(waits[l]);
+    end
+  end
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      in_valid_i != '0 && !in_ready_o && !clear_i |=>
+      clear_i || (in_valid_i == $past(in_valid_i) && $stable(in_elem_i)))
+  else $error("flk_lane_core: element changed before its transfer");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) !in_valid_i[InWidth-1] || in_valid_i[0])
+  else $error("flk_lane_core: a younger element without the older one");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) dispatch |-> pending_q[slot] == '0)
+  else $error("flk_lane_core: a slot was given twice");
+`endif
+
+endmodule

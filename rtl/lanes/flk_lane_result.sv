@@ -1,0 +1,62 @@
+// Result of a pixel in FP16: transmittance T = 2^-S and colours (docs/lanes.md).
+//
+// S comes with one place more than the table's address, for rounding, ties upwards; S = 0 gives exactly 1, and T is always a normal number.
+// Colours are rounded to the nearest, ties to even; the least, 2^-ACCUMULATOR, is a normal number.
+// Combinational.
+module flk_lane_result
+  import flk_pkg::*;
+  import flk_lane_pkg::*;
+(
+  input  logic [RESULT_BITS-1:0] s_i,
+  input  logic [2:0][C_BITS-1:0] colour_i,  // red is 2
+  output pixel_t                 pixel_o
+);
+
+  localparam logic [15:0] HALF = 16'h3800;  // 0.5
+  localparam int unsigned WHOLE_BITS = RESULT_BITS - 1 - RESULT_FRACTION;
+  localparam int unsigned BIAS = 15;
+
+  if (C_BITS < 12 || ACCUMULATOR > BIAS - 1) begin : gen_check
+    $error("flk_lane_result: colours must have 12 bits or more, and no subnormal number");
+  end
+
+  // ---- Transmittance ---------------------------------------------------------------------------------------
+
+  logic [WHOLE_BITS-1:0] whole;
+  logic [RESULT_FRACTION-1:0] fraction;
+  logic unused_place;
+
+  assign {whole, fraction, unused_place} = s_i + 1'b1;
+  assign pixel_o.transmittance = HALF + 16'(RESULT[fraction]) - {1'b0, 5'(whole), 10'b0};
+
+  // ---- Colours -----------------------------------------------------------------------------------------------
+
+  localparam int unsigned ZeroBits = $clog2(C_BITS + 1);
+  localparam int unsigned LOWER = C_BITS - 12;  // places below the one that rounds
+
+  fp16_t [2:0] colour;
+
+  for (genvar c = 0; c < 3; c++) begin : gen_colour
+    logic [ZeroBits-1:0] zeros;
+    logic [C_BITS-2:0] normal;  // below the leading one
+    logic [4:0] exponent;
+    logic up;
+
+    flk_lzc #(
+      .Width(C_BITS)
+    ) i_lzc (
+      .value_i(colour_i[c]),
+      .count_o(zeros)
+    );
+
+    assign normal    = (C_BITS - 1)'(colour_i[c] << zeros);
+    assign exponent  = 5'(C_BITS - 1 + BIAS - ACCUMULATOR) - 5'(zeros);
+    assign up        = normal[LOWER] && (normal[LOWER+1] || normal[LOWER-1:0] != '0);
+    assign colour[c] = colour_i[c] == '0 ? '0 : {1'b0, exponent, normal[C_BITS-2-:10]} + 16'(up);
+  end
+
+  assign pixel_o.red   = colour[2];
+  assign pixel_o.green = colour[1];
+  assign pixel_o.blue  = colour[0];
+
+endmodule
