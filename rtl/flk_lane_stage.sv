@@ -17,7 +17,7 @@
 // Counters: one is read at a time, COUNTER_LATENCY cycles after its address (core, then index flk_lane_pkg::LANE_CNT_*). They stand still while
 // hold_counters_i is high.
 //
-// Combinational paths: in_ready_o depends on in_elem_i, in_valid_i of the same core and clear_i; all other outputs come from registers.
+// Combinational paths: in_ready_o depends on clear_i; all other outputs come from registers.
 module flk_lane_stage
   import flk_pkg::*;
   import flk_param_pkg::*;

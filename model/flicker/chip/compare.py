@@ -9,6 +9,7 @@ from ..explore.evaluate import draw
 from ..explore.machine import Configuration, subtile_cycles
 from ..explore.stages.lanes import Lanes
 from ..front.view import View
+from ..perf.render_stage import StageCycles
 from .execute import SchemeResult, run_scheme
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate, prepare
 
@@ -17,8 +18,8 @@ def estimate(prepared: Prepared, configuration: Configuration, chip: ChipConfig 
     """A frame with a configuration's rendering stage, by its cycle model."""
     work = draw(prepared.view, configuration).work
     cycles, counters = configuration.simulate(work)
-    own_places = None  # lanes deal sub-tiles out otherwise
-    if counters is not None and not isinstance(configuration.stage, Lanes):
+    own_places = None  # the exploration's lanes deal sub-tiles out otherwise; those in the log domain say nothing of single ones
+    if isinstance(counters, StageCycles) and not isinstance(configuration.stage, Lanes):
         own_places = subtile_cycles(work, counters)
     return frame_estimate(prepared, cycles, chip, scheme_result, own_places)
 

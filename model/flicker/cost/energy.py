@@ -14,7 +14,9 @@ import math
 import numpy as np
 
 from ..errors import FlickerError
+from ..golden.lanes import formats as lane_formats
 from ..params import CORES, PIXELS_PER_VRU, CatMode, Form, Precision, RenderConfig
+from ..perf.lanes import LaneCycles
 from .area import RECORD_BITS, Part, operator, part, parts, vru_part
 from .operations import Operations, ctu_operations
 
@@ -149,6 +151,42 @@ def stage_energy(
         "mask generators": masks_pj,
         "counters, arbiters": control,
         "ungated clock": cycles * clock_pj(free),
+        "leakage": area * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12,
+    }
+    return {name: value * 1e-6 for name, value in picojoules.items()}
+
+
+def lane_energy(counters: LaneCycles, config: RenderConfig, build: str, subtiles: int, area: float) -> dict[str, float]:
+    """Microjoules of a frame in the stage of lanes, by part: events of its counters times the loads of its units. build: its name in the table of areas.
+
+    A visit switches a lane, clocks its pipeline and one pixel's state; the end of a list clocks the state and the bank of all pixels. A splat that is taken
+    switches and clocks a setup and a mask; one that is dispatched, a slot of the store. What is in no unit (store, dispatch, delays, output) switches with
+    the visits, a lane's share each: most of it is what lanes read the store with.
+    """
+    pixels = 64 * CORES // config.lanes
+    lane, queue = part("lane", f"{pixels} pixels"), part("lane_queue", f"{pixels} pixels")
+    setup, mask, count, result = part("splat_setup", "default"), part("row_mask", "default"), part("lane_counters", "default"), part("lane_result", "default")
+    stage, core = part("lane_stage", build), part("lane_core", build)
+    per_core = config.lanes // CORES
+    own = core.load - per_core * (lane.load + queue.load) - config.in_width * (setup.load + mask.load) - result.load
+    gated = core.clock_gated - per_core * (lane.clock_gated + queue.clock_gated) - config.in_width * (setup.clock_gated + mask.clock_gated)
+    f = lane_formats.FORMATS
+    pin = (lane.clock_free + lane.clock_gated) / lane.ff
+    state, bank = pin * (f.sum + 4 + 3 * (f.accumulator + 2)), pin * (lane_formats.RESULT_FRACTION + 5 + 3 * (f.accumulator + 2))
+    pipe = max(lane.clock_gated - pixels * (state + bank), 0.0)
+    visits, ends = counters.total("visits"), config.lanes * counters.total("subtiles")
+    row = queue.clock_gated / config.fifo_depth
+    cycles = counters.cycles
+    picojoules = {
+        "lanes": visits * (switching_pj(lane.load) + clock_pj(pipe + state)) + ends * clock_pj(pixels * (state + bank)),
+        "queues": counters.total("entries") * (switching_pj(queue.load) + clock_pj(row)) + visits * switching_pj(queue.load),
+        "setup and masks": (counters.total("gaussians_in") + counters.total("subtiles")) * (
+            switching_pj(setup.load + mask.load) + clock_pj(setup.clock_gated + mask.clock_gated)
+        ),
+        "store, dispatch, output": visits * switching_pj(own / per_core) + counters.total("dispatched") * clock_pj(gated / config.slots)
+        + 64 * subtiles * switching_pj(result.load),
+        "counters": CORES * cycles * (switching_pj(count.load) + clock_pj(count.clock_gated)),
+        "ungated clock": cycles * clock_pj(stage.clock_free),
         "leakage": area * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12,
     }
     return {name: value * 1e-6 for name, value in picojoules.items()}

@@ -14,10 +14,10 @@ from ..errors import FlickerError
 from ..front.view import View
 from ..params import RenderConfig
 from . import machine
-from .generators import all_pixels, contribution, exact, oracle, rows, seele
+from .generators import all_pixels, contribution, exact, log_lanes, oracle, rows, seele
 from .machine import Configuration, Result
 
-GENERATORS = (contribution, seele, exact, rows, all_pixels, oracle)
+GENERATORS = (contribution, seele, exact, rows, log_lanes, all_pixels, oracle)
 
 CONFIGURATIONS: dict[str, Configuration] = {c.name: c for module in GENERATORS for c in module.configurations()}
 
@@ -28,17 +28,19 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "vanilla", "no-ctu-32", "no-ctu-64", "gscore", "seele", "faithful", "faithful-barrier", "flicker", "flicker-barrier",
         "flicker-*-*-factored", "flicker-*-*-conic", "flicker-stop", "flicker-16", "flicker-64", "flicker-fifo-64",
         "exact", "exact-e4m3", "exact-e5m2", "exact-e5m3", "exact-e4m4", "exact-q8.8", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64",
-        "lanes", "lanes-deep", "lanes-64", "lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20", "oracle", "oracle-lanes",
+        "lanes", "lanes-deep", "lanes-64", "lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20", "log-lanes", "log-lanes-64",
+        "log-lanes-128", "oracle", "oracle-lanes",
         "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic",
     ),
     # README, in few rows
-    "summary": ("gscore", "faithful", "flicker", "lanes", "lanes-64"),
+    "summary": ("gscore", "faithful", "flicker", "log-lanes", "log-lanes-64", "log-lanes-128"),
     # docs/exploration.md, by theme
     "rivals and the RTL": ("gscore", "seele", "no-ctu-32", "faithful", "flicker"),
     "barriers, finished sub-tiles, FIFOs, VRUs": ("flicker-barrier", "flicker-stop", "flicker-fifo-64", "flicker-16", "flicker-64"),
     "exact rectangle, by format": ("exact", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e5m2", "exact-q8.8"),
     "only pixels that contribute": ("rows-minitile", "rows", "rows-ellipse", "rows-ellipse-64", "oracle"),
     "lanes": ("lanes", "lanes-deep", "lanes-64", "oracle-lanes"),
+    "lanes in the log domain, RTL": ("log-lanes", "log-lanes-64", "log-lanes-128"),
     "accumulators": ("lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20"),
     # from the default to lanes and on to lanes-deep; each step changes one thing (tb/model/test_configurations.py)
     "ablation": (
@@ -48,7 +50,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
     # whole-frame estimates, figure 10
     "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64"),
     # docs/energy.md
-    "energy": ("gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64"),
+    "energy": (
+        "gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64", "log-lanes", "log-lanes-64",
+        "log-lanes-128",
+    ),
     # docs/configurations.md
     "pictures": (
         "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-fp16", "exact-fp16-bound", "exact-e5m6",
@@ -59,7 +64,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     # flicker stability: every picture once (row intervals draw what no test draws, so one of them is enough), and the two machines that have names
     "stability": (
         "vanilla*", "no-ctu-32*", "gscore*", "seele*", "faithful", "flicker", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*",
-        "rows", "rows-f*", "rows-ellipse-acc*", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
+        "rows", "rows-f*", "rows-ellipse-acc*", "log-lanes", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
     ),
     "stability, quick": (
         "vanilla", "no-ctu-32", "no-ctu-32-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-e4m3", "exact",
@@ -67,7 +72,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
 }
 EXPLORED = (
-    "rivals and the RTL", "barriers, finished sub-tiles, FIFOs, VRUs", "exact rectangle, by format", "only pixels that contribute", "lanes", "accumulators",
+    "rivals and the RTL", "barriers, finished sub-tiles, FIFOs, VRUs", "exact rectangle, by format", "only pixels that contribute", "lanes",
+    "lanes in the log domain, RTL", "accumulators",
 )
 
 

@@ -14,11 +14,10 @@ import numpy as np
 
 from ..front.view import View
 from ..params import CHANNELS, SUBTILE
-from ..perf.render_stage import StageCycles
 from ..perf.work import Work
 from ..scene import metrics
 from .configurations import get_configuration
-from .machine import Configuration, Result, run
+from .machine import Configuration, Counters, Result, run
 
 CLOCK_HZ = 1e9
 
@@ -33,7 +32,7 @@ class Evaluation:
     row: dict[str, Any]
     image: np.ndarray
     work: Work
-    counters: StageCycles | None
+    counters: Counters | None
     energy: dict[str, float]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..front.projection import Projected
 from ..params import CHANNELS, MINITILE, SUBTILE
-from ..perf.render_stage import simulate
+from ..perf.render_stage import StageCycles, simulate
 from ..perf.work import MINITILE_PIXELS, Work
 from ..scene.metrics import flip_map
 from .evaluate import Evaluation, channel_slots
@@ -45,7 +45,7 @@ def heat_maps(evaluation: Evaluation, reference: np.ndarray) -> dict[str, np.nda
         "imbalance": imbalance.reshape(work.rows, work.cols).astype(np.float32),
         "error": flip_map(evaluation.image, reference).astype(np.float32),
     }
-    if evaluation.counters is not None and not isinstance(evaluation.configuration.stage, Lanes):
+    if isinstance(evaluation.counters, StageCycles) and not isinstance(evaluation.configuration.stage, Lanes):
         maps["cycles"] = subtile_cycles(work, evaluation.counters).reshape(work.rows, work.cols).astype(np.float32)
     return maps
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,8 +26,11 @@ from ..front.view import View
 from ..golden.masked import render_masked
 from ..golden.render import assemble, stream_order
 from ..params import CORES, Form, RenderConfig
+from ..perf.lanes import LaneCycles
 from ..perf.render_stage import StageCycles
 from ..perf.work import Work
+
+Counters = StageCycles | LaneCycles
 
 
 @dataclass
@@ -92,13 +95,14 @@ class RenderingStage(ABC):
     """Draws what the masks let through, and says how long it takes and what it costs. Subclasses are frozen dataclasses.
 
     form: of VRU and record. vrus: of the whole stage. accumulator: fraction bits of the colour accumulators, 0: FP16. idealised: its cycles are a
-    closed form. assumed: what else its figures rest on, in few words, for tables.
+    closed form. assumed: what else its figures rest on, in few words, for tables. lists_of_rtl: kinds of lists that it is fed with where it is RTL.
     """
 
     form: Form
     accumulator: int = 0
     idealised: bool = False
     assumed: ClassVar[tuple[str, ...]] = ()
+    lists_of_rtl: ClassVar[tuple[str, ...]] = ("subtile",)
 
     @property
     @abstractmethod
@@ -113,7 +117,7 @@ class RenderingStage(ABC):
         return render_masked(lists, order, masks.mask, masks.visit, self.accumulator)
 
     @abstractmethod
-    def simulate(self, work: Work, generator: MaskGenerator) -> tuple[int, StageCycles | None]:
+    def simulate(self, work: Work, generator: MaskGenerator) -> tuple[int, Counters | None]:
         """Cycles of a frame and, where the stage is modelled cycle by cycle, its counters."""
 
     @abstractmethod
@@ -121,10 +125,10 @@ class RenderingStage(ABC):
         """GE by part, generators included."""
 
     @abstractmethod
-    def energy(self, work: Work, cycles: int, counters: StageCycles | None, generator: MaskGenerator) -> dict[str, float]:
+    def energy(self, work: Work, cycles: int, counters: Any, generator: MaskGenerator) -> dict[str, float]:
         """Microjoules of a frame by part, generators included."""
 
-    def utilisation(self, counters: StageCycles) -> float:
+    def utilisation(self, counters: Any) -> float:
         """Share of the cycles in which a VRU works."""
         return counters.utilisation
 
@@ -133,7 +137,7 @@ class RenderingStage(ABC):
 class Configuration:
     """A machine.
 
-    name: unique, lower case. title: for tables. family: `baseline`, `flicker`, `exact`, `rows` or `oracle`. lists: a kind of `front.lists.LISTS`.
+    name: unique, lower case. title: for tables. family: `baseline`, `flicker`, `exact`, `rows`, `lanes` or `oracle`. lists: a kind of `front.lists.LISTS`.
     stop: the rest of a list is not streamed once all pixels of its sub-tile are finished; idealised, known at once.
     """
 
@@ -161,7 +165,7 @@ class Configuration:
     def render_config(self) -> RenderConfig | None:
         """The RTL that does the same; None where there is none."""
         generator, stage = self.generator.rtl(), self.stage.rtl()
-        if generator is None or stage is None or self.lists != "subtile" or self.stop:
+        if generator is None or stage is None or self.lists not in self.stage.lists_of_rtl or self.stop:
             return None
         return RenderConfig(**generator, **stage)
 
@@ -178,7 +182,7 @@ class Configuration:
         """Configurations with equal keys draw the same picture with the same work (before `stop`)."""
         return self.lists, self.form, self.generator, self.generator.picture_key(self.stage), self.stage.accumulator
 
-    def simulate(self, work: Work) -> tuple[int, StageCycles | None]:
+    def simulate(self, work: Work) -> tuple[int, Counters | None]:
         """Cycles of the rendering stage and its counters. work: of `run`, without what `stop` leaves out."""
         return self.stage.simulate(work, self.generator)
 
@@ -190,7 +194,7 @@ class Configuration:
         """GE of the rendering stage."""
         return sum(self.area_parts().values())
 
-    def energy(self, work: Work, cycles: int, counters: StageCycles | None) -> dict[str, float]:
+    def energy(self, work: Work, cycles: int, counters: Counters | None) -> dict[str, float]:
         """Microjoules of a frame in the rendering stage, by part."""
         return self.stage.energy(work, cycles, counters, self.generator)
 

@@ -46,7 +46,8 @@ class LaneWork:
     """What a frame makes the lanes do; nothing in it depends on timing or on the number of lanes.
 
     start: int64 (S + 1,), elements of sub-tile s, near to far. mask, passes: uint64 (E,), pixels (bit 16 m + i) of each element's mask, and those that pass the
-    lane's own test. finish: int64 (S, 64), position in the list of the element that finishes the pixel; the list's length when none does.
+    lane's own test; of those that are visited when they are finished it matters to one counter alone, `skipped`. finish: int64 (S, 64), position in the list of
+    the element that finishes the pixel; the list's length when none does. contributing: pairs that are blended or finish a pixel.
     """
 
     cols: int
@@ -55,35 +56,30 @@ class LaneWork:
     mask: np.ndarray
     passes: np.ndarray
     finish: np.ndarray
-
-    @property
-    def contributing(self) -> int:
-        """Pairs that are blended, and those that finish a pixel."""
-        return int(_contributing(self.start, self.mask, self.passes, self.finish))
+    contributing: int
 
 
 @dataclass
 class LaneCycles:
-    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS))."""
+    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS)); lanes: of all cores."""
 
     cycles: int
     counters: np.ndarray
+    lanes: int
 
     def total(self, name: str) -> int:
         """Sum of a counter over the cores."""
         return int(self.counters[:, [n for n, _ in LANE_COUNTERS].index(name)].sum())
 
+    @property
+    def utilisation(self) -> float:
+        """Share of the lanes' cycles in which a pair is blended or finishes a pixel."""
+        return (self.total("blended") + self.total("pixels_finished")) / (self.cycles * self.lanes)
 
-@numba.njit(parallel=True, cache=True)
-def _contributing(start, mask, passes, finish):
-    total = np.zeros(len(start) - 1, np.int64)
-    for s in numba.prange(len(start) - 1):
-        for n in range(start[s], start[s + 1]):
-            both = mask[n] & passes[n]
-            for p in range(64):
-                if (both >> np.uint64(p)) & np.uint64(1) and n - start[s] <= finish[s, p]:
-                    total[s] += 1
-    return total.sum()
+    @property
+    def stall_rate(self) -> float:
+        """Share of the cycles in which a core has input but cannot take it."""
+        return self.total("stalled") / (self.cycles * CORES)
 
 
 def pixels_of_lanes(lanes: int) -> np.ndarray:
@@ -351,7 +347,8 @@ def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width
 def lane_work(lists: RecordLists) -> LaneWork:
     """What a frame makes the lanes do."""
     mask, passes = lane_masks(lists)
-    return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish_positions(lists, mask, passes))
+    finish, contributing = finish_positions(lists, mask, passes)
+    return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish, int(np.bitwise_count(contributing).sum(dtype=np.int64)))
 
 
 def simulate_lanes(work: LaneWork, config: RenderConfig, *, leave: bool = False, empty: bool = True) -> LaneCycles:
@@ -368,4 +365,4 @@ def simulate_lanes(work: LaneWork, config: RenderConfig, *, leave: bool = False,
     counters[:, CYCLES] = cycles
     counters[:, IDLE] += cycles - ends[:, 0]
     counters[:, STARVED] += (cycles - ends[:, 0]) * lanes
-    return LaneCycles(cycles, counters)
+    return LaneCycles(cycles, counters, config.lanes)

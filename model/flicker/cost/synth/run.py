@@ -1,6 +1,6 @@
 """Runs the flow for many units: parts before what they are put together from, in parallel, cached by content.
 
-A result lives in ``build/synth/units/<module>-<hash>``; the hash covers the sources, the parameters, the library, the flow's own
+A result lives in ``build/synth/units/<module>-<hash>``; the hash covers the tokens of the sources, the parameters, the library, the flow's own
 code and the results of the parts.
 """
 
@@ -16,11 +16,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
 from ...errors import FlickerError
 from ...toolchain import BUILD, locked, sources_of
+from ..stamp import words
 from .units import COMPOSED, MEMORY, Unit, open_bits
 
 FOLDER = BUILD / "synth"
@@ -29,6 +31,11 @@ UNITS = FOLDER / "units"
 
 def _digest(*parts: object) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:12]
+
+
+@cache
+def _tokens(path: Path) -> str:
+    return " ".join(words(path.read_text()))
 
 
 def _code() -> str:
@@ -60,7 +67,7 @@ class Runner:
     # Planning
 
     def _sources(self, top: str) -> str:
-        return "".join(path.read_text() for path in sources_of(top))
+        return "".join(_tokens(path) for path in sources_of(top))
 
     def _job(self, top: str, parameters: dict[str, int], action: str) -> dict:
         return {

@@ -326,28 +326,33 @@ def _front() -> list[Unit]:
     ]
 
 
-def _lanes() -> list[Unit]:
-    """Units of the lanes in the log domain."""
+def lane_builds() -> tuple[RenderConfig, ...]:
+    """Builds of the lanes: the default, fewer elements a cycle, more lanes; the last with 128 at no more area than the GSCore-like stage."""
     default = RenderConfig(stage="lanes")
-    units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_counters")]
-    for lanes in LANE_COUNTS:
-        count, pixels = lanes // CORES, SUBTILE_PIXELS * CORES // lanes
-        units += [
-            unit("flk_lane", f"{pixels} pixels", Lanes=count, Lane=0, Slots=default.slots),
-            unit("flk_lane_queue", f"{pixels} pixels", Pixels=pixels, Slots=default.slots, Depth=default.fifo_depth),
-        ]
-    for config in (*(default.with_(lanes=lanes) for lanes in LANE_COUNTS), default.with_(in_width=1)):
-        ports = config.rtl_parameters()
-        units += [
-            unit("flk_lane_core", lane_config(config), **ports | {"Lanes": config.lanes // CORES}),
-            unit("flk_lane_stage", lane_config(config), **ports),
-        ]
-    return units
+    return default, default.with_(in_width=1), default.with_(lanes=64), default.with_(lanes=128, in_width=1, slots=12, fifo_depth=8)
 
 
 def lane_config(config: RenderConfig) -> str:
     """Name of a core or stage of lanes in the tables."""
-    return f"{config.lanes} lanes" + ("" if config.in_width == RenderConfig().in_width else f", {config.in_width} a cycle")
+    default = RenderConfig(stage="lanes")
+    names = [f"{config.lanes} lanes"]
+    names += [f"{config.in_width} a cycle"] * (config.in_width != default.in_width)
+    names += [f"{config.slots} slots"] * (config.slots != default.slots) + [f"queues of {config.fifo_depth}"] * (config.fifo_depth != default.fifo_depth)
+    return ", ".join(names)
+
+
+def _lanes() -> list[Unit]:
+    """Units of the lanes in the log domain."""
+    units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_counters")]
+    for config in lane_builds():
+        ports, count, pixels = config.rtl_parameters(), config.lanes // CORES, SUBTILE_PIXELS * CORES // config.lanes
+        if config.in_width == RenderConfig().in_width or config.lanes != LANE_COUNTS[0]:
+            units += [
+                unit("flk_lane", f"{pixels} pixels", Lanes=count, Lane=0, Slots=config.slots),
+                unit("flk_lane_queue", f"{pixels} pixels", Pixels=pixels, Slots=config.slots, Depth=config.fifo_depth),
+            ]
+        units += [unit("flk_lane_core", lane_config(config), **ports | {"Lanes": count}), unit("flk_lane_stage", lane_config(config), **ports)]
+    return units
 
 
 def _top() -> list[Unit]:

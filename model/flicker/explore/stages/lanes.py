@@ -1,4 +1,4 @@
-"""Independent lanes with scattered pixels: a model (`flicker.perf.lane_stage`), no RTL exists."""
+"""Independent lanes of FP16 units with scattered pixels: a model (`flicker.perf.lane_stage`), no RTL exists. Those in the log domain: `log_lanes`."""
 
 from __future__ import annotations
 

@@ -82,13 +82,14 @@ def _render(records, start, entry, cols, t, pixels, counts, needed):
 
 
 @numba.njit(parallel=True, cache=True)
-def _finish(records, start, entry, cols, t, mask, passes, finish):
+def _finish(records, start, entry, cols, t, mask, passes, finish, contributing):
     for s in numba.prange(len(start) - 1):
         total = np.zeros(SUBTILE_PIXELS, np.int64)
         unfinished = np.int64(ALL)
         finish[s, :] = start[s + 1] - start[s]
         for n in range(start[s], start[s + 1]):
             both = mask[n] & passes[n] & unfinished
+            contributing[n] = both
             if both == 0:
                 continue
             i = entry[n]
@@ -155,8 +156,9 @@ def lane_masks(lists: RecordLists, formats: LaneFormats = FORMATS) -> tuple[np.n
     return mask.view(np.uint64), passes.view(np.uint64)
 
 
-def finish_positions(lists: RecordLists, mask: np.ndarray, passes: np.ndarray, formats: LaneFormats = FORMATS) -> np.ndarray:
-    """int64 (S, 64): position in the list of the entry that finishes each pixel 16 m + i; the list's length when none does. mask, passes: of `lane_masks`."""
-    finish = np.zeros((lists.cols * lists.rows, SUBTILE_PIXELS), np.int64)
-    _finish(lists.records, lists.start, lists.entry, lists.cols, tables(formats), mask.view(np.int64), passes.view(np.int64), finish)
-    return finish
+def finish_positions(lists: RecordLists, mask: np.ndarray, passes: np.ndarray, formats: LaneFormats = FORMATS) -> tuple[np.ndarray, np.ndarray]:
+    """int64 (S, 64): position in the list of the entry that finishes each pixel 16 m + i; the list's length when none does. uint64 (E,): pixels that each entry
+    is blended into or finishes. mask, passes: of `lane_masks`."""
+    finish, contributing = np.zeros((lists.cols * lists.rows, SUBTILE_PIXELS), np.int64), np.zeros(len(mask), np.int64)
+    _finish(lists.records, lists.start, lists.entry, lists.cols, tables(formats), mask.view(np.int64), passes.view(np.int64), finish, contributing)
+    return finish, contributing.view(np.uint64)

@@ -1,0 +1,63 @@
+"""`make docs PART=lane_stage`: cycles and areas of the lanes' RTL, in docs/lane_stage.md."""
+
+from __future__ import annotations
+
+from flicker.cost.area import part
+from flicker.cost.synth.units import lane_builds, lane_config
+from flicker.front.view import View, load_view
+from flicker.golden.lanes.lists import float_lists
+from flicker.markdown import table
+from flicker.params import CORES, SUBTILE_PIXELS, Form
+from flicker.perf.lanes import lane_work, simulate_lanes
+from flicker.scene.real import REAL_VIEWS
+
+from .common import Say, folder_of_scenes, load
+
+SMALL = (480, 270)
+
+
+def cycle_rows(view: View, title: str, say: Say) -> list[tuple[str, ...]]:
+    """Cycles of every build by the model that equals the RTL; lists by the ellipse, as the front end makes them, left early, empty ones not streamed."""
+    say(title)
+    work = lane_work(float_lists(view.projected, view.lists(Form.FACTORED, "ellipse")))
+    rows = []
+    for config in lane_builds():
+        m = simulate_lanes(work, config, leave=True, empty=False)
+        slots = m.cycles * config.lanes
+        late = m.total("visits") - m.total("skipped") - m.total("blended") - m.total("pixels_finished")
+        lanes = [m.total("skipped"), late, m.total("starved"), m.total("bank_waits")]
+        cores = [m.total("no_slot"), m.total("no_room")]
+        rows.append((
+            title, lane_config(config), f"{work.contributing / config.lanes:,.0f}", f"{m.cycles:,}", f"{work.contributing / slots:.1%}",
+            *(f"{n / slots:.1%}" for n in lanes), *(f"{n / (m.cycles * CORES):.1%}" for n in cores),
+        ))
+    return rows
+
+
+def area_rows() -> list[tuple[str, ...]]:
+    """GE of the stage by part, for each build."""
+    rows = []
+    for config in lane_builds():
+        name = f"{SUBTILE_PIXELS * CORES // config.lanes} pixels"
+        stage = part("lane_stage", lane_config(config)).ge
+        found = [
+            CORES * config.in_width * part("splat_setup", "default").ge, CORES * config.in_width * part("row_mask", "default").ge,
+            config.lanes * part("lane", name).ge, config.lanes * part("lane_queue", name).ge, CORES * part("lane_counters", "default").ge,
+        ]
+        rows.append((lane_config(config), f"{stage:,.0f}", *(f"{v:,.0f}" for v in (*found, stage - sum(found))), f"{part('lane', name).ge:,.0f}"))
+    return rows
+
+
+def tables(say: Say) -> dict[str, str]:
+    views = [(real.title, load(real)) for real in REAL_VIEWS]
+    small = REAL_VIEWS[0]
+    views.append((f"{small.title}, {SMALL[0]}x{SMALL[1]}", load_view(small.path(folder_of_scenes()), small.number, SMALL)))
+    return {
+        "cycles": table(
+            ["view", "build", "bound", "cycles", "share of the bound", "skipped", "finished before", "no entry", "bank taken", "no slot", "no room"],
+            [row for title, view in views for row in cycle_rows(view, title, say)],
+        ),
+        "area": table(
+            ["build", "stage, GE", "setup", "masks", "lanes", "their queues", "counters", "store, dispatch, delays, output", "one lane"], area_rows(),
+        ),
+    }
