@@ -100,7 +100,7 @@ module flk_stub_stage
   end
 endmodule
 """
-STAGE_ENTRY = 'STAGES["stub"] = Stage("flk_stub_stage", "splat_elem", "core_pixel", (), "background")\n'
+STAGE_ENTRY = 'STAGES["stub"] = Stage("flk_stub_stage", "splat_elem", "core_pixel", (), STAGES["channels"].counters, "background")\n'
 GENERATOR_ENTRY = (
     'MASK_GENERATORS["pixels"] = MaskGenerator("flk_mask_pixels", SUBTILE_PIXELS, {}, lambda config: 1, one_token=False, tests=False, note="ones")\n'
 )

@@ -187,6 +187,39 @@ async def one_bank_stands(dut):
 
 
 @cocotb.test()
+async def overtaken_by_progress(dut):
+    """A lane's entry is on its way from the queue's memory, and the lane's progress already beyond it: no other lane's entry goes before it."""
+    test = Merge(dut)
+    await test.bench.reset()
+    edge = RisingEdge(dut.clk_i)
+    entry = lambda seq: packed((seq, 2, 4, seq, seq, 1))  # noqa: E731
+    got: list[int] = []
+
+    async def cycle(ready: int, progress: tuple[int, int], offer: dict[int, int] | None = None, start: int = 0) -> None:
+        offer = offer or {}
+        dut.start_i.value, dut.out_ready_i.value = start, ready
+        dut.progress_i.value = progress[0] | progress[1] << SEQ | 100 << 2 * SEQ | 100 << 3 * SEQ
+        dut.in_valid_i.value = sum(1 << lane for lane in offer)
+        dut.in_data_i.value = sum(entry(seq) << ENTRY_BITS * lane for lane, seq in offer.items())
+        await edge
+        assert all(int(dut.in_ready_o.value) >> lane & 1 for lane in offer)
+        if ready and int(dut.out_valid_o.value) & 1:
+            got.append(int(dut.out_entry_o.value) >> 4 & 0xFFFFFF)
+
+    await cycle(0, (0, 0), start=1)
+    await cycle(0, (0, 3), {0: 0, 1: 3})
+    for _ in range(4):  # 0 stands at the output, 3 waits
+        await cycle(0, (1, 50))
+    await cycle(0, (1, 50), {0: 1})
+    for _ in range(4):  # 1 waits in its lane's register
+        await cycle(0, (2, 50))
+    await cycle(0, (2, 50), {0: 2})  # into the memory
+    for _ in range(8):  # and the output moves
+        await cycle(1, (10, 50))
+    assert got == [0, 1, 2, 3], got
+
+
+@cocotb.test()
 async def half_the_range(dut):
     """An entry 2,047 before others that wait."""
     test = Merge(dut, 2047)

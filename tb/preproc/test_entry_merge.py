@@ -12,7 +12,7 @@ from flicker_tb.runner import build_and_test, refused
 
 @pytest.mark.parametrize("depth", [2, 4])
 def test_entry_merge(depth: int) -> None:
-    tests = [] if depth == 4 else ["frames", "one_lane_late"]
+    tests = [] if depth == 4 else ["frames", "one_lane_late", "overtaken_by_progress"]
     build_and_test("flk_entry_merge", "cocotb_entry_merge", parameters={"Depth": depth}, inner=False, tests=tests)
 
 
