@@ -76,6 +76,8 @@ render/flk_pixel_state.sv
 render/flk_record_to_splat.sv
 render/flk_rendering_core.sv
 render/flk_shape_to_fp16.sv
+render/flk_splat_input.sv
+render/flk_stage.sv
 render/flk_stage_control.sv
 render/flk_vru.sv
 lanes/flk_lane.sv

@@ -1,7 +1,7 @@
 // Rendering: from tile lists and records in memory to a frame buffer in memory (docs/rendering.md).
 //
 // What flk_preprocessing leaves is read back list by list: four list readers and sorting units take the tiles of the walk in turn,
-// delivery fetches records and gives them to four cores, flk_record_to_splat makes the stage's splats of them, and the frame writer
+// delivery fetches records and gives them to four cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
 // puts finished pixels together. The walk goes row by row, in pairs of tiles; a tile that the picture lacks has an empty list.
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
 // error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
@@ -15,13 +15,17 @@ module flk_rendering
   import flk_param_pkg::*;
   import flk_rendering_pkg::*;
 #(
+  parameter  int unsigned Stage          = STAGE_CHANNELS,  // the next ones are its parameters
   parameter  int unsigned Form           = FORM_FACTORED,
   parameter  int unsigned Precision      = PRECISION_FIXED,
   parameter  int unsigned FifoDepth      = FIFO_DEPTH,
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
-  parameter  int unsigned Slots          = 16,   // chunks in a list reader's memory
+  parameter  int unsigned Lanes          = 32,
+  parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
+  parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
+  parameter  int unsigned Chunks         = 16,   // in a list reader's memory
   parameter  int unsigned Queue          = 64,   // records of each core and channel
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
@@ -187,7 +191,7 @@ module flk_rendering
     assign tile_valid[u] = !walk_done && turn_q == 2'(u);
 
     flk_list_reader #(
-      .Slots (Slots),
+      .Slots (Chunks),
       .IdBits(IdBits),
       .Id    (u)
     ) i_reader (
@@ -328,37 +332,24 @@ module flk_rendering
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
-  logic        [CORES-1:0] splat_valid, splat_ready, splat_finished, pixel_valid;
-  logic                    pair_freed;
-  splat_elem_t [CORES-1:0] splat;
-  core_pixel_t [CORES-1:0] pixel;
+  logic        [CORES-1:0]                 own_valid, own_ready, own_end, own_finished, pixel_valid;
+  logic        [CORES-1:0][RecordBits-1:0] own_record;
+  subtile_t    [CORES-1:0]                 subtile;
+  logic                                    pair_freed;
+  core_pixel_t [CORES-1:0]                 pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic                       unused_done, open, next;
-    logic                       valid, ready, is_end;
-    logic [RecordBits-1:0]      own;
+    logic                       unused_done, open, next, valid;
     logic [TILE_COORD_BITS-1:0] x, y;
-    subtile_t                   subtile;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
-    logic                       end_in, end_out;
-    logic [2:0]                 ends_q;   // between delivery and the stage
 
     // The frame writer has a place for what the core is given.
-    assign open            = 32'(begun_q) < Pairs;
-    assign next            = valid && open && ready && is_end;
+    assign open         = 32'(begun_q) < Pairs;
+    assign own_valid[k] = valid && open;
+    assign next         = own_valid[k] && own_ready[k] && own_end[k];
 
-    // The stage speaks of the sub-tile that it takes, which is the one that delivery gives when no end lies between.
-    assign end_in      = record_valid[k] && record_ready[k] && record_end[k];
-    assign end_out     = splat_valid[k] && splat_ready[k] && splat[k].eos;
-    assign finished[k] = splat_finished[k] && ends_q == '0;
-
-    always_ff @(posedge clk_i or negedge rst_ni) begin
-      if (!rst_ni) begin
-        ends_q <= '0;
-      end else begin
-        ends_q <= ends_q + 3'(end_in) - 3'(end_out);
-      end
-    end
+    // The stage speaks of the element that it takes, delivery of the one after it.
+    assign finished[k] = own_finished[k] && !(valid && own_end[k]);
 
     flk_pipe_reg #(
       .Width(1 + RecordBits)
@@ -370,8 +361,8 @@ module flk_rendering
       .in_ready_o (record_ready[k]),
       .in_data_i  ({record_end[k], record[k]}),
       .out_valid_o(valid),
-      .out_ready_i(open && ready),
-      .out_data_o ({is_end, own})
+      .out_ready_i(open && own_ready[k]),
+      .out_data_o ({own_end[k], own_record[k]})
     );
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -396,43 +387,34 @@ module flk_rendering
       .tile_y_o(y)
     );
 
-    assign subtile.col = SUBTILE_COORD_BITS'({x, 1'(k)});
-    assign subtile.row = SUBTILE_COORD_BITS'({y, 1'(k / 2)});
-
-    flk_record_to_splat #(
-      .Form(Form)
-    ) i_splat (
-      .clk_i,
-      .rst_ni,
-      .clear_i     (1'b0),
-      .in_valid_i  (valid && open),
-      .in_ready_o  (ready),
-      .in_eos_i    (is_end),
-      .in_record_i (own),
-      .in_subtile_i(subtile),
-      .out_valid_o (splat_valid[k]),
-      .out_ready_i (splat_ready[k]),
-      .out_elem_o  (splat[k])
-    );
+    assign subtile[k].col = SUBTILE_COORD_BITS'({x, 1'(k)});
+    assign subtile[k].row = SUBTILE_COORD_BITS'({y, 1'(k / 2)});
   end
 
-  flk_render_stage #(
+  flk_stage #(
+    .Stage         (Stage),
     .Form          (Form),
     .Precision     (Precision),
     .FifoDepth     (FifoDepth),
     .CtuFifoDepth  (CtuFifoDepth),
     .VrusPerChannel(VrusPerChannel),
-    .MaskGenerator (MaskGenerator)
+    .MaskGenerator (MaskGenerator),
+    .Lanes         (Lanes),
+    .InWidth       (1),
+    .Slots         (Slots),
+    .Depth         (Depth)
   ) i_stage (
     .clk_i,
     .rst_ni,
     .clear_i         (start),  // the automatic mode begins anew
     .idle_o          (stage_idle),
     .mode_i          (registers_i.mode),
-    .in_valid_i      (splat_valid),
-    .in_ready_o      (splat_ready),
-    .in_elem_i       (splat),
-    .finished_o      (splat_finished),
+    .in_valid_i      (own_valid),
+    .in_ready_o      (own_ready),
+    .in_end_i        (own_end),
+    .in_record_i     (own_record),
+    .in_subtile_i    (subtile),
+    .finished_o      (own_finished),
     .out_valid_o     (pixel_valid),
     .out_ready_i     ('1),
     .out_data_o      (pixel),
@@ -452,7 +434,8 @@ module flk_rendering
   flk_frame_writer #(
     .Pairs     (Pairs),
     .BeatBits  (BeatBits),
-    .StrideBits(STRIDE_BITS)
+    .StrideBits(STRIDE_BITS),
+    .Lanes     (STAGE_LANE_ORDER[Stage] == '0 ? 0 : Lanes)
   ) i_frame (
     .clk_i,
     .rst_ni,
@@ -535,12 +518,6 @@ module flk_rendering
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)
   else $error("flk_rendering: start while a frame is under way");
-
-  for (genvar k = 0; k < CORES; k++) begin : gen_check
-    assert property (@(posedge clk_i) disable iff (!rst_ni)
-        (gen_core[k].ends_q != '0 || !gen_core[k].end_out) && !(&gen_core[k].ends_q))
-    else $error("flk_rendering: number of ends");
-  end
 `endif
 
 endmodule

@@ -18,11 +18,15 @@ module flk_top
   import flk_rendering_pkg::*;
   import flk_top_pkg::*;
 #(
+  parameter  int unsigned Stage          = STAGE_CHANNELS,  // the next ones are its parameters
   parameter  int unsigned Precision      = PRECISION_FIXED,
   parameter  int unsigned FifoDepth      = FIFO_DEPTH,
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
+  parameter  int unsigned Lanes          = 32,
+  parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
+  parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned Pointers       = 2048,  // lists of a list writer: up to 1920x1088
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
   localparam int unsigned IdBits         = 4,
@@ -465,12 +469,16 @@ module flk_top
   );
 
   flk_rendering #(
+    .Stage         (Stage),
     .Form          (FORM_FACTORED),
     .Precision     (Precision),
     .FifoDepth     (FifoDepth),
     .CtuFifoDepth  (CtuFifoDepth),
     .VrusPerChannel(VrusPerChannel),
     .MaskGenerator (MaskGenerator),
+    .Lanes         (Lanes),
+    .Slots         (Slots),
+    .Depth         (Depth),
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),
@@ -601,10 +609,13 @@ module flk_top
   // ---- to the host ------------------------------------------------------------------------------------------
 
   assign to_host.descriptor_locked           = locked;
-  assign to_host.capability.stage.next       = 4'(MaskGenerator);
+  assign to_host.capability.stage.next       = 4'(Stage);
   assign to_host.capability.form.next        = 2'(FORM_FACTORED);
   assign to_host.capability.precision.next   = 2'(Precision);
   assign to_host.capability.vrus.next        = 4'(VrusPerChannel);
+  assign to_host.capability.mask_generator.next =
+      4'(MaskGenerator);
+  assign to_host.capability.log2_lanes.next  = 4'($clog2(Lanes));
   assign to_host.capability.log2_lists.next  = 4'($clog2(Pointers));
   assign to_host.capability.log2_beat.next   = 4'($clog2(Width / 8));
   assign to_host.status.ready.next           = !locked && state_q == RUN;

@@ -4,6 +4,7 @@
 flk_param_pkg.sv  constants, from flicker.params
 flk_pkg.sv        records, from flicker.layout
 flk_mask_generator.sv  the choice of the mask generator, from flicker.params.MASK_GENERATORS
+flk_stage.sv           the choice of the rendering stage, from flicker.params.STAGES
 lanes/flk_lane_pkg.sv  widths, constants and tables of the lanes, from flicker.golden.lanes.formats
 preproc/flk_*.sv  pipelines of the front end, from flicker.datapath
 flk.f             every source: packages first, each after those it uses; then the modules, folder by folder
@@ -68,6 +69,11 @@ def param_package() -> str:
         const(f"MASK_GENERATOR_{name.upper()}", i, generator.note)
     const("MASK_GENERATORS", len(p.MASK_GENERATORS))
     table("MASK_BITS", [generator.mask_bits for generator in p.MASK_GENERATORS.values()], "by mask generator")
+    out.append("\n  // Rendering stages (docs/render_stage.md)")
+    for i, (name, stage) in enumerate(p.STAGES.items()):
+        const(f"STAGE_{name.upper()}", i, stage.note)
+    const("RENDER_STAGES", len(p.STAGES))
+    table("STAGE_LANE_ORDER", [int(stage.lane_order) for stage in p.STAGES.values()], "pixels keep their order in each lane, else in each mini-tile")
     out.append("\n  // Rendering rules, rounded to FP16 (docs/architecture.md)")
     bits("FP16_ONE", 16, p.FP16_ONE_BITS, "1.0")
     bits("ALPHA_MIN", 16, p.ALPHA_MIN_BITS, "1/255, rounded up")
@@ -290,6 +296,15 @@ def lane_package() -> str:
         "    endcase",
         "  endfunction",
         "",
+        "  // The lane that has a pixel.",
+        "  function automatic int unsigned lane_of(int unsigned lanes, logic [2:0] row, logic [2:0] column);",
+        "    case (lanes)",
+        "      8:       return 32'(3'(column + 3'(row << 1) + row));",
+        "      16:      return 32'({row[1:0], column[1:0]});",
+        "      default: return 32'({row[1:0], column});",
+        "    endcase",
+        "  endfunction",
+        "",
         "  // Number of a lane's pixel in masks: 16 m + i, pixel i of mini-tile m.",
         "  function automatic int unsigned lane_pixel(int unsigned lanes, int unsigned lane, int unsigned p);",
         "    logic [2:0] row, column;",
@@ -360,6 +375,111 @@ def mask_generator() -> str:
     ]) + "\n"
 
 
+def stage() -> str:
+    """Module that instantiates the chosen rendering stage."""
+    wide = max(map(len, [*p.STAGE_PARAMETERS, "RecordBits"]))
+    first = next(iter(p.STAGES))
+    parameters = [f"  parameter  int unsigned {'Stage':{wide}} = STAGE_{first.upper()},"]
+    parameters += [f"  parameter  int unsigned {name:{wide}} = {value}," for name, value in p.STAGE_PARAMETERS.items()]
+    cases = []
+    for name, entry in p.STAGES.items():
+        settings = ",\n".join(f"      .{port}({port})" for port in entry.parameters)
+        common = ["clk_i", "rst_ni", "clear_i", "idle_o", "mode_i"]
+        tail = ["out_valid_o", "out_ready_i", "out_data_o", "clear_counters_i", "hold_counters_i", "counter_addr_i", "counter_data_o"]
+        instance = f"{entry.module} #(\n{settings}\n    ) i_stage (" if settings else f"{entry.module} i_stage ("
+        lines = []
+        if entry.element == p.RECORD_ELEMENT:
+            lines += [
+                "record_elem_t [CORES-1:0][InWidth-1:0] elem;",
+                "",
+                "always_comb begin",
+                "  for (int unsigned k = 0; k < CORES; k++) begin",
+                "    for (int unsigned w = 0; w < InWidth; w++) begin",
+                "      elem[k][w] = '{eos: in_end_i[k][w], record: in_record_i[k][w], subtile: in_subtile_i[k]};",
+                "    end",
+                "  end",
+                "end",
+                "",
+            ]
+            inputs = [".in_valid_i", ".in_ready_o", ".in_elem_i(elem)", ".finished_o"]
+        else:
+            lines += [
+                "logic        [CORES-1:0] valid, ready, finished;",
+                "splat_elem_t [CORES-1:0] splat;",
+                "",
+                "flk_splat_input #(",
+                "  .Form(Form)",
+                ") i_input (",
+                "  .clk_i,",
+                "  .rst_ni,",
+                "  .clear_i,",
+                "  .in_valid_i,",
+                "  .in_ready_o,",
+                "  .in_end_i,",
+                "  .in_record_i,",
+                "  .in_subtile_i,",
+                "  .finished_o,",
+                "  .out_valid_o(valid),",
+                "  .out_ready_i(ready),",
+                "  .out_elem_o(splat),",
+                "  .finished_i(finished)",
+                ");",
+                "",
+            ]
+            inputs = [".in_valid_i(valid)", ".in_ready_o(ready)", ".in_elem_i(splat)", ".finished_o(finished)"]
+        lines += instance.replace("\n    ", "\n").split("\n")
+        lines += [f"  {port}," for port in [*(f".{port}" for port in common), *inputs, *(f".{port}" for port in tail)]]
+        lines[-1] = lines[-1].rstrip(",")
+        lines += [");"]
+        body = "\n".join(f"    {line}".rstrip() for line in lines)
+        cases.append(f"if (Stage == STAGE_{name.upper()}) begin : gen_{name}\n{body}\n  end")
+    return "\n".join([
+        "// Rendering stage: the module that Stage chooses, from records as they lie in memory to finished pixels.",
+        "//",
+        "// Generated by `make generate` from model/flicker/params.py (STAGES): edit that, not this.",
+        "// Ports: docs/render_stage.md. in_*: of each core up to InWidth records of a list, or its end, the older lower; all that are valid are taken",
+        "// together. in_subtile_i: whose list it is. finished_o is about the sub-tile of in_*. A stage that takes splats has flk_splat_input before it.",
+        "module flk_stage",
+        "  import flk_pkg::*;",
+        "  import flk_param_pkg::*;",
+        "  import flk_lane_pkg::*;",
+        "#(",
+        *parameters,
+        f"  localparam int unsigned {'RecordBits':{wide}} = (Form == FORM_FACTORED) ? 128 : 256",
+        ") (",
+        "  input  logic                                                 clk_i,",
+        "  input  logic                                                 rst_ni,",
+        "  input  logic                                                 clear_i,",
+        "  output logic                                                 idle_o,",
+        "  input  logic        [2:0]                                    mode_i,",
+        "  // sorted lists",
+        "  input  logic        [CORES-1:0][InWidth-1:0]                 in_valid_i,",
+        "  output logic        [CORES-1:0]                              in_ready_o,",
+        "  input  logic        [CORES-1:0][InWidth-1:0]                 in_end_i,",
+        "  input  logic        [CORES-1:0][InWidth-1:0][RecordBits-1:0] in_record_i,",
+        "  input  subtile_t    [CORES-1:0]                              in_subtile_i,",
+        "  output logic        [CORES-1:0]                              finished_o,",
+        "  // finished pixels",
+        "  output logic        [CORES-1:0]                              out_valid_o,",
+        "  input  logic        [CORES-1:0]                              out_ready_i,",
+        "  output core_pixel_t [CORES-1:0]                              out_data_o,",
+        "  // counters",
+        "  input  logic                                                 clear_counters_i,",
+        "  input  logic                                                 hold_counters_i,",
+        "  input  logic        [COUNTER_ADDR_BITS-1:0]                  counter_addr_i,",
+        "  output logic        [COUNTER_BITS-1:0]                       counter_data_o",
+        ");",
+        "",
+        "  if (Stage >= RENDER_STAGES) begin : gen_check_stage",
+        '    $error("flk_stage: Stage must be one of STAGE_*");',
+        "  end",
+        "",
+        "  " + " else ".join(cases),
+        "",
+        "endmodule",
+    ]) + "\n"
+
+
 def file_list() -> str:
     """rtl/flk.f: every source below rtl/, also those that are about to be written."""
     paths = {path.relative_to(RTL) for path in RTL.rglob("*.sv")} | {Path(name) for name in SOURCES}
@@ -393,6 +513,7 @@ SOURCES = {
     "common/flk_pkg.sv": record_package,
     "lanes/flk_lane_pkg.sv": lane_package,
     "render/flk_mask_generator.sv": mask_generator,
+    "render/flk_stage.sv": stage,
 }
 GENERATED = {**SOURCES, "flk.f": file_list}
 

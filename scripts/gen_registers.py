@@ -13,6 +13,7 @@ import itertools
 import re
 import sys
 import tempfile
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -135,7 +136,10 @@ def python_module(top: AddrmapNode, enums: dict[str, Any]) -> str:
     for reg in registers(top):
         text = ", ".join(f'"{field.inst_name}": ({field.low}, {field.width})' for field in fields(reg))
         line = f'    "{reg.inst_name}": Register(0x{offset(reg):03X}, {count(reg)}, {{{text}}}),'
-        lines += [line] if len(line) <= 160 else [f'    "{reg.inst_name}": Register(', f"        0x{offset(reg):03X}, {count(reg)}, {{{text}}},", "    ),"]
+        if len(line) > 160:
+            parts = (f"            {part}" for part in textwrap.wrap(text, 148, break_long_words=False))
+            line = "\n".join([f'    "{reg.inst_name}": Register(', f"        0x{offset(reg):03X}, {count(reg)}, {{", *parts, "        },", "    ),"])
+        lines.append(line)
     lines.append("}")
     for name, enum in enums.items():
         python, what, _ = ENUMS[name]

@@ -47,12 +47,13 @@ TIMEOUT = 900  # seconds of a test run, on a busy machine
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 # Modules whose numbers stand in a generated package: an outcome depends on that.
 PACKAGES = {"flicker.params": ROOT / "rtl/common/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/common/flk_pkg.sv"}
-KEYS = {"file", "find", "replace", "unit", "note", "survives"}
+KEYS = {"file", "find", "replace", "unit", "note", "survives", "slow"}
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none can notice."""
+    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none can notice.
+    slow: its unit's tests that are marked slow run too."""
 
     number: int
     file: str
@@ -61,6 +62,7 @@ class Mutant:
     unit: str
     note: str = ""
     survives: str = ""
+    slow: bool = False
 
     @property
     def title(self) -> str:
@@ -99,7 +101,7 @@ def load(folder: Path = LISTS) -> list[Mutant]:
             where = f"{path}: mutant {i + 1}"
             if unknown := entry.keys() - KEYS:
                 raise FlickerError(f"{where}: unknown key '{sorted(unknown)[0]}'")
-            if missing := KEYS - {"note", "survives"} - entry.keys():
+            if missing := KEYS - {"note", "survives", "slow"} - entry.keys():
                 raise FlickerError(f"{where}: key '{sorted(missing)[0]}' is missing")
             source = ROOT / entry["file"]
             if not source.is_file():
@@ -141,7 +143,7 @@ class Copies:
             source.write_text(text.replace(mutant.find, mutant.replace))
             for units in ((mutant.unit,), *_above(mutant)):
                 for unit in units:
-                    died, wrong = _test(folder, unit, seed)
+                    died, wrong = _test(folder, unit, seed, mutant.slow)
                     if wrong:
                         return Outcome(mutant, wrong=wrong)
                     if died:
@@ -157,9 +159,9 @@ def _above(mutant: Mutant) -> tuple[tuple[str, ...], ...]:
     return LEVELS if ROOT / mutant.file in toolchain.sources_of("flk_render_stage") else ()
 
 
-def _test(folder: Path, unit: str, seed: int) -> tuple[bool, str]:
+def _test(folder: Path, unit: str, seed: int, slow: bool) -> tuple[bool, str]:
     """Whether the tests of a unit fail in a copy; and what is wrong if they could not run."""
-    environment = {**os.environ, "PYTHONPATH": f"{folder / 'model'}{os.pathsep}{folder / 'scripts'}", "FLICKER_SEED": str(seed)}
+    environment = {**os.environ, "PYTHONPATH": f"{folder / 'model'}{os.pathsep}{folder / 'scripts'}", "FLICKER_SEED": str(seed), "SLOW": "1" if slow else ""}
     environment.pop("FLICKER_SCENES", None)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "sim", "--unit", unit, "tb"]
     try:

@@ -409,6 +409,8 @@ flk_status_t flk_probe(flk_device_t *device, const flk_bus_t *bus)
   device->form = GET(FLK_CAPABILITY_FORM, capability);
   device->precision = GET(FLK_CAPABILITY_PRECISION, capability);
   device->vrus = GET(FLK_CAPABILITY_VRUS, capability);
+  device->mask_generator = GET(FLK_CAPABILITY_MASK_GENERATOR, capability);
+  device->lanes = (uint32_t)1 << GET(FLK_CAPABILITY_LOG2_LANES, capability);
   device->lists = (uint32_t)1 << GET(FLK_CAPABILITY_LOG2_LISTS, capability);
   device->beat = (uint32_t)1 << GET(FLK_CAPABILITY_LOG2_BEAT, capability);
   device->started = (uint16_t)GET(FLK_FRAMES_STARTED, get(device, FLK_FRAMES_OFFSET));

@@ -154,7 +154,9 @@ typedef struct {
 typedef struct {
   flk_bus_t bus;
   uint32_t minor;                        /* of the version */
-  uint32_t stage, form, precision, vrus; /* what the chip was built with */
+  uint32_t stage, form, precision; /* what the chip was built with */
+  uint32_t vrus, mask_generator;   /* of a stage of channels */
+  uint32_t lanes;                  /* of a stage of lanes */
   uint32_t lists;                        /* of a list writer: pictures have at most 4 as many tiles, whole pairs in each direction */
   uint32_t beat;                         /* bytes of the memory port's data */
   uint16_t started;                      /* number of the frame that was started last, modulo 2^16 */

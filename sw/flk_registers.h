@@ -14,7 +14,7 @@
 #define FLK_VERSION_MAJOR_RESET 0x1u
 #define FLK_VERSION_MINOR_MASK 0x0000ff00u
 #define FLK_VERSION_MINOR_SHIFT 8
-#define FLK_VERSION_MINOR_RESET 0x0u
+#define FLK_VERSION_MINOR_RESET 0x1u
 
 #define FLK_CAPABILITY_OFFSET 0x008u
 #define FLK_CAPABILITY_STAGE_MASK 0x0000000fu
@@ -25,10 +25,14 @@
 #define FLK_CAPABILITY_PRECISION_SHIFT 6
 #define FLK_CAPABILITY_VRUS_MASK 0x00000f00u
 #define FLK_CAPABILITY_VRUS_SHIFT 8
+#define FLK_CAPABILITY_MASK_GENERATOR_MASK 0x0000f000u
+#define FLK_CAPABILITY_MASK_GENERATOR_SHIFT 12
 #define FLK_CAPABILITY_LOG2_LISTS_MASK 0x000f0000u
 #define FLK_CAPABILITY_LOG2_LISTS_SHIFT 16
 #define FLK_CAPABILITY_LOG2_BEAT_MASK 0x00f00000u
 #define FLK_CAPABILITY_LOG2_BEAT_SHIFT 20
+#define FLK_CAPABILITY_LOG2_LANES_MASK 0x0f000000u
+#define FLK_CAPABILITY_LOG2_LANES_SHIFT 24
 
 #define FLK_CONTROL_OFFSET 0x00cu
 #define FLK_CONTROL_START_MASK 0x00000001u
@@ -393,6 +397,6 @@
 #define FLK_COUNTER_LIVE_FRAME_ADDRESS_WAITS 77  /* cycles in which an address waits: frame buffer */
 #define FLK_COUNTER_LIVE_FRONT_ADDRESS_WAITS 78  /* cycles in which an address waits: records, lists, pointers */
 #define FLK_COUNTER_LIVE_DATA_WAITS 79  /* cycles in which data to be written wait at the memory */
-#define FLK_COUNTER_STAGE 128  /* rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md) */
+#define FLK_COUNTER_STAGE 128  /* rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md) or LANE_CNT_* (docs/lane_stage.md) */
 
 #endif

@@ -181,6 +181,7 @@ def test_trace_format(monkeypatch: pytest.MonkeyPatch) -> None:
     assert runner.waves() == ""
 
 
+@pytest.mark.slow
 def test_vcd_is_written() -> None:
     """A simulation with traces leaves a VCD and its view; needs no headers."""
     done = command(
@@ -296,6 +297,7 @@ def test_manifests_follow_the_list() -> None:
     assert yaml.safe_load((ROOT / "flicker.core").read_text())["filesets"]["rtl"]["files"] == files
 
 
+@pytest.mark.slow
 def test_fusesoc_lint(tmp_path: Path) -> None:
     """FuseSoC finds the core and lints it with the environment's Verilator; a wrong source fails."""
     tree = tmp_path / "tree"

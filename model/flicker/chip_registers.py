@@ -19,7 +19,12 @@ class Register:
 REGISTERS = {
     "id": Register(0x000, 1, {"value": (0, 32)}),
     "version": Register(0x004, 1, {"major": (0, 8), "minor": (8, 8)}),
-    "capability": Register(0x008, 1, {"stage": (0, 4), "form": (4, 2), "precision": (6, 2), "vrus": (8, 4), "log2_lists": (16, 4), "log2_beat": (20, 4)}),
+    "capability": Register(
+        0x008, 1, {
+            "stage": (0, 4), "form": (4, 2), "precision": (6, 2), "vrus": (8, 4), "mask_generator": (12, 4), "log2_lists": (16, 4), "log2_beat": (20, 4),
+            "log2_lanes": (24, 4)
+        },
+    ),
     "control": Register(0x00C, 1, {"start": (0, 1), "abort": (1, 1), "reset": (2, 1)}),
     "status": Register(0x010, 1, {"ready": (0, 1), "front_busy": (1, 1), "render_busy": (2, 1), "aborting": (3, 1), "dead": (4, 1)}),
     "interrupt": Register(0x014, 1, {"front_done": (0, 1), "frame_done": (1, 1), "error": (2, 1), "aborted": (3, 1), "refused": (4, 1)}),
@@ -129,4 +134,4 @@ class ChipCounter(IntEnum):
     LIVE_FRAME_ADDRESS_WAITS = 77  # cycles in which an address waits: frame buffer
     LIVE_FRONT_ADDRESS_WAITS = 78  # cycles in which an address waits: records, lists, pointers
     LIVE_DATA_WAITS = 79  # cycles in which data to be written wait at the memory
-    STAGE = 128  # rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md)
+    STAGE = 128  # rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md) or LANE_CNT_* (docs/lane_stage.md)

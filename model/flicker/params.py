@@ -237,6 +237,12 @@ class RenderConfig:
         }
         return {name: values[name] for name in STAGES[self.stage].parameters}
 
+    def chip_parameters(self) -> dict[str, int]:
+        """Module parameters of the rendering half and the chip: the stage and what it is built with. A core gets one record a cycle there."""
+        parameters = self.rtl_parameters()
+        parameters.pop("InWidth", None)
+        return {"Stage": list(STAGES).index(self.stage), **parameters}
+
     def with_(self, **changes) -> RenderConfig:
         """A copy with some fields changed."""
         return replace(self, **changes)
@@ -289,7 +295,9 @@ class Stage:
 
     element, pixel: records (flicker.layout) that it takes and gives, on one stream per core. A token of `element` is its bit `eos`, with the
     sub-tile's place in the lowest bits; RECORD_ELEMENT: records as they lie in memory. `pixel` names sub-tile, mini-tile, index and pixel.
-    parameters: those of RenderConfig.rtl_parameters() that the module has. counters: of a core, in the order of their indices.
+    parameters: those of RenderConfig.rtl_parameters() that the module has (STAGE_PARAMETERS). counters: of a core, in the order of their indices.
+    lane_order: all pixels of a lane (flk_lane_pkg) before any of the next sub-tile; else all pixels of a mini-tile, which flk_frame_writer
+    needs to know.
     """
 
     module: str
@@ -298,9 +306,17 @@ class Stage:
     parameters: tuple[str, ...]
     counters: tuple[str, ...]
     note: str
+    lane_order: bool = False
 
 
 RECORD_ELEMENT = "record_elem"
+
+# What a rendering stage can be built from, with default values: parameters of `flk_stage`, which instantiates the chosen one.
+STAGE_PARAMETERS = {
+    "Form": "FORM_FACTORED", "Precision": "PRECISION_FIXED", "FifoDepth": "FIFO_DEPTH", "CtuFifoDepth": "CTU_FIFO_DEPTH",
+    "VrusPerChannel": "VRUS_PER_CHANNEL", "MaskGenerator": "MASK_GENERATOR_CTU", "Lanes": "32", "InWidth": "1", "Slots": "LANE_SLOTS",
+    "Depth": "LANE_QUEUE_DEPTH",
+}
 
 # ---- performance counters (order of the RTL's counter vector) ----------------------------------
 
@@ -361,7 +377,7 @@ STAGES: dict[str, Stage] = {
     ),
     "lanes": Stage(
         "flk_lane_stage", RECORD_ELEMENT, "core_pixel", ("Lanes", "InWidth", "Slots", "Depth"), tuple(name for name, _ in LANE_COUNTERS),
-        "lanes in the log domain (docs/lanes.md)",
+        "lanes in the log domain (docs/lanes.md)", lane_order=True,
     ),
 }
 

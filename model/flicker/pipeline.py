@@ -285,7 +285,7 @@ def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, op
     """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once. The RTL
     is fed as a chip feeds a stage that says when a sub-tile is finished: it leaves its list then, and one with an empty list is not streamed."""
     if engine is Engine.REFERENCE:
-        raise FlickerError("stage lanes: for --engine golden, rtl and chip-golden, not reference")
+        raise FlickerError("stage lanes: not for engine reference, which has no stage")
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = lane_lists(frame_in, steps)

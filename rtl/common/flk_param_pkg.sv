@@ -31,6 +31,12 @@ package flk_param_pkg;
   localparam int unsigned MASK_GENERATORS = 2;
   localparam logic [1:0][7:0] MASK_BITS = {8'd4, 8'd4};  // by mask generator
 
+  // Rendering stages (docs/render_stage.md)
+  localparam int unsigned STAGE_CHANNELS = 0;  // mask generators and volume rendering units
+  localparam int unsigned STAGE_LANES = 1;  // lanes in the log domain (docs/lanes.md)
+  localparam int unsigned RENDER_STAGES = 2;
+  localparam logic [1:0][7:0] STAGE_LANE_ORDER = {8'd1, 8'd0};  // pixels keep their order in each lane, else in each mini-tile
+
   // Rendering rules, rounded to FP16 (docs/architecture.md)
   localparam logic [15:0] FP16_ONE = 16'h3c00;  // 1.0
   localparam logic [15:0] ALPHA_MIN = 16'h1c05;  // 1/255, rounded up

@@ -977,6 +977,15 @@ package flk_lane_pkg;
     endcase
   endfunction
 
+  // The lane that has a pixel.
+  function automatic int unsigned lane_of(int unsigned lanes, logic [2:0] row, logic [2:0] column);
+    case (lanes)
+      8:       return 32'(3'(column + 3'(row << 1) + row));
+      16:      return 32'({row[1:0], column[1:0]});
+      default: return 32'({row[1:0], column});
+    endcase
+  endfunction
+
   // Number of a lane's pixel in masks: 16 m + i, pixel i of mini-tile m.
   function automatic int unsigned lane_pixel(int unsigned lanes, int unsigned lane, int unsigned p);
     logic [2:0] row, column;

@@ -2328,15 +2328,17 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h1;
-            readback_data_var[15:8] = 8'h0;
+            readback_data_var[15:8] = 8'h1;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
             readback_data_var[5:4] = hwif_in.capability.form.next;
             readback_data_var[7:6] = hwif_in.capability.precision.next;
             readback_data_var[11:8] = hwif_in.capability.vrus.next;
+            readback_data_var[15:12] = hwif_in.capability.mask_generator.next;
             readback_data_var[19:16] = hwif_in.capability.log2_lists.next;
             readback_data_var[23:20] = hwif_in.capability.log2_beat.next;
+            readback_data_var[27:24] = hwif_in.capability.log2_lanes.next;
         end
         if(rd_mux_addr == 10'h10) begin
             readback_data_var[0] = hwif_in.status.ready.next;

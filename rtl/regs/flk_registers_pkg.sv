@@ -28,6 +28,10 @@ package flk_registers_pkg;
 
     typedef struct packed {
         logic [3:0] next;
+    } flk_registers__capability__mask_generator__in_t;
+
+    typedef struct packed {
+        logic [3:0] next;
     } flk_registers__capability__log2_lists__in_t;
 
     typedef struct packed {
@@ -35,12 +39,18 @@ package flk_registers_pkg;
     } flk_registers__capability__log2_beat__in_t;
 
     typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability__log2_lanes__in_t;
+
+    typedef struct packed {
         flk_registers__capability__stage__in_t stage;
         flk_registers__capability__form__in_t form;
         flk_registers__capability__precision__in_t precision;
         flk_registers__capability__vrus__in_t vrus;
+        flk_registers__capability__mask_generator__in_t mask_generator;
         flk_registers__capability__log2_lists__in_t log2_lists;
         flk_registers__capability__log2_beat__in_t log2_beat;
+        flk_registers__capability__log2_lanes__in_t log2_lanes;
     } flk_registers__capability__in_t;
 
     typedef struct packed {

@@ -1,11 +1,12 @@
 // Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/frame_writer.md).
 //
-// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Its mini-tiles go on by themselves,
-// the 16 pixels of each in any order. All have the same order of tiles, which come in pairs: an even column, then the one right of
-// it. A pair of tiles, 32 x 16 pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in
-// RGBA16F, whole bursts of 32 bytes. Pixel formats: golden/frame_buffer.py.
+// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Groups of its pixels go on by
+// themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any
+// of the next tile. All groups have the same order of tiles, which come in pairs: an even column, then the one right of it. A pair of
+// tiles, 32 x 16 pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in RGBA16F, whole
+// bursts of 32 bytes. Pixel formats: golden/frame_buffer.py.
 // Pairs of tiles are held, and no pixel waits: who gives a core its tiles keeps at most so many pairs begun there that were not
-// freed (freed_o, high for a cycle: the oldest is on its way out). A mini-tile that is ahead would else stop those behind.
+// freed (freed_o, high for a cycle: the oldest is on its way out). A group that is ahead would else stop those behind.
 //
 // Frame: start_i while idle_o; rgba_i, background_i, base_i (in beats of 64 bytes), stride_i (of a row of pixels, in 32 bytes) and
 // pairs_i (of the frame, at least 1) stay until done_o, high for the cycle after the last line has left. clear_i aborts: as after
@@ -19,7 +20,8 @@ module flk_frame_writer
 #(
   parameter int unsigned Pairs      = 4,   // of tiles that are held: 2, 4 or 8
   parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
-  parameter int unsigned StrideBits = 12
+  parameter int unsigned StrideBits = 12,
+  parameter int unsigned Lanes      = 0    // of all cores: 32, 64 or 128; 0: groups are mini-tiles
 ) (
   input  logic                    clk_i,
   input  logic                    rst_ni,
@@ -48,6 +50,9 @@ module flk_frame_writer
   if (Pairs != 2 && Pairs != 4 && Pairs != 8) begin : gen_check_pairs
     $error("flk_frame_writer: Pairs must be 2, 4 or 8");
   end
+  if (Lanes != 0 && Lanes != 32 && Lanes != 64 && Lanes != 128) begin : gen_check_lanes
+    $error("flk_frame_writer: Lanes must be 0, 32, 64 or 128");
+  end
 
   localparam int unsigned PairBits = SUBTILE_COORD_BITS - 2;  // of a pair's column
   localparam int unsigned TileBits = SUBTILE_COORD_BITS - 1;  // of a tile's row
@@ -59,8 +64,11 @@ module flk_frame_writer
 
   localparam int unsigned IndexBits = $clog2(Pairs);
   localparam int unsigned FullBits = $clog2(Pairs + 1);
+  localparam int unsigned Groups = (Lanes == 0) ? CHANNELS : Lanes / CORES;
+  localparam int unsigned GroupBits = $clog2(Groups);
+  localparam int unsigned CountBits = $clog2(2 * SUBTILE * SUBTILE / Groups);
 
-  logic [CORES-1:0][3:0]            complete;  // by core and mini-tile: a whole pair is there
+  logic [CORES-1:0][Groups-1:0]     complete;  // by core and group: a whole pair is there
   logic [IndexBits-1:0]             from_q;    // buffer that leaves
   logic [IndexBits-1:0]             first_into;
   logic                             freed, running_q;
@@ -74,15 +82,19 @@ module flk_frame_writer
   pixel_t [CORES-1:0][7:0]          pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic [3:0][4:0]           count_q;  // pixels of a mini-tile in the pair that comes
-    logic [3:0][IndexBits-1:0] into_q;   // buffer that it goes to
-    logic [3:0][FullBits-1:0]  full_q;   // pairs that are there
-    logic [1:0]                m;
-    logic [IndexBits+3:0]      place;
+    logic [Groups-1:0][CountBits-1:0] count_q;  // pixels of a group in the pair that comes
+    logic [Groups-1:0][IndexBits-1:0] into_q;   // buffer that it goes to
+    logic [Groups-1:0][FullBits-1:0]  full_q;   // pairs that are there
+    logic [2:0]                       row, column;
+    logic [GroupBits-1:0]             group;
+    logic [IndexBits+3:0]             place;
 
+    assign row    = {in_data_i[k].minitile[1], in_data_i[k].index[3:2]};
+    assign column = {in_data_i[k].minitile[0], in_data_i[k].index[1:0]};
+    assign group  = (Lanes == 0) ? GroupBits'(in_data_i[k].minitile)
+                                 : GroupBits'(flk_lane_pkg::lane_of(Groups, row, column));
     // Buffer, tile of the pair, row.
-    assign m     = in_data_i[k].minitile;
-    assign place = {into_q[m], in_data_i[k].subtile.col[1], m[1], in_data_i[k].index[3:2]};
+    assign place  = {into_q[group], in_data_i[k].subtile.col[1], row};
 
     for (genvar x = 0; x < 8; x++) begin : gen_column
       flk_sram #(
@@ -90,7 +102,7 @@ module flk_frame_writer
         .Depth(16 * Pairs)
       ) i_pixels (
         .clk_i,
-        .wr_en_i  (in_valid_i[k] && {m[0], in_data_i[k].index[1:0]} == 3'(x)),
+        .wr_en_i  (in_valid_i[k] && column == 3'(x)),
         .wr_addr_i(place),
         .wr_data_i(in_data_i[k].pixel),
         .rd_en_i  (en && read),
@@ -99,10 +111,10 @@ module flk_frame_writer
       );
     end
 
-    for (genvar i = 0; i < 4; i++) begin : gen_minitile
+    for (genvar i = 0; i < Groups; i++) begin : gen_group
       logic taken, last;
 
-      assign taken          = in_valid_i[k] && m == 2'(i);
+      assign taken          = in_valid_i[k] && group == GroupBits'(i);
       assign last           = taken && (&count_q[i]);
       assign complete[k][i] = full_q[i] != '0;
 
@@ -116,7 +128,7 @@ module flk_frame_writer
           into_q[i]  <= '0;
           full_q[i]  <= '0;
         end else begin
-          count_q[i] <= count_q[i] + 5'(taken);
+          count_q[i] <= count_q[i] + CountBits'(taken);
           into_q[i]  <= into_q[i] + IndexBits'(last);
           full_q[i]  <= full_q[i] + FullBits'(last) - FullBits'(freed);
         end
@@ -127,13 +139,13 @@ module flk_frame_writer
           taken |-> running_q && 32'(full_q[i]) < Pairs)
       else $error("flk_frame_writer: a pixel of a pair that has no place");
       assert property (@(posedge clk_i) disable iff (!rst_ni)
-          taken |-> in_data_i[k].subtile.col[1] == count_q[i][4])
+          taken |-> in_data_i[k].subtile.col[1] == count_q[i][CountBits-1])
       else $error("flk_frame_writer: tiles do not come in pairs");
 `endif
     end
 
     if (k == 0) begin : gen_first
-      assign first_into = into_q[m];
+      assign first_into = into_q[group];
     end
 
 `ifndef SYNTHESIS

@@ -2,9 +2,9 @@
 
 State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000 splats; all modes;
 idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it fall and return, under different
-stalls; reset and clear in mid-traffic. Parameter space: without output FIFO the factored form in fixed point and FP16, the conic one in mixed precision; an
-output FIFO of one place and that of the faithful configuration; VRU cycles of channels with 1 and 2 VRUs; illegal parameters. With SLOW=1 also the
-other precisions of each form, output FIFOs of 2 and 3 places, channels with 4 VRUs. Not covered: a change of mode in mid-frame, which the contract
+stalls; reset and clear in mid-traffic. Parameter space: without output FIFO the factored form in fixed point; an output FIFO of one place, and that of the
+faithful configuration, conic in mixed precision; VRU cycles of channels with 1 and 2 VRUs; illegal parameters. With SLOW=1 also the other precisions of
+each form, output FIFOs of 2 and 3 places, channels with 4 VRUs. Not covered: a change of mode in mid-frame, which the contract
 excludes (tb/render/test_stage_control.py: the mode is latched).
 """
 
@@ -26,8 +26,8 @@ def run(form: Form, precision: Precision, depth: int, tests: list[str], **more: 
 COMBINATIONS = [
     pytest.param(form, precision, id=f"{form.name}-{precision.name}".lower(), marks=[pytest.mark.slow] if slow else [])
     for form, precision, slow in (
-        (Form.FACTORED, Precision.FIXED, False), (Form.FACTORED, Precision.FP16, False), (Form.FACTORED, Precision.FP8, True),
-        (Form.FACTORED, Precision.MIXED, True), (Form.CONIC, Precision.MIXED, False), (Form.CONIC, Precision.FP16, True),
+        (Form.FACTORED, Precision.FIXED, False), (Form.FACTORED, Precision.FP16, True), (Form.FACTORED, Precision.FP8, True),
+        (Form.FACTORED, Precision.MIXED, True), (Form.CONIC, Precision.MIXED, True), (Form.CONIC, Precision.FP16, True),
         (Form.CONIC, Precision.FP8, True), (Form.CONIC, Precision.FIXED, True),
     )
 ]

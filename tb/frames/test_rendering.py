@@ -3,7 +3,8 @@
 State space: the demo scene, both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing, frames one after the other, an odd
 number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: the default stage, one and four VRUs a channel with it, no contribution test; `faithful` wants records of 32 bytes, which only the golden
+Parameter space: a stage of 32 lanes; with SLOW=1 64 and 128 of them, and channels with every mode, one, two and four VRUs, without a contribution test
+(tb/frames/test_chip_frames.py has the default stage every time); `faithful` wants records of 32 bytes, which only the golden
 front end makes. Not covered: resets within a frame.
 """
 
@@ -23,6 +24,7 @@ from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PAIR, PixelFormat, least_stride
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
+from flicker.golden.lanes.lists import front_lists
 from flicker.golden.list_reader import read_tile
 from flicker.golden.lists import ENTRY_BITS
 from flicker.golden.sorting import sort_list
@@ -37,7 +39,8 @@ from flicker.sim.memory import PortConfig
 from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, regions, rendering_rtl
 
 LIMIT = 1_000_000  # a frame that hangs says so within minutes
-CONFIG = RenderConfig()
+CONFIG = RenderConfig(stage="lanes")
+CHANNELS = RenderConfig()
 LAYERS = 6000
 
 
@@ -93,7 +96,7 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
     """A frame of both, compared, with what it moves."""
     front, image = view_of(*size, scene)
     row = least_stride(size[0], format_)
-    golden = render_chip(front.subtile_lists(), config, format_, background, row + 32 * gap)
+    golden = render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config, format_, background, row + 32 * gap)
     rtl = rendering_rtl(image, front.camera, config, format_=format_, background=background, stride=row + 32 * gap, seed=seed(), limit=LIMIT, **options)
     assert rtl.errors[-1] == 0
     assert np.array_equal(rtl.buffer[:, :row], golden.buffer[:, :row])
@@ -106,7 +109,7 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
         starts = np.arange(rows * TILE) * (golden.buffer.shape[1] // 32) % 2  # a row of RGBA16F that begins within a beat has one more
         written = pairs * (2 * len(starts) if format_ is PixelFormat.RGB8 else (4 + starts).sum())
         lengths = np.diff(golden.frame.lists.start)
-        whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu"
+        whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu" and not config.by_lanes
         assert may_be_given(rtl.given, lengths, golden.frame.needed, whole).all(), "a core lacks records that its pixels need"
         entries, readings = rtl.counters["entries"].sum(), rtl.counters["readings"].sum() - (tiles - due.lists)
         lines = rtl.traffic["lists"].read_beats / frames
@@ -161,23 +164,31 @@ def test_nothing_visible() -> None:
     assert (rtl.buffer.reshape(-1, 3) == (7, 8, 9)).all() and rtl.counters["lines"] == 0
 
 
+@pytest.mark.slow
 def test_modes() -> None:
     """Every mode of the contribution test, the automatic one over sub-tiles that the picture lacks too."""
     for mode in CatMode:
-        check((80, 40), CONFIG.with_(cat=mode))
-
-
-def test_automatic_mode() -> None:
-    """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
-    check((96, 54), CONFIG.with_(cat=CatMode.AUTO), scene="demo", frames=2)
+        check((80, 40), CHANNELS.with_(cat=mode))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", [{"vrus_per_channel": 1}, {"vrus_per_channel": 4}, {"mask_generator": "all", "cat": CatMode.OFF}], ids=str)
-def test_stages(change: dict) -> None:
-    """Other numbers of VRUs and the generator without a test: sub-tiles finish at other times."""
-    rtl = check((96, 54), CONFIG.with_(**change), scene="demo")
+def test_automatic_mode() -> None:
+    """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
+    check((96, 54), CHANNELS.with_(cat=CatMode.AUTO), scene="demo", frames=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", [
+    CHANNELS, CHANNELS.with_(vrus_per_channel=1), CHANNELS.with_(vrus_per_channel=4), CHANNELS.with_(mask_generator="all", cat=CatMode.OFF),
+    CONFIG.with_(lanes=64), CONFIG.with_(lanes=128),
+], ids=lambda c: "-".join(map(str, c.chip_parameters().values())))
+def test_stages(config: RenderConfig) -> None:
+    """Other stages: pixels leave in another order, sub-tiles finish at other times."""
+    rtl = check((96, 54), config, scene="demo")
     assert left_out(rtl, view_of(96, 54, "demo")[0]) > 0.14
+    shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
+    check((80, 40), config, PixelFormat.RGBA16F, gap=1, memory=MemoryOptions(DramConfig().timing, paused(shares)), frames=2)
+    check((32, 32), config, scene="layers")
 
 
 def test_pauses_and_dram() -> None:

@@ -206,6 +206,7 @@ def table_1(verdicts) -> list:
     return [v for v in verdicts if v.figure == "Table 1" and v.kind != "open"]
 
 
+@pytest.mark.slow
 def test_table_1_is_measured(fitted, tmp_path):
     """Losses are means of the views' own, their figures are in the verdict; the view without photograph is judged apart, by the assumption."""
     names = [claims.NO_CTU, claims.FAITHFUL]

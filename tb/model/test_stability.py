@@ -150,6 +150,7 @@ def test_known_failures(quick):
     assert first is not None and first.psnr_db < BROKEN_PSNR and first.step > 0
 
 
+@pytest.mark.slow
 def test_all_configurations_once():
     """Every configuration of the full suite through the worst step of two families: a finite picture."""
     full = run_stability(["thin_far", "colour"], suite(), quick=True, seed=seed())

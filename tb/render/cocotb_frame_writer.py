@@ -11,10 +11,12 @@ from flicker_tb import stalls
 from flicker_tb.bench import Bench, config
 
 from flicker.golden.frame_buffer import PAIR, PixelFormat, frame_buffer, least_stride
-from flicker.params import SUBTILE_COORD_BITS, TILE
+from flicker.params import CORES, SUBTILE_COORD_BITS, TILE
+from flicker.perf.lanes import pixels_of_lanes
 
-CORES = 4
 PAIRS = config().get("pairs", 4)  # that the design holds
+LANES = config().get("lanes", 0)
+GROUPS = [list(map(int, pixels)) for pixels in (pixels_of_lanes(LANES // CORES) if LANES else np.arange(64).reshape(4, 16))]  # pixels of each
 PIXEL_BITS = 64 + 4 + 2 + 2 * SUBTILE_COORD_BITS
 SPECIAL = np.array([0, 0x8000, 1, 0x3FF, 0x400, 0x3BFF, 0x3C00, 0x3C01, 0x3FFF, 0x4000, 0x7BFF, 0x7C00, 0xB800, 0xBC00, 0x1C00, 0x1C04], np.uint16)
 
@@ -40,7 +42,7 @@ class Writer:
     async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0,
                     order: str = "any") -> int:
         """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle.
-        order: of a core's mini-tiles, any, ahead (as far apart as they may be) or pairs (one pair after the other)."""
+        order: of a core's groups of pixels, any, ahead (as far apart as they may be) or pairs (one pair after the other)."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         across, down = -(-cols * 8 // PAIR), -(-rows * 8 // TILE)
         cols, rows = 4 * across, 2 * down
@@ -52,14 +54,14 @@ class Writer:
         pairs = [(x, y) for y in range(down) for x in range(across)]
         if walk == "any":
             rng.shuffle(pairs)
-        # By core and mini-tile: pair and pixel, in order; a core's stream takes from any of its four.
-        work: list[list[deque[tuple[int, int]]]] = [[deque() for _ in range(4)] for _ in range(CORES)]
+        # By core and group: pair and pixel, in order; a core's stream takes from any of its groups.
+        work: list[list[deque[tuple[int, int]]]] = [[deque() for _ in GROUPS] for _ in range(CORES)]
         for number, (x, y) in enumerate(pairs):
             for tile in range(2):
                 for k in range(CORES):
                     col, row = 4 * x + 2 * tile + k % 2, 2 * y + k // 2
-                    for m in range(4):
-                        places = list(range(16 * m, 16 * m + 16))
+                    for m, group in enumerate(GROUPS):
+                        places = group.copy()
                         rng.shuffle(places)
                         for i in places:
                             t, r, g, b = (int(v) for v in pixels[row * cols + col, i])
@@ -80,7 +82,7 @@ class Writer:
         while True:
             valid = data = 0
             for k in range(CORES):
-                open_ = [m for m in range(4) if work[k][m] and work[k][m][0][0] < freed + PAIRS]
+                open_ = [m for m in range(len(GROUPS)) if work[k][m] and work[k][m][0][0] < freed + PAIRS]
                 if order == "ahead":
                     open_ = open_[:1]
                 elif order == "pairs":

@@ -1,8 +1,8 @@
 """Frame writer: every byte of the frame buffer as in the golden model, nothing else written; lines, rates, frames one after the other, abort.
 
 State space: pixels of every sub-tile in any order, cores apart by up to two pairs, special FP16 values, idle and back-pressure patterns, both pixel formats,
-strides with a gap, odd and even bursts at the start of a row, tiles in any order of pairs. Parameter space: four pairs held; two, and
-with SLOW=1 eight, for the bytes of frames and one late core only.
+strides with a gap, odd and even bursts at the start of a row, tiles in any order of pairs. Parameter space: four pairs held and the
+order of mini-tiles; two and the order of 32 lanes, with SLOW=1 two and eight, 64 and 128 lanes, for the bytes of frames and one late core only.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ import pytest
 from flicker_tb.runner import build_and_test, refused
 
 
-@pytest.mark.parametrize("pairs", [4, 2, pytest.param(8, marks=pytest.mark.slow)])
-def test_frame_writer(pairs: int) -> None:
-    tests = [] if pairs == 4 else ["bytes_of_frames", "one_core_late"]
-    build_and_test("flk_frame_writer", "cocotb_frame_writer", parameters={"Pairs": pairs}, config={"pairs": pairs}, tests=tests, inner=False)
+@pytest.mark.parametrize(("pairs", "lanes"), [
+    (4, 0), (2, 32), *(pytest.param(pairs, lanes, marks=pytest.mark.slow) for pairs, lanes in ((2, 0), (8, 64), (4, 128))),
+])
+def test_frame_writer(pairs: int, lanes: int) -> None:
+    tests = [] if pairs == 4 and lanes == 0 else ["bytes_of_frames", "one_core_late"]
+    build_and_test("flk_frame_writer", "cocotb_frame_writer", parameters={"Pairs": pairs, "Lanes": lanes}, config={"pairs": pairs, "lanes": lanes},
+                   tests=tests, inner=False)
 
 
 def test_illegal_parameters() -> None:
-    with refused("Pairs must be 2, 4 or 8"):
-        build_and_test("flk_frame_writer", "cocotb_frame_writer", parameters={"Pairs": 3}, inner=False)
+    for parameters, message in (({"Pairs": 3}, "Pairs must be 2, 4 or 8"), ({"Lanes": 16}, "Lanes must be 0, 32, 64 or 128")):
+        with refused(message):
+            build_and_test("flk_frame_writer", "cocotb_frame_writer", parameters=parameters, inner=False)

@@ -1,8 +1,9 @@
 """Sorting unit: every list in order, read as often as the golden model says, whatever the timing; lists finished early; clear; counters; cycles.
 
 State space: lists empty, of one entry, around the lengths of runs, around the capacity and beyond it; keys random, few, equal, ascending, descending, extreme;
-idle and back-pressure patterns on lines, answers and output; finish_i at every place; clear_i at random times. Parameter space: the unit as it is (16 cells, 7
-steps) and small ones, in which lists that do not fit are many and short. SLOW=1: a list of 20,000 entries. Not covered: counters of more than 2**16.
+idle and back-pressure patterns on lines, answers and output; finish_i at every place; clear_i at random times.
+Parameter space: small units, in which lists that do not fit are many and short; the unit as it is (16 cells, 7 steps) with lists of all lengths, with
+SLOW=1 in everything and with a list of 20,000 entries. Not covered: counters of more than 2**16.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ def test_small(cells: int, stages: int) -> None:
                    config={"cells": cells, "stages": stages}, tests=SMALL, opt="-O1", seeds=2 if stages == 1 else 1)
 
 
-def test_sorting_unit() -> None:
-    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=[*SMALL, "finish_is_quick", "rate"], opt="-O1")
+@pytest.mark.parametrize("tests", [["lists", "finish_is_quick", "rate"], pytest.param(SMALL[1:], marks=pytest.mark.slow)], ids=["lists", "more"])
+def test_sorting_unit(tests: list[str]) -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=tests, opt="-O1")
 
 
 @pytest.mark.slow

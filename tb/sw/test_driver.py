@@ -388,7 +388,7 @@ class Chip:
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
         self.set("version", (3 << 8) | 1)
-        self.field("capability", stage=1, form=1, precision=2, vrus=2, log2_lists=11, log2_beat=6)
+        self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=11, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
         self.bus = CBus(*self.calls, 0x1234)
@@ -587,7 +587,8 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.lists, device.beat) == (3, 1, 1, 2, 2, 2048, 64)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (3, 1, 1, 2, 2, 3, 32)
+    assert (device.lists, device.beat) == (2048, 64)
     assert device.started == 0xFFFF and not chip.writes
     chip.set("version", 2)
     assert chip.probe() == "DEVICE_VERSION"

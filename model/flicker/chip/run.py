@@ -61,8 +61,6 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
             sent = golden.frame.total("minitiles_sent")
             stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
         return _frame_image(golden.buffer, camera), stats
-    if config.by_lanes:
-        raise FlickerError(f"stage lanes: for --engine golden, rtl and chip-golden, not {engine.value}")
     if config.form is not Form.FACTORED:
         raise FlickerError("--engine chip: the front end in RTL writes records of 16 bytes, for --form factored; --engine chip-golden takes the conic form too")
     with steps.step("packing the scene"):
@@ -89,12 +87,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, frame.usage.live
     count = lambda name: int(np.sum(front[name]))  # noqa: E731
     phases = {"front end": stamps["front_done"] - stamps["taken"], "rendering": stamps["rendering_done"] - stamps["rendering_start"]}
-    core = {name: frame.stage[:, k] for k, (name, _) in enumerate(params.CORE_COUNTERS)}
-    first = len(params.CORE_COUNTERS)
-    channel = {
-        name: np.stack([frame.stage[:, first + len(params.CHANNEL_COUNTERS) * c + k] for c in range(CHANNELS)])
-        for k, (name, _) in enumerate(params.CHANNEL_COUNTERS)
-    }
+    core = {name: frame.stage[:, k] for k, name in enumerate(params.STAGES[config.stage].counters)}
+    stage = (_lane_chip_stats if config.by_lanes else _channel_chip_stats)(core, config, phases["rendering"])
     traffic = {name: moved for name, moved in frame.usage.traffic.items() if any(moved)}
     cycles = stamps["rendering_done"] - stamps["taken"]
     efficiency = sum(map(sum, traffic.values())) * CLOCK_HZ / (cycles * dram.bytes_per_second)
@@ -107,8 +101,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
         },
         "rendering": {
             "sorting units": int(np.max(rendering["entries"])) / phases["rendering"], "record cache's port": int(rendering["lines"]) / phases["rendering"],
-            "contribution test": float(core["ctu_busy"].max() / phases["rendering"]),
-            "VRUs": float(channel["vru_busy"].sum(axis=0).max() / (CHANNELS * phases["rendering"])),
+            **stage.pop("busy"),
         },
     }
     longest = max(phases, key=lambda name: phases[name])
@@ -122,17 +115,47 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
             OUTCOMES[Outcome.LISTED]: count("survivors") - count("unlisted"),
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
-        "subtile_pairs": int(core["gaussians_in"].sum()), "minitiles_sent": int(channel["minitiles_sent"].sum()),
-        "pixel_pairs": 16 * int(channel["minitiles_sent"].sum()),
+        "subtile_pairs": int(core["gaussians_in"].sum()),
         "cycles": cycles, "phases": phases, "dram_bytes": traffic, "dram_efficiency": efficiency,
         "stalls": {
-            "contribution test": int(core["ctu_stalled"].sum()), "no records for the contribution test": int(core["ctu_idle"].sum()),
-            "feature FIFO full": int(channel["fifo_full"].sum()),
+            **stage.pop("stalls"),
             **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
         },
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
         "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},
-        "vrus": CORES * CHANNELS * config.vrus_per_channel,
+        **stage,
+    }
+
+
+def _channel_chip_stats(core: Mapping[str, np.ndarray], config: RenderConfig, cycles: int) -> dict[str, Any]:
+    """`chip_stats` of the channels. core: counters by name, int64 (cores,)."""
+    channel = {
+        name: np.stack([core[f"channel {c} {name}"] for c in range(CHANNELS)]) for name, _ in params.CHANNEL_COUNTERS
+    }
+    sent = int(channel["minitiles_sent"].sum())
+    return {
+        "minitiles_sent": sent, "pixel_pairs": 16 * sent, "vrus": CORES * CHANNELS * config.vrus_per_channel,
+        "busy": {
+            "contribution test": float(core["ctu_busy"].max() / cycles),
+            "VRUs": float(channel["vru_busy"].sum(axis=0).max() / (CHANNELS * cycles)),
+        },
+        "stalls": {
+            "contribution test": int(core["ctu_stalled"].sum()), "no records for the contribution test": int(core["ctu_idle"].sum()),
+            "feature FIFO full": int(channel["fifo_full"].sum()),
+        },
+    }
+
+
+def _lane_chip_stats(core: Mapping[str, np.ndarray], config: RenderConfig, cycles: int) -> dict[str, Any]:
+    """`chip_stats` of the lanes."""
+    count = {name: int(values.sum()) for name, values in core.items()}
+    return {
+        "pixel_pairs": count["visits"], "pairs_blended": count["blended"], "pixels_finished": count["pixels_finished"],
+        "lanes": {"lanes": config.lanes, "visited": count["visits"], "skipped": count["skipped"], "blended": count["blended"]},
+        "busy": {"lanes": float(core["visits"].max() * CORES / (config.lanes * cycles))},
+        "stalls": {
+            "no records for the lanes": count["idle"], "no slot in the lanes' store": count["no_slot"], "no room in a lane's queue": count["no_room"],
+        },
     }
 
 

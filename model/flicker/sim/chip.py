@@ -44,7 +44,7 @@ def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) ->
     """Shared library of the simulator, with the design's assertions; cached by content."""
     if config.form is not Form.FACTORED:
         raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
-    parameters = {name: value for name, value in config.rtl_parameters().items() if name != "Form"}
+    parameters = {name: value for name, value in config.chip_parameters().items() if name != "Form"}
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "rendering")]
     return half.build(
         "flk_top", {**parameters, "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",

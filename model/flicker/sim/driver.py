@@ -52,8 +52,8 @@ class CBus(ctypes.Structure):
 
 class CDevice(ctypes.Structure):
     _fields_ = [
-        ("bus", CBus), ("minor", u32), ("stage", u32), ("form", u32), ("precision", u32), ("vrus", u32), ("lists", u32), ("beat", u32), ("started", u16),
-        ("region", ctypes.c_uint),
+        ("bus", CBus), ("minor", u32), ("stage", u32), ("form", u32), ("precision", u32), ("vrus", u32), ("mask_generator", u32), ("lanes", u32),
+        ("lists", u32), ("beat", u32), ("started", u16), ("region", ctypes.c_uint),
     ]
 
 

@@ -26,6 +26,7 @@ from ...params import (
     Precision,
     RenderConfig,
 )
+from ...params import STAGES as RENDERING_STAGES
 
 FORMS = {"conic": 0, "factored": 1}
 PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
@@ -76,9 +77,11 @@ COMPOSED: dict[str, list[str]] = {
     "flk_line_writer": ["flk_sram_fifo", "flk_axi_write"],
     "flk_axi_read_mux": ["flk_stream_arbiter"],
     "flk_rendering": [
-        "flk_tile_walk", "flk_list_reader", "flk_sorting_unit", "flk_axi_read_mux", "flk_delivery", "flk_record_to_splat", "flk_render_stage",
+        "flk_tile_walk", "flk_list_reader", "flk_sorting_unit", "flk_axi_read_mux", "flk_delivery", "flk_stage",
         "flk_frame_writer", "flk_line_writer", "flk_pipe_reg",
     ],
+    "flk_splat_input": ["flk_record_to_splat"],
+    "flk_stage": ["flk_splat_input", *(stage.module for stage in RENDERING_STAGES.values())],
     "flk_axi_arbiter": ["flk_priority_arbiter", "flk_fifo"],
     "flk_frame_counters": [MEMORY],
     "flk_top": [
@@ -318,11 +321,12 @@ def _front() -> list[Unit]:
         unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),
         unit("flk_sort_merge", "runs of 1024, selection", Run=1024, Lists=8, Select=1), unit("flk_sorting_unit"),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
-        unit("flk_pixel_out"), unit("flk_frame_writer"),
+        unit("flk_splat_input"), unit("flk_pixel_out"), unit("flk_frame_writer"), unit("flk_frame_writer", "32 lanes", Lanes=LANE_COUNTS[0]),
         unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
         unit("flk_record_cache"), unit("flk_delivery"), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
         unit("flk_tile_walk"), unit("flk_axi_read_mux"), unit("flk_line_writer"),
-        Unit("flk_rendering", "default", tuple(sorted(RenderConfig().rtl_parameters().items()))),
+        unit("flk_rendering", "default", **RenderConfig().chip_parameters()),
+        unit("flk_rendering", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()),
     ]
 
 
@@ -360,6 +364,7 @@ def _top() -> list[Unit]:
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
         unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_top"),
+        unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()),
     ]
 
 
