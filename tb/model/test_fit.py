@@ -60,16 +60,14 @@ def busy(count: int = 60, degree: int = 3) -> Parameters:
 # -- pictures and derivatives ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [np.float64, np.float32])
-def test_picture_is_the_reference(kind: type) -> None:
-    """Picture and transmittance; in float64 to rounding, with means in float32 and activations within its resolution."""
+def test_picture_is_the_reference() -> None:
+    """Picture and transmittance, but for the rounding of scales and opacities to the scene's float32."""
     found, camera = busy(), look()
-    frame = render(found, camera, BACKGROUND, kind)
+    frame = render(found, camera, BACKGROUND)
     image, left = render_with_transmittance(project(found.scene(), camera), camera, BACKGROUND)
     assert left.min() < 1e-3 and left.max() > 0.5
     assert np.abs(frame.image - image).max() < 2e-5 and np.abs(frame.transmittance - left).max() < 2e-5
-    assert np.sqrt(np.mean((frame.image - image) ** 2)) < (2e-6 if kind is np.float32 else 1e-6)
-    assert frame.image.dtype == kind and not frame.bad.any() and frame.used.sum() > 50
+    assert not frame.bad.any() and frame.used.sum() > 50
 
 
 def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: int, column: int) -> tuple[float, float]:
@@ -80,7 +78,7 @@ def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: in
             moved = Parameters(parameters.values.copy())
             moved.values[i, column] += np.float32(sign * step)
             places.append(float(moved.values[i, column]))
-            results.append(float((weight * render(moved, camera, BACKGROUND, np.float64).image).sum()))
+            results.append(float((weight * render(moved, camera, BACKGROUND).image).sum()))
         return (results[0] - results[1]) / (places[0] - places[1])
 
     coarse, middle, fine = slope(2e-3), slope(1e-3), slope(5e-4)
@@ -91,9 +89,9 @@ def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: in
 @pytest.mark.parametrize(("degree", "z"), [(3, -3.0), (1, -1.3)])
 def test_derivatives(degree: int, z: float) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
-    parameters, camera = busy(24, degree), look(31, 23, 28.0, z)
+    parameters, camera = busy(32, degree), look(31, 23, 28.0, z)
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
-    frame = render(parameters, camera, BACKGROUND, np.float64)
+    frame = render(parameters, camera, BACKGROUND)
     found = backward(frame, weight)
     checked = np.zeros(parameters.values.shape[1], int)
     largest = np.abs(found.values).max(axis=0)
@@ -106,11 +104,12 @@ def test_derivatives(degree: int, z: float) -> None:
             if doubt < 2e-5 * scale:
                 assert abs(found.values[k, column] - wanted) < 1e-4 * scale, (i, column, found.values[k, column], wanted)
                 checked[column] += 1
+    print(len(frame.index), checked, clamped)
     assert clamped >= 3 and (checked >= len(frame.index) // 3).all(), checked
 
 
 def test_rules_near() -> None:
-    """One Gaussian over one pixel's centre: just below and above the clamp, just above and below 1/255; the second of two that ends the pixel."""
+    """One Gaussian over one pixel's centre: just below and above the clamp, just above and below 1/255; one that ends the pixel."""
     camera = Camera(1, 1, 10.0, 10.0, np.zeros(3), np.eye(3))
     values = np.zeros((3, SH + 3), np.float32)
     values[:, MEAN + 2] = (1.0, 2.0, 3.0)
@@ -118,25 +117,26 @@ def test_rules_near() -> None:
     values[:, SCALE:QUAT] = -1.0
     weight = np.ones((1, 1, 3))
 
-    def slope(opacity: list[float]) -> np.ndarray:
-        parameters = Parameters(values[: len(opacity)].copy())
-        o = np.array(opacity)
+    def slope(*opacity: float) -> np.ndarray:
+        parameters, o = Parameters(values[: len(opacity)].copy()), np.array(opacity)
         parameters.values[:, LOGIT] = np.log(o / (1 - o))
-        found = backward(render(parameters, camera, BACKGROUND, np.float64), weight)
-        return found.values[np.argsort(found.index), LOGIT] / (o * (1 - o))[found.index].astype(np.float64)[np.argsort(found.index)]
+        found = backward(render(parameters, camera, BACKGROUND), weight)
+        assert found.index.tolist() == list(range(len(o)))
+        return found.values[:, LOGIT] / (o * (1 - o))
 
-    own, behind = 1.5, sum(BACKGROUND)  # coefficients 0: grey of one half a channel
-    for o, wanted in ((0.9899, own - behind), (0.9901, 0.0), (1.01 / 255, own - behind), (0.99 / 255, 0.0)):
-        assert slope([o]) == pytest.approx([wanted], rel=1e-4, abs=1e-9)
-    # T after the first is 0.01; the second would leave 5e-5 and finishes the pixel, or 2e-4 and does not.
-    assert slope([0.995, 0.995])[1] == 0.0
-    assert slope([0.9, 0.995, 0.5]) == pytest.approx([own - behind, 0.0, 0.0], abs=1e-3) or True
-    assert slope([0.9, 0.98]) == pytest.approx([0.02 * (own - behind), 0.1 * (own - behind)], rel=1e-4)
+    step = 1.5 - sum(BACKGROUND)  # coefficients 0: one half a channel, in place of the background
+    for o, wanted in ((0.9899, step), (0.9901, 0.0), (1.01 / 255, step), (0.99 / 255, 0.0)):
+        assert slope(o) == pytest.approx([wanted], rel=1e-4, abs=1e-9)
+    # A clamped one between two: 0.01 of the light passes it.
+    assert slope(0.9, 0.995, 0.5) == pytest.approx([0.005 * step, 0.0, 0.001 * step], rel=1e-4, abs=1e-9)
+    # The third would leave 8e-5 and finishes the pixel, or leaves 1.2e-4 and does not.
+    assert slope(0.9, 0.98, 0.96) == pytest.approx([0.02 * step, 0.1 * step, 0.0], rel=1e-4, abs=1e-9)
+    assert slope(0.9, 0.98, 0.94) == pytest.approx([0.0012 * step, 0.006 * step, 0.002 * step], rel=1e-4)
 
 
 def test_same_bits_for_any_number_of_threads() -> None:
     parameters, camera = busy(), look()
-    weight = np.random.default_rng(seed()).normal(size=(37, 45, 3)).astype(np.float32)
+    weight = np.random.default_rng(seed()).normal(size=(37, 45, 3))
     results, threads = [], numba.get_num_threads()
     for count in {1, threads}:
         numba.set_num_threads(count)
@@ -148,7 +148,7 @@ def test_same_bits_for_any_number_of_threads() -> None:
 
 def test_untrained_coefficients() -> None:
     frame = render(busy(), look(), BACKGROUND)
-    weight = np.ones((37, 45, 3), np.float32)
+    weight = np.ones((37, 45, 3))
     all_, some = backward(frame, weight).values, backward(frame, weight, 4).values
     assert (some[:, SH + 12 :] == 0).all() and np.array_equal(some[:, : SH + 12], all_[:, : SH + 12]) and (all_[:, SH + 12 :] != 0).any()
 
@@ -157,9 +157,9 @@ def test_loss() -> None:
     """SSIM is that of the metrics away from the borders; the derivative is that of the loss, by central differences."""
     rng = np.random.default_rng(seed())
     image, photo = rng.random((2, 40, 36, 3))
-    _, window = loss_and_slope(image, photo, 1.0)
-    padded = [np.pad(p, ((20, 20), (20, 20), (0, 0))) for p in (image, photo)]
-    assert (1 - loss_and_slope(*padded, 1.0)[0]) == pytest.approx(ssim(*padded), abs=2e-3)  # where the metrics' window is cut at 3.5 sigma
+    padded = [np.pad(p, ((10, 10), (10, 10), (0, 0))) for p in (image, photo)]
+    inner, all_ = 50 * 46, 60 * 56  # the metrics leave out five pixels at the borders, where these are equal
+    assert 1 - loss_and_slope(*padded, 1.0)[0] == pytest.approx((ssim(*padded) * inner + all_ - inner) / all_, abs=1e-9)
     assert loss_and_slope(photo, photo)[0] == pytest.approx(0.0, abs=1e-12)
     loss, slope = loss_and_slope(image, photo)
     assert loss == pytest.approx(0.8 * np.abs(image - photo).mean() + 0.2 * loss_and_slope(image, photo, 1.0)[0])
@@ -282,7 +282,6 @@ def test_bad_transforms(nerf, tmp_path) -> None:
     refused(r"frames\[0\]: cx: 30 is 6.0 pixels off the middle", cx=30.0)
     refused(r"frames\[0\]: k1: the lens distorts by up to .* pixels", k1=0.2)
     refused(r"frames\[0\]: camera_angle_x: 4 is not between 0 and pi", camera_angle_x=4.0)
-    refused(r"frames: not a list", frames=None) if False else None
     file.write_text(json.dumps(good | {"frames": good["frames"][:1]}))
     with pytest.raises(FlickerError, match="1 photograph, at least 3 are needed"):
         load_dataset(tmp_path)

@@ -1,8 +1,8 @@
 """Blending of a picture and its derivatives, tile by tile, with the rules of `front.reference`.
 
 A tile is drawn by one thread, entries in the order of its list, and writes nothing that another tile writes: the results have the same bits whatever the
-number of threads. Kernels work in the number format of their arrays, float32 or float64. Indices are unsigned: signed ones may count from the end, which costs
-a test at every access.
+number of threads. Indices are unsigned: signed ones may count from the end, which costs a test at every access. What a thread does stands in a function of its
+own, which halves the time to compile.
 """
 
 from __future__ import annotations
@@ -26,9 +26,42 @@ COLOUR_MAX = 1e4  # a Gaussian with more is taken for a broken one
 _FAST = {"contract", "nsz", "arcp"}  # nothing that would change what is not finite, or the order of sums
 
 
-def constants(kind: type) -> np.ndarray:
-    """Numbers that the kernels compare with, in their format: 0, 1, largest and least alpha, least transmittance, margin."""
-    return np.array([0.0, 1.0, ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN, MARGIN], kind)
+@numba.njit(cache=True)
+def _make_row(k, index, table, opacity, rgb, width, height, rows, box, bad):
+    tiles_x = (width + TILE - 1) // TILE
+    tiles_y = (height + TILE - 1) // TILE
+    i = index[k]
+    x, y, xx, yy = table[i, X], table[i, Y], table[i, XX], table[i, YY]
+    a, b, c = table[i, A], table[i, B], table[i, C]
+    limit = 2.0 * np.log(opacity[i] / ALPHA_MIN)
+    colour = max(abs(rgb[k, 0]), abs(rgb[k, 1]), abs(rgb[k, 2])) + rgb[k, 0] + rgb[k, 1] + rgb[k, 2]
+    box[k] = 0
+    bad[k] = not np.isfinite(x + y + table[i, XY] + 1.0 / xx + 1.0 / yy + 1.0 / a + b + c + opacity[i]) or not colour <= 4 * COLOUR_MAX
+    if bad[k] or not limit >= 0.0:
+        rows[k] = 0.0
+        return
+    limit += MARGIN * limit + MARGIN
+    half_x, half_y = np.sqrt(limit * xx) + MARGIN, np.sqrt(limit * yy) + MARGIN
+    circle = tile_range(x, table[i, RADIUS], tiles_x)
+    ellipse = span(x - half_x, min(x + half_x, width - 1.0), TILE, tiles_x)
+    box[k, 0], box[k, 1] = max(circle[0], ellipse[0]), min(circle[1], ellipse[1])
+    circle = tile_range(y, table[i, RADIUS], tiles_y)
+    ellipse = span(y - half_y, min(y + half_y, height - 1.0), TILE, tiles_y)
+    box[k, 2], box[k, 3] = max(circle[0], ellipse[0]), min(circle[1], ellipse[1])
+    rows[k, MX] = x
+    rows[k, MY] = y
+    rows[k, HALF_A] = 0.5 * a
+    rows[k, MIXED] = b
+    rows[k, HALF_C] = 0.5 * c
+    rows[k, OPACITY] = opacity[i]
+    rows[k, LIMIT] = limit
+    rows[k, HALF_HEIGHT] = half_y
+    rows[k, PER_YY] = 1.0 / yy
+    rows[k, PER_A] = 1.0 / a
+    rows[k, SLOPE] = -b / a
+    rows[k, RED] = rgb[k, 0]
+    rows[k, GREEN] = rgb[k, 1]
+    rows[k, BLUE] = rgb[k, 2]
 
 
 @numba.njit(parallel=True, cache=True)
@@ -38,197 +71,168 @@ def make_rows(index, table, opacity, rgb, width, height, rows, box, bad):
     table: of `front.projection.geometry`. opacity: float64 (N,). rgb: float64 (M, 3). box: int32 (M, 4), columns, then rows, first and one past last. bad: bool
     (M,), something is not finite; such a Gaussian is in no tile.
     """
-    tiles_x = (width + TILE - 1) // TILE
-    tiles_y = (height + TILE - 1) // TILE
     for k in numba.prange(len(index)):
-        i = index[k]
-        x, y, xx, yy = table[i, X], table[i, Y], table[i, XX], table[i, YY]
-        a, b, c = table[i, A], table[i, B], table[i, C]
-        limit = 2.0 * np.log(opacity[i] / ALPHA_MIN)
-        colour = max(abs(rgb[k, 0]), abs(rgb[k, 1]), abs(rgb[k, 2])) + rgb[k, 0] + rgb[k, 1] + rgb[k, 2]
-        box[k] = 0
-        bad[k] = not np.isfinite(x + y + table[i, XY] + 1.0 / xx + 1.0 / yy + 1.0 / a + b + c + opacity[i]) or not colour <= 4 * COLOUR_MAX
-        if bad[k] or not limit >= 0.0:
-            rows[k] = 0.0
-            continue
-        limit += MARGIN * limit + MARGIN
-        half_x, half_y = np.sqrt(limit * xx) + MARGIN, np.sqrt(limit * yy) + MARGIN
-        circle = tile_range(x, table[i, RADIUS], tiles_x)
-        ellipse = span(x - half_x, min(x + half_x, width - 1.0), TILE, tiles_x)
-        box[k, 0], box[k, 1] = max(circle[0], ellipse[0]), min(circle[1], ellipse[1])
-        circle = tile_range(y, table[i, RADIUS], tiles_y)
-        ellipse = span(y - half_y, min(y + half_y, height - 1.0), TILE, tiles_y)
-        box[k, 2], box[k, 3] = max(circle[0], ellipse[0]), min(circle[1], ellipse[1])
-        rows[k, MX] = x
-        rows[k, MY] = y
-        rows[k, HALF_A] = 0.5 * a
-        rows[k, MIXED] = b
-        rows[k, HALF_C] = 0.5 * c
-        rows[k, OPACITY] = opacity[i]
-        rows[k, LIMIT] = limit
-        rows[k, HALF_HEIGHT] = half_y
-        rows[k, PER_YY] = 1.0 / yy
-        rows[k, PER_A] = 1.0 / a
-        rows[k, SLOPE] = -b / a
-        rows[k, RED] = rgb[k, 0]
-        rows[k, GREEN] = rgb[k, 1]
-        rows[k, BLUE] = rgb[k, 2]
+        _make_row(np.int64(k), index, table, opacity, rgb, width, height, rows, box, bad)
 
 
-@numba.njit(parallel=True, fastmath=_FAST, cache=True)
-def blend(rows, start, entry, tiles_x, constant, grid, background, image, transmittance, used):
-    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel. grid: 0, 1, 2, ... in the format."""
+@numba.njit(fastmath=_FAST, cache=True)
+def _blend_tile(t, rows, start, entry, tiles_x, background, image, transmittance, used):
     height, width = transmittance.shape
-    zero, one, alpha_max, alpha_min, least, margin = constant[0], constant[1], constant[2], constant[3], constant[4], constant[5]
-    for t in numba.prange(len(start) - 1):
-        left = np.int64(t) % tiles_x * TILE
-        top = np.int64(t) // tiles_x * TILE
-        columns, lines = min(TILE, width - left), min(TILE, height - top)
-        right, bottom = grid[columns - 1], grid[lines - 1]
-        remains = np.full((TILE, TILE), one)  # transmittance; negative once the pixel is finished
-        colour = np.zeros((TILE, TILE, 3), rows.dtype)
-        live = columns * lines
-        for e in range(start[t], start[t + 1]):
-            if live == 0:
-                break
-            i = np.uint64(entry[e])
-            mx, my = rows[i, MX] - grid[left], rows[i, MY] - grid[top]
-            half = rows[i, HALF_HEIGHT]
-            low, high = max(np.ceil(my - half), zero), min(np.floor(my + half), bottom)
-            if high < low:
+    left, top = t % tiles_x * TILE, t // tiles_x * TILE
+    columns, lines = min(TILE, width - left), min(TILE, height - top)
+    right, bottom = columns - 1.0, lines - 1.0
+    remains = np.ones((TILE, TILE))  # transmittance; negative once the pixel is finished
+    colour = np.zeros((TILE, TILE, 3))
+    live = columns * lines
+    for e in range(start[t], start[t + 1]):
+        if live == 0:
+            break
+        i = np.uint64(entry[e])
+        mx, my = rows[i, MX] - left, rows[i, MY] - top
+        half = rows[i, HALF_HEIGHT]
+        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
+        if high < low:
+            continue
+        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
+        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+        red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
+        blended = False
+        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
+            dy = np.float64(y) - my
+            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
+            middle = mx + slope * dy
+            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
+            if high_x < low_x:
                 continue
-            half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-            opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-            red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-            blended = False
-            for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-                dy = grid[y] - my
-                half = np.sqrt(max(limit - dy * dy * per_yy, zero) * per_a) + margin
-                middle = mx + slope * dy
-                low_x, high_x = max(np.ceil(middle - half), zero), min(np.floor(middle + half), right)
-                if high_x < low_x:
+            along, constant_part = mixed * dy, half_c * dy * dy
+            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
+                before = remains[y, x]
+                if before < 0.0:
                     continue
-                along, constant_part = mixed * dy, half_c * dy * dy
-                for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                    before = remains[y, x]
-                    if before < zero:
-                        continue
-                    dx = grid[x] - mx
-                    energy = (half_a * dx + along) * dx + constant_part
-                    if energy < zero:
-                        continue
-                    alpha = min(alpha_max, opacity * np.exp(-energy))
-                    if alpha < alpha_min:
-                        continue
-                    after = before * (one - alpha)
-                    if after < least:
-                        remains[y, x] = -before
-                        live -= 1
-                        continue
-                    weight = alpha * before
-                    colour[y, x, 0] += weight * red
-                    colour[y, x, 1] += weight * green
-                    colour[y, x, 2] += weight * blue
-                    remains[y, x] = after
-                    blended = True
-            used[e] = blended
-        for y in range(lines):
-            for x in range(columns):
-                remaining = abs(remains[y, x])
-                transmittance[top + y, left + x] = remaining
-                for k in range(3):
-                    image[top + y, left + x, k] = colour[y, x, k] + remaining * background[k]
+                dx = np.float64(x) - mx
+                energy = (half_a * dx + along) * dx + constant_part
+                if energy < 0.0:
+                    continue
+                alpha = min(ALPHA_MAX, opacity * np.exp(-energy))
+                if alpha < ALPHA_MIN:
+                    continue
+                after = before * (1.0 - alpha)
+                if after < TRANSMITTANCE_MIN:
+                    remains[y, x] = -before
+                    live -= 1
+                    continue
+                weight = alpha * before
+                colour[y, x, 0] += weight * red
+                colour[y, x, 1] += weight * green
+                colour[y, x, 2] += weight * blue
+                remains[y, x] = after
+                blended = True
+        used[e] = blended
+    for y in range(lines):
+        for x in range(columns):
+            remaining = abs(remains[y, x])
+            transmittance[top + y, left + x] = remaining
+            for k in range(3):
+                image[top + y, left + x, k] = colour[y, x, k] + remaining * background[k]
 
 
-@numba.njit(parallel=True, fastmath=_FAST, cache=True)
-def blend_back(rows, start, entry, tiles_x, constant, grid, image, used, slope_of_image, sums):
-    """sums (E, 9) of every used entry; the others' are not written. slope_of_image: (H, W, 3), dL/d image.
+@numba.njit(parallel=True, cache=True)
+def blend(rows, start, entry, tiles_x, background, image, transmittance, used):
+    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel."""
+    for t in numba.prange(len(start) - 1):
+        _blend_tile(np.int64(t), rows, start, entry, tiles_x, background, image, transmittance, used)
 
-    Walks the lists as `blend` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's scalar product with its slope.
-    """
+
+@numba.njit(fastmath=_FAST, cache=True)
+def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image, sums):
+    """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's scalar product with its slope."""
     height, width = image.shape[:2]
-    zero, one, alpha_max, alpha_min, least, margin = constant[0], constant[1], constant[2], constant[3], constant[4], constant[5]
-    for t in numba.prange(len(start) - 1):
-        left = np.int64(t) % tiles_x * TILE
-        top = np.int64(t) // tiles_x * TILE
-        columns, lines = min(TILE, width - left), min(TILE, height - top)
-        right, bottom = grid[columns - 1], grid[lines - 1]
-        remains = np.full((TILE, TILE), one)
-        pixel = np.zeros((TILE, TILE, 4), rows.dtype)  # slope of the three channels, rest
-        for y in range(lines):
-            for x in range(columns):
-                rest = zero
-                for k in range(3):
-                    pixel[y, x, k] = slope_of_image[top + y, left + x, k]
-                    rest += slope_of_image[top + y, left + x, k] * image[top + y, left + x, k]
-                pixel[y, x, 3] = rest
-        for e in range(start[t], start[t + 1]):
-            if not used[e]:
+    left, top = t % tiles_x * TILE, t // tiles_x * TILE
+    columns, lines = min(TILE, width - left), min(TILE, height - top)
+    right, bottom = columns - 1.0, lines - 1.0
+    remains = np.ones((TILE, TILE))
+    pixel = np.zeros((TILE, TILE, 4))  # slope of the three channels, rest
+    for y in range(lines):
+        for x in range(columns):
+            rest = 0.0
+            for k in range(3):
+                pixel[y, x, k] = slope_of_image[top + y, left + x, k]
+                rest += slope_of_image[top + y, left + x, k] * image[top + y, left + x, k]
+            pixel[y, x, 3] = rest
+    for e in range(start[t], start[t + 1]):
+        if not used[e]:
+            continue
+        i = np.uint64(entry[e])
+        mx, my = rows[i, MX] - left, rows[i, MY] - top
+        half = rows[i, HALF_HEIGHT]
+        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
+        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
+        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+        red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
+        g, g_x, g_y, g_xx, g_xy, g_yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        d_red, d_green, d_blue = 0.0, 0.0, 0.0
+        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
+            dy = np.float64(y) - my
+            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
+            middle = mx + slope * dy
+            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
+            if high_x < low_x:
                 continue
-            i = np.uint64(entry[e])
-            mx, my = rows[i, MX] - grid[left], rows[i, MY] - grid[top]
-            half = rows[i, HALF_HEIGHT]
-            low, high = max(np.ceil(my - half), zero), min(np.floor(my + half), bottom)
-            half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-            opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-            red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-            g, g_x, g_y, g_xx, g_xy, g_yy = zero, zero, zero, zero, zero, zero
-            d_red, d_green, d_blue = zero, zero, zero
-            for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-                dy = grid[y] - my
-                half = np.sqrt(max(limit - dy * dy * per_yy, zero) * per_a) + margin
-                middle = mx + slope * dy
-                low_x, high_x = max(np.ceil(middle - half), zero), min(np.floor(middle + half), right)
-                if high_x < low_x:
+            along, constant_part = mixed * dy, half_c * dy * dy
+            line, line_x, line_xx = 0.0, 0.0, 0.0
+            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
+                before = remains[y, x]
+                if before < 0.0:
                     continue
-                along, constant_part = mixed * dy, half_c * dy * dy
-                line, line_x, line_xx = zero, zero, zero
-                for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                    before = remains[y, x]
-                    if before < zero:
-                        continue
-                    dx = grid[x] - mx
-                    energy = (half_a * dx + along) * dx + constant_part
-                    if energy < zero:
-                        continue
-                    raw = opacity * np.exp(-energy)
-                    alpha = min(alpha_max, raw)
-                    if alpha < alpha_min:
-                        continue
-                    passed = one - alpha
-                    after = before * passed
-                    if after < least:
-                        remains[y, x] = -before
-                        continue
-                    s_red, s_green, s_blue = pixel[y, x, 0], pixel[y, x, 1], pixel[y, x, 2]
-                    weight = alpha * before
-                    d_red += weight * s_red
-                    d_green += weight * s_green
-                    d_blue += weight * s_blue
-                    own = s_red * red + s_green * green + s_blue * blue
-                    rest = pixel[y, x, 3] - weight * own
-                    pixel[y, x, 3] = rest
-                    remains[y, x] = after
-                    if raw < alpha_max:
-                        d_energy = alpha * (rest / passed - before * own)
-                        line += d_energy
-                        line_x += d_energy * dx
-                        line_xx += d_energy * dx * dx
-                g += line
-                g_x += line_x
-                g_xx += line_xx
-                g_y += line * dy
-                g_xy += line_x * dy
-                g_yy += line * dy * dy
-            sums[e, G] = g
-            sums[e, G_X] = g_x
-            sums[e, G_Y] = g_y
-            sums[e, G_XX] = g_xx
-            sums[e, G_XY] = g_xy
-            sums[e, G_YY] = g_yy
-            sums[e, D_RED] = d_red
-            sums[e, D_GREEN] = d_green
-            sums[e, D_BLUE] = d_blue
+                dx = np.float64(x) - mx
+                energy = (half_a * dx + along) * dx + constant_part
+                if energy < 0.0:
+                    continue
+                raw = opacity * np.exp(-energy)
+                alpha = min(ALPHA_MAX, raw)
+                if alpha < ALPHA_MIN:
+                    continue
+                passed = 1.0 - alpha
+                after = before * passed
+                if after < TRANSMITTANCE_MIN:
+                    remains[y, x] = -before
+                    continue
+                s_red, s_green, s_blue = pixel[y, x, 0], pixel[y, x, 1], pixel[y, x, 2]
+                weight = alpha * before
+                d_red += weight * s_red
+                d_green += weight * s_green
+                d_blue += weight * s_blue
+                own = s_red * red + s_green * green + s_blue * blue
+                rest = pixel[y, x, 3] - weight * own
+                pixel[y, x, 3] = rest
+                remains[y, x] = after
+                if raw < ALPHA_MAX:
+                    d_energy = alpha * (rest / passed - before * own)
+                    line += d_energy
+                    line_x += d_energy * dx
+                    line_xx += d_energy * dx * dx
+            g += line
+            g_x += line_x
+            g_xx += line_xx
+            g_y += line * dy
+            g_xy += line_x * dy
+            g_yy += line * dy * dy
+        sums[e, G] = g
+        sums[e, G_X] = g_x
+        sums[e, G_Y] = g_y
+        sums[e, G_XX] = g_xx
+        sums[e, G_XY] = g_xy
+        sums[e, G_YY] = g_yy
+        sums[e, D_RED] = d_red
+        sums[e, D_GREEN] = d_green
+        sums[e, D_BLUE] = d_blue
+
+
+@numba.njit(parallel=True, cache=True)
+def blend_back(rows, start, entry, tiles_x, image, used, slope_of_image, sums):
+    """sums (E, 9) of every used entry; the others' are not written. slope_of_image: (H, W, 3), dL/d image."""
+    for t in numba.prange(len(start) - 1):
+        _blend_back_tile(np.int64(t), rows, start, entry, tiles_x, image, used, slope_of_image, sums)
 
 
 @numba.njit(cache=True)

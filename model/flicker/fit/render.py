@@ -27,7 +27,7 @@ from .parameters import Parameters
 class Frame:
     """A view of parameters and what its way back needs. M Gaussians are in front of the camera, E entries in the lists of 16x16 tiles.
 
-    image: (H, W, 3), neither clamped nor quantised. transmittance: (H, W). index: int64 (M,), Gaussians near to far. rows: (M, COLUMNS), `raster`.
+    image: float64 (H, W, 3), neither clamped nor quantised. transmittance: float64 (H, W). index: int64 (M,), Gaussians near to far. rows: float64 (M, COLUMNS), `raster`.
     start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel. bad: bool (M,), Gaussians that were left out for a number
     that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
     """
@@ -54,8 +54,8 @@ class Gradient:
     index: np.ndarray
 
 
-def render(parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0), kind: type = np.float32) -> Frame:
-    """The picture over an RGB background; kind: number format of the blending, float32 or float64."""
+def render(parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0)) -> Frame:
+    """The picture over an RGB background."""
     count, (width, height) = len(parameters), (camera.width, camera.height)
     with np.errstate(all="ignore"):  # what is not finite is found below
         scales = np.exp(parameters.log_scales.astype(np.float64))
@@ -69,15 +69,12 @@ def render(parameters: Parameters, camera: Camera, background: Sequence[float] =
     index = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
     rgb = np.empty((len(index), 3))
     colours(parameters.means, parameters.sh, index, camera.position, rgb)
-    rows, box, bad = np.empty((len(index), raster.COLUMNS), kind), np.empty((len(index), 4), np.int32), np.empty(len(index), np.bool_)
+    rows, box, bad = np.empty((len(index), raster.COLUMNS)), np.empty((len(index), 4), np.int32), np.empty(len(index), np.bool_)
     raster.make_rows(index, table, opacity, rgb, width, height, rows, box, bad)
     tiles_x, tiles_y = -(-width // TILE), -(-height // TILE)
     start, entry = bin_boxes(box, tiles_x, tiles_y)
-    image, transmittance, used = np.empty((height, width, 3), kind), np.empty((height, width), kind), np.zeros(len(entry), np.bool_)
-    raster.blend(
-        rows, start, entry, tiles_x, raster.constants(kind), np.arange(max(width, height) + TILE, dtype=kind), np.asarray(background, kind), image,
-        transmittance, used,
-    )
+    image, transmittance, used = np.empty((height, width, 3)), np.empty((height, width)), np.zeros(len(entry), np.bool_)
+    raster.blend(rows, start, entry, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
     return Frame(parameters, camera, image, transmittance, index, rows, start, entry, used, bad, table)
 
 
@@ -86,12 +83,10 @@ def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -
 
     coefficients: how many SH coefficients a channel are trained; the others' derivatives are 0.
     """
-    camera, kind, values = frame.camera, frame.image.dtype.type, frame.parameters.values
-    sums = np.empty((len(frame.entry), raster.SUMS), kind)
-    raster.blend_back(
-        frame.rows, frame.start, frame.entry, -(-camera.width // TILE), raster.constants(kind), np.arange(max(camera.width, camera.height) + TILE, dtype=kind),
-        frame.image, frame.used, np.asarray(slope_of_image, kind), sums,
-    )
+    camera, values = frame.camera, frame.parameters.values
+    sums = np.empty((len(frame.entry), raster.SUMS))
+    slope = np.ascontiguousarray(slope_of_image, np.float64)
+    raster.blend_back(frame.rows, frame.start, frame.entry, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
     total = np.zeros((len(frame.index), raster.SUMS))
     raster.gather(frame.entry, frame.used, sums, total)
     gradient, screen = np.empty((len(frame.index), values.shape[1]), np.float32), np.empty((len(frame.index), 2))
