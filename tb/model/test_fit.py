@@ -1,7 +1,7 @@
 """Fitting: pictures and derivatives of the differentiable renderer, loss, data sets, training, the command.
 
 The picture is compared with the reference renderer; derivatives with central differences in float64, of every parameter, on scenes in which alpha meets the
-clamp, the skip and the end of a pixel. Data sets are made of renderings of the demo scene. Not covered: how good fits of real photographs become
+clamp, the skip and the end of a pixel. Data sets are made of renderings of a small scene. Not covered: how good fits of real photographs become
 (docs/fit.md has figures; with FLICKER_SCENES a slow test fits lego for a minute).
 """
 
@@ -29,7 +29,6 @@ from flicker.fit.render import backward, render
 from flicker.fit.train import Options, Trainer, affine_fit
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
-from flicker.scene import demo
 from flicker.scene.camera import Camera, load_cameras, orbit_camera
 from flicker.scene.files import load_scene
 from flicker.scene.image import save_png
@@ -89,7 +88,7 @@ def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: in
 @pytest.mark.parametrize(("degree", "z"), [(3, -3.0), (1, -1.3)])
 def test_derivatives(degree: int, z: float) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
-    parameters, camera = busy(32, degree), look(31, 23, 28.0, z)
+    parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
     frame = render(parameters, camera, BACKGROUND)
     found = backward(frame, weight)
@@ -118,8 +117,9 @@ def test_rules_near() -> None:
     weight = np.ones((1, 1, 3))
 
     def slope(*opacity: float) -> np.ndarray:
-        parameters, o = Parameters(values[: len(opacity)].copy()), np.array(opacity)
-        parameters.values[:, LOGIT] = np.log(o / (1 - o))
+        parameters, o = Parameters(values.copy()), np.array(opacity)
+        parameters.values[: len(o), LOGIT] = np.log(o / (1 - o))
+        parameters.values[len(o) :, MEAN + 2] = -1.0  # behind the camera
         found = backward(render(parameters, camera, BACKGROUND), weight)
         assert found.index.tolist() == list(range(len(o)))
         return found.values[:, LOGIT] / (o * (1 - o))
@@ -185,8 +185,9 @@ def pose(camera: Camera) -> list:
 
 @pytest.fixture(scope="module")
 def shots() -> list[tuple[Camera, np.ndarray]]:
-    """Views all around the demo scene."""
-    scene = demo.generate()
+    """Views all around a small scene."""
+    scene = samples.random_scene(seed(), 120, 1)
+    scene.scales *= np.float32(3.0)
     cameras = [orbit_camera(scene, k, SHOTS, WIDTH, HEIGHT) for k in range(SHOTS)]
     return [(camera, render_with_transmittance(project(scene, camera), camera, (0, 0, 0))[0]) for camera in cameras]
 
@@ -364,7 +365,7 @@ def test_fit_and_resume(nerf, tmp_path) -> None:
 
 def test_poisoned_scene(nerf) -> None:
     """Gaussians with numbers that are not finite, or that would give such pictures, are taken out and counted; the others learn as without them."""
-    data, options = load_dataset(nerf), Options(iterations=60, gaussians=600, degree=1)
+    data, options = load_dataset(nerf), Options(iterations=200, gaussians=600, degree=1)
     clean = Trainer(data, options)
     poison = np.repeat(clean.parameters.values[:1], 6, axis=0)
     for k, (column, value) in enumerate(((MEAN, np.nan), (SCALE + 1, np.inf), (QUAT + 2, np.nan), (LOGIT, np.nan), (SH + 5, np.inf), (SH, 1e30))):
@@ -372,11 +373,12 @@ def test_poisoned_scene(nerf) -> None:
     poisoned = Trainer(data, options, Parameters(np.concatenate([clean.parameters.values, poison])))
     poisoned.rng = np.random.default_rng(5)
     clean.rng = np.random.default_rng(5)
-    losses = [(clean.step(), poisoned.step()) for _ in range(options.iterations)]
-    assert np.isfinite(losses).all() and poisoned.parameters.finite().all()
-    scene = poisoned.scene()
-    assert poisoned.removed >= 4 and len(scene) + poisoned.removed <= len(clean.parameters) + 6 + 600
-    assert abs(poisoned.measure() - clean.measure()) < 0.5
+    losses = [(clean.step(), poisoned.step()) for _ in range(60)]
+    assert np.isfinite(losses).all() and abs(poisoned.measure() - clean.measure()) < 0.1
+    assert len(poisoned.scene()) == len(clean.parameters) == poisoned.first - 6
+    while poisoned.iteration < 100:  # those that no view shows go when Gaussians are cloned and split
+        poisoned.step()
+    assert poisoned.removed == 6 and poisoned.parameters.finite().all()
 
 
 def test_exposure(shots) -> None:
@@ -392,15 +394,19 @@ def test_command(nerf, tmp_path) -> None:
         done = flicker("fit", nerf, "-o", tmp_path / "a.ply", "--gaussians", 800, "--size", 40, *args)
         assert done.returncode == code, done.stderr
         assert code == 0 or done.stderr.count("\n") == 1
-        return done.stdout + done.stderr
+        return " ".join((done.stdout + done.stderr).split())
 
-    told = fit("--iterations", 120, "--checkpoint", tmp_path / "s.npz")
-    assert "14 photographs to fit, 3 for testing, 40x33" in told and "PSNR on the test photographs" in told and not (tmp_path / "s.npz").exists()
+    told = fit("--iterations", 120)
+    assert "14 photographs to fit, 3 for testing, 40x33" in told and "PSNR on the test photographs" in told
     scene, cameras = load_scene(tmp_path / "a.ply"), load_cameras(tmp_path / "cameras.json")
     assert 0 < len(scene) <= 800 and [c.img_name for c in cameras] == ["r_0.png", "r_8.png", "r_16.png"] and cameras[0].width == 40
     first = (tmp_path / "a.ply").read_bytes()
-    fit("--iterations", 120)
-    assert (tmp_path / "a.ply").read_bytes() == first
+    half = Trainer(load_dataset(nerf, 40), Options(iterations=120, gaussians=800))
+    for _ in range(70):
+        half.step()
+    half.save(tmp_path / "s.npz")
+    told = fit("--iterations", 120, "--checkpoint", tmp_path / "s.npz", "--resume")
+    assert "continues after 70 iterations" in told and (tmp_path / "a.ply").read_bytes() == first
     done = flicker("render", tmp_path / "a.ply", "--engine", "reference", "--out", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
     assert "--resume: from which --checkpoint?" in fit("--resume", code=2)

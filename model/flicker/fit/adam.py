@@ -10,23 +10,28 @@ import numpy as np
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-15
 
 
+@numba.njit(cache=True)
+def _row(k, values, first, second, index, gradient, rate, scale_1, scale_2, refused):
+    i = index[k]
+    total = np.float32(0.0)
+    for j in range(values.shape[1]):
+        total += abs(gradient[k, j]) + abs(values[i, j])
+    refused[k] = not np.isfinite(total)
+    if refused[k]:
+        return
+    for j in range(values.shape[1]):
+        g = gradient[k, j]
+        m = np.float32(BETA_1) * first[i, j] + np.float32(1.0 - BETA_1) * g
+        v = np.float32(BETA_2) * second[i, j] + np.float32(1.0 - BETA_2) * g * g
+        first[i, j] = m
+        second[i, j] = v
+        values[i, j] -= rate[j] * (m * scale_1) / (np.sqrt(v * scale_2) + np.float32(EPSILON))
+
+
 @numba.njit(parallel=True, cache=True)
 def _step(values, first, second, index, gradient, rate, scale_1, scale_2, refused):
     for k in numba.prange(len(index)):
-        i = index[k]
-        total = np.float32(0.0)
-        for j in range(values.shape[1]):
-            total += abs(gradient[k, j]) + abs(values[i, j])
-        refused[k] = not np.isfinite(total)
-        if refused[k]:
-            continue
-        for j in range(values.shape[1]):
-            g = gradient[k, j]
-            m = np.float32(BETA_1) * first[i, j] + np.float32(1.0 - BETA_1) * g
-            v = np.float32(BETA_2) * second[i, j] + np.float32(1.0 - BETA_2) * g * g
-            first[i, j] = m
-            second[i, j] = v
-            values[i, j] -= rate[j] * (m * scale_1) / (np.sqrt(v * scale_2) + np.float32(EPSILON))
+        _row(np.int64(k), values, first, second, index, gradient, rate, scale_1, scale_2, refused)
 
 
 @dataclass(eq=False)

@@ -143,10 +143,10 @@ class Trainer:
 
     def _select(self, keep: np.ndarray, new: np.ndarray | None = None) -> None:
         """Keep the Gaussians `keep`, in that order, and put new rows behind them."""
-        if len(keep) == 0:
-            raise FlickerError(f"fit: no Gaussian is left after {self.iteration} iterations")
         values = self.parameters.values
         new = values[:0] if new is None else new
+        if not len(keep) + len(new):
+            raise FlickerError(f"fit: no Gaussian is left after {self.iteration} iterations")
         self.parameters = Parameters(np.concatenate([values[keep], new]))
         self.moments.select(keep, len(new))
         self.score, self.seen = (np.concatenate([old[keep], np.zeros(len(new))]) for old in (self.score, self.seen))
@@ -157,6 +157,10 @@ class Trainer:
         begin, end = total // 20, total // 2
         if self.iteration % density.EVERY or not begin <= self.iteration <= end:
             return
+        good = self.parameters.finite()  # what no view shows is found here
+        if not good.all():
+            self.removed += int((~good).sum())
+            self._select(np.flatnonzero(good))
         share = min(1.0, (self.iteration - begin + density.EVERY) / (0.7 * (end - begin) + 1))
         most = int(self.first + share * max(0, self.options.gaussians - self.first))
         keep, new = density.refine(self.parameters, self.score / np.maximum(self.seen, 1), self.extent, most, self.rng)
