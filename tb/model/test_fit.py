@@ -257,6 +257,10 @@ def test_colmap(shots, tmp_path) -> None:
     for shot, number in zip(data.tests, (0, 8, 16)):
         same_cameras(shot.camera, shots[number][0])
     assert data.dropped == 1 and np.array_equal(data.points, points[np.isfinite(points).all(axis=1)]) and data.colours[0] == pytest.approx([1, 0, 0.2])
+    trainer = Trainer(data, Options(10, 40, degree=1))  # starts from 40 of the 49 points, in their colour
+    assert len(trainer.parameters) == 40 and np.isin(trainer.parameters.means, np.float32(data.points)).all()
+    assert trainer.parameters.scene().sh[:, 0] == pytest.approx(np.tile((np.array([1, 0, 0.2]) - 0.5) / samples.C0, (40, 1)), abs=1e-5)
+    trainer.run()
 
 
 def test_bad_transforms(nerf, tmp_path) -> None:
@@ -381,8 +385,14 @@ def test_poisoned_scene(nerf) -> None:
     assert poisoned.removed == 6 and poisoned.parameters.finite().all()
 
 
-def test_exposure(shots) -> None:
-    """An affine change of colour is undone."""
+def test_exposure(shots, nerf) -> None:
+    """An affine change of colour is undone; photographs taken at half the light get darker colours of their own."""
+    trainer = Trainer(load_dataset(nerf), Options(iterations=200, gaussians=600, degree=0, exposure=True))
+    for k in range(0, len(trainer.dataset.fitted), 2):
+        trainer._photos[k] *= np.float32(0.5)
+    trainer.run()
+    gain = trainer.exposures.reshape(-1, 3, 4)[:, range(3), range(3)].mean(axis=1)
+    assert gain[::2].max() < gain[1::2].min()
     picture = shots[0][1]
     changed = picture @ np.array([[0.8, 0.1, 0.0], [0.0, 0.9, 0.0], [0.05, 0.0, 0.7]]) + 0.1
     assert psnr(affine_fit(changed, picture), picture) > 80 > 30 > psnr(changed, picture)

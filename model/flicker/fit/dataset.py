@@ -87,7 +87,7 @@ def _shot(where: str, picture: Path, root: Path, size: int | None, width: float 
     used = max(1, round(own_width * shrink)), max(1, round(own_height * shrink))
     fx, fy = focal(w, h)
     try:
-        camera = Camera(w, h, fx, fy, position, rotation, name=picture.stem, img_name=_name(picture, root))
+        camera = Camera(round(w), round(h), fx, fy, position, rotation, name=picture.stem, img_name=_name(picture, root))
         return Shot(camera.resized(*used), picture)
     except FlickerError as error:
         raise FlickerError(f"{where}: {error}") from None

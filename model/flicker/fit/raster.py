@@ -145,7 +145,7 @@ def blend(rows, start, entry, tiles_x, background, image, transmittance, used):
 
 @numba.njit(fastmath=_FAST, cache=True)
 def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image, sums):
-    """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's scalar product with its slope."""
+    """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's product with its slope."""
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)

@@ -187,7 +187,7 @@ class Trainer:
         return self.parameters.scene()
 
     def measure(self) -> float:
-        """Mean PSNR of the test photographs in dB, float32 pictures; with exposure after an affine fit."""
+        """Mean PSNR of the test photographs in dB, pictures of `render`; with exposure after an affine fit."""
         found = []
         for shot, photo in zip(self.dataset.tests, self._test_photos):
             image = render(self.parameters, shot.camera, self.options.background).image
