@@ -2,7 +2,7 @@
 
 The picture is compared with the reference renderer; derivatives with central differences in float64, of every parameter, on scenes in which alpha meets the
 clamp, the skip and the end of a pixel. Data sets are made of renderings of a small scene. Not covered: how good fits of real photographs become
-(docs/fit.md has figures; with FLICKER_SCENES a slow test fits lego for a minute).
+(docs/fit.md has figures of lego).
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 
 from flicker.errors import FlickerError
-from flicker.fit import train
 from flicker.fit.dataset import load_dataset
 from flicker.fit.loss import loss_and_slope
 from flicker.fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH, Parameters
@@ -33,7 +32,6 @@ from flicker.scene.camera import Camera, load_cameras, orbit_camera
 from flicker.scene.files import load_scene
 from flicker.scene.image import save_png
 from flicker.scene.metrics import psnr, ssim
-from flicker.scene.real import real_scenes
 
 BACKGROUND = (0.3, 0.1, 0.6)
 
@@ -103,7 +101,6 @@ def test_derivatives(degree: int, z: float) -> None:
             if doubt < 2e-5 * scale:
                 assert abs(found.values[k, column] - wanted) < 1e-4 * scale, (i, column, found.values[k, column], wanted)
                 checked[column] += 1
-    print(len(frame.index), checked, clamped)
     assert clamped >= 3 and (checked >= len(frame.index) // 3).all(), checked
 
 
@@ -424,16 +421,3 @@ def test_command(nerf, tmp_path) -> None:
     assert "background: expected black" in fit("--background", "blue", code=2)
     done = flicker("fit", nerf, "-o", tmp_path / "a.spz")
     assert done.returncode == 2 and "not a .ply" in done.stderr
-
-
-@pytest.mark.slow
-def test_lego(tmp_path) -> None:
-    """Real photographs, real scale: a minute's fit at half the size."""
-    scenes = real_scenes()
-    if scenes is None or not (scenes / "lego" / "transforms.json").exists():
-        pytest.skip("FLICKER_SCENES names no folder with lego")
-    trainer = Trainer(load_dataset(scenes / "lego", 200), Options(iterations=1000, gaussians=30_000))
-    trainer.run()
-    assert trainer.measure() > 27
-    assert trainer.quality(trainer.scene()).psnr == pytest.approx(trainer.measure(), abs=0.01)
-    assert train.MEASURE_EVERY == 500
