@@ -18,7 +18,7 @@ from flicker_tb.runner import seed
 
 from flicker.chip.scene_cost import ENTRY_BYTES, SH_PEAK, SceneCost, scene_cost
 from flicker.errors import FlickerError
-from flicker.front.projection import _colours
+from flicker.front.projection import colours
 from flicker.front.view import View
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.frame import run_front
@@ -110,7 +110,7 @@ def test_silent_coefficients() -> None:
         sh = np.zeros((len(direction), 16, 3))
         sh[:, k] = 0.5
         rgb = np.empty((len(direction), 3))
-        _colours(direction, sh, np.arange(len(direction)), np.zeros(3), rgb)
+        colours(direction, sh, np.arange(len(direction)), np.zeros(3), rgb)
         assert 0.98 * peak < 2 * np.abs(rgb - 0.5).max() <= peak * (1 + 1e-6), k
 
 

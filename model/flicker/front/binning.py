@@ -12,7 +12,7 @@ from .projection import tile_range
 
 
 @numba.njit(cache=True)
-def _span(low, high, size, count):
+def span(low, high, size, count):
     """First and one-past-last block of `size` pixels with a pixel centre in [low, high], clipped to [0, count)."""
     first = np.ceil(max(low, 0.0))
     last = np.floor(min(high, size * count - 1.0))
@@ -29,8 +29,8 @@ def pixel_boxes(mean, radii, size, cols, rows, width, height):
     """
     box = np.empty((mean.shape[0], 4), np.int32)
     for i in range(mean.shape[0]):
-        x0, x1 = _span(mean[i, 0] - radii[i, 0], min(mean[i, 0] + radii[i, 0], width - 1.0), size, cols)
-        y0, y1 = _span(mean[i, 1] - radii[i, 1], min(mean[i, 1] + radii[i, 1], height - 1.0), size, rows)
+        x0, x1 = span(mean[i, 0] - radii[i, 0], min(mean[i, 0] + radii[i, 0], width - 1.0), size, cols)
+        y0, y1 = span(mean[i, 1] - radii[i, 1], min(mean[i, 1] + radii[i, 1], height - 1.0), size, rows)
         box[i] = x0, x1, y0, y1
     return box
 

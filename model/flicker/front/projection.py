@@ -21,7 +21,7 @@ NEAR = 0.2
 DILATION = 0.3
 _CLAMP = 1.3
 # Columns of the geometry table that the first pass fills.
-_X, _Y, _XX, _XY, _YY, _A, _B, _C, _RADIUS, _SPIKY = range(10)
+X, Y, XX, XY, YY, A, B, C, RADIUS, SPIKY = range(10)
 
 # Real spherical harmonics, in the order and with the signs of the INRIA code.
 _C0 = 0.28209479177387814
@@ -71,7 +71,7 @@ def tile_range(centre, radius, tiles):
 
 
 @numba.njit(parallel=True, cache=True)
-def _geometry(means, scales, quats, view, position, width, height, fx, fy, table, depth):
+def geometry(means, scales, quats, view, position, width, height, fx, fy, table, depth):
     """Fill the table and depth (0: not visible) of every Gaussian. view: world to camera (3, 3)."""
     lim_x = _CLAMP * 0.5 * width / fx
     lim_y = _CLAMP * 0.5 * height / fy
@@ -133,20 +133,20 @@ def _geometry(means, scales, quats, view, position, width, height, fx, fy, table
         if first_x >= last_x or first_y >= last_y:
             continue
         depth[i] = z
-        table[i, _X] = x
-        table[i, _Y] = y
-        table[i, _XX] = xx
-        table[i, _XY] = xy
-        table[i, _YY] = yy
-        table[i, _A] = yy / det
-        table[i, _B] = -xy / det
-        table[i, _C] = xx / det
-        table[i, _RADIUS] = radius
-        table[i, _SPIKY] = long * long >= SPIKY_AXIS_RATIO**2 * det
+        table[i, X] = x
+        table[i, Y] = y
+        table[i, XX] = xx
+        table[i, XY] = xy
+        table[i, YY] = yy
+        table[i, A] = yy / det
+        table[i, B] = -xy / det
+        table[i, C] = xx / det
+        table[i, RADIUS] = radius
+        table[i, SPIKY] = long * long >= SPIKY_AXIS_RATIO**2 * det
 
 
 @numba.njit(parallel=True, cache=True)
-def _colours(means, sh, index, position, rgb):
+def colours(means, sh, index, position, rgb):
     """max(0, 0.5 + SH) of the Gaussians `index`, seen from `position`."""
     count = sh.shape[1]
     for i in numba.prange(len(index)):
@@ -183,7 +183,7 @@ def project(scene: Scene, camera: Camera) -> Projected:
     count = len(scene.means)
     table = np.empty((count, 10))
     depth = np.empty(count, np.float32)
-    _geometry(
+    geometry(
         scene.means, scene.scales, scene.quats, np.ascontiguousarray(camera.rotation.T), camera.position,
         camera.width, camera.height, camera.fx, camera.fy, table, depth,
     )
@@ -191,17 +191,17 @@ def project(scene: Scene, camera: Camera) -> Projected:
     index = index[np.argsort(depth[index], kind="stable")]
     table = table[index]
     rgb = np.empty((len(index), 3))
-    _colours(scene.means, scene.sh, index, camera.position, rgb)
-    cov2d = np.ascontiguousarray(table[:, _XX : _YY + 1])
+    colours(scene.means, scene.sh, index, camera.position, rgb)
+    cov2d = np.ascontiguousarray(table[:, XX : YY + 1])
     return Projected(
-        mean=np.ascontiguousarray(table[:, _X : _Y + 1]),
+        mean=np.ascontiguousarray(table[:, X : Y + 1]),
         cov2d=cov2d,
-        conic=np.ascontiguousarray(table[:, _A : _C + 1]),
+        conic=np.ascontiguousarray(table[:, A : C + 1]),
         depth=depth[index],
         opacity=scene.opacities[index].astype(np.float64),
         rgb=rgb,
-        spiky=table[:, _SPIKY] != 0.0,
+        spiky=table[:, SPIKY] != 0.0,
         index=index,
         radii=3.0 * np.sqrt(cov2d[:, ::2]),
-        circle=np.ascontiguousarray(table[:, _RADIUS]),
+        circle=np.ascontiguousarray(table[:, RADIUS]),
     )

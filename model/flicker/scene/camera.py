@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,15 @@ def load_cameras(path: str | Path) -> list[Camera]:
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
     return cameras
+
+
+def cameras_text(cameras: Sequence[Camera]) -> str:
+    """The text of an INRIA `cameras.json`; a camera without photograph goes by its name."""
+    return json.dumps([
+        {"id": k, "img_name": c.img_name or c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
+         "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy}
+        for k, c in enumerate(cameras)
+    ], indent=1) + "\n"
 
 
 def _box(scene: Scene) -> np.ndarray:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from flicker.errors import FlickerError
+from flicker.scene.camera import cameras_text
 from flicker.scene.demo.splats import Rand, Splats, dot, unit
 from flicker.scene.demo.views import EYES, demo_cameras, to_world
 from flicker.scene.files import Scene, save_ply
@@ -48,15 +48,10 @@ def write_demo(folder: str | Path, seed: int = 1) -> tuple[Path, Path]:
     """
     folder = Path(folder)
     scene_path, cameras_path = folder / "demo.ply", folder / "cameras.json"
-    cameras = [
-        {"id": k, "img_name": c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
-         "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy}
-        for k, c in enumerate(demo_cameras())
-    ]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         save_ply(generate(seed), scene_path)
-        cameras_path.write_text(json.dumps(cameras, indent=1) + "\n")
+        cameras_path.write_text(cameras_text(demo_cameras()))
     except OSError as error:
         raise FlickerError(f"{folder}: cannot be written ({error.strerror or error})") from None
     return scene_path, cameras_path

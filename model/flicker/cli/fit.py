@@ -1,0 +1,97 @@
+"""`flicker fit`: a scene from posed photographs."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from ..errors import FlickerError
+from .options import RichSteps, console, writable, write_atomically
+
+
+def _cameras_beside(out: Path, text: str) -> Path:
+    """Where the cameras of the test photographs go; FlickerError where other cameras are in the way."""
+    path = out.parent / "cameras.json"
+    writable(path, "--out")
+    try:
+        if path.exists() and path.read_text() != text:
+            raise FlickerError(f"{path}: holds other cameras than those of the test photographs, which go there: choose another folder for --out")
+    except (OSError, ValueError):
+        raise FlickerError(f"{path}: cannot be read") from None
+    return path
+
+
+def fit(
+    dataset: Annotated[Path, typer.Argument(help="folder with transforms.json, or with sparse/0 and images/ of COLMAP; or a transforms.json")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="scene, .ply; cameras.json of the test photographs goes beside it")],
+    iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,
+    size: Annotated[int, typer.Option(help="longer side of the pictures in pixels; larger ones are averaged, none is enlarged", min=16)] = 640,
+    gaussians: Annotated[int, typer.Option(help="at most so many", min=4)] = 100_000,
+    degree: Annotated[int, typer.Option(help="of the spherical harmonics", min=0, max=3)] = 2,
+    seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
+    background: Annotated[str, typer.Option(help="black, white or r,g,b: behind the scene, and behind what is transparent in the pictures")] = "black",
+    exposure: Annotated[bool, typer.Option("--exposure", help="an affine colour for each photograph")] = False,
+    checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to every 500 iterations, .npz")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="continue from the checkpoint, if it is there")] = False,
+) -> None:
+    """Fit a scene to photographs; every eighth is held back and measured against."""
+    from ..fit.dataset import load_dataset
+    from ..fit.train import Options, Trainer
+    from ..scene.camera import cameras_text
+    from ..scene.files import save_ply
+    from ..scene.photos import parse_background
+
+    if out.suffix.lower() != ".ply":
+        raise FlickerError(f"--out: {out}: not a .ply")
+    writable(out, "--out")
+    writable(checkpoint, "--checkpoint")
+    if resume and checkpoint is None:
+        raise FlickerError("--resume: from which --checkpoint?")
+    options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure)
+    data = load_dataset(dataset, size)
+    text = cameras_text([shot.camera for shot in data.tests])
+    cameras = _cameras_beside(out, text)
+    steps = RichSteps()
+    with steps.step("reading photographs"):
+        trainer = Trainer(data, options)
+    if checkpoint is not None and resume and checkpoint.exists():
+        trainer.restore(checkpoint)
+    shot = data.tests[0].camera
+    points = "random places" if data.points is None else f"{len(data.points):,} points of COLMAP"
+    console.print(f"{dataset}: {len(data.fitted)} photographs to fit, {len(data.tests)} for testing, {shot.width}x{shot.height}; starts from {points}")
+    if data.dropped:
+        console.print(f"{data.dropped:,} points were left out: not finite")
+    if trainer.iteration:
+        console.print(f"continues after {trainer.iteration:,} iterations")
+    began, used = time.monotonic(), time.process_time()
+
+    def told(iteration: int, count: int, decibels: float) -> None:
+        console.print(f"{iteration:7,} iterations {count:9,} Gaussians {decibels:6.2f} dB on the test photographs {time.monotonic() - began:6.0f} s")
+
+    trainer.run(steps, told, None if checkpoint is None else lambda: write_atomically(checkpoint, trainer.save))
+    seconds, processor = time.monotonic() - began, time.process_time() - used
+    scene = trainer.scene()
+    if not len(scene):
+        raise FlickerError("fit: no Gaussian is left")
+    write_atomically(out, lambda path: save_ply(scene, path))
+    write_atomically(cameras, lambda path: path.write_text(text))
+    quality = trainer.quality(scene)
+    table = Table(show_header=False)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_row("scene", str(out))
+    table.add_row("Gaussians", f"{len(scene):,}")
+    if removed := trainer.removed + len(trainer.parameters) - len(scene):
+        table.add_row("taken out, not finite", f"{removed:,}")
+    table.add_row("PSNR on the test photographs", f"{quality.psnr:.2f} dB")
+    table.add_row("  after an affine colour fit of each", f"{quality.compensated:.2f} dB")
+    table.add_row("SSIM", f"{quality.ssim:.4f}")
+    table.add_row("time", f"{seconds:,.0f} s, {processor:,.0f} s of processor time")
+    console.print(table)
+    folder = data.tests[0].path.parent
+    if folder.resolve() not in (out.parent.resolve(), (out.parent / "images").resolve()):
+        console.print(f"flicker report {out}:all --photos {folder} measures against them")

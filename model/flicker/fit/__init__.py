@@ -1,0 +1,1 @@
+"""Scenes from photographs, and gradients of a picture in all parameters of a scene (docs/fit.md)."""

@@ -1,0 +1,97 @@
+"""A picture of parameters, and the derivatives of a function of it in all of them.
+
+    frame = render(parameters, camera)
+    gradient = backward(frame, slope_of_image)        # dL/d image (H, W, 3) gives dL/d parameters[frame.index]
+
+The rules are those of the reference renderer (docs/reference.md): projection and colours are its own functions. Where a derivative does not exist, at the clamp
+of alpha, of a colour, of the Jacobian, it is that of the side on which the value lies; skipped pairs and finished pixels give nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..front.binning import bin_boxes
+from ..front.projection import colours, geometry
+from ..params import TILE
+from ..scene.camera import Camera
+from . import raster
+from .chain import chain
+from .parameters import Parameters
+
+
+@dataclass(eq=False)
+class Frame:
+    """A view of parameters and what its way back needs. M Gaussians are in front of the camera, E entries in the lists of 16x16 tiles.
+
+    image: float64 (H, W, 3), neither clamped nor quantised. transmittance: float64 (H, W). index: int64 (M,), Gaussians near to far.
+    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel.
+    bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
+    """
+
+    parameters: Parameters
+    camera: Camera
+    image: np.ndarray
+    transmittance: np.ndarray
+    index: np.ndarray
+    rows: np.ndarray
+    start: np.ndarray
+    entry: np.ndarray
+    used: np.ndarray
+    bad: np.ndarray
+    table: np.ndarray
+
+
+@dataclass(eq=False)
+class Gradient:
+    """values: float32 (M, P), dL/d parameters.values[index]. screen: float64 (M, 2), dL/d mean in pixels. index: of the frame."""
+
+    values: np.ndarray
+    screen: np.ndarray
+    index: np.ndarray
+
+
+def render(parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0)) -> Frame:
+    """The picture over an RGB background."""
+    count, (width, height) = len(parameters), (camera.width, camera.height)
+    with np.errstate(all="ignore"):  # what is not finite is found below
+        scales = np.exp(parameters.log_scales.astype(np.float64))
+        opacity = 1.0 / (1.0 + np.exp(-parameters.logits.astype(np.float64)))
+    table, depth = np.empty((count, 10)), np.empty(count, np.float32)
+    view = np.ascontiguousarray(camera.rotation.T)
+    geometry(parameters.means, scales, parameters.quats, view, camera.position, width, height, camera.fx, camera.fy, table, depth)
+    # Sorted by depth, then number: both in one key.
+    index = np.flatnonzero(depth)
+    key = np.sort(depth[index].view(np.uint32).astype(np.uint64) << np.uint64(32) | index.astype(np.uint64))
+    index = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    rgb = np.empty((len(index), 3))
+    colours(parameters.means, parameters.sh, index, camera.position, rgb)
+    rows, box, bad = np.empty((len(index), raster.COLUMNS)), np.empty((len(index), 4), np.int32), np.empty(len(index), np.bool_)
+    raster.make_rows(index, table, opacity, rgb, width, height, rows, box, bad)
+    tiles_x, tiles_y = -(-width // TILE), -(-height // TILE)
+    start, entry = bin_boxes(box, tiles_x, tiles_y)
+    image, transmittance, used = np.empty((height, width, 3)), np.empty((height, width)), np.zeros(len(entry), np.bool_)
+    raster.blend(rows, start, entry, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
+    return Frame(parameters, camera, image, transmittance, index, rows, start, entry, used, bad, table)
+
+
+def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -> Gradient:
+    """Derivatives of L in the parameters, given dL/d image (H, W, 3).
+
+    coefficients: how many SH coefficients a channel are trained; the others' derivatives are 0.
+    """
+    camera, values = frame.camera, frame.parameters.values
+    sums = np.empty((len(frame.entry), raster.SUMS))
+    slope = np.ascontiguousarray(slope_of_image, np.float64)
+    raster.blend_back(frame.rows, frame.start, frame.entry, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
+    total = np.zeros((len(frame.index), raster.SUMS))
+    raster.gather(frame.entry, frame.used, sums, total)
+    gradient, screen = np.empty((len(frame.index), values.shape[1]), np.float32), np.empty((len(frame.index), 2))
+    chain(
+        values, frame.index, frame.table, frame.rows, total, np.ascontiguousarray(camera.rotation.T), camera.position, camera.width, camera.height,
+        camera.fx, camera.fy, coefficients, gradient, screen,
+    )
+    return Gradient(gradient, screen, frame.index)

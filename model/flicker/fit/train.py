@@ -1,0 +1,251 @@
+"""Optimisation of a scene on photographs (docs/fit.md).
+
+    trainer = Trainer(load_dataset(path, 400), Options(iterations=4000))
+    trainer.run()
+    scene = trainer.scene()
+
+A trainer's state is its arrays, a random generator and a count: `save` writes them, `restore` continues to the same bits.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlickerError, one_line
+from ..front.projection import project
+from ..front.reference import render_reference
+from ..progress import Steps
+from ..scene.gaussians import Scene
+from ..scene.metrics import psnr, ssim
+from ..scene.photos import BLACK
+from . import density
+from .adam import Adam
+from .dataset import Dataset
+from .loss import loss_and_slope
+from .parameters import LOGIT, QUAT, SCALE, SH, Parameters
+from .render import backward, render
+from .start import extent_of, start
+
+MEASURE_EVERY = 500  # iterations
+SAVE_EVERY = 500
+# Learning rates of the INRIA code: of means in extents of the scene, first and last.
+_MEAN_RATES = (1.6e-4, 1.6e-6)
+_SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5e-3, 1 / 20
+_EXPOSURE_RATES = (1e-2, 1e-3)
+_LAST_RATE = 0.1  # of all rates but the means', which fall evenly over the last third
+_DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
+
+
+@dataclass(frozen=True)
+class Options:
+    """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own."""
+
+    iterations: int = 4000
+    gaussians: int = 100_000
+    degree: int = 2
+    seed: int = 1
+    background: tuple[float, float, float] = BLACK
+    exposure: bool = False
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Mean over the test photographs. psnr in dB; compensated: after an affine colour fit of each picture to its photograph."""
+
+    psnr: float
+    ssim: float
+    compensated: float
+
+
+def affine_fit(image: np.ndarray, photo: np.ndarray) -> np.ndarray:
+    """The picture (H, W, 3) with the affine change of colour that brings it nearest to the photograph, least squares."""
+    columns = np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=2).reshape(-1, 4).astype(np.float64)
+    change = np.linalg.lstsq(columns, photo.reshape(-1, 3).astype(np.float64), rcond=None)[0]
+    return (columns @ change).reshape(image.shape)
+
+
+class Trainer:
+    """State of a fit. parameters, moments: of the Gaussians. exposures: float32 (photographs, 12), rows of an affine colour (3, 4).
+
+    iteration: how many are done. removed: Gaussians that were taken out because a number of theirs, or of their derivatives, was not finite.
+    """
+
+    def __init__(self, dataset: Dataset, options: Options, parameters: Parameters | None = None) -> None:
+        """parameters: to begin with; None: `start` makes them."""
+        self.dataset, self.options = dataset, options
+        self.rng = np.random.default_rng(options.seed)
+        self.parameters = start(dataset, options.gaussians, options.degree, self.rng) if parameters is None else parameters
+        self.first = len(self.parameters)
+        self.moments = Adam.of(self.parameters.values)
+        self.exposures = np.tile(np.eye(3, 4, dtype=np.float32).ravel(), (len(dataset.fitted), 1))
+        self.exposure_moments = Adam.of(self.exposures)
+        self.iteration, self.removed = 0, 0
+        self.order = np.zeros(0, np.int64)  # photographs that come next
+        self.score, self.seen = np.zeros(self.first), np.zeros(self.first)
+        self.extent = extent_of([shot.camera for shot in dataset.fitted])
+        self._photos = [shot.load(options.background) for shot in dataset.fitted]
+        self._test_photos = [shot.load(options.background) for shot in dataset.tests]
+
+    # -- one step ---------------------------------------------------------------------------------------------------------------------
+
+    def rates(self) -> np.ndarray:
+        """float32 (P,): learning rates of this iteration."""
+        done = self.iteration / self.options.iterations
+        falling = _LAST_RATE ** max(0.0, 3.0 * done - 2.0)
+        rates = np.empty(self.parameters.values.shape[1])
+        first, last = _MEAN_RATES
+        rates[:SCALE] = self.extent * first * (last / first) ** done
+        rates[SCALE:QUAT], rates[QUAT:LOGIT], rates[LOGIT] = _SCALE_RATE * falling, _QUAT_RATE * falling, _LOGIT_RATE * falling
+        rates[SH:] = _SH_RATE * _SH_REST * falling
+        rates[SH : SH + 3] = _SH_RATE * falling
+        return rates.astype(np.float32)
+
+    @property
+    def degree(self) -> int:
+        """SH degree that is trained now."""
+        return min(self.options.degree, self.iteration // max(1, min(_DEGREE_EVERY, self.options.iterations // 8)))
+
+    def step(self) -> float:
+        """One photograph; the loss."""
+        if not len(self.order):
+            self.order = self.rng.permutation(len(self._photos))
+        view, self.order = int(self.order[0]), self.order[1:]
+        camera, photo = self.dataset.fitted[view].camera, self._photos[view]
+        frame = render(self.parameters, camera, self.options.background)
+        if self.options.exposure:
+            change = self.exposures[view].reshape(3, 4)
+            loss, slope = loss_and_slope(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
+            by_colour = np.einsum("hwi,hwj->ij", slope, frame.image, dtype=np.float64)
+            gradient = np.concatenate([by_colour, slope.sum(axis=(0, 1), dtype=np.float64)[:, None]], axis=1).astype(np.float32)
+            slope = slope @ change[:, :3]
+            first, last = _EXPOSURE_RATES
+            rate = np.full(12, first * (last / first) ** (self.iteration / self.options.iterations), np.float32)
+            self.exposure_moments.step(self.exposures, np.array([view]), gradient.reshape(1, 12), rate)
+        else:
+            loss, slope = loss_and_slope(frame.image, photo)
+        found = backward(frame, slope, (self.degree + 1) ** 2)
+        refused = self.moments.step(self.parameters.values, found.index, found.values, self.rates())
+        self.score[found.index] += np.hypot(found.screen[:, 0] * camera.width / 2, found.screen[:, 1] * camera.height / 2)
+        self.seen[found.index] += 1
+        self.iteration += 1
+        broken = refused | frame.bad
+        if broken.any():
+            self.removed += int(broken.sum())
+            self._select(np.setdiff1d(np.arange(len(self.parameters)), found.index[broken]))
+        self._grow()
+        return loss
+
+    def _select(self, keep: np.ndarray, new: np.ndarray | None = None) -> None:
+        """Keep the Gaussians `keep`, in that order, and put new rows behind them."""
+        values = self.parameters.values
+        new = values[:0] if new is None else new
+        if not len(keep) + len(new):
+            raise FlickerError(f"fit: no Gaussian is left after {self.iteration} iterations")
+        self.parameters = Parameters(np.concatenate([values[keep], new]))
+        self.moments.select(keep, len(new))
+        self.score, self.seen = (np.concatenate([old[keep], np.zeros(len(new))]) for old in (self.score, self.seen))
+
+    def _grow(self) -> None:
+        """Clone, split and remove, from a twentieth to the half of the iterations."""
+        total = self.options.iterations
+        begin, end = total // 20, total // 2
+        if self.iteration % density.EVERY or not begin <= self.iteration <= end:
+            return
+        good = self.parameters.finite()  # what no view shows is found here
+        if not good.all():
+            self.removed += int((~good).sum())
+            self._select(np.flatnonzero(good))
+        share = min(1.0, (self.iteration - begin + density.EVERY) / (0.7 * (end - begin) + 1))
+        most = int(self.first + share * max(0, self.options.gaussians - self.first))
+        keep, new = density.refine(self.parameters, self.score / np.maximum(self.seen, 1), self.extent, most, self.rng)
+        self._select(keep, new)
+        self._select(density.in_order(self.parameters))
+        self.score[:], self.seen[:] = 0, 0
+
+    # -- whole runs -------------------------------------------------------------------------------------------------------------------
+
+    def run(
+        self, steps: Steps | None = None, told: Callable[[int, int, float], None] | None = None, keep: Callable[[], None] | None = None,
+    ) -> None:
+        """All iterations that are left. told(iteration, Gaussians, PSNR of the test photographs), keep(): every so many."""
+        with (steps or Steps()).bar("fitting") as report:
+            while self.iteration < self.options.iterations:
+                self.step()
+                report(self.iteration, self.options.iterations)
+                if told and (self.iteration % MEASURE_EVERY == 0 or self.iteration == self.options.iterations):
+                    told(self.iteration, len(self.parameters), self.measure())
+                if keep and self.iteration % SAVE_EVERY == 0:
+                    keep()
+
+    def scene(self) -> Scene:
+        return self.parameters.scene()
+
+    def measure(self) -> float:
+        """Mean PSNR of the test photographs in dB, pictures of `render`; with exposure after an affine fit."""
+        found = []
+        for shot, photo in zip(self.dataset.tests, self._test_photos):
+            image = render(self.parameters, shot.camera, self.options.background).image
+            found.append(psnr(affine_fit(image, photo) if self.options.exposure else image, photo))
+        return float(np.mean(found))
+
+    def quality(self, scene: Scene) -> Quality:
+        """A scene against the test photographs by the reference renderer."""
+        rows = []
+        for shot, photo in zip(self.dataset.tests, self._test_photos):
+            image = render_reference(project(scene, shot.camera), shot.camera, self.options.background)
+            same = ssim(image, photo) if min(photo.shape[:2]) >= 11 else float("nan")
+            rows.append((psnr(image, photo), same, psnr(affine_fit(image, photo), photo)))
+        return Quality(*map(float, np.mean(rows, axis=0)))
+
+    # -- state ------------------------------------------------------------------------------------------------------------------------
+
+    def _identity(self) -> dict[str, Any]:
+        """What a checkpoint must agree on."""
+        return asdict(self.options) | {
+            "background": list(self.options.background),
+            "photographs": [[str(s.camera.img_name), s.camera.width, s.camera.height] for s in (*self.dataset.fitted, *self.dataset.tests)],
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the state. Raises OSError."""
+        numbers = {
+            "identity": self._identity(), "rng": self.rng.bit_generator.state, "iteration": self.iteration, "removed": self.removed, "first": self.first,
+            "steps": [self.moments.steps, self.exposure_moments.steps],
+        }
+        with path.open("wb") as file:
+            np.savez(
+                file, numbers=np.array(json.dumps(numbers)), values=self.parameters.values, m=self.moments.first, v=self.moments.second,
+                exposures=self.exposures, exposure_m=self.exposure_moments.first, exposure_v=self.exposure_moments.second, order=self.order,
+                score=self.score, seen=self.seen,
+            )
+
+    def restore(self, path: Path) -> None:
+        """Continue from a state that `save` wrote. FlickerError for another fit's, or a damaged file."""
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            numbers = json.loads(str(arrays.pop("numbers")))
+            theirs, ours = numbers["identity"], json.loads(json.dumps(self._identity()))
+            for key in ours:
+                if theirs[key] != ours[key]:
+                    said = "" if key == "photographs" else f" {theirs[key]}, not {ours[key]}"
+                    raise FlickerError(f"{path}: is of a fit with other {key}{said}" if key == "photographs" else f"{path}: is of a fit with {key}{said}")
+            self.parameters = Parameters(arrays["values"])
+            self.moments = Adam(arrays["m"], arrays["v"], numbers["steps"][0])
+            self.exposures = arrays["exposures"]
+            self.exposure_moments = Adam(arrays["exposure_m"], arrays["exposure_v"], numbers["steps"][1])
+            self.order, self.score, self.seen = arrays["order"], arrays["score"], arrays["seen"]
+            self.iteration, self.removed, self.first = numbers["iteration"], numbers["removed"], numbers["first"]
+            self.rng.bit_generator.state = numbers["rng"]
+        except FlickerError:
+            raise
+        except OSError as error:
+            raise FlickerError(f"{path}: cannot be read ({error.strerror or one_line(error)})") from None
+        except Exception as error:  # numpy raises anything at all for a damaged file
+            raise FlickerError(f"{path}: not a checkpoint ({one_line(error)})") from None

@@ -1,0 +1,423 @@
+"""Fitting: pictures and derivatives of the differentiable renderer, loss, data sets, training, the command.
+
+The picture is compared with the reference renderer; derivatives with central differences in float64, of every parameter, on scenes in which alpha meets the
+clamp, the skip and the end of a pixel. Data sets are made of renderings of a small scene. Not covered: how good fits of real photographs become
+(docs/fit.md has figures of lego).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+import scene_samples as samples
+from flicker_tb.command import flicker
+from flicker_tb.runner import seed
+
+from flicker.errors import FlickerError
+from flicker.fit.dataset import load_dataset
+from flicker.fit.loss import loss_and_slope
+from flicker.fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH, Parameters
+from flicker.fit.render import backward, render
+from flicker.fit.train import Options, Trainer, affine_fit
+from flicker.front.projection import project
+from flicker.front.reference import render_with_transmittance
+from flicker.scene.camera import Camera, load_cameras, orbit_camera
+from flicker.scene.files import load_scene
+from flicker.scene.image import save_png
+from flicker.scene.metrics import psnr, ssim
+
+BACKGROUND = (0.3, 0.1, 0.6)
+
+
+def look(width: int = 45, height: int = 37, focal: float = 40.0, z: float = -3.0) -> Camera:
+    turn = np.array([[math.cos(0.1), 0, math.sin(0.1)], [0, 1, 0], [-math.sin(0.1), 0, math.cos(0.1)]])
+    return Camera(width, height, focal, 1.1 * focal, np.array([0.1, -0.2, z]), turn)
+
+
+def busy(count: int = 60, degree: int = 3) -> Parameters:
+    """Gaussians that cover each other: some above the clamp of alpha, some hardly above 1/255, some beside the picture, colours below 0."""
+    scene = samples.random_scene(seed() + 7, count, degree)
+    scene.scales *= np.float32(4.0)
+    scene.scales[:, 0] *= np.float32(0.3)
+    scene.means[:8] *= np.float32(3.0)
+    found = Parameters.of(scene)
+    found.values[8:20, LOGIT] = 6.0  # opacity 0.998: clamped in the middle
+    found.values[20:26, LOGIT] = -5.4  # 1.15 / 255
+    found.values[:, QUAT:LOGIT] *= np.random.default_rng(seed()).uniform(0.5, 2.0, (count, 1)).astype(np.float32)
+    return found
+
+
+# -- pictures and derivatives ---------------------------------------------------------------------------------------------------------
+
+
+def test_picture_is_the_reference() -> None:
+    """Picture and transmittance, but for the rounding of scales and opacities to the scene's float32."""
+    found, camera = busy(), look()
+    frame = render(found, camera, BACKGROUND)
+    image, left = render_with_transmittance(project(found.scene(), camera), camera, BACKGROUND)
+    assert left.min() < 1e-3 and left.max() > 0.5
+    assert np.abs(frame.image - image).max() < 2e-5 and np.abs(frame.transmittance - left).max() < 2e-5
+    assert not frame.bad.any() and frame.used.sum() > 50
+
+
+def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: int, column: int) -> tuple[float, float]:
+    """dL/d values[i, column] by Richardson's extrapolation of central differences, for L = sum(weight * image); and how far two step sizes disagree."""
+    def slope(step: float) -> float:
+        results, places = [], []
+        for sign in (1, -1):
+            moved = Parameters(parameters.values.copy())
+            moved.values[i, column] += np.float32(sign * step)
+            places.append(float(moved.values[i, column]))
+            results.append(float((weight * render(moved, camera, BACKGROUND).image).sum()))
+        return (results[0] - results[1]) / (places[0] - places[1])
+
+    coarse, middle, fine = slope(2e-3), slope(1e-3), slope(5e-4)
+    first, second = (4 * middle - coarse) / 3, (4 * fine - middle) / 3
+    return second, abs(second - first)
+
+
+@pytest.mark.parametrize(("degree", "z"), [(3, -3.0), (1, -1.3)])
+def test_derivatives(degree: int, z: float) -> None:
+    """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
+    parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
+    weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
+    frame = render(parameters, camera, BACKGROUND)
+    found = backward(frame, weight)
+    checked = np.zeros(parameters.values.shape[1], int)
+    largest = np.abs(found.values).max(axis=0)
+    clamped = 0
+    for k, i in enumerate(frame.index):
+        clamped += int(parameters.values[i, LOGIT] == 6.0)
+        for column in range(parameters.values.shape[1]):
+            wanted, doubt = difference(parameters, camera, weight, int(i), column)
+            scale = max(abs(wanted), 1e-3 * largest[column], 1e-6)
+            if doubt < 2e-5 * scale:
+                assert abs(found.values[k, column] - wanted) < 1e-4 * scale, (i, column, found.values[k, column], wanted)
+                checked[column] += 1
+    assert clamped >= 3 and (checked >= len(frame.index) // 3).all(), checked
+
+
+def test_rules_near() -> None:
+    """One Gaussian over one pixel's centre: just below and above the clamp, just above and below 1/255; one that ends the pixel."""
+    camera = Camera(1, 1, 10.0, 10.0, np.zeros(3), np.eye(3))
+    values = np.zeros((3, SH + 3), np.float32)
+    values[:, MEAN + 2] = (1.0, 2.0, 3.0)
+    values[:, QUAT] = 1.0
+    values[:, SCALE:QUAT] = -1.0
+    weight = np.ones((1, 1, 3))
+
+    def slope(*opacity: float) -> np.ndarray:
+        parameters, o = Parameters(values.copy()), np.array(opacity)
+        parameters.values[: len(o), LOGIT] = np.log(o / (1 - o))
+        parameters.values[len(o) :, MEAN + 2] = -1.0  # behind the camera
+        found = backward(render(parameters, camera, BACKGROUND), weight)
+        assert found.index.tolist() == list(range(len(o)))
+        return found.values[:, LOGIT] / (o * (1 - o))
+
+    step = 1.5 - sum(BACKGROUND)  # coefficients 0: one half a channel, in place of the background
+    for o, wanted in ((0.9899, step), (0.9901, 0.0), (1.01 / 255, step), (0.99 / 255, 0.0)):
+        assert slope(o) == pytest.approx([wanted], rel=1e-4, abs=1e-9)
+    # A clamped one between two: 0.01 of the light passes it.
+    assert slope(0.9, 0.995, 0.5) == pytest.approx([0.005 * step, 0.0, 0.001 * step], rel=1e-4, abs=1e-9)
+    # The third would leave 8e-5 and finishes the pixel, or leaves 1.2e-4 and does not.
+    assert slope(0.9, 0.98, 0.96) == pytest.approx([0.02 * step, 0.1 * step, 0.0], rel=1e-4, abs=1e-9)
+    assert slope(0.9, 0.98, 0.94) == pytest.approx([0.0012 * step, 0.006 * step, 0.002 * step], rel=1e-4)
+
+
+def test_same_bits_for_any_number_of_threads() -> None:
+    parameters, camera = busy(), look()
+    weight = np.random.default_rng(seed()).normal(size=(37, 45, 3))
+    results, threads = [], numba.get_num_threads()
+    for count in {1, threads}:
+        numba.set_num_threads(count)
+        frame = render(parameters, camera, BACKGROUND)
+        results.append((frame.image.tobytes(), backward(frame, weight).values.tobytes(), loss_and_slope(frame.image, weight)[1].tobytes()))
+    numba.set_num_threads(threads)
+    assert len(set(results)) == 1
+
+
+def test_untrained_coefficients() -> None:
+    frame = render(busy(), look(), BACKGROUND)
+    weight = np.ones((37, 45, 3))
+    all_, some = backward(frame, weight).values, backward(frame, weight, 4).values
+    assert (some[:, SH + 12 :] == 0).all() and np.array_equal(some[:, : SH + 12], all_[:, : SH + 12]) and (all_[:, SH + 12 :] != 0).any()
+
+
+def test_loss() -> None:
+    """SSIM is that of the metrics away from the borders; the derivative is that of the loss, by central differences."""
+    rng = np.random.default_rng(seed())
+    image, photo = rng.random((2, 40, 36, 3))
+    padded = [np.pad(p, ((10, 10), (10, 10), (0, 0))) for p in (image, photo)]
+    inner, all_ = 50 * 46, 60 * 56  # the metrics leave out five pixels at the borders, where these are equal
+    assert 1 - loss_and_slope(*padded, 1.0)[0] == pytest.approx((ssim(*padded) * inner + all_ - inner) / all_, abs=1e-9)
+    assert loss_and_slope(photo, photo)[0] == pytest.approx(0.0, abs=1e-12)
+    loss, slope = loss_and_slope(image, photo)
+    assert loss == pytest.approx(0.8 * np.abs(image - photo).mean() + 0.2 * loss_and_slope(image, photo, 1.0)[0])
+    for _ in range(20):
+        at = tuple(rng.integers(0, image.shape))
+        step = np.zeros_like(image)
+        step[at] = 1e-5
+        wanted = (loss_and_slope(image + step, photo)[0] - loss_and_slope(image - step, photo)[0]) / 2e-5
+        assert slope[at] == pytest.approx(wanted, rel=1e-5, abs=1e-9)
+
+
+# -- data sets ------------------------------------------------------------------------------------------------------------------------
+
+WIDTH, HEIGHT, SHOTS = 48, 40, 17
+
+
+def pose(camera: Camera) -> list:
+    matrix = np.eye(4)
+    matrix[:3, :3] = camera.rotation * np.array([1, -1, -1])
+    matrix[:3, 3] = camera.position
+    return matrix.tolist()
+
+
+@pytest.fixture(scope="module")
+def shots() -> list[tuple[Camera, np.ndarray]]:
+    """Views all around a small scene."""
+    scene = samples.random_scene(seed(), 120, 1)
+    scene.scales *= np.float32(3.0)
+    cameras = [orbit_camera(scene, k, SHOTS, WIDTH, HEIGHT) for k in range(SHOTS)]
+    return [(camera, render_with_transmittance(project(scene, camera), camera, (0, 0, 0))[0]) for camera in cameras]
+
+
+@pytest.fixture(scope="module")
+def nerf(shots, tmp_path_factory) -> Path:
+    """A data set with transforms.json."""
+    folder = tmp_path_factory.mktemp("nerf")
+    (folder / "images").mkdir()
+    for k, (_, picture) in enumerate(shots):
+        save_png(folder / "images" / f"r_{k}.png", picture)
+    (folder / "transforms.json").write_text(json.dumps({
+        "camera_angle_x": 2 * math.atan(WIDTH / 2 / shots[0][0].fx),
+        "frames": [{"file_path": f"./images/r_{k}", "transform_matrix": pose(camera)} for k, (camera, _) in enumerate(shots)],
+    }))
+    return folder
+
+
+def write_colmap(folder: Path, shots: list[tuple[Camera, np.ndarray]], model: int = 1, points: np.ndarray | None = None) -> Path:
+    """sparse/0 and images/, at twice the pictures' size."""
+    sparse = folder / "sparse" / "0"
+    sparse.mkdir(parents=True, exist_ok=True)
+    (folder / "images").mkdir(exist_ok=True)
+    c = shots[0][0]
+    lens = struct.pack("<4d", 2 * c.fx, 2 * c.fy, WIDTH, HEIGHT)
+    (sparse / "cameras.bin").write_bytes(struct.pack("<QiiQQ", 1, 7, model, 2 * WIDTH, 2 * HEIGHT) + lens)
+    data = struct.pack("<Q", len(shots))
+    for k, (camera, picture) in enumerate(shots):
+        save_png(folder / "images" / f"shot.{k:02}.png", picture)
+        m = camera.rotation.T
+        w = math.sqrt(max(0.0, 1 + np.trace(m))) / 2
+        if w > 1e-3:
+            quat = [w, *(np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]) / (4 * w))]
+        else:  # half a turn: its axis is an eigenvector
+            values, vectors = np.linalg.eigh((m + m.T) / 2)
+            quat = [0.0, *vectors[:, np.argmax(values)]]
+        data += struct.pack("<I7dI", k, *quat, *(-m @ camera.position), 7) + f"shot.{k:02}.png".encode() + b"\0" + struct.pack("<Q", 1) + bytes(24)
+    (sparse / "images.bin").write_bytes(data)
+    points = np.random.default_rng(seed()).uniform(-1, 1, (50, 3)) if points is None else points
+    (sparse / "points3D.bin").write_bytes(struct.pack("<Q", len(points)) + b"".join(
+        struct.pack("<Q3d3BdQ", k, *p, 255, 0, 51, 0.5, 1) + bytes(8) for k, p in enumerate(points)))
+    return folder
+
+
+def same_cameras(a: Camera, b: Camera) -> None:
+    assert (a.width, a.height) == (b.width, b.height) and (a.fx, a.fy) == pytest.approx((b.fx, b.fy), rel=1e-9)
+    assert np.abs(a.position - b.position).max() < 1e-6 and np.abs(a.rotation - b.rotation).max() < 1e-6
+
+
+def test_transforms(nerf, shots) -> None:
+    """Cameras, every eighth for testing, names; half the size keeps the field of view."""
+    data = load_dataset(nerf)
+    assert [s.camera.img_name for s in data.tests] == ["r_0.png", "r_8.png", "r_16.png"] and len(data.fitted) == 14 and data.points is None
+    for shot, number in zip(data.tests, (0, 8, 16)):
+        same_cameras(shot.camera, replace(shots[number][0], fy=shots[number][0].fx))
+        assert psnr(shot.load(), shots[number][1]) > 50
+    half = load_dataset(nerf / "transforms.json", 24).tests[0]
+    assert (half.camera.width, half.camera.height, half.load().shape) == (24, 20, (20, 24, 3))
+    same_cameras(half.camera, data.tests[0].camera.resized(24, 20))
+
+
+def test_colmap(shots, tmp_path) -> None:
+    points = np.random.default_rng(seed()).uniform(-1, 1, (50, 3))
+    points[3, 1] = np.nan
+    data = load_dataset(write_colmap(tmp_path, shots, points=points))
+    assert [s.camera.img_name for s in data.tests] == ["shot.00.png", "shot.08.png", "shot.16.png"]
+    for shot, number in zip(data.tests, (0, 8, 16)):
+        same_cameras(shot.camera, shots[number][0])
+    assert data.dropped == 1 and np.array_equal(data.points, points[np.isfinite(points).all(axis=1)]) and data.colours[0] == pytest.approx([1, 0, 0.2])
+    trainer = Trainer(data, Options(10, 40, degree=1))  # starts from 40 of the 49 points, in their colour
+    assert len(trainer.parameters) == 40 and np.isin(trainer.parameters.means, np.float32(data.points)).all()
+    assert trainer.parameters.scene().sh[:, 0] == pytest.approx(np.tile((np.array([1, 0, 0.2]) - 0.5) / samples.C0, (40, 1)), abs=1e-5)
+    trainer.run()
+
+
+def test_bad_transforms(nerf, tmp_path) -> None:
+    """One line that names the file and the field."""
+    good = json.loads((nerf / "transforms.json").read_text())
+    (tmp_path / "images").symlink_to(nerf / "images")
+    file = tmp_path / "transforms.json"
+
+    def refused(pattern: str, frame: dict | None = None, **more) -> None:
+        data = json.loads(json.dumps(good | more))
+        data["frames"][5].update(frame or {})
+        file.write_text(json.dumps(data))
+        with pytest.raises(FlickerError, match=pattern) as caught:
+            load_dataset(tmp_path)
+        assert "\n" not in str(caught.value) and "transforms.json" in str(caught.value)
+
+    refused(r"frames\[5\]: file_path: no picture .*r_99", {"file_path": "images/r_99"})
+    refused(r"frames\[5\]: file_path: not a text", {"file_path": 5})
+    refused(r"frames\[5\]: rotation: not a rotation matrix", {"transform_matrix": np.zeros((4, 4)).tolist()})
+    refused(r"frames\[5\]: position: not finite", {"transform_matrix": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})
+    refused(r"frames\[5\]: transform_matrix: not 4x4 numbers", {"transform_matrix": [[1, 2], [3]]})
+    refused(r"frames\[5\]: fl_x: not a number", {"fl_x": "wide"})
+    refused(r"frames\[5\]: .*r_5.png is 48x40, not of the shape of the camera's 48x48", {"w": 48, "h": 48})
+    refused(r"frames\[0\]: cx: 30 is 6.0 pixels off the middle", cx=30.0)
+    refused(r"frames\[0\]: k1: the lens distorts by up to .* pixels", k1=0.2)
+    refused(r"frames\[0\]: camera_angle_x: 4 is not between 0 and pi", camera_angle_x=4.0)
+    file.write_text(json.dumps(good | {"frames": good["frames"][:1]}))
+    with pytest.raises(FlickerError, match="1 photograph, at least 3 are needed"):
+        load_dataset(tmp_path)
+    file.write_text(json.dumps({"camera_angle_x": 1}))
+    with pytest.raises(FlickerError, match="frames: not a list"):
+        load_dataset(tmp_path)
+    file.write_text("{")
+    with pytest.raises(FlickerError, match=r"transforms.json: not JSON"):
+        load_dataset(tmp_path)
+    file.unlink()
+    with pytest.raises(FlickerError, match=r"neither transforms.json nor sparse/0"):
+        load_dataset(tmp_path)
+    with pytest.raises(FlickerError, match=r"no such folder"):
+        load_dataset(tmp_path / "none")
+
+
+def test_bad_colmap(shots, tmp_path) -> None:
+    sparse = write_colmap(tmp_path, shots, model=4) / "sparse" / "0"
+    with pytest.raises(FlickerError, match=r"cameras.bin: truncated"):
+        load_dataset(tmp_path)
+    (sparse / "cameras.bin").write_bytes((sparse / "cameras.bin").read_bytes() + bytes(32))
+    with pytest.raises(FlickerError, match=r"cameras.bin: camera 7: model OPENCV, not PINHOLE"):
+        load_dataset(tmp_path)
+    write_colmap(tmp_path, shots)
+    whole = (sparse / "images.bin").read_bytes()
+    (sparse / "images.bin").write_bytes(whole[:-5])
+    with pytest.raises(FlickerError, match=r"images.bin: truncated"):
+        load_dataset(tmp_path)
+    (sparse / "images.bin").write_bytes(whole)
+    (tmp_path / "images" / "shot.03.png").unlink()
+    with pytest.raises(FlickerError, match=r"images.bin: image 3 \(shot.03.png\): no picture"):
+        load_dataset(tmp_path)
+    (sparse / "points3D.bin").unlink()
+    (tmp_path / "images" / "shot.03.png").write_bytes((tmp_path / "images" / "shot.04.png").read_bytes())
+    with pytest.raises(FlickerError, match=r"points3D.bin: cannot be read"):
+        load_dataset(tmp_path)
+
+
+def test_views_that_do_not_overlap(nerf, tmp_path) -> None:
+    """Random places need some that two cameras see."""
+    data = json.loads((nerf / "transforms.json").read_text())
+    (tmp_path / "images").symlink_to(nerf / "images")
+    data["camera_angle_x"] = 0.01
+    for k, frame in enumerate(data["frames"][:4]):
+        frame["transform_matrix"] = [[1, 0, 0, 100.0 * k], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "transforms.json").write_text(json.dumps(data | {"frames": data["frames"][:4]}))
+    with pytest.raises(FlickerError, match="do not overlap"):
+        Trainer(load_dataset(tmp_path), Options(10, 100))
+
+
+# -- training -------------------------------------------------------------------------------------------------------------------------
+
+
+def test_fit_and_resume(nerf, tmp_path) -> None:
+    """It learns; interrupted and resumed it has the same bits; other options are refused."""
+    data, options = load_dataset(nerf), Options(iterations=200, gaussians=1500, degree=1, exposure=True)
+    whole = Trainer(data, options)
+    before = whole.measure()
+    saved = tmp_path / "state.npz"
+    for k in range(options.iterations):
+        if k == 77:
+            whole.save(saved)
+        whole.step()
+    assert whole.first < len(whole.parameters) <= 1500 and whole.measure() > before + 3
+    again = Trainer(data, options)
+    again.restore(saved)
+    assert again.iteration == 77
+    again.run()
+    for name in ("parameters", "exposures"):
+        a, b = (getattr(t, name) for t in (whole, again))
+        assert (a.values if name == "parameters" else a).tobytes() == (b.values if name == "parameters" else b).tobytes()
+    with pytest.raises(FlickerError, match="is of a fit with seed 1, not 2"):
+        Trainer(data, replace(options, seed=2)).restore(saved)
+    saved.write_bytes(saved.read_bytes()[:-100])
+    with pytest.raises(FlickerError, match="not a checkpoint"):
+        Trainer(data, options).restore(saved)
+    with pytest.raises(FlickerError, match="cannot be read"):
+        Trainer(data, options).restore(tmp_path / "none")
+
+
+def test_poisoned_scene(nerf) -> None:
+    """Gaussians with numbers that are not finite, or that would give such pictures, are taken out and counted; the others learn as without them."""
+    data, options = load_dataset(nerf), Options(iterations=200, gaussians=600, degree=1)
+    clean = Trainer(data, options)
+    poison = np.repeat(clean.parameters.values[:1], 6, axis=0)
+    for k, (column, value) in enumerate(((MEAN, np.nan), (SCALE + 1, np.inf), (QUAT + 2, np.nan), (LOGIT, np.nan), (SH + 5, np.inf), (SH, 1e30))):
+        poison[k, column] = value
+    poisoned = Trainer(data, options, Parameters(np.concatenate([clean.parameters.values, poison])))
+    poisoned.rng = np.random.default_rng(5)
+    clean.rng = np.random.default_rng(5)
+    losses = [(clean.step(), poisoned.step()) for _ in range(60)]
+    assert np.isfinite(losses).all() and abs(poisoned.measure() - clean.measure()) < 0.1
+    assert len(poisoned.scene()) == len(clean.parameters) == poisoned.first - 6
+    while poisoned.iteration < 100:  # those that no view shows go when Gaussians are cloned and split
+        poisoned.step()
+    assert poisoned.removed == 6 and poisoned.parameters.finite().all()
+
+
+def test_exposure(shots, nerf) -> None:
+    """An affine change of colour is undone; photographs taken at half the light get darker colours of their own."""
+    trainer = Trainer(load_dataset(nerf), Options(iterations=200, gaussians=600, degree=0, exposure=True))
+    for k in range(0, len(trainer.dataset.fitted), 2):
+        trainer._photos[k] *= np.float32(0.5)
+    trainer.run()
+    gain = trainer.exposures.reshape(-1, 3, 4)[:, range(3), range(3)].mean(axis=1)
+    assert gain[::2].max() < gain[1::2].min()
+    picture = shots[0][1]
+    changed = picture @ np.array([[0.8, 0.1, 0.0], [0.0, 0.9, 0.0], [0.05, 0.0, 0.7]]) + 0.1
+    assert psnr(affine_fit(changed, picture), picture) > 80 > 30 > psnr(changed, picture)
+
+
+def test_command(nerf, tmp_path) -> None:
+    """Scene and cameras that the other commands read; the same file whether interrupted or not; bad requests in one line."""
+    def fit(*args: object, code: int = 0):
+        done = flicker("fit", nerf, "-o", tmp_path / "a.ply", "--gaussians", 800, "--size", 40, *args)
+        assert done.returncode == code, done.stderr
+        assert code == 0 or done.stderr.count("\n") == 1
+        return " ".join((done.stdout + done.stderr).split())
+
+    told = fit("--iterations", 120)
+    assert "14 photographs to fit, 3 for testing, 40x33" in told and "PSNR on the test photographs" in told
+    scene, cameras = load_scene(tmp_path / "a.ply"), load_cameras(tmp_path / "cameras.json")
+    assert 0 < len(scene) <= 800 and [c.img_name for c in cameras] == ["r_0.png", "r_8.png", "r_16.png"] and cameras[0].width == 40
+    first = (tmp_path / "a.ply").read_bytes()
+    half = Trainer(load_dataset(nerf, 40), Options(iterations=120, gaussians=800))
+    for _ in range(70):
+        half.step()
+    half.save(tmp_path / "s.npz")
+    told = fit("--iterations", 120, "--checkpoint", tmp_path / "s.npz", "--resume")
+    assert "continues after 70 iterations" in told and (tmp_path / "a.ply").read_bytes() == first
+    done = flicker("render", tmp_path / "a.ply", "--engine", "reference", "--out", tmp_path / "a.png")
+    assert done.returncode == 0, done.stderr
+    assert "--resume: from which --checkpoint?" in fit("--resume", code=2)
+    assert "holds other cameras" in fit("--size", 30, code=2)
+    assert "background: expected black" in fit("--background", "blue", code=2)
+    done = flicker("fit", nerf, "-o", tmp_path / "a.spz")
+    assert done.returncode == 2 and "not a .ply" in done.stderr
