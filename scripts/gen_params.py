@@ -138,9 +138,11 @@ def record_package() -> str:
     ]) + "\n"
 
 
-def lane_package() -> str:
-    """Lanes in the log domain, in their default formats."""
-    f, t = lanes.FORMATS, lanes.tables(lanes.FORMATS)
+def lane_package(f: lanes.LaneFormats = lanes.FORMATS) -> str:
+    """Lanes in the log domain. Raises FlickerError for formats that the RTL does not have."""
+    if not f.pieces:
+        raise FlickerError("lanes: pieces 0: the RTL has h by lines only")
+    t = lanes.tables(f)
     value, fall = lanes.h_lines(f, t.clamp + 1, t.limit)
     first, top = int(t.clamp + 1).bit_length() - 1, int(t.limit).bit_length()  # octave of the least La that is not clamped; bits of La
     if t.clamp + 1 != 1 << first:

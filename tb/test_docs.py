@@ -186,9 +186,10 @@ def test_areas_without_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 # ---- what tables say ----------------------------------------------------------------------------
 
 
-def test_ablation_changes_one_thing_at_a_time() -> None:
-    names = group("ablation")
-    assert names[0] == "flicker" and "lanes" in names
+@pytest.mark.parametrize("name,first,last", [("ablation", "flicker", "log-lanes-64"), ("deeper FIFOs", "lanes", "lanes-deep")])
+def test_ablations_change_one_thing_at_a_time(name: str, first: str, last: str) -> None:
+    names = group(name)
+    assert (names[0], names[-1]) == (first, last)
     for before, after in zip(names, names[1:]):
         changes = frames.differences(get_configuration(before), get_configuration(after))
         assert len(changes) == 1, (before, after, changes)
@@ -202,6 +203,7 @@ def test_differences_are_seen() -> None:
     assert between("rows", "lanes") == ["lists", "accumulator", "stage"]
     assert between("exact", "rows") == ["masks"] and between("flicker", "flicker-stop") == ["stop"]
     assert between("lanes", "lanes-deep") == ["fifo_depth", "window", "width"]
+    assert between("lanes", "log-lanes-64") == ["lanes", "stage"] and between("log-lanes-one", "log-lanes") == ["in_width"]
     assert between("flicker", "flicker-barrier") == ["stage"] and between("flicker", "flicker") == []
 
 

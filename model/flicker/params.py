@@ -384,4 +384,6 @@ STAGES: dict[str, Stage] = {
 # The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
 # the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
 FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
+# What `flicker render` and `flicker demo` take when nothing else is said: best in cycles times area and in pictures (docs/exploration.md).
+RECOMMENDED = RenderConfig(stage="lanes")
 NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}

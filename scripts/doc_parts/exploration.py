@@ -1,4 +1,4 @@
-"""`make docs PART=exploration`: every explored configuration on the real views, half of GSCore's cycles, and the chart of speed against accuracy.
+"""`make docs PART=exploration`: every explored configuration on the real views, half of GSCore's cycles, and the charts of speed against accuracy.
 
 All configurations of the report are needed, since the chart shows them: about 20 minutes the first time, later out of the store that
 `flicker report` and sweeps share.
@@ -15,13 +15,13 @@ from flicker.cost.area import lane_stage_parts
 from flicker.explore.configurations import EXPLORED, get_configuration, group
 from flicker.perf.lane_stage import LaneStage
 from flicker.report.collect import ViewResult
-from flicker.report.figures import speed_accuracy
+from flicker.report.figures import speed_accuracy, speed_area_accuracy
 from flicker.scene.real import REAL_VIEWS
 from flicker.toolchain import ROOT
 
 from .common import Measured, Rows, Say, measure, significant
 
-CHART = ROOT / "docs" / "images" / "speed_accuracy.png"
+IMAGES = ROOT / "docs" / "images"
 PLAIN = 58.0  # dB: what is no worse than this counts as as good as GSCore
 
 
@@ -75,14 +75,15 @@ def halves(views: Rows) -> str:
 
 
 def draw(say: Say) -> str:
-    """The chart of the report, of the real views."""
+    """The charts of the report, of the real views."""
     names = group("report")
     views = [ViewResult(measured.target, measured.rows(names, say)) for measured in map(Measured, REAL_VIEWS)]
+    figures = [speed_accuracy(views), speed_area_accuracy(views)]
     with tempfile.TemporaryDirectory() as folder:
-        figure = speed_accuracy(views)
-        figure.write(Path(folder))
-        shutil.copy(Path(folder) / f"{figure.name}.png", CHART)
-    return str(CHART.relative_to(ROOT))
+        for figure in figures:
+            figure.write(Path(folder))
+            shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
+    return ", ".join(str((IMAGES / f"{figure.name}.png").relative_to(ROOT)) for figure in figures)
 
 
 def tables(say: Say) -> dict[str, str]:

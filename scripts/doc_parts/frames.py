@@ -1,16 +1,19 @@
-"""`make docs PART=frames`: few configurations on the real views, for README.md, and the way from the default to `lanes` in docs/exploration.md."""
+"""`make docs PART=frames`: few configurations on the real views, for README.md, and the way from the default to lanes in docs/exploration.md."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from flicker import markdown
 from flicker.explore.configurations import get_configuration, group
 from flicker.explore.machine import Configuration
 from flicker.explore.stages.lanes import Lanes
+from flicker.explore.stages.log_lanes import LogLanes
 
 from .areas import generator_errors
 from .common import Rows, Say, measure, significant
 
-SUMMARY, ABLATION = "summary", "ablation"
+SUMMARY, ABLATION, DEEPER = "summary", "ablation", "deeper FIFOs"
 LISTS = {
     "subtile": "3-sigma boxes", "tile": "boxes on 16x16 tiles", "obb": "oriented boxes",
     "reach": "the box of alpha = 1/255, made on the host in float64", "ellipse": "the ellipse of alpha = 1/255, made on the host in float64",
@@ -18,7 +21,8 @@ LISTS = {
 CHANGES = {
     "lists": "lists", "generator": "mask generator", "masks": "masks name pixels, VRUs visit pixels", "stop": "early exit", "stage": "rendering stage",
     "window": "entries in which a lane looks for its next pixel", "accumulator": "accumulators with their loop", "fifo_depth": "FIFO depth",
-    "width": "elements a cycle", "vrus_per_channel": "VRUs", "lanes": "VRUs", "loop": "loop of a pixel",
+    "width": "elements a cycle", "vrus_per_channel": "VRUs", "lanes": "VRUs", "in_width": "elements a cycle", "slots": "splats in the store",
+    "loop": "loop of a pixel",
 }
 
 
@@ -75,8 +79,8 @@ def summary(views: Rows) -> str:
 def differences(a: Configuration, b: Configuration) -> list[str]:
     """What changes from one configuration to the other, keys of CHANGES: lists, generator, stop, the stage's kind, fields that both stages have.
 
-    Three pairs are one change: masks that name pixels need a stage that visits pixels (`masks`), accumulators bring the loop that they allow, and lanes
-    leave a finished list of themselves, so that `stop` ends with them.
+    Four pairs are one change: masks that name pixels need a stage that visits pixels (`masks`), accumulators bring the loop that they allow, lanes leave a
+    finished list of themselves, so that `stop` ends with them, and those in the log domain have masks of their own sums.
     """
     found = [name for name in ("lists", "generator", "stop") if getattr(a, name) != getattr(b, name)]
     before, after = a.stage, b.stage
@@ -85,6 +89,8 @@ def differences(a: Configuration, b: Configuration) -> list[str]:
         fields.remove("loop")
     if isinstance(after, Lanes) and not isinstance(before, Lanes) and "stop" in found and a.stop:
         found.remove("stop")
+    if isinstance(after, LogLanes) and not isinstance(before, LogLanes) and "generator" in found:
+        found.remove("generator")
     if type(before) is not type(after):
         if a.generator.pixels == b.generator.pixels or "generator" not in found or isinstance(after, Lanes) or isinstance(before, Lanes):
             fields.append("stage")
@@ -93,11 +99,11 @@ def differences(a: Configuration, b: Configuration) -> list[str]:
     return found + fields
 
 
-def ablation(views: Rows) -> str:
-    """From the default to lanes, cycles and energy of each step over those of the step before."""
+def ablation(views: Rows, names: Sequence[str]) -> str:
+    """From the default to lanes, and to deeper FIFOs: cycles and energy of each step over those of the step before."""
     rows = []
     before: str | None = None
-    for name in group(ABLATION):
+    for name in names:
         configuration = get_configuration(name)
         cells = []
         for found in views.values():
@@ -111,5 +117,5 @@ def ablation(views: Rows) -> str:
 
 
 def tables(say: Say) -> dict[str, str]:
-    views = measure([*group(SUMMARY), *group(ABLATION)], say)
-    return {"summary": summary(views), "ablation": ablation(views)}
+    views = measure(list(dict.fromkeys([*group(SUMMARY), *group(ABLATION), *group(DEEPER)])), say)
+    return {"summary": summary(views), "ablation": ablation(views, group(ABLATION)), "deeper": ablation(views, group(DEEPER))}

@@ -1,14 +1,25 @@
-"""`make docs PART=lanes`: lanes in the log domain, in docs/lanes.md: where the dB go, number formats, masks, counts, hard inputs."""
+"""`make docs PART=lanes`: lanes in the log domain, in docs/lanes.md: where the dB go, number formats and what a lane of them costs, masks, counts,
+hard inputs."""
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from zlib import crc32
 
+import lane_picture
+import matplotlib.pyplot as plt
 import numpy as np
+from gen_params import lane_package
 
+from flicker.cost.synth.gates import DEFAULT_LIBERTY
+from flicker.errors import FlickerError
 from flicker.explore.stability import FAMILIES
 from flicker.front.projection import Projected
 from flicker.front.records import LOG2E, SubtileLists
@@ -25,15 +36,18 @@ from flicker.golden.lanes.render import LaneFrame, render_lanes
 from flicker.markdown import table
 from flicker.params import LANE_COUNTS, Form
 from flicker.pipeline import packed_scene
+from flicker.report.figures import COLOURS, STYLE
 from flicker.scene.metrics import psnr
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
+from flicker.toolchain import ROOT, filelist
 
 from .common import Say, load
 
 SEED = 1
 LISTS = {"subtile": "3-sigma boxes on 8x8", "ellipse": "ellipse alpha = 1/255 in these boxes", "tile": "INRIA's squares on 16x16"}
 COLOUR_BITS = 10
+CHART = ROOT / "docs" / "images" / "lane_formats.png"
 EQUAL = 200.0  # dB: what is left is the rounding of float64
 D = FORMATS
 # The default; what the design began with; one number changed at a time.
@@ -43,7 +57,8 @@ TRIED = tuple(dict.fromkeys((
     LaneFormats(uv=8, log=8, sum=10, mantissa=7, pieces=0),
     *(replace(D, uv=b) for b in (7, 8, 10)), *(replace(D, log=b) for b in (7, 8, 10)), *(replace(D, sum=b) for b in (11, 12, 14, 20)),
     *(replace(D, pieces=b) for b in (0, 2, 3, 5)), *(replace(D, mantissa=b) for b in (7, 8, 9, 11)), *(replace(D, accumulator=b) for b in (11, 12, 13, 16)),
-    replace(D, guard=6),
+    replace(D, guard=6), LaneFormats(uv=8, log=8, sum=12, mantissa=9), LaneFormats(uv=8, log=8, sum=16, mantissa=10),
+    LaneFormats(uv=8, log=8, sum=12, mantissa=8, accumulator=13),
 )))
 NAMED = ("layers", "faint", "opaque")
 NARROWER = (D, replace(D, mantissa=9), replace(D, uv=8), replace(D, log=8), replace(D, uv=8, log=8), replace(D, uv=8, log=8, mantissa=9),
@@ -94,14 +109,63 @@ def bits(formats: LaneFormats) -> tuple[int, int, int]:
     return products, entries, 4 + f.sum + 3 * (2 + f.accumulator)
 
 
+# Synthesis with another file list, in a process of its own: the flow runs Yosys, whose state is global.
+_SYNTHESISE = "import sys; from pathlib import Path; from flicker.cost.synth import flow; flow.FILELIST = Path(sys.argv.pop()); sys.exit(flow.main())"
+
+
+def lane_area(formats: LaneFormats) -> tuple[float, float] | None:
+    """GE and longest path in FO4 of one lane of eight pixels, synthesised in these formats; None for formats that the RTL does not have."""
+    try:
+        package = lane_package(formats)
+    except FlickerError:
+        return None
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "flk_lane_pkg.sv").write_text(package)
+        files = [folder / path.name if path.name == "flk_lane_pkg.sv" else path for path in filelist()]
+        (folder / "flk.f").write_text("".join(f"{path}\n" for path in files))
+        job = {"action": "synthesise", "top": "flk_lane", "parameters": {}, "extra": [], "boxes": [], "children": {}, "child_parameters": {},
+               "liberty": str(DEFAULT_LIBERTY.resolve()), "results": name, "open": []}
+        (folder / "job.json").write_text(json.dumps(job))
+        done = subprocess.run([sys.executable, "-c", _SYNTHESISE, str(folder / "job.json"), str(folder / "flk.f")], capture_output=True, text=True)
+        error = folder / "error"
+        if done.returncode or error.exists():
+            raise FlickerError(f"lanes, {formats.name}: {error.read_text() if error.exists() else done.stderr}")
+        result = json.loads((folder / "result.json").read_text())
+    return result["ge_comb"] + result["ge_seq"], result["paths"][0]["fo4"]
+
+
 def format_rows(seen: list[Seen], say: Say) -> list[tuple[str, ...]]:
-    rows = []
+    """PSNR and size of all formats that were tried; draws `CHART` of those that the RTL has."""
+    rows, built = [], []
     for formats in TRIED:
         say(formats.name)
         name = formats.name + (f", guard {formats.guard}" if formats.guard != D.guard else "")
-        cells = [one.decibel(render_lanes(one.lists, formats)) for one in seen]
-        rows.append((f"**{name}**" if formats is D else name, *cells, *(f"{n:,}" for n in bits(formats))))
+        frames = [render_lanes(one.lists, formats) for one in seen]
+        area = lane_area(formats)
+        if area is not None:
+            built.append((area[0], min(psnr(frame.image(), one.records) for frame, one in zip(frames, seen)), formats))
+        size = ("", "") if area is None else (f"{area[0]:,.0f}", f"{area[1]:.0f}")
+        cells = [one.decibel(frame) for frame, one in zip(frames, seen)]
+        rows.append((f"**{name}**" if formats is D else name, *cells, *size, *(f"{n:,}" for n in bits(formats))))
+    _draw(built)
     return rows
+
+
+def _draw(built: list[tuple[float, float, LaneFormats]]) -> None:
+    """Area of a lane against the least PSNR of its arithmetic, with the formats that no other beats in both."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+        front = {i for i, (area, db, _) in enumerate(built) if not any(a <= area and b >= db and (a, b) != (area, db) for a, b, _ in built)}
+        for i, (area, db, formats) in enumerate(built):
+            axes.plot(area / 1000, db, "o" if formats is D else ".", color=COLOURS[1] if formats is D else COLOURS[0] if i in front else COLOURS[7])
+            if i in front or formats is D:
+                axes.annotate(formats.name, (area / 1000, db), fontsize=6, xytext=(4, -7), textcoords="offset points")
+        line = sorted(built[i][:2] for i in front)
+        axes.plot([area / 1000 for area, _ in line], [db for _, db in line], "-", color=COLOURS[0], linewidth=0.8)
+        axes.set(xlabel="one lane of eight pixels, thousand GE", ylabel="least PSNR of four views against the same records in float64, dB")
+        figure.savefig(CHART, dpi=130, metadata={"Software": None})
+        plt.close(figure)
 
 
 def mask_rows(seen: list[Seen], say: Say) -> list[tuple[str, ...]]:
@@ -184,6 +248,12 @@ def family_rows(say: Say) -> list[tuple[str, ...]]:
     return rows
 
 
+def draw(say: Say) -> str:
+    """The picture that explains the arithmetic."""
+    say("picture")
+    return lane_picture.draw()
+
+
 def tables(say: Say) -> dict[str, str]:
     seen, parts = [], []
     for real in REAL_VIEWS:
@@ -195,7 +265,7 @@ def tables(say: Say) -> dict[str, str]:
     titles = [one.title for one in seen]
     return {
         "breakdown": table(["view", "records from", "exact, float64", "records, float64", "lanes", "lanes, s"], parts),
-        "formats": table(["u, v / La / S, h; weight; colour", *titles, "multipliers", "tables", "state"], format_rows(seen, say)),
+        "formats": table(["u, v / La / S, h; weight; colour", *titles, "lane, GE", "FO4", "multipliers", "tables", "state"], format_rows(seen, say)),
         "families": table(["u, v / La / S, h; weight; colour", *(f"`{name}`" for name in NAMED)], family_rows(say)),
         "masks": table(["fraction bits", "bits of the root's address", *titles], mask_rows(seen, say)),
         "counts": table(

@@ -3,7 +3,8 @@
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
-Parameter space: the default stage. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw; with SLOW=1 real scenes and every other build of the stage.
+Parameter space: a stage of 32 lanes; with SLOW=1 of channels too, with modes that travel with their frame, and real scenes (tb/frames/test_rendering.py has
+the rendering half with channels every time). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, Outcome, run_front
-from flicker.params import CHANNEL_COUNTERS, CORE_COUNTERS, CORES, CatMode, RenderConfig
+from flicker.golden.lanes.lists import front_lists
+from flicker.params import CORES, CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -39,7 +41,8 @@ from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import CHANNELS, Order, PortConfig, WriteOrder
 
 LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
-CONFIG = RenderConfig()
+CONFIG = RenderConfig(stage="lanes")
+CHANNELS_CONFIG = RenderConfig()
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
     (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders
@@ -62,17 +65,17 @@ def small(count: int = 500) -> PackedScene:
 
 def golden(packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8) -> tuple[FrontFrame, GoldenFrame]:
     front = run_front(packed, view)
-    return front, render_chip(front.subtile_lists(), config, format_, BLUE)
+    return front, render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config, format_, BLUE)
 
 
 def session(packed: PackedScene | None = None, **options) -> ChipSession:
     return ChipSession(small() if packed is None else packed, options.pop("config", CONFIG), seed=seed(), **options)
 
 
-def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8) -> ChipFrame:
+def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> ChipFrame:
     """A frame by itself, with its front end's counters."""
     done = chip.render(view, format_, background=BLUE, limit=LIMIT)
-    compare(chip, view, done, format_)
+    compare(chip, view, done, format_, config)
     return done
 
 
@@ -91,26 +94,27 @@ def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelForm
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
     # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i is of sorting
     # unit i mod 4, which delivers what the core that needs most of the tile's list needs.
-    taken, lists = done.stage[:, [name for name, _ in CORE_COUNTERS].index("gaussians_in")], want.frame.lists
+    counters = params.STAGES[config.stage].counters
+    taken, lists = done.stage[:, counters.index("gaussians_in")], want.frame.lists
     lengths, needed = (of_cores(values, lists.cols) for values in (np.diff(lists.start), want.frame.needed))
-    assert may_be_given(taken, lengths, needed, config.cat == CatMode.AUTO and config.mask_generator == "ctu").all(), (taken, needed, lengths)
+    whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu" and not config.by_lanes
+    assert may_be_given(taken, lengths, needed, whole).all(), (taken, needed, lengths)
     delivered = np.asarray(done.rendering["entries"])
     least = want.frame.needed.reshape(lists.rows // 2, 2, lists.cols // 2, 2).max(axis=(1, 3)).ravel()
     assert all(delivered[k] >= least[k::4].sum() for k in range(4)), (delivered, least)
     assert taken.sum() <= CORES * delivered.sum() and delivered.sum() <= counts["entries"]
-    for number, (name, _) in enumerate(CHANNEL_COUNTERS):
-        if name not in ("minitiles_sent", "pixels_finished"):
-            continue
-        words = [len(CORE_COUNTERS) + len(CHANNEL_COUNTERS) * c + number for c in range(params.CHANNELS)]
-        assert done.stage[:, words].sum() == want.frame.total(name)
+    for name in ("blended", "pixels_finished") if config.by_lanes else ("minitiles_sent", "pixels_finished"):
+        words = [k for k, counter in enumerate(counters) if counter.split()[-1] == name]
+        assert words and done.stage[:, words].sum() == want.frame.total(name), name
     assert done.stamps["taken"] < done.stamps["front_done"] < done.stamps["rendering_start"] < done.stamps["rendering_done"]
 
 
-def test_demo_scene() -> None:
+@pytest.mark.parametrize("config", [CONFIG, pytest.param(CHANNELS_CONFIG, marks=pytest.mark.slow)], ids=lambda c: c.stage)
+def test_demo_scene(config: RenderConfig) -> None:
     view = load_view(DEMO, 0, (160, 90))
     packed = packed_scene(view, PackedFormat.CHUNK)
-    with session(packed) as chip:
-        done = check(chip, view.camera)
+    with session(packed, config=config) as chip:
+        done = check(chip, view.camera, config=config)
         assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
         traffic = chip.purposes()
         assert traffic["table"].read_bytes and traffic["records"].write_bytes and not any(t.errors for t in traffic.values())
@@ -165,9 +169,10 @@ def test_back_to_back(overlap: bool) -> None:
         assert chip.field("frames", "started") == chip.field("frames", "finished") == 4
 
 
-def test_modes_travel_with_their_frame() -> None:
-    """Two frames under way, the second one's mode, format and background written while the first is rendered."""
-    with session() as chip:
+@pytest.mark.parametrize("config", [CONFIG, pytest.param(CHANNELS_CONFIG, marks=pytest.mark.slow)], ids=lambda c: c.stage)
+def test_modes_travel_with_their_frame(config: RenderConfig) -> None:
+    """Two frames under way, the second one's mode (which lanes do not have), format and background written while the first is rendered."""
+    with session(config=config) as chip:
         view = camera()
         first = chip.frame(view, chip.place(view), background=BLUE, tag=1)
         second = chip.frame(view, chip.place(view, PixelFormat.RGBA16F), PixelFormat.RGBA16F, tag=2)
@@ -176,8 +181,8 @@ def test_modes_travel_with_their_frame() -> None:
         while not chip.field("status", "render_busy"):
             chip.step(50)
         chip.start(second, first)
-        compare(chip, view, chip.finish(first, LIMIT))
-        compare(chip, view, chip.finish(second, LIMIT), PixelFormat.RGBA16F, replace(CONFIG, cat=CatMode.OFF))
+        compare(chip, view, chip.finish(first, LIMIT), config=config)
+        compare(chip, view, chip.finish(second, LIMIT), PixelFormat.RGBA16F, replace(config, cat=CatMode.OFF))
 
 
 def test_registers_in_mid_frame() -> None:
@@ -411,16 +416,17 @@ def test_silent_memory(channel: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("config", [CONFIG, CHANNELS_CONFIG], ids=lambda c: c.stage)
 @pytest.mark.parametrize("real,size", LARGE, ids=lambda value: value.folder if isinstance(value, RealView) else f"{value[0]}x{value[1]}")
-def test_real_scenes(real: RealView, size: tuple[int, int]) -> None:
+def test_real_scenes(real: RealView, size: tuple[int, int], config: RenderConfig) -> None:
     """With LPDDR4: all at 320x180, two at 640x360, flowers at 1280x720 (some 15 minutes)."""
     scenes = real_scenes()
     if scenes is None:
         pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
     view = load_view(real.path(scenes), real.number, size)
-    with session(packed_scene(view, PackedFormat.CHUNK), memory=MemoryOptions(DramConfig().timing)) as chip:
+    with session(packed_scene(view, PackedFormat.CHUNK), config=config, memory=MemoryOptions(DramConfig().timing)) as chip:
         done = chip.render(view.camera, background=BLUE)
-        compare(chip, view.camera, done)
+        compare(chip, view.camera, done, config=config)
 
 
 def test_strides_and_places() -> None:

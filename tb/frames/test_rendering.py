@@ -3,8 +3,8 @@
 State space: the demo scene, both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing, frames one after the other, an odd
 number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: a stage of 32 lanes; with SLOW=1 64 and 128 of them, and channels with every mode, one, two and four VRUs, without a contribution test
-(tb/frames/test_chip_frames.py has the default stage every time); `faithful` wants records of 32 bytes, which only the golden
+Parameter space: channels with two VRUs; with SLOW=1 every mode, one and four VRUs, no contribution test, and 32, 64 and 128 lanes
+(tb/frames/test_chip_frames.py has the chip with lanes every time); `faithful` wants records of 32 bytes, which only the golden
 front end makes. Not covered: resets within a frame.
 """
 
@@ -39,8 +39,8 @@ from flicker.sim.memory import PortConfig
 from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, regions, rendering_rtl
 
 LIMIT = 1_000_000  # a frame that hangs says so within minutes
-CONFIG = RenderConfig(stage="lanes")
-CHANNELS = RenderConfig()
+CONFIG = RenderConfig()
+LANES = RenderConfig(stage="lanes")
 LAYERS = 6000
 
 
@@ -168,19 +168,19 @@ def test_nothing_visible() -> None:
 def test_modes() -> None:
     """Every mode of the contribution test, the automatic one over sub-tiles that the picture lacks too."""
     for mode in CatMode:
-        check((80, 40), CHANNELS.with_(cat=mode))
+        check((80, 40), CONFIG.with_(cat=mode))
 
 
 @pytest.mark.slow
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
-    check((96, 54), CHANNELS.with_(cat=CatMode.AUTO), scene="demo", frames=2)
+    check((96, 54), CONFIG.with_(cat=CatMode.AUTO), scene="demo", frames=2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [
-    CHANNELS, CHANNELS.with_(vrus_per_channel=1), CHANNELS.with_(vrus_per_channel=4), CHANNELS.with_(mask_generator="all", cat=CatMode.OFF),
-    CONFIG.with_(lanes=64), CONFIG.with_(lanes=128),
+    CONFIG.with_(vrus_per_channel=1), CONFIG.with_(vrus_per_channel=4), CONFIG.with_(mask_generator="all", cat=CatMode.OFF),
+    LANES, LANES.with_(lanes=64), LANES.with_(lanes=128),
 ], ids=lambda c: "-".join(map(str, c.chip_parameters().values())))
 def test_stages(config: RenderConfig) -> None:
     """Other stages: pixels leave in another order, sub-tiles finish at other times."""

@@ -63,7 +63,7 @@ def test_options_reach_the_engine(demo, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(path.read_text())
 
-    base = run()
+    base = run("--stage", "channels")
     assert (base["form"], base["precision"], base["cat"], base["fifo_depth"]) == ("factored", "fixed", "smooth", 16)
     faithful = run("--faithful")
     assert (faithful["form"], faithful["precision"], faithful["cat"], faithful["fifo_depth"]) == ("conic", "mixed", "smooth", 16)
@@ -108,7 +108,7 @@ def test_scenes_as_people_have_them(demo, tmp_path):
 
     found = {name: run(tmp_path / name) for name in ("robot", "robot/meta.json", "robot.zip", "robot.ply")}
     stats = [f[0] for f in found.values()]
-    for key in ("gaussians", "visible", "subtile_pairs", "minitiles_sent", "picture"):
+    for key in ("gaussians", "visible", "subtile_pairs", "pixel_pairs", "picture"):
         assert all(s[key] == stats[0][key] for s in stats)
     assert stats[0]["gaussians"] == 300
     assert "robot, view 0" in found["robot"][1] and "robot, view 0" in found["robot/meta.json"][1]

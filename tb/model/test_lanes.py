@@ -498,11 +498,13 @@ def test_command(tmp_path):
         assert np.array_equal(stats["picture"], found[32]["picture"]) and stats["lanes"]["least_cycles"] == -(-visited // n)
         assert stats["lanes"] | {"lanes": 0, "least_cycles": 0} == found[32]["lanes"] | {"lanes": 0, "least_cycles": 0}
     assert f"{visited:,}" in found[32]["text"] and found[32]["formats"] == FORMATS.name
-    assert run("--stage", "lanes")["lanes"]["lanes"] == 32 and run()["stage"] == "channels"
+    assert run()["lanes"]["lanes"] == 32 and run("--lanes", "64")["stage"] == "lanes"
+    assert all(run(*args)["stage"] == "channels" for args in (("--stage", "channels"), ("--cat", "off"), ("--faithful",), ("--form", "conic")))
     chip, golden = run("--stage", "lanes", "--engine", "chip-golden"), run("--stage", "lanes", "--front", "golden")
     assert chip["lanes"]["visited"] == golden["lanes"]["visited"] and np.array_equal(chip["picture"], golden["picture"])
     for args, named in (
-        (("--lanes", "32"), "--lanes: for --stage lanes only"), (("--stage", "lanes", "--lanes", "33"), "lanes must be 32, 64 or 128, not 33"),
+        (("--stage", "channels", "--lanes", "32"), "--lanes: for --stage lanes only"), (("--lanes", "32", "--cat", "off"), "--cat"),
+        (("--stage", "lanes", "--lanes", "33"), "lanes must be 32, 64 or 128, not 33"),
         (("--stage", "lanes", "--engine", "reference"), "not for --engine reference"),
         (("--stage", "lanes", "--cat", "off", "--precision", "fp8"), "--cat, --precision"),
         (("--stage", "lanes", "--form", "conic"), "--form conic"), (("--stage", "lanes", "--faithful"), "--faithful"),

@@ -292,11 +292,14 @@ def test_bounds_stand_in_no_front():
     figure = figures.speed_accuracy([view])
     column = {name: figure.header.index(name) for name in figure.header}
     fronts = {
-        which: {row[column["config"]] for row in figure.rows if row[column[which]]} for which in ("pareto_cycles_psnr", "pareto_of_rtl")
+        which: {row[column["config"]] for row in figure.rows if row[column[which]]} for which in ("pareto", "pareto_of_rtl")
     }
-    assert fronts == {"pareto_cycles_psnr": {"lanes"}, "pareto_of_rtl": {"flicker", "no-ctu-64"}}
+    assert fronts == {"pareto": {"lanes"}, "pareto_of_rtl": {"flicker", "no-ctu-64"}}
     points = json.loads(page._points([view]))["one 0"]
     assert {p["config"] for p in points if p["bound"]} == {"oracle"}
+    view.rows["lanes"]["area_ge"] = 4.0
+    rows = figures.speed_area_accuracy([view]).rows
+    assert {row[column["config"]] for row in rows if row[column["pareto"]]} == {"flicker", "no-ctu-64", "lanes"}  # now it costs 8, and 4 and 3 do the others
 
 
 def test_verdicts_are_computed():

@@ -11,7 +11,19 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from ..params import FAITHFUL, LANE_COUNTS, MAX_FIFO_DEPTH, MAX_LANE_ENTRIES, STAGES, CatMode, Coords, Form, Precision, RenderConfig
+from ..params import (
+    FAITHFUL,
+    LANE_COUNTS,
+    MAX_FIFO_DEPTH,
+    MAX_LANE_ENTRIES,
+    RECOMMENDED,
+    STAGES,
+    CatMode,
+    Coords,
+    Form,
+    Precision,
+    RenderConfig,
+)
 from .options import RichSteps, console, parse_size, writable, write_atomically
 
 
@@ -101,15 +113,21 @@ def summary(stats: dict, picture: Path | None) -> Table:
     return table
 
 
-def _check_lanes(engine: Enum, given: dict[str, object]) -> None:
-    """Refuse what the stage `lanes` does not go with."""
-    if engine is EngineChoice.REFERENCE:
-        raise FlickerError("--stage lanes: not for --engine reference, which has no stage")
-    names = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
+def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str, object]) -> str:
+    """The stage that the options mean; raises where they contradict each other. given: options by name, None: not given."""
+    of_channels = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
     if given["form"] is FormChoice["CONIC"]:
-        names.append("--form conic")
-    if names:
-        raise FlickerError(f"--stage lanes: takes records of 16 bytes and has no contribution test, so it cannot be combined with {', '.join(names)}")
+        of_channels.append("--form conic")
+    if stage is None:
+        stage = StageChoice.CHANNELS if lanes is None and (of_channels or engine is EngineChoice.REFERENCE) else StageChoice(RECOMMENDED.stage)
+    if stage is not StageChoice.LANES:
+        if lanes is not None:
+            raise FlickerError("--lanes: for --stage lanes only")
+    elif engine is EngineChoice.REFERENCE:
+        raise FlickerError("--stage lanes: not for --engine reference, which has no stage")
+    elif of_channels:
+        raise FlickerError(f"--stage lanes: takes records of 16 bytes and has no contribution test, so it cannot be combined with {', '.join(of_channels)}")
+    return stage.value
 
 
 def render(
@@ -124,9 +142,10 @@ def render(
     )] = None,
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
-    stage: Annotated[StageChoice, typer.Option(
-        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain",
-    )] = StageChoice.CHANNELS,
+    stage: Annotated[StageChoice | None, typer.Option(
+        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
+             f"[default: {RECOMMENDED.stage}, but channels with an option that only they have]",
+    )] = None,
     lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
@@ -154,11 +173,7 @@ def render(
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
-    by_lanes = stage is StageChoice.LANES
-    if lanes is not None and not by_lanes:
-        raise FlickerError("--lanes: for --stage lanes only")
-    if by_lanes:
-        _check_lanes(engine, {**given, "faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords})
+    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
     base = FAITHFUL if faithful else RenderConfig()
     config = base.with_(
         cat=CatMode[cat.name] if cat else base.cat,
@@ -166,7 +181,7 @@ def render(
         form=Form[form.name] if form else base.form,
         fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
         coords=Coords[coords.name],
-        stage=stage.value,
+        stage=_stage(stage, engine, lanes, of_stage),
         lanes=base.lanes if lanes is None else lanes,
     )
     if out is not None and out.suffix.lower() != ".png":
@@ -221,8 +236,8 @@ def demo(
     view = load_view(scene_path, 0, wanted, cameras_path)
     with steps.step("rendering the float64 reference (compiling on the first run)"):
         _ = view.reference
-    golden = render_on_chip(view, Engine.CHIP_GOLDEN, compare=True, steps=steps)
-    rtl = render_on_chip(view, Engine.CHIP, compare=True, steps=steps)
+    golden = render_on_chip(view, Engine.CHIP_GOLDEN, config=RECOMMENDED, compare=True, steps=steps)
+    rtl = render_on_chip(view, Engine.CHIP, config=RECOMMENDED, compare=True, steps=steps)
     if not (golden.image == rtl.image).all():
         raise FlickerError("demo: the chip's picture differs from its golden model's")
     picture = folder / "demo.png"

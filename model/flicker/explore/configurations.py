@@ -42,11 +42,13 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "lanes": ("lanes", "lanes-deep", "lanes-64", "oracle-lanes"),
     "lanes in the log domain, RTL": ("log-lanes", "log-lanes-64", "log-lanes-128"),
     "accumulators": ("lanes-fp16", "lanes-acc10", "lanes-acc12", "lanes-acc16", "lanes-acc20"),
-    # from the default to lanes and on to lanes-deep; each step changes one thing (tb/model/test_configurations.py)
+    # from the default to lanes in the log domain; each step changes one thing (tb/test_docs.py)
     "ablation": (
-        "flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-stop", "lanes-fp16-window-1", "lanes-fp16", "lanes", "lanes-fifo-40",
-        "lanes-fifo-40-window-3", "lanes-deep",
+        "flicker", "exact", "rows-minitile", "rows", "rows-ellipse", "rows-ellipse-stop", "lanes-fp16-window-1", "lanes-fp16", "lanes", "log-lanes-one",
+        "log-lanes", "log-lanes-64",
     ),
+    # from lanes with FIFOs of whole records to lanes-deep, likewise
+    "deeper FIFOs": ("lanes", "lanes-fifo-40", "lanes-fifo-40-window-3", "lanes-deep"),
     # whole-frame estimates, figure 10
     "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "lanes", "lanes-64"),
     # docs/energy.md

@@ -6,7 +6,7 @@ import base64
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -448,17 +448,28 @@ def is_bound(name: str) -> bool:
     return configuration is not None and configuration.generator.free
 
 
-# What speed_accuracy draws: label, marker, colour, which points.
+# What the charts of all configurations draw: label, marker, colour, which points.
 KINDS = (
     ("RTL exists", "o", COLOURS[0], lambda p: not p["model_only"]),
     ("model only", "^", COLOURS[1], lambda p: p["model_only"] and not is_bound(p["config"])),
     ("bound: masks for free", "x", COLOURS[7], lambda p: is_bound(p["config"])),
 )
-NAMED = ("vanilla", "gscore", "no-ctu-32", "no-ctu-64", "faithful", "flicker")  # written beside their points, besides the front's
+NAMED = ("vanilla", "gscore", "no-ctu-32", "faithful", "flicker", "log-lanes", "log-lanes-128")  # written beside their points, besides the front's
 
 
-def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
-    """Every configuration a point: speed against accuracy, Pareto fronts of everything and of what exists as RTL, per view and over all."""
+def _cycles(point: dict) -> float:
+    return float(point["cycles"])
+
+
+def _cycles_area(point: dict) -> float:
+    return point["cycles"] * point["area_ge"] / 1e6
+
+
+def _cloud(views: Sequence[ViewResult], name: str, title: str, note: str, cost: Callable[[dict], float], label: str) -> Figure:
+    """Every configuration a point: a cost against accuracy, Pareto fronts of everything and of what exists as RTL, per view and over all.
+
+    cost: of a row of results; label: of its axis, for millions of it.
+    """
     groups = {v.target.title: list(v.rows.values()) for v in views}
     if len(views) > 1:
         groups["all views"] = overall(views)
@@ -468,11 +479,11 @@ def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
     for a in grid.flat[len(groups) :]:
         a.axis("off")
     rows = []
-    for a, (title, points) in zip(grid.flat, groups.items()):
-        values = [(float(p["cycles"]), _finite(float(p["psnr_db"]))) for p in points]
-        for label, marker, colour, choose in KINDS:
+    for a, (head, points) in zip(grid.flat, groups.items()):
+        values = [(cost(p), _finite(float(p["psnr_db"]))) for p in points]
+        for kind, marker, colour, choose in KINDS:
             chosen = [v for v, p in zip(values, points) if choose(p)]
-            a.plot([v[0] for v in chosen], [v[1] for v in chosen], marker, color=colour, markersize=4, alpha=0.8, label=label)
+            a.plot([v[0] for v in chosen], [v[1] for v in chosen], marker, color=colour, markersize=4, alpha=0.8, label=kind)
         built = [i for i, p in enumerate(points) if not is_bound(p["config"])]
         front = [built[k] for k in pareto([values[i] for i in built])]
         real = [i for i in built if not points[i]["model_only"]]
@@ -480,19 +491,28 @@ def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
         a.plot([values[i][0] for i in front], [values[i][1] for i in front], "-", color="black", linewidth=0.8, label="Pareto front")
         a.plot([values[i][0] for i in real_front], [values[i][1] for i in real_front], "-", color=COLOURS[0], linewidth=0.8, label="of the RTL")
         named = {points[i]["config"]: i for i in built if points[i]["config"] in NAMED} | {points[i]["config"]: i for i in (*front[:1], *front[-1:])}
-        for name, i in named.items():
-            a.annotate(name, values[i], fontsize=6, xytext=(3, 4 if i == front[0] else -7), textcoords="offset points")
-        a.set(xscale="log", xlabel="cycles, millions", ylabel="PSNR against float64, dB", title=title)
+        for config, i in named.items():
+            a.annotate(config, values[i], fontsize=6, xytext=(3, 4 if i == front[0] else -7), textcoords="offset points")
+        a.set(xscale="log", xlabel=label, ylabel="PSNR against float64, dB", title=head)
         a.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        a.xaxis.set_major_formatter(FuncFormatter(lambda cycles, _: f"{cycles / 1e6:g}"))
+        a.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 1e6:g}"))
         a.xaxis.set_minor_formatter(NullFormatter())
-        rows += [[title, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front, i in real_front]
+        rows += [[head, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front, i in real_front]
                  for i, p in enumerate(points)]
     grid.flat[0].legend(fontsize=6)
-    return Figure(
-        "speed_accuracy", "Speed against accuracy", "", "Over all views: geometric mean of cycles and energy, mean of PSNR, SSIM and FLIP.",
-        ["group", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only", "pareto_cycles_psnr", "pareto_of_rtl"], rows, figure,
-    )
+    header = ["group", "config", "cycles", "psnr_db", "ssim", "flip", "area_ge", "energy_uj", "model_only", "pareto", "pareto_of_rtl"]
+    return Figure(name, title, "", f"{note} Over all views: geometric mean of cycles and energy, mean of PSNR, SSIM and FLIP.".strip(), header, rows, figure)
+
+
+def speed_accuracy(views: Sequence[ViewResult]) -> Figure:
+    """Cycles against accuracy."""
+    return _cloud(views, "speed_accuracy", "Speed against accuracy", "", _cycles, "cycles, millions")
+
+
+def speed_area_accuracy(views: Sequence[ViewResult]) -> Figure:
+    """Cycles times area against accuracy, so that builds of different size compare."""
+    note = "The area that a frame keeps busy for how long: half the cycles on twice the area is no gain."
+    return _cloud(views, "speed_area_accuracy", "Cycles times area against accuracy", note, _cycles_area, "cycles times area, million cycles of a million GE")
 
 
 def paper_figures(views: Sequence[ViewResult], areas: dict[tuple[str, str], float]) -> list[Figure]:
@@ -502,7 +522,7 @@ def paper_figures(views: Sequence[ViewResult], areas: dict[tuple[str, str], floa
         return [f for f in made if f is not None] + [area(areas)]
 
 
-def own_figures(views: Sequence[ViewResult]) -> tuple[Figure, list[Figure]]:
-    """Speed against accuracy, and the heat maps of every view."""
+def own_figures(views: Sequence[ViewResult]) -> tuple[list[Figure], list[Figure]]:
+    """Speed, and speed times area, against accuracy; and the heat maps of every view."""
     with plt.rc_context(STYLE):
-        return speed_accuracy(views), [f for f in map(heat, views) if f is not None]
+        return [speed_accuracy(views), speed_area_accuracy(views)], [f for f in map(heat, views) if f is not None]

@@ -2,13 +2,16 @@
 const AXES = {
   cycles: ["cycles of the rendering stage", false, true], fps: ["FPS at 1 GHz", true, true], psnr_db: ["PSNR, dB", true, false], ssim: ["SSIM", true, false],
   flip: ["FLIP", false, false], photo_psnr_db: ["PSNR against photographs, dB", true, false], photo_ssim: ["SSIM against photographs", true, false],
-  area_ge: ["area, GE", false, false], energy_uj: ["energy, uJ a frame", false, true],
+  area_ge: ["area, GE", false, false], work: ["cycles x area, G GE cycles", false, true], energy_uj: ["energy, uJ a frame", false, true],
 };
 const NS = "http://www.w3.org/2000/svg", svg = document.getElementById("scatter"), read = document.getElementById("read");
 const W = 900, H = 480, L = 70, R = 20, T = 15, B = 45;
 let kept = null;
 
-for (const points of Object.values(DATA)) for (const p of points) p.fps = p.cycles ? 1e9 / p.cycles : null;
+for (const points of Object.values(DATA)) for (const p of points) {
+  p.fps = p.cycles ? 1e9 / p.cycles : null;
+  p.work = p.cycles && p.area_ge ? p.cycles * p.area_ge / 1e9 : null;
+}
 
 function choice(name, options, value) {
   const label = document.createElement("label"), select = document.createElement("select");

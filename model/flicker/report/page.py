@@ -93,15 +93,20 @@ def _stability(result: Stability, figure: Figure) -> str:
 
 
 def page(
-    views: Sequence[ViewResult], verdicts: Sequence[Verdict], paper: Sequence[Figure], chart: Figure, heats: Sequence[Figure],
+    views: Sequence[ViewResult], verdicts: Sequence[Verdict], paper: Sequence[Figure], charts: Sequence[Figure], heats: Sequence[Figure],
     stability: tuple[Stability, Figure], about: dict[str, str],
 ) -> str:
-    """The whole page. about: facts of the run, by name."""
+    """The whole page. charts: of all configurations. about: facts of the run, by name."""
     counts = {kind: sum(v.kind == kind for v in verdicts) for kind in _MARKS}
     tally = ", ".join(f"{count} {_MARKS[kind]}" for kind, count in counts.items())
     facts = "".join(f"<dt>{_e(k)}</dt><dd>{_e(v)}</dd>" for k, v in about.items())
     of_figure = {f.name: [v for v in verdicts if v.figure.rstrip("abc") == f.of.rstrip("abc") and f.of] for f in paper}
-    chart_links = " ".join(f'<a href="figures/{chart.name}.{kind}">{kind.upper()}</a>' for kind in ("csv", "png", "svg"))
+
+    def printed(chart: Figure) -> str:
+        links = " ".join(f'<a href="figures/{chart.name}.{kind}">{kind.upper()}</a>' for kind in ("csv", "png", "svg"))
+        return (f"<details><summary>{_e(chart.title)}, for every view, printed</summary><p>{_e(chart.note)} {links}</p>"
+                f"<img alt='{_e(chart.title)}' src='{chart.image}'></details>")
+
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>FLICKER report</title>",
         f"<style>{(_FOLDER / 'page.css').read_text()}</style></head><body>",
@@ -111,9 +116,9 @@ def page(
         "<a href='#heat'>heat maps</a> <a href='#fail'>where configurations fail</a></nav>",
         "<h2 id='chart'>Speed against accuracy</h2>",
         "<p>Every configuration is a point; the line is the Pareto front of the two axes shown. Point at one to read it, click to keep it. "
-        f"FPS are those of the rendering stage at 1 GHz. {_e(chart.note)} {chart_links}</p>",
+        "FPS are those of the rendering stage at 1 GHz; cycles times area lets builds of different size compare.</p>",
         "<div id='controls'></div><div id='plot'><svg id='scatter' viewBox='0 0 900 480' role='img' aria-label='scatter chart'></svg><pre id='read'>no point chosen</pre></div>",
-        f"<details><summary>for every view, printed</summary><img alt='{_e(chart.title)}' src='{chart.image}'></details>",
+        *map(printed, charts),
         f"<h2 id='claims'>Claims of the paper</h2><p>{len(verdicts)} claims: {tally}. What a verdict asks for stands in it.</p>",
         _verdicts(verdicts),
         "<h2 id='paper'>Figures of the paper</h2><p>Figure 1 (GPU profile) appears with its published numbers only, in the table above.</p>",

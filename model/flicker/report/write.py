@@ -131,9 +131,9 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     areas = {key: part.ge for key, part in parts().items()}
     verdicts = all_verdicts(views, areas)
     paper = paper_figures(views, areas)
-    chart, heats = own_figures(views)
+    charts, heats = own_figures(views)
     table = stability_table(stability)
-    for figure in (*paper, chart, *heats, table):
+    for figure in (*paper, *charts, *heats, table):
         figure.write(job.folder / "figures")
     about = {
         "views": ", ".join(v.target.title for v in views), "size": ", ".join(dict.fromkeys(f"{w}x{h}" for w, h in (t.size for t in job.targets))),
@@ -142,7 +142,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }
-    text = page(views, verdicts, paper, chart, heats, (stability, table), about)
+    text = page(views, verdicts, paper, charts, heats, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]
     columns = [*SUMMARY, *(key for key in rows[0] if key not in SUMMARY)]
     index, summary = job.folder / "index.html", job.folder / "summary.csv"

@@ -48,9 +48,10 @@ class LogRows(MaskGenerator):
 
 
 def configurations() -> Iterator[Configuration]:
-    """The default build, more lanes, and as many as fit the area of the GSCore-like build."""
+    """The default build, one that takes an element a cycle, more lanes, and as many as fit the area of the GSCore-like build."""
     for name, title, stage in (
         ("log-lanes", "lanes in the log domain", LogLanes()),
+        ("log-lanes-one", "lanes in the log domain, one element a cycle", LogLanes(in_width=1)),
         ("log-lanes-64", "64 lanes in the log domain", LogLanes(64)),
         ("log-lanes-128", "128 lanes in the log domain, one element a cycle, half the store", LogLanes(128, 1, 12, 8)),
     ):
