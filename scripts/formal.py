@@ -43,7 +43,7 @@ TOOLS = Path(sys.executable).parent
 TIMEOUT = 400  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
-              "standins", "cut", "fast", "long", "mutant_depth", "mutant"}
+              "standins", "cut", "fast", "fast_set", "long", "mutant_depth", "mutant"}
 MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters", "slow"}
 
 
@@ -79,6 +79,7 @@ class Proof:
     standins: list[str] = field(default_factory=list)
     cut: list[str] = field(default_factory=list)
     fast: bool = False
+    fast_set: int = 0
     long: bool = False
 
 
@@ -143,8 +144,8 @@ def read_proofs(path: Path = PROOFS) -> list[Proof]:
 
 
 def tasks_of(proof: Proof, fast: bool) -> list[Task]:
-    """Tasks of a proof; with ``fast`` those of its first set of parameters."""
-    sets = proof.parameters[:1] if fast else proof.parameters
+    """Tasks of a proof; with ``fast`` those of one set of parameters."""
+    sets = [proof.parameters[proof.fast_set]] if fast else proof.parameters
     covered = proof.cover_parameters or sets[: proof.cover_sets or len(sets)]
     return [
         *(Task(proof, "proof", parameters) for parameters in sets),

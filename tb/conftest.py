@@ -36,7 +36,7 @@ demo.generate = _made_once(demo.generate)  # before a test module takes it
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also the tests marked slow (as with SLOW=1)")
-    parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py")
+    parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py; slow ones too where it has no others")
 
 
 def _simulates(path: Path) -> bool:
@@ -79,7 +79,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     slow = config.getoption("--slow") or os.environ.get("SLOW") == "1"
-    if not slow:
+    named = config.getoption("--unit") is not None and all(item.get_closest_marker("slow") for item in items)
+    if not slow and not named:
         left_out = [item for item in items if item.get_closest_marker("slow")]
         items[:] = [item for item in items if not item.get_closest_marker("slow")]
         config.hook.pytest_deselected(items=left_out)

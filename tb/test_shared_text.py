@@ -23,9 +23,15 @@ module st_unit (
   output logic [7:0] sum_o
 );
   logic [7:0] sum_q;
+  function automatic logic [7:0] mixed(logic [7:0] sum, logic [7:0] value);  // its variables get numbers of the whole design
+    logic [7:0] result;
+    result = value;
+    for (int k = 0; k < 8; k++) result = result ^ (sum[k] ? value << k : sum >> k);
+    return sum + value + (result ^ result);
+  endfunction
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) sum_q <= '0;
-    else sum_q <= sum_q + value_i;
+    else sum_q <= mixed(sum_q, value_i);
   end
   assign sum_o = sum_q;
   assert property (@(posedge clk_i) disable iff (!rst_ni) value_i != 8'd7 || sum_q > 8'd250) else $error("st_unit: seven");
@@ -51,6 +57,7 @@ HARNESS = """
 #include "Vtop.h"
 #include "verilated.h"
 void vl_stop(const char*, int, const char*) VL_MT_UNSAFE {}
+void vl_fatal(const char*, int, const char*, const char*) VL_MT_UNSAFE {}
 extern "C" unsigned run(unsigned values, int cycles) {
   VerilatedContext context;
   Vtop top{&context};
@@ -80,7 +87,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, Path]:
     def build(top: str) -> Path:
         return toolchain.verilate(
             "st_top", [paths["st_unit.sv"], paths["st_top.sv"]], settings=[paths["settings.vlt"]], cpp=[paths["harness.cpp"]], args=["--assert", "-fno-dfg"],
-            cflags="-DVL_USER_STOP", shared=True, kind="sim", name=top,
+            cflags="-DVL_USER_STOP -DVL_USER_FATAL", shared=True, kind="sim", name=top,
         )
 
     out = {True: build("st_shared")}
@@ -100,13 +107,14 @@ def run(library: Path, values: list[int], cycles: int) -> tuple[int, list[str]]:
     return int(found[1]), re.findall(r"Assertion failed in ([\w.\[\]]+): st_unit: seven", done.stdout)
 
 
-def texts(library: Path) -> int:
-    """Functions of the unit that have a text of their own with the assertion."""
-    return sum(path.read_text().count("st_unit: seven") for path in library.parent.glob("Vtop_st_unit__*.cpp"))
+def texts(library: Path, what: str) -> int:
+    """Functions of the unit that have a text of their own with `what`, a regular expression."""
+    return sum(len(re.findall(what, path.read_text())) for path in library.parent.glob("Vtop_st_unit__*.cpp"))
 
 
-def test_one_text(built: dict[bool, Path]) -> None:
-    assert texts(built[True]) == 1 and texts(built[False]) == 4
+@pytest.mark.parametrize("what", ["st_unit: seven", r"CData/\*7:0\*/ \w+mixed\w+Vfuncout;"], ids=["assertion", "function"])
+def test_one_text(built: dict[bool, Path], what: str) -> None:
+    assert texts(built[True], what) == 1 and texts(built[False], what) == 4
 
 
 @pytest.mark.parametrize("k", range(4))

@@ -1,8 +1,9 @@
 """One text for all instances of a module, in the C++ that Verilator wrote.
 
 Verilator writes a function for each instance of a module that it does not inline, and keeps one where their texts agree. Concurrent assertions keep
-them from agreeing: what they sampled is a variable named after the instance, and their messages hold its name. Here such variables get one name in all
-instances, messages take the name from the object, and functions whose texts are then equal become calls of the first. What a function does stays as it was; the
+them from agreeing: what they sampled is a variable named after the instance, and their messages hold its name; and so do the functions of a design, whose local
+variables have a number of the whole design in their names. Here such variables get one name in all instances, messages take the name from the object, and
+functions whose texts are then equal become calls of the first. What a function does stays as it was; the
 compiler has less to read, and a cycle of simulation less to fetch. Texts that agree in no other way are left alone.
 """
 
@@ -16,6 +17,7 @@ _INSTANCE = re.compile(r"^    (Vtop_\w+)\s+(TOP__\w+);", re.M)  # class and obje
 _SAMPLED = re.compile(r"\b(TOP__\w+)\.__Vsampled_\1__(\w+)")
 _MESSAGE = re.compile(r"vlSymsp->name\(\),\"([^\"\n]+)\"")
 _FUNCTION = re.compile(r"^(?P<head>(?:VL_\w+ )*(?:void|bool|CData) (?P<name>Vtop_\w+?)\((?P<self>Vtop_\w+)\* vlSelf\)) \{\n(?P<body>.*?)^\}\n", re.M | re.S)
+_LOCAL = re.compile(r"(?<![.>])\b(__Vfunc_\w+__)(\d+)(__\w+)")  # of a function of the design: its name, a number, the variable
 _TRACE = re.compile(r"^    VL_DEBUG_IF\(VL_DBG_MSGF\(.*\n", re.M)  # the function's own name, in debug builds
 
 
@@ -27,7 +29,11 @@ def _plain(scope: str) -> str:
 
 def _one_name(text: str, scope: str) -> str:
     """A text of an instance's function with variables and messages that do not name the instance."""
+    numbers: dict[tuple[str, str], int] = {}
+    text = _LOCAL.sub(lambda found: f"{found[1]}{numbers.setdefault((found[1], found[2]), len(numbers))}{found[3]}", text)
     text = text.replace(f"vlSelfRef.__Vsampled_{scope}__", "vlSelfRef.__Vsampled_self__")
+    if "vlSymsp" in text:  # what is sampled once for all belongs to one instance: the others reach it so
+        text = text.replace("vlSelfRef.__Vsampled_TOP__", f"vlSymsp->{scope}.__Vsampled_TOP__")
     path = _plain(scope)
 
     def message(found: re.Match[str]) -> str:

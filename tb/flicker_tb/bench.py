@@ -29,6 +29,11 @@ def netlist() -> bool:
     return os.environ.get("NETLIST", "") not in ("", "0")
 
 
+def rounds(few: int, many: int) -> int:
+    """How often a random test repeats itself: `few`, with SLOW=1 `many`."""
+    return many if os.environ.get("SLOW") == "1" else few
+
+
 class Bench:
     """One test's view of a design with ``clk_i`` and ``rst_ni``, and perhaps ``clear_i``, which stays low until ``clear``.
 

@@ -142,6 +142,18 @@ def test_memories(number: int) -> None:
         check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2])
 
 
+def test_opaque_layers() -> None:
+    """Lists of thousands of opaque splats: read in part, sorted in part, few records looked up."""
+    rng, n = np.random.default_rng(seed()), 6000
+    packed = pack(Scene(
+        means=np.stack([*rng.uniform(-1.5, 1.5, (2, n)), rng.uniform(1.0, 6.0, n)], axis=1), scales=rng.uniform(2.0, 3.0, (n, 3)),
+        quats=rng.normal(size=(n, 4)), opacities=rng.uniform(0.9, 1.0, n), sh=rng.normal(scale=0.3, size=(n, 4, 3)),
+    ), PackedFormat.CHUNK).packed
+    with session(packed) as chip:
+        done = check(chip, camera(32, 32))
+        assert np.sum(done.rendering["entries"]) < 0.5 * np.sum(done.front["entries"]) and done.rendering["lines"] < 0.5 * n
+
+
 @pytest.mark.parametrize("overlap", [True, False])
 def test_back_to_back(overlap: bool) -> None:
     """Four frames with cameras of their own on two regions: the front end works on the next one while one is rendered."""

@@ -3,9 +3,9 @@
 State space: the demo scene, both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing, frames one after the other, an odd
 number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: channels with two VRUs; with SLOW=1 every mode, one and four VRUs, no contribution test, and 32, 64 and 128 lanes
-(tb/frames/test_chip_frames.py has the chip with lanes every time); `faithful` wants records of 32 bytes, which only the golden
-front end makes. Not covered: resets within a frame.
+Parameter space: channels with every mode, one, two and four VRUs, without a contribution test; 32, 64 and 128 lanes. All with SLOW=1 or by name
+(`make sim UNIT=rendering`): tb/frames/test_chip_frames.py has the whole chip, with lanes, every time. `faithful` wants records of 32 bytes, which only
+the golden front end makes. Not covered: resets within a frame.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
 from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, regions, rendering_rtl
 
+pytestmark = pytest.mark.slow
 LIMIT = 1_000_000  # a frame that hangs says so within minutes
 CONFIG = RenderConfig()
 LANES = RenderConfig(stage="lanes")
@@ -164,20 +165,17 @@ def test_nothing_visible() -> None:
     assert (rtl.buffer.reshape(-1, 3) == (7, 8, 9)).all() and rtl.counters["lines"] == 0
 
 
-@pytest.mark.slow
 def test_modes() -> None:
     """Every mode of the contribution test, the automatic one over sub-tiles that the picture lacks too."""
     for mode in CatMode:
         check((80, 40), CONFIG.with_(cat=mode))
 
 
-@pytest.mark.slow
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
     check((96, 54), CONFIG.with_(cat=CatMode.AUTO), scene="demo", frames=2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("config", [
     CONFIG.with_(vrus_per_channel=1), CONFIG.with_(vrus_per_channel=4), CONFIG.with_(mask_generator="all", cat=CatMode.OFF),
     LANES, LANES.with_(lanes=64), LANES.with_(lanes=128),
@@ -210,7 +208,6 @@ def test_errors_of_the_memory(part: str) -> None:
     assert rtl.errors == [1 << code, 0], ERRORS[code]
 
 
-@pytest.mark.slow
 def test_demo_scene_larger() -> None:
     """At 320x180 with five seeds of pauses."""
     for k in range(5):

@@ -8,7 +8,7 @@ from typing import Any
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp
-from flicker_tb.bench import Bench, config
+from flicker_tb.bench import Bench, config, rounds
 
 SETTINGS = config()
 
@@ -133,7 +133,7 @@ async def reset_values(dut: Any) -> None:
 async def _traffic(dut: Any, pauses: tuple[str, ...]) -> None:
     regs = Registers(dut, pauses)
     await regs.bench.reset()
-    for turn in range(4):
+    for turn in range(rounds(2, 4)):
         regs.random_inputs()
         for word in regs.rng.sample(WORDS, len(WORDS)):
             value, first = regs.rng.getrandbits(32), regs.rng.randrange(4)

@@ -45,7 +45,7 @@ def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) ->
     if config.form is not Form.FACTORED:
         raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
     parameters = {name: value for name, value in config.chip_parameters().items() if name != "Form"}
-    settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "rendering")]
+    settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
         "flk_top", {**parameters, "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",
     )

@@ -48,7 +48,8 @@ class RtlRendering:
 
 def build(config: RenderConfig) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content."""
-    return half.build("flk_rendering", config.chip_parameters(), [half.HERE / name for name in ("render_stage.vlt", "rendering.vlt")], define="-DFLK_RENDERING")
+    settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering")]
+    return half.build("flk_rendering", config.chip_parameters(), settings, define="-DFLK_RENDERING")
 
 
 def rendering_rtl(
