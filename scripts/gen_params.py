@@ -142,6 +142,8 @@ def lane_package(f: lanes.LaneFormats = lanes.FORMATS) -> str:
     """Lanes in the log domain. Raises FlickerError for formats that the RTL does not have."""
     if not f.pieces:
         raise FlickerError("lanes: pieces 0: the RTL has h by lines only")
+    if f.sum <= lanes.RESULT_FRACTION:
+        raise FlickerError(f"lanes: sum {f.sum}: the RTL rounds S to {lanes.RESULT_FRACTION} fraction bits, so it wants more of them")
     t = lanes.tables(f)
     value, fall = lanes.h_lines(f, t.clamp + 1, t.limit)
     first, top = int(t.clamp + 1).bit_length() - 1, int(t.limit).bit_length()  # octave of the least La that is not clamped; bits of La

@@ -55,10 +55,10 @@ TRIED = tuple(dict.fromkeys((
     D, LaneFormats(uv=12, log=14, sum=16, mantissa=12, accumulator=20, pieces=0), LaneFormats(uv=9, log=9, sum=12, pieces=0),
     LaneFormats(uv=8, log=8, sum=16, mantissa=9), LaneFormats(uv=8, log=8, sum=10, mantissa=9, pieces=0),
     LaneFormats(uv=8, log=8, sum=10, mantissa=7, pieces=0),
-    *(replace(D, uv=b) for b in (7, 8, 10)), *(replace(D, log=b) for b in (7, 8, 10)), *(replace(D, sum=b) for b in (11, 12, 14, 20)),
+    *(replace(D, uv=b) for b in (7, 8, 10)), *(replace(D, log=b) for b in (7, 8, 10)), *(replace(D, sum=b) for b in (11, 12, 13, 14, 20)),
     *(replace(D, pieces=b) for b in (0, 2, 3, 5)), *(replace(D, mantissa=b) for b in (7, 8, 9, 11)), *(replace(D, accumulator=b) for b in (11, 12, 13, 16)),
-    replace(D, guard=6), LaneFormats(uv=8, log=8, sum=12, mantissa=9), LaneFormats(uv=8, log=8, sum=16, mantissa=10),
-    LaneFormats(uv=8, log=8, sum=12, mantissa=8, accumulator=13),
+    replace(D, guard=6), LaneFormats(uv=8, log=8, sum=13, mantissa=9), LaneFormats(uv=8, log=8, sum=16, mantissa=10),
+    LaneFormats(uv=8, log=8, sum=13, mantissa=8, accumulator=13),
 )))
 NAMED = ("layers", "faint", "opaque")
 NARROWER = (D, replace(D, mantissa=9), replace(D, uv=8), replace(D, log=8), replace(D, uv=8, log=8), replace(D, uv=8, log=8, mantissa=9),
@@ -113,8 +113,8 @@ def bits(formats: LaneFormats) -> tuple[int, int, int]:
 _SYNTHESISE = "import sys; from pathlib import Path; from flicker.cost.synth import flow; flow.FILELIST = Path(sys.argv.pop()); sys.exit(flow.main())"
 
 
-def lane_area(formats: LaneFormats) -> tuple[float, float] | None:
-    """GE and longest path in FO4 of one lane of eight pixels, synthesised in these formats; None for formats that the RTL does not have."""
+def lane_area(formats: LaneFormats, lanes: int = 8) -> tuple[float, float] | None:
+    """GE and longest path in FO4 of one of so many lanes of a core, synthesised in these formats; None for formats that the RTL does not have."""
     try:
         package = lane_package(formats)
     except FlickerError:
@@ -124,7 +124,7 @@ def lane_area(formats: LaneFormats) -> tuple[float, float] | None:
         (folder / "flk_lane_pkg.sv").write_text(package)
         files = [folder / path.name if path.name == "flk_lane_pkg.sv" else path for path in filelist()]
         (folder / "flk.f").write_text("".join(f"{path}\n" for path in files))
-        job = {"action": "synthesise", "top": "flk_lane", "parameters": {}, "extra": [], "boxes": [], "children": {}, "child_parameters": {},
+        job = {"action": "synthesise", "top": "flk_lane", "parameters": {"Lanes": lanes}, "extra": [], "boxes": [], "children": {}, "child_parameters": {},
                "liberty": str(DEFAULT_LIBERTY.resolve()), "results": name, "open": []}
         (folder / "job.json").write_text(json.dumps(job))
         done = subprocess.run([sys.executable, "-c", _SYNTHESISE, str(folder / "job.json"), str(folder / "flk.f")], capture_output=True, text=True)
@@ -142,27 +142,31 @@ def format_rows(seen: list[Seen], say: Say) -> list[tuple[str, ...]]:
         say(formats.name)
         name = formats.name + (f", guard {formats.guard}" if formats.guard != D.guard else "")
         frames = [render_lanes(one.lists, formats) for one in seen]
-        area = lane_area(formats)
-        if area is not None:
-            built.append((area[0], min(psnr(frame.image(), one.records) for frame, one in zip(frames, seen)), formats))
-        size = ("", "") if area is None else (f"{area[0]:,.0f}", f"{area[1]:.0f}")
+        area, small = lane_area(formats), lane_area(formats, 32)
+        if area is None or small is None:
+            size = ["", "", ""]
+        else:
+            size = [f"{area[0]:,.0f}", f"{small[0]:,.0f}", f"{max(area[1], small[1]):.0f}"]
+            built.append((area[0], min(psnr(frame.image(), one.records) for frame, one in zip(frames, seen)), name))
         cells = [one.decibel(frame) for frame, one in zip(frames, seen)]
         rows.append((f"**{name}**" if formats is D else name, *cells, *size, *(f"{n:,}" for n in bits(formats))))
     _draw(built)
     return rows
 
 
-def _draw(built: list[tuple[float, float, LaneFormats]]) -> None:
-    """Area of a lane against the least PSNR of its arithmetic, with the formats that no other beats in both."""
+def _draw(built: list[tuple[float, float, str]]) -> None:
+    """Area of a lane against the least PSNR of its arithmetic, the default first, with the formats that no other beats in both."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
-        front = {i for i, (area, db, _) in enumerate(built) if not any(a <= area and b >= db and (a, b) != (area, db) for a, b, _ in built)}
-        for i, (area, db, formats) in enumerate(built):
-            axes.plot(area / 1000, db, "o" if formats is D else ".", color=COLOURS[1] if formats is D else COLOURS[0] if i in front else COLOURS[7])
-            if i in front or formats is D:
-                axes.annotate(formats.name, (area / 1000, db), fontsize=6, xytext=(4, -7), textcoords="offset points")
-        line = sorted(built[i][:2] for i in front)
-        axes.plot([area / 1000 for area, _ in line], [db for _, db in line], "-", color=COLOURS[0], linewidth=0.8)
+        front = sorted(i for i, (area, db, _) in enumerate(built) if not any(a <= area and b >= db and (a, b) != (area, db) for a, b, _ in built))
+        front.sort(key=lambda i: built[i][0])
+        axes.plot([area / 1000 for area, _, _ in built], [db for _, db, _ in built], ".", color=COLOURS[7])
+        axes.plot([built[i][0] / 1000 for i in front], [built[i][1] for i in front], ".-", color=COLOURS[0], linewidth=0.8)
+        axes.plot(built[0][0] / 1000, built[0][1], "o", color=COLOURS[1])
+        for number, i in enumerate(front, 1):
+            axes.annotate(str(number), (built[i][0] / 1000, built[i][1]), fontsize=7, xytext=(0, 5), textcoords="offset points", ha="center")
+        names = [f"{number}: {built[i][2]}{'' if i else ' (default)'}" for number, i in enumerate(front, 1)]
+        axes.text(0.98, 0.03, "\n".join(names), fontsize=6.5, transform=axes.transAxes, ha="right", va="bottom")
         axes.set(xlabel="one lane of eight pixels, thousand GE", ylabel="least PSNR of four views against the same records in float64, dB")
         figure.savefig(CHART, dpi=130, metadata={"Software": None})
         plt.close(figure)
@@ -265,7 +269,7 @@ def tables(say: Say) -> dict[str, str]:
     titles = [one.title for one in seen]
     return {
         "breakdown": table(["view", "records from", "exact, float64", "records, float64", "lanes", "lanes, s"], parts),
-        "formats": table(["u, v / La / S, h; weight; colour", *titles, "lane, GE", "FO4", "multipliers", "tables", "state"], format_rows(seen, say)),
+        "formats": table(["u, v / La / S, h; weight; colour", *titles, "lane of 8 pixels, GE", "of 2", "FO4", "multipliers", "tables", "state"], format_rows(seen, say)),
         "families": table(["u, v / La / S, h; weight; colour", *(f"`{name}`" for name in NAMED)], family_rows(say)),
         "masks": table(["fraction bits", "bits of the root's address", *titles], mask_rows(seen, say)),
         "counts": table(
