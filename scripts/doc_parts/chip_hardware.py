@@ -20,6 +20,7 @@ from flicker.golden.front.memory import front_memory
 from flicker.markdown import table
 from flicker.params import RenderConfig
 from flicker.pipeline import packed_scene
+from flicker.scene.camera import Camera
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
 from flicker.sim.chip import PORT, ChipFrame, ChipSession, build, pointers_for
@@ -34,9 +35,9 @@ CHUNKS = 8000  # of a list writer: enough for these views
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
 
-def back_to_back(chip: ChipSession, camera) -> list[ChipFrame]:
-    """Three frames of one view, each started as soon as the chip takes it."""
-    places = [chip.place(camera, chunks=CHUNKS) for _ in range(2)]
+def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS) -> list[ChipFrame]:
+    """Three frames of one view, each started as soon as the chip takes it. chunks: of a list writer."""
+    places = [chip.place(camera, chunks=chunks) for _ in range(2)]
     frames = [chip.frame(camera, places[k % 2], tag=k + 1) for k in range(3)]
     chip.start(frames[0])
     done = []

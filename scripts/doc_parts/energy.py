@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from flicker import markdown
+from flicker.errors import FlickerError
 from flicker.explore.configurations import group
 from flicker.scene.real import REAL_VIEWS
 
@@ -12,7 +13,12 @@ from .common import Measured, Say, significant
 
 BASE = "gscore"
 PREFIX = "energy_uj_"
-PARTS = ("VRUs", "feature FIFOs", "mask generators", "counters, arbiters", "ungated clock", "leakage")
+# Heads of the table with the parts that the stages of channels and of lanes have for them.
+PARTS = {
+    "VRUs or lanes": ("VRUs", "lanes"), "FIFOs, queues, store": ("feature FIFOs", "queues", "store, dispatch, output"),
+    "mask generators, setup": ("mask generators", "setup and masks"), "counters, arbiters": ("counters, arbiters", "counters"),
+    "ungated clock": ("ungated clock",), "leakage": ("leakage",),
+}
 
 
 def tables(say: Say) -> dict[str, str]:
@@ -20,7 +26,9 @@ def tables(say: Say) -> dict[str, str]:
     found = Measured(REAL_VIEWS[0]).rows(group("energy"), say)
     rows = []
     for name, row in found.items():
-        by_part = [row[PREFIX + re.sub(r"\W+", "_", part)] for part in PARTS]
+        by_part = [sum(row.get(PREFIX + re.sub(r"\W+", "_", part)) or 0.0 for part in parts) for parts in PARTS.values()]
+        if abs(sum(by_part) / row["energy_uj"] - 1) > 1e-6:
+            raise FlickerError(f"energy: {name}: parts of the stage that the table does not have")
         rows.append([
             f"`{name}`", f"{row['energy_uj'] / found[BASE]['energy_uj']:.2f}", significant(row["energy_uj"], 2),
             *(significant(value, 2) if value else "0" for value in by_part),

@@ -269,7 +269,9 @@ def tables(say: Say) -> dict[str, str]:
     titles = [one.title for one in seen]
     return {
         "breakdown": table(["view", "records from", "exact, float64", "records, float64", "lanes", "lanes, s"], parts),
-        "formats": table(["u, v / La / S, h; weight; colour", *titles, "lane of 8 pixels, GE", "of 2", "FO4", "multipliers", "tables", "state"], format_rows(seen, say)),
+        "formats": table(
+            ["u, v / La / S, h; weight; colour", *titles, "lane of 8 pixels, GE", "of 2", "FO4", "multipliers", "tables", "state"], format_rows(seen, say),
+        ),
         "families": table(["u, v / La / S, h; weight; colour", *(f"`{name}`" for name in NAMED)], family_rows(say)),
         "masks": table(["fraction bits", "bits of the root's address", *titles], mask_rows(seen, say)),
         "counts": table(
