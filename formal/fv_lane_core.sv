@@ -8,13 +8,12 @@ module fv_lane_core #(
   parameter  int unsigned Slots   = 2,
   parameter  int unsigned Depth   = 2,
   localparam int unsigned Lanes   = 8,
-  localparam int unsigned Watched = 3,  // lane
-  localparam int unsigned Other   = 6,
-  localparam int unsigned First   = 2,  // pixel
-  localparam int unsigned Second  = 5
+  localparam int unsigned Watched = 6,  // lane
+  localparam int unsigned Other   = 3,
+  localparam int unsigned First   = 5,  // pixel; the other one of a lane is visited before it
+  localparam int unsigned Second  = 2
 ) (
   input logic                                      clk_i,
-  input logic                                      again_i,
   input logic                                      clear_i,
   input logic                                      pick_i,
   input logic                                      which_i,
@@ -31,7 +30,7 @@ module fv_lane_core #(
   flk_pkg::core_pixel_t out_data;
   lane_core_events_t events;
 
-  fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
+  fv_reset i_reset (.clk_i, .again_i(1'b0), .rst_no(rst_n));
 
   flk_lane_core #(
     .Lanes  (Lanes),
@@ -115,7 +114,9 @@ module fv_lane_core #(
     if (rst_n) begin
       assume (!in_valid_i[InWidth-1] || in_valid_i[0]);
       for (int unsigned w = 0; w < InWidth; w++) begin
-        assume ((in_elem_i[w].record[63:0] & ~some) == '0);
+        // What is left constant only passes through.
+        assume ((in_elem_i[w].record[63:0] & ~some) == '0 && in_elem_i[w].record[127:66] == '0);
+        assume (in_elem_i[w].subtile.row == '0 && in_elem_i[w].subtile.col[flk_param_pkg::SUBTILE_COORD_BITS-1:2] == '0);
       end
 
       a_visited: assert (!visit || visited_q != taken_q);

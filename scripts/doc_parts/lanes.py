@@ -62,7 +62,7 @@ TRIED = tuple(dict.fromkeys((
 )))
 NAMED = ("layers", "faint", "opaque")
 NARROWER = (D, replace(D, mantissa=9), replace(D, uv=8), replace(D, log=8), replace(D, uv=8, log=8), replace(D, uv=8, log=8, mantissa=9),
-            replace(D, accumulator=13), replace(D, pieces=3), replace(D, pieces=0))
+            replace(D, accumulator=13), replace(D, pieces=3), replace(D, pieces=0), replace(D, sum=14), replace(D, sum=13))
 MASKS = tuple((mask, root) for mask in (4, 5, 6, 7, 8) for root in (4, 6, 8))
 
 
