@@ -105,6 +105,7 @@ PARTS = (
     Part("rendering_hardware", "rendering half's RTL beside the chip model", ("cycles",), rendering_hardware.tables, scenes_missing),
     Part("chip_hardware", "frames of the whole chip in RTL beside the chip model", ("cycles", "traffic"), chip_hardware.tables, scenes_missing),
     Part("chip_lanes", "frames of the whole chip with lanes in RTL", ("cycles",), chip_lanes.tables, scenes_missing),
+    Part("chip_queues", "the rendering half with lanes by the depth of its queues", ("",), chip_lanes.queue_tables, scenes_missing),
     Part("record_cache", "lines that the record cache reads", ("sizes", "walks"), record_cache.tables, scenes_missing),
     Part("lanes", "lanes in the log domain: number formats, masks, where the dB go",
          ("breakdown", "formats", "families", "masks", "counts", "stability"), lanes.tables, scenes_missing,

@@ -1,4 +1,4 @@
-"""`make docs PART=chip_lanes`: frames of the verilated chip with lanes, in docs/chip.md: what the lanes wait for.
+"""`make docs PART=chip_lanes` and `PART=chip_queues`: frames of the verilated chip with lanes, in docs/chip.md: what the lanes wait for.
 
 An error: a frame buffer that differs from the golden model's.
 """
@@ -11,6 +11,8 @@ from flicker.chip.dram import DramConfig
 from flicker.errors import FlickerError
 from flicker.golden.chip import render_chip
 from flicker.golden.front.frame import run_front
+from flicker.golden.front.memory import front_memory
+from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
 from flicker.markdown import table
 from flicker.params import CORES, STAGES, RenderConfig
@@ -20,6 +22,7 @@ from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
 from flicker.sim.chip import ChipFrame, ChipSession, pointers_for
 from flicker.sim.half import MemoryOptions
+from flicker.sim.rendering import rendering_rtl
 
 from .chip_hardware import back_to_back
 from .common import Say, load
@@ -63,3 +66,24 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: int) -> tuple[str, 
         f"{last.stamps['front_done'] - last.stamps['taken']:,}", f"{rendering:,}", f"{stage:,}", f"{idle / (CORES * rendering):.1%}",
         f"{int(np.max(last.rendering['entries'])):,}", f"{interval:,}", f"{1e9 / interval:,.0f}",
     )
+
+
+QUEUES = (64, 128, 256)  # records of each core and channel of delivery
+QUEUE_NUMBER = 2 * CORES
+RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1  # with the bit that marks an end
+
+
+def queue_tables(say: Say) -> dict[str, str]:
+    """The rendering half alone, with a memory that answers everything at once, by the queues between record cache and cores."""
+    real = next(view for view in REAL_VIEWS if view.folder == VIEW)
+    view = load(real)
+    front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
+    image, config = front_memory(front), RenderConfig(stage="lanes")
+    golden, rows = render_chip(front_lists(front), config).buffer, []
+    for queue in QUEUES:
+        say(f"{real.title}: queues of {queue}")
+        rtl = rendering_rtl(image, view.camera, config, parameters={"Queue": queue})
+        if any(rtl.errors) or not np.array_equal(rtl.buffer[:, : golden.shape[1]], golden):
+            raise FlickerError(f"{real.title}: the picture differs from the golden model's")
+        rows.append((str(queue), f"{QUEUE_NUMBER * queue * RECORD_BITS:,}", f"{rtl.cycles:,}"))
+    return {"": table(["records in a queue", "bits of all queues", "rendering half, cycles"], rows)}

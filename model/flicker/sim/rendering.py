@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -46,10 +47,10 @@ class RtlRendering:
         return int(self.counters["cycles"])
 
 
-def build(config: RenderConfig) -> Path:
-    """Shared library of the simulator, with the design's assertions; cached by content."""
+def build(config: RenderConfig, parameters: Mapping[str, int] | None = None) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content. parameters: of `flk_rendering`, further ones."""
     settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering")]
-    return half.build("flk_rendering", config.chip_parameters(), settings, define="-DFLK_RENDERING")
+    return half.build("flk_rendering", config.chip_parameters() | dict(parameters or {}), settings, define="-DFLK_RENDERING")
 
 
 def rendering_rtl(
@@ -64,6 +65,7 @@ def rendering_rtl(
     frames: int = 1,
     seed: int = 1,
     limit: int = 20_000_000,
+    parameters: Mapping[str, int] | None = None,
 ) -> RtlRendering:
     """Run frames of one memory through the RTL. FlickerError where one does not end within `limit` cycles, an assertion fails or a rule of AXI is broken."""
     stride = stride or least_stride(camera.width, format_)
@@ -71,7 +73,7 @@ def rendering_rtl(
     parts = (image.lists.memory.tobytes(), image.lists.pointers.tobytes(), image.records.tobytes(), b"")
     chunks = len(parts[0]) // (WRITERS * CHUNK_LINES * LINE_BYTES)
     base = regions(image, stride * rows * TILE)
-    with Half("rendering", build(config), PORTS, memory or MemoryOptions(), seed) as sim:
+    with Half("rendering", build(config, parameters), PORTS, memory or MemoryOptions(), seed) as sim:
         for purpose, (name, data) in enumerate(zip(PURPOSES, parts)):
             size = stride * rows * TILE if name == "frame" else max(len(data), BEAT)
             sim.load(base[name], -(-size // BEAT) * BEAT, data, purpose)
