@@ -51,7 +51,7 @@ def tables(say: Say) -> dict[str, str]:
                 raise FlickerError(f"{real.title}: the picture differs from the golden model's")
             rows.append((str(lanes), memory, *_row(done, config, stage)))
     return {"cycles": table(
-        ["lanes", "memory", "front end, cycles", "rendering, cycles", "the stage alone", "lanes wait for records", "a sorting unit's entries at most",
+        ["lanes", "memory", "front end, cycles", "rendering, cycles", "the stage alone", "cores without a record", "a sorting unit's entries at most",
          "interval back to back", "FPS at 1 GHz"], rows,
     )}
 
