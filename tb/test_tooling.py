@@ -97,7 +97,7 @@ def test_names_of_tests_are_unique() -> None:
 
 def test_every_named_unit_has_simulations() -> None:
     """One collection of all: each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these."""
-    done = command(sys.executable, "-m", "pytest", "-m", "sim", "--collect-only", "-q", "tb")
+    done = command(sys.executable, "-m", "pytest", "-m", "sim", "--slow", "--collect-only", "-q", "tb")
     files = {line.split("::")[0] for line in done.stdout.splitlines() if "::" in line}
     assert files == {path.relative_to(ROOT).as_posix() for path in (ROOT / "tb").glob("*/test_*.py") if path.parent.name not in ("model", "sw")}
 

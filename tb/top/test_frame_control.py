@@ -1,7 +1,7 @@
 """Frames of the chip: flk_frame_control with host, halves and counters as Python agents.
 
 State space: random and limiting descriptors, every rule broken alone; errors of either half; halves, counters and hosts of every speed; starts while locked;
-clear, abort, time-out and reset at random times. Parameter space: 30 and 2048 lists of a writer, with SLOW=1 16384. Not covered: numbers of frames
+clear, abort, time-out and reset at random times. Parameter space: 30 lists of a writer, with SLOW=1 2048 and 16384. Not covered: numbers of frames
 that wrap at 2^16.
 """
 
@@ -11,6 +11,6 @@ import pytest
 from flicker_tb.runner import build_and_test
 
 
-@pytest.mark.parametrize("parameters", [{}, pytest.param({"Pointers": 16384}, marks=pytest.mark.slow), {"Pointers": 30}], ids=str)
+@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"Pointers": 16384})), {"Pointers": 30}], ids=str)
 def test_frame_control(parameters: dict[str, int]) -> None:
     build_and_test("flk_frame_control", "cocotb_frame_control", parameters=parameters)
