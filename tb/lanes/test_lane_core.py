@@ -1,11 +1,11 @@
 """Core of the lanes: every pixel of every list once and equal to golden.lanes.render, idle_o and finished_o in every cycle, events.
 
 State space: lists of every kind (random splats about the sub-tile, random bits, opaque ones that finish it with many behind, faint ones over all pixels,
-single pixels, empty masks, no element); two elements a beat in every split, an end beside the next list's first element or end; lists left
-early; pauses and back-pressure of every pattern; clear_i at random times, elements beside and right behind it. Parameter space: the default; with SLOW=1 one element a
-cycle with few slots and queues of two, 16 and 32 lanes with few slots. Events in the input's cycles are exact, so are the sums that do
-not depend on timing; entries and visits lie between what the golden model needs and what the masks hold.
-Not covered: cycles (tb/frames/test_lane_frames.py), which compares them with the cycle model.
+single pixels, empty masks, no element); two elements a beat in every split, an end beside the next list's first element or end; lists left early; pauses and
+back-pressure of every pattern; clear_i at random times, elements beside and right behind it. Parameter space: the default; with SLOW=1 one element a cycle
+with few slots and queues of two, 16 and 32 lanes with few slots. Events in the input's cycles are exact, so are the sums that do not depend on timing;
+entries and visits lie between what the golden model needs and what the masks hold. Not covered: cycles (tb/frames/test_lane_frames.py), which compares them
+with the cycle model.
 """
 
 from __future__ import annotations

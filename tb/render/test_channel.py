@@ -1,9 +1,9 @@
 """Channel: pixels against the golden model, splats accounted for, under stalls.
 
-State space: random lists (as in real scenes, thin, special numbers, covering), empty and one-splat sub-tiles, lists whose pixels finish early, one of
-5,000 splats; idle input, blocked output; clear in mid-traffic; finished_o and idle_o in every cycle. Parameter space: FIFO depths 1, 3, 5,
-both forms, mini-tile positions 0, 2, 3 (spread over the depths); 1, 2 and 4 VRUs. With SLOW=1 also depths 2, 16 and 128 (the list of 5,000), position 1. Not covered: more than
-a few dozen sub-tiles in one run.
+State space: random lists (as in real scenes, thin, special numbers, covering), empty and one-splat sub-tiles, lists whose pixels finish early, one of 5,000
+splats; idle input, blocked output; clear in mid-traffic; finished_o and idle_o in every cycle. Parameter space: FIFO depths 1, 3, 5, both forms, mini-tile
+positions 0, 2, 3 (spread over the depths); 1, 2 and 4 VRUs. With SLOW=1 also depths 2, 16 and 128 (the list of 5,000), position 1. Not covered: more than a
+few dozen sub-tiles in one run.
 """
 
 from __future__ import annotations
