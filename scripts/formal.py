@@ -144,9 +144,9 @@ def read_proofs(path: Path = PROOFS) -> list[Proof]:
 
 
 def tasks_of(proof: Proof, fast: bool) -> list[Task]:
-    """Tasks of a proof; with ``fast`` those of one set of parameters."""
+    """Tasks of a proof; with ``fast`` those of one set of parameters (all of them tasks of the whole run too)."""
     sets = [proof.parameters[proof.fast_set]] if fast else proof.parameters
-    covered = proof.cover_parameters or sets[: proof.cover_sets or len(sets)]
+    covered = proof.cover_parameters or proof.parameters[: 1 if fast else proof.cover_sets or len(proof.parameters)]
     return [
         *(Task(proof, "proof", parameters) for parameters in sets),
         *(Task(proof, "cover", parameters) for parameters in covered),
