@@ -1,11 +1,11 @@
 """The rendering half of the chip, from lists and records in memory to a frame buffer: every byte as in the golden model.
 
-State space: the demo scene, both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing, frames one after the other, an odd
-number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
+State space: the middle of the demo scene (the whole with SLOW=1), both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing,
+frames one after the other, an odd number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: channels with every mode, one, two and four VRUs, without a contribution test; 32, 64 and 128 lanes. All with SLOW=1 or by name
-(`make sim UNIT=rendering`): tb/frames/test_chip_frames.py has the whole chip, with lanes, every time. `faithful` wants records of 32 bytes, which only
-the golden front end makes. Not covered: resets within a frame.
+Parameter space: channels with every mode; with SLOW=1 one and four VRUs, no contribution test, and 32, 64 and 128 lanes, which
+tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end makes. Not covered: resets within
+a frame.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
 from flicker.sim.rendering import ERRORS, PORTS, PURPOSES, RtlRendering, regions, rendering_rtl
 
-pytestmark = pytest.mark.slow
 LIMIT = 1_000_000  # a frame that hangs says so within minutes
 CONFIG = RenderConfig()
 LANES = RenderConfig(stage="lanes")
@@ -47,10 +46,11 @@ LAYERS = 6000
 
 @cache
 def view_of(width: int, height: int, scene: str = "some") -> tuple[FrontFrame, FrontImage]:
-    """The demo scene, whose splats are as many at any size; `some` Gaussians in front of the camera or `behind` it; opaque `layers` that cover the picture."""
-    if scene == "demo":
-        view = load_view(DEMO, 0, (width, height))
-        front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
+    """The demo scene, whose splats are as many at any size, or the `middle` of it at 96x54; `some` Gaussians in front of the camera or `behind` it; opaque
+    `layers` that cover the picture."""
+    if scene in ("demo", "middle"):
+        view = load_view(DEMO, 0, (width, height) if scene == "demo" else (96, 54))
+        front = run_front(packed_scene(view, PackedFormat.CHUNK), replace(view.camera, width=width, height=height))
     else:
         layers = scene == "layers"
         rng, n = np.random.default_rng(seed()), LAYERS if layers else 500
@@ -135,6 +135,12 @@ def left_out(rtl: RtlRendering, front: FrontFrame) -> float:
 
 
 def test_demo_scene() -> None:
+    rtl = check((40, 24), scene="middle")
+    assert left_out(rtl, view_of(40, 24, "middle")[0]) > 0.2
+
+
+@pytest.mark.slow
+def test_demo_scene_whole() -> None:
     rtl = check((96, 54), scene="demo")
     assert left_out(rtl, view_of(96, 54, "demo")[0]) > 0.14 and rtl.counters["dropped"].any()  # 0.195 come behind the last pixel
 
@@ -173,9 +179,10 @@ def test_modes() -> None:
 
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
-    check((96, 54), CONFIG.with_(cat=CatMode.AUTO), scene="demo", frames=2)
+    check((40, 24), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", [
     CONFIG.with_(vrus_per_channel=1), CONFIG.with_(vrus_per_channel=4), CONFIG.with_(mask_generator="all", cat=CatMode.OFF),
     LANES, LANES.with_(lanes=64), LANES.with_(lanes=128),
@@ -208,6 +215,7 @@ def test_errors_of_the_memory(part: str) -> None:
     assert rtl.errors == [1 << code, 0], ERRORS[code]
 
 
+@pytest.mark.slow
 def test_demo_scene_larger() -> None:
     """At 320x180 with five seeds of pauses."""
     for k in range(5):

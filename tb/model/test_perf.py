@@ -43,7 +43,6 @@ def one_splat(pixels: list[int], times: int = 1) -> Work:
     )
 
 
-@pytest.mark.slow
 def test_whole_minitiles(view: View) -> None:
     """Visiting all pixels, halves to each VRU, takes what the RTL's VRUs take."""
     work = run("no-ctu-32", view).work
