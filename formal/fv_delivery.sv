@@ -1,36 +1,42 @@
-// flk_delivery, one channel and one core that finishes no tile early: every entry with the core's bit, and every end,
-// reaches the core once, unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others
-// do not. The core takes the channels' tiles in turn. The cache keeps each channel's order and is arbitrary otherwise
-// (standin). The assertions l_* say what is where, for induction.
+// flk_delivery, one core that finishes no tile early: every entry with the core's bit, and every end, reaches the core once,
+// unchanged, in order (fv_pair_stream), whatever the other cores finish and whenever; the others do not. The cache keeps the order and
+// is arbitrary otherwise, the queues' memories are stand-ins. The assertions l_* say what is where, for induction.
 module fv_delivery #(
-  parameter int unsigned Channel = 0,
-  parameter int unsigned Core    = 0
+  parameter int unsigned Core = 0
 ) (
-  input logic            clk_i,
-  input logic            again_i,
-  input logic            pick_i,
-  input logic            clear_i,
-  input logic [3:0]      in_valid_i,
-  input logic [3:0]      in_end_i,
-  input logic [3:0][5:0] in_entry_i,
-  input logic [3:0]      out_ready_i,
-  input logic [3:0]      finished_i
+  input logic                 clk_i,
+  input logic                 again_i,
+  input logic [1:0]           pick_i,
+  input logic                 clear_i,
+  input logic [3:0][1:0]      some_valid_i,
+  input logic [3:0][1:0]      in_end_i,
+  input logic [3:0][1:0][4:0] in_entry_i,
+  input logic [3:0]           out_ready_i,
+  input logic [3:0]           finished_i
 );
 
-  localparam int unsigned Queue = 4;
-  localparam int unsigned Held = Queue + 4;  // in the queue and its register, the cache, the channel's register
+  localparam int unsigned Queue = 8;
+  localparam int unsigned Half = Queue / 2 + 1;
+  localparam int unsigned Cached = 3;
+  localparam int unsigned Held = 2 * Half + Cached + 2;  // queue, cache, entries taken
 
   logic            rst_n;
   logic [3:0]      in_ready, finish, out_valid, out_end, finished;
-  logic [3:0][1:0] out_record;
+  logic [3:0]      out_record;  // of one bit: its number
+  logic [3:0][1:0] in_valid;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
   assign finished = finished_i & ~(4'd1 << Core);
 
+  // A second entry only beside a first one that is no end.
+  for (genvar u = 0; u < 4; u++) begin : gen_in
+    assign in_valid[u] = {&some_valid_i[u] && !in_end_i[u][0], some_valid_i[u][0]};
+  end
+
   flk_delivery #(
-    .RecordBits(2),
-    .NumberBits(2),
+    .RecordBits(1),
+    .NumberBits(1),
     .Queue     (Queue)
   ) dut (
     .clk_i,
@@ -41,7 +47,7 @@ module fv_delivery #(
     .error_o      (),
     .lines_o      (),
     .record_base_i('0),
-    .in_valid_i,
+    .in_valid_i   (in_valid),
     .in_ready_o   (in_ready),
     .in_end_i,
     .in_entry_i,
@@ -68,101 +74,124 @@ module fv_delivery #(
 
   // What the unit in turn gives, and whether the core is to have it.
 
-  logic       unit_q, turn_q, take, wanted;
-  logic [1:0] unit_now;
-  logic [5:0] entry;
+  logic [1:0]      unit_q, taken, is_end, wanted;
+  logic [1:0][4:0] entry;
 
-  assign unit_now = {unit_q, 1'(Channel)};
-  assign take     = in_valid_i[unit_now] && in_ready[unit_now];
-  assign entry    = in_entry_i[unit_now];
-  assign wanted   = in_end_i[unit_now] || entry[Core];
+  assign taken  = in_ready[unit_q] ? in_valid[unit_q] : '0;
+  assign entry  = in_entry_i[unit_q];
+  assign is_end = in_end_i[unit_q];
+  assign wanted = taken & (is_end | {entry[1][Core], entry[0][Core]});
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
-      unit_q <= 1'b0;
-      turn_q <= 1'b0;
+      unit_q <= '0;
     end else if (clear_i) begin
-      unit_q <= 1'b0;
-      turn_q <= 1'b0;
+      unit_q <= '0;
     end else begin
-      unit_q <= unit_q ^ (take && in_end_i[unit_now]);
-      turn_q <= turn_q ^ (out_valid[Core] && out_ready_i[Core] && out_end[Core]);
+      unit_q <= unit_q + 2'((taken & is_end) != '0);
     end
   end
 
-  logic [3:0] count, ahead;
+  logic [4:0] count, ahead;
   logic       watching;
-  logic [2:0] watched;
+  logic [1:0] watched;
 
-  fv_stream #(
-    .Width   (3),
+  fv_pair_stream #(
+    .Width   (2),
     .Capacity(Held)
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
     .clear_i,
     .pick_i,
-    .push_i     (take && wanted),
-    .in_data_i  ({in_end_i[unit_now], entry[5:4]}),
-    .out_valid_i(out_valid[Core] && turn_q == 1'(Channel)),
+    .push_i     (wanted),
+    .in_data_i  ({is_end[1], entry[1][4], is_end[0], entry[0][4]}),
+    .out_valid_i({1'b0, out_valid[Core]}),
     .out_ready_i(out_ready_i[Core]),
-    .out_data_i ({out_end[Core], out_record[Core]}),
+    .out_data_i ({2'd0, out_end[Core], out_record[Core]}),
     .inside_o   (count),
     .watching_o (watching),
     .ahead_o    (ahead),
     .watched_o  (watched)
   );
 
-  // What is inside, the oldest first.
+  // The core's queue: what each memory holds, the oldest first.
+
+  logic [1:0][4:0]           fill;
+  logic [1:0][Half-1:0][1:0] word;
+  logic                      read, write;
+  logic [4:0]                queued;
+  logic [1:0]                push;
+
+  assign read   = dut.gen_core[Core].read_q;
+  assign write  = dut.gen_core[Core].write_q;
+  assign queued = fill[0] + fill[1];
+  assign push   = dut.gen_core[Core].push;
+
+  for (genvar b = 0; b < 2; b++) begin : gen_bank
+    logic shown;
+    assign shown   = dut.gen_core[Core].gen_bank[b].i_queue.out_valid_q;
+    assign fill[b] = 5'(dut.gen_core[Core].gen_bank[b].i_queue.used_q) + 5'(shown);
+    for (genvar d = 0; d < Half; d++) begin : gen_word
+      if (d == 0) begin : gen_first
+        assign word[b][d] = shown ? dut.gen_core[Core].gen_bank[b].i_queue.out_q
+                            : dut.gen_core[Core].gen_bank[b].i_queue.words_q[0];
+      end else if (d == Half - 1) begin : gen_last
+        assign word[b][d] = dut.gen_core[Core].gen_bank[b].i_queue.words_q[d-1];
+      end else begin : gen_other
+        assign word[b][d] = shown ? dut.gen_core[Core].gen_bank[b].i_queue.words_q[d-1]
+                            : dut.gen_core[Core].gen_bank[b].i_queue.words_q[d];
+      end
+    end
+  end
+
+  // All that is inside, the oldest first, and which of it is the core's.
 
   logic [Held-1:0]      present;
-  logic [Held-1:0][2:0] item;
-  logic [2:0]           used;
-  logic [1:0]           cached;
-  logic [3:0]           at, in_cache, in_queue, ends, opened;
+  logic [Held-1:0][1:0] item;
+  logic [2:0]           cached;
+  logic [4:0]           at, ends, opened;
   logic                 found;  // the element that is watched, in its place
-  logic [1:0]           masks;
+  logic [Cached-1:0]    right;
 
-  assign used   = dut.gen_queues[Channel].gen_core[Core].i_queue.used_q;
-  assign cached = dut.i_cache.used_q[Channel];
+  assign cached = dut.i_cache.used_q;
 
-  assign present[0] = dut.gen_queues[Channel].gen_core[Core].i_queue.out_valid_q;
-  assign item[0]    = dut.gen_queues[Channel].gen_core[Core].i_queue.out_q;
-
-  for (genvar d = 0; d < Queue; d++) begin : gen_words
-    assign present[1+d] = 3'(d) < used;
-    assign item[1+d]    = dut.gen_queues[Channel].gen_core[Core].i_queue.words_q[d];
+  for (genvar d = 0; d < 2 * Half; d++) begin : gen_queued
+    assign present[d] = 5'(d) < queued;
+    assign item[d]    = word[read^1'(d)][d/2];
   end
 
-  for (genvar d = 0; d < 2; d++) begin : gen_cached
-    logic [6:0] word;  // record, end, mask
-    assign word               = dut.i_cache.words_q[Channel][d];
-    assign present[1+Queue+d] = 2'(d) < cached && word[Core];
-    assign item[1+Queue+d]    = {word[4], word[6:5]};
-    assign masks[d]           = 2'(d) >= cached || !word[4] || word[3:0] == '1;
+  for (genvar d = 0; d < Cached; d++) begin : gen_cached
+    logic [5:0] element;  // record, end, mask
+    assign element             = dut.i_cache.words_q[d];
+    assign present[2*Half+d] = 3'(d) < cached && element[Core];
+    assign item[2*Half+d]    = {element[4], element[5]};
+    // An end goes to all cores, and nothing goes with it that comes behind it.
+    if (d == 0) begin : gen_oldest
+      assign right[d] = 3'(d) >= cached || !element[4] || element[3:0] == '1;
+    end else begin : gen_behind
+      assign right[d] = 3'(d) >= cached || ((!element[4] || element[3:0] == '1) &&
+                        !(dut.i_cache.pair_q[d] && dut.i_cache.words_q[d-1][4]));
+    end
   end
 
-  assign present[Held-1] = dut.e_valid_q[Channel] &&
-                           (dut.e_q[Channel].last || dut.e_q[Channel].mask[Core]);
-  assign item[Held-1]    = {dut.e_q[Channel].last, dut.e_record_q[Channel]};
+  for (genvar k = 0; k < 2; k++) begin : gen_taken
+    assign present[Held-2+k] = dut.e_valid_q[k] && (dut.e_q[k].last || dut.e_q[k].mask[Core]);
+    assign item[Held-2+k]    = {dut.e_q[k].last, dut.e_record_q[k]};
+  end
 
   always_comb begin
-    at       = '0;
-    in_cache = '0;
-    in_queue = '0;
-    ends     = '0;
-    opened   = '0;
-    found    = 1'b1;
+    at     = '0;
+    ends   = '0;
+    opened = '0;
+    found  = 1'b0;
     for (int unsigned d = 0; d < Held; d++) begin
       if (present[d]) begin
-        found  = found && (at != ahead || item[d] == watched);
+        found  = found || (at == ahead && item[d] == watched);
         at     = at + 1'b1;
-        opened = opened + 4'(item[d][2]);
-        if (d <= Queue) begin
-          in_queue = in_queue + 1'b1;
-          ends     = ends + 4'(item[d][2]);
-        end else if (d < Held - 1) begin
-          in_cache = in_cache + 1'b1;
+        opened = opened + 5'(item[d][1]);
+        if (d < 2 * Half) begin
+          ends = ends + 5'(item[d][1]);
         end
       end
     end
@@ -170,17 +199,23 @@ module fv_delivery #(
 
   always_comb begin
     if (rst_n) begin
+      a_room: assert (queued + 5'(push[0]) + 5'(push[1]) <= 5'(Queue));
       l_inside: assert (count == at);
-      l_used: assert (used <= 3'(Queue) && cached <= 2'd2);
-      l_places: assert (4'(dut.places_q[Channel][Core]) + in_cache + in_queue == 4'(Queue));
-      l_ends: assert (4'(dut.ends_q[Channel][Core]) == ends);
-      l_opened: assert (4'(dut.opened_q[Channel][Core]) == opened);
-      l_gone: assert (!dut.gone_q[Channel][Core]);
-      l_unit: assert (dut.unit_q[Channel] == unit_q && dut.turn_q[Core] == turn_q);
+      l_cached: assert (cached <= 3'(Cached));
+      l_used: assert (5'(dut.used_q[Core]) == queued && queued <= 5'(Queue));
+      l_fill: assert (fill[read] == fill[!read] + 5'(queued[0]) && write == (read ^ queued[0]));
+      l_room: assert (!dut.room_q || queued <= 5'(Queue - 4));
+      l_next: assert (!dut.i_cache.ready_q || queued <= 5'(Queue - 2));
+      l_ends: assert (5'(dut.ends_q[Core]) == ends);
+      l_opened: assert (5'(dut.opened_q[Core]) == opened);
+      l_gone: assert (!dut.gone_q[Core]);
+      l_unit: assert (dut.unit_q == unit_q);
+      l_pair: assert (!(dut.e_valid_q[1] && dut.e_valid_q[0] && dut.e_q[0].last));
       l_watched: assert (!watching || found);
-      l_mask: assert (masks == '1);
-      a_finish: assert (finish[{1'b0, 1'(Channel)}] == 1'b0 && finish[{1'b1, 1'(Channel)}] == 1'b0);
-      c_end: cover (out_valid[Core] && out_ready_i[Core] && out_end[Core] && turn_q);
+      l_right: assert (right == '1);
+      a_finish: assert (finish == '0);
+      c_end: cover (out_valid[Core] && out_ready_i[Core] && out_end[Core] && unit_q == 2'd3);
+      c_full: cover (!dut.room_q && dut.i_cache.ready_q);
     end
   end
 

@@ -90,6 +90,7 @@ lanes/flk_splat_setup.sv
 sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
 sort/flk_delivery.sv
+sort/flk_entry_buffer.sv
 sort/flk_list_reader.sv
 sort/flk_record_cache.sv
 sort/flk_sort_merge.sv

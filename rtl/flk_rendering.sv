@@ -26,7 +26,8 @@ module flk_rendering
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned Chunks         = 16,   // in a list reader's memory
-  parameter  int unsigned Queue          = 64,   // records of each core and channel
+  parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
+  parameter  int unsigned Queue          = 64,   // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
   parameter  int unsigned IdBits         = 4,
@@ -104,8 +105,8 @@ module flk_rendering
 
   assign start  = state_q == START && delivery_idle;
   assign idle_o = state_q == IDLE;
-  assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) && delivery_idle &&
-                  stage_idle;
+  assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) && (&buffer_empty) &&
+                  delivery_idle && stage_idle;
 
   // Delivery forgets its cache first; all others start when it has.
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -156,6 +157,9 @@ module flk_rendering
   logic [3:0][1:0]             ask_burst;
   logic [3:0]                  sorted_valid, sorted_ready, sorted_end, finish;
   logic [3:0][27:0]            sorted_entry;
+  logic [3:0]                  finish_unit, buffer_empty, entry_ready;
+  logic [3:0][1:0]             entry_valid, entry_end;
+  logic [3:0][1:0][27:0]       entry;
   logic [3:0][31:0]            entries, readings, dropped;
 
   flk_tile_walk #(
@@ -253,7 +257,26 @@ module flk_rendering
       .out_ready_i (sorted_ready[u]),
       .out_end_o   (sorted_end[u]),
       .out_entry_o (sorted_entry[u]),
-      .finish_i    (finish[u])
+      .finish_i    (finish_unit[u])
+    );
+
+    flk_entry_buffer #(
+      .Depth(Entries)
+    ) i_buffer (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (sorted_valid[u]),
+      .in_ready_o (sorted_ready[u]),
+      .in_end_i   (sorted_end[u]),
+      .in_entry_i (sorted_entry[u]),
+      .finish_o   (finish_unit[u]),
+      .out_valid_o(entry_valid[u]),
+      .out_ready_i(entry_ready[u]),
+      .out_end_o  (entry_end[u]),
+      .out_entry_o(entry[u]),
+      .finish_i   (finish[u]),
+      .empty_o    (buffer_empty[u])
     );
   end
 
@@ -305,10 +328,10 @@ module flk_rendering
     .error_o      (record_error),
     .lines_o      (cache_lines),
     .record_base_i({registers_i.records_beat, 1'b0}),
-    .in_valid_i   (sorted_valid),
-    .in_ready_o   (sorted_ready),
-    .in_end_i     (sorted_end),
-    .in_entry_i   (sorted_entry),
+    .in_valid_i   (entry_valid),
+    .in_ready_o   (entry_ready),
+    .in_end_i     (entry_end),
+    .in_entry_i   (entry),
     .finish_o     (finish),
     .out_valid_o  (record_valid),
     .out_ready_i  (record_ready),

@@ -82,7 +82,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_cluster_cull": [{"BufferBeats": 16, "MaxBeats": 16}],
     "flk_geometry_fetch": [{"BufferBeats": 20, "Clusters": 3, "MaxBeats": 16, "Bursts": 5}],
     "flk_record_cache": [{"RecordBits": 256, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}],
-    "flk_delivery": [{"Queue": 4}],
+    "flk_delivery": [{"Queue": 8}],
     "flk_list_reader": [{"Contexts": 2, "Slots": 5, "Ahead": 1}],
     "flk_axi_write": [{"Width": 64, "MaxBeats": 256}, {"Bursts": 1, "IdBits": 1, "Id": 1, "BeatBits": 1}],
     "flk_bitonic_sorter": [

@@ -1,5 +1,6 @@
-// A cache as its user sees it: each channel's elements in order, taken and given whenever it likes; a record's
-// number in place of the record. What is taken and given is up to the solver (signals without driver).
+// A cache as its user sees it: elements in order, one or two taken and given in a cycle whenever it likes, none in the cycle after
+// out_ready_i was low; two are given together only if they were taken together. A record's number stands in place of the record. What
+// is taken and given is up to the solver (signals without driver).
 module flk_record_cache #(
   parameter  int unsigned RecordBits = 2,
   parameter  int unsigned NumberBits = 2,
@@ -26,6 +27,7 @@ module flk_record_cache #(
   input  logic [1:0]                  in_skip_i,
   input  logic [1:0][NumberBits-1:0]  in_record_i,
   input  logic [1:0][TagBits-1:0]     in_tag_i,
+  input  logic                        out_ready_i,
   output logic [1:0]                  out_valid_o,
   output logic [1:0][RecordBits-1:0]  out_record_o,
   output logic [1:0][TagBits-1:0]     out_tag_o,
@@ -46,47 +48,61 @@ module flk_record_cache #(
 
   localparam int unsigned ItemBits = NumberBits + TagBits;
 
-  logic [1:0]                    takes, gives;  // the solver's
-  logic                          ready;
-  logic [1:0][1:0]               used_q;        // elements of a channel
-  logic [1:0][1:0][ItemBits-1:0] words_q;       // the oldest first
+  logic [1:0]               takes, gives;  // the solver's
+  logic                     ready;
+  logic                     ready_q;       // out_ready_i of the cycle before
+  logic [2:0]               used_q, left;
+  logic [2:0][ItemBits-1:0] words_q, words_d, words_left;  // the oldest first
+  logic [2:0]               pair_q, pair_d, pair_left;     // taken together with the one before it
+  logic [1:0]               push;
 
-  assign idle_o     = used_q == '0 && ready;
-  assign ar_valid_o = 1'b0;
-  assign r_ready_o  = 1'b1;
+  assign idle_o         = used_q == '0 && ready;
+  assign ar_valid_o     = 1'b0;
+  assign r_ready_o      = 1'b1;
+  assign in_ready_o[0]  = takes[0] && used_q <= 3'd1;
+  assign in_ready_o[1]  = in_ready_o[0] && takes[1];
+  assign push           = in_valid_i & in_ready_o;
+  assign out_valid_o[0] = gives[0] && ready_q && used_q != 3'd0;
+  assign out_valid_o[1] = out_valid_o[0] && gives[1] && used_q >= 3'd2 && pair_q[1];
+  assign left           = used_q - 3'(out_valid_o[0]) - 3'(out_valid_o[1]);
 
-  for (genvar c = 0; c < 2; c++) begin : gen_channel
-    logic push, pop;
-    logic [1:0] left;
-    logic [1:0][ItemBits-1:0] words;
+  for (genvar c = 0; c < 2; c++) begin : gen_out
+    assign {out_record_o[c], out_tag_o[c]} = words_q[c];
+  end
 
-    assign in_ready_o[c]   = takes[c] && used_q[c] != 2'd2;
-    assign out_valid_o[c]  = gives[c] && used_q[c] != 2'd0;
-    assign {out_record_o[c], out_tag_o[c]} = words_q[c][0];
-    assign push            = in_valid_i[c] && in_ready_o[c];
-    assign pop             = out_valid_o[c];
-    assign left            = used_q[c] - 2'(pop);
-
-    always_comb begin
-      words = pop ? {words_q[c][1], words_q[c][1]} : words_q[c];
-      if (push) begin
-        words[left[0]] = {in_record_i[c], in_tag_i[c]};
+  always_comb begin
+    words_left = out_valid_o[1] ? words_q >> 2 * ItemBits : out_valid_o[0] ? words_q >> ItemBits : words_q;
+    pair_left  = out_valid_o[1] ? pair_q >> 2 : out_valid_o[0] ? pair_q >> 1 : pair_q;
+    words_d    = words_left;
+    pair_d     = pair_left;
+    for (int unsigned d = 0; d < 3; d++) begin
+      if (push[0] && left == 3'(d)) begin
+        words_d[d] = {in_record_i[0], in_tag_i[0]};
+        pair_d[d]  = 1'b0;
+      end
+      if (push[1] && left + 3'(push[0]) == 3'(d)) begin
+        words_d[d] = {in_record_i[1], in_tag_i[1]};
+        pair_d[d]  = push[0];
       end
     end
+  end
 
-    always_ff @(posedge clk_i or negedge rst_ni) begin
-      if (!rst_ni) begin
-        used_q[c] <= '0;
-      end else if (start_i || clear_i) begin
-        used_q[c] <= '0;
-      end else begin
-        used_q[c] <= left + 2'(push);
-      end
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      used_q  <= '0;
+      ready_q <= 1'b0;
+    end else if (start_i || clear_i) begin
+      used_q  <= '0;
+      ready_q <= 1'b0;
+    end else begin
+      used_q  <= left + 3'(push[0]) + 3'(push[1]);
+      ready_q <= out_ready_i;
     end
+  end
 
-    always_ff @(posedge clk_i) begin
-      words_q[c] <= words;
-    end
+  always_ff @(posedge clk_i) begin
+    words_q <= words_d;
+    pair_q  <= pair_d;
   end
 
 endmodule

@@ -1,16 +1,16 @@
 // Delivery: sorted entries of four sorting units to records at four cores (docs/delivery.md).
 //
-// Tile i of the walk comes from unit i mod 4 and goes through channel i mod 2: two tiles are delivered
-// at a time. A channel takes an entry a cycle, looks its record up in the cache (flk_record_cache), and
-// puts the record into the queue that it has at each core of the entry's mask; the end of a list goes
-// to all four. A core takes from the two channels' queues in turn, tile by tile, so that cores may be
-// a tile apart.
-// Places in the queues are kept before a record is looked up: what is under way never waits, so that
-// neither channel waits for the other's cores.
+// Tile i of the walk comes from unit i mod 4. Tiles go one after the other, two entries a cycle (pairs of
+// flk_entry_buffer, never beyond the end of a list). An entry's record is looked up in the cache
+// (flk_record_cache) and put into the queues of the cores in its mask; the end of a list goes to all four.
+// All is one stream in one order: what cannot go on holds up only what is behind it, so lookups run
+// ahead of the queues, as far as the cache has places, and the memory's latency is not waited for.
+// The head of the stream waits while any core's queue is nearly full.
+// in_*: of each unit, the oldest entry and the one behind it; in_ready_o takes all that is valid.
 // finished_i of a core, a level, is about the tile whose elements it is taking, until it has taken its
 // end; in the cycle after that it is about the next tile. Records of such a tile that are not in its
 // queue yet do not come; an entry that no core wants is not looked up. When all four cores are finished
-// with the tile that a channel takes from a unit, finish_o of that unit rises, until its end is taken.
+// with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
 // Latency 9 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
@@ -18,11 +18,11 @@
 module flk_delivery #(
   parameter  int unsigned RecordBits = 128,
   parameter  int unsigned NumberBits = 24,
-  parameter  int unsigned Queue      = 64,   // records, of each core and channel
+  parameter  int unsigned Queue      = 64,   // records, of each core
   parameter  int unsigned Banks      = 4,    // of the cache
   parameter  int unsigned Sets       = 64,
   parameter  int unsigned Ways       = 4,
-  parameter  int unsigned Depth      = 256,
+  parameter  int unsigned Depth      = 128,
   parameter  int unsigned Places     = 128,
   parameter  int unsigned AddrBits   = 40,
   parameter  int unsigned IdBits     = 4,
@@ -41,11 +41,11 @@ module flk_delivery #(
   output logic [31:0]                       lines_o,        // read from memory since start_i
   input  logic [AddrBits-Shift-1:0]         record_base_i,  // in 32 bytes
   // Sorting units
-  input  logic [3:0]                        in_valid_i,
-  output logic [3:0]                        in_ready_o,
-  input  logic [3:0]                        in_end_i,
-  input  logic [3:0][NumberBits+Cores-1:0]  in_entry_i,
-  output logic [3:0]                        finish_o,
+  input  logic [3:0][1:0]                       in_valid_i,
+  output logic [3:0]                            in_ready_o,
+  input  logic [3:0][1:0]                       in_end_i,
+  input  logic [3:0][1:0][NumberBits+Cores-1:0] in_entry_i,
+  output logic [3:0]                            finish_o,
   // Cores
   output logic [Cores-1:0]                  out_valid_o,
   input  logic [Cores-1:0]                  out_ready_i,
@@ -68,11 +68,12 @@ module flk_delivery #(
   input  logic                              r_last_i
 );
 
-  localparam int unsigned FillBits = $clog2(Queue + 1);
-  localparam int unsigned EndBits = $clog2(Queue + 2);
+  localparam int unsigned FillBits = $clog2(Queue + 3);  // each of two memories has one word more
+  localparam int unsigned EndBits = $clog2(Depth + Queue + 10);
+  localparam int unsigned Margin = 6;  // records under way when a queue is seen to be nearly full
 
-  if (Queue < 4) begin : gen_check_queue
-    $error("flk_delivery: Queue must be at least 4");
+  if (Queue < 8 || Queue % 2 != 0) begin : gen_check_queue
+    $error("flk_delivery: Queue must be even, at least 8");
   end
 
   typedef struct packed {
@@ -86,56 +87,59 @@ module flk_delivery #(
 
   // ---- entries ----------------------------------------------------------------------------------------
 
-  logic [1:0]                  unit_q;              // channel c takes from unit c + 2 unit_q
-  logic [1:0]                  e_valid_q, e_move, e_ready, e_take, e_end_taken;
+  logic [1:0]                  unit_q;              // that is taken from
+  logic [1:0]                  e_valid_q, gone, nothing, look, look_ready;
   what_t [1:0]                 e_q, what;
   logic [1:0][NumberBits-1:0]  e_record_q;
-  logic [1:0][1:0]             e_unit;
-  logic [1:0]                  nothing, room, look, look_ready;
-  logic [1:0][Cores-1:0]       kept, fits, dropped;
+  logic [1:0][Cores-1:0]       kept;
+  logic                        e_move, e_ready, e_take, e_end_taken;
 
-  // Of a channel's queue at a core: free places that nobody has been promised; ends between the unit and the core, and
-  // in the queue alone. The core is finished with the tile that it takes from the channel.
-  logic [1:0][Cores-1:0][FillBits-1:0] places_q;
-  logic [1:0][Cores-1:0][EndBits-1:0]  opened_q, ends_q;
-  logic [1:0][Cores-1:0]               gone_q, unopened, unended;
-  logic [1:0][Cores-1:0]               push, pop, pop_end;
-  logic [Cores-1:0]                    turn_q;      // the channel that a core takes from
-  logic                                ready_q;     // the cache is
+  // Of a core: ends between the unit and it, and in its queue alone. It is finished with the tile that it takes.
+  logic [Cores-1:0][EndBits-1:0]  opened_q;
+  logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
+  logic [Cores-1:0]               gone_q, unopened, unended;
+  logic [Cores-1:0]               pop, pop_end;
+  logic                           ready_q;          // the cache is
 
-  for (genvar c = 0; c < 2; c++) begin : gen_channel
-    assign e_unit[c]      = {unit_q[c], 1'(c)};
-    assign e_ready[c]     = ready_q && (!e_valid_q[c] || e_move[c]);
-    assign e_take[c]      = in_valid_i[e_unit[c]] && e_ready[c];
-    assign e_end_taken[c] = e_take[c] && in_end_i[e_unit[c]];
+  assign e_move      = (e_valid_q & ~gone) == '0;
+  assign e_ready     = ready_q && e_move;
+  assign e_take      = in_valid_i[unit_q][0] && e_ready;
+  assign e_end_taken = e_take && (in_valid_i[unit_q] & in_end_i[unit_q]) != '0;
 
-    // The element in the register is before all ends taken after it: those in opened_q are of earlier tiles, or its own.
-    assign kept[c]    = e_q[c].last ? '1 : e_q[c].mask & ~(gone_q[c] & unopened[c]);
-    assign nothing[c] = kept[c] == '0;
-    assign room[c]    = (kept[c] & ~fits[c]) == '0;
-    assign look[c]    = e_valid_q[c] && !nothing[c] && room[c] && !stop;
-    assign e_move[c]  = e_valid_q[c] && (nothing[c] || (room[c] && look_ready[c]));
-    assign what[c]    = '{last: e_q[c].last, mask: kept[c]};
+  for (genvar k = 0; k < 2; k++) begin : gen_entry
+    // The entries in the registers are before all ends taken after them: those in opened_q are of earlier tiles, or their own.
+    assign kept[k]    = e_q[k].last ? '1 : e_q[k].mask & ~(gone_q & unopened);
+    assign nothing[k] = kept[k] == '0;
+    assign look[k]    = e_valid_q[k] && !nothing[k] && !stop;
+    assign gone[k]    = nothing[k] || look_ready[k];
+    assign what[k]    = '{last: e_q[k].last, mask: kept[k]};
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
-        unit_q[c]    <= 1'b0;
-        e_valid_q[c] <= 1'b0;
+        e_valid_q[k] <= 1'b0;
       end else if (stop) begin
-        unit_q[c]    <= 1'b0;
-        e_valid_q[c] <= 1'b0;
+        e_valid_q[k] <= 1'b0;
       end else begin
-        unit_q[c]    <= unit_q[c] ^ e_end_taken[c];
-        e_valid_q[c] <= e_take[c] || (e_valid_q[c] && !e_move[c]);
+        e_valid_q[k] <= e_take ? in_valid_i[unit_q][k] : e_valid_q[k] && !gone[k];
       end
     end
 
     always_ff @(posedge clk_i) begin
-      if (e_take[c]) begin
-        e_q[c].last   <= in_end_i[e_unit[c]];
-        e_q[c].mask   <= in_entry_i[e_unit[c]][Cores-1:0];
-        e_record_q[c] <= in_entry_i[e_unit[c]][NumberBits+Cores-1:Cores];
+      if (e_take) begin
+        e_q[k].last   <= in_end_i[unit_q][k];
+        e_q[k].mask   <= in_entry_i[unit_q][k][Cores-1:0];
+        e_record_q[k] <= in_entry_i[unit_q][k][NumberBits+Cores-1:Cores];
       end
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      unit_q <= '0;
+    end else if (stop) begin
+      unit_q <= '0;
+    end else begin
+      unit_q <= unit_q + 2'(e_end_taken);
     end
   end
 
@@ -143,22 +147,21 @@ module flk_delivery #(
   logic [3:0] finish_q;
 
   for (genvar u = 0; u < 4; u++) begin : gen_unit
-    assign in_ready_o[u] = e_ready[u%2] && unit_q[u%2] == 1'(u / 2);
+    assign in_ready_o[u] = e_ready && unit_q == 2'(u);
     assign finish_o[u]   = finish_q[u];
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
         finish_q[u] <= 1'b0;
       end else begin
-        finish_q[u] <= !stop && (&(gone_q[u%2] & unopened[u%2])) && unit_q[u%2] == 1'(u / 2) &&
-                       !e_end_taken[u%2];
+        finish_q[u] <= !stop && (&(gone_q & unopened)) && unit_q == 2'(u) && !e_end_taken;
       end
     end
   end
 
   // ---- records ----------------------------------------------------------------------------------------
 
-  logic                        cache_idle;
+  logic                        cache_idle, room_q;
   logic [1:0]                  found_valid;
   logic [1:0][RecordBits-1:0]  found_record;
   what_t [1:0]                 found;
@@ -189,6 +192,7 @@ module flk_delivery #(
     .in_skip_i   ({e_q[1].last, e_q[0].last}),
     .in_record_i (e_record_q),
     .in_tag_i    (what),
+    .out_ready_i (room_q),
     .out_valid_o (found_valid),
     .out_record_o(found_record),
     .out_tag_o   (found),
@@ -218,99 +222,107 @@ module flk_delivery #(
 
   // ---- queues -----------------------------------------------------------------------------------------
 
-  logic [1:0][Cores-1:0]                   queue_valid, queue_end, queue_empty, unused_ready;
-  logic [1:0][Cores-1:0][RecordBits-1:0]   queue_record;
+  logic [Cores-1:0] full, queue_empty;
 
-  for (genvar c = 0; c < 2; c++) begin : gen_queues
-    for (genvar s = 0; s < Cores; s++) begin : gen_core
-      logic asked, end_in;
+  // What has left the head of the cache's queue in this cycle and the one before is not counted yet.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      room_q <= 1'b0;
+    end else begin
+      room_q <= full == '0;
+    end
+  end
 
-      assign unopened[c][s] = opened_q[c][s] == '0;
-      assign unended[c][s]  = ends_q[c][s] == '0;
-      assign fits[c][s]     = places_q[c][s] != '0;
-      assign asked          = look[c] && look_ready[c] && kept[c][s];
-      assign dropped[c][s]  = found_valid[c] && !found[c].last && found[c].mask[s] &&
-                              gone_q[c][s] && unended[c][s];
-      assign push[c][s]     = found_valid[c] && found[c].mask[s] && !dropped[c][s];
-      assign end_in         = push[c][s] && found[c].last;
-      assign pop[c][s]      = out_valid_o[s] && out_ready_i[s] && turn_q[s] == 1'(c);
-      assign pop_end[c][s]  = pop[c][s] && queue_end[c][s];
+  for (genvar s = 0; s < Cores; s++) begin : gen_core
+    // Records go into two memories in turn, and come from them in turn.
+    logic                       write_q, read_q;
+    logic [1:0]                 push, valid, is_end, empty, unused_ready;
+    logic [1:0][RecordBits-1:0] record;
+    logic                       end_in;
+
+    assign unopened[s] = opened_q[s] == '0;
+    assign unended[s]  = ends_q[s] == '0;
+    assign full[s]     = 32'(used_q[s]) > Queue - Margin;
+    assign end_in      = (found_valid & {found[1].last, found[0].last}) != '0;
+    assign pop[s]      = out_valid_o[s] && out_ready_i[s];
+    assign pop_end[s]  = pop[s] && out_end_o[s];
+
+    for (genvar k = 0; k < 2; k++) begin : gen_found
+      assign push[k] = found_valid[k] && found[k].mask[s] &&
+                       (found[k].last || !(gone_q[s] && unended[s]));
+    end
+
+    for (genvar b = 0; b < 2; b++) begin : gen_bank
+      logic first;  // of what is found
+
+      assign first = push[0] && write_q == 1'(b);
 
       flk_sram_fifo #(
         .Width(RecordBits + 1),
-        .Depth(Queue)
+        .Depth(Queue / 2)
       ) i_queue (
         .clk_i,
         .rst_ni,
         .clear_i    (stop),
-        .in_valid_i (push[c][s]),
-        .in_ready_o (unused_ready[c][s]),  // a place has been kept
-        .in_data_i  ({found[c].last, found_record[c]}),
-        .out_valid_o(queue_valid[c][s]),
-        .out_ready_i(out_ready_i[s] && turn_q[s] == 1'(c)),
-        .out_data_o ({queue_end[c][s], queue_record[c][s]}),
-        .empty_o    (queue_empty[c][s])
+        .in_valid_i (first || (push[1] && (write_q ^ push[0]) == 1'(b))),
+        .in_ready_o (unused_ready[b]),  // there is room
+        .in_data_i  (first ? {found[0].last, found_record[0]} : {found[1].last, found_record[1]}),
+        .out_valid_o(valid[b]),
+        .out_ready_i(out_ready_i[s] && read_q == 1'(b)),
+        .out_data_o ({is_end[b], record[b]}),
+        .empty_o    (empty[b])
       );
-
-      always_ff @(posedge clk_i or negedge rst_ni) begin
-        if (!rst_ni) begin
-          places_q[c][s] <= FillBits'(Queue);
-          opened_q[c][s] <= '0;
-          ends_q[c][s]   <= '0;
-          gone_q[c][s]   <= 1'b0;
-        end else if (stop) begin
-          places_q[c][s] <= FillBits'(Queue);
-          opened_q[c][s] <= '0;
-          ends_q[c][s]   <= '0;
-          gone_q[c][s]   <= 1'b0;
-        end else begin
-          places_q[c][s] <= places_q[c][s] - FillBits'(asked) + FillBits'(pop[c][s])
-                            + FillBits'(dropped[c][s]);
-          opened_q[c][s] <= opened_q[c][s] + EndBits'(e_end_taken[c]) - EndBits'(pop_end[c][s]);
-          ends_q[c][s]   <= ends_q[c][s] + EndBits'(end_in) - EndBits'(pop_end[c][s]);
-          gone_q[c][s]   <= finished_i[s] && turn_q[s] == 1'(c) && !pop_end[c][s];
-        end
-      end
-
-`ifndef SYNTHESIS
-      assert property (@(posedge clk_i) disable iff (!rst_ni)
-          push[c][s] && !stop |-> unused_ready[c][s])
-      else $error("flk_delivery: a record without a place");
-
-      assert property (@(posedge clk_i) disable iff (!rst_ni)
-          ends_q[c][s] <= opened_q[c][s] && 32'(places_q[c][s]) <= Queue)
-      else $error("flk_delivery: ends or places");
-`endif
     end
-  end
 
-  // ---- cores ------------------------------------------------------------------------------------------
-
-  for (genvar s = 0; s < Cores; s++) begin : gen_out
-    assign out_valid_o[s]  = queue_valid[turn_q[s]][s];
-    assign out_end_o[s]    = queue_end[turn_q[s]][s];
-    assign out_record_o[s] = queue_record[turn_q[s]][s];
+    assign out_valid_o[s]  = valid[read_q];
+    assign out_end_o[s]    = is_end[read_q];
+    assign out_record_o[s] = record[read_q];
+    assign queue_empty[s]  = &empty;
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
-        turn_q[s] <= 1'b0;
+        write_q     <= 1'b0;
+        read_q      <= 1'b0;
+        used_q[s]   <= '0;
+        opened_q[s] <= '0;
+        ends_q[s]   <= '0;
+        gone_q[s]   <= 1'b0;
       end else if (stop) begin
-        turn_q[s] <= 1'b0;
-      end else if (out_valid_o[s] && out_ready_i[s] && out_end_o[s]) begin
-        turn_q[s] <= !turn_q[s];
+        write_q     <= 1'b0;
+        read_q      <= 1'b0;
+        used_q[s]   <= '0;
+        opened_q[s] <= '0;
+        ends_q[s]   <= '0;
+        gone_q[s]   <= 1'b0;
+      end else begin
+        write_q     <= write_q ^ (^push);
+        read_q      <= read_q ^ pop[s];
+        used_q[s]   <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop[s]);
+        opened_q[s] <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end[s]);
+        ends_q[s]   <= ends_q[s] + FillBits'(end_in) - FillBits'(pop_end[s]);
+        gone_q[s]   <= finished_i[s] && !pop_end[s];
       end
     end
+
+`ifndef SYNTHESIS
+    assert property (@(posedge clk_i) disable iff (!rst_ni) push != '0 && !stop |-> 32'(used_q[s]) + $countones(push) <= Queue)
+    else $error("flk_delivery: a record without a place");
+
+    assert property (@(posedge clk_i) disable iff (!rst_ni) 32'(ends_q[s]) <= 32'(opened_q[s]) && ends_q[s] <= used_q[s])
+    else $error("flk_delivery: ends or places");
+
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        out_valid_o[s] && !out_ready_i[s] && !stop |=>
+        out_valid_o[s] && $stable({out_end_o[s], out_record_o[s]}))
+    else $error("flk_delivery: output changed before its transfer");
+`endif
   end
 
   assign idle_o = cache_idle && e_valid_q == '0 && (&queue_empty);
 
 `ifndef SYNTHESIS
-  for (genvar s = 0; s < Cores; s++) begin : gen_check
-    assert property (@(posedge clk_i) disable iff (!rst_ni)
-        out_valid_o[s] && !out_ready_i[s] && !stop |=>
-        out_valid_o[s] && $stable({out_end_o[s], out_record_o[s]}))
-    else $error("flk_delivery: output changed before its transfer");
-  end
+  assert property (@(posedge clk_i) disable iff (!rst_ni) &found_valid |-> !found[0].last)
+  else $error("flk_delivery: a record beside the end before it");
 `endif
 
 endmodule

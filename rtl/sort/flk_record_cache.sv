@@ -1,18 +1,18 @@
-// Record cache: records of two channels from DRAM by their numbers, in order (docs/delivery.md).
+// Record cache: records from DRAM by their numbers, in order, two a cycle (docs/delivery.md).
 //
 // Tags are looked up first, data come later: a lookup decides at once whether its line has to be read
-// and which line goes; then it waits in one queue for both channels, in the order of the lookups. Lines
+// and which line goes; then it waits in a queue, in the order of the lookups, input 0 before input 1. Lines
 // come in the order in which they were asked for, and each is written over the line that goes when the
 // lookup that asked for it is at the head of the queue. All lookups before it have then been served, so
 // a line that is still needed is never lost, and a lookup that finds its tag finds its data.
 // Elements with in_skip_i look nothing up and keep their place in the order. What comes out must be
-// taken: the user has room for it, so that the channels never wait for each other's users.
+// taken, output 0 before output 1; none comes in the cycle after one with out_ready_i low.
 // Memory of Banks x Sets x Ways lines of 32 bytes; the way that is replaced is the oldest of its set.
 // start_i (while idle_o) and clear_i (at any time) forget all; idle_o rises when what was asked for has
 // come and the tags are cleared (Sets cycles). error_o: the memory answered with an error; until then.
-// Throughput: an element a cycle and channel, unless both look up the same bank; a line a cycle from
-// memory. Latency 5 without a miss in the queue. in_ready_o depends on both channels' in_*.
-// Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port.
+// Throughput: two elements a cycle, one where both look up the same bank: input 1 then waits; a line a cycle from
+// memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
+// Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
   parameter  int unsigned NumberBits  = 24,
@@ -20,7 +20,7 @@ module flk_record_cache #(
   parameter  int unsigned Banks       = 4,
   parameter  int unsigned Sets        = 64,   // of a bank
   parameter  int unsigned Ways        = 4,
-  parameter  int unsigned Depth       = 256,  // lookups that wait, two each
+  parameter  int unsigned Depth       = 128,  // lookups that wait, two each
   parameter  int unsigned Places      = 128,  // lines on their way
   parameter  int unsigned AddrBits    = 40,
   parameter  int unsigned IdBits      = 4,
@@ -44,6 +44,7 @@ module flk_record_cache #(
   input  logic [1:0][NumberBits-1:0]      in_record_i,
   input  logic [1:0][TagBits-1:0]         in_tag_i,
   // Records
+  input  logic                            out_ready_i,
   output logic [1:0]                      out_valid_o,
   output logic [1:0][RecordBits-1:0]      out_record_o,
   output logic [1:0][TagBits-1:0]         out_tag_o,
@@ -139,9 +140,9 @@ module flk_record_cache #(
     end
   end
 
-  // ---- A: a lookup of each channel, of different banks ------------------------------------------------
+  // ---- A: two lookups, of different banks -------------------------------------------------------------
 
-  logic                         advance, conflict, turn_q;
+  logic                         advance, conflict;
   logic [1:0]                   take;
   logic [1:0][LineBits-1:0]     in_line;
   logic [1:0][BankBits-1:0]     in_bank;
@@ -154,14 +155,14 @@ module flk_record_cache #(
   logic [1:0][BankBits-1:0]     b_bank;
   logic [1:0][SetBits-1:0]      b_set;
 
-  for (genvar c = 0; c < 2; c++) begin : gen_channel
+  for (genvar c = 0; c < 2; c++) begin : gen_input
     assign in_line[c] = in_record_i[c][NumberBits-1:PartBits];
     assign in_part[c] = PerLine > 1 && in_record_i[c][0];
     assign in_bank[c] = in_line[c][BankBits-1:0];
     assign in_set[c]  = in_line[c][BankBits+:SetBits];
     assign b_bank[c]  = b_line_q[c][BankBits-1:0];
     assign b_set[c]   = b_line_q[c][BankBits+:SetBits];
-    assign in_ready_o[c] = advance && state_q == READY && !(conflict && turn_q != 1'(c));
+    assign in_ready_o[c] = advance && state_q == READY && !(conflict && c == 1);
     assign take[c]    = in_valid_i[c] && in_ready_o[c];
   end
 
@@ -169,15 +170,11 @@ module flk_record_cache #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      turn_q    <= 1'b0;
       b_valid_q <= '0;
-    end else begin
-      turn_q <= turn_q ^ (conflict && (take != '0));
-      if (stop) begin
-        b_valid_q <= '0;
-      end else if (advance) begin
-        b_valid_q <= take;
-      end
+    end else if (stop) begin
+      b_valid_q <= '0;
+    end else if (advance) begin
+      b_valid_q <= take;
     end
   end
 
@@ -324,7 +321,7 @@ module flk_record_cache #(
     .empty_o    (miss_empty)
   );
 
-  // The first channel's line, then the second's; its address, added up in two halves.
+  // The first input's line, then the second's; its address, added up in two halves.
   assign sum_move = sum_valid_q && (!fetch_valid_q || fetch_ready);
   assign sum_load = miss_valid && (!sum_valid_q || sum_move);
   assign miss_pop = sum_load && (sent_q || !(next[0].valid && next[1].valid));
@@ -417,17 +414,19 @@ module flk_record_cache #(
 
   // ---- C: the head of the queue ------------------------------------------------------------------------
 
-  // Two lines that both have to be written take two cycles; the second channel goes with or after the first.
-  logic       done_q;  // the first channel's element has gone
+  // Two lines that both have to be written take two cycles; the second element goes with or after the first.
+  logic       done_q;  // the first element has gone
   logic       go_first, go_second;
   logic [1:0] go;
 
-  assign go_first  = wait_valid && head[0].valid && !done_q && (!head[0].miss || line_valid);
-  assign go_second = wait_valid && head[1].valid && (go_first || done_q || !head[0].valid) &&
+  assign go_first  = wait_valid && out_ready_i && head[0].valid && !done_q &&
+                     (!head[0].miss || line_valid);
+  assign go_second = wait_valid && out_ready_i && head[1].valid &&
+                     (go_first || done_q || !head[0].valid) &&
                      (!head[1].miss || (line_valid && !(go_first && head[0].miss)));
   assign go        = {go_second, go_first};
-  assign wait_pop = (go_second || !head[1].valid) && (go_first || done_q || !head[0].valid);
-  assign line_pop = (go[0] && head[0].miss) || (go[1] && head[1].miss);
+  assign wait_pop  = (go_second || !head[1].valid) && (go_first || done_q || !head[0].valid);
+  assign line_pop  = (go[0] && head[0].miss) || (go[1] && head[1].miss);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -18,24 +18,29 @@ Tile = list[tuple[int, int]]
 
 
 class Unit:
-    """What stands for a sorting unit: its tiles' entries, an end behind each; the rest of a list is dropped when finish_o says so."""
+    """What stands for a sorting unit and its buffer: its tiles' entries, an end behind each; the rest of a list is dropped when finish_o says so."""
 
     def __init__(self) -> None:
         self.lists: deque[tuple[int, deque[tuple[int, int]]]] = deque()  # number of the tile, entries left
-        self.offered = False
+        self.offered = 0
 
     @property
-    def item(self) -> tuple[int, int, int]:
+    def most(self) -> int:
+        """Elements that may be offered: a pair does not go beyond the end of a list."""
+        return min(2, len(self.lists[0][1]) + 1) if self.lists else 0
+
+    def item(self, k: int) -> tuple[int, int, int]:
         """End, record, mask."""
         entries = self.lists[0][1]
-        return (0, *entries[0]) if entries else (1, 0, 0)
+        return (0, *entries[k]) if k < len(entries) else (1, 0, 0)
 
     def move(self) -> None:
-        self.offered = False
-        if self.lists[0][1]:
-            self.lists[0][1].popleft()
-        else:
-            self.lists.popleft()
+        for _ in range(self.offered):
+            if self.lists[0][1]:
+                self.lists[0][1].popleft()
+            else:
+                self.lists.popleft()
+        self.offered = 0
 
 
 class Delivery:
@@ -87,7 +92,7 @@ class Delivery:
 
     async def _run(self) -> None:
         dut, edge = self.dut, RisingEdge(self.dut.clk_i)
-        bits, number = 8 * self.bytes, len(dut.in_entry_i) // 4
+        bits, number = 8 * self.bytes, len(dut.in_entry_i) // 8
         ready = 0
         told: list[set[int]] = [set() for _ in range(CORES)]
         while True:
@@ -113,10 +118,10 @@ class Delivery:
                     unit.move()
                 elif finish >> u & 1 and unit.lists:  # the rest of the list is dropped but for what is offered
                     entries = unit.lists[0][1]
-                    while len(entries) > (1 if unit.offered else 0):
+                    while len(entries) > unit.offered:
                         entries.pop()
-                if not unit.offered and unit.lists and not next(self.idle[u]):
-                    unit.offered = True
+                while unit.offered < unit.most and not next(self.idle[u]):  # one, or two; a second may join
+                    unit.offered += 1
             # Cores
             valid, ends = int(dut.out_valid_o.value), int(dut.out_end_o.value)
             moved = valid & ready
@@ -134,10 +139,11 @@ class Delivery:
             ready = sum((not self.rest[s] and not next(self.stall[s])) << s for s in range(CORES))
             dut.out_ready_i.value = ready
             dut.finished_i.value = sum(f << s for s, f in enumerate(self.finished))
-            items = [unit.item if unit.offered else (self.rng.getrandbits(1), self.rng.getrandbits(number - 4), 15) for unit in self.units]
-            dut.in_valid_i.value = sum(unit.offered << u for u, unit in enumerate(self.units))
-            dut.in_end_i.value = sum(item[0] << u for u, item in enumerate(items))
-            dut.in_entry_i.value = sum((item[1] << 4 | item[2]) << number * u for u, item in enumerate(items))
+            junk = (self.rng.getrandbits(1), self.rng.getrandbits(number - 4), 15)
+            items = [unit.item(k) if k < unit.offered else junk for unit in self.units for k in range(2)]
+            dut.in_valid_i.value = sum(((1 << unit.offered) - 1) << 2 * u for u, unit in enumerate(self.units))
+            dut.in_end_i.value = sum(item[0] << k for k, item in enumerate(items))
+            dut.in_entry_i.value = sum((item[1] << 4 | item[2]) << number * k for k, item in enumerate(items))
 
     def _element(self, s: int, end: bool, record: int) -> None:
         due = self.due[s]
@@ -211,14 +217,14 @@ async def finishing(dut, idle, stall, latency, share):
     test = Delivery(dut, idle, stall, latency, finish=share)
     await test.bench.reset()
     await test.ready()
-    await test.run(make(test.rng, 60, 200))
+    await test.run(make(test.rng, 60, 200) + make(test.rng, 4, 1000))
     assert test.records > 200 and (share < 0.9 or test.finish_seen)
 
 
 @cocotb.test()
 @cocotb.parametrize(slow=[0, 3])
 async def pace(dut, slow):
-    """One core takes a record every eight cycles: the others go on until they are a tile ahead."""
+    """One core takes a record every eight cycles: the others go on until its queue is full."""
     test = Delivery(dut, pace=tuple(8 if s == slow else 1 for s in range(CORES)), finish=0.1)
     await test.bench.reset()
     await test.ready()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 from flicker_tb.runner import build_and_test, refused
 
-SMALL = {"Queue": 4, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 6, "Places": 4}
+SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 6, "Places": 4}
 
 
 @pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256})), SMALL])
@@ -20,5 +20,5 @@ def test_delivery(parameters: dict[str, int]) -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Queue must be at least 4"):
-        build_and_test("flk_delivery", "cocotb_delivery", parameters={"Queue": 3})
+    with refused("Queue must be even, at least 8"):
+        build_and_test("flk_delivery", "cocotb_delivery", parameters={"Queue": 6})

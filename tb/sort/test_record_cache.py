@@ -1,6 +1,6 @@
-"""Record cache: records of both channels in order, and exactly the lines read that the golden model says for the order of the lookups.
+"""Record cache: records in order, two a cycle, and exactly the lines read that the golden model says for the order of the lookups.
 
-State space: records of one line, of one set, near each other and anywhere; ends between them; both channels in one bank; idle patterns on each channel,
+State space: records of one line, of one set, near each other and anywhere; ends between them; pairs in one bank; idle patterns, outputs that wait,
 memory with and without pauses, latency 1 to 100; errors; start and clear at any time. Parameter space: the default, a small cache with short queues, records
 of 32 bytes.
 """
