@@ -166,13 +166,7 @@ module fv_delivery #(
     assign element             = dut.i_cache.words_q[d];
     assign present[2*Half+d] = 3'(d) < cached && element[Core];
     assign item[2*Half+d]    = {element[4], element[5]};
-    // An end goes to all cores, and nothing goes with it that comes behind it.
-    if (d == 0) begin : gen_oldest
-      assign right[d] = 3'(d) >= cached || !element[4] || element[3:0] == '1;
-    end else begin : gen_behind
-      assign right[d] = 3'(d) >= cached || ((!element[4] || element[3:0] == '1) &&
-                        !(dut.i_cache.pair_q[d] && dut.i_cache.words_q[d-1][4]));
-    end
+    assign right[d]          = 3'(d) >= cached || !element[4] || element[3:0] == '1;  // an end goes to all cores
   end
 
   for (genvar k = 0; k < 2; k++) begin : gen_taken

@@ -1,6 +1,6 @@
 // A cache as its user sees it: elements in order, one or two taken and given in a cycle whenever it likes, none in the cycle after
-// out_ready_i was low; two are given together only if they were taken together. A record's number stands in place of the record. What
-// is taken and given is up to the solver (signals without driver).
+// out_ready_i was low. A record's number stands in place of the record. What is taken and given is up to the solver (signals without
+// driver).
 module flk_record_cache #(
   parameter  int unsigned RecordBits = 2,
   parameter  int unsigned NumberBits = 2,
@@ -53,7 +53,6 @@ module flk_record_cache #(
   logic                     ready_q;       // out_ready_i of the cycle before
   logic [2:0]               used_q, left;
   logic [2:0][ItemBits-1:0] words_q, words_d, words_left;  // the oldest first
-  logic [2:0]               pair_q, pair_d, pair_left;     // taken together with the one before it
   logic [1:0]               push;
 
   assign idle_o         = used_q == '0 && ready;
@@ -63,7 +62,7 @@ module flk_record_cache #(
   assign in_ready_o[1]  = in_ready_o[0] && takes[1];
   assign push           = in_valid_i & in_ready_o;
   assign out_valid_o[0] = gives[0] && ready_q && used_q != 3'd0;
-  assign out_valid_o[1] = out_valid_o[0] && gives[1] && used_q >= 3'd2 && pair_q[1];
+  assign out_valid_o[1] = out_valid_o[0] && gives[1] && used_q >= 3'd2;
   assign left           = used_q - 3'(out_valid_o[0]) - 3'(out_valid_o[1]);
 
   for (genvar c = 0; c < 2; c++) begin : gen_out
@@ -72,17 +71,13 @@ module flk_record_cache #(
 
   always_comb begin
     words_left = out_valid_o[1] ? words_q >> 2 * ItemBits : out_valid_o[0] ? words_q >> ItemBits : words_q;
-    pair_left  = out_valid_o[1] ? pair_q >> 2 : out_valid_o[0] ? pair_q >> 1 : pair_q;
     words_d    = words_left;
-    pair_d     = pair_left;
     for (int unsigned d = 0; d < 3; d++) begin
       if (push[0] && left == 3'(d)) begin
         words_d[d] = {in_record_i[0], in_tag_i[0]};
-        pair_d[d]  = 1'b0;
       end
       if (push[1] && left + 3'(push[0]) == 3'(d)) begin
         words_d[d] = {in_record_i[1], in_tag_i[1]};
-        pair_d[d]  = push[0];
       end
     end
   end
@@ -102,7 +97,6 @@ module flk_record_cache #(
 
   always_ff @(posedge clk_i) begin
     words_q <= words_d;
-    pair_q  <= pair_d;
   end
 
 endmodule

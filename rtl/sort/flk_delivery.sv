@@ -22,7 +22,7 @@ module flk_delivery #(
   parameter  int unsigned Banks      = 4,    // of the cache
   parameter  int unsigned Sets       = 64,
   parameter  int unsigned Ways       = 4,
-  parameter  int unsigned Depth      = 128,
+  parameter  int unsigned Depth      = 256,
   parameter  int unsigned Places     = 128,
   parameter  int unsigned AddrBits   = 40,
   parameter  int unsigned IdBits     = 4,
@@ -238,19 +238,20 @@ module flk_delivery #(
     logic                       write_q, read_q;
     logic [1:0]                 push, valid, is_end, empty, unused_ready;
     logic [1:0][RecordBits-1:0] record;
-    logic                       end_in;
+    logic [1:0]                 ended;
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
     assign full[s]     = 32'(used_q[s]) > Queue - Margin;
-    assign end_in      = (found_valid & {found[1].last, found[0].last}) != '0;
+    assign ended       = found_valid & {found[1].last, found[0].last};
     assign pop[s]      = out_valid_o[s] && out_ready_i[s];
     assign pop_end[s]  = pop[s] && out_end_o[s];
 
-    for (genvar k = 0; k < 2; k++) begin : gen_found
-      assign push[k] = found_valid[k] && found[k].mask[s] &&
-                       (found[k].last || !(gone_q[s] && unended[s]));
-    end
+    // What is behind an end is not of the tile that the core takes.
+    assign push[0] = found_valid[0] && found[0].mask[s] &&
+                     (found[0].last || !(gone_q[s] && unended[s]));
+    assign push[1] = found_valid[1] && found[1].mask[s] &&
+                     (found[1].last || !(gone_q[s] && unended[s] && !ended[0]));
 
     for (genvar b = 0; b < 2; b++) begin : gen_bank
       logic first;  // of what is found
@@ -299,7 +300,7 @@ module flk_delivery #(
         read_q      <= read_q ^ pop[s];
         used_q[s]   <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop[s]);
         opened_q[s] <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end[s]);
-        ends_q[s]   <= ends_q[s] + FillBits'(end_in) - FillBits'(pop_end[s]);
+        ends_q[s]   <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1]) - FillBits'(pop_end[s]);
         gone_q[s]   <= finished_i[s] && !pop_end[s];
       end
     end
@@ -319,10 +320,5 @@ module flk_delivery #(
   end
 
   assign idle_o = cache_idle && e_valid_q == '0 && (&queue_empty);
-
-`ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) &found_valid |-> !found[0].last)
-  else $error("flk_delivery: a record beside the end before it");
-`endif
 
 endmodule

@@ -1,7 +1,8 @@
 // Record cache: records from DRAM by their numbers, in order, two a cycle (docs/delivery.md).
 //
 // Tags are looked up first, data come later: a lookup decides at once whether its line has to be read
-// and which line goes; then it waits in a queue, in the order of the lookups, input 0 before input 1. Lines
+// and which line goes; then it waits in a queue, in the order of the lookups, input 0 before input 1, and
+// the two oldest leave together if they can. Lines
 // come in the order in which they were asked for, and each is written over the line that goes when the
 // lookup that asked for it is at the head of the queue. All lookups before it have then been served, so
 // a line that is still needed is never lost, and a lookup that finds its tag finds its data.
@@ -10,8 +11,8 @@
 // Memory of Banks x Sets x Ways lines of 32 bytes; the way that is replaced is the oldest of its set.
 // start_i (while idle_o) and clear_i (at any time) forget all; idle_o rises when what was asked for has
 // come and the tags are cleared (Sets cycles). error_o: the memory answered with an error; until then.
-// Throughput: two elements a cycle, one where both look up the same bank: input 1 then waits; a line a cycle from
-// memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
+// Throughput: two elements a cycle, one where both are of the same bank, at the lookup and at the data; a line a cycle
+// from memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
 // Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
@@ -20,7 +21,7 @@ module flk_record_cache #(
   parameter  int unsigned Banks       = 4,
   parameter  int unsigned Sets        = 64,   // of a bank
   parameter  int unsigned Ways        = 4,
-  parameter  int unsigned Depth       = 128,  // lookups that wait, two each
+  parameter  int unsigned Depth       = 256,  // elements that wait
   parameter  int unsigned Places      = 128,  // lines on their way
   parameter  int unsigned AddrBits    = 40,
   parameter  int unsigned IdBits      = 4,
@@ -78,6 +79,9 @@ module flk_record_cache #(
   if (RecordBits * PerLine != Width || PerLine > 2) begin : gen_check_record
     $error("flk_record_cache: RecordBits must be 128 or 256");
   end
+  if (Depth < 4 || Depth % 2 != 0) begin : gen_check_depth
+    $error("flk_record_cache: Depth must be even, at least 4");
+  end
   if (Banks < 2 || Banks != 1 << BankBits || Sets < 2 || Sets != 1 << SetBits ||
       Ways < 2 || Ways != 1 << WayBits) begin : gen_check_size
     $error("flk_record_cache: Banks, Sets and Ways must be powers of two, at least 2");
@@ -94,7 +98,6 @@ module flk_record_cache #(
   } row_t;
 
   typedef struct packed {
-    logic                 valid;
     logic                 skip;
     logic                 miss;
     logic                 part;  // of the line
@@ -265,31 +268,57 @@ module flk_record_cache #(
     end
 
     assign pushed[c] = '{
-      valid: b_valid_q[c], skip: b_skip_q[c], miss: miss[c], part: b_part_q[c], bank: b_bank[c],
+      skip: b_skip_q[c], miss: miss[c], part: b_part_q[c], bank: b_bank[c],
       place: {b_set[c], way[c]}, tag: b_tag_q[c]
     };
     assign missed[c] = '{valid: miss[c], line: b_line_q[c]};
   end
 
-  logic wait_ready, wait_valid, wait_pop, wait_empty, miss_ready, miss_valid, miss_pop, miss_empty;
+  // Elements wait in two memories in turn, so that the two oldest are there.
+  logic       write_q, read_q;  // the memory of the next element
+  logic [1:0] wait_push, wait_ready, wait_valid, wait_pop, wait_empty, go;
+  logic       miss_ready, miss_valid, miss_pop, miss_empty;
+  element_t [1:0] oldest;
 
-  assign advance = wait_ready && miss_ready;
+  assign advance   = (&wait_ready) && miss_ready;
+  assign wait_push = advance ? b_valid_q : '0;
+  assign head      = {oldest[!read_q], oldest[read_q]};
+  assign wait_pop  = read_q ? {go[0], go[1]} : go;
 
-  flk_sram_fifo #(
-    .Width($bits(pushed)),
-    .Depth(Depth)
-  ) i_waiting (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (stop),
-    .in_valid_i (b_valid_q != '0 && miss_ready),
-    .in_ready_o (wait_ready),
-    .in_data_i  (pushed),
-    .out_valid_o(wait_valid),
-    .out_ready_i(wait_pop),
-    .out_data_o (head),
-    .empty_o    (wait_empty)
-  );
+  for (genvar b = 0; b < 2; b++) begin : gen_waiting
+    logic first;
+
+    assign first = wait_push[0] && write_q == 1'(b);
+
+    flk_sram_fifo #(
+      .Width($bits(element_t)),
+      .Depth(Depth / 2)
+    ) i_queue (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (stop),
+      .in_valid_i (first || (wait_push[1] && (write_q ^ wait_push[0]) == 1'(b))),
+      .in_ready_o (wait_ready[b]),
+      .in_data_i  (first ? pushed[0] : pushed[1]),
+      .out_valid_o(wait_valid[b]),
+      .out_ready_i(wait_pop[b]),
+      .out_data_o (oldest[b]),
+      .empty_o    (wait_empty[b])
+    );
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      write_q <= 1'b0;
+      read_q  <= 1'b0;
+    end else if (stop) begin
+      write_q <= 1'b0;
+      read_q  <= 1'b0;
+    end else begin
+      write_q <= write_q ^ (^wait_push);
+      read_q  <= read_q ^ (^go);
+    end
+  end
 
   // ---- lines from memory ------------------------------------------------------------------------------
 
@@ -310,7 +339,7 @@ module flk_record_cache #(
     .clk_i,
     .rst_ni,
     .clear_i    (stop),
-    .in_valid_i (miss != '0 && wait_ready),
+    .in_valid_i (miss != '0 && (&wait_ready)),
     .in_ready_o (miss_ready),
     .in_data_i  (missed),
     .out_valid_o(miss_valid),
@@ -414,26 +443,20 @@ module flk_record_cache #(
 
   // ---- C: the head of the queue ------------------------------------------------------------------------
 
-  // Two lines that both have to be written take two cycles; the second element goes with or after the first.
-  logic       done_q;  // the first element has gone
-  logic       go_first, go_second;
-  logic [1:0] go;
+  // The second goes with the first: not if both write a line, or want the same bank.
+  logic go_first, go_second;
 
-  assign go_first  = wait_valid && out_ready_i && head[0].valid && !done_q &&
-                     (!head[0].miss || line_valid);
-  assign go_second = wait_valid && out_ready_i && head[1].valid &&
-                     (go_first || done_q || !head[0].valid) &&
-                     (!head[1].miss || (line_valid && !(go_first && head[0].miss)));
+  assign go_first  = wait_valid[read_q] && out_ready_i && (!head[0].miss || line_valid);
+  assign go_second = go_first && wait_valid[!read_q] &&
+                     (!head[1].miss || (line_valid && !head[0].miss)) &&
+                     (head[0].skip || head[1].skip || head[0].bank != head[1].bank);
   assign go        = {go_second, go_first};
-  assign wait_pop  = (go_second || !head[1].valid) && (go_first || done_q || !head[0].valid);
   assign line_pop  = (go[0] && head[0].miss) || (go[1] && head[1].miss);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      done_q  <= 1'b0;
       freed_q <= 1'b0;
     end else begin
-      done_q  <= !stop && !wait_pop && (done_q || go[0]);
       freed_q <= !stop && line_pop;
     end
   end
@@ -522,7 +545,7 @@ module flk_record_cache #(
   );
 
   assign error_o = error_q;
-  assign idle_o  = state_q == READY && b_valid_q == '0 && wait_empty && miss_empty &&
+  assign idle_o  = state_q == READY && b_valid_q == '0 && (&wait_empty) && miss_empty &&
                    !sum_valid_q && !fetch_valid_q &&
                    fetch_idle && line_empty && d_valid_q == '0;
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 from flicker_tb.runner import build_and_test, refused
 
-SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 6, "Places": 4}
+SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
 
 
 @pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256})), SMALL])
