@@ -11,8 +11,8 @@
 // Memory of Banks x Sets x Ways lines of 32 bytes; the way that is replaced is the oldest of its set.
 // start_i (while idle_o) and clear_i (at any time) forget all; idle_o rises when what was asked for has
 // come and the tags are cleared (Sets cycles). error_o: the memory answered with an error; until then.
-// Throughput: two elements a cycle, one where both are of the same bank, at the lookup and at the data; a line a cycle
-// from memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
+// Throughput: two elements a cycle, one where both are of the same bank (at the data: if both read, or both write, or
+// are of one place); a line a cycle from memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
 // Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
@@ -74,13 +74,14 @@ module flk_record_cache #(
   localparam int unsigned KeyBits = LineBits - BankBits - SetBits;
   localparam int unsigned PlaceBits = SetBits + WayBits;
   localparam int unsigned LowBits = LineBits / 2 + 4;  // of an address, less than a line number's
+  localparam int unsigned OwedBits = $clog2(Places + 3);
   localparam int unsigned HighBits = AddrBits - Shift - LowBits;
 
   if (RecordBits * PerLine != Width || PerLine > 2) begin : gen_check_record
     $error("flk_record_cache: RecordBits must be 128 or 256");
   end
-  if (Depth < 4 || Depth % 2 != 0) begin : gen_check_depth
-    $error("flk_record_cache: Depth must be even, at least 4");
+  if (Depth < 4 || Depth % 2 != 0 || Places < 4 || Places % 2 != 0) begin : gen_check_depth
+    $error("flk_record_cache: Depth and Places must be even, at least 4");
   end
   if (Banks < 2 || Banks != 1 << BankBits || Sets < 2 || Sets != 1 << SetBits ||
       Ways < 2 || Ways != 1 << WayBits) begin : gen_check_size
@@ -327,9 +328,13 @@ module flk_record_cache #(
   logic [LineBits-1:0]       sum_line_q;
   logic [LowBits:0]          fetch_low_q;
   logic [HighBits-1:0]       fetch_high_q;  // without the carry from below
-  logic                      beat_valid, beat_error, unused_tag, unused_ready;
-  logic                      line_valid, line_pop, line_empty, freed_q;
-  logic [Width-1:0]          beat_data, line_data;
+  logic                      beat_valid, beat_error, unused_tag, freed;
+  logic                      line_write_q, line_read_q;  // the memory of the next line
+  logic [1:0]                unused_ready, line_there, line_take, line_empty;
+  logic [1:0]                line_valid, line_pop;       // of the two oldest
+  logic [OwedBits-1:0]       owed_q;
+  logic [Width-1:0]          beat_data;
+  logic [1:0][Width-1:0]     line, line_data;
   logic                      sum_load;
 
   flk_fifo #(
@@ -405,7 +410,7 @@ module flk_record_cache #(
     .in_beats_i (2'd1),
     .in_tag_i   (1'b0),
     .in_placed_i(1'b0),
-    .freed_i    (freed_q),
+    .freed_i    (freed),
     .out_valid_o(beat_valid),
     .out_data_o (beat_data),
     .out_tag_o  (unused_tag),
@@ -425,55 +430,78 @@ module flk_record_cache #(
     .r_last_i
   );
 
-  flk_sram_fifo #(
-    .Width(Width),
-    .Depth(Places)
-  ) i_lines (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (stop),
-    .in_valid_i (beat_valid),
-    .in_ready_o (unused_ready),  // only what has a place is asked for
-    .in_data_i  (beat_data),
-    .out_valid_o(line_valid),
-    .out_ready_i(line_pop),
-    .out_data_o (line_data),
-    .empty_o    (line_empty)
-  );
+  // As the elements, in two memories in turn.
+  for (genvar b = 0; b < 2; b++) begin : gen_lines
+    flk_sram_fifo #(
+      .Width(Width),
+      .Depth(Places / 2)
+    ) i_queue (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (stop),
+      .in_valid_i (beat_valid && line_write_q == 1'(b)),
+      .in_ready_o (unused_ready[b]),  // only what has a place is asked for
+      .in_data_i  (beat_data),
+      .out_valid_o(line_there[b]),
+      .out_ready_i(line_take[b]),
+      .out_data_o (line[b]),
+      .empty_o    (line_empty[b])
+    );
+  end
+
+  assign line_valid = {line_there[!line_read_q], line_there[line_read_q]};
+  assign line_data  = {line[!line_read_q], line[line_read_q]};
+  assign line_take  = line_read_q ? {line_pop[0], line_pop[1]} : line_pop;
+
+  // Places that are free again are told one a cycle.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      line_write_q <= 1'b0;
+      line_read_q  <= 1'b0;
+      owed_q       <= '0;
+    end else if (stop) begin
+      line_write_q <= 1'b0;
+      line_read_q  <= 1'b0;
+      owed_q       <= '0;
+    end else begin
+      line_write_q <= line_write_q ^ beat_valid;
+      line_read_q  <= line_read_q ^ (^line_pop);
+      owed_q       <= owed_q + OwedBits'(line_pop[0]) + OwedBits'(line_pop[1]) - OwedBits'(freed);
+    end
+  end
+
+  assign freed = owed_q != '0;
 
   // ---- C: the head of the queue ------------------------------------------------------------------------
 
-  // The second goes with the first: not if both write a line, or want the same bank.
-  logic go_first, go_second;
+  // The second goes with the first: not if both read one bank, or both write one, or if they are of one place.
+  logic go_first, go_second, apart;
 
-  assign go_first  = wait_valid[read_q] && out_ready_i && (!head[0].miss || line_valid);
-  assign go_second = go_first && wait_valid[!read_q] &&
-                     (!head[1].miss || (line_valid && !head[0].miss)) &&
-                     (head[0].skip || head[1].skip || head[0].bank != head[1].bank);
+  assign apart     = head[0].skip || head[1].skip || head[0].bank != head[1].bank ||
+                     (head[0].miss != head[1].miss && head[0].place != head[1].place);
+  assign go_first  = wait_valid[read_q] && out_ready_i && (!head[0].miss || line_valid[0]);
+  assign go_second = go_first && wait_valid[!read_q] && apart &&
+                     (!head[1].miss || (head[0].miss ? line_valid[1] : line_valid[0]));
   assign go        = {go_second, go_first};
-  assign line_pop  = (go[0] && head[0].miss) || (go[1] && head[1].miss);
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      freed_q <= 1'b0;
-    end else begin
-      freed_q <= !stop && line_pop;
-    end
-  end
+  assign line_pop  = {go_second && head[1].miss && head[0].miss,
+                      go_first && (head[0].miss || (go_second && head[1].miss))};
 
   // ---- D: data ----------------------------------------------------------------------------------------
 
   logic [1:0]                d_valid_q, d_part_q, d_miss_q;
   logic [1:0][BankBits-1:0]  d_bank_q;
   logic [1:0][TagBits-1:0]   d_tag_q;
-  logic [Width-1:0]          d_line_q;  // what came from memory
+  logic [1:0][Width-1:0]     d_line_q, came;  // from memory
   logic [Banks-1:0][Width-1:0] data;
 
+  assign came = {head[0].miss ? line_data[1] : line_data[0], line_data[0]};
+
   for (genvar b = 0; b < Banks; b++) begin : gen_data
-    logic [1:0] here;
+    logic [1:0] writes, reads;
 
     for (genvar c = 0; c < 2; c++) begin : gen_here
-      assign here[c] = go[c] && !head[c].skip && head[c].bank == BankBits'(b);
+      assign writes[c] = go[c] && !head[c].skip && head[c].bank == BankBits'(b) && head[c].miss;
+      assign reads[c]  = go[c] && !head[c].skip && head[c].bank == BankBits'(b) && !head[c].miss;
     end
 
     flk_sram #(
@@ -481,11 +509,11 @@ module flk_record_cache #(
       .Depth(Sets * Ways)
     ) i_data (
       .clk_i,
-      .wr_en_i  ((here[0] && head[0].miss) || (here[1] && head[1].miss)),
-      .wr_addr_i(here[1] ? head[1].place : head[0].place),
-      .wr_data_i(line_data),
-      .rd_en_i  ((here[0] && !head[0].miss) || (here[1] && !head[1].miss)),
-      .rd_addr_i(here[1] ? head[1].place : head[0].place),
+      .wr_en_i  (writes != '0),
+      .wr_addr_i(writes[1] ? head[1].place : head[0].place),
+      .wr_data_i(writes[1] ? came[1] : came[0]),
+      .rd_en_i  (reads != '0),
+      .rd_addr_i(reads[1] ? head[1].place : head[0].place),
       .rd_data_o(data[b])
     );
   end
@@ -506,20 +534,20 @@ module flk_record_cache #(
         d_bank_q[c] <= head[c].bank;
         d_tag_q[c]  <= head[c].tag;
       end
-    end
-    if (line_pop) begin
-      d_line_q <= line_data;
+      if (go[c] && head[c].miss) begin
+        d_line_q[c] <= came[c];
+      end
     end
   end
 
   for (genvar c = 0; c < 2; c++) begin : gen_out
-    logic [Width-1:0] line;
+    logic [Width-1:0] whole;
 
-    assign line            = d_miss_q[c] ? d_line_q : data[d_bank_q[c]];
+    assign whole           = d_miss_q[c] ? d_line_q[c] : data[d_bank_q[c]];
     assign out_valid_o[c]  = d_valid_q[c];
     assign out_tag_o[c]    = d_tag_q[c];
-    assign out_record_o[c] = PerLine > 1 && d_part_q[c] ? line[Width-1-:RecordBits]
-                             : line[RecordBits-1:0];
+    assign out_record_o[c] = PerLine > 1 && d_part_q[c] ? whole[Width-1-:RecordBits]
+                             : whole[RecordBits-1:0];
   end
 
   // ---- what is told -----------------------------------------------------------------------------------
@@ -547,18 +575,14 @@ module flk_record_cache #(
   assign error_o = error_q;
   assign idle_o  = state_q == READY && b_valid_q == '0 && (&wait_empty) && miss_empty &&
                    !sum_valid_q && !fetch_valid_q &&
-                   fetch_idle && line_empty && d_valid_q == '0;
+                   fetch_idle && (&line_empty) && owed_q == '0 && d_valid_q == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o || state_q != READY)
   else $error("flk_record_cache: start while lookups are under way");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid && !stop |-> unused_ready)
+  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid && !stop |-> unused_ready[line_write_q])
   else $error("flk_record_cache: a line without a place");
-
-  assert property (@(posedge clk_i) disable iff (!rst_ni)
-      &go && head[0].skip == 1'b0 && head[1].skip == 1'b0 |-> head[0].bank != head[1].bank)
-  else $error("flk_record_cache: two elements of a bank");
 
   for (genvar c = 0; c < 2; c++) begin : gen_check
     assert property (@(posedge clk_i) disable iff (!rst_ni)
