@@ -10,6 +10,7 @@ import numpy as np
 from flicker.chip.dram import DramConfig
 from flicker.errors import FlickerError
 from flicker.golden.chip import render_chip
+from flicker.golden.delivery import UNITS
 from flicker.golden.front.frame import run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
@@ -68,22 +69,24 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: int) -> tuple[str, 
     )
 
 
-QUEUES = (64, 128, 256)  # records of each core and channel of delivery
-QUEUE_NUMBER = 2 * CORES
-RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1  # with the bit that marks an end
+ENTRY_BITS = 28 + 1  # record number, mask, and the bit that marks an end
+RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
+# Entries that each sorting unit's buffer holds, records that each core's queue holds.
+HELD = ((4, 64), (128, 64), (512, 32), (512, 64), (512, 128), (1024, 64))
 
 
 def queue_tables(say: Say) -> dict[str, str]:
-    """The rendering half alone, with a memory that answers everything at once, by the queues between record cache and cores."""
+    """The rendering half alone, with a memory that answers everything at once, by what waits before and behind the record cache."""
     real = next(view for view in REAL_VIEWS if view.folder == VIEW)
     view = load(real)
     front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
-    image, config = front_memory(front), RenderConfig(stage="lanes")
+    image, config = front_memory(front), RenderConfig(stage="lanes", lanes=LANES[-1])
     golden, rows = render_chip(front_lists(front), config).buffer, []
-    for queue in QUEUES:
-        say(f"{real.title}: queues of {queue}")
-        rtl = rendering_rtl(image, view.camera, config, parameters={"Queue": queue})
+    for entries, queue in HELD:
+        say(f"{real.title}: buffers of {entries}, queues of {queue}")
+        rtl = rendering_rtl(image, view.camera, config, parameters={"Entries": entries, "Queue": queue})
         if any(rtl.errors) or not np.array_equal(rtl.buffer[:, : golden.shape[1]], golden):
             raise FlickerError(f"{real.title}: the picture differs from the golden model's")
-        rows.append((str(queue), f"{QUEUE_NUMBER * queue * RECORD_BITS:,}", f"{rtl.cycles:,}"))
-    return {"": table(["records in a queue", "bits of all queues", "rendering half, cycles"], rows)}
+        bits = UNITS * entries * ENTRY_BITS + CORES * queue * RECORD_BITS
+        rows.append((str(entries), str(queue), f"{bits:,}", f"{rtl.cycles:,}", f"{rtl.counters['lines']:,}"))
+    return {"": table(["entries in a buffer", "records in a queue", "bits of all", "rendering half, cycles", "lines of records"], rows)}

@@ -20,24 +20,6 @@ VIEWS = ("demo", "flowers")
 
 
 @numba.njit(cache=True)
-def _both_channels(record, place):
-    """Lookups in order: the channels (even and odd places of the walk) in turn, neither more than a tile ahead of the other."""
-    mine = [np.flatnonzero(place % 2 == c) for c in range(2)]
-    at = np.zeros(2, np.int64)
-    out = np.empty(len(record), np.int64)
-    n = 0
-    while n < len(record):
-        for c in range(2):
-            if at[c] < len(mine[c]) and (
-                at[1 - c] == len(mine[1 - c]) or place[mine[c][at[c]]] <= place[mine[1 - c][at[1 - c]]] + 1
-            ):
-                out[n] = record[mine[c][at[c]]]
-                at[c] += 1
-                n += 1
-    return out
-
-
-@numba.njit(cache=True)
 def _lines(line, sets, ways):
     """Lines read: as `flicker.golden.delivery.RecordCache`, whose banks are low bits of the set."""
     held = np.full((sets, ways), -1, np.int64)
@@ -71,7 +53,7 @@ def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tables(say: Say) -> dict[str, str]:
-    sizes: dict[tuple[int, int] | str, list[str]] = {key: [] for key in (*SIZES, "two")}
+    sizes: dict[tuple[int, int], list[str]] = {key: [] for key in SIZES}
     walks: dict[str, list[str]] = {}
     titles = []
     for title, view in titled_views(say):
@@ -81,20 +63,14 @@ def tables(say: Say) -> dict[str, str]:
         number, tile = _entries(front)
         per_line = LINE_BYTES // front.kind.bytes
         titles.append(f"{title}: {len(number):,} entries, {len(np.unique(number // per_line)):,} lines")
-        lookups = _both_channels(number, tile)
         for lines, ways in SIZES:
-            sizes[lines, ways].append(f"{_lines(lookups // per_line, lines // ways, ways):,}")
+            sizes[lines, ways].append(f"{_lines(number // per_line, lines // ways, ways):,}")
         lines, ways = DEFAULT
-        apart = (_lines(number[tile % 2 == c] // per_line, lines // 2 // ways, ways) for c in range(2))
-        sizes["two"].append(f"{sum(apart):,}")
         cols, rows = (-(-n // TILE) for n in (view.camera.width, view.camera.height))
         for name, walk in _walks(cols, rows).items():
-            place = np.argsort(walk)[tile]
-            order = np.argsort(place, kind="stable")
-            walks.setdefault(name, []).append(f"{_lines(_both_channels(number[order], place[order]) // per_line, lines // ways, ways):,}")
-    apart_too = [f"two of {DEFAULT[0] // 2}, one for each channel", str(DEFAULT[1])]
-    named = {key: [f"{key[0]:,}", str(key[1])] if isinstance(key, tuple) else apart_too for key in sizes}
+            order = np.argsort(np.argsort(walk)[tile], kind="stable")
+            walks.setdefault(name, []).append(f"{_lines(number[order] // per_line, lines // ways, ways):,}")
     return {
-        "sizes": table(["lines", "ways", *titles], [[*named[key], *cells] for key, cells in sizes.items()]),
+        "sizes": table(["lines", "ways", *titles], [[f"{lines:,}", str(ways), *cells] for (lines, ways), cells in sizes.items()]),
         "walks": table(["tiles", *titles], [[name, *cells] for name, cells in walks.items()]),
     }

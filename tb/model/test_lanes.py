@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
+from gen_params import lane_package
 from scene_samples import random_scene
 
 from flicker.errors import FlickerError
@@ -260,6 +261,14 @@ def test_faint_layers_are_not_biased():
         if len(la):
             h = h_of(la / 2.0**FORMATS.log) * 2.0**FORMATS.sum
             assert abs(t.h[la].sum() / h.sum() - 1) < 3e-4 and abs(t.h[la] / h - 1).max() < 0.006
+
+
+@pytest.mark.parametrize(("formats", "message"), [
+    (LaneFormats(pieces=0), "h by lines only"), (LaneFormats(sum=12), "wants more of them"), (LaneFormats(log=10), "a power of two"),
+])
+def test_formats_that_the_rtl_lacks(formats: LaneFormats, message: str):
+    with pytest.raises(FlickerError, match=message):
+        lane_package(formats)
 
 
 def test_lines_of_h():

@@ -1,10 +1,10 @@
 """Rendering as the RTL does it (`flk_rendering`): what it moves, and an estimate of its cycles, from lists in memory to the frame buffer.
 
-One pass over the records in the order in which delivery looks them up, each with the times at which it goes on: sorted by its unit, looked up when the queues
-of its cores have a place, found, taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies are
-those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are left
-out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its last reading; lines of
-records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
+One pass over the records in the order in which delivery looks them up, each with the times at which it goes on: sorted by its unit, looked up, found (two a
+cycle each, when all queues have places), taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies
+are those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are
+left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its last reading; lines
+of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
 
 Left out: conflicts of banks in the cache, beats that wait for each other in the memory (a lone access has its latency, and all together the peak rate), the
 order of entries within a merge, arbitration between list readers.
@@ -45,8 +45,11 @@ FIRST = 17  # a tile's first line beside two accesses
 SLOTS, CONTEXTS = 16, 4  # chunks in a list reader, lists under way
 SORTED_LISTS, SORTED_ENTRIES = 8, 2 * CAPACITY  # that a sorting unit holds
 CUT = 3 * CAPACITY // 2 + 38  # that a reading stops for
-QUEUE = 64  # records of each core and channel
-DEPTH, PLACES = 256, 128  # lookups that wait in the cache, lines on their way
+ENTRIES = 514  # of a sorting unit that wait for delivery
+BUFFERED = 3  # from the sorting unit through the buffer to a lookup
+QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
+ROOM = 4  # from a record's leaving a queue to the next one that comes
+DEPTH, PLACES = 256, 128  # elements that wait in the cache, lines on their way
 FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
 ELASTIC = 4  # registers between a queue and the stage: latency and places
@@ -113,33 +116,33 @@ def _frame(
     chunk_count = np.zeros(4, np.int64)
     readings = np.zeros(tiles, np.int64)
     given = np.zeros((tiles, 4), np.int64)
-    # Channels of delivery
-    tile = np.array([0, 1])
-    at = np.zeros(2, np.int64)  # entry
-    looked = np.zeros(2, np.int64)  # the last lookup
-    begun = np.zeros(2, np.bool_)
-    ready = np.zeros(2, np.int64)  # what is left of the list's present chunk is sorted from here on
-    part = np.zeros(2, np.int64)  # chunk of a list that is read more than once
-    part_end = np.zeros(2, np.int64)  # its last entry
-    part_gate = np.zeros((2, (reading_start[1:] - reading_start[:-1]).max() + 1), np.int64)  # end of each reading
-    asked = np.zeros((2, 4), np.int64)
-    freed = np.full((2, 4, QUEUE), -1, np.int64)  # when a place was free again
-    # Queues: when found; element in its list, or -1, the end
-    found = np.zeros((2, 4, QUEUE), np.int64)
-    which = np.zeros((2, 4, QUEUE), np.int64)
-    slot = np.zeros((2, 4, QUEUE), np.int64)
-    put, got = np.zeros((2, 4), np.int64), np.zeros((2, 4), np.int64)
+    # Delivery
+    tile, at = 0, np.int64(0)  # at: entry
+    looked, looked_before = np.int64(0), np.int64(0)  # the last lookup, and the one before
+    begun = False
+    ready = np.int64(0)  # what is left of the list's present chunk is sorted from here on
+    part = 0  # chunk of a list that is read more than once
+    part_end = np.int64(0)  # its last entry
+    part_gate = np.zeros((reading_start[1:] - reading_start[:-1]).max() + 1, np.int64)  # end of each reading
+    # Buffers: when the unit gave its last entry, and when entries were taken
+    emitted = np.zeros(4, np.int64)
+    removed, removals = np.zeros((4, ENTRIES), np.int64), np.zeros(4, np.int64)
+    # Queues: when found; element in its list, or -1, the end; when taken
+    found = np.zeros((4, QUEUE), np.int64)
+    which = np.zeros((4, QUEUE), np.int64)
+    freed = np.zeros((4, QUEUE), np.int64)
+    put, got = np.zeros(4, np.int64), np.zeros(4, np.int64)
     # Cache
     held = np.full((sets, ways), -1, np.int64)
     turn = np.zeros(sets, np.int64)
     lookups, misses = 0, 0
-    last_found, last_line, last_ask = np.int64(0), np.int64(0), np.int64(0)
+    last_found, found_before, last_line, last_ask = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
     found_at = np.zeros(DEPTH, np.int64)
     line_at = np.zeros(PLACES, np.int64)
     line_used = np.zeros(PLACES, np.int64)
     # Cores
     core_tile = np.zeros(4, np.int64)
-    finished = np.full((4, 2), NEVER, np.int64)  # time from which delivery knows, of the core's tile, by channel
+    finished = np.full(4, NEVER, np.int64)  # time from which delivery knows, of the core's tile
     taken = np.zeros(4, np.int64)
     accepted = np.zeros((4, ring), np.int64)
     count = np.zeros(4, np.int64)  # elements that the generator has issued
@@ -166,23 +169,22 @@ def _frame(
         for k in range(4):
             while core_tile[k] < tiles:
                 t_now = core_tile[k]
-                c = t_now % 2
-                if got[c, k] == put[c, k]:
+                if got[k] == put[k]:
                     break
                 if t_now // 2 >= PAIRS and pair_free[t_now // 2 - PAIRS] == NEVER:
                     break
-                q = got[c, k] % QUEUE
+                q = got[k] % QUEUE
                 n = count[k]
-                leave = max(found[c, k, q] + QUEUED, taken[k] + 1)
+                leave = max(found[k, q] + QUEUED, taken[k] + 1)
                 if n >= ELASTIC:
                     leave = max(leave, accepted[k, (n - ELASTIC) % ring])
                 go = leave + ELASTIC
                 if t_now // 2 >= PAIRS:
                     go = max(go, pair_free[t_now // 2 - PAIRS] + ELASTIC)
                 taken[k] = leave
-                freed[c, k, slot[c, k, q]] = leave
-                got[c, k] += 1
-                element = which[c, k, q]
+                freed[k, q] = leave
+                got[k] += 1
+                element = which[k, q]
                 is_end = element < 0
                 place = element_start[t_now, k] + element
                 # The mask generator takes it.
@@ -241,7 +243,7 @@ def _frame(
                     for c2 in range(4):
                         pair_done[pair] = max(pair_done[pair], drained[k, c2])
                         done[k, c2] = NEVER
-                    finished[k, c] = NEVER
+                    finished[k] = NEVER
                     core_tile[k] += 1
                     while pairs_left < len(pair_free) and pair_cores[pairs_left] == 8:
                         writer = max(writer + PAIR_GAP, pair_done[pairs_left]) + PAIR_CYCLES
@@ -249,104 +251,92 @@ def _frame(
                         pairs_left += 1
                 elif early:
                     over = max(max(done[k, 0], done[k, 1]), max(done[k, 2], done[k, 3]))
-                    finished[k, c] = NEVER if over == NEVER else over + TOLD
-        if tile[0] >= tiles and tile[1] >= tiles:
+                    finished[k] = NEVER if over == NEVER else over + TOLD
+        if tile >= tiles:
             break
-        # ---- the channel whose next lookup comes first
-        best, best_at = -1, NEVER
-        for c in range(2):
-            if tile[c] >= tiles:
-                continue
-            t_c = tile[c]
-            if not begun[c]:
-                begun[c] = True
-                at[c] = tile_start[t_c]
-                n = tile_start[t_c + 1] - tile_start[t_c]
-                u = t_c % 4
-                # Chunks of its list: asked for one after the other, in the order of the lists.
-                came = np.int64(CLEAR)
-                if t_c >= 4 * CONTEXTS:
-                    came = max(came, gate_end[t_c - 4 * CONTEXTS])
-                if t_c < 4:
-                    came += FIRST - CHAIN + read_latency
-                gate = gate_end[t_c - 4] if t_c >= 4 else np.int64(CLEAR)
-                if t_c >= 4 * SORTED_LISTS:
-                    gate = max(gate, out_end[t_c - 4 * SORTED_LISTS])
-                for j in range(lines_start[t_c], lines_start[t_c + 1]):
-                    came = max(came, chunk_free[u, chunk_count[u] % SLOTS]) + CHAIN + read_latency
-                    gate = max(gate, came) + chunk_entries[j]
-                    chunk_free[u, chunk_count[u] % SLOTS] = gate
-                    chunk_count[u] += 1
-                # What lies SORTED_ENTRIES before has left.
-                total = n
-                before = t_c - 4
-                while before >= 0 and total <= SORTED_ENTRIES:
-                    total += tile_start[before + 1] - tile_start[before]
-                    before -= 4
-                if before >= 0 and total > SORTED_ENTRIES:
-                    gate = max(gate, out_end[before + 4])
-                gate += 1
-                gate_end[t_c] = gate
-                readings[t_c] = 1
-                part[c] = 0
-                r = reading_start[t_c]
-                parts = reading_start[t_c + 1] - r
-                part_end[c] = at[c] + n
-                ready[c] = gate - n + sort_delay[t_c] - 1
-                if parts > 1:
-                    part_gate[c, 0] = gate + reading_cuts[r] * CUT
-                    part_end[c] = at[c] + reading_size[r]
-                    ready[c] = part_gate[c, 0] + sort_delay[t_c]
-                    part_gate[c, 1] = part_gate[c, 0] + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
-                if t_c >= 4:
-                    ready[c] = max(ready[c], out_end[t_c - 4] + 1)
-            now = max(looked[c] + 1, ready[c])
-            if lookups >= DEPTH:
-                now = max(now, found_at[lookups % DEPTH])
-            is_end = at[c] == tile_start[t_c + 1]
-            wanted = 15 if is_end else mask[at[c]]
-            for k in range(4):
-                if not wanted >> k & 1:
-                    continue
-                room = np.int64(0)
-                if asked[c, k] >= QUEUE:
-                    room = freed[c, k, asked[c, k] % QUEUE]
-                    if room < 0:
-                        room = NEVER
-                if not is_end and core_tile[k] == t_c:
-                    room = min(room, finished[k, c])
-                now = max(now, room)
-            if now < best_at:
-                best, best_at = c, now
-        if best < 0:
-            raise RuntimeError("rendering: nothing can go on")
-        c, t, t_c = best, best_at, tile[best]
-        looked[c] = t
-        is_end = at[c] == tile_start[t_c + 1]
-        kept = 15 if is_end else mask[at[c]]
+        # ---- the next lookup
+        t_c, u = tile, tile % 4
+        if not begun:
+            begun = True
+            at = tile_start[t_c]
+            n = tile_start[t_c + 1] - tile_start[t_c]
+            # Chunks of its list: asked for one after the other, in the order of the lists.
+            came = np.int64(CLEAR)
+            if t_c >= 4 * CONTEXTS:
+                came = max(came, gate_end[t_c - 4 * CONTEXTS])
+            if t_c < 4:
+                came += FIRST - CHAIN + read_latency
+            gate = gate_end[t_c - 4] if t_c >= 4 else np.int64(CLEAR)
+            if t_c >= 4 * SORTED_LISTS:
+                gate = max(gate, out_end[t_c - 4 * SORTED_LISTS])
+            for j in range(lines_start[t_c], lines_start[t_c + 1]):
+                came = max(came, chunk_free[u, chunk_count[u] % SLOTS]) + CHAIN + read_latency
+                gate = max(gate, came) + chunk_entries[j]
+                chunk_free[u, chunk_count[u] % SLOTS] = gate
+                chunk_count[u] += 1
+            # What lies SORTED_ENTRIES before has left.
+            total = n
+            before = t_c - 4
+            while before >= 0 and total <= SORTED_ENTRIES:
+                total += tile_start[before + 1] - tile_start[before]
+                before -= 4
+            if before >= 0 and total > SORTED_ENTRIES:
+                gate = max(gate, out_end[before + 4])
+            gate += 1
+            gate_end[t_c] = gate
+            readings[t_c] = 1
+            part = 0
+            r = reading_start[t_c]
+            parts = reading_start[t_c + 1] - r
+            part_end = at + n
+            ready = gate - n + sort_delay[t_c] - 1
+            if parts > 1:
+                part_gate[0] = gate + reading_cuts[r] * CUT
+                part_end = at + reading_size[r]
+                ready = part_gate[0] + sort_delay[t_c]
+                part_gate[1] = part_gate[0] + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+            if t_c >= 4:
+                ready = max(ready, out_end[t_c - 4] + 1)
+        is_end = at == tile_start[t_c + 1]
+        # The unit gives an entry a cycle, while its buffer has a place; two a cycle are looked up.
+        give = max(emitted[u] + 1, ready)
+        if removals[u] >= ENTRIES:
+            give = max(give, removed[u, removals[u] % ENTRIES] + 1)
+        t = max(give + BUFFERED, max(looked, looked_before + 1))
+        if lookups >= DEPTH:
+            t = max(t, found_at[lookups % DEPTH])
+        kept = 15 if is_end else mask[at]
         over = np.int64(0)
         for k in range(4):
-            if core_tile[k] == t_c and finished[k, c] <= t:
+            if core_tile[k] == t_c and finished[k] <= t:
                 over |= 1 << k
         if not is_end:
             kept &= ~over
             parts = reading_start[t_c + 1] - reading_start[t_c]
             if over == 15:
-                # The list is dropped. A reading that has begun runs out.
+                # The list is dropped: what is in the buffer is taken, two a cycle. A reading that has begun runs out.
+                rest = tile_start[t_c + 1] - at
+                inside = min(rest, max(t - give, 0))
                 if parts > 1:
                     r = 1
-                    while r < parts and r <= part[c] + 1 and part_gate[c, r - 1] < t + DROPPED - TOLD:
+                    while r < parts and r <= part + 1 and part_gate[r - 1] < t + DROPPED - TOLD:
                         r += 1
                     readings[t_c] = r
-                    gate_end[t_c] = max(t, part_gate[c, r - 1])
-                at[c] = tile_start[t_c + 1]
-                part_end[c] = at[c] + 1
-                ready[c] = t + DROPPED
+                    gate_end[t_c] = max(t, part_gate[r - 1])
+                at = tile_start[t_c + 1]
+                part_end = at + 1
+                emitted[u] = max(give, t) + (DROPPED if inside < rest else 0)
+                ready = emitted[u]
+                looked = looked_before = t + inside // 2
                 continue
+        emitted[u] = give
+        removed[u, removals[u] % ENTRIES] = t
+        removals[u] += 1
+        looked_before, looked = looked, t
         if kept:
             come = t + FOUND
             if not is_end:
-                line = record[at[c]] // per_line
+                line = record[at] // per_line
                 if _lookup(line, held, turn, ways):
                     ask = max(t + 2, last_ask + 1)
                     if misses >= PLACES:
@@ -361,48 +351,48 @@ def _frame(
                     come = max(come, last_line + 3)
                     line_used[misses % PLACES] = max(come, last_found)
                     misses += 1
-            come = max(come, last_found)
-            last_found = come
+            come = max(come, max(last_found, found_before + 1))
+            # All queues have places.
+            for k in range(4):
+                first = put[k] - (QUEUE - MARGIN) - 1
+                if first >= 0:
+                    if first >= got[k]:
+                        raise RuntimeError("rendering: nothing can go on")
+                    come = max(come, freed[k, first % QUEUE] + ROOM)
+            found_before, last_found = last_found, come
             found_at[lookups % DEPTH] = come
             lookups += 1
             for k in range(4):
                 if not kept >> k & 1:
                     continue
-                s = asked[c, k] % QUEUE
-                asked[c, k] += 1
-                if not is_end and core_tile[k] == t_c and finished[k, c] <= come:
-                    freed[c, k, s] = come
-                    # Its element is never taken; those behind it are not either.
-                    continue
-                freed[c, k, s] = -1
-                q = put[c, k] % QUEUE
-                found[c, k, q] = come
-                which[c, k, q] = -1 if is_end else given[t_c, k]
-                slot[c, k, q] = s
-                put[c, k] += 1
+                if not is_end and core_tile[k] == t_c and finished[k] <= come:
+                    continue  # its element is never taken; those behind it are not either
+                q = put[k] % QUEUE
+                found[k, q] = come
+                which[k, q] = -1 if is_end else given[t_c, k]
+                put[k] += 1
                 if not is_end:
                     given[t_c, k] += 1
         if is_end:
-            out_end[t_c] = t
+            out_end[t_c] = give
             if not listed[t_c]:
                 readings[t_c] = 0
-            tile[c] += 2
-            begun[c] = False
+            tile += 1
+            begun = False
             continue
-        at[c] += 1
-        if at[c] == part_end[c] and at[c] < tile_start[t_c + 1]:
+        at += 1
+        if at == part_end and at < tile_start[t_c + 1]:
             # The next chunk of a list that is read again.
             parts = reading_start[t_c + 1] - reading_start[t_c]
-            part[c] += 1
-            p = part[c]
-            r = reading_start[t_c] + p
+            part += 1
+            r = reading_start[t_c] + part
             n = tile_start[t_c + 1] - tile_start[t_c]
-            part_end[c] += reading_size[r]
-            ready[c] = max(ready[c], part_gate[c, p] + sort_delay[t_c])
-            readings[t_c] = p + 1
-            gate_end[t_c] = part_gate[c, p]
-            if p + 1 < parts:
-                part_gate[c, p + 1] = max(part_gate[c, p], t) + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+            part_end += reading_size[r]
+            ready = max(ready, part_gate[part] + sort_delay[t_c])
+            readings[t_c] = part + 1
+            gate_end[t_c] = part_gate[part]
+            if part + 1 < parts:
+                part_gate[part + 1] = max(part_gate[part], t) + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
     return writer, misses, readings, given
 
 
