@@ -332,6 +332,7 @@ module flk_record_cache #(
   logic                      line_write_q, line_read_q;  // the memory of the next line
   logic [1:0]                unused_ready, line_there, line_take, line_empty;
   logic [1:0]                line_valid, line_pop;       // of the two oldest
+  logic [1:0]                popped_q;
   logic [OwedBits-1:0]       owed_q;
   logic [Width-1:0]          beat_data;
   logic [1:0][Width-1:0]     line, line_data;
@@ -458,15 +459,18 @@ module flk_record_cache #(
     if (!rst_ni) begin
       line_write_q <= 1'b0;
       line_read_q  <= 1'b0;
+      popped_q     <= '0;
       owed_q       <= '0;
     end else if (stop) begin
       line_write_q <= 1'b0;
       line_read_q  <= 1'b0;
+      popped_q     <= '0;
       owed_q       <= '0;
     end else begin
       line_write_q <= line_write_q ^ beat_valid;
       line_read_q  <= line_read_q ^ (^line_pop);
-      owed_q       <= owed_q + OwedBits'(line_pop[0]) + OwedBits'(line_pop[1]) - OwedBits'(freed);
+      popped_q     <= line_pop;
+      owed_q       <= owed_q + OwedBits'(popped_q[0]) + OwedBits'(popped_q[1]) - OwedBits'(freed);
     end
   end
 
@@ -575,7 +579,8 @@ module flk_record_cache #(
   assign error_o = error_q;
   assign idle_o  = state_q == READY && b_valid_q == '0 && (&wait_empty) && miss_empty &&
                    !sum_valid_q && !fetch_valid_q &&
-                   fetch_idle && (&line_empty) && owed_q == '0 && d_valid_q == '0;
+                   fetch_idle && (&line_empty) && popped_q == '0 && owed_q == '0 &&
+                   d_valid_q == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o || state_q != READY)

@@ -44,10 +44,11 @@ class Unit:
 
 
 class Delivery:
-    """The design with its memory, units and cores. finish: share of the tiles that a core finishes early; pace: of each core, cycles from record to record."""
+    """The design with its memory, units and cores. finish: share of the tiles that a core finishes early; pace: of each core, cycles from record to record.
+    deaf: units give all, as their buffers do with what they hold of a finished list."""
 
-    def __init__(self, dut, idle="never", stall="never", latency=5, pauses=0.0, finish=0.0, pace=(1, 1, 1, 1), perfect=True):
-        self.dut, self.bench, self.finish, self.pace = dut, Bench(dut), finish, pace
+    def __init__(self, dut, idle="never", stall="never", latency=5, pauses=0.0, finish=0.0, pace=(1, 1, 1, 1), perfect=True, deaf=False):
+        self.dut, self.bench, self.finish, self.pace, self.deaf = dut, Bench(dut), finish, pace, deaf
         rng = self.rng = self.bench.rng
         self.bytes = len(dut.out_record_o) // 32
         memory = Memory(DramConfig().timing, perfect)
@@ -116,7 +117,7 @@ class Delivery:
                     self.finish_seen += 1
                 if unit.offered and moved >> u & 1:
                     unit.move()
-                elif finish >> u & 1 and unit.lists:  # the rest of the list is dropped but for what is offered
+                elif finish >> u & 1 and unit.lists and not self.deaf:  # the rest of the list is dropped but for what is offered
                     entries = unit.lists[0][1]
                     while len(entries) > unit.offered:
                         entries.pop()
@@ -232,9 +233,10 @@ async def pace(dut, slow):
 
 
 @cocotb.test()
-async def all_finished(dut):
-    """All cores finished with their tiles at once: of long lists no more is looked up than the queues of a core that is not there yet hold."""
-    test = Delivery(dut, latency=30)
+@cocotb.parametrize(deaf=[False, True])
+async def all_finished(dut, deaf):
+    """All cores finished with their tiles at once: of long lists no more is looked up than before they are there, whether the unit drops the rest or not."""
+    test = Delivery(dut, latency=30, deaf=deaf)
     await test.bench.reset()
     await test.ready()
     lists = [[(test.rng.randrange(RECORDS), 15) for _ in range(300)] for _ in range(8)]
