@@ -100,13 +100,13 @@ module flk_rendering
 
   state_e     state_q;
   logic       start, pixels_done, lines_idle, quiet, done_q;
-  logic [3:0] reader_idle, sorter_idle, list_error;
+  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error;
   logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
 
   assign start  = state_q == START && delivery_idle;
   assign idle_o = state_q == IDLE;
-  assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) && (&buffer_empty) &&
-                  delivery_idle && stage_idle;
+  assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) &&
+                  (&buffer_empty) && delivery_idle && stage_idle;
 
   // Delivery forgets its cache first; all others start when it has.
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -157,7 +157,7 @@ module flk_rendering
   logic [3:0][1:0]             ask_burst;
   logic [3:0]                  sorted_valid, sorted_ready, sorted_end, finish;
   logic [3:0][27:0]            sorted_entry;
-  logic [3:0]                  finish_unit, buffer_empty, entry_ready;
+  logic [3:0]                  finish_unit, entry_ready;
   logic [3:0][1:0]             entry_valid, entry_end;
   logic [3:0][1:0][27:0]       entry;
   logic [3:0][31:0]            entries, readings, dropped;

@@ -300,16 +300,19 @@ module flk_delivery #(
         read_q      <= read_q ^ pop[s];
         used_q[s]   <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop[s]);
         opened_q[s] <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end[s]);
-        ends_q[s]   <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1]) - FillBits'(pop_end[s]);
+        ends_q[s]   <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
+                       - FillBits'(pop_end[s]);
         gone_q[s]   <= finished_i[s] && !pop_end[s];
       end
     end
 
 `ifndef SYNTHESIS
-    assert property (@(posedge clk_i) disable iff (!rst_ni) push != '0 && !stop |-> 32'(used_q[s]) + $countones(push) <= Queue)
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        push != '0 && !stop |-> 32'(used_q[s]) + $countones(push) <= Queue)
     else $error("flk_delivery: a record without a place");
 
-    assert property (@(posedge clk_i) disable iff (!rst_ni) 32'(ends_q[s]) <= 32'(opened_q[s]) && ends_q[s] <= used_q[s])
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        32'(ends_q[s]) <= 32'(opened_q[s]) && ends_q[s] <= used_q[s])
     else $error("flk_delivery: ends or places");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)

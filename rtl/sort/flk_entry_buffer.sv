@@ -48,7 +48,8 @@ module flk_entry_buffer #(
   assign out_entry_o    = {entry[!read_q], entry[read_q]};
   assign out_valid_o[0] = valid[read_q];
   assign out_valid_o[1] = &valid && !is_end[read_q];
-  assign take           = out_ready_i ? (read_q ? {out_valid_o[0], out_valid_o[1]} : out_valid_o) : '0;
+  assign take           = !out_ready_i ? '0
+                          : read_q ? {out_valid_o[0], out_valid_o[1]} : out_valid_o;
   assign pop_end        = out_ready_i && (out_valid_o & out_end_o) != '0;
   assign finish_o       = finish_i && ends_q == '0;
   assign empty_o        = &empty;
@@ -88,11 +89,13 @@ module flk_entry_buffer #(
   end
 
 `ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) out_valid_o[1] |-> out_valid_o[0] && !out_end_o[0])
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      out_valid_o[1] |-> out_valid_o[0] && !out_end_o[0])
   else $error("flk_entry_buffer: a pair beyond the end of a list");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o[0] && !out_ready_i && !clear_i |=> out_valid_o[0] && $stable({out_end_o[0], out_entry_o[0]}))
+      out_valid_o[0] && !out_ready_i && !clear_i |=>
+      out_valid_o[0] && $stable({out_end_o[0], out_entry_o[0]}))
   else $error("flk_entry_buffer: output changed before its transfer");
 `endif
 

@@ -586,7 +586,8 @@ module flk_record_cache #(
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o || state_q != READY)
   else $error("flk_record_cache: start while lookups are under way");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid && !stop |-> unused_ready[line_write_q])
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      beat_valid && !stop |-> unused_ready[line_write_q])
   else $error("flk_record_cache: a line without a place");
 
   for (genvar c = 0; c < 2; c++) begin : gen_check
