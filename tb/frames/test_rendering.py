@@ -179,7 +179,7 @@ def test_modes() -> None:
 
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
-    check((40, 24), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
+    check((24, 16), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
 
 
 @pytest.mark.slow
