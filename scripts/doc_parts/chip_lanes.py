@@ -72,7 +72,7 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: int) -> tuple[str, 
 ENTRY_BITS = 28 + 1  # record number, mask, and the bit that marks an end
 RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
 # Entries that each sorting unit's buffer holds, records that each core's queue holds.
-HELD = ((4, 64), (128, 64), (512, 64), (512, 128))
+HELD = ((4, 64), (512, 64), (512, 128))
 
 
 def queue_tables(say: Say) -> dict[str, str]:
