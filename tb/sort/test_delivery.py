@@ -15,7 +15,7 @@ SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
 
 @pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256})), SMALL])
 def test_delivery(parameters: dict[str, int]) -> None:
-    tests = [] if not parameters else ["tiles", "finishing"]
+    tests = [] if not parameters else ["tiles", "finishing", "all_finished", "clear"]
     build_and_test("flk_delivery", "cocotb_delivery", parameters=parameters, tests=tests)
 
 
