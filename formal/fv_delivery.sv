@@ -1,6 +1,6 @@
 // flk_delivery, one core that finishes no tile early: every entry with the core's bit, and every end, reaches the core once,
-// unchanged, in order (fv_pair_stream), whatever the other cores finish and whenever; the others do not. The cache keeps the order and
-// is arbitrary otherwise, the queues' memories are stand-ins. The assertions l_* say what is where, for induction.
+// unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others do not. The cache keeps the order and
+// is arbitrary otherwise, the queues are stand-ins. The assertions l_* say what is where, for induction.
 module fv_delivery #(
   parameter int unsigned Core = 0
 ) (
@@ -16,9 +16,9 @@ module fv_delivery #(
 );
 
   localparam int unsigned Queue = 8;
-  localparam int unsigned Half = Queue / 2 + 1;
+  localparam int unsigned Queued = Queue + 2;
   localparam int unsigned Cached = 3;
-  localparam int unsigned Held = 2 * Half + Cached + 2;  // queue, cache, entries taken
+  localparam int unsigned Held = Queued + Cached + 2;  // queue, cache, entries taken
 
   logic            rst_n;
   logic [3:0]      in_ready, finish, out_valid, out_end, finished;
@@ -92,13 +92,14 @@ module fv_delivery #(
     end
   end
 
-  logic [4:0] count, ahead;
+  logic [3:0] count, ahead;
   logic       watching;
   logic [1:0] watched;
 
-  fv_pair_stream #(
+  fv_stream #(
     .Width   (2),
-    .Capacity(Held)
+    .Capacity(Held),
+    .In      (2)
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
@@ -106,44 +107,20 @@ module fv_delivery #(
     .pick_i,
     .push_i     (wanted),
     .in_data_i  ({is_end[1], entry[1][4], is_end[0], entry[0][4]}),
-    .out_valid_i({1'b0, out_valid[Core]}),
+    .out_valid_i(out_valid[Core]),
     .out_ready_i(out_ready_i[Core]),
-    .out_data_i ({2'd0, out_end[Core], out_record[Core]}),
+    .out_data_i ({out_end[Core], out_record[Core]}),
     .inside_o   (count),
     .watching_o (watching),
     .ahead_o    (ahead),
     .watched_o  (watched)
   );
 
-  // The core's queue: what each memory holds, the oldest first.
+  logic [4:0] queued;  // in the core's queue
+  logic [1:0] push;
 
-  logic [1:0][4:0]           fill;
-  logic [1:0][Half-1:0][1:0] word;
-  logic                      read, write;
-  logic [4:0]                queued;
-  logic [1:0]                push;
-
-  assign read   = dut.gen_core[Core].read_q;
-  assign write  = dut.gen_core[Core].write_q;
-  assign queued = fill[0] + fill[1];
+  assign queued = 5'(dut.gen_core[Core].i_queue.used_q);
   assign push   = dut.gen_core[Core].push;
-
-  for (genvar b = 0; b < 2; b++) begin : gen_bank
-    logic shown;
-    assign shown   = dut.gen_core[Core].gen_bank[b].i_queue.out_valid_q;
-    assign fill[b] = 5'(dut.gen_core[Core].gen_bank[b].i_queue.used_q) + 5'(shown);
-    for (genvar d = 0; d < Half; d++) begin : gen_word
-      if (d == 0) begin : gen_first
-        assign word[b][d] = shown ? dut.gen_core[Core].gen_bank[b].i_queue.out_q
-                            : dut.gen_core[Core].gen_bank[b].i_queue.words_q[0];
-      end else if (d == Half - 1) begin : gen_last
-        assign word[b][d] = dut.gen_core[Core].gen_bank[b].i_queue.words_q[d-1];
-      end else begin : gen_other
-        assign word[b][d] = shown ? dut.gen_core[Core].gen_bank[b].i_queue.words_q[d-1]
-                            : dut.gen_core[Core].gen_bank[b].i_queue.words_q[d];
-      end
-    end
-  end
 
   // All that is inside, the oldest first, and which of it is the core's.
 
@@ -156,16 +133,16 @@ module fv_delivery #(
 
   assign cached = dut.i_cache.used_q;
 
-  for (genvar d = 0; d < 2 * Half; d++) begin : gen_queued
+  for (genvar d = 0; d < Queued; d++) begin : gen_queued
     assign present[d] = 5'(d) < queued;
-    assign item[d]    = word[read^1'(d)][d/2];
+    assign item[d]    = dut.gen_core[Core].i_queue.words_q[d];
   end
 
   for (genvar d = 0; d < Cached; d++) begin : gen_cached
     logic [5:0] element;  // record, end, mask
-    assign element             = dut.i_cache.words_q[d];
-    assign present[2*Half+d] = 3'(d) < cached && element[Core];
-    assign item[2*Half+d]    = {element[4], element[5]};
+    assign element           = dut.i_cache.words_q[d];
+    assign present[Queued+d] = 3'(d) < cached && element[Core];
+    assign item[Queued+d]    = {element[4], element[5]};
     assign right[d]          = 3'(d) >= cached || !element[4] || element[3:0] == '1;  // an end goes to all cores
   end
 
@@ -181,10 +158,10 @@ module fv_delivery #(
     found  = 1'b0;
     for (int unsigned d = 0; d < Held; d++) begin
       if (present[d]) begin
-        found  = found || (at == ahead && item[d] == watched);
+        found  = found || (at == 5'(ahead) && item[d] == watched);
         at     = at + 1'b1;
         opened = opened + 5'(item[d][1]);
-        if (d < 2 * Half) begin
+        if (d < Queued) begin
           ends = ends + 5'(item[d][1]);
         end
       end
@@ -194,15 +171,15 @@ module fv_delivery #(
   always_comb begin
     if (rst_n) begin
       a_room: assert (queued + 5'(push[0]) + 5'(push[1]) <= 5'(Queue));
-      l_inside: assert (count == at);
+      l_inside: assert (5'(count) == at);
       l_cached: assert (cached <= 3'(Cached));
-      l_used: assert (5'(dut.used_q[Core]) == queued && queued <= 5'(Queue));
-      l_fill: assert (fill[read] == fill[!read] + 5'(queued[0]) && write == (read ^ queued[0]));
-      l_room: assert (!dut.room_q || queued <= 5'(Queue - 4));
-      l_next: assert (!dut.i_cache.ready_q || queued <= 5'(Queue - 2));
-      l_ends: assert (5'(dut.ends_q[Core]) == ends);
-      l_opened: assert (5'(dut.opened_q[Core]) == opened);
-      l_gone: assert (!dut.gone_q[Core]);
+      l_used: assert (5'(dut.used_q[Core]) == queued + 5'(dut.pop_q[Core]) && 5'(dut.used_q[Core]) <= 5'(Queue));
+      l_room: assert (!dut.room_q || 5'(dut.used_q[Core]) <= 5'(Queue - 4));
+      l_next: assert (!dut.i_cache.ready_q || 5'(dut.used_q[Core]) <= 5'(Queue - 2));
+      l_pop: assert (!dut.pop_end_q[Core] || dut.pop_q[Core]);
+      l_ends: assert (5'(dut.ends_q[Core]) == ends + 5'(dut.pop_end_q[Core]));
+      l_opened: assert (5'(dut.opened_q[Core]) == opened + 5'(dut.pop_end_q[Core]));
+      l_finished: assert (!dut.finished_q[Core]);
       l_unit: assert (dut.unit_q == unit_q);
       l_pair: assert (!(dut.e_valid_q[1] && dut.e_valid_q[0] && dut.e_q[0].last));
       l_watched: assert (!watching || found);

@@ -51,6 +51,7 @@ common/flk_line_writer.sv
 common/flk_log_opacity.sv
 common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
+common/flk_pair_fifo.sv
 common/flk_phase_mux.sv
 common/flk_pipe_reg.sv
 common/flk_priority_arbiter.sv

@@ -13,7 +13,7 @@
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
-// Latency 9 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
+// Latency 7 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
 // and out_* come from registers through a multiplexer.
 module flk_delivery #(
   parameter  int unsigned RecordBits = 128,
@@ -68,8 +68,8 @@ module flk_delivery #(
   input  logic                              r_last_i
 );
 
-  localparam int unsigned FillBits = $clog2(Queue + 3);  // each of two memories has one word more
-  localparam int unsigned EndBits = $clog2(Depth + Queue + 10);
+  localparam int unsigned FillBits = $clog2(Queue + 3);  // the queue holds two more
+  localparam int unsigned EndBits = $clog2(Depth + Queue + 16);
   localparam int unsigned Margin = 6;  // records under way when a queue is seen to be nearly full
 
   if (Queue < 8 || Queue % 2 != 0) begin : gen_check_queue
@@ -88,30 +88,31 @@ module flk_delivery #(
   // ---- entries ----------------------------------------------------------------------------------------
 
   logic [1:0]                  unit_q;              // that is taken from
-  logic [1:0]                  e_valid_q, gone, nothing, look, look_ready;
+  logic [1:0]                  e_valid_q, leaves, nothing, look, look_ready;
   what_t [1:0]                 e_q, what;
   logic [1:0][NumberBits-1:0]  e_record_q;
   logic [1:0][Cores-1:0]       kept;
   logic                        e_move, e_ready, e_take, e_end_taken;
 
-  // Of a core: ends between the unit and it, and in its queue alone. It is finished with the tile that it takes.
+  // Of a core: ends between the unit and it, and in its queue alone; it is finished with the tile that it takes.
   logic [Cores-1:0][EndBits-1:0]  opened_q;
   logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
-  logic [Cores-1:0]               gone_q, unopened, unended;
+  logic [Cores-1:0]               finished_q, unopened, unended;
   logic [Cores-1:0]               pop, pop_end;
-  logic                           ready_q;          // the cache is
+  logic [Cores-1:0]               pop_q, pop_end_q;  // counted a cycle later: ready comes late
+  logic                           ready_q;           // the cache is
 
-  assign e_move      = (e_valid_q & ~gone) == '0;
+  assign e_move      = (e_valid_q & ~leaves) == '0;
   assign e_ready     = ready_q && e_move;
   assign e_take      = in_valid_i[unit_q][0] && e_ready;
   assign e_end_taken = e_take && (in_valid_i[unit_q] & in_end_i[unit_q]) != '0;
 
   for (genvar k = 0; k < 2; k++) begin : gen_entry
     // The entries in the registers are before all ends taken after them: those in opened_q are of earlier tiles, or their own.
-    assign kept[k]    = e_q[k].last ? '1 : e_q[k].mask & ~(gone_q & unopened);
+    assign kept[k]    = e_q[k].last ? '1 : e_q[k].mask & ~(finished_q & unopened);
     assign nothing[k] = kept[k] == '0;
     assign look[k]    = e_valid_q[k] && !nothing[k] && !stop;
-    assign gone[k]    = nothing[k] || look_ready[k];
+    assign leaves[k]  = nothing[k] || look_ready[k];
     assign what[k]    = '{last: e_q[k].last, mask: kept[k]};
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -120,7 +121,7 @@ module flk_delivery #(
       end else if (stop) begin
         e_valid_q[k] <= 1'b0;
       end else begin
-        e_valid_q[k] <= e_take ? in_valid_i[unit_q][k] : e_valid_q[k] && !gone[k];
+        e_valid_q[k] <= e_take ? in_valid_i[unit_q][k] : e_valid_q[k] && !leaves[k];
       end
     end
 
@@ -154,7 +155,7 @@ module flk_delivery #(
       if (!rst_ni) begin
         finish_q[u] <= 1'b0;
       end else begin
-        finish_q[u] <= !stop && (&(gone_q & unopened)) && unit_q == 2'(u) && !e_end_taken;
+        finish_q[u] <= !stop && (&(finished_q & unopened)) && unit_q == 2'(u) && !e_end_taken;
       end
     end
   end
@@ -234,11 +235,9 @@ module flk_delivery #(
   end
 
   for (genvar s = 0; s < Cores; s++) begin : gen_core
-    // Records go into two memories in turn, and come from them in turn.
-    logic                       write_q, read_q;
-    logic [1:0]                 push, valid, is_end, empty, unused_ready;
-    logic [1:0][RecordBits-1:0] record;
-    logic [1:0]                 ended;
+    logic [1:0]          push, ended, unused_ready;
+    logic                unused_valid;   // of the record behind the oldest
+    logic [RecordBits:0] unused_record;
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
@@ -249,60 +248,49 @@ module flk_delivery #(
 
     // What is behind an end is not of the tile that the core takes.
     assign push[0] = found_valid[0] && found[0].mask[s] &&
-                     (found[0].last || !(gone_q[s] && unended[s]));
+                     (found[0].last || !(finished_q[s] && unended[s]));
     assign push[1] = found_valid[1] && found[1].mask[s] &&
-                     (found[1].last || !(gone_q[s] && unended[s] && !ended[0]));
+                     (found[1].last || !(finished_q[s] && unended[s] && !ended[0]));
 
-    for (genvar b = 0; b < 2; b++) begin : gen_bank
-      logic first;  // of what is found
-
-      assign first = push[0] && write_q == 1'(b);
-
-      flk_sram_fifo #(
-        .Width(RecordBits + 1),
-        .Depth(Queue / 2)
-      ) i_queue (
-        .clk_i,
-        .rst_ni,
-        .clear_i    (stop),
-        .in_valid_i (first || (push[1] && (write_q ^ push[0]) == 1'(b))),
-        .in_ready_o (unused_ready[b]),  // there is room
-        .in_data_i  (first ? {found[0].last, found_record[0]} : {found[1].last, found_record[1]}),
-        .out_valid_o(valid[b]),
-        .out_ready_i(out_ready_i[s] && read_q == 1'(b)),
-        .out_data_o ({is_end[b], record[b]}),
-        .empty_o    (empty[b])
-      );
-    end
-
-    assign out_valid_o[s]  = valid[read_q];
-    assign out_end_o[s]    = is_end[read_q];
-    assign out_record_o[s] = record[read_q];
-    assign queue_empty[s]  = &empty;
+    flk_pair_fifo #(
+      .Width(RecordBits + 1),
+      .Depth(Queue)
+    ) i_queue (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (stop),
+      .in_valid_i (push),
+      .in_ready_o (unused_ready),  // there is room
+      .in_data_i  ({found[1].last, found_record[1], found[0].last, found_record[0]}),
+      .out_valid_o({unused_valid, out_valid_o[s]}),
+      .out_ready_i({1'b0, out_ready_i[s]}),
+      .out_data_o ({unused_record, out_end_o[s], out_record_o[s]}),
+      .empty_o    (queue_empty[s])
+    );
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
-        write_q     <= 1'b0;
-        read_q      <= 1'b0;
-        used_q[s]   <= '0;
-        opened_q[s] <= '0;
-        ends_q[s]   <= '0;
-        gone_q[s]   <= 1'b0;
+        used_q[s]     <= '0;
+        opened_q[s]   <= '0;
+        ends_q[s]     <= '0;
+        finished_q[s] <= 1'b0;
+        pop_q[s]      <= 1'b0;
+        pop_end_q[s]  <= 1'b0;
       end else if (stop) begin
-        write_q     <= 1'b0;
-        read_q      <= 1'b0;
-        used_q[s]   <= '0;
-        opened_q[s] <= '0;
-        ends_q[s]   <= '0;
-        gone_q[s]   <= 1'b0;
+        used_q[s]     <= '0;
+        opened_q[s]   <= '0;
+        ends_q[s]     <= '0;
+        finished_q[s] <= 1'b0;
+        pop_q[s]      <= 1'b0;
+        pop_end_q[s]  <= 1'b0;
       end else begin
-        write_q     <= write_q ^ (^push);
-        read_q      <= read_q ^ pop[s];
-        used_q[s]   <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop[s]);
-        opened_q[s] <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end[s]);
-        ends_q[s]   <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
-                       - FillBits'(pop_end[s]);
-        gone_q[s]   <= finished_i[s] && !pop_end[s];
+        pop_q[s]      <= pop[s];
+        pop_end_q[s]  <= pop_end[s];
+        used_q[s]     <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop_q[s]);
+        opened_q[s]   <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
+        ends_q[s]     <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
+                         - FillBits'(pop_end_q[s]);
+        finished_q[s] <= finished_i[s] && !pop_end[s];
       end
     end
 

@@ -1,9 +1,9 @@
 // Buffer of a sorting unit's entries: one a cycle in, two a cycle out (docs/delivery.md).
 //
-// While delivery is at other units' tiles the unit fills it, and its tile then goes at two entries a cycle. Entries and ends lie in
-// two queues in turn, so that the two oldest are at both outputs. out_valid_o[1] implies out_valid_o[0], and out_end_o[0] is low
-// with it: a pair never goes beyond the end of a list. out_ready_i takes all that is valid; until then it stays, but for a second
-// entry that may join.
+// While delivery is at other units' tiles the unit fills it, and its tile then goes at two entries a cycle. The two oldest of what
+// flk_pair_fifo holds, entries and ends, are at both outputs. out_valid_o[1] implies out_valid_o[0], and out_end_o[0] is low with
+// it: a pair never goes beyond the end of a list. out_ready_i takes all that is valid; until then it stays, but for a second entry
+// that may join.
 // finish_i is about the list that the buffer gives, until its end has been taken; finish_o tells the unit so while that is the
 // list that it gives, until its end has been taken: while no end is inside. What the buffer holds must still be taken.
 // clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
@@ -30,61 +30,42 @@ module flk_entry_buffer #(
   output logic                  empty_o
 );
 
-  localparam int unsigned EndBits = $clog2(Depth + 3);  // each queue holds one more than its memory
+  localparam int unsigned EndBits = $clog2(Depth + 3);  // the queue holds two more
 
-  if (Depth < 4 || Depth % 2 != 0) begin : gen_check
-    $error("flk_entry_buffer: Depth must be even, at least 4");
-  end
+  logic [1:0]         valid, take;
+  logic               unused_ready;  // for two
+  logic [EndBits-1:0] ends_q;
+  logic               push, pop_end;
 
-  logic                  write_q, read_q;  // the queue of the next entry
-  logic [1:0]            ready, valid, is_end, empty, take;
-  logic [1:0][Width-1:0] entry;
-  logic [EndBits-1:0]    ends_q;
-  logic                  push, pop_end;
+  assign push        = in_valid_i && in_ready_o;
+  assign out_valid_o = {valid[1] && !out_end_o[0], valid[0]};
+  assign take        = out_ready_i ? out_valid_o : '0;
+  assign pop_end     = (take & out_end_o) != '0;
+  assign finish_o    = finish_i && ends_q == '0;
 
-  assign in_ready_o     = ready[write_q];
-  assign push           = in_valid_i && in_ready_o;
-  assign out_end_o      = {is_end[!read_q], is_end[read_q]};
-  assign out_entry_o    = {entry[!read_q], entry[read_q]};
-  assign out_valid_o[0] = valid[read_q];
-  assign out_valid_o[1] = &valid && !is_end[read_q];
-  assign take           = !out_ready_i ? '0
-                          : read_q ? {out_valid_o[0], out_valid_o[1]} : out_valid_o;
-  assign pop_end        = out_ready_i && (out_valid_o & out_end_o) != '0;
-  assign finish_o       = finish_i && ends_q == '0;
-  assign empty_o        = &empty;
-
-  for (genvar k = 0; k < 2; k++) begin : gen_queue
-    flk_sram_fifo #(
-      .Width(1 + Width),
-      .Depth(Depth / 2)
-    ) i_queue (
-      .clk_i,
-      .rst_ni,
-      .clear_i,
-      .in_valid_i (in_valid_i && write_q == 1'(k)),
-      .in_ready_o (ready[k]),
-      .in_data_i  ({in_end_i, in_entry_i}),
-      .out_valid_o(valid[k]),
-      .out_ready_i(take[k]),
-      .out_data_o ({is_end[k], entry[k]}),
-      .empty_o    (empty[k])
-    );
-  end
+  flk_pair_fifo #(
+    .Width(1 + Width),
+    .Depth(Depth)
+  ) i_queue (
+    .clk_i,
+    .rst_ni,
+    .clear_i,
+    .in_valid_i ({1'b0, in_valid_i}),
+    .in_ready_o ({unused_ready, in_ready_o}),
+    .in_data_i  ({(1 + Width)'(0), in_end_i, in_entry_i}),
+    .out_valid_o(valid),
+    .out_ready_i(take),
+    .out_data_o ({out_end_o[1], out_entry_o[1], out_end_o[0], out_entry_o[0]}),
+    .empty_o
+  );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      write_q <= 1'b0;
-      read_q  <= 1'b0;
-      ends_q  <= '0;
+      ends_q <= '0;
     end else if (clear_i) begin
-      write_q <= 1'b0;
-      read_q  <= 1'b0;
-      ends_q  <= '0;
+      ends_q <= '0;
     end else begin
-      write_q <= write_q ^ push;
-      read_q  <= read_q ^ (^take);
-      ends_q  <= ends_q + EndBits'(push && in_end_i) - EndBits'(pop_end);
+      ends_q <= ends_q + EndBits'(push && in_end_i) - EndBits'(pop_end);
     end
   end
 
@@ -92,11 +73,6 @@ module flk_entry_buffer #(
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       out_valid_o[1] |-> out_valid_o[0] && !out_end_o[0])
   else $error("flk_entry_buffer: a pair beyond the end of a list");
-
-  assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o[0] && !out_ready_i && !clear_i |=>
-      out_valid_o[0] && $stable({out_end_o[0], out_entry_o[0]}))
-  else $error("flk_entry_buffer: output changed before its transfer");
 `endif
 
 endmodule

@@ -12,7 +12,8 @@
 // start_i (while idle_o) and clear_i (at any time) forget all; idle_o rises when what was asked for has
 // come and the tags are cleared (Sets cycles). error_o: the memory answered with an error; until then.
 // Throughput: two elements a cycle, one where both are of the same bank (at the data: if both read, or both write, or
-// are of one place); a line a cycle from memory. Latency 5 without a miss in the queue. in_ready_o[1] depends on in_*; it is never high without in_ready_o[0].
+// are of one place); a line a cycle from memory. Latency 4 without a miss in the queue. in_ready_o[1] depends on in_*; it is
+// never high without in_ready_o[0].
 // Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
@@ -275,51 +276,29 @@ module flk_record_cache #(
     assign missed[c] = '{valid: miss[c], line: b_line_q[c]};
   end
 
-  // Elements wait in two memories in turn, so that the two oldest are there.
-  logic       write_q, read_q;  // the memory of the next element
-  logic [1:0] wait_push, wait_ready, wait_valid, wait_pop, wait_empty, go;
-  logic       miss_ready, miss_valid, miss_pop, miss_empty;
-  element_t [1:0] oldest;
+  // What has been looked up waits.
+  logic [1:0] wait_push, wait_valid, go;
+  logic       wait_ready, unused_one;  // for two elements; for one
+  logic       wait_empty, miss_ready, miss_valid, miss_pop, miss_empty;
 
-  assign advance   = (&wait_ready) && miss_ready;
+  assign advance   = wait_ready && miss_ready;
   assign wait_push = advance ? b_valid_q : '0;
-  assign head      = {oldest[!read_q], oldest[read_q]};
-  assign wait_pop  = read_q ? {go[0], go[1]} : go;
 
-  for (genvar b = 0; b < 2; b++) begin : gen_waiting
-    logic first;
-
-    assign first = wait_push[0] && write_q == 1'(b);
-
-    flk_sram_fifo #(
-      .Width($bits(element_t)),
-      .Depth(Depth / 2)
-    ) i_queue (
-      .clk_i,
-      .rst_ni,
-      .clear_i    (stop),
-      .in_valid_i (first || (wait_push[1] && (write_q ^ wait_push[0]) == 1'(b))),
-      .in_ready_o (wait_ready[b]),
-      .in_data_i  (first ? pushed[0] : pushed[1]),
-      .out_valid_o(wait_valid[b]),
-      .out_ready_i(wait_pop[b]),
-      .out_data_o (oldest[b]),
-      .empty_o    (wait_empty[b])
-    );
-  end
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      write_q <= 1'b0;
-      read_q  <= 1'b0;
-    end else if (stop) begin
-      write_q <= 1'b0;
-      read_q  <= 1'b0;
-    end else begin
-      write_q <= write_q ^ (^wait_push);
-      read_q  <= read_q ^ (^go);
-    end
-  end
+  flk_pair_fifo #(
+    .Width($bits(element_t)),
+    .Depth(Depth)
+  ) i_waiting (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (stop),
+    .in_valid_i (wait_push),
+    .in_ready_o ({wait_ready, unused_one}),
+    .in_data_i  (pushed),
+    .out_valid_o(wait_valid),
+    .out_ready_i(go),
+    .out_data_o (head),
+    .empty_o    (wait_empty)
+  );
 
   // ---- lines from memory ------------------------------------------------------------------------------
 
@@ -329,13 +308,12 @@ module flk_record_cache #(
   logic [LowBits:0]          fetch_low_q;
   logic [HighBits-1:0]       fetch_high_q;  // without the carry from below
   logic                      beat_valid, beat_error, unused_tag, freed;
-  logic                      line_write_q, line_read_q;  // the memory of the next line
-  logic [1:0]                unused_ready, line_there, line_take, line_empty;
-  logic [1:0]                line_valid, line_pop;       // of the two oldest
+  logic [1:0]                unused_ready, line_valid, line_pop;  // of the two oldest
+  logic                      line_empty;
   logic [1:0]                popped_q;
   logic [OwedBits-1:0]       owed_q;
   logic [Width-1:0]          beat_data;
-  logic [1:0][Width-1:0]     line, line_data;
+  logic [1:0][Width-1:0]     line_data;
   logic                      sum_load;
 
   flk_fifo #(
@@ -345,7 +323,7 @@ module flk_record_cache #(
     .clk_i,
     .rst_ni,
     .clear_i    (stop),
-    .in_valid_i (miss != '0 && (&wait_ready)),
+    .in_valid_i (miss != '0 && wait_ready),
     .in_ready_o (miss_ready),
     .in_data_i  (missed),
     .out_valid_o(miss_valid),
@@ -431,46 +409,33 @@ module flk_record_cache #(
     .r_last_i
   );
 
-  // As the elements, in two memories in turn.
-  for (genvar b = 0; b < 2; b++) begin : gen_lines
-    flk_sram_fifo #(
-      .Width(Width),
-      .Depth(Places / 2)
-    ) i_queue (
-      .clk_i,
-      .rst_ni,
-      .clear_i    (stop),
-      .in_valid_i (beat_valid && line_write_q == 1'(b)),
-      .in_ready_o (unused_ready[b]),  // only what has a place is asked for
-      .in_data_i  (beat_data),
-      .out_valid_o(line_there[b]),
-      .out_ready_i(line_take[b]),
-      .out_data_o (line[b]),
-      .empty_o    (line_empty[b])
-    );
-  end
-
-  assign line_valid = {line_there[!line_read_q], line_there[line_read_q]};
-  assign line_data  = {line[!line_read_q], line[line_read_q]};
-  assign line_take  = line_read_q ? {line_pop[0], line_pop[1]} : line_pop;
+  flk_pair_fifo #(
+    .Width(Width),
+    .Depth(Places)
+  ) i_lines (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (stop),
+    .in_valid_i ({1'b0, beat_valid}),
+    .in_ready_o (unused_ready),  // only what has a place is asked for
+    .in_data_i  ({Width'(0), beat_data}),
+    .out_valid_o(line_valid),
+    .out_ready_i(line_pop),
+    .out_data_o (line_data),
+    .empty_o    (line_empty)
+  );
 
   // Places that are free again are told one a cycle.
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      line_write_q <= 1'b0;
-      line_read_q  <= 1'b0;
-      popped_q     <= '0;
-      owed_q       <= '0;
+      popped_q <= '0;
+      owed_q   <= '0;
     end else if (stop) begin
-      line_write_q <= 1'b0;
-      line_read_q  <= 1'b0;
-      popped_q     <= '0;
-      owed_q       <= '0;
+      popped_q <= '0;
+      owed_q   <= '0;
     end else begin
-      line_write_q <= line_write_q ^ beat_valid;
-      line_read_q  <= line_read_q ^ (^line_pop);
-      popped_q     <= line_pop;
-      owed_q       <= owed_q + OwedBits'(popped_q[0]) + OwedBits'(popped_q[1]) - OwedBits'(freed);
+      popped_q <= line_pop;
+      owed_q   <= owed_q + OwedBits'(popped_q[0]) + OwedBits'(popped_q[1]) - OwedBits'(freed);
     end
   end
 
@@ -483,8 +448,8 @@ module flk_record_cache #(
 
   assign apart     = head[0].skip || head[1].skip || head[0].bank != head[1].bank ||
                      (head[0].miss != head[1].miss && head[0].place != head[1].place);
-  assign go_first  = wait_valid[read_q] && out_ready_i && (!head[0].miss || line_valid[0]);
-  assign go_second = go_first && wait_valid[!read_q] && apart &&
+  assign go_first  = wait_valid[0] && out_ready_i && (!head[0].miss || line_valid[0]);
+  assign go_second = go_first && wait_valid[1] && apart &&
                      (!head[1].miss || (head[0].miss ? line_valid[1] : line_valid[0]));
   assign go        = {go_second, go_first};
   assign line_pop  = {go_second && head[1].miss && head[0].miss,
@@ -577,9 +542,9 @@ module flk_record_cache #(
   );
 
   assign error_o = error_q;
-  assign idle_o  = state_q == READY && b_valid_q == '0 && (&wait_empty) && miss_empty &&
+  assign idle_o  = state_q == READY && b_valid_q == '0 && wait_empty && miss_empty &&
                    !sum_valid_q && !fetch_valid_q &&
-                   fetch_idle && (&line_empty) && popped_q == '0 && owed_q == '0 &&
+                   fetch_idle && line_empty && popped_q == '0 && owed_q == '0 &&
                    d_valid_q == '0;
 
 `ifndef SYNTHESIS
@@ -587,7 +552,7 @@ module flk_record_cache #(
   else $error("flk_record_cache: start while lookups are under way");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      beat_valid && !stop |-> unused_ready[line_write_q])
+      beat_valid && !stop |-> unused_ready[0])
   else $error("flk_record_cache: a line without a place");
 
   for (genvar c = 0; c < 2; c++) begin : gen_check

@@ -261,6 +261,26 @@ async def rate(dut):
 
 
 @cocotb.test()
+async def latency(dut):
+    """Seven cycles from the transfer of an entry, whose record is in the cache, to its record."""
+    test = Delivery(dut)
+    await test.bench.reset()
+    await test.ready()
+    await test.run([[(5, 15)], [], [], []])
+    test.give([[(5, 15)], [], [], []])
+    edge = RisingEdge(dut.clk_i)
+    while not (int(dut.in_valid_i.value) & 1 and int(dut.in_ready_o.value) & 1):
+        await edge
+    cycle = 0
+    while not int(dut.out_valid_o.value):
+        await edge
+        cycle += 1
+    assert cycle == 7, f"{cycle} cycles"
+    assert int(dut.out_valid_o.value) == 15 and int(dut.out_end_o.value) == 0
+    await test.bench.until(lambda: not any(test.due), 100, "last end")
+
+
+@cocotb.test()
 async def clear(dut):
     """Clear at any time; the next frame is right."""
     test = Delivery(dut, "rare", "rare", 30, 0.1, finish=0.3)

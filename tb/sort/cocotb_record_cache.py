@@ -196,6 +196,27 @@ async def rate(dut):
 
 
 @cocotb.test()
+async def latency(dut):
+    """Four cycles from a lookup that hits to its record."""
+    cache = Cache(dut)
+    await cache.bench.reset()
+    await cache.ready()
+    cache.queue.append((0, 7, 1))
+    await cache.through()
+    cache.queue.append((0, 7, 2))
+    edge = RisingEdge(dut.clk_i)
+    while not int(dut.in_valid_i.value):
+        await edge
+    assert int(dut.in_ready_o.value) & 1
+    cycles = 0
+    while not int(dut.out_valid_o.value):
+        await edge
+        cycles += 1
+    assert cycles == 4, f"{cycles} cycles"
+    await cache.through()
+
+
+@cocotb.test()
 async def dram(dut):
     """DRAM timing."""
     cache = Cache(dut, "rare", 30, perfect=False)

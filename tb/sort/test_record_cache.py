@@ -1,8 +1,8 @@
 """Record cache: records in order, two a cycle, and exactly the lines read that the golden model says for the order of the lookups.
 
 State space: records of one line, of one set, near each other and anywhere; ends between them; pairs in one bank; idle patterns, outputs that wait,
-memory with and without pauses, latency 1 to 100; errors; start and clear at any time. Parameter space: the default, a small cache with short queues, records
-of 32 bytes.
+memory with and without pauses, latency 1 to 100; latency of a hit; errors; start and clear at any time. Parameter space: the default, a small cache
+with short queues, records of 32 bytes.
 """
 
 from __future__ import annotations

@@ -55,9 +55,10 @@ COMPOSED: dict[str, list[str]] = {
     "flk_list_writer": [MEMORY],
     "flk_frame_writer": [MEMORY, "flk_pixel_out"],
     "flk_list_reader": [MEMORY, "flk_axi_read"],
-    "flk_record_cache": [MEMORY, "flk_sram_fifo", "flk_axi_fetch"],
-    "flk_delivery": ["flk_record_cache", "flk_sram_fifo"],
-    "flk_entry_buffer": ["flk_sram_fifo"],
+    "flk_pair_fifo": ["flk_sram_fifo"],
+    "flk_record_cache": [MEMORY, "flk_pair_fifo", "flk_axi_fetch"],
+    "flk_delivery": ["flk_record_cache", "flk_pair_fifo"],
+    "flk_entry_buffer": ["flk_pair_fifo"],
     "flk_record_writer": [MEMORY, "flk_sram_fifo", "flk_stream_arbiter"],
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
@@ -315,7 +316,7 @@ def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_event_counter"),
-        unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_axi_fetch"),
+        unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),

@@ -1,0 +1,20 @@
+"""Queue of two words a cycle: order, loss and duplication under idle and back-pressure patterns, one and two words at either input and output,
+room, capacity, latency, rate, clear in traffic.
+
+Parameter space: depths 4, one whose half is no power of two, 32. Not covered: reset in traffic (as clear, and flk_sram_fifo's).
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.runner import build_and_test, refused
+
+
+@pytest.mark.parametrize(("width", "depth"), [(3, 4), (79, 10), (8, 32)])
+def test_pair_fifo(width: int, depth: int) -> None:
+    build_and_test("flk_pair_fifo", "cocotb_pair_fifo", parameters={"Width": width, "Depth": depth}, config={"width": width, "depth": depth})
+
+
+def test_illegal_parameters() -> None:
+    with refused("Depth must be even, at least 4"):
+        build_and_test("flk_pair_fifo", "cocotb_pair_fifo", parameters={"Depth": 5})
