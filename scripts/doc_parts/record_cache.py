@@ -62,7 +62,8 @@ def tables(say: Say) -> dict[str, str]:
         front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
         number, tile = _entries(front)
         per_line = LINE_BYTES // front.kind.bytes
-        titles.append(f"{title}: {len(number):,} entries, {len(np.unique(number // per_line)):,} lines")
+        cores = np.bitwise_count(front.entry_mask).mean()
+        titles.append(f"{title}: {len(number):,} entries, {cores:.2f} cores each, {len(np.unique(number // per_line)):,} lines")
         for lines, ways in SIZES:
             sizes[lines, ways].append(f"{_lines(number // per_line, lines // ways, ways):,}")
         lines, ways = DEFAULT

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 
+from flicker.chip import rendering as model
 from flicker.chip.dram import DramConfig
 from flicker.chip.rendering import Rendering, estimate, tile_lists
 from flicker.front.view import DEMO, load_view
@@ -17,6 +19,7 @@ from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.params import CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
+from flicker.toolchain import ROOT
 
 SIZE = (112, 54)  # four pairs of tiles in a row, the last tile of which the picture lacks
 
@@ -43,6 +46,23 @@ def test_records_given(change: dict) -> None:
     whole = config.cat == CatMode.AUTO
     assert may_be_given(found.given, lengths, golden.frame.needed, whole).all()
     assert whole or found.given.sum() < 0.9 * lengths.sum()
+
+
+def test_sizes() -> None:
+    """What waits where in the model is what the RTL has places for."""
+    def default(module: str, name: str) -> int:
+        found = re.search(rf"parameter\s+int unsigned {name}\s*=\s*(\d+)", (ROOT / "rtl" / f"{module}.sv").read_text())
+        assert found, f"{module}: {name}"
+        return int(found[1])
+
+    assert model.ENTRIES == default("flk_rendering", "Entries") == default("sort/flk_entry_buffer", "Depth")
+    assert model.QUEUE == default("flk_rendering", "Queue") == default("sort/flk_delivery", "Queue")
+    assert model.PAIRS == default("flk_rendering", "Pairs")
+    assert model.SLOTS == default("flk_rendering", "Chunks")
+    for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
+        assert (model.DEPTH, model.PLACES) == (default(unit, "Depth"), default(unit, "Places"))
+    margin = re.search(r"Margin = (\d+);", (ROOT / "rtl/sort/flk_delivery.sv").read_text())
+    assert margin and model.MARGIN == int(margin[1])
 
 
 def test_cycles() -> None:

@@ -45,7 +45,8 @@ FIRST = 17  # a tile's first line beside two accesses
 SLOTS, CONTEXTS = 16, 4  # chunks in a list reader, lists under way
 SORTED_LISTS, SORTED_ENTRIES = 8, 2 * CAPACITY  # that a sorting unit holds
 CUT = 3 * CAPACITY // 2 + 38  # that a reading stops for
-ENTRIES = 514  # of a sorting unit that wait for delivery
+ENTRIES = 512  # of a sorting unit that wait for delivery, in the buffer's memories
+BUFFER = ENTRIES + 2  # with those at its outputs
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
@@ -126,7 +127,7 @@ def _frame(
     part_gate = np.zeros((reading_start[1:] - reading_start[:-1]).max() + 1, np.int64)  # end of each reading
     # Buffers: when the unit gave its last entry, and when entries were taken
     emitted = np.zeros(4, np.int64)
-    removed, removals = np.zeros((4, ENTRIES), np.int64), np.zeros(4, np.int64)
+    removed, removals = np.zeros((4, BUFFER), np.int64), np.zeros(4, np.int64)
     # Queues: when found; element in its list, or -1, the end; when taken
     found = np.zeros((4, QUEUE), np.int64)
     which = np.zeros((4, QUEUE), np.int64)
@@ -300,8 +301,8 @@ def _frame(
         is_end = at == tile_start[t_c + 1]
         # The unit gives an entry a cycle, while its buffer has a place; two a cycle are looked up.
         give = max(emitted[u] + 1, ready)
-        if removals[u] >= ENTRIES:
-            give = max(give, removed[u, removals[u] % ENTRIES] + 1)
+        if removals[u] >= BUFFER:
+            give = max(give, removed[u, removals[u] % BUFFER] + 1)
         t = max(give + BUFFERED, max(looked, looked_before + 1))
         if lookups >= DEPTH:
             t = max(t, found_at[lookups % DEPTH])
@@ -330,7 +331,7 @@ def _frame(
                 looked = looked_before = t + inside // 2
                 continue
         emitted[u] = give
-        removed[u, removals[u] % ENTRIES] = t
+        removed[u, removals[u] % BUFFER] = t
         removals[u] += 1
         looked_before, looked = looked, t
         if kept:
