@@ -94,12 +94,12 @@ module flk_delivery #(
   logic [1:0][Cores-1:0]       kept;
   logic                        e_move, e_ready, e_take, e_end_taken;
 
-  // Of a core: ends between the unit and it, and in its queue alone; it is finished with the tile that it takes.
+  // Of a core: ends between the unit and it, and in its queue alone; it is finished with the tile that it takes, or took in the
+  // cycle before: an end that it took then still counts.
   logic [Cores-1:0][EndBits-1:0]  opened_q;
   logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
   logic [Cores-1:0]               finished_q, unopened, unended;
-  logic [Cores-1:0]               pop, pop_end;
-  logic [Cores-1:0]               pop_q, pop_end_q;  // counted a cycle later: ready comes late
+  logic [Cores-1:0]               pop, pop_q, pop_end_q;  // counted a cycle later: ready comes late
   logic                           ready_q;           // the cache is
 
   assign e_move      = (e_valid_q & ~leaves) == '0;
@@ -244,7 +244,6 @@ module flk_delivery #(
     assign full[s]     = 32'(used_q[s]) > Queue - Margin;
     assign ended       = found_valid & {found[1].last, found[0].last};
     assign pop[s]      = out_valid_o[s] && out_ready_i[s];
-    assign pop_end[s]  = pop[s] && out_end_o[s];
 
     // What is behind an end is not of the tile that the core takes.
     assign push[0] = found_valid[0] && found[0].mask[s] &&
@@ -285,12 +284,12 @@ module flk_delivery #(
         pop_end_q[s]  <= 1'b0;
       end else begin
         pop_q[s]      <= pop[s];
-        pop_end_q[s]  <= pop_end[s];
+        pop_end_q[s]  <= pop[s] && out_end_o[s];
         used_q[s]     <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop_q[s]);
         opened_q[s]   <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
         ends_q[s]     <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
                          - FillBits'(pop_end_q[s]);
-        finished_q[s] <= finished_i[s] && !pop_end[s];
+        finished_q[s] <= finished_i[s];
       end
     end
 

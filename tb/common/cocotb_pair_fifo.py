@@ -93,16 +93,19 @@ async def order(dut, idle, stall):
 
 
 @cocotb.test()
-async def capacity(dut):
-    """A blocked output: Depth and two more enter. Then two a cycle, without a gap."""
-    test = Queue(dut, alone=0.0)
+@cocotb.parametrize(alone=[0.0, 1.0])
+async def capacity(dut, alone):
+    """A blocked output: Depth and two more enter, in pairs or one by one. Then pairs go through without a gap."""
+    test = Queue(dut, alone=alone)
     depth = test.depth
-    test.stall = iter([True] * (2 * depth + 20) + [False] * 10_000)
+    test.stall = iter([True] * (3 * depth + 20) + [False] * 10_000)
     await test.bench.reset()
     test.words(8 * depth)
-    await test.bench.cycles(depth + 15)
+    await test.bench.cycles(2 * depth + 15)
     assert test.most == depth + 2
-    await test.bench.until(lambda: len(test.taken) > 0, 2 * depth + 20, "first word")
+    if alone:
+        return
+    await test.bench.until(lambda: len(test.taken) > 0, 3 * depth + 20, "first word")
     cycles = await test.bench.until(lambda: len(test.taken) == 8 * depth, 10 * depth, "all")
     assert cycles <= 4 * depth
 
