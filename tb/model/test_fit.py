@@ -1,7 +1,7 @@
 """Fitting: pictures and derivatives of the differentiable renderer, loss, data sets, training, the command.
 
 The picture is compared with the reference renderer; derivatives with central differences in float64, of every parameter, on scenes in which alpha meets the
-clamp, the skip and the end of a pixel. Data sets are made of renderings of a small scene. Not covered: how good fits of real photographs become
+clamp, the skip and the end of a pixel; with the masks of a contribution test also with the bit-true picture. Data sets are made of renderings of a small scene. Not covered: how good fits of real photographs become
 (docs/fit.md has figures of lego).
 """
 
@@ -21,15 +21,20 @@ from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 
 from flicker.errors import FlickerError
+from flicker.explore.configurations import run
+from flicker.explore.machine import Configuration
 from flicker.fit.dataset import load_dataset
 from flicker.fit.loss import loss_and_slope
 from flicker.fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH, Parameters
 from flicker.fit.render import backward, render
+from flicker.fit.through import through
 from flicker.fit.train import Options, Trainer, affine_fit
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
+from flicker.front.view import View
 from flicker.scene.camera import Camera, load_cameras, orbit_camera
 from flicker.scene.files import load_scene
+from flicker.scene.gaussians import Scene
 from flicker.scene.image import save_png
 from flicker.scene.metrics import psnr, ssim
 
@@ -67,7 +72,23 @@ def test_picture_is_the_reference() -> None:
     assert not frame.bad.any() and frame.used.sum() > 50
 
 
-def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: int, column: int) -> tuple[float, float]:
+@pytest.mark.parametrize("name", ["faithful", "flicker-sparse-fixed-factored", "flicker-auto-mixed-factored", "vanilla"])
+def test_picture_is_the_machine(name: str) -> None:
+    """With masks the picture is that of the bit-true machine but for FP16 in its VRUs; vanilla's masks let everything through."""
+    found, camera = busy(), look()
+    masked, whole = (render(found, camera, BACKGROUND, machine) for machine in (through(name), None))
+    drawn = run(name, View(camera, found.scene(), background=BACKGROUND)).image
+    away = psnr(masked.image, drawn)
+    assert away > 50
+    if name == "vanilla":
+        assert np.array_equal(masked.image, whole.image)
+    else:
+        assert psnr(whole.image, drawn) < away - 10 and not masked.used.all()
+
+
+def difference(
+    parameters: Parameters, camera: Camera, weight: np.ndarray, i: int, column: int, machine: Configuration | None,
+) -> tuple[float, float]:
     """dL/d values[i, column] by Richardson's extrapolation of central differences, for L = sum(weight * image); and how far two step sizes disagree."""
     def slope(step: float) -> float:
         results, places = [], []
@@ -75,7 +96,7 @@ def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: in
             moved = Parameters(parameters.values.copy())
             moved.values[i, column] += np.float32(sign * step)
             places.append(float(moved.values[i, column]))
-            results.append(float((weight * render(moved, camera, BACKGROUND).image).sum()))
+            results.append(float((weight * render(moved, camera, BACKGROUND, machine).image).sum()))
         return (results[0] - results[1]) / (places[0] - places[1])
 
     coarse, middle, fine = slope(2e-3), slope(1e-3), slope(5e-4)
@@ -83,12 +104,13 @@ def difference(parameters: Parameters, camera: Camera, weight: np.ndarray, i: in
     return second, abs(second - first)
 
 
-@pytest.mark.parametrize(("degree", "z"), [(3, -3.0), (1, -1.3)])
-def test_derivatives(degree: int, z: float) -> None:
+@pytest.mark.parametrize(("degree", "z", "name"), [(3, -3.0, None), (1, -1.3, None), (0, -3.0, "flicker-sparse-fixed-factored")])
+def test_derivatives(degree: int, z: float, name: str | None) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
     parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
-    frame = render(parameters, camera, BACKGROUND)
+    machine = None if name is None else through(name)
+    frame = render(parameters, camera, BACKGROUND, machine)
     found = backward(frame, weight)
     checked = np.zeros(parameters.values.shape[1], int)
     largest = np.abs(found.values).max(axis=0)
@@ -96,7 +118,7 @@ def test_derivatives(degree: int, z: float) -> None:
     for k, i in enumerate(frame.index):
         clamped += int(parameters.values[i, LOGIT] == 6.0)
         for column in range(parameters.values.shape[1]):
-            wanted, doubt = difference(parameters, camera, weight, int(i), column)
+            wanted, doubt = difference(parameters, camera, weight, int(i), column, machine)
             scale = max(abs(wanted), 1e-3 * largest[column], 1e-6)
             if doubt < 2e-5 * scale:
                 assert abs(found.values[k, column] - wanted) < 1e-4 * scale, (i, column, found.values[k, column], wanted)
@@ -180,11 +202,16 @@ def pose(camera: Camera) -> list:
     return matrix.tolist()
 
 
+def scene_of_shots() -> Scene:
+    scene = samples.random_scene(seed(), 120, 1)
+    scene.scales *= np.float32(3.0)
+    return scene
+
+
 @pytest.fixture(scope="module")
 def shots() -> list[tuple[Camera, np.ndarray]]:
     """Views all around a small scene."""
-    scene = samples.random_scene(seed(), 120, 1)
-    scene.scales *= np.float32(3.0)
+    scene = scene_of_shots()
     cameras = [orbit_camera(scene, k, SHOTS, WIDTH, HEIGHT) for k in range(SHOTS)]
     return [(camera, render_with_transmittance(project(scene, camera), camera, (0, 0, 0))[0]) for camera in cameras]
 
@@ -364,6 +391,21 @@ def test_fit_and_resume(nerf, tmp_path) -> None:
         Trainer(data, options).restore(tmp_path / "none")
 
 
+def test_tune_through_a_machine(nerf, tmp_path) -> None:
+    """What a sparse test misses is won back; no Gaussian comes or goes; a checkpoint is of its scene."""
+    data = load_dataset(nerf)
+    options = Options(iterations=100, tune=True, through="flicker-sparse-fixed-factored")
+    tuned = Trainer(data, options, Parameters.of(scene_of_shots()))
+    before = tuned.quality(tuned.scene())
+    tuned.run()
+    after = tuned.quality(tuned.scene())
+    assert len(tuned.parameters) == tuned.first and tuned.parameters.degree == 1
+    assert before.machine < before.psnr - 1 and after.machine > before.machine + 0.5 * (before.psnr - before.machine)
+    tuned.save(tmp_path / "state.npz")
+    with pytest.raises(FlickerError, match="is of a fit with another scene"):
+        Trainer(data, options, Parameters.of(tuned.scene())).restore(tmp_path / "state.npz")
+
+
 def test_poisoned_scene(nerf) -> None:
     """Gaussians with numbers that are not finite, or that would give such pictures, are taken out and counted; the others learn as without them."""
     data, options = load_dataset(nerf), Options(iterations=200, gaussians=600, degree=1)
@@ -416,6 +458,10 @@ def test_command(nerf, tmp_path) -> None:
     assert "continues after 70 iterations" in told and (tmp_path / "a.ply").read_bytes() == first
     done = flicker("render", tmp_path / "a.ply", "--engine", "reference", "--out", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
+    told = fit("--from", tmp_path / "a.ply", "--through", "faithful", "--iterations", 20)
+    assert "PSNR of the pictures of faithful" in told and len(load_scene(tmp_path / "a.ply")) == len(scene)
+    assert "its masks are not of 4x4 mini-tiles" in fit("--through", "log-lanes", code=2)
+    assert "configuration 'fiathful' is unknown; close names: faithful" in fit("--through", "fiathful", code=2)
     assert "--resume: from which --checkpoint?" in fit("--resume", code=2)
     assert "holds other cameras" in fit("--size", 30, code=2)
     assert "background: expected black" in fit("--background", "blue", code=2)

@@ -28,10 +28,12 @@ def _cameras_beside(out: Path, text: str) -> Path:
 def fit(
     dataset: Annotated[Path, typer.Argument(help="folder with transforms.json, or with sparse/0 and images/ of COLMAP; or a transforms.json")],
     out: Annotated[Path, typer.Option("--out", "-o", help="scene, .ply; cameras.json of the test photographs goes beside it")],
+    scene: Annotated[Path | None, typer.Option("--from", help="scene of these photographs to fine-tune, as in the last third of a fit")] = None,
+    through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
     iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,
     size: Annotated[int, typer.Option(help="longer side of the pictures in pixels; larger ones are averaged, none is enlarged", min=16)] = 640,
-    gaussians: Annotated[int, typer.Option(help="at most so many", min=4)] = 100_000,
-    degree: Annotated[int, typer.Option(help="of the spherical harmonics", min=0, max=3)] = 2,
+    gaussians: Annotated[int, typer.Option(help="at most so many; of --from, as many as it has", min=4)] = 100_000,
+    degree: Annotated[int, typer.Option(help="of the spherical harmonics; of --from, its own", min=0, max=3)] = 2,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     background: Annotated[str, typer.Option(help="black, white or r,g,b: behind the scene, and behind what is transparent in the pictures")] = "black",
     exposure: Annotated[bool, typer.Option("--exposure", help="an affine colour for each photograph")] = False,
@@ -40,7 +42,9 @@ def fit(
 ) -> None:
     """Fit a scene to photographs; every eighth is held back and measured against."""
     from ..fit.dataset import load_dataset
+    from ..fit.parameters import Parameters
     from ..fit.train import Options, Trainer
+    from ..scene import load_scene
     from ..scene.camera import cameras_text
     from ..scene.files import save_ply
     from ..scene.photos import parse_background
@@ -51,19 +55,20 @@ def fit(
     writable(checkpoint, "--checkpoint")
     if resume and checkpoint is None:
         raise FlickerError("--resume: from which --checkpoint?")
-    options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure)
+    options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through)
     data = load_dataset(dataset, size)
     text = cameras_text([shot.camera for shot in data.tests])
     cameras = _cameras_beside(out, text)
     steps = RichSteps()
     with steps.step("reading photographs"):
-        trainer = Trainer(data, options)
+        trainer = Trainer(data, options, None if scene is None else Parameters.of(load_scene(scene)))
     if checkpoint is not None and resume and checkpoint.exists():
         trainer.restore(checkpoint)
     shot = data.tests[0].camera
-    points = "random places" if data.points is None else f"{len(data.points):,} points of COLMAP"
-    console.print(f"{dataset}: {len(data.fitted)} photographs to fit, {len(data.tests)} for testing, {shot.width}x{shot.height}; starts from {points}")
-    if data.dropped:
+    beginning = scene or ("random places" if data.points is None else f"{len(data.points):,} points of COLMAP")
+    console.print(f"{dataset}: {len(data.fitted)} photographs to fit, {len(data.tests)} for testing, {shot.width}x{shot.height}; starts from {beginning}")
+    before = None if scene is None else trainer.quality(trainer.scene())
+    if data.dropped and scene is None:
         console.print(f"{data.dropped:,} points were left out: not finite")
     if trainer.iteration:
         console.print(f"continues after {trainer.iteration:,} iterations")
@@ -74,23 +79,32 @@ def fit(
 
     trainer.run(steps, told, None if checkpoint is None else lambda: write_atomically(checkpoint, trainer.save))
     seconds, processor = time.monotonic() - began, time.process_time() - used
-    scene = trainer.scene()
-    if not len(scene):
+    fitted = trainer.scene()
+    if not len(fitted):
         raise FlickerError("fit: no Gaussian is left")
-    write_atomically(out, lambda path: save_ply(scene, path))
+    write_atomically(out, lambda path: save_ply(fitted, path))
     write_atomically(cameras, lambda path: path.write_text(text))
-    quality = trainer.quality(scene)
-    table = Table(show_header=False)
+    after = trainer.quality(fitted)
+    table = Table(show_header=before is not None)
     table.add_column(style="bold")
-    table.add_column(justify="right")
-    table.add_row("scene", str(out))
-    table.add_row("Gaussians", f"{len(scene):,}")
-    if removed := trainer.removed + len(trainer.parameters) - len(scene):
-        table.add_row("taken out, not finite", f"{removed:,}")
-    table.add_row("PSNR on the test photographs", f"{quality.psnr:.2f} dB")
-    table.add_row("  after an affine colour fit of each", f"{quality.compensated:.2f} dB")
-    table.add_row("SSIM", f"{quality.ssim:.4f}")
-    table.add_row("time", f"{seconds:,.0f} s, {processor:,.0f} s of processor time")
+    if before is not None:
+        table.add_column("before", justify="right")
+    table.add_column("after", justify="right")
+
+    def row(title: str, now: str, then: str = "") -> None:
+        table.add_row(title, *([] if before is None else [then]), now)
+
+    row("scene", str(out), str(scene))
+    row("Gaussians", f"{len(fitted):,}", f"{trainer.first:,}")
+    if removed := trainer.removed + len(trainer.parameters) - len(fitted):
+        row("taken out, not finite", f"{removed:,}")
+    for name, title, form in (
+        ("psnr", "PSNR on the test photographs", "{:.2f} dB"), ("compensated", "  after an affine colour fit of each", "{:.2f} dB"), ("ssim", "SSIM", "{:.4f}"),
+        ("machine", f"PSNR of the pictures of {through}", "{:.2f} dB"),
+    ):
+        if name != "machine" or through is not None:
+            row(title, form.format(getattr(after, name)), "" if before is None else form.format(getattr(before, name)))
+    row("time", f"{seconds:,.0f} s, {processor:,.0f} s of processor time")
     console.print(table)
     folder = data.tests[0].path.parent
     if folder.resolve() not in (out.parent.resolve(), (out.parent / "images").resolve()):

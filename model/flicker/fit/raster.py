@@ -23,6 +23,7 @@ G, G_X, G_Y, G_XX, G_XY, G_YY, D_RED, D_GREEN, D_BLUE = range(9)
 SUMS = 9
 MARGIN = 1e-3  # pixels and parts of LIMIT by which more is visited than alpha >= 1/255 needs: rounding never decides
 COLOUR_MAX = 1e4  # a Gaussian with more is taken for a broken one
+_ONE, _TWO = np.uint64(1), np.uint64(2)  # signed ones would make floats of unsigned indices
 _FAST = {"contract", "nsz", "arcp"}  # nothing that would change what is not finite, or the order of sums
 
 
@@ -76,7 +77,7 @@ def make_rows(index, table, opacity, rgb, width, height, rows, box, bad):
 
 
 @numba.njit(fastmath=_FAST, cache=True)
-def _blend_tile(t, rows, start, entry, tiles_x, background, image, transmittance, used):
+def _blend_tile(t, rows, start, entry, mask, tiles_x, background, image, transmittance, used):
     height, width = transmittance.shape
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
@@ -95,6 +96,7 @@ def _blend_tile(t, rows, start, entry, tiles_x, background, image, transmittance
             continue
         half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
         opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+        visited = np.uint64(mask[e])
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
         blended = False
         for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
@@ -114,7 +116,7 @@ def _blend_tile(t, rows, start, entry, tiles_x, background, image, transmittance
                 if energy < 0.0:
                     continue
                 alpha = min(ALPHA_MAX, opacity * np.exp(-energy))
-                if alpha < ALPHA_MIN:
+                if alpha < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
                     continue
                 after = before * (1.0 - alpha)
                 if after < TRANSMITTANCE_MIN:
@@ -137,14 +139,17 @@ def _blend_tile(t, rows, start, entry, tiles_x, background, image, transmittance
 
 
 @numba.njit(parallel=True, cache=True)
-def blend(rows, start, entry, tiles_x, background, image, transmittance, used):
-    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel."""
+def blend(rows, start, entry, mask, tiles_x, background, image, transmittance, used):
+    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel.
+
+    mask: uint16 (E,), 4x4 pixels of the tile in which an entry may be blended, bit 4 row + column.
+    """
     for t in numba.prange(len(start) - 1):
-        _blend_tile(np.int64(t), rows, start, entry, tiles_x, background, image, transmittance, used)
+        _blend_tile(np.int64(t), rows, start, entry, mask, tiles_x, background, image, transmittance, used)
 
 
 @numba.njit(fastmath=_FAST, cache=True)
-def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image, sums):
+def _blend_back_tile(t, rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums):
     """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's product with its slope."""
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
@@ -168,6 +173,7 @@ def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image
         low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
         half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
         opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+        visited = np.uint64(mask[e])
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
         g, g_x, g_y, g_xx, g_xy, g_yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         d_red, d_green, d_blue = 0.0, 0.0, 0.0
@@ -190,7 +196,7 @@ def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image
                     continue
                 raw = opacity * np.exp(-energy)
                 alpha = min(ALPHA_MAX, raw)
-                if alpha < ALPHA_MIN:
+                if alpha < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
                     continue
                 passed = 1.0 - alpha
                 after = before * passed
@@ -229,10 +235,10 @@ def _blend_back_tile(t, rows, start, entry, tiles_x, image, used, slope_of_image
 
 
 @numba.njit(parallel=True, cache=True)
-def blend_back(rows, start, entry, tiles_x, image, used, slope_of_image, sums):
+def blend_back(rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums):
     """sums (E, 9) of every used entry; the others' are not written. slope_of_image: (H, W, 3), dL/d image."""
     for t in numba.prange(len(start) - 1):
-        _blend_back_tile(np.int64(t), rows, start, entry, tiles_x, image, used, slope_of_image, sums)
+        _blend_back_tile(np.int64(t), rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums)
 
 
 @numba.njit(cache=True)

@@ -14,13 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..explore.machine import Configuration
 from ..front.binning import bin_boxes
-from ..front.projection import colours, geometry
+from ..front.projection import RADIUS, SPIKY, XX, YY, A, C, Projected, X, Y, colours, geometry
 from ..params import TILE
 from ..scene.camera import Camera
 from . import raster
 from .chain import chain
 from .parameters import Parameters
+from .through import ALL, tile_masks
 
 
 @dataclass(eq=False)
@@ -28,7 +30,8 @@ class Frame:
     """A view of parameters and what its way back needs. M Gaussians are in front of the camera, E entries in the lists of 16x16 tiles.
 
     image: float64 (H, W, 3), neither clamped nor quantised. transmittance: float64 (H, W). index: int64 (M,), Gaussians near to far.
-    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel.
+    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel. mask: uint16 (E,), 4x4
+    pixels of the tile that are visited (`through`).
     bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
     """
 
@@ -40,6 +43,7 @@ class Frame:
     rows: np.ndarray
     start: np.ndarray
     entry: np.ndarray
+    mask: np.ndarray
     used: np.ndarray
     bad: np.ndarray
     table: np.ndarray
@@ -54,8 +58,27 @@ class Gradient:
     index: np.ndarray
 
 
-def render(parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0)) -> Frame:
-    """The picture over an RGB background."""
+def _masks(
+    through: Configuration, frame: tuple[np.ndarray, ...], opacity: np.ndarray, depth: np.ndarray, camera: Camera, start: np.ndarray, entry: np.ndarray,
+) -> np.ndarray:
+    """Masks of the entries. frame: index, table, rgb, bad, of `Frame`."""
+    index, table, rgb, bad = frame
+    good = np.flatnonzero(~bad)
+    number = np.cumsum(~bad) - 1
+    index = index[good]
+    table = table[index]
+    cov2d = np.ascontiguousarray(table[:, XX : YY + 1])
+    projected = Projected(
+        np.ascontiguousarray(table[:, X : Y + 1]), cov2d, np.ascontiguousarray(table[:, A : C + 1]), depth[index], opacity[index], rgb[good],
+        table[:, SPIKY] != 0.0, index, 3.0 * np.sqrt(cov2d[:, ::2]), np.ascontiguousarray(table[:, RADIUS]),
+    )
+    return tile_masks(through, projected, camera, start, number[entry].astype(np.int32))
+
+
+def render(
+    parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0), through: Configuration | None = None,
+) -> Frame:
+    """The picture over an RGB background; through: only where the masks of that machine let a Gaussian through (`through.through`)."""
     count, (width, height) = len(parameters), (camera.width, camera.height)
     with np.errstate(all="ignore"):  # what is not finite is found below
         scales = np.exp(parameters.log_scales.astype(np.float64))
@@ -74,8 +97,12 @@ def render(parameters: Parameters, camera: Camera, background: Sequence[float] =
     tiles_x, tiles_y = -(-width // TILE), -(-height // TILE)
     start, entry = bin_boxes(box, tiles_x, tiles_y)
     image, transmittance, used = np.empty((height, width, 3)), np.empty((height, width)), np.zeros(len(entry), np.bool_)
-    raster.blend(rows, start, entry, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
-    return Frame(parameters, camera, image, transmittance, index, rows, start, entry, used, bad, table)
+    if through is None:
+        mask = np.full(len(entry), ALL, np.uint16)
+    else:
+        mask = _masks(through, (index, table, rgb, bad), opacity, depth, camera, start, entry)
+    raster.blend(rows, start, entry, mask, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
+    return Frame(parameters, camera, image, transmittance, index, rows, start, entry, mask, used, bad, table)
 
 
 def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -> Gradient:
@@ -86,7 +113,7 @@ def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -
     camera, values = frame.camera, frame.parameters.values
     sums = np.empty((len(frame.entry), raster.SUMS))
     slope = np.ascontiguousarray(slope_of_image, np.float64)
-    raster.blend_back(frame.rows, frame.start, frame.entry, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
+    raster.blend_back(frame.rows, frame.start, frame.entry, frame.mask, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
     total = np.zeros((len(frame.index), raster.SUMS))
     raster.gather(frame.entry, frame.used, sums, total)
     gradient, screen = np.empty((len(frame.index), values.shape[1]), np.float32), np.empty((len(frame.index), 2))

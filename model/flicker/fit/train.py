@@ -9,6 +9,7 @@ A trainer's state is its arrays, a random generator and a count: `save` writes t
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -18,8 +19,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlickerError, one_line
+from ..explore.machine import run
 from ..front.projection import project
 from ..front.reference import render_reference
+from ..front.view import View
 from ..progress import Steps
 from ..scene.gaussians import Scene
 from ..scene.metrics import psnr, ssim
@@ -31,6 +34,7 @@ from .loss import loss_and_slope
 from .parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from .render import backward, render
 from .start import extent_of, start
+from .through import through
 
 MEASURE_EVERY = 500  # iterations
 SAVE_EVERY = 500
@@ -44,7 +48,11 @@ _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
 
 @dataclass(frozen=True)
 class Options:
-    """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own."""
+    """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own.
+
+    tune: the last third of a fit, of a scene that is there: none of its Gaussians is split or removed. through: name of the configuration whose masks the
+    pictures are drawn with; None: all pixels are visited.
+    """
 
     iterations: int = 4000
     gaussians: int = 100_000
@@ -52,15 +60,19 @@ class Options:
     seed: int = 1
     background: tuple[float, float, float] = BLACK
     exposure: bool = False
+    tune: bool = False
+    through: str | None = None
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Mean over the test photographs. psnr in dB; compensated: after an affine colour fit of each picture to its photograph."""
+    """Mean over the test photographs. psnr in dB; compensated: after an affine colour fit of each picture to its photograph. machine: psnr of the picture
+    that the configuration `Options.through` draws, bit for bit; NaN without one."""
 
     psnr: float
     ssim: float
     compensated: float
+    machine: float
 
 
 def affine_fit(image: np.ndarray, photo: np.ndarray) -> np.ndarray:
@@ -79,9 +91,11 @@ class Trainer:
     def __init__(self, dataset: Dataset, options: Options, parameters: Parameters | None = None) -> None:
         """parameters: to begin with; None: `start` makes them."""
         self.dataset, self.options = dataset, options
+        self.machine = None if options.through is None else through(options.through)
         self.rng = np.random.default_rng(options.seed)
         self.parameters = start(dataset, options.gaussians, options.degree, self.rng) if parameters is None else parameters
         self.first = len(self.parameters)
+        self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes()).hexdigest()
         self.moments = Adam.of(self.parameters.values)
         self.exposures = np.tile(np.eye(3, 4, dtype=np.float32).ravel(), (len(dataset.fitted), 1))
         self.exposure_moments = Adam.of(self.exposures)
@@ -97,6 +111,8 @@ class Trainer:
     def rates(self) -> np.ndarray:
         """float32 (P,): learning rates of this iteration."""
         done = self.iteration / self.options.iterations
+        if self.options.tune:
+            done = (2.0 + done) / 3.0
         falling = _LAST_RATE ** max(0.0, 3.0 * done - 2.0)
         rates = np.empty(self.parameters.values.shape[1])
         first, last = _MEAN_RATES
@@ -109,6 +125,8 @@ class Trainer:
     @property
     def degree(self) -> int:
         """SH degree that is trained now."""
+        if self.options.tune:
+            return self.parameters.degree
         return min(self.options.degree, self.iteration // max(1, min(_DEGREE_EVERY, self.options.iterations // 8)))
 
     def step(self) -> float:
@@ -117,7 +135,7 @@ class Trainer:
             self.order = self.rng.permutation(len(self._photos))
         view, self.order = int(self.order[0]), self.order[1:]
         camera, photo = self.dataset.fitted[view].camera, self._photos[view]
-        frame = render(self.parameters, camera, self.options.background)
+        frame = render(self.parameters, camera, self.options.background, self.machine)
         if self.options.exposure:
             change = self.exposures[view].reshape(3, 4)
             loss, slope = loss_and_slope(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
@@ -155,7 +173,7 @@ class Trainer:
         """Clone, split and remove, from a twentieth to the half of the iterations."""
         total = self.options.iterations
         begin, end = total // 20, total // 2
-        if self.iteration % density.EVERY or not begin <= self.iteration <= end:
+        if self.options.tune or self.iteration % density.EVERY or not begin <= self.iteration <= end:
             return
         good = self.parameters.finite()  # what no view shows is found here
         if not good.all():
@@ -190,7 +208,7 @@ class Trainer:
         """Mean PSNR of the test photographs in dB, pictures of `render`; with exposure after an affine fit."""
         found = []
         for shot, photo in zip(self.dataset.tests, self._test_photos):
-            image = render(self.parameters, shot.camera, self.options.background).image
+            image = render(self.parameters, shot.camera, self.options.background, self.machine).image
             found.append(psnr(affine_fit(image, photo) if self.options.exposure else image, photo))
         return float(np.mean(found))
 
@@ -200,7 +218,10 @@ class Trainer:
         for shot, photo in zip(self.dataset.tests, self._test_photos):
             image = render_reference(project(scene, shot.camera), shot.camera, self.options.background)
             same = ssim(image, photo) if min(photo.shape[:2]) >= 11 else float("nan")
-            rows.append((psnr(image, photo), same, psnr(affine_fit(image, photo), photo)))
+            drawn = float("nan")
+            if self.machine is not None:
+                drawn = psnr(run(self.machine, View(shot.camera, scene, background=self.options.background)).image, photo)
+            rows.append((psnr(image, photo), same, psnr(affine_fit(image, photo), photo), drawn))
         return Quality(*map(float, np.mean(rows, axis=0)))
 
     # -- state ------------------------------------------------------------------------------------------------------------------------
@@ -208,6 +229,7 @@ class Trainer:
     def _identity(self) -> dict[str, Any]:
         """What a checkpoint must agree on."""
         return asdict(self.options) | {
+            "scene": self._began,
             "background": list(self.options.background),
             "photographs": [[str(s.camera.img_name), s.camera.width, s.camera.height] for s in (*self.dataset.fitted, *self.dataset.tests)],
         }
@@ -234,8 +256,8 @@ class Trainer:
             theirs, ours = numbers["identity"], json.loads(json.dumps(self._identity()))
             for key in ours:
                 if theirs[key] != ours[key]:
-                    said = "" if key == "photographs" else f" {theirs[key]}, not {ours[key]}"
-                    raise FlickerError(f"{path}: is of a fit with other {key}{said}" if key == "photographs" else f"{path}: is of a fit with {key}{said}")
+                    said = f"another {key}" if key == "scene" else f"other {key}" if key == "photographs" else f"{key} {theirs[key]}, not {ours[key]}"
+                    raise FlickerError(f"{path}: is of a fit with {said}")
             self.parameters = Parameters(arrays["values"])
             self.moments = Adam(arrays["m"], arrays["v"], numbers["steps"][0])
             self.exposures = arrays["exposures"]
