@@ -36,8 +36,10 @@ def view(
         from ..scene.camera import find_cameras
         from ..scene.demo import demo_cameras
         from ..view.server import Viewer, port_free
-    if port:
-        port_free(host, port)  # before the scene is loaded
+    for option, given in (("cameras", cameras), ("up", up)):
+        if scene == DEMO and given is not None:
+            raise FlickerError(f"--{option}: not for the demo scene, which has its own cameras")
+    port_free(host, port)  # before the scene is loaded
     with steps.step("loading the scene"):
         loaded = load_view(scene, number, wanted, cameras, up)
     found = demo_cameras() if scene == DEMO else find_cameras(loaded.scene, cameras, up)

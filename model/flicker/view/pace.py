@@ -12,14 +12,14 @@ COARSEST = 8
 class Pace:
     """A coarse frame of divisor d has 1/d of the width and of the height, and 1/d of the Gaussians, the largest ones.
 
-    rest: seconds without motion after which the full frame is due. budget: seconds that a moving frame may take; the divisor follows it.
+    rest: seconds without motion, while no frame is made, after which the full frame is due: kernels that run keep the news from coming in. budget: seconds that a moving frame may take; the divisor follows it.
     wanted, shown: anything that can be compared. shown_divisor: of what is shown, 1: full.
     """
 
     rest: float = 0.2
     budget: float = 0.35
     divisor: int = 2
-    changed: float = -math.inf
+    changed: float = -math.inf  # last motion, or the end of the moving frame that followed
     wanted: object = None
     shown: object = None
     shown_divisor: int = 0
@@ -39,9 +39,11 @@ class Pace:
             return 1, 0.0
         return (0, self.changed + self.rest - now) if current else (self.divisor, 0.0)
 
-    def made(self, what: object, divisor: int, seconds: float) -> None:
+    def made(self, what: object, divisor: int, seconds: float, now: float) -> None:
         """A frame was made; the next moving one is coarser or finer by what it took."""
         self.shown, self.shown_divisor = what, divisor
+        if self.changed > -math.inf:
+            self.changed = now
         if divisor != self.divisor:
             return
         if seconds > self.budget:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
 import math
 import socket
 import threading
@@ -221,7 +223,7 @@ class Session:
             return self._step(now)
         except FlickerError as error:
             with self.viewer.changed:
-                self.pace.made(self.pace.wanted, 1, 0.0)
+                self.pace.made(self.pace.wanted, 1, 0.0, now)
             self.more, self.status.content = None, f"**{error}**"
             return 0.0
 
@@ -234,10 +236,11 @@ class Session:
             self.status.content = "" if divisor > 1 else "*rendering...*"
             self.frames = [self.viewer.renderer.frame(camera, choice, divisor) for choice in choices]
             self.send(divisor)
+            done = time.monotonic()
             with self.viewer.changed:
-                self.pace.made(wanted, divisor, time.monotonic() - now)
+                self.pace.made(wanted, divisor, done - now, done)
             self.more = self.tell(self.frames) if divisor == 1 else None
-            self.more_at = time.monotonic() + (NUMBERS_AFTER if self.pace.changed > -math.inf else 0.0)
+            self.more_at = done + (NUMBERS_AFTER if self.pace.changed > -math.inf else 0.0)
             return 0.0
         if repaint:
             self.send(1)
@@ -313,11 +316,12 @@ class Viewer:
         self.shots_made = 0
         self._simulation: Simulation | None = None
         self._ended = False
-        if port:
-            port_free(host, port)
-        self.server = viser.ViserServer(host, port, label=f"flicker view {view.name}", verbose=False)
+        port_free(host, port)
+        with contextlib.redirect_stdout(io.StringIO()):  # a banner, which comes before there is something to see
+            self.server = viser.ViserServer(host, port, label=f"flicker view {view.name}", verbose=False)
         self.url = f"http://{host}:{self.server.get_port()}"
-        self.server.gui.configure_theme(control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
+        self.server.gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
+        self.server.gui.main_panel.dock_right()
         self.server.scene.set_up_direction(self.up)
         initial, projected = self.server.initial_camera, self.renderer.view(self.start).projected
         initial.position, initial.look_at, initial.up = self.start.position, target(self.start, projected), upright(self.start, self.up)
@@ -336,9 +340,8 @@ class Viewer:
             self.sessions.pop(client.client_id, None)
 
     def prepare(self) -> None:
-        """Make the first frame and a coarse one, so that the kernels are there when a browser is."""
+        """Make the first frame, so that it is there when a browser is."""
         self.renderer.frame(self.start, Choice())
-        self.renderer.frame(self.start, Choice(), Pace().divisor)
 
     def serve(self) -> None:
         """Make frames until `stop`."""
@@ -362,7 +365,8 @@ class Viewer:
         with self.changed:
             self._ended = True
             self.changed.notify()
-        self.server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
 
     # ---- simulated frames
 
