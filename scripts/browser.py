@@ -19,13 +19,11 @@ def missing() -> str | None:
 
 
 @contextmanager
-def opened(url: str, size: tuple[int, int]) -> Iterator[Any]:
-    """A page of playwright in a window of a size (width, height)."""
+def opened(size: tuple[int, int]) -> Iterator[Any]:
+    """An empty page of playwright in a window of a size (width, height)."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         try:
-            page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-            page.goto(url)
-            yield page
+            yield browser.new_page(viewport={"width": size[0], "height": size[1]})
         finally:
             browser.close()

@@ -81,7 +81,7 @@ def rested(viewer: Viewer) -> Session:
     """The browser's session, once it shows all there is."""
     until(lambda: viewer.sessions)
     session = next(iter(viewer.sessions.values()))
-    until(lambda: session.frames and session.more is None and not session.tasks and session.pace.due(time.monotonic())[0] == 0)
+    until(lambda: session.pace.shown_divisor == 1 and session.more is None and not session.tasks and session.pace.due(time.monotonic())[0] == 0)
     return session
 
 
@@ -107,8 +107,9 @@ def tables(say: Callable[[str], None]) -> dict[str, str]:
     process.join()
     rows = []
     say("loading")
-    with served(scene) as (viewer, loaded), browser.opened(viewer.url, WINDOW) as page:
+    with browser.opened(WINDOW) as page, served(scene) as (viewer, loaded):
         say("first picture")
+        page.goto(viewer.url)
         until(lambda: any(session.sent for session in viewer.sessions.values()))
         session = next(iter(viewer.sessions.values()))
         rows.append(["first picture, seconds after the scene was loaded", f"{session.sent[0][0] - loaded:.1f}"])
@@ -130,18 +131,17 @@ def tables(say: Callable[[str], None]) -> dict[str, str]:
 
 
 def draw(path: Path = PICTURE) -> str:
-    """A picture of the viewer with the demo scene: lanes beside channels, with the Gaussians that are visited."""
-    with served(DEMO) as (viewer, _), browser.opened(viewer.url, WINDOW) as page:
+    """A picture of the viewer with the demo scene: lanes beside channels, these with the Gaussians that are visited."""
+    with browser.opened((WINDOW[0], 960)) as page, served(DEMO) as (viewer, _):
+        page.goto(viewer.url)
         session = rested(viewer)
-        for controls in (session.a, session.b):
-            controls.overlay.value = "visited"
-        session.b.stage.value = "channels"
+        session.b.overlay.value, session.b.stage.value = "visited", "channels"
         session.comparing.value = True
         session.b.show()
         session.compare()
         until(lambda: len(session.frames) == 2 and session.frames[1].overlay is not None)
         rested(viewer)
-        for note in page.get_by_role("button", name="Close").all():
+        for note in page.locator(".mantine-Notification-closeButton").all():  # on drawing without a GPU
             note.click()
         time.sleep(2.0)  # the browser draws
         page.screenshot(path=path)

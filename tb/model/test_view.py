@@ -18,6 +18,7 @@ import browser
 import numpy as np
 import pytest
 from flicker_tb.command import flicker
+from flicker_tb.runner import seed
 from PIL import Image
 
 from flicker.errors import FlickerError
@@ -25,9 +26,8 @@ from flicker.front.lists import subtile_lists
 from flicker.front.view import View
 from flicker.params import CHANNELS, CORES, FAITHFUL, RECOMMENDED, CatMode, Form, RenderConfig
 from flicker.pipeline import Engine, render_view
-from flicker.scene import demo
 from flicker.scene.camera import Camera, load_cameras, orbit_camera
-from flicker.scene.demo import demo_cameras
+from flicker.scene.files import Scene, save_ply
 from flicker.scene.image import save_png
 from flicker.scene.metrics import flip
 from flicker.view import server
@@ -43,8 +43,18 @@ CONFIGS = (RECOMMENDED, RECOMMENDED.with_(lanes=128), RenderConfig(), FAITHFUL, 
 
 @pytest.fixture(scope="module")
 def view() -> View:
-    """The demo scene's largest Gaussians, seen small."""
-    return View(demo_cameras()[0].resized(*SIZE), largest(demo.generate(), 16), name="demo")
+    """A cloud of Gaussians that fills the picture."""
+    rng, n = np.random.default_rng(seed()), 1500
+    scene = Scene(
+        means=rng.uniform(-1.0, 1.0, (n, 3)), scales=rng.uniform(0.02, 0.2, (n, 3)), quats=rng.normal(size=(n, 4)), opacities=rng.uniform(0.05, 1.0, n),
+        sh=rng.normal(scale=0.8, size=(n, 4, 3)),
+    )
+    return View(orbit_camera(scene, 0, width=SIZE[0], height=SIZE[1]), scene, name="cloud")
+
+
+@pytest.fixture(scope="module")
+def cameras(view) -> list[Camera]:
+    return [view.camera, *(orbit_camera(view.scene, k) for k in range(1, 8))]
 
 
 @pytest.fixture(scope="module")
@@ -90,14 +100,19 @@ def test_cost_of_gaussians(view, renderer) -> None:
     frame = renderer.frame(view.camera, Choice(overlay="cost"))
     cost = renderer.cost(view.camera)
     seen = cost.views[0].seen
-    assert set(np.unique(seen[seen >= 0])) <= set(np.flatnonzero(cost.peak > 0)) and (seen >= 0).mean() > 0.9
+    assert set(np.unique(seen[seen >= 0])) <= set(np.flatnonzero(cost.peak > 0)) and (seen >= 0).mean() > 0.3
     assert np.array_equal(np.isnan(frame.overlay), seen < 0)
     y, x = np.argwhere(seen >= 0)[len(seen)]
     found, of = renderer.picked(frame, int(x), int(y)), cost.of(seen[y, x])
     assert found["Gaussian"] == f"{of['gaussian']:,}" and found["pixel visits"] == f"{of['visits']:,.0f}" and found["cycles"] == f"{of['cycles']:,.1f}"
     assert frame.overlay[y, x] == pytest.approx(of["cycles"])
-    # The largest weight of a pixel is nobody's in a view of what is seen there alone.
-    assert cost.views[0].peak[seen[y, x]] >= cost.views[0].peak[seen[y, x]] > 0
+    # The largest alpha T by the reference's rules; the chip's records are rounded, so a few pixels differ.
+    pixels, p = np.argwhere(seen >= 0)[::25, ::-1], view.projected
+    dx, dy = np.moveaxis(pixels[:, None, :] - p.mean, -1, 0)
+    alpha = np.minimum(0.99, p.opacity * np.exp(-(0.5 * (p.conic[:, 0] * dx**2 + p.conic[:, 2] * dy**2) + p.conic[:, 1] * dx * dy)))
+    alpha[alpha < 1 / 255] = 0.0
+    before = np.cumprod(np.concatenate([np.ones((len(pixels), 1)), 1.0 - alpha[:, :-1]], axis=1), axis=1)
+    assert (p.index[(alpha * before).argmax(axis=1)] == seen[pixels[:, 1], pixels[:, 0]]).mean() > 0.95
 
 
 def test_tiles_at_the_edge() -> None:
@@ -130,9 +145,9 @@ def test_numbers(view, renderer) -> None:
     assert not missing.image.any() and "no frame of the chip yet" in list(renderer.numbers(missing))[-1]["engine"]
 
 
-def test_simulated_frames(view, renderer) -> None:
+def test_simulated_frames(view, renderer, cameras) -> None:
     """The last one of the RTL is shown from where it was simulated, with the model's maps of its own configuration."""
-    camera = demo_cameras()[1].resized(96, 64)
+    camera = cameras[1].resized(96, 64)
     image = render_view(renderer.view(camera), config=FAITHFUL).image
     stats = {"visible": 5, "pixel_pairs": 7, "cycles": 1000}
     renderer.shots[Engine.RTL] = Shot(Engine.RTL, camera, FAITHFUL, image, stats)
@@ -235,14 +250,14 @@ def test_pace_follows_the_budget() -> None:
 # ---- files and refusals
 
 
-def test_stills(view, tmp_path) -> None:
+def test_stills(view, cameras, tmp_path) -> None:
     """Cameras are added, and read as any others; a file that is none is named and kept."""
     folder = tmp_path / "new" / "folder"
     for k in range(2):
-        still, number = save(folder, Image.new("RGB", SIZE), demo_cameras()[k].resized(*SIZE))
+        still, number = save(folder, Image.new("RGB", SIZE), cameras[k].resized(*SIZE))
         assert number == k and Image.open(still).size == SIZE
     stored = load_cameras(folder / "cameras.json")
-    assert [c.name for c in stored] == ["view_000.png", "view_001.png"] and close(stored[1], demo_cameras()[1].resized(*SIZE))
+    assert [c.name for c in stored] == ["view_000.png", "view_001.png"] and close(stored[1], cameras[1].resized(*SIZE))
     (folder / "cameras.json").write_text("{")
     with pytest.raises(FlickerError, match="cameras.json: not JSON"):
         save(folder, Image.new("RGB", SIZE), view.camera)
@@ -261,7 +276,7 @@ def test_boxed() -> None:
         assert out.getpixel(corner) == (255, 255, 255) and np.asarray(out).sum() == 3 * 255 * 160 * 96
 
 
-def test_refusals(tmp_path, monkeypatch) -> None:
+def test_refusals(view, tmp_path, monkeypatch) -> None:
     """One line that names the option or the file, and exit code 2."""
     monkeypatch.setattr(server.Viewer, "serve", lambda _: pytest.fail("it serves"))
     with socket.socket() as taken:
@@ -270,10 +285,12 @@ def test_refusals(tmp_path, monkeypatch) -> None:
         port = taken.getsockname()[1]
         (tmp_path / "file").write_text("")
         (tmp_path / "bad.ply").write_text("not a scene")
+        scene = tmp_path / "cloud.ply"
+        save_ply(view.scene, scene)
         for arguments, said in (
             (("demo", "--port", port), f"--port: {port} is in use"), (("demo", "--port", 70000), "--port"),
-            (("demo", "--size", "0x10", "--port", 0), "width"), (("demo", "--size", "90000x1"), "width"), (("demo", "--size", "big"), "--size"),
-            (("demo", "--size", "9000x9000"), "--size"), (("demo", "--view", 99, "--port", 0), "view 99"), (("demo", "--dir", tmp_path / "file"), "--dir"),
+            ((scene, "--size", "0x10", "--port", 0), "width"), ((scene, "--size", "90000x1", "--port", 0), "width"), (("demo", "--size", "big"), "--size"),
+            (("demo", "--size", "9000x9000"), "--size"), ((scene, "--view", 99, "--port", 0), "view 99"), (("demo", "--dir", tmp_path / "file"), "--dir"),
             ((tmp_path / "none.ply", "--port", 0), "none.ply"), ((tmp_path / "bad.ply", "--port", 0), "bad.ply"),
             (("demo", "--cameras", tmp_path / "none.json"), "--cameras"), (("demo", "--up", "z"), "--up"),
             (("demo", "--port", 0, "--host", "nowhere.invalid"), "--host"),
@@ -296,7 +313,7 @@ class Page:
     def pixels(self) -> np.ndarray:
         """uint8 (H, W, 3): what is to the left of the controls."""
         shot = np.asarray(Image.open(io.BytesIO(self.page.screenshot(animations="allow"))).convert("RGB"))
-        return shot[200:-60, : shot.shape[1] - 400]
+        return shot[:, : shot.shape[1] - 400]
 
     def until(self, true, what: str, seconds: float = 20.0):
         """What `true` gives, when it gives something."""
@@ -337,8 +354,8 @@ class Page:
 
 
 @pytest.fixture(scope="module")
-def viewer(view, tmp_path_factory):
-    viewer = server.Viewer(view, demo_cameras(), tmp_path_factory.mktemp("stills"), port=0)
+def viewer(view, cameras, tmp_path_factory):
+    viewer = server.Viewer(view, cameras, tmp_path_factory.mktemp("stills"), port=0)
     viewer.prepare()
     thread = threading.Thread(target=viewer.serve)
     thread.start()
@@ -350,12 +367,17 @@ def viewer(view, tmp_path_factory):
 @pytest.mark.skipif(browser.CHROMIUM is None, reason=str(browser.missing()))
 def test_browser(view, viewer, monkeypatch) -> None:
     """A picture comes; every control changes picture and numbers; the mouse orbits; a click names a Gaussian; the comparison; stills; a simulated frame."""
-    with browser.opened(viewer.url, (900, 620)) as page:
+    with browser.opened((900, 460)) as page:
+        page.goto(viewer.url)
         interact(Page(page), view, viewer, monkeypatch)
 
 
 def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None:
-    page.until(lambda: page.pixels().max() > 60, "a picture")
+    page.until(lambda: viewer.sessions, "a session")
+    note = page.page.locator(".mantine-Notification-closeButton")  # on drawing without a GPU
+    if note.count():
+        note.first.click()
+    page.until(lambda: page.pixels()[200:260].max() > 60, "a picture")
     cycles = page.number("cycles (model)")
     lanes = page.settled()
     session = next(iter(viewer.sessions.values()))
@@ -382,7 +404,7 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     assert session.frames[0].overlay is not None and session.frames[0].choice.overlay == "cost"
 
     # What is under the pointer.
-    page.page.mouse.click(250, 330)
+    page.page.mouse.click(250, 230)
     page.until(lambda: "blended weight" in page.page.inner_text("body"), "the Gaussian under the pointer")
     page.choose("overlay", "picture")
     page.changed(shown, "the picture again")
@@ -393,6 +415,7 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     page.choose("stage", "channels", 1)
     page.until(lambda: [n.strip() for n in page.numbers().get("cycles (model)", [])] == [cycles, channels], "the cycles of both")
     half = page.settled()
+    page.page.get_by_role("slider").first.scroll_into_view_if_needed()
     thumb = page.page.get_by_role("slider").first.bounding_box()
     x, y = thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2
     page.page.mouse.move(x, y)
@@ -407,10 +430,10 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     page.page.get_by_label("compare", exact=True).uncheck()
     page.until(lambda: len(session.frames) == 1 and session.more is None, "one picture again")
     before, sent = page.settled(), len(session.sent)
-    page.page.mouse.move(250, 330)
+    page.page.mouse.move(250, 230)
     page.page.mouse.down()
     for k in range(12):
-        page.page.mouse.move(250 + 8 * k, 330)
+        page.page.mouse.move(250 + 8 * k, 230)
         time.sleep(0.03)
     page.page.mouse.up()
     page.changed(before, "the orbit")
@@ -443,6 +466,6 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     page.page.get_by_role("button", name="chip", exact=True).click()
     page.choose("engine", "chip, last frame")
     assert page.number("cycles") == "1,234"
-    page.until(lambda: (np.abs(page.pixels()[100:200, 150:350].astype(int) - [255, 0, 255]).max() < 40), "the simulated frame")
+    page.until(lambda: (np.abs(page.pixels()[180:280, 150:350].astype(int) - [255, 0, 255]).max() < 40), "the simulated frame")
     page.choose("engine", "RTL, last frame")
     page.until(lambda: "no frame of the RTL yet" in page.page.inner_text("body"), "no frame of the RTL")

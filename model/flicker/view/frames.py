@@ -42,6 +42,7 @@ from .overlays import (
 )
 
 KEPT_VIEWS = 2  # full ones: of the camera and of a simulated frame, or of two such
+OPACITY = 0.75  # of maps
 SIMULATED = {Engine.RTL: "RTL", Engine.CHIP: "chip"}
 
 
@@ -261,7 +262,7 @@ def described(config: RenderConfig) -> str:
     return f"channels, {config.cat.name.lower()}, {config.precision.name.lower()}, {config.form.name.lower()}"
 
 
-def composed(frames: Sequence[Frame], size: tuple[int, int], split: float = 0.5, opacity: float = 0.85) -> Image.Image:
+def composed(frames: Sequence[Frame], size: tuple[int, int], split: float = 0.5, opacity: float = OPACITY) -> Image.Image:
     """One frame, or two beside each other, with maps and legends, at a size (width, height). Equal maps have one scale. split: where the second begins."""
     pictures = []
     for k, frame in enumerate(frames):

@@ -12,7 +12,8 @@ COARSEST = 8
 class Pace:
     """A coarse frame of divisor d has 1/d of the width and of the height, and 1/d of the Gaussians, the largest ones.
 
-    rest: seconds without motion, while no frame is made, after which the full frame is due: kernels that run keep the news from coming in. budget: seconds that a moving frame may take; the divisor follows it.
+    rest: seconds without motion, while no frame is made, after which the full frame is due: kernels that run keep the news from coming in.
+    budget: seconds that a moving frame may take; the divisor follows it.
     wanted, shown: anything that can be compared. shown_divisor: of what is shown, 1: full.
     """
 

@@ -24,7 +24,7 @@ from ..front.view import View
 from ..params import LANE_COUNTS, RECOMMENDED, CatMode, Form, Precision, RenderConfig
 from ..pipeline import Engine
 from ..scene.camera import Camera
-from .frames import SIMULATED, Choice, Frame, Renderer, camera_key, composed
+from .frames import OPACITY, SIMULATED, Choice, Frame, Renderer, camera_key, composed
 from .overlays import OVERLAYS
 from .pace import Pace
 from .pose import Pose, close, common_up, target, upright
@@ -127,7 +127,7 @@ class Session:
         self.b = Controls(gui, "picture on the right", self.changed)
         self.b.folder.visible = False
         self.split = gui.add_slider("slider", 0.0, 1.0, 0.01, 0.5, visible=False)
-        self.opacity = gui.add_slider("overlay's opacity", 0.0, 1.0, 0.05, 0.85)
+        self.opacity = gui.add_slider("overlay's opacity", 0.0, 1.0, 0.05, OPACITY)
         self.status = gui.add_markdown("")
         self.table = gui.add_markdown("")
         self.picked = gui.add_markdown("*Click on the picture for the Gaussian there.*")
