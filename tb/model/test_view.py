@@ -324,11 +324,11 @@ class Page:
         return found
 
     def changed(self, before: np.ndarray, what: str) -> np.ndarray:
-        """The picture, once it is another and stays so."""
-        self.until(lambda: not np.array_equal(self.pixels(), before), what)
-        return self.settled()
+        """The picture, once it is another."""
+        return self.until(lambda: None if np.array_equal(found := self.pixels(), before) else (found,), what)[0]
 
     def settled(self) -> np.ndarray:
+        """The picture, once it stays."""
         def twice():
             first = self.pixels()
             time.sleep(0.4)
@@ -422,7 +422,8 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     page.page.mouse.down()
     page.page.mouse.move(x + 30, y, steps=3)
     page.page.mouse.up()
-    moved = page.changed(half, "the slider")
+    page.changed(half, "the slider")
+    moved = page.settled()
     third = half.shape[1] // 3
     assert session.split.value > 0.55 and np.abs(half[:, :third].astype(int) - moved[:, :third]).max() < 20
 

@@ -135,6 +135,7 @@ class Session:
             self.number = gui.add_number("view", viewer.number, min=0, max=len(viewer.cameras) - 1, step=1)
             go = gui.add_button("go to view")
             still = gui.add_button("save picture and camera")
+            self.saved = gui.add_markdown("")
         with gui.add_folder("simulate this view", expand_by_default=False):
             simulate = {engine: gui.add_button(name) for engine, name in SIMULATED.items()}
             stop = gui.add_button("stop")
@@ -296,7 +297,7 @@ class Session:
 
     def save(self) -> None:
         still, number = save(self.viewer.folder, self.picture(), self.frames[0].camera)
-        self.status.content = f"saved {still}, camera {number} of {self.viewer.folder / 'cameras.json'}"
+        self.saved.content = f"saved {still}, camera {number} of {self.viewer.folder / 'cameras.json'}"
 
 
 class Viewer:
