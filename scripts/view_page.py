@@ -120,10 +120,8 @@ def tables(say: Callable[[str], None]) -> dict[str, str]:
             until(lambda: session.frames[0].choice.config == config)
             rested(viewer)
             sent = dragged(page, session)
-            coarse = sorted({divisor for _, divisor in sent})
-            rows.append([
-                f"golden engine, {stage}: pictures a second while moving", f"{len(sent) / DRAG:.1f}, at 1/{' and 1/'.join(map(str, coarse))}",
-            ])
+            coarsest = max((divisor for _, divisor in sent), default=1)
+            rows.append([f"golden engine, {stage}: pictures a second while moving", f"{len(sent) / DRAG:.1f}, down to 1/{coarsest} of the size"])
             rested(viewer)
             rows.append([f"golden engine, {stage}: full frame at rest, seconds", f"{session.frames[0].seconds:.2f}"])
     about = f"{Path(scene).name}, view 0, {SIZE[0]}x{SIZE[1]}. Processor cores used: {os.cpu_count()}, the browser's drawing included."

@@ -191,7 +191,9 @@ class Renderer:
     def numbers(self, frame: Frame) -> Iterator[dict[str, str]]:
         """Numbers of a frame for people, more of them with every step: what is known at once, quality, work, cycles."""
         camera, config, stats = frame.camera, frame.choice.config, frame.stats
-        found = {"picture": f"{camera.width}x{camera.height}, {frame.seconds:.2f} s" + (f", coarse 1/{frame.coarse}" if frame.coarse > 1 else "")}
+        found = {"picture": f"{camera.width}x{camera.height}" + (f", {frame.seconds:.2f} s" if frame.seconds >= 0.005 else "")}  # else it was there already
+        if frame.coarse > 1:
+            found["coarse"] = f"1/{frame.coarse}"
         if "missing" in stats:
             yield found | {"engine": f"no frame of the {stats['missing']} yet: simulate one"}
             return
