@@ -45,6 +45,7 @@ from doc_parts import (
     stability,
     subnormals,
     synthesis,
+    view,
 )
 from doc_parts.common import Say, scenes_missing
 from rich.console import Console
@@ -113,6 +114,7 @@ PARTS = (
     Part("lane_stage", "the lanes' RTL: cycles and areas", ("cycles", "area"), lane_stage.tables, scenes_missing),
     Part("lists", "layouts of tile lists in DRAM", ("entries", "layouts", "flight"), lists.tables, scenes_missing),
     Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
+    Part("view", "the viewer in a headless browser: its picture, how fast it is", ("",), view.tables, view.missing, before=view.draw),
     Part("exploration", "all configurations of the report on real views, with the chart", ("explored", "halves"), exploration.tables, scenes_missing,
          before=exploration.draw),
 )

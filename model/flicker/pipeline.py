@@ -10,7 +10,7 @@ import numpy as np
 
 from . import params
 from .errors import FlickerError
-from .front.records import SubtileLists, build_lists
+from .front.records import SubtileLists, bin_splats, build_lists
 from .front.view import View
 from .golden.front.blend import blend_records
 from .golden.front.frame import FrontFrame, ListKind, run_front
@@ -286,15 +286,17 @@ def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, op
     is fed as a chip feeds a stage that says when a sub-tile is finished: it leaves its list then, and one with an empty list is not streamed."""
     if engine is Engine.REFERENCE:
         raise FlickerError("stage lanes: not for engine reference, which has no stage")
+    camera = view.camera
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = lane_lists(frame_in, steps)
         more |= simulated
     else:
-        by_splat, more = _float_lists(view, config, steps)
-        with steps.step("writing records"):
-            lists = float_lists(view.projected, by_splat)
-        more["adjusted"] = lists.adjusted
+        with steps.step("projecting"):
+            projected = view.projected
+        with steps.step("building sub-tile lists"):
+            lists = float_lists(projected, bin_splats(projected, camera))
+        more = {"visible": len(projected.depth), "adjusted": lists.adjusted}
     stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
     frame: LaneFrame | RtlFrame
     if engine is Engine.RTL:

@@ -25,7 +25,7 @@ from ..golden.front.frame import FrontFrame, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.setup import MEAN_FRACTION, FrameSetup
 from ..golden.render import stream_order
-from ..params import ALPHA_MIN, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
+from ..params import ALPHA_MIN, CORES, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
 from ..pipeline import packing_of
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -49,13 +49,15 @@ SH_PEAK = np.array([
 
 
 @numba.njit(parallel=True, cache=True)
-def _give(mean, shape, opacity, start, entry, mask, cols, width, height, weight, peak, visits, visited):
-    """Of each entry: weight, largest alpha T, pixels visited in mini-tiles of its mask that are not finished. Of each pixel: how often it is visited."""
+def _give(mean, shape, opacity, start, entry, mask, cols, width, height, weight, peak, visits, visited, seen):
+    """Of each entry: weight, largest alpha T, pixels visited in mini-tiles of its mask that are not finished. Of each pixel: how often it is visited, the entry
+    with the largest alpha T."""
     for s in numba.prange(len(start) - 1):
         left, top = s % cols * SUBTILE, s // cols * SUBTILE
         transmittance = np.ones((SUBTILE, SUBTILE))
         done = np.zeros((SUBTILE, SUBTILE), np.bool_)
         live = np.full(4, 16)
+        most = np.zeros((SUBTILE, SUBTILE))
         for e in range(start[s], start[s + 1]):
             i = entry[e]
             for m in range(4):
@@ -83,7 +85,15 @@ def _give(mean, shape, opacity, start, entry, mask, cols, width, height, weight,
                     if y < height and x < width:
                         weight[e] += alpha * before
                         peak[e] = max(peak[e], alpha * before)
+                        if alpha * before > most[v, u]:
+                            most[v, u] = alpha * before
+                            seen[y, x] = e
                     transmittance[v, u] = after
+
+
+def stage_cycles(visits: np.ndarray, entries: np.ndarray) -> np.ndarray:
+    """Cycles of the rendering stage for so many visits and sub-tile entries: what the VRUs take, and a core takes an entry a cycle."""
+    return visits / VRUS + entries / CORES
 
 
 @dataclass(eq=False)
@@ -92,7 +102,8 @@ class ViewCost:
 
     Of each Gaussian of the scene, in its file's order: entries, tiles: int64 (N,), entries of its 8x8 sub-tiles and of 16x16 tiles; visits: int64 (N,), pixels
     visited for it; weight, peak: float64 (N,), sum over pixels and largest of alpha T; fetched, recorded: bool (N,), its geometry was read, it got a record.
-    visited: int32 (H, W), visits of each pixel. cluster_fetched: bool (clusters,).
+    visited: int32 (H, W), visits of each pixel. seen: int64 (H, W), the Gaussian with the largest alpha T at each pixel, -1: none. cluster_fetched: bool
+    (clusters,).
     """
 
     camera: Camera
@@ -106,6 +117,7 @@ class ViewCost:
     fetched: np.ndarray
     recorded: np.ndarray
     visited: np.ndarray
+    seen: np.ndarray
     cluster_fetched: np.ndarray
 
     @property
@@ -207,19 +219,23 @@ class SceneCost:
         found.append(Finding("wide clusters", what, int((packed_ & wide[cluster]).sum()), bytes_ / len(self.views), 0.0, 0.0))
         return [finding for finding in found if finding.gaussians]
 
+    @cached_property
+    def cycles(self) -> np.ndarray:
+        """float64 (N,): cycles of the rendering stage that each Gaussian takes in a frame, mean over the views."""
+        return stage_cycles(self._sum("visits"), self._sum("entries")) / len(self.views)
+
+    def of(self, i: int) -> dict[str, Any]:
+        """What Gaussian i costs and gives in a frame, mean over the views, as plain numbers."""
+        entries, visits, weight = (float(np.mean([getattr(view, name)[i] for view in self.views])) for name in ("entries", "visits", "weight"))
+        return {
+            "gaussian": int(i), "cycles": float(self.cycles[i]), "entries": entries, "visits": visits, "weight": weight, "peak": float(self.peak[i]),
+            "opacity": float(self.scene.opacities[i]), "scale": float(np.max(self.scene.scales[i])),
+        }
+
     def dearest(self, count: int = 10) -> list[dict[str, Any]]:
         """Gaussians that cost most for what they give: visits and entries, in cycles of a frame, over blended weight in pixels; mean over the views."""
-        n = len(self.views)
-        visits, entries, weight = self._sum("visits") / n, self._sum("entries") / n, self._sum("weight") / n
-        cycles = visits / VRUS + entries / 4  # what the VRUs take; a core takes an entry a cycle
-        order = np.argsort(-cycles / (weight + 1.0), kind="stable")[:count]
-        return [
-            {
-                "gaussian": int(i), "cycles": float(cycles[i]), "entries": float(entries[i]), "visits": float(visits[i]), "weight": float(weight[i]),
-                "peak": float(self.peak[i]), "opacity": float(self.scene.opacities[i]), "scale": float(np.max(self.scene.scales[i])),
-            }
-            for i in order if cycles[i] > 0
-        ]
+        order = np.argsort(-self.cycles / (self._sum("weight") / len(self.views) + 1.0), kind="stable")[:count]
+        return [self.of(i) for i in order if self.cycles[i] > 0]
 
     def summary(self) -> dict[str, Any]:
         """Everything as plain numbers."""
@@ -238,33 +254,41 @@ class SceneCost:
         }
 
 
-def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig) -> ViewCost:
-    """One view of a packed scene of so many Gaussians in its file."""
+def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None) -> ViewCost:
+    """One view of a packed scene of so many Gaussians in its file. dram: None: without cycles and bytes of the halves, which take most of the time."""
     packed = packing.packed
     front = run_front(packed, camera)
-    image = front_memory(front)
-    first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(front, image, CONFIG, dram)
-    weight, peak, visits, visited = _entries(front)
+    cycles, bytes_ = _halves(front, dram) if dram else ({}, {})
+    weight, peak, visits, visited, entry = _entries(front)
     lists = front.subtile_lists()
     number = packing.order[front.gaussian]  # in the file, of each record
     sums = lambda values: np.bincount(number[lists.entry], values, minlength=gaussians)  # noqa: E731
     largest = np.zeros(gaussians)
     np.maximum.at(largest, number[lists.entry], peak)
+    seen = np.where(entry >= 0, number[lists.entry[entry]], -1) if len(lists.entry) else entry
     fetched, recorded = np.zeros((2, gaussians), np.bool_)
     kept = cull(packed, FrameSetup.of(camera)).keep
     fetched[packing.order[kept[packed.cluster]]] = True
     recorded[number] = True
-    bytes_ = dict(first.bytes)
-    for name, more in second.bytes.items():
-        bytes_[name] = bytes_.get(name, 0) + more
     return ViewCost(
-        camera, {"front end": first.cycles, "rendering": second.cycles}, bytes_, sums(None).astype(np.int64),
-        np.bincount(number[front.entry_splat], minlength=gaussians), sums(visits).astype(np.int64), sums(weight), largest, fetched, recorded, visited, kept,
+        camera, cycles, bytes_, sums(None).astype(np.int64),
+        np.bincount(number[front.entry_splat], minlength=gaussians), sums(visits).astype(np.int64), sums(weight), largest, fetched, recorded, visited, seen,
+        kept,
     )
 
 
-def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _halves(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dict[str, int]]:
+    """Cycles of each half, bytes of both by purpose."""
+    image = front_memory(front)
+    first = preprocessing.estimate(front, image, dram)
+    second = rendering.estimate(front, image, CONFIG, dram)
+    bytes_ = dict(first.bytes)
+    for name, more in second.bytes.items():
+        bytes_[name] = bytes_.get(name, 0) + more
+    return {"front end": first.cycles, "rendering": second.cycles}, bytes_
+
+
+def _entries(front: FrontFrame) -> tuple[np.ndarray, ...]:
     lists = front.subtile_lists()
     whole = whole_pairs(lists)
     order, core_start = stream_order(whole)
@@ -273,22 +297,28 @@ def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     n = len(lists.entry)
     weight, peak, visits = np.zeros(n), np.zeros(n), np.zeros(n, np.int64)
     height, width = front.camera.height, front.camera.width
-    visited = np.zeros((height, width), np.int32)
+    visited, seen = np.zeros((height, width), np.int32), np.full((height, width), -1)
     _give(
         splats.mean / (1 << MEAN_FRACTION), splats.shape, splats.opacity, lists.start, lists.entry, mask.astype(np.int64), lists.cols, width, height,
-        weight, peak, visits, visited,
+        weight, peak, visits, visited, seen,
     )
-    return weight, peak, visits, visited
+    return weight, peak, visits, visited, seen
+
+
+def packed_for_cost(scene: Scene, form: PackedFormat | None = None, steps: Steps | None = None) -> tuple[Scene, Packing]:
+    """A scene in memory (`packing_of`) and its Gaussians in the order that `Packing.order` counts in."""
+    packing = packing_of(scene, form, steps)
+    if scene.rejected and not packing.left_out:  # the file's Gaussians as they are, with those that loading left out
+        with np.errstate(over="ignore"):
+            scene = decode(packing.packed)
+    return scene, packing
 
 
 def scene_cost(scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat | None = None, steps: Steps | None = None) -> SceneCost:
     """Look at a scene through cameras, as `packing_of` puts it into memory. form: None: that of a packed scene, else chunk. FlickerError where it cannot be
     packed."""
     steps = steps or Steps()
-    packing = packing_of(scene, form, steps)
-    if scene.rejected and not packing.left_out:  # the file's Gaussians as they are, with those that loading left out
-        with np.errstate(over="ignore"):
-            scene = decode(packing.packed)
+    scene, packing = packed_for_cost(scene, form, steps)
     views = []
     with steps.bar("views") as report:
         for k, camera in enumerate(cameras):

@@ -112,7 +112,10 @@ def run(configuration: Configuration | str, view: View) -> Result:
 
 
 def rtl_configuration(config: RenderConfig, name: str = "rtl") -> Configuration:
-    """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs."""
+    """The configuration that a build of the RTL is, whatever its depths and numbers of VRUs or lanes."""
+    if config.by_lanes:
+        lanes = log_lanes.LogLanes(config.lanes, config.in_width, config.slots, config.fifo_depth)
+        return Configuration(name, "RTL, lanes", "lanes", log_lanes.LogRows(), lanes)
     if config.mask_generator == "all":
         return Configuration(
             name, "RTL, no test", "baseline", contribution.Untested(config.form),

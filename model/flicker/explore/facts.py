@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
 import numpy as np
 
 from ..front.projection import Projected
 from ..params import CHANNELS, MINITILE, SUBTILE
-from ..perf.render_stage import StageCycles, simulate
+from ..perf.render_stage import simulate
 from ..perf.work import MINITILE_PIXELS, Work
 from ..scene.metrics import flip_map
 from .evaluate import Evaluation, channel_slots
@@ -17,11 +21,56 @@ TILE_SIZES = (4, 8, 16, 32)
 FIFO_DEPTHS = (1, 2, 4, 8, 16, 32, 64, 128)
 
 
-def _pixel_grid(values: np.ndarray, cols: int, rows: int) -> np.ndarray:
-    """(S, 4, 16) per pixel of a mini-tile to a picture (8 rows, 8 cols), border included."""
+def pixel_grid(values: np.ndarray, cols: int, rows: int) -> np.ndarray:
+    """Values of pixel 16 m + i of each sub-tile, (S, 64), to a picture (8 rows, 8 cols), border included."""
     side = SUBTILE // MINITILE
     grid = values.reshape(rows, cols, side, side, MINITILE, MINITILE)
     return grid.transpose(0, 2, 4, 1, 3, 5).reshape(rows * SUBTILE, cols * SUBTILE)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a map is drawn. title: what a value is. colours: a colour map of matplotlib. low: least value, of a linear scale."""
+
+    title: str
+    colours: str
+    logarithmic: bool = False
+    low: float = 0.0
+
+    def limits(self, shown: Sequence[np.ndarray]) -> tuple[float, float]:
+        """Least and largest value that maps have in common, cut at the 99.5 % quantile of the one that needs most; three decades of a logarithmic scale."""
+        top = max((float(np.nanpercentile(m, 99.5)) for m in shown if np.isfinite(m).any()), default=1.0)
+        high = max(top, self.low + 1e-6)
+        return (max(high / 1000, 1.0), max(high, 2.0)) if self.logarithmic else (self.low, high)
+
+
+MAPS = {
+    "gaussians": Scale("Gaussians per pixel", "viridis", True), "cycles": Scale("cycles per sub-tile", "magma", True),
+    "imbalance": Scale("busiest channel / mean", "cividis", low=1.0), "error": Scale("FLIP", "inferno"),
+}
+
+
+@numba.njit(parallel=True, cache=True)
+def _visited(start, visit, pixel_finish, count):
+    for s in numba.prange(len(start) - 1):
+        for n in range(start[s], start[s + 1]):
+            for p in range(count.shape[1]):
+                if (visit[n, p // 16] >> (p % 16)) & 1 and n - start[s] <= pixel_finish[s, p]:
+                    count[s, p] += 1
+
+
+def visited_counts(work: Work) -> np.ndarray:
+    """int64 (S, 64): Gaussians that the VRUs visit at pixel 16 m + i of each sub-tile before it is finished."""
+    count = np.zeros((work.subtiles, CHANNELS * MINITILE_PIXELS), np.int64)
+    _visited(work.start, work.visit_masks(), work.pixel_finish, count)
+    return count
+
+
+def imbalance(slots: np.ndarray) -> np.ndarray:
+    """float64 (S,): pixels of the busiest channel (or lane) over the mean, NaN where nothing is visited. slots: (S, channels), pixels of each."""
+    total = slots.sum(axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.where(total > 0, slots.shape[1] * slots.max(axis=1) / total, np.nan)
 
 
 def heat_maps(evaluation: Evaluation, reference: np.ndarray) -> dict[str, np.ndarray]:
@@ -31,21 +80,12 @@ def heat_maps(evaluation: Evaluation, reference: np.ndarray) -> dict[str, np.nda
     busiest channel over the mean, NaN where nothing is visited. `error`: float32 (H, W), FLIP."""
     work = evaluation.work
     height, width = reference.shape[:2]
-    visited = work.visit_masks() & work.unfinished()
-    count = np.empty((work.subtiles, CHANNELS, MINITILE_PIXELS), np.uint16)
-    for pixel in range(MINITILE_PIXELS):
-        bits = (visited >> np.uint16(pixel)) & 1
-        sums = np.concatenate([np.zeros((1, CHANNELS), np.int64), bits.cumsum(axis=0, dtype=np.int64)])
-        count[:, :, pixel] = np.minimum(sums[work.start[1:]] - sums[work.start[:-1]], 65535)
-    slots = channel_slots(work).astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        imbalance = np.where(slots.sum(axis=1) > 0, CHANNELS * slots.max(axis=1) / slots.sum(axis=1), np.nan)
     maps = {
-        "gaussians": _pixel_grid(count, work.cols, work.rows)[:height, :width],
-        "imbalance": imbalance.reshape(work.rows, work.cols).astype(np.float32),
+        "gaussians": np.minimum(pixel_grid(visited_counts(work), work.cols, work.rows)[:height, :width], 65535).astype(np.uint16),
+        "imbalance": imbalance(channel_slots(work)).reshape(work.rows, work.cols).astype(np.float32),
         "error": flip_map(evaluation.image, reference).astype(np.float32),
     }
-    if isinstance(evaluation.counters, StageCycles) and not isinstance(evaluation.configuration.stage, Lanes):
+    if evaluation.counters is not None and not isinstance(evaluation.configuration.stage, Lanes):
         maps["cycles"] = subtile_cycles(work, evaluation.counters).reshape(work.rows, work.cols).astype(np.float32)
     return maps
 

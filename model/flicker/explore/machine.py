@@ -223,10 +223,11 @@ def run(configuration: Configuration, view: View) -> Result:
     return Result(configuration, assemble(lists, pixels, view.background), work.until_finished() if configuration.stop else work, lists)
 
 
-def subtile_cycles(work: Work, counters: StageCycles) -> np.ndarray:
-    """int64 (S,): cycles between the end of a sub-tile and that of the one before it in the same core."""
+def subtile_cycles(work: Work, counters: Counters) -> np.ndarray:
+    """int64 (S,): cycles between the end of a sub-tile and that of the one before it in the same core; 0 for one that is not streamed."""
     cycles = np.zeros(work.subtiles, np.int64)
     for k in range(CORES):
         mine = work.order[work.core_start[k] : work.core_start[k + 1]]
+        mine = mine[counters.subtile_end[mine] > 0]
         cycles[mine] = np.diff(counters.subtile_end[mine], prepend=0)
     return cycles

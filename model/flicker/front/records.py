@@ -20,6 +20,19 @@ MAX_FP16 = 65504.0
 
 
 @dataclass
+class Bins:
+    """Lists of one frame without records; fields as in `SubtileLists`."""
+
+    width: int
+    height: int
+    start: np.ndarray
+    entry: np.ndarray
+    cols: int
+    rows: int
+    tile_pairs: int
+
+
+@dataclass
 class SubtileLists:
     """Records of one frame.
 
@@ -100,21 +113,27 @@ def local_means(mean, start, entry, cols, absolute, out):
             out[e, 1] = fp16_bits(y)
 
 
+def bin_splats(projected, camera) -> Bins:
+    """Sub-tile lists of the projected splats."""
+    cols = -(-camera.width // SUBTILE)
+    rows = -(-camera.height // SUBTILE)
+    size = camera.width, camera.height
+    start, entry = bin_boxes(pixel_boxes(projected.mean, projected.radii, SUBTILE, cols, rows, *size), cols, rows)
+    tile_pairs = pairs(pixel_boxes(projected.mean, projected.radii, TILE, -(-camera.width // TILE), -(-camera.height // TILE), *size))
+    return Bins(*size, start, entry, cols, rows, tile_pairs)
+
+
 def build_lists(projected, camera, config: RenderConfig) -> SubtileLists:
     """Round the projected splats to records and bin them into sub-tile lists."""
     n = len(projected.depth)
     gauss = np.zeros((n, 9), np.uint16)
     clamped = np.zeros(n, np.int32)
     _round_splats(projected.conic, projected.cov2d, projected.opacity, projected.rgb, config.form == Form.FACTORED, gauss, clamped)
-    cols = -(-camera.width // SUBTILE)
-    rows = -(-camera.height // SUBTILE)
-    size = camera.width, camera.height
-    start, entry = bin_boxes(pixel_boxes(projected.mean, projected.radii, SUBTILE, cols, rows, *size), cols, rows)
-    tile_pairs = pairs(pixel_boxes(projected.mean, projected.radii, TILE, -(-camera.width // TILE), -(-camera.height // TILE), *size))
-    mean = np.empty((len(entry), 2), np.uint16)
-    local_means(projected.mean, start, entry, cols, config.coords == Coords.ABSOLUTE, mean)
+    bins = bin_splats(projected, camera)
+    mean = np.empty((len(bins.entry), 2), np.uint16)
+    local_means(projected.mean, bins.start, bins.entry, bins.cols, config.coords == Coords.ABSOLUTE, mean)
     adjusted = {"value beyond FP16 clamped": int((clamped > 0).sum())} if clamped.any() else {}
     return SubtileLists(
-        camera.width, camera.height, config.form, gauss, np.asarray(projected.spiky, bool), start, entry, mean,
-        cols, rows, tile_pairs, adjusted,
+        bins.width, bins.height, config.form, gauss, np.asarray(projected.spiky, bool), bins.start, bins.entry, mean,
+        bins.cols, bins.rows, bins.tile_pairs, adjusted,
     )

@@ -61,11 +61,13 @@ class LaneWork:
 
 @dataclass
 class LaneCycles:
-    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS)); lanes: of all cores."""
+    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS)); lanes: of all cores; subtile_end: int64 (S,), cycle in which the last pixel
+    of each sub-tile left, 0 where it was not streamed."""
 
     cycles: int
     counters: np.ndarray
     lanes: int
+    subtile_end: np.ndarray
 
     def total(self, name: str) -> int:
         """Sum of a counter over the cores."""
@@ -98,8 +100,8 @@ def pixels_of_lanes(lanes: int) -> np.ndarray:
 
 
 @numba.njit(cache=True)
-def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, count):
-    """One core; returns the cycles it was followed for, and that after its last pixel."""
+def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, count, subtile_end):
+    """One core: fills its counters and the end of each sub-tile; returns the cycles it was followed for, and that after its last pixel."""
     lanes, per_lane = pixel.shape
     n_sub = len(order)
     # Setup and masks: ring of groups, the youngest at `young`; the group at dispatch is `latency` moves old.
@@ -137,6 +139,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
     n_held = 0
     sub_finished = False  # the register finished_o
     pixels_left = 64 * n_sub
+    arrived = np.zeros(n_sub, np.int64)  # pixels of each sub-tile that have left
     last_pixel = np.int64(0)
     t = np.int64(0)
     while pixels_left > 0:  # the last ones are on their way through the output's registers afterwards
@@ -226,6 +229,10 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
             first = (served + 1) % lanes
             pixels_left -= 1
             last_pixel = t
+            k = sub[served] - 1  # the bank holds the sub-tile before the one that is visited
+            arrived[k] += 1
+            if arrived[k] == SUBTILE_PIXELS:
+                subtile_end[order[k]] = t + OUTPUT
         # ---- lanes
         for l in range(lanes):
             taken = bank[l]
@@ -338,10 +345,10 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
 
 
 @numba.njit(parallel=True, cache=True)
-def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters, ends):
+def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters, end, ends):
     for k in numba.prange(CORES):
         own = order[core_start[k] : core_start[k + 1]]
-        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters[k])
+        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters[k], end)
 
 
 def lane_work(lists: RecordLists) -> LaneWork:
@@ -356,13 +363,14 @@ def simulate_lanes(work: LaneWork, config: RenderConfig, *, leave: bool = False,
     lanes = config.lanes // CORES
     order, core_start = stream_order(work, empty)
     counters, ends = np.zeros((CORES, len(LANE_COUNTERS)), np.int64), np.zeros((CORES, 2), np.int64)
+    end = np.zeros(work.cols * work.rows, np.int64)
     _cores(
         order, core_start, work.start, work.mask, work.passes, work.finish, pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES,
-        config.in_width, config.slots, config.fifo_depth, leave, counters, ends,
+        config.in_width, config.slots, config.fifo_depth, leave, counters, end, ends,
     )
     cycles = int(ends[:, 1].max())
     # A core that has ended goes on counting: no input, no entry in any queue.
     counters[:, CYCLES] = cycles
     counters[:, IDLE] += cycles - ends[:, 0]
     counters[:, STARVED] += (cycles - ends[:, 0]) * lanes
-    return LaneCycles(cycles, counters, config.lanes)
+    return LaneCycles(cycles, counters, config.lanes, end)

@@ -23,7 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: 
 
 from ..errors import FlickerError  # noqa: E402
 from ..explore.configurations import CONFIGURATIONS  # noqa: E402
-from ..explore.facts import TILE_SIZES  # noqa: E402
+from ..explore.facts import MAPS, TILE_SIZES  # noqa: E402
 from ..explore.stability.run import Stability  # noqa: E402
 from .claims import (  # noqa: E402
     DENSE,
@@ -367,13 +367,6 @@ def stability_table(result: Stability) -> Figure:
     )
 
 
-MAPS = {
-    "gaussians": ("Gaussians per pixel", "viridis"), "cycles": ("cycles per sub-tile", "magma"), "imbalance": ("busiest channel / mean", "cividis"),
-    "error": ("FLIP", "inferno"),
-}
-LOGARITHMIC = ("gaussians", "cycles")
-
-
 def heat(view: ViewResult) -> Figure | None:
     """Heat maps of one view: a line per configuration, columns with a common scale."""
     names = [n for n in view.rows if n in view.maps]
@@ -382,9 +375,9 @@ def heat(view: ViewResult) -> Figure | None:
     height, width = view.reference.shape[:2]
     figure, axes = plt.subplots(len(names), 4, figsize=(13, (13 / 4 * height / width + 0.45) * len(names)), layout="constrained", squeeze=False)
     rows = []
-    for column, (key, (title, colours)) in enumerate(MAPS.items()):
+    for column, (key, scale) in enumerate(MAPS.items()):
         shown = [view.maps[n][key] for n in names if key in view.maps[n]]
-        top = max((float(np.nanpercentile(m, 99.5)) for m in shown if np.isfinite(m).any()), default=1.0)
+        low, high = scale.limits(shown)
         for a, name in zip(axes[:, column], names):
             a.set_xticks([])
             a.set_yticks([])
@@ -392,13 +385,11 @@ def heat(view: ViewResult) -> Figure | None:
             if values is None:
                 a.text(0.5, 0.5, "cycles are a closed form", ha="center", va="center", transform=a.transAxes)
             else:
-                low = 1.0 if key == "imbalance" else 0.0
-                high = max(top, low + 1e-6)
-                scale = LogNorm(max(high / 1000, 1.0), max(high, 2.0), clip=True) if key in LOGARITHMIC else Normalize(low, high)
-                drawn = a.imshow(values, cmap=colours, norm=scale, interpolation="nearest", aspect="auto")
+                norm = LogNorm(low, high, clip=True) if scale.logarithmic else Normalize(low, high)
+                drawn = a.imshow(values, cmap=scale.colours, norm=norm, interpolation="nearest", aspect="auto")
                 figure.colorbar(drawn, ax=a, shrink=0.8)
                 rows.append([view.target.scene.name, view.target.view, name, key, float(np.nanmean(values)), float(np.nanpercentile(values, 99)), float(np.nanmax(values))])
-            a.set_title(f"{name}: {title}")
+            a.set_title(f"{name}: {scale.title}")
     return Figure(
         f"heat_{view.target.scene.name}_{view.target.view}", f"Heat maps, {view.target.title}", "", "Gaussians that VRUs visit before a pixel is finished; cycles from the end of a sub-tile to the "
         "end of the next in the same core; pixels visited by the busiest channel over the mean of four; FLIP against float64. Common scale per column, cut at the 99.5 % quantile, the first two logarithmic.",

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from ...front.projection import Projected
-from ...front.records import LOG2E, SubtileLists
+from ...front.records import LOG2E, Bins, SubtileLists
 from ...params import Form
 from ..front.colour import COLOUR_FRACTION, COLOUR_LIMIT
 from ..front.frame import OPACITY_LIMIT, FrontFrame
@@ -74,7 +74,7 @@ def _encode(mean, conic, cov, opacity, rgb, spiky, words, flags):
         flags[i, 2] = code == 0
 
 
-def float_lists(projected: Projected, lists: SubtileLists) -> RecordLists:
+def float_lists(projected: Projected, lists: SubtileLists | Bins) -> RecordLists:
     """Records of 16 bytes of the float64 projection, every field rounded once, and any kind of its lists."""
     n = len(projected.depth)
     words, flags = np.zeros((n, 2), np.int64), np.zeros((n, 3), np.bool_)

@@ -1,0 +1,29 @@
+"""Still pictures and the cameras they were taken from, as `flicker render --cameras` reads them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from PIL import Image
+
+from ..errors import FlickerError
+from ..scene.camera import Camera, cameras_text, load_cameras
+
+
+def save(folder: Path, picture: Image.Image, camera: Camera) -> tuple[Path, int]:
+    """Write a still picture and add its camera to the folder's `cameras.json`: (the picture's file, number of the camera)."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / "cameras.json"
+        cameras = load_cameras(path) if path.exists() else []
+        number = len(cameras)
+        still = folder / f"view_{number:03d}.png"
+        picture.save(still)
+        temporary = folder / f".cameras.{os.getpid()}.json"
+        temporary.write_text(cameras_text([*cameras, replace(camera, name=still.name, img_name=None)]))
+        temporary.replace(path)
+    except OSError as error:
+        raise FlickerError(f"{folder}: cannot be written ({error.strerror})") from None
+    return still, number
