@@ -30,7 +30,7 @@ from ..pipeline import packing_of
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..scene.gaussians import Scene
-from ..scene.packed import PackedFormat, decode
+from ..scene.packed import PackedFormat, PackedScene, decode
 from ..scene.packing import Packing
 from . import preprocessing, rendering
 from .constants import CLOCK_HZ
@@ -238,13 +238,22 @@ class SceneCost:
         }
 
 
-def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig) -> ViewCost:
-    """One view of a packed scene of so many Gaussians in its file."""
-    packed = packing.packed
+def frame_cost(packed: PackedScene, camera: Camera, dram: DramConfig) -> tuple[FrontFrame, dict[str, int], dict[str, int]]:
+    """The front end's frame of a view; cycles of each half; bytes by purpose."""
     front = run_front(packed, camera)
     image = front_memory(front)
     first = preprocessing.estimate(front, image, dram)
     second = rendering.estimate(front, image, CONFIG, dram)
+    bytes_ = dict(first.bytes)
+    for name, more in second.bytes.items():
+        bytes_[name] = bytes_.get(name, 0) + more
+    return front, {"front end": first.cycles, "rendering": second.cycles}, bytes_
+
+
+def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig) -> ViewCost:
+    """One view of a packed scene of so many Gaussians in its file."""
+    packed = packing.packed
+    front, cycles, bytes_ = frame_cost(packed, camera, dram)
     weight, peak, visits, visited = _entries(front)
     lists = front.subtile_lists()
     number = packing.order[front.gaussian]  # in the file, of each record
@@ -255,11 +264,8 @@ def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig
     kept = cull(packed, FrameSetup.of(camera)).keep
     fetched[packing.order[kept[packed.cluster]]] = True
     recorded[number] = True
-    bytes_ = dict(first.bytes)
-    for name, more in second.bytes.items():
-        bytes_[name] = bytes_.get(name, 0) + more
     return ViewCost(
-        camera, {"front end": first.cycles, "rendering": second.cycles}, bytes_, sums(None).astype(np.int64),
+        camera, cycles, bytes_, sums(None).astype(np.int64),
         np.bincount(number[front.entry_splat], minlength=gaussians), sums(visits).astype(np.int64), sums(weight), largest, fetched, recorded, visited, kept,
     )
 
