@@ -12,6 +12,9 @@ from ..chip.constants import DRAM_BYTES_PER_SECOND
 from ..chip.dram import DramConfig
 from ..chip.scene_cost import ENTRY_BYTES, VRUS, frame_cost
 from ..errors import FlickerError
+from ..golden.lanes.lists import front_lists
+from ..params import CatMode, RenderConfig
+from ..perf.lanes import lane_work, simulate_lanes
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..scene.gaussians import Scene
@@ -19,6 +22,7 @@ from ..scene.packed import PackedFormat
 from ..scene.packing import pack
 from .score import Scores
 
+LANES = RenderConfig(stage="lanes", cat=CatMode.OFF)
 _RECORD_BYTES = 32  # 16, written and read once
 _GAUSSIAN_BYTES = 12  # geometry in chunks
 
@@ -50,37 +54,49 @@ class Goal:
 
 @dataclass(frozen=True)
 class FrameCost:
-    """Mean over views. cycles: of the slower half. bytes: all of a frame. image_bytes: of the packed scene."""
+    """Mean over views. cycles: of the slower half, with channels. lane_cycles: of the stage of lanes alone, if it was asked for. bytes: all of a frame.
+    picture_bytes: of its pixels. image_bytes: of the packed scene."""
 
     cycles: float
+    lane_cycles: float | None
     bytes: float
+    picture_bytes: float
     image_bytes: int
 
     def of(self, kind: Kind) -> float:
         """In the unit of a goal's value."""
         return self.cycles if kind is Kind.CYCLES else self.bytes / 1e6
 
+    def fixed(self, kind: Kind) -> float:
+        """What no Gaussian has a part in."""
+        return 0.0 if kind is Kind.CYCLES else self.picture_bytes / 1e6
 
-def chip_cost(scene: Scene, cameras: Sequence[Camera], form: PackedFormat, steps: Steps | None = None) -> FrameCost:
-    """A frame of each camera on the chip model, as `flicker cost` counts it, of the scene packed anew."""
+
+def chip_cost(scene: Scene, cameras: Sequence[Camera], form: PackedFormat, steps: Steps | None = None, *, lanes: bool = False) -> FrameCost:
+    """A frame of each camera on the chip model, as `flicker cost` counts it, of the scene packed anew. lanes: simulate the other rendering stage, too."""
     steps = steps or Steps()
     packed = pack(scene, form).packed
-    cycles, moved = [], []
+    cycles, by_lanes, moved, pictures = [], [], [], []
     with steps.bar("frames on the chip model") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            _, halves, bytes_ = frame_cost(packed, camera, DramConfig())
+            front, halves, bytes_ = frame_cost(packed, camera, DramConfig())
             cycles.append(max(halves.values()))
             moved.append(sum(bytes_.values()))
-    return FrameCost(float(np.mean(cycles)), float(np.mean(moved)), len(packed.image()))
+            pictures.append(bytes_["frame"])
+            if lanes:
+                by_lanes.append(simulate_lanes(lane_work(front_lists(front)), LANES, leave=True).cycles)
+    return FrameCost(
+        float(np.mean(cycles)), float(np.mean(by_lanes)) if lanes else None, float(np.mean(moved)), float(np.mean(pictures)), len(packed.image()),
+    )
 
 
 def price(scores: Scores, kind: Kind, scale: float, coefficients: np.ndarray) -> np.ndarray:
     """float64 (N,): roughly what each Gaussian costs in a frame, in bytes or cycles; 1 for a budget of Gaussians or dB.
 
     scale: pixels of a frame of the chip over those of the scores' views, by which tiles and pixels grow. coefficients: int64 (N,), of its SH a channel. The
-    bytes are those of `flicker cost`: geometry and colour, a record written and read, list entries written and read; the cycles are pixels visited over VRUs and
-    the bytes at the memory's peak rate.
+    bytes are those of `flicker cost`: geometry and colour, a record written and read, list entries written and read; the cycles are pixels visited over VRUs
+    and the bytes at the memory's peak rate.
     """
     if kind not in (Kind.CYCLES, Kind.MBYTES):
         return np.ones(len(scores.peak))

@@ -1,7 +1,7 @@
 """Colours by least squares: with geometry and opacities fixed, a picture is linear in the SH coefficients.
 
-A picture over black is sum_i w_i max(0, 1/2 + b(d_i) . x_i): w = alpha T of `fit.raster`, b the harmonics in the direction d_i of Gaussian i, x_i its coefficients.
-The Gauss-Newton step minimises |A delta - r|^2 + ridge |delta|^2 over all views, r being what the full scene's pictures have more, by conjugate
+A picture over black is sum_i w_i max(0, 1/2 + b(d_i) . x_i): w = alpha T of `fit.raster`, b the harmonics in the direction d_i of Gaussian i, x_i its
+coefficients. The Gauss-Newton step minimises |A delta - r|^2 + ridge |delta|^2 over all views, r being what the full scene's pictures have more, by conjugate
 gradients on the normal equations with the diagonal as preconditioner (Hestenes and Stiefel 1952; Saad, "Iterative Methods for Sparse Linear Systems", 2003,
 algorithm 9.1). Colours that are clamped at 0 in a view, and channels of pixels that are saturated in both pictures, have no part in A.
 
@@ -42,8 +42,8 @@ from ..progress import Steps
 from ..scene.camera import Camera
 
 SH_BAND = np.repeat(np.arange(4), (1, 3, 5, 7))  # of each coefficient
-RIDGE = (0.01, 10.0, 10.0, 10.0)  # of each band, in pixels of weight 1: what a coefficient's change costs beside the pictures' error
-ITERATIONS = 15
+RIDGE = (0.1, 30.0, 30.0, 30.0)  # of each band, in pixels of weight 1: what a coefficient's change costs beside the pictures' error
+ITERATIONS = 8
 MEMORY = 3 << 30  # bytes of kept weights at most: more views than that are left out of the fit, evenly
 _PAIR_BYTES = 5
 
@@ -212,9 +212,9 @@ def _gather(slot, sums, rgb):
 class ViewMatrix:
     """A of one view: coefficients float64 (N, K, 3) to a picture float64 (H, W, 3), and its transpose.
 
-    gaussian: int64 (m,), those that the view shows; shown: bool (m, 3), their channels that are not clamped at 0. start: int64 (tiles + 1,); slot: int32 (E,), into
-    gaussian, by entry of the tiles' lists; offset: int64 (E + 1,) into pixel (uint8, place in the 16x16 tile) and weight (float32, alpha T). mask: bool (H, W, 3),
-    channels of pixels that count.
+    gaussian: int64 (m,), those that the view shows; shown: bool (m, 3), their channels that are not clamped at 0. start: int64 (tiles + 1,); slot: int32 (E,),
+    into gaussian, by entry of the tiles' lists; offset: int64 (E + 1,) into pixel (uint8, place in the 16x16 tile) and weight (float32, alpha T). mask: bool
+    (H, W, 3), channels of pixels that count.
     """
 
     values: np.ndarray
@@ -282,7 +282,7 @@ def refit(
     free = np.ones(x0.shape[:2], np.bool_) if coefficients is None else np.arange(x0.shape[1]) < coefficients[:, None]
     right, diagonal = np.zeros_like(x0), np.zeros_like(x0)
     matrices: list[ViewMatrix] = []
-    used = np.arange(len(cameras))
+    used = list(range(len(cameras)))
     before, pairs = 0.0, 0
     with steps.bar("least squares: weights") as report:
         while len(matrices) < len(used):
@@ -296,9 +296,9 @@ def refit(
             pairs += len(matrix.weight)
             if n == 0 and len(used) * len(matrix.weight) * _PAIR_BYTES > MEMORY:
                 most = max(1, MEMORY // max(1, len(matrix.weight) * _PAIR_BYTES))
-                used = used[np.arange(most) * len(used) // most]
+                used = [k * len(used) // most for k in range(most)]
             left = np.where(mask, wanted - image, 0.0)
-            before += float((left**2).sum())
+            before += float(((np.clip(image, 0.0, 1.0) - wanted) ** 2).sum())
             matrix.back(left, right)
             matrix.back(image, diagonal, square=True)
             matrices.append(matrix)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numba
 import numpy as np
@@ -32,9 +33,18 @@ from ..params import ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN
 from ..progress import Steps
 from ..scene.camera import Camera
 
-# Sums of an entry: of alpha T, its largest, squared change of the picture without the Gaussian, pixels.
-WEIGHT, PEAK, CHANGE, PIXELS = range(4)
-COLUMNS = 4
+# Sums of an entry: of alpha T, its largest, squared change of the picture without the Gaussian, pixels, of (alpha T)^2.
+WEIGHT, PEAK, CHANGE, PIXELS, SQUARE = range(5)
+COLUMNS = 5
+
+
+class Score(str, Enum):
+    """What decides which Gaussians stay; fields of `Scores`."""
+
+    CHANGE = "change"
+    WEIGHT = "weight"
+    PEAK = "peak"
+
 
 
 @numba.njit(fastmath=_FAST, cache=True)
@@ -60,7 +70,7 @@ def _score_tile(t, rows, start, entry, tiles_x, image, used, sums):
         half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
         opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-        total, peak, change, pixels = 0.0, 0.0, 0.0, 0.0
+        total, peak, change, pixels, square = 0.0, 0.0, 0.0, 0.0, 0.0
         for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
             dy = np.float64(y) - my
             half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
@@ -93,12 +103,14 @@ def _score_tile(t, rows, start, entry, tiles_x, image, used, sums):
                 d_red, d_green, d_blue = red - rest[y, x, 0] * per, green - rest[y, x, 1] * per, blue - rest[y, x, 2] * per
                 change += weight * weight * (d_red * d_red + d_green * d_green + d_blue * d_blue)
                 total += weight
+                square += weight * weight
                 peak = max(peak, weight)
                 pixels += 1.0
         sums[e, WEIGHT] = total
         sums[e, PEAK] = peak
         sums[e, CHANGE] = change
         sums[e, PIXELS] = pixels
+        sums[e, SQUARE] = square
 
 
 @numba.njit(parallel=True, cache=True)
@@ -118,6 +130,7 @@ def _gather(index, entry, used, sums, total, tiles):
             total[i, PEAK] = max(total[i, PEAK], sums[e, PEAK])
             total[i, CHANGE] += sums[e, CHANGE]
             total[i, PIXELS] += sums[e, PIXELS]
+            total[i, SQUARE] += sums[e, SQUARE]
 
 
 @dataclass(eq=False)
@@ -136,6 +149,9 @@ class Scores:
     tiles: np.ndarray
     frames: np.ndarray
     views: int
+
+    def by(self, score: Score) -> np.ndarray:
+        return getattr(self, score.value)
 
 
 def score_frame(frame: Frame, total: np.ndarray, tiles: np.ndarray, frames: np.ndarray) -> None:

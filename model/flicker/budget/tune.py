@@ -54,13 +54,6 @@ def log_error_slope(image: np.ndarray, wanted: np.ndarray) -> tuple[float, np.nd
     return error, difference * (2.0 / (difference.size * max(error, _LEAST_ERROR)))
 
 
-def coefficient_columns(coefficients: np.ndarray, columns: int) -> np.ndarray:
-    """bool (N, columns): parameters that may be other than 0, where each Gaussian has so many SH coefficients a channel."""
-    used = np.ones((len(coefficients), columns), np.bool_)
-    used[:, SH:] = np.arange((columns - SH) // 3).repeat(3) < coefficients[:, None]
-    return used
-
-
 def tune_step(
     parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray,
 ) -> tuple[float, np.ndarray]:

@@ -1,9 +1,8 @@
-"""Cameras that a budget is fitted to, cameras that are held out, and the pictures of the full scene in both."""
+"""Cameras that a budget is fitted to, and cameras that are held out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,23 +13,15 @@ from ..front.reference import render_reference
 from ..progress import Steps
 from ..scene.camera import DEFAULT_UP, Camera, load_cameras, orbit_camera
 from ..scene.gaussians import Scene
+from ..scene.metrics import psnr
 
 VIEWS = 48  # of an orbit: 40 to fit, 8 held out
 HOLD_EVERY = 6  # cameras 0, 6, 12, ... are held out
 LEAST_VIEWS = 3
+SIZE = (480, 270)  # of an orbit's pictures
 ELEVATIONS = (5.0, 45.0)  # degrees, of the orbits
 NEARER = (1.0, 2.2)  # times nearer than the orbit of `flicker render`, which shows the scene whole
 _G = 1.2207440846057596  # x^4 = x + 1
-
-
-@dataclass(eq=False)
-class Views:
-    """Cameras and float32 pictures (H, W, 3) of the full scene, not clamped. fitted: what is fitted to. held: what decides, and is never fitted to."""
-
-    fitted: list[Camera]
-    held: list[Camera]
-    fitted_pictures: list[np.ndarray]
-    held_pictures: list[np.ndarray]
 
 
 def orbits(scene: Scene, count: int, size: tuple[int, int], up: str | None, seed: int) -> list[Camera]:
@@ -53,7 +44,7 @@ def cameras_of(
 ) -> tuple[list[Camera], list[Camera]]:
     """Cameras to fit and cameras held out. path: a cameras.json, all of which are taken; None: `orbits`, `count` of them.
 
-    size: (width, height) of the pictures; focal lengths scale with it. None: that of the cameras of the file, 480x270 of an orbit. FlickerError names the
+    size: (width, height) of the pictures; focal lengths scale with it. None: that of the cameras of the file, `SIZE` of an orbit. FlickerError names the
     file and the field.
     """
     if path is not None:
@@ -65,22 +56,16 @@ def cameras_of(
         if len(cameras) < LEAST_VIEWS:
             raise FlickerError(f"{path}: {len(cameras)} cameras: at least {LEAST_VIEWS} are needed, of which some are held out")
     else:
-        cameras = orbits(scene, count, size or (480, 270), up, seed)
+        cameras = orbits(scene, count, size or SIZE, up, seed)
     held = cameras[::HOLD_EVERY]
     return [camera for k, camera in enumerate(cameras) if k % HOLD_EVERY], held
 
 
-def pictures(scene: Scene, cameras: Sequence[Camera], steps: Steps | None = None, what: str = "views") -> list[np.ndarray]:
-    """float32 (H, W, 3) of each camera over black, by the reference renderer."""
+def reference_psnr(full: Scene, small: Scene, cameras: Sequence[Camera], steps: Steps | None = None) -> list[float]:
+    """dB of a scene against the full one, over black, both drawn by the reference renderer; of each camera."""
     found = []
-    with (steps or Steps()).bar(what) as report:
+    with (steps or Steps()).bar("reference pictures") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            found.append(render_reference(project(scene, camera), camera).astype(np.float32))
+            found.append(psnr(*(render_reference(project(scene, camera), camera) for scene in (small, full))))
     return found
-
-
-def views_of(scene: Scene, fitted: list[Camera], held: list[Camera], steps: Steps | None = None) -> Views:
-    """Cameras with their pictures of the full scene."""
-    found = pictures(scene, [*fitted, *held], steps, "pictures of the full scene")
-    return Views(fitted, held, found[: len(fitted)], found[len(fitted) :])
