@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
 import time
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+from flicker.budget.curve import Curve
 from flicker.budget.goal import Goal, Kind
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.views import cameras_of, reference_psnr
 from flicker.errors import FlickerError
 from flicker.markdown import table
+from flicker.report.figures import budget_curves
 from flicker.scene import load_scene
 from flicker.scene.real import REAL_VIEWS
-from flicker.toolchain import BUILD
+from flicker.toolchain import BUILD, ROOT
 
 from .common import Say, folder_of_scenes
 
 FOLDER = BUILD / "budget"
+IMAGES = ROOT / "docs" / "images"
 JOBS = (
     ("guitar", Options(Goal(Kind.KEEP, 0.25), rounds=3, steps=100, last=400)),
     ("playbot", Options(Goal(Kind.KEEP, 0.45), rounds=3, steps=80, last=200)),
@@ -67,14 +73,28 @@ def _run(name: str, options: Options, say: Say) -> Result:
     return Result(len(scene), reducer.rows, reference_psnr(clean, reducer.scene(), held), json.loads(clock.read_text()) / 60)
 
 
+@cache
+def _results(say: Say) -> tuple[tuple[str, Options, Result], ...]:
+    return tuple((name, options, _run(name, options, say)) for name, options in JOBS)
+
+
+def draw(say: Say) -> str:
+    """The chart of the budgets by share."""
+    curves = [Curve.of(name, result.gaussians, result.rows) for name, options, result in _results(say) if options.goal.kind is Kind.KEEP]
+    figure = budget_curves(curves)
+    with tempfile.TemporaryDirectory() as folder:
+        figure.write(Path(folder))
+        shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
+    return str((IMAGES / f"{figure.name}.png").relative_to(ROOT))
+
+
 def _decibel(value: float) -> str:
     return "equal" if value > 150 else f"{value:.2f}"
 
 
 def tables(say: Say) -> dict[str, str]:
     steps, ends = [], []
-    for name, options in JOBS:
-        result = _run(name, options, say)
+    for name, options, result in _results(say):
         for row in result.rows:
             cost = row.cost
             steps.append((

@@ -17,6 +17,7 @@ import scene_samples as samples
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 
+from flicker.budget.curve import Curve
 from flicker.budget.degrees import cut, cuts, losses
 from flicker.budget.goal import Goal, Kind, chip_cost, price
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
@@ -214,7 +215,7 @@ def test_keep() -> None:
 def test_interrupted(goal: Goal, tmp_path: Path) -> None:
     """Continued from any of its checkpoints, a run ends with the same bits and the same table."""
     scene, options = small(150), keeping(0.5, goal=goal, steps=4, last=8, degrees=0.1)
-    whole = start(scene, options)
+    whole = start(scene, options, 7)
     states: list[Path] = []
 
     def kept() -> None:
@@ -230,19 +231,19 @@ def test_interrupted(goal: Goal, tmp_path: Path) -> None:
             kept()
     assert {phase for pair in seen for phase in pair} >= {Phase.REMOVE, Phase.TUNE, Phase.DEGREES, Phase.REFIT, Phase.LAST}
     for state in states[:: 1 if goal.kind is Kind.KEEP else 4]:
-        other = start(scene, options)
+        other = start(scene, options, 7)
         other.restore(state)
         other.run()
         assert other.parameters.values.tobytes() == whole.parameters.values.tobytes() and other.rows == whole.rows, state
     with pytest.raises(FlickerError, match="has steps 4, not 5"):
-        start(scene, replace(options, steps=5)).restore(states[0])
+        start(scene, replace(options, steps=5), 7).restore(states[0])
     with pytest.raises(FlickerError, match="is of another scene"):
-        start(small(151), options).restore(states[0])
+        start(small(151), options, 7).restore(states[0])
     with pytest.raises(FlickerError, match="is of another view"):
         start(scene, options, 13).restore(states[0])
     states[0].write_bytes(states[0].read_bytes()[:300])
     with pytest.raises(FlickerError, match="not a checkpoint"):
-        start(scene, options).restore(states[0])
+        start(scene, options, 7).restore(states[0])
 
 
 def test_decibels() -> None:
@@ -350,6 +351,11 @@ def test_command(tmp_path: Path) -> None:
     kept, written = json.loads((tmp_path / "a.json").read_text()), (tmp_path / "out.ply").read_bytes()
     assert kept["gaussians"] == [398, 159] and kept["left_out"] == 2 and len(load_scene(tmp_path / "out.ply")) == 159
     assert kept["steps"][0]["decibels"] is None and kept["steps"][-1]["cost"]["bytes"] < kept["steps"][0]["cost"]["bytes"]
+    curve = Curve.load(tmp_path / "a.json")
+    assert curve.title == "in" and [point.kept for point in curve.points][-1] == pytest.approx(159 / 398) and len(curve.points) == 3
+    (tmp_path / "b.json").write_text(json.dumps(kept | {"steps": [{}]}))
+    with pytest.raises(FlickerError, match="b.json: not what flicker budget --json writes .KeyError: 'decibels'"):
+        Curve.load(tmp_path / "b.json")
     told = run("--keep", 0.4, *few, "--checkpoint", tmp_path / "state.npz", "--resume")
     assert "continues after 8 steps" in told and (tmp_path / "out.ply").read_bytes() == written
     assert Row(**kept["steps"][1]).step == "1: removal"
