@@ -44,6 +44,7 @@ LEAST_GAIN = 0.01  # dB
 SAVE_EVERY = 100
 CHIP_VIEWS = 2  # held-out views that a frame's cost is the mean of
 _SHRINK, _LEAST_SHRINK = 0.85, 0.97  # of the Gaussians, a round towards dB; the search ends where rounds of the second fail
+_AIM = 0.995  # of a goal of cycles or bytes: what removal aims at, since tuning moves it a little
 _OVER = 0.98  # of what an estimate allows, where the model found more than the goal
 _MOST_ROUNDS = 40
 _REFIT_SHARES = (0.25, 0.5, 1.0)  # of the step of least squares that are tried
@@ -191,7 +192,7 @@ class Reducer:
             assert cost is not None
             now, left = cost.of(goal.kind), max(1, self.options.rounds + 1 - self.round)
             fixed = cost.fixed(goal.kind)
-            target = now * (goal.value / now) ** (1.0 / left)
+            target = now * (_AIM * goal.value / now) ** (1.0 / left)
             if target <= fixed:
                 raise FlickerError(f"--{goal.kind.value}: {goal.value:g}: the picture alone takes {fixed:.4g}")
             share = (target - fixed) / (now - fixed) * (_OVER if self.round > self.options.rounds else 1.0)
@@ -267,7 +268,7 @@ class Reducer:
         elif goal.kind is Kind.KEEP:
             over = self.round >= self.options.rounds
         else:
-            over = cost.of(goal.kind) <= goal.value
+            over = cost.of(goal.kind) <= _AIM * goal.value
         if self.round >= _MOST_ROUNDS and not over:
             raise FlickerError(f"--{goal.kind.value}: {goal.value:g}: not reached in {_MOST_ROUNDS} rounds")
         self.phase, self.step = Phase.DEGREES if over else Phase.REMOVE, 0
@@ -279,15 +280,17 @@ class Reducer:
             return
         error = sum(float(((np.clip(render(self.parameters, c).image, 0, 1) - np.clip(w, 0, 1)) ** 2).sum()) for c, w in zip(self.fitted, self.wanted))
         lost = losses(self.parameters, self.fitted, self._steps)
-        found = cuts(self.parameters, self.coefficients, lost, np.ones(len(self.parameters)))
+        found, before = cuts(self.parameters, self.coefficients, lost, np.ones(len(self.parameters))), (self.parameters.values.copy(), self.coefficients.copy())
         order = np.argsort(found.error / found.bytes, kind="stable")
         cut(self.parameters, self.coefficients, lost, found, order[: np.searchsorted(np.cumsum(found.error[order]), self.options.degrees * error)])
-        self._told_row("SH coefficients", self.measure())
+        decibels = self.measure()
+        if self.options.goal.kind is Kind.DB and decibels < self.options.goal.value:
+            self.parameters, self.coefficients, decibels = Parameters(before[0]), before[1], self.good[2]
+        self._told_row("SH coefficients", decibels)
 
     def _refit(self) -> None:
         """The held-out views say how far to go towards the least squares of the fitted ones."""
-        decibels = self.rows[-1].decibels
-        self._keep_best(decibels)
+        self._keep_best(self.measure())
         assert self.best is not None
         found, before = refit(self.parameters, self.fitted, self.wanted, self.coefficients, steps=self._steps), self.parameters.values
         for share in _REFIT_SHARES:
@@ -313,8 +316,9 @@ class Reducer:
                 self._keep_best(decibels)
             if over or self.stale >= PATIENCE:
                 self._return_to_best()
-                self._told_row(f"tuning, {self.step} steps", self.best[2], self.frame_cost(lanes=True))
-                self.phase = Phase.DONE
+                cost, goal = self.frame_cost(lanes=True), self.options.goal
+                self._told_row(f"tuning, {self.step} steps", self.best[2], cost)
+                self.phase, self.step = (Phase.REMOVE, 0) if goal.of_chip and cost.of(goal.kind) > goal.value else (Phase.DONE, self.step)
 
     def advance(self) -> None:
         """One step."""
