@@ -6,14 +6,14 @@ import json
 import shutil
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from flicker.budget.curve import Curve
-from flicker.budget.goal import Goal, Kind
+from flicker.budget.goal import FrameCost, Goal, Kind
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.score import Score, scores
 from flicker.budget.tune import quality
@@ -77,6 +77,9 @@ def _run(name: str, options: Options, say: Say) -> Result:
     view = next(view for view in REAL_VIEWS if view.folder == name)
     title = f"{name} {options.goal.kind.value} {options.goal.value:g}"
     state, clock = (FOLDER / f"{title.replace(' ', '_')}.{suffix}" for suffix in ("npz", "json"))
+    asked = json.loads(json.dumps(asdict(options)))
+    if clock.exists() and (told := json.loads(clock.read_text())).get("options") == asked:
+        return Result(**told["result"] | {"rows": [Row(**row | {"cost": row["cost"] and FrameCost(**row["cost"])}) for row in told["result"]["rows"]]})
     say(f"{title}: views")
     began, before = time.process_time(), 0.0
     scene = load_scene(view.path(folder_of_scenes()))
@@ -92,16 +95,15 @@ def _run(name: str, options: Options, say: Say) -> Result:
     if reducer.phase is not Phase.DONE:
         reducer.run(told=lambda row: say(f"{title}: {row.step}: {row.gaussians:,} Gaussians, {row.decibels:.2f} dB"),
                     keep=lambda: _keep(reducer, state, clock, before + time.process_time() - began))
-    told = json.loads(clock.read_text())
-    if "alone" not in told:
-        small = reducer.scene()
-        say(f"{title}: reference pictures")
-        told["decibels"] = reference_psnr(clean, small, held)
-        told["large"] = reference_psnr(clean, small, [camera.resized(*SIZE) for camera in held])
-        told["shown"] = float(np.mean([picture.max(axis=2) > 0 for picture in pictures[len(fitted) :]]))
-        told["alone"] = _alone(clean, fitted, held, pictures[len(fitted) :])
-        clock.write_text(json.dumps(told))
-    return Result(len(scene), reducer.rows, told["decibels"], told["large"], told["shown"], told["alone"], told["seconds"] / 60)
+    say(f"{title}: reference pictures")
+    small = reducer.scene()
+    result = Result(
+        len(scene), reducer.rows, reference_psnr(clean, small, held), reference_psnr(clean, small, [camera.resized(*SIZE) for camera in held]),
+        float(np.mean([picture.max(axis=2) > 0 for picture in pictures[len(fitted) :]])), _alone(clean, fitted, held, pictures[len(fitted) :]),
+        json.loads(clock.read_text())["seconds"] / 60,
+    )
+    clock.write_text(json.dumps({"options": asked, "result": asdict(result)}))
+    return result
 
 
 @cache
