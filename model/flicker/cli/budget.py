@@ -114,7 +114,9 @@ def budget(
     if not len(found):
         raise FlickerError("budget: no Gaussian is left")
     write_atomically(out, lambda path: save(found, out, path, options.form, progress))
-    decibels = reference_psnr(clean, load_scene(out), held, progress)
+    written = load_scene(out)
+    decibels = reference_psnr(clean, written, held, progress)
+    at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
     _show(reducer.rows, seconds)
     table = Table(show_header=False)
     table.add_column(style="bold")
@@ -125,11 +127,13 @@ def budget(
         table.add_row("taken out, not finite", f"{removed:,}")
     table.add_row("PSNR of the file on the held-out views, mean", f"{sum(decibels) / len(decibels):.2f} dB")
     table.add_row("  worst view", f"{min(decibels):.2f} dB")
+    table.add_row(f"  at {counted[0]}x{counted[1]}, mean", f"{sum(at_frame) / len(at_frame):.2f} dB")
     table.add_row("bytes", f"{out.stat().st_size:,}")
     console.print(table)
     if json_ is not None:
         text = json.dumps({
             "scene": scene, "goal": {goal.kind.value: goal.value}, "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
-            "held_out_db": decibels, "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
+            "held_out_db": decibels, "held_out_db_at_frame": at_frame,
+            "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
         }, indent=2)
         write_atomically(json_, lambda path: path.write_text(text + "\n"))
