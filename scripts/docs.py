@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import pages
 from doc_parts import (
     areas,
+    budget,
     chip,
     chip_hardware,
     chip_lanes,
@@ -99,6 +100,8 @@ PARTS = (
     Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),
     Part("chip", "whole frames: culling, memory, lists, sorting",
          ("counts", "culling", "frames", "traffic", "schemes", "variations", "broadcast", "formats", "keys"), chip.tables, scenes_missing),
+    Part("budget", "real scenes to budgets, step by step; hours, can be interrupted", ("results", "alone", "steps"), budget.tables, scenes_missing,
+         before=budget.draw),
     Part("packing", "memory images in every format, and choices in making chunks", ("alternatives", "alone"), packing.tables, scenes_missing),
     Part("front", "bit-true front end: pictures, what becomes of Gaussians, number formats", ("pictures", "outcomes", "formats", "cells"), front.tables,
          scenes_missing),

@@ -43,7 +43,10 @@ NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faith
 def made(tmp_path_factory):
     """A report on the demo scene: (job, what was written, the calls of its progress)."""
     folder = tmp_path_factory.mktemp("report")
-    job = check([], folder / "out", SIZE, NAMES, folder / "store")
+    cost = {"cycles": 1e6, "lane_cycles": 3e5, "bytes": 2e7, "picture_bytes": 3e6, "image_bytes": 1000}
+    steps = [{"step": "", "gaussians": n, "coefficients": 4.0, "decibels": dB, "cost": cost} for n, dB in ((100, None), (50, 40.0), (25, 30.0))]
+    (folder / "budget.json").write_text(json.dumps({"scene": "a/demo.ply", "gaussians": [100, 25], "steps": steps}))
+    job = check([], folder / "out", SIZE, NAMES, folder / "store", budgets=[folder / "budget.json"])
     calls = []
     return job, write_report(job, seed(), lambda *call: calls.append(call)), calls
 
@@ -185,7 +188,7 @@ def test_page_is_self_contained(made):
         assert link[1:] in parsed.ids if link.startswith("#") else (job.folder / link).is_file(), link
     assert not re.search(r"(@import|fetch\(|XMLHttpRequest|<script src|url\(http)", text)
     for name in ("fig3a_modes", "fig4_intersection", "fig7c_precision", "fig8_rendering_stage", "fig9_fifo_depth", "fig10_whole_system",
-                 "table1_contribution_test", "table2_area", "heat_demo_0", "stability"):
+                 "table1_contribution_test", "table2_area", "heat_demo_0", "stability", "budget"):
         assert name in parsed.ids and (job.folder / "figures" / f"{name}.csv").stat().st_size > 30, name
     for name in ("fig8_rendering_stage", "speed_accuracy", "heat_demo_0"):
         assert all((job.folder / "figures" / f"{name}.{kind}").stat().st_size > 5000 for kind in ("png", "svg"))

@@ -254,11 +254,22 @@ class SceneCost:
         }
 
 
+def frame_cost(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dict[str, int]]:
+    """Cycles of each half of the chip, bytes of both by purpose."""
+    image = front_memory(front)
+    first = preprocessing.estimate(front, image, dram)
+    second = rendering.estimate(front, image, CONFIG, dram)
+    bytes_ = dict(first.bytes)
+    for name, more in second.bytes.items():
+        bytes_[name] = bytes_.get(name, 0) + more
+    return {"front end": first.cycles, "rendering": second.cycles}, bytes_
+
+
 def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None) -> ViewCost:
     """One view of a packed scene of so many Gaussians in its file. dram: None: without cycles and bytes of the halves, which take most of the time."""
     packed = packing.packed
     front = run_front(packed, camera)
-    cycles, bytes_ = _halves(front, dram) if dram else ({}, {})
+    cycles, bytes_ = frame_cost(front, dram) if dram else ({}, {})
     weight, peak, visits, visited, entry = _entries(front)
     lists = front.subtile_lists()
     number = packing.order[front.gaussian]  # in the file, of each record
@@ -275,17 +286,6 @@ def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig
         np.bincount(number[front.entry_splat], minlength=gaussians), sums(visits).astype(np.int64), sums(weight), largest, fetched, recorded, visited, seen,
         kept,
     )
-
-
-def _halves(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dict[str, int]]:
-    """Cycles of each half, bytes of both by purpose."""
-    image = front_memory(front)
-    first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(front, image, CONFIG, dram)
-    bytes_ = dict(first.bytes)
-    for name, more in second.bytes.items():
-        bytes_[name] = bytes_.get(name, 0) + more
-    return {"front end": first.cycles, "rendering": second.cycles}, bytes_
 
 
 def _entries(front: FrontFrame) -> tuple[np.ndarray, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 import typer
 
 from ..errors import FlickerError, FlickerWarning
+from .budget import budget
 from .chip import chip
 from .cost import cost
 from .fit import fit
@@ -21,7 +22,7 @@ from .view import view
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
-for command in (render, demo, view, pack, chip, cost, fit, report, stability, sweep):
+for command in (render, demo, view, pack, chip, cost, fit, budget, report, stability, sweep):
     app.command()(command)
 
 

@@ -20,6 +20,7 @@ def report(
     background: Annotated[str, typer.Option(help="black, white or r,g,b from 0 to 1: as the scene was fitted")] = "black",
     configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
     store: Annotated[Path | None, typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
+    budget: Annotated[list[Path] | None, typer.Option(help="what flicker budget --json wrote, for the figure of budgets; may be repeated")] = None,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:
@@ -42,7 +43,7 @@ def report(
         behind = parse_background(background)
     except FlickerError as error:
         raise FlickerError(f"--{error}") from None
-    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind)
+    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind, budget or ())
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(

@@ -21,6 +21,7 @@ from matplotlib.colors import LogNorm, Normalize  # noqa: E402
 from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
+from ..budget.curve import Curve  # noqa: E402
 from ..errors import FlickerError  # noqa: E402
 from ..explore.configurations import CONFIGURATIONS  # noqa: E402
 from ..explore.facts import MAPS, TILE_SIZES  # noqa: E402
@@ -504,6 +505,32 @@ def speed_area_accuracy(views: Sequence[ViewResult]) -> Figure:
     """Cycles times area against accuracy, so that builds of different size compare."""
     note = "The area that a frame keeps busy for how long: half the cycles on twice the area is no gain."
     return _cloud(views, "speed_area_accuracy", "Cycles times area against accuracy", note, _cycles_area, "cycles times area, million cycles of a million GE")
+
+
+def budget_curves(curves: Sequence[Curve]) -> Figure:
+    """What scenes lose by `flicker budget`."""
+    with plt.rc_context(STYLE):
+        figure, axes = _axes(3, 3.6)
+        rows: list[list] = []
+        for k, curve in enumerate(curves):
+            points, colour = sorted(curve.points, key=lambda p: (p.kept, p.decibels)), COLOURS[k % len(COLOURS)]
+            decibels = [p.decibels for p in points]
+            axes[0].plot([100 * p.kept for p in points], decibels, "o-", markersize=3, color=colour, label=curve.title)
+            axes[1].plot([p.cost.bytes / 1e6 for p in points], decibels, "o-", markersize=3, color=colour, label=curve.title)
+            axes[2].plot([p.cost.cycles / 1e6 for p in points], decibels, "o-", markersize=3, color=colour, label=curve.title)
+            lanes = [(p.cost.lane_cycles / 1e6, p.decibels) for p in points if p.cost.lane_cycles]
+            axes[2].plot([x for x, _ in lanes], [y for _, y in lanes], "o:", markersize=3, color=colour, fillstyle="none")
+            rows += [[curve.title, p.kept, p.decibels, p.cost.bytes, p.cost.cycles, p.cost.lane_cycles, p.cost.image_bytes] for p in points]
+        for axis, label in zip(axes, ("Gaussians kept, %", "MB a frame", "million cycles; dotted: lanes alone")):
+            axis.set_xlabel(label)
+            axis.set_ylabel("PSNR on held-out views, dB")
+            axis.grid(alpha=0.3)
+        axes[0].legend(frameon=False)
+        return Figure(
+            "budget", "Scenes to a budget", "", "Mean PSNR against the full scene on views that were not fitted to, by what is kept; frames on the chip's models: "
+            "the slower half with channels, the stage of lanes alone.",
+            ["scene", "kept", "psnr_db", "frame_bytes", "cycles", "lane_cycles", "packed_bytes"], rows, figure,
+        )
 
 
 def paper_figures(views: Sequence[ViewResult], areas: dict[tuple[str, str], float]) -> list[Figure]:

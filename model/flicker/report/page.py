@@ -94,7 +94,7 @@ def _stability(result: Stability, figure: Figure) -> str:
 
 def page(
     views: Sequence[ViewResult], verdicts: Sequence[Verdict], paper: Sequence[Figure], charts: Sequence[Figure], heats: Sequence[Figure],
-    stability: tuple[Stability, Figure], about: dict[str, str],
+    budgets: Sequence[Figure], stability: tuple[Stability, Figure], about: dict[str, str],
 ) -> str:
     """The whole page. charts: of all configurations. about: facts of the run, by name."""
     counts = {kind: sum(v.kind == kind for v in verdicts) for kind in _MARKS}
@@ -125,6 +125,7 @@ def page(
         *(_figure(f, of_figure[f.name]) for f in paper),
         "<h2 id='heat'>Heat maps</h2>",
         *(_figure(f) for f in heats),
+        *(["<h2>Scenes to a budget</h2>", *map(_figure, budgets)] if budgets else []),
         "<h2 id='fail'>Where configurations fail</h2>", _stability(*stability),
         f"<script>const DATA = {_points(views)};\n{(_FOLDER / 'page.js').read_text()}</script></body></html>\n",
     ]

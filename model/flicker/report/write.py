@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..budget.curve import Curve
 from ..cost.area import TABLE, parts
 from ..cost.stamp import stamp_of
 from ..errors import FlickerError
@@ -26,7 +27,7 @@ from ..scene.files import scene_kind
 from ..scene.photos import BLACK
 from .claims import Verdict, all_verdicts
 from .collect import collect
-from .figures import own_figures, paper_figures, stability_table
+from .figures import budget_curves, own_figures, paper_figures, stability_table
 from .page import page
 
 SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "photo_psnr_db", "photo_ssim", "area_ge", "energy_uj", "model_only")
@@ -34,12 +35,13 @@ SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "phot
 
 @dataclass(frozen=True)
 class Job:
-    """A checked request. store: folder of results, shared with sweeps."""
+    """A checked request. store: folder of results, shared with sweeps. curves: of `flicker budget`."""
 
     targets: tuple[Target, ...]
     configurations: tuple[str, ...]
     folder: Path
     store: Path
+    curves: tuple[Curve, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,12 @@ def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = 
 
 def check(
     scenes: Sequence[str], folder: Path, size: tuple[int, int] | None = None, configurations: Sequence[str] | None = None, store: Path = DEFAULT,
-    photos: str | None = None, background: tuple[float, float, float] = BLACK,
+    photos: str | None = None, background: tuple[float, float, float] = BLACK, budgets: Sequence[Path] = (),
 ) -> Job:
     """All that can be wrong is found here, before any work; FlickerError. Without scenes the demo scene is taken.
 
-    size: None: every camera's own where there is a photograph, else `explore.points.SIZE`. photos, background: as in `SceneFile`.
+    size: None: every camera's own where there is a photograph, else `explore.points.SIZE`. photos, background: as in `SceneFile`. budgets: files of
+    `flicker budget --json`.
     """
     if size is not None:
         Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
@@ -107,7 +110,7 @@ def check(
     for name in ("index.html", "summary.csv"):
         if (folder / name).is_dir():
             raise FlickerError(f"{folder / name}: is a folder")
-    return Job(tuple(targets), tuple(names), folder, store)
+    return Job(tuple(targets), tuple(names), folder, store, tuple(map(Curve.load, budgets)))
 
 
 def _stability(store: Store, seed: int) -> Stability:
@@ -132,8 +135,9 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     verdicts = all_verdicts(views, areas)
     paper = paper_figures(views, areas)
     charts, heats = own_figures(views)
+    budgets = [budget_curves(job.curves)] if job.curves else []
     table = stability_table(stability)
-    for figure in (*paper, *charts, *heats, table):
+    for figure in (*paper, *charts, *heats, *budgets, table):
         figure.write(job.folder / "figures")
     about = {
         "views": ", ".join(v.target.title for v in views), "size": ", ".join(dict.fromkeys(f"{w}x{h}" for w, h in (t.size for t in job.targets))),
@@ -142,7 +146,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }
-    text = page(views, verdicts, paper, charts, heats, (stability, table), about)
+    text = page(views, verdicts, paper, charts, heats, budgets, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]
     columns = [*SUMMARY, *(key for key in rows[0] if key not in SUMMARY)]
     index, summary = job.folder / "index.html", job.folder / "summary.csv"

@@ -160,18 +160,19 @@ def _upright(up: str) -> np.ndarray:
     return np.stack([right, down, np.cross(right, down)])
 
 
-def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: int = 1280, height: int = 720,
-                 up: str = DEFAULT_UP) -> Camera:
+def orbit_camera(scene: Scene, view: float = 0, views: int = ORBIT_VIEWS, width: int = 1280, height: int = 720,
+                 up: str = DEFAULT_UP, *, elevation: float = 15.0, nearer: float = 1.0) -> Camera:
     """Camera `view` of `views` on a circle around the scene, looking slightly down at its middle.
 
-    up: the world's axis that points up, one of `UP_AXES`; FlickerError for another.
+    view: also between whole numbers. up: the world's axis that points up, one of `UP_AXES`; FlickerError for another. elevation: degrees above the middle.
+    nearer: the distance is divided by it; of scenes so small that this would bring them before the nearest depth that is drawn, the lens is longer instead.
     """
     upright = _upright(up)
     low, high = np.sort(upright @ _box(scene), axis=1).T
     centre, half = (low + high) / 2, (high - low) / 2
     across = math.hypot(half[0], half[2])
     tangent = math.tan(math.radians(25.0)) / min(width, height)  # half the field of view across the shorter side
-    elevation = math.radians(15.0)
+    elevation = math.radians(elevation)
     # The cylinder that the box sweeps, from its middle, in camera axes; it must lie within the picture.
     ring = np.linspace(0.0, 2 * math.pi, 32)
     x, z = across * np.cos(ring), across * np.sin(ring)
@@ -184,6 +185,10 @@ def orbit_camera(scene: Scene, view: int = 0, views: int = ORBIT_VIEWS, width: i
     zoom = max(1.0, (across + half[1] + 0.4) / distance)
     distance *= zoom
     focal = zoom / (2 * tangent)
+    if zoom > 1.0:
+        focal *= nearer
+    else:
+        distance /= nearer
     azimuth = 2 * math.pi * view / views
     back = np.array([
         math.sin(azimuth) * math.cos(elevation), -math.sin(elevation), -math.cos(azimuth) * math.cos(elevation),

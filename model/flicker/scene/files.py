@@ -210,6 +210,14 @@ def _read_spz(path: Path) -> tuple[np.ndarray, ...]:
     return means * _TURN, scales, quats * np.append([1.0], _TURN), opacities, sh * _TURN_SH[: sh.shape[1], None]
 
 
+def half_turn(scene: Scene) -> Scene:
+    """The scene turned by half a turn about x, as it stands in an SPZ file."""
+    return Scene(
+        scene.means * _TURN, scene.scales, scene.quats * np.append([1.0], _TURN), scene.opacities, scene.sh * _TURN_SH[: scene.sh.shape[1], None],
+        scene.path, scene.rejected,
+    )
+
+
 # Half a turn about x, from right-up-back to right-down-forward: y, z and the harmonics odd in (y, z) change sign. (A quaternion
 # whose y and z change sign is the turned rotation with two axes of the Gaussian reversed: the same ellipsoid.)
 _TURN = np.array([1, -1, -1], np.float32)

@@ -1,0 +1,104 @@
+"""SH coefficients that say little: what the pictures would lose by fewer, Gaussian by Gaussian, and which clusters to take them from.
+
+The chip's memory holds as many coefficients for all Gaussians of a cluster as one of them needs (docs/memory_image.md), so cuts are made by cluster. What is
+cut is replaced by its mean over the views, weighted by the squares of alpha T, in the constant term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fit.parameters import Parameters
+from ..fit.render import render
+from ..front.projection import colours
+from ..progress import Steps
+from ..scene.camera import Camera
+from ..scene.clusters import morton_order
+from ..scene.gaussians import SH_C0
+from ..scene.packed import CLUSTER_LIMIT
+from .score import COLUMNS, SQUARE, score_frame
+
+
+@dataclass(eq=False)
+class Losses:
+    """Of N Gaussians and D smaller SH degrees 0 to D - 1. error: float64 (N, D), squared change of the pictures with no more than that degree; shift: float32
+    (N, D, 3), what the constant coefficients then gain."""
+
+    error: np.ndarray
+    shift: np.ndarray
+
+
+def losses(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None) -> Losses:
+    """What every Gaussian's degrees are worth in the cameras' pictures, the others being as they are."""
+    n, degrees = len(parameters), parameters.degree
+    square, sum_, weight = np.zeros((n, degrees)), np.zeros((n, degrees, 3)), np.zeros(n)
+    cut = [parameters.sh.copy() for _ in range(degrees)]
+    for degree, sh in enumerate(cut):
+        sh[:, (degree + 1) ** 2 :] = 0.0
+    with (steps or Steps()).bar("SH coefficients") as report:
+        for k, camera in enumerate(cameras):
+            report(k, len(cameras))
+            frame = render(parameters, camera)
+            total, unused_tiles, unused_frames = np.zeros((n, COLUMNS)), np.zeros(n, np.int64), np.zeros(n, np.int64)
+            score_frame(frame, total, unused_tiles, unused_frames)
+            index = frame.index[total[frame.index, SQUARE] > 0]
+            of = total[index, SQUARE]
+            weight[index] += of
+            now, then = np.empty((2, len(index), 3))
+            colours(parameters.means, parameters.sh, index, camera.position, now)
+            for degree, sh in enumerate(cut):
+                colours(parameters.means, sh, index, camera.position, then)
+                change = now - then
+                square[index, degree] += of * (change**2).sum(axis=1)
+                sum_[index, degree] += of[:, None] * change
+    mean = sum_ / np.maximum(weight, 1e-30)[:, None, None]
+    error = np.maximum(square - (mean * sum_).sum(axis=2), 0.0)
+    return Losses(error, (mean / SH_C0).astype(np.float32))
+
+
+@dataclass(eq=False)
+class Cuts:
+    """Cuts that could be made, M of them. members: Gaussians of the cluster. degree: int64 (M,), what stays. error: float64 (M,), squared change of the
+    pictures beyond that of the cluster's cuts before it; bytes: float64 (M,), what it spares, likewise. Error by byte does not fall from a cluster's cut to its
+    next."""
+
+    members: list[np.ndarray]
+    degree: np.ndarray
+    error: np.ndarray
+    bytes: np.ndarray
+
+
+def cuts(parameters: Parameters, coefficients: np.ndarray, lost: Losses, seen: np.ndarray) -> Cuts:
+    """By clusters of a Morton curve. coefficients: int64 (N,), of each Gaussian now. seen: float64 (N,), how often its coefficients are read."""
+    order = morton_order(parameters.means)
+    members, degree, error, bytes_ = [], [], [], []
+    for begin in range(0, len(order), CLUSTER_LIMIT):
+        here = order[begin : begin + CLUSTER_LIMIT]
+        now = int(np.sqrt(coefficients[here].max())) - 1
+        total = [*lost.error[here].sum(axis=0).tolist(), 0.0]
+        size = [3.0 * float((seen[here] * (np.minimum(coefficients[here], (d + 1) ** 2) - 1)).sum()) for d in range(now + 1)]
+        while now > 0:
+            # Along the lower hull of error over bytes.
+            slopes = [max(total[d] - (total[now] if now < len(total) - 1 else 0.0), 0.0) / max(size[now] - size[d], 1e-12) for d in range(now)]
+            best = int(np.argmin(slopes))
+            members.append(here)
+            degree.append(best)
+            bytes_.append(max(size[now] - size[best], 1e-12))
+            error.append(slopes[best] * bytes_[-1])
+            now = best
+    return Cuts(members, np.array(degree, np.int64), np.array(error), np.array(bytes_))
+
+
+def cut(parameters: Parameters, coefficients: np.ndarray, lost: Losses, found: Cuts, chosen: np.ndarray) -> None:
+    """Make the cuts `chosen` (numbers, int64); parameters and coefficients change in place."""
+    degree = np.sqrt(coefficients).astype(np.int64) - 1
+    left = degree.copy()
+    for k in chosen.tolist():
+        left[found.members[k]] = np.minimum(left[found.members[k]], found.degree[k])
+    less = np.flatnonzero(left < degree)
+    parameters.sh[less, 0] += lost.shift[less, left[less]]
+    coefficients[less] = (left[less] + 1) ** 2
+    parameters.sh[np.arange(parameters.sh.shape[1]) >= coefficients[:, None]] = 0.0
