@@ -460,7 +460,7 @@ def test_command(nerf, tmp_path) -> None:
     done = flicker("render", tmp_path / "a.ply", "--engine", "reference", "--out", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
     told = fit("--from", tmp_path / "a.ply", "--through", "faithful", "--iterations", 20)
-    assert "PSNR of the pictures of faithful" in told and len(load_scene(tmp_path / "a.ply")) == len(scene)
+    assert "as faithful draws" in told and len(load_scene(tmp_path / "a.ply")) == len(scene)
     assert "its masks are not of 4x4 mini-tiles" in fit("--through", "log-lanes", code=2)
     assert "configuration 'fiathful' is unknown; close names: faithful" in fit("--through", "fiathful", code=2)
     assert "--resume: from which --checkpoint?" in fit("--resume", code=2)

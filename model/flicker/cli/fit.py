@@ -94,13 +94,13 @@ def fit(
     def row(title: str, now: str, then: str = "") -> None:
         table.add_row(title, *([] if before is None else [then]), now)
 
-    row("scene", str(out), str(scene))
+    row("scene", out.name, "" if scene is None else scene.name)
     row("Gaussians", f"{len(fitted):,}", f"{trainer.first:,}")
     if removed := trainer.removed + len(trainer.parameters) - len(fitted):
         row("taken out, not finite", f"{removed:,}")
     for name, title, form in (
-        ("psnr", "PSNR on the test photographs", "{:.2f} dB"), ("compensated", "  after an affine colour fit of each", "{:.2f} dB"), ("ssim", "SSIM", "{:.4f}"),
-        ("machine", f"PSNR of the pictures of {through}", "{:.2f} dB"),
+        ("psnr", "PSNR on the test photographs", "{:.2f} dB"), ("compensated", "  after an affine colour fit of each", "{:.2f} dB"),
+        ("machine", f"  as {through} draws", "{:.2f} dB"), ("ssim", "SSIM", "{:.4f}"),
     ):
         if name != "machine" or through is not None:
             row(title, form.format(getattr(after, name)), "" if before is None else form.format(getattr(before, name)))
