@@ -596,7 +596,7 @@ def picture_db(view: View, packing: Packing) -> float:
     return psnr(View(view.camera, decode(packing.packed)).reference, whole.reference)
 
 
-@pytest.mark.parametrize("real", REAL_VIEWS, ids=lambda view: view.folder)
+@pytest.mark.parametrize("real", [pytest.param(r, id=r.folder, marks=[pytest.mark.slow] * (r.folder in ("flowers", "playbot"))) for r in REAL_VIEWS])
 def test_real_scenes_keep_their_picture(real) -> None:
     folder = real_scenes()
     if folder is None:

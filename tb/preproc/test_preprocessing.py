@@ -235,12 +235,12 @@ def test_frame_read_back_from_memory() -> None:
     assert np.array_equal(lists.gauss[lists.entry], golden.gauss[golden.entry]) and np.array_equal(lists.spiky[lists.entry], golden.spiky[golden.entry])
 
 
-LARGE = ("flowers", "playbot")
+LARGE = ("flowers", "playbot", "stpeter")
 
 
 @pytest.mark.parametrize("real", [pytest.param(r, id=r.folder, marks=[pytest.mark.slow] * (r.folder in LARGE)) for r in REAL_VIEWS])
 def test_real_scenes(real) -> None:
-    """At 640x360; the two large ones with SLOW=1."""
+    """At 640x360; the larger ones with SLOW=1."""
     folder = real_scenes()
     if folder is None:
         pytest.skip("FLICKER_SCENES is not set")
