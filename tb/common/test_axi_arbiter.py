@@ -2,9 +2,8 @@
 
 A model of choice, order, drain and watch is compared in every cycle. State space: random requests of every manager with several identifiers, bursts of 1 to
 16 beats, narrow reads; memory perfect, LPDDR4 and of another project (cocotbext-axi), every order of answers, of addresses and data, pauses of every channel;
-drains at random times; each channel that stops. Parameter space: 2 to 5 readers, 2 and 3 writers, 64 to 512 bits, little patience, few orders (other than the defaults and
-the chip's with SLOW=1).
-Not covered: 4095 bursts under way.
+drains at random times; each channel that stops. Parameter space: 2 to 5 readers, 2 and 3 writers, 64 to 512 bits, little patience, few orders
+(numbers other than the defaults and the chip's with SLOW=1). Not covered: 4095 bursts under way.
 """
 
 from __future__ import annotations
