@@ -211,7 +211,7 @@ def test_keep() -> None:
     assert first and last and last.bytes < first.bytes and last.image_bytes < first.image_bytes and (last.lane_cycles or 0) > 0
 
 
-@pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), Goal(Kind.DB, 45.0)])
+@pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), pytest.param(Goal(Kind.DB, 45.0), marks=pytest.mark.slow)])
 def test_interrupted(goal: Goal, tmp_path: Path) -> None:
     """Continued from any of its checkpoints, a run ends with the same bits and the same table."""
     scene, options = small(150), keeping(0.5, goal=goal, steps=4, last=8, degrees=0.1, frame=(32, 32))
@@ -320,7 +320,7 @@ def test_views(tmp_path: Path) -> None:
 # -- files and the command ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "least"), [("a.ply", 100), ("a.compressed.ply", 40), ("a.spz", 40), ("a.flk", 40)])
+@pytest.mark.parametrize(("name", "least"), [("a.ply", 100), ("a.compressed.ply", 40), pytest.param("a.spz", 40, marks=pytest.mark.slow), ("a.flk", 40)])
 def test_files(name: str, least: float, tmp_path: Path) -> None:
     scene = small(600, 2)
     scene.scales *= np.float32(0.5)

@@ -245,7 +245,9 @@ def test_metrics_and_pictures(tmp_path: Path) -> None:
 SCENES = {"flowers": "flowers.compressed.ply", "guitar": "guitar.ply", "playbot": "playbot.sog", "stpeter": "st-peter.sog"}
 
 
-@pytest.mark.parametrize(("name", "unpacked"), [*((name, False) for name in SCENES), ("stpeter", True)])
+@pytest.mark.parametrize(("name", "unpacked"), [
+    ("guitar", False), *(pytest.param(n, False, marks=pytest.mark.slow) for n in SCENES if n != "guitar"), ("stpeter", True),
+])
 def test_real_scenes(name: str, unpacked: bool, tmp_path: Path) -> None:
     """Every stored reference picture (8 bits, so about 58 dB is what agreement guarantees), of a SOG also unpacked."""
     if "FLICKER_SCENES" not in os.environ:
