@@ -154,6 +154,28 @@ def test_rules_near() -> None:
     assert slope(0.9, 0.98, 0.94) == pytest.approx([0.0012 * step, 0.006 * step, 0.002 * step], rel=1e-4)
 
 
+def test_gaussian_that_only_finishes() -> None:
+    """In the last tile, of two pixels, two wide Gaussians leave 1.06e-4, a narrow one of alpha 0.13 finishes one pixel and is blended in none, a wide faint one
+    lies behind: it has no part in the finished pixel, neither in the picture nor in the derivatives, and has one in the other."""
+    camera = Camera(18, 17, 10.0, 10.0, np.zeros(3), np.eye(3))
+    values = np.zeros((4, SH + 3), np.float32)
+    values[:, MEAN + 2] = (1.0, 2.0, 3.0, 4.0)
+    values[:, QUAT] = 1.0
+    values[:, SCALE:QUAT] = 8.0
+    values[2, SCALE:QUAT] = -9.0
+    values[2, MEAN : MEAN + 2] = 3.0 * (14.9 - 8.5) / 10.0, 3.0 * (16.0 - 8.0) / 10.0
+    opacity = np.array([0.9897, 0.9897, 0.99, 0.02])
+    values[:, LOGIT] = np.log(opacity / (1 - opacity))
+    frame = render(Parameters(values), camera)
+    assert frame.rows[2, :2] == pytest.approx((14.9, 16.0)) and frame.index.tolist() == [0, 1, 2, 3]
+    assert frame.transmittance[16, 16] == pytest.approx(1.0609e-4, rel=1e-4)
+    assert frame.transmittance[16, 17] == pytest.approx(1.0397e-4, rel=1e-4)
+    for x, wanted in ((16, 0.0), (17, 0.02 * 1.0609e-4)):
+        weight = np.zeros((17, 18, 3))
+        weight[16, x] = 1.0
+        assert backward(frame, weight).values[3, SH] / 0.28209479177387814 == pytest.approx(wanted, rel=1e-3, abs=1e-12)
+
+
 def test_same_bits_for_any_number_of_threads() -> None:
     parameters, camera = busy(), look()
     weight = np.random.default_rng(seed()).normal(size=(37, 45, 3))

@@ -18,26 +18,9 @@ import numpy as np
 
 from ..fit.chain import _basis
 from ..fit.parameters import MEAN, SH, Parameters
-from ..fit.raster import (
-    _FAST,
-    BLUE,
-    GREEN,
-    HALF_A,
-    HALF_C,
-    HALF_HEIGHT,
-    LIMIT,
-    MARGIN,
-    MIXED,
-    MX,
-    MY,
-    OPACITY,
-    PER_A,
-    PER_YY,
-    RED,
-    SLOPE,
-)
+from ..fit.raster import BLUE, GREEN, RED, visit
 from ..fit.render import Frame, render
-from ..params import ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN
+from ..params import TILE
 from ..progress import Steps
 from ..scene.camera import Camera
 
@@ -48,60 +31,29 @@ MEMORY = 3 << 30  # bytes of kept weights at most: more views than that are left
 _PAIR_BYTES = 5
 
 
-@numba.njit(fastmath=_FAST, cache=True)
-def _weigh_tile(t, rows, start, entry, tiles_x, height, width, used, offset, pixel, weight, fill):
+@numba.njit(cache=True)
+def _weigh_tile(t, rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill):
     """Count the pixels of each used entry into offset[e + 1], or, to fill, write their places in the tile and alpha T from offset[e] on."""
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
-    columns, lines = min(TILE, width - left), min(TILE, height - top)
-    right, bottom = columns - 1.0, lines - 1.0
+    right, bottom = min(TILE, width - left) - 1.0, min(TILE, height - top) - 1.0
     remains = np.ones((TILE, TILE))
+    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
-        i = np.uint64(entry[e])
-        mx, my = rows[i, MX] - left, rows[i, MY] - top
-        half = rows[i, HALF_HEIGHT]
-        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
-        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-        place = offset[e]
-        count = 0
-        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-            dy = np.float64(y) - my
-            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
-            middle = mx + slope * dy
-            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
-            if high_x < low_x:
-                continue
-            along, constant_part = mixed * dy, half_c * dy * dy
-            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                before = remains[y, x]
-                if before < 0.0:
-                    continue
-                dx = np.float64(x) - mx
-                energy = (half_a * dx + along) * dx + constant_part
-                if energy < 0.0:
-                    continue
-                alpha = min(ALPHA_MAX, opacity * np.exp(-energy))
-                if alpha < ALPHA_MIN:
-                    continue
-                after = before * (1.0 - alpha)
-                if after < TRANSMITTANCE_MIN:
-                    remains[y, x] = -before
-                    continue
-                remains[y, x] = after
-                if fill:
-                    pixel[place + count] = np.uint8(np.int64(y) * TILE + np.int64(x))
-                    weight[place + count] = np.float32(alpha * before)
-                count += 1
+        count, _ = visit(rows, np.uint64(entry[e]), np.uint64(mask[e]), left, top, right, bottom, remains, place, alpha, before)
         if not fill:
             offset[e + 1] = count
+            continue
+        for k in range(count):
+            pixel[offset[e] + k] = place[k]
+            weight[offset[e] + k] = alpha[k] * before[k]
 
 
 @numba.njit(parallel=True, cache=True)
-def _weigh(rows, start, entry, tiles_x, height, width, used, offset, pixel, weight, fill):
+def _weigh(rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill):
     for t in numba.prange(len(start) - 1):
-        _weigh_tile(np.int64(t), rows, start, entry, tiles_x, height, width, used, offset, pixel, weight, fill)
+        _weigh_tile(np.int64(t), rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill)
 
 
 @numba.njit(cache=True)
@@ -235,10 +187,10 @@ class ViewMatrix:
         tiles_x = -(-width // TILE)
         offset = np.zeros(len(frame.entry) + 1, np.int64)
         nothing = np.empty(0, np.uint8), np.empty(0, np.float32)
-        _weigh(frame.rows, frame.start, frame.entry, tiles_x, height, width, frame.used, offset, *nothing, False)
+        _weigh(frame.rows, frame.start, frame.entry, frame.mask, tiles_x, height, width, frame.used, offset, *nothing, False)
         offset = np.cumsum(offset)
         pixel, weight = np.empty(offset[-1], np.uint8), np.empty(offset[-1], np.float32)
-        _weigh(frame.rows, frame.start, frame.entry, tiles_x, height, width, frame.used, offset, pixel, weight, True)
+        _weigh(frame.rows, frame.start, frame.entry, frame.mask, tiles_x, height, width, frame.used, offset, pixel, weight, True)
         entry = frame.entry[frame.used]
         seen = np.zeros(len(frame.index), np.bool_)
         seen[entry] = True

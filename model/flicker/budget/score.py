@@ -10,26 +10,9 @@ import numba
 import numpy as np
 
 from ..fit.parameters import Parameters
-from ..fit.raster import (
-    _FAST,
-    BLUE,
-    GREEN,
-    HALF_A,
-    HALF_C,
-    HALF_HEIGHT,
-    LIMIT,
-    MARGIN,
-    MIXED,
-    MX,
-    MY,
-    OPACITY,
-    PER_A,
-    PER_YY,
-    RED,
-    SLOPE,
-)
+from ..fit.raster import BLUE, GREEN, RED, visit
 from ..fit.render import Frame, render
-from ..params import ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN
+from ..params import TILE
 from ..progress import Steps
 from ..scene.camera import Camera
 
@@ -46,77 +29,48 @@ class Score(str, Enum):
     PEAK = "peak"
 
 
-
-@numba.njit(fastmath=_FAST, cache=True)
-def _score_tile(t, rows, start, entry, tiles_x, image, used, sums):
+@numba.njit(cache=True)
+def _score_tile(t, rows, start, entry, mask, tiles_x, image, used, sums):
     """Walks the list as `fit.raster` does. A pixel's state: the transmittance, and what is yet to come of its three channels."""
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    right, bottom = columns - 1.0, lines - 1.0
     remains = np.ones((TILE, TILE))
-    rest = np.zeros((TILE, TILE, 3))
+    rest = np.zeros((TILE * TILE, 3))
+    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
     for y in range(lines):
         for x in range(columns):
             for k in range(3):
-                rest[y, x, k] = image[top + y, left + x, k]
+                rest[y * TILE + x, k] = image[top + y, left + x, k]
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
         i = np.uint64(entry[e])
-        mx, my = rows[i, MX] - left, rows[i, MY] - top
-        half = rows[i, HALF_HEIGHT]
-        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
-        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+        count, _ = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-        total, peak, change, pixels, square = 0.0, 0.0, 0.0, 0.0, 0.0
-        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-            dy = np.float64(y) - my
-            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
-            middle = mx + slope * dy
-            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
-            if high_x < low_x:
-                continue
-            along, constant_part = mixed * dy, half_c * dy * dy
-            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                before = remains[y, x]
-                if before < 0.0:
-                    continue
-                dx = np.float64(x) - mx
-                energy = (half_a * dx + along) * dx + constant_part
-                if energy < 0.0:
-                    continue
-                alpha = min(ALPHA_MAX, opacity * np.exp(-energy))
-                if alpha < ALPHA_MIN:
-                    continue
-                after = before * (1.0 - alpha)
-                if after < TRANSMITTANCE_MIN:
-                    remains[y, x] = -before
-                    continue
-                weight = alpha * before
-                per = 1.0 / after
-                remains[y, x] = after
-                rest[y, x, 0] -= weight * red
-                rest[y, x, 1] -= weight * green
-                rest[y, x, 2] -= weight * blue
-                d_red, d_green, d_blue = red - rest[y, x, 0] * per, green - rest[y, x, 1] * per, blue - rest[y, x, 2] * per
-                change += weight * weight * (d_red * d_red + d_green * d_green + d_blue * d_blue)
-                total += weight
-                square += weight * weight
-                peak = max(peak, weight)
-                pixels += 1.0
+        total, peak, change, square = 0.0, 0.0, 0.0, 0.0
+        for k in range(count):
+            at, weight = np.uint64(place[k]), alpha[k] * before[k]
+            per = 1.0 / (before[k] * (1.0 - alpha[k]))
+            rest[at, 0] -= weight * red
+            rest[at, 1] -= weight * green
+            rest[at, 2] -= weight * blue
+            d_red, d_green, d_blue = red - rest[at, 0] * per, green - rest[at, 1] * per, blue - rest[at, 2] * per
+            change += weight * weight * (d_red * d_red + d_green * d_green + d_blue * d_blue)
+            total += weight
+            square += weight * weight
+            peak = max(peak, weight)
         sums[e, WEIGHT] = total
         sums[e, PEAK] = peak
         sums[e, CHANGE] = change
-        sums[e, PIXELS] = pixels
+        sums[e, PIXELS] = count
         sums[e, SQUARE] = square
 
 
 @numba.njit(parallel=True, cache=True)
-def _score(rows, start, entry, tiles_x, image, used, sums):
+def _score(rows, start, entry, mask, tiles_x, image, used, sums):
     for t in numba.prange(len(start) - 1):
-        _score_tile(np.int64(t), rows, start, entry, tiles_x, image, used, sums)
+        _score_tile(np.int64(t), rows, start, entry, mask, tiles_x, image, used, sums)
 
 
 @numba.njit(cache=True)
@@ -157,7 +111,7 @@ class Scores:
 def score_frame(frame: Frame, total: np.ndarray, tiles: np.ndarray, frames: np.ndarray) -> None:
     """Add one view: total float64 (N, COLUMNS), tiles and frames int64 (N,)."""
     sums = np.empty((len(frame.entry), COLUMNS))
-    _score(frame.rows, frame.start, frame.entry, -(-frame.camera.width // TILE), frame.image, frame.used, sums)
+    _score(frame.rows, frame.start, frame.entry, frame.mask, -(-frame.camera.width // TILE), frame.image, frame.used, sums)
     before = tiles[frame.index]
     _gather(frame.index, frame.entry, frame.used, sums, total, tiles)
     frames[frame.index[tiles[frame.index] > before]] += 1

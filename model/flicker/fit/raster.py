@@ -2,7 +2,7 @@
 
 A tile is drawn by one thread, entries in the order of its list, and writes nothing that another tile writes: the results have the same bits whatever the
 number of threads. Indices are unsigned: signed ones may count from the end, which costs a test at every access. What a thread does stands in a function of its
-own, which halves the time to compile.
+own, which halves the time to compile. `visit` is the one place where pixels are chosen and transmittance is counted down: whoever walks a list calls it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ G, G_X, G_Y, G_XX, G_XY, G_YY, D_RED, D_GREEN, D_BLUE = range(9)
 SUMS = 9
 MARGIN = 1e-3  # pixels and parts of LIMIT by which more is visited than alpha >= 1/255 needs: rounding never decides
 COLOUR_MAX = 1e4  # a Gaussian with more is taken for a broken one
-_ONE, _TWO = np.uint64(1), np.uint64(2)  # signed ones would make floats of unsigned indices
+_NONE, _ONE, _TWO, _FOUR, _FIFTEEN = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(15)  # signed ones would make floats of unsigned indices
 _FAST = {"contract", "nsz", "arcp"}  # nothing that would change what is not finite, or the order of sums
 
 
@@ -77,70 +77,86 @@ def make_rows(index, table, opacity, rgb, width, height, rows, box, bad):
 
 
 @numba.njit(fastmath=_FAST, cache=True)
+def visit(rows, i, visited, left, top, right, bottom, remains, place, alpha, before):
+    """Pixels of a tile that Gaussian i is blended in: how many, and how many it finishes. This is where the rules of blending stand.
+
+    visited: uint64, bit 4 row + column of the 4x4 pixels of the tile in which it may be. left, top: the tile's first pixel. right, bottom: its last column and
+    line within the picture, from there. remains: float64 (16, 16), transmittance, negative once the pixel is finished; brought up to date. The k-th blended
+    pixel is at place[k] = 16 line + column (uint8), where the Gaussian has alpha[k] behind a transmittance of before[k] (float64, 256 of each).
+    """
+    mx, my = rows[i, MX] - left, rows[i, MY] - top
+    half = rows[i, HALF_HEIGHT]
+    low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
+    blended, finished = _NONE, 0
+    if high < low:
+        return blended, finished
+    half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
+    opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
+    for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
+        dy = np.float64(y) - my
+        half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
+        middle = mx + slope * dy
+        low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
+        if high_x < low_x:
+            continue
+        along, constant_part = mixed * dy, half_c * dy * dy
+        for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
+            transmittance = remains[y, x]
+            if transmittance < 0.0:
+                continue
+            dx = np.float64(x) - mx
+            energy = (half_a * dx + along) * dx + constant_part
+            if energy < 0.0:
+                continue
+            opaque = min(ALPHA_MAX, opacity * np.exp(-energy))
+            if opaque < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
+                continue
+            after = transmittance * (1.0 - opaque)
+            if after < TRANSMITTANCE_MIN:
+                remains[y, x] = -transmittance
+                finished += 1
+                continue
+            remains[y, x] = after
+            place[blended] = (y << _FOUR) + x
+            alpha[blended] = opaque
+            before[blended] = transmittance
+            blended += _ONE
+    return blended, finished
+
+
+@numba.njit(fastmath=_FAST, cache=True)
 def _blend_tile(t, rows, start, entry, mask, tiles_x, background, image, transmittance, used):
     height, width = transmittance.shape
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    right, bottom = columns - 1.0, lines - 1.0
-    remains = np.ones((TILE, TILE))  # transmittance; negative once the pixel is finished
-    colour = np.zeros((TILE, TILE, 3))
+    remains = np.ones((TILE, TILE))
+    colour = np.zeros((TILE * TILE, 3))
+    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
     live = columns * lines
     for e in range(start[t], start[t + 1]):
         if live == 0:
             break
         i = np.uint64(entry[e])
-        mx, my = rows[i, MX] - left, rows[i, MY] - top
-        half = rows[i, HALF_HEIGHT]
-        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
-        if high < low:
-            continue
-        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-        visited = np.uint64(mask[e])
+        count, finished = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
+        live -= finished
+        used[e] = count or finished
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-        blended = False
-        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-            dy = np.float64(y) - my
-            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
-            middle = mx + slope * dy
-            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
-            if high_x < low_x:
-                continue
-            along, constant_part = mixed * dy, half_c * dy * dy
-            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                before = remains[y, x]
-                if before < 0.0:
-                    continue
-                dx = np.float64(x) - mx
-                energy = (half_a * dx + along) * dx + constant_part
-                if energy < 0.0:
-                    continue
-                alpha = min(ALPHA_MAX, opacity * np.exp(-energy))
-                if alpha < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
-                    continue
-                after = before * (1.0 - alpha)
-                if after < TRANSMITTANCE_MIN:
-                    remains[y, x] = -before
-                    live -= 1
-                    continue
-                weight = alpha * before
-                colour[y, x, 0] += weight * red
-                colour[y, x, 1] += weight * green
-                colour[y, x, 2] += weight * blue
-                remains[y, x] = after
-                blended = True
-        used[e] = blended
+        for k in range(count):
+            at, weight = np.uint64(place[k]), alpha[k] * before[k]
+            colour[at, 0] += weight * red
+            colour[at, 1] += weight * green
+            colour[at, 2] += weight * blue
     for y in range(lines):
         for x in range(columns):
             remaining = abs(remains[y, x])
             transmittance[top + y, left + x] = remaining
             for k in range(3):
-                image[top + y, left + x, k] = colour[y, x, k] + remaining * background[k]
+                image[top + y, left + x, k] = colour[y * TILE + x, k] + remaining * background[k]
 
 
 @numba.njit(parallel=True, cache=True)
 def blend(rows, start, entry, mask, tiles_x, background, image, transmittance, used):
-    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel.
+    """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel or finished one.
 
     mask: uint16 (E,), 4x4 pixels of the tile in which an entry may be blended, bit 4 row + column.
     """
@@ -154,75 +170,43 @@ def _blend_back_tile(t, rows, start, entry, mask, tiles_x, image, used, slope_of
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    right, bottom = columns - 1.0, lines - 1.0
     remains = np.ones((TILE, TILE))
-    pixel = np.zeros((TILE, TILE, 4))  # slope of the three channels, rest
+    pixel = np.zeros((TILE * TILE, 4))  # slope of the three channels, rest
+    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
     for y in range(lines):
         for x in range(columns):
-            rest = 0.0
+            at = y * TILE + x
             for k in range(3):
-                pixel[y, x, k] = slope_of_image[top + y, left + x, k]
-                rest += slope_of_image[top + y, left + x, k] * image[top + y, left + x, k]
-            pixel[y, x, 3] = rest
+                pixel[at, k] = slope_of_image[top + y, left + x, k]
+                pixel[at, 3] += slope_of_image[top + y, left + x, k] * image[top + y, left + x, k]
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
         i = np.uint64(entry[e])
+        count, _ = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
         mx, my = rows[i, MX] - left, rows[i, MY] - top
-        half = rows[i, HALF_HEIGHT]
-        low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
-        half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-        opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-        visited = np.uint64(mask[e])
         red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
         g, g_x, g_y, g_xx, g_xy, g_yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         d_red, d_green, d_blue = 0.0, 0.0, 0.0
-        for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-            dy = np.float64(y) - my
-            half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
-            middle = mx + slope * dy
-            low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
-            if high_x < low_x:
-                continue
-            along, constant_part = mixed * dy, half_c * dy * dy
-            line, line_x, line_xx = 0.0, 0.0, 0.0
-            for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-                before = remains[y, x]
-                if before < 0.0:
-                    continue
-                dx = np.float64(x) - mx
-                energy = (half_a * dx + along) * dx + constant_part
-                if energy < 0.0:
-                    continue
-                raw = opacity * np.exp(-energy)
-                alpha = min(ALPHA_MAX, raw)
-                if alpha < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
-                    continue
-                passed = 1.0 - alpha
-                after = before * passed
-                if after < TRANSMITTANCE_MIN:
-                    remains[y, x] = -before
-                    continue
-                s_red, s_green, s_blue = pixel[y, x, 0], pixel[y, x, 1], pixel[y, x, 2]
-                weight = alpha * before
-                d_red += weight * s_red
-                d_green += weight * s_green
-                d_blue += weight * s_blue
-                own = s_red * red + s_green * green + s_blue * blue
-                rest = pixel[y, x, 3] - weight * own
-                pixel[y, x, 3] = rest
-                remains[y, x] = after
-                if raw < ALPHA_MAX:
-                    d_energy = alpha * (rest / passed - before * own)
-                    line += d_energy
-                    line_x += d_energy * dx
-                    line_xx += d_energy * dx * dx
-            g += line
-            g_x += line_x
-            g_xx += line_xx
-            g_y += line * dy
-            g_xy += line_x * dy
-            g_yy += line * dy * dy
+        for k in range(count):
+            at = np.uint64(place[k])
+            s_red, s_green, s_blue = pixel[at, 0], pixel[at, 1], pixel[at, 2]
+            weight = alpha[k] * before[k]
+            d_red += weight * s_red
+            d_green += weight * s_green
+            d_blue += weight * s_blue
+            own = s_red * red + s_green * green + s_blue * blue
+            rest = pixel[at, 3] - weight * own
+            pixel[at, 3] = rest
+            if alpha[k] < ALPHA_MAX:
+                dx, dy = np.float64(at & _FIFTEEN) - mx, np.float64(at >> _FOUR) - my
+                slope = alpha[k] * (rest / (1.0 - alpha[k]) - before[k] * own)
+                g += slope
+                g_x += slope * dx
+                g_y += slope * dy
+                g_xx += slope * dx * dx
+                g_xy += slope * dx * dy
+                g_yy += slope * dy * dy
         sums[e, G] = g
         sums[e, G_X] = g_x
         sums[e, G_Y] = g_y

@@ -30,8 +30,8 @@ class Frame:
     """A view of parameters and what its way back needs. M Gaussians are in front of the camera, E entries in the lists of 16x16 tiles.
 
     image: float64 (H, W, 3), neither clamped nor quantised. transmittance: float64 (H, W). index: int64 (M,), Gaussians near to far.
-    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel. mask: uint16 (E,), 4x4
-    pixels of the tile that are visited (`through`).
+    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel or finishing one. mask:
+    uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
     bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
     """
 
