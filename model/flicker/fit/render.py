@@ -16,7 +16,7 @@ import numpy as np
 
 from ..explore.machine import Configuration
 from ..front.binning import bin_boxes
-from ..front.projection import RADIUS, SPIKY, XX, YY, A, C, Projected, X, Y, colours, geometry
+from ..front.projection import Projected, colours, geometry
 from ..params import TILE
 from ..scene.camera import Camera
 from . import raster
@@ -65,13 +65,7 @@ def _masks(
     index, table, rgb, bad = frame
     good = np.flatnonzero(~bad)
     number = np.cumsum(~bad) - 1
-    index = index[good]
-    table = table[index]
-    cov2d = np.ascontiguousarray(table[:, XX : YY + 1])
-    projected = Projected(
-        np.ascontiguousarray(table[:, X : Y + 1]), cov2d, np.ascontiguousarray(table[:, A : C + 1]), depth[index], opacity[index], rgb[good],
-        table[:, SPIKY] != 0.0, index, 3.0 * np.sqrt(cov2d[:, ::2]), np.ascontiguousarray(table[:, RADIUS]),
-    )
+    projected = Projected.of(table, depth, opacity, rgb[good], index[good])
     return tile_masks(through, projected, camera, start, number[entry].astype(np.int32))
 
 

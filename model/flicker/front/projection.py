@@ -57,6 +57,24 @@ class Projected:
     radii: np.ndarray
     circle: np.ndarray
 
+    @classmethod
+    def of(cls, table: np.ndarray, depth: np.ndarray, opacity: np.ndarray, rgb: np.ndarray, index: np.ndarray) -> Projected:
+        """From the outcome of `geometry`: table, depth and opacity of all Gaussians of the scene, rgb of those in `index`."""
+        table = table[index]
+        cov2d = np.ascontiguousarray(table[:, XX : YY + 1])
+        return cls(
+            mean=np.ascontiguousarray(table[:, X : Y + 1]),
+            cov2d=cov2d,
+            conic=np.ascontiguousarray(table[:, A : C + 1]),
+            depth=depth[index],
+            opacity=opacity[index].astype(np.float64),
+            rgb=rgb,
+            spiky=table[:, SPIKY] != 0.0,
+            index=index,
+            radii=3.0 * np.sqrt(cov2d[:, ::2]),
+            circle=np.ascontiguousarray(table[:, RADIUS]),
+        )
+
     @property
     def n_visible(self) -> int:
         return len(self.depth)
@@ -189,19 +207,6 @@ def project(scene: Scene, camera: Camera) -> Projected:
     )
     index = np.flatnonzero(depth)
     index = index[np.argsort(depth[index], kind="stable")]
-    table = table[index]
     rgb = np.empty((len(index), 3))
     colours(scene.means, scene.sh, index, camera.position, rgb)
-    cov2d = np.ascontiguousarray(table[:, XX : YY + 1])
-    return Projected(
-        mean=np.ascontiguousarray(table[:, X : Y + 1]),
-        cov2d=cov2d,
-        conic=np.ascontiguousarray(table[:, A : C + 1]),
-        depth=depth[index],
-        opacity=scene.opacities[index].astype(np.float64),
-        rgb=rgb,
-        spiky=table[:, SPIKY] != 0.0,
-        index=index,
-        radii=3.0 * np.sqrt(cov2d[:, ::2]),
-        circle=np.ascontiguousarray(table[:, RADIUS]),
-    )
+    return Projected.of(table, depth, scene.opacities, rgb, index)
