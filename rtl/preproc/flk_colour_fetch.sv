@@ -161,6 +161,7 @@ module flk_colour_fetch
   // The beats that are still to be read.
 
   logic                 known_q;  // beats up to reached_q of the cluster have been asked for
+  logic                 over;
   cluster_index_t       asked_q;
   logic [AT_BITS-1:0]   reached_q, first;
   logic                 same, nothing, request_ready;
@@ -185,7 +186,7 @@ module flk_colour_fetch
       known_q   <= 1'b0;
       c_valid_q <= 1'b0;
     end else begin
-      known_q   <= !start_i && (known_q || b_move);
+      known_q   <= !start_i && ((known_q && !over) || b_move);
       c_valid_q <= c_valid_q ? !request_ready : b_move && !nothing;
     end
   end
@@ -260,7 +261,7 @@ module flk_colour_fetch
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       following_q <= 1'b0;
-    end else if (start_i) begin
+    end else if (start_i || over) begin
       following_q <= 1'b0;
     end else if (fetch_valid) begin
       following_q <= 1'b1;
@@ -308,6 +309,10 @@ module flk_colour_fetch
   mark_t            seen_q;
   logic [Width-1:0] seen_data_q;
   logic [LANES-1:0] lane_empty, lane_served;  // no Gaussian waits; the beat is taken or not needed
+
+  // Nothing is under way and groups of a later cluster come: what is known of beats is forgotten.
+  // The next cluster with survivors may be any number of clusters further and bear the same number.
+  assign over       = (&lane_empty) && !a_valid_q && !b_valid_q && asked_q != exit_i;
 
   // A cluster's last beat goes when all has been taken of it and another cluster's groups come.
   assign stale      = seen_valid_q && seen_q.cluster != exit_i && (&lane_empty) && !a_valid_q;
@@ -472,7 +477,8 @@ module flk_colour_fetch
     assign lane_served[k] = passed || (needed && (has || take));
     assign lane_empty[k]  = none && !want_q;
     // Beats of a cluster that is over for a lane without work must not be taken for a later one's.
-    assign drop           = lane_empty[k] && seen_valid_q && l0_q.cluster != seen_q.cluster;
+    assign drop           = over ||
+                            (lane_empty[k] && seen_valid_q && l0_q.cluster != seen_q.cluster);
 
     // The first of the two is not the beat in which the part that is wanted in the next cycle begins; the second is.
     mark_t then_at, beyond;  // of the next Gaussian, of the next part

@@ -437,7 +437,7 @@ def test_real_scenes(real: RealView, size: tuple[int, int], config: RenderConfig
         pytest.skip("FLICKER_SCENES does not name the folder of real scenes")
     view = load_view(real.path(scenes), real.number, size)
     with session(packed_scene(view, PackedFormat.CHUNK), config=config, memory=MemoryOptions(DramConfig().timing)) as chip:
-        done = chip.render(view.camera, background=BLUE)
+        done = chip.render(view.camera, background=BLUE, limit=10 * LIMIT)
         compare(chip, view.camera, done, config=config)
 
 

@@ -171,6 +171,20 @@ async def a_lane_that_waits(dut):
 
 
 @cocotb.test()
+@cocotb.parametrize(gap=[15, 16, 17, 32, 48])
+async def clusters_without_survivors(dut, gap):
+    """So many cluster numbers further come the next survivors, in the same beats of their cluster; all that went before is done by then, or nearly."""
+    fetch = Fetch(dut, True, True, latency=3)
+    await fetch.bench.reset()
+    rng = fetch.bench.rng
+    for _ in range(2):
+        alive = [rng.randrange(1, 16) for _ in range(6)]
+        groups = [Survivors(c, 20 * c, 3, rng.randrange(2), alive[c // gap] if c % gap == 0 else 0) for c in range(5 * gap + 1)]
+        await fetch.run(groups)
+        await fetch.run([g for group in groups for g in (group, Survivors(group.cluster, group.colour, 3, 2 + rng.randrange(3), group.alive))])
+
+
+@cocotb.test()
 @cocotb.parametrize(degree=[0, 1, 2, 3])
 async def rates(dut, degree):
     """With every Gaussian alive: as fast as groups come, beats or the lanes' parts allow, nearly."""
