@@ -114,7 +114,7 @@ PARTS = (
     Part("lanes", "lanes in the log domain: number formats, masks, where the dB go",
          ("breakdown", "formats", "families", "masks", "counts", "stability"), lanes.tables, scenes_missing,
          before=lanes.draw),
-    Part("lane_stage", "the lanes' RTL: cycles and areas", ("cycles", "area"), lane_stage.tables, scenes_missing),
+    Part("lane_stage", "the lanes' RTL: cycles and areas; cycles of cores that take more", ("cycles", "feeds", "area"), lane_stage.tables, scenes_missing),
     Part("lists", "layouts of tile lists in DRAM", ("entries", "layouts", "flight"), lists.tables, scenes_missing),
     Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
     Part("view", "the viewer in a headless browser: its picture, how fast it is", ("",), view.tables, view.missing, before=view.draw),

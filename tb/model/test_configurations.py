@@ -140,6 +140,18 @@ def test_equals_golden_lanes(name, demo):
     assert min(energy.values()) > 0 and abs(result.configuration.area() - part("lane_stage", lane_config(config)).ge) < 1
 
 
+def test_lanes_that_take_more(demo):
+    """Cores that take and dispatch more in a cycle than the RTL: the same pairs, in fewer cycles, and no more splats to the lanes in a cycle than were allowed."""
+    work = lane_work(float_lists(demo.projected, demo.lists(Form.FACTORED, "ellipse")))
+    config = CONFIGURATIONS["log-lanes"].render_config.with_(slots=64, fifo_depth=64)
+    built, two, four = (simulate_lanes(work, config, in_width=n, dispatch=d) for n, d in ((2, 1), (2, 2), (4, 4)))
+    assert built.cycles > two.cycles > four.cycles
+    for found, most in ((built, 1), (two, 2), (four, 4)):
+        assert [found.total(name) for name in ("gaussians_in", "blended", "pixels_finished")] == [
+            built.total(name) for name in ("gaussians_in", "blended", "pixels_finished")]
+        assert found.total("dispatched") <= most * 4 * found.cycles
+
+
 @pytest.mark.parametrize("name", [c.name for c in CONFIGURATIONS.values() if c.render_config and not c.render_config.by_lanes])
 def test_equals_golden(name, demo):
     """Configurations that the RTL has: the golden model's pixels, counts and automatic mode."""

@@ -100,7 +100,7 @@ def pixels_of_lanes(lanes: int) -> np.ndarray:
 
 
 @numba.njit(cache=True)
-def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, count, subtile_end):
+def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, count, subtile_end):
     """One core: fills its counters and the end of each sub-tile; returns the cycles it was followed for, and that after its last pixel."""
     lanes, per_lane = pixel.shape
     n_sub = len(order)
@@ -111,6 +111,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
     sent = np.zeros(width, np.bool_)
     live = np.zeros(width, np.uint64)
     wanted = np.zeros(width, np.bool_)
+    going = np.full(width, -1, np.int64)  # slot of those that dispatch gives to the lanes in this cycle
     # Store
     pending = np.zeros(slots, np.int64)  # lanes that have not released
     release = np.zeros((RELEASE + 1, slots), np.int64)
@@ -131,7 +132,8 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
     full_at = np.full(lanes, -NOTHING, np.int64)
     bank_left = np.zeros(lanes, np.int64)
     first = 0
-    bits = np.zeros(lanes, np.int64)
+    bits = np.zeros((width, lanes), np.int64)
+    coming = np.zeros(lanes, np.int64)  # entries of this cycle
     # Input
     sub_in, began = 0, False
     at = start[order[0]] if n_sub else np.int64(0)
@@ -167,7 +169,6 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                 n_held += 1
         # ---- dispatch: of the group at the pipeline's end
         old = (young + 1) % latency
-        choice, any_wanted = -1, False
         after_token = False
         for w in range(width):
             e = pipe[old, w]
@@ -188,36 +189,41 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                                     m &= ~(np.uint64(1) << np.uint64(pixel[l, p]))
                 live[w] = m
                 wanted[w] = m != np.uint64(0)
-            if wanted[w] and choice < 0:
-                choice = w
-                any_wanted = True
-        dispatched = False
-        slot = -1
-        if any_wanted:
-            for s in range(slots):
-                if pending[s] == 0:
-                    slot = s
-                    break
-            token = pipe[old, choice] <= TOKEN
+        move = True
+        slot, left = -1, dispatch
+        coming[:] = 0
+        for w in range(width):
+            going[w] = -1
+            if not wanted[w]:
+                continue
+            if left == 0 or not move:  # in order
+                move = False
+                continue
+            slot += 1
+            while slot < slots and pending[slot] != 0:
+                slot += 1
+            token = pipe[old, w] <= TOKEN
             room = True
             for l in range(lanes):
-                bits[l] = 0
+                bits[w, l] = 0
                 if not token:
                     for p in range(per_lane):
-                        bits[l] |= np.int64((live[choice] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
-                if (token or bits[l]) and q_used[l] == depth:
+                        bits[w, l] |= np.int64((live[w] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
+                if (token or bits[w, l]) and q_used[l] + coming[l] == depth:
                     room = False
-            if slot < 0:
+            if slot == slots:
                 count[NO_SLOT] += 1
+                move = False
             elif not room:
                 count[NO_ROOM] += 1
-            else:
-                dispatched = True
-                count[DISPATCHED] += 1
-        move = True
-        for w in range(width):
-            if wanted[w] and not (dispatched and w == choice):
                 move = False
+            else:
+                count[DISPATCHED] += 1
+                going[w] = slot
+                left -= 1
+                for l in range(lanes):
+                    if token or bits[w, l]:
+                        coming[l] += 1
         # ---- pixels leave: the registers behind take one in every cycle
         served = -1
         for i in range(lanes):
@@ -295,21 +301,28 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
             if tokens[l] > 0 or flags[l] != (1 << per_lane) - 1:
                 all_finished = False
         sub_finished = all_finished and pipe_tokens == 0
-        if dispatched:
-            token = pipe[old, choice] <= TOKEN
+        for w in range(width):
+            slot = going[w]
+            if slot < 0:
+                continue
+            token = pipe[old, w] <= TOKEN
             for l in range(lanes):
-                if token or bits[l]:
-                    w = (q_read[l] + q_used[l]) % depth
-                    q_slot[l, w] = slot
-                    q_bits[l, w] = bits[l]
+                if token or bits[w, l]:
+                    r = (q_read[l] + q_used[l]) % depth
+                    q_slot[l, r] = slot
+                    q_bits[l, r] = bits[w, l]
                     q_used[l] += 1
                     pending[slot] += 1
                     if token:
                         tokens[l] += 1
                     else:
                         count[ENTRIES] += 1
-            slot_at[slot] = pipe[old, choice]
-            sent[choice] = True
+            slot_at[slot] = pipe[old, w]
+            sent[w] = True
+            for u in range(w):  # what was passed over is dropped, whatever its lanes say later
+                if not sent[u]:
+                    sent[u] = True
+                    count[REJECTED if mask[pipe[old, u]] == np.uint64(0) else DROPPED] += 1
         if n_held == 0:
             count[IDLE] += 1
         elif not move:
@@ -345,10 +358,10 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
 
 
 @numba.njit(parallel=True, cache=True)
-def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters, end, ends):
+def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters, end, ends):
     for k in numba.prange(CORES):
         own = order[core_start[k] : core_start[k + 1]]
-        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, counters[k], end)
+        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters[k], end)
 
 
 def lane_work(lists: RecordLists) -> LaneWork:
@@ -358,15 +371,21 @@ def lane_work(lists: RecordLists) -> LaneWork:
     return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish, int(np.bitwise_count(contributing).sum(dtype=np.int64)))
 
 
-def simulate_lanes(work: LaneWork, config: RenderConfig, *, leave: bool = False, empty: bool = True) -> LaneCycles:
-    """Cycles of a frame. leave: a finished sub-tile leaves its list. empty: sub-tiles with an empty list are streamed, too."""
+def simulate_lanes(
+    work: LaneWork, config: RenderConfig, *, leave: bool = False, empty: bool = True, in_width: int | None = None, dispatch: int = 1,
+) -> LaneCycles:
+    """Cycles of a frame. leave: a finished sub-tile leaves its list. empty: sub-tiles with an empty list are streamed, too.
+
+    in_width, dispatch: elements that a core takes in a cycle (None: config's) and splats of these that get a slot and entries in queues; the RTL has 1 or 2, and
+    1. Anything else is a core that was not built.
+    """
     lanes = config.lanes // CORES
     order, core_start = stream_order(work, empty)
     counters, ends = np.zeros((CORES, len(LANE_COUNTERS)), np.int64), np.zeros((CORES, 2), np.int64)
     end = np.zeros(work.cols * work.rows, np.int64)
     _cores(
         order, core_start, work.start, work.mask, work.passes, work.finish, pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES,
-        config.in_width, config.slots, config.fifo_depth, leave, counters, end, ends,
+        in_width or config.in_width, config.slots, config.fifo_depth, leave, dispatch, counters, end, ends,
     )
     cycles = int(ends[:, 1].max())
     # A core that has ended goes on counting: no input, no entry in any queue.
