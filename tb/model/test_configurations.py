@@ -141,7 +141,7 @@ def test_equals_golden_lanes(name, demo):
 
 
 def test_lanes_that_take_more(demo):
-    """Cores that take and dispatch more in a cycle than the RTL: the same pairs, in fewer cycles, and no more splats to the lanes in a cycle than were allowed."""
+    """Cores that take and dispatch more in a cycle than the RTL: the same pairs in fewer cycles, no more splats to the lanes in a cycle than allowed."""
     work = lane_work(float_lists(demo.projected, demo.lists(Form.FACTORED, "ellipse")))
     config = CONFIGURATIONS["log-lanes"].render_config.with_(slots=64, fifo_depth=64)
     built, two, four = (simulate_lanes(work, config, in_width=n, dispatch=d) for n, d in ((2, 1), (2, 2), (4, 4)))

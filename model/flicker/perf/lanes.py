@@ -376,8 +376,8 @@ def simulate_lanes(
 ) -> LaneCycles:
     """Cycles of a frame. leave: a finished sub-tile leaves its list. empty: sub-tiles with an empty list are streamed, too.
 
-    in_width, dispatch: elements that a core takes in a cycle (None: config's) and splats of these that get a slot and entries in queues; the RTL has 1 or 2, and
-    1. Anything else is a core that was not built.
+    in_width, dispatch: elements that a core takes in a cycle (None: config's) and splats of these that get a slot and entries in queues. The RTL has 1 or 2,
+    and 1; anything else is a core that was not built.
     """
     lanes = config.lanes // CORES
     order, core_start = stream_order(work, empty)
