@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -22,17 +23,20 @@ from flicker.cli.options import parse_size
 from flicker.errors import FlickerError
 from flicker.explore.configurations import rtl_configuration, run
 from flicker.front.projection import project
-from flicker.front.records import build_lists
+from flicker.front.records import SubtileLists, build_lists
 from flicker.front.reference import render_reference
 from flicker.front.view import DEMO, View, load_view
-from flicker.golden.render import render_golden
-from flicker.params import CHANNELS, CORES, NAMED_CONFIGS, CatMode
-from flicker.perf.render_stage import simulate
+from flicker.golden.lanes.lists import RecordLists, float_lists
+from flicker.golden.lanes.render import LaneFrame, render_lanes
+from flicker.golden.render import Frame, render_golden
+from flicker.params import CHANNELS, CORES, NAMED_CONFIGS, CatMode, Form, RenderConfig
+from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.scene.metrics import psnr
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.render_stage import build, render_rtl
 
 T = TypeVar("T")
+LISTS = {"channels": "subtile", "lanes": "ellipse"}  # by stage: 3-sigma boxes, or the ellipse as in the front end
 
 
 def best(function: Callable[[], T], runs: int = 3) -> tuple[float, T]:
@@ -51,6 +55,18 @@ def default_scene() -> str:
     return str(REAL_VIEWS[0].path(folder)) if folder else DEMO
 
 
+def lists_of(view: View, config: RenderConfig) -> SubtileLists | RecordLists:
+    """What a build takes: splats, or raw records for lanes."""
+    if config.by_lanes:
+        return float_lists(view.projected, View(view.camera, projected=view.projected).lists(Form.FACTORED, LISTS[config.stage]))
+    return build_lists(view.projected, view.camera, config)
+
+
+def golden(lists: SubtileLists | RecordLists, config: RenderConfig) -> Frame | LaneFrame:
+    """The golden frame of such lists."""
+    return render_lanes(lists) if isinstance(lists, RecordLists) else render_golden(lists, config)
+
+
 def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None, say: Callable[[str], None]) -> dict[str, str]:
     """`engines`: steps and golden frames, with a line on the scene. `rtl`: simulated frames. `model`: the cycle model."""
     name = Path(scene).name
@@ -67,11 +83,12 @@ def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None,
     rtl_rows, model_rows = [], []
     for title, config in {
         "default": NAMED_CONFIGS["default"], "faithful": NAMED_CONFIGS["faithful"], "default, test off": NAMED_CONFIGS["default"].with_(cat=CatMode.OFF),
+        "32 lanes": RenderConfig(stage="lanes"), "64 lanes": RenderConfig(stage="lanes", lanes=64),
     }.items():
         say(f"{name}: golden, {title}")
-        lists_s, lists = best(lambda: build_lists(projected, camera, config))
-        render_golden(lists, config)
-        golden_s, golden = best(lambda: render_golden(lists, config))
+        lists_s, lists = best(lambda: lists_of(view, config))
+        golden(lists, config)
+        golden_s, frame = best(lambda: golden(lists, config))
         total = project_s + lists_s + golden_s
         steps.append([f"golden, {title}, with projection and lists", f"{total:.2f}", f"{total / base:.1f}"])
         if config.cat == CatMode.OFF:
@@ -79,19 +96,26 @@ def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None,
         say(f"{name}: building the simulator, {title}")
         build(config)
         say(f"{name}: simulating the RTL, {title}")
-        rtl = render_rtl(lists, config)
-        wrong = int((golden.pixels != rtl.pixels).any(axis=2).sum())
-        busy = rtl.channel_counter("vru_busy").sum() / (rtl.cycles * CORES * CHANNELS)
+        rtl = render_rtl(lists, config, leave=config.by_lanes, empty=not config.by_lanes)
+        wrong = int((frame.pixels != rtl.pixels).any(axis=2).sum())
+        if config.by_lanes:
+            busy = rtl.core_counter("visits").sum() / (rtl.cycles * config.lanes)
+        else:
+            busy = rtl.channel_counter("vru_busy").sum() / (rtl.cycles * CORES * CHANNELS)
         rtl_rows.append([
             title, f"{rtl.cycles:,}", f"{busy:.1%}", f"{rtl.cycles / rtl.seconds:,.0f}", f"{wrong} of {lists.cols * lists.rows * 64:,}",
             f"{psnr(rtl.image(), reference):.2f}",
         ])
         say(f"{name}: cycle model, {title}")
-        configuration = rtl_configuration(config)
+        configuration = replace(rtl_configuration(config), lists=LISTS[config.stage])
         run(configuration, View(camera, projected=projected))
         run_s, result = best(lambda: run(configuration, View(camera, projected=projected)))
-        simulate(result.work, config)
-        model_s, model = best(lambda: simulate(result.work, config), 5)
+        if isinstance(lists, RecordLists):  # the work of a configuration does not tell `skipped` of finished pixels
+            own = lane_work(lists)
+            model_s, model = best(lambda: simulate_lanes(own, config, leave=True, empty=False), 5)
+        else:
+            configuration.simulate(result.work)
+            model_s, (_, model) = best(lambda: configuration.simulate(result.work), 5)
         differ = int((model.counters != rtl.counters).sum())
         model_rows.append([
             title, f"{model.cycles:,}; {differ} of {rtl.counters.size}", f"{model.cycles / model_s / 1e6:.1f}",
@@ -102,9 +126,9 @@ def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None,
     )
     return {
         "engines": f"{about}\n\n{markdown.table(['step', 'seconds', 'relative to the reference'], steps)}",
-        "rtl": markdown.table(["RTL frame", "cycles", "VRUs busy", "cycles/s simulated", "pixels that differ from golden", "PSNR, dB"], rtl_rows),
+        "rtl": markdown.table(["RTL frame", "cycles", "VRUs or lanes busy", "cycles/s simulated", "pixels that differ from golden", "PSNR, dB"], rtl_rows),
         "model": markdown.table(
-            ["cycle model", "cycles, and counters that differ from the RTL's", "million cycles/s", "times the RTL", "masks, VRUs and cycles, s"], model_rows,
+            ["cycle model", "cycles; counters unlike the RTL's", "million cycles/s", "times the RTL", "masks, pictures and cycles, s"], model_rows,
         ),
     }
 
