@@ -219,7 +219,7 @@ module flk_lane
 
   localparam int unsigned REST_BITS = LOG + 2 - PIECE_BITS;
 
-  logic skip_q, clamp_q;
+  logic skip_q;
   logic [LA_BITS-1:0] la_q;
   logic [LA_BITS-2:0] normal;  // below the leading one
   logic [$clog2(LA_BITS+1)-1:0] zeros;
@@ -227,9 +227,8 @@ module flk_lane
 
   always_ff @(posedge clk_i) begin
     if (valid_q[2]) begin
-      la_q    <= la[LA_BITS-1:0];
-      skip_q  <= la > (LA_WIDE - DROP)'(LIMIT);
-      clamp_q <= la <= (LA_WIDE - DROP)'(CLAMP);
+      la_q   <= la[LA_BITS-1:0];
+      skip_q <= la > (LA_WIDE - DROP)'(LIMIT);
     end
   end
 
@@ -264,7 +263,7 @@ module flk_lane
       rest_q    <= normal[REST_BITS-1:0];
       la_4_q    <= la_q;
       skip_4_q  <= skip_q;
-      clamp_4_q <= clamp_q;
+      clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
     end
   end
 
@@ -354,10 +353,13 @@ module flk_lane
   // Places from the product to the accumulator, but for the exponent and the place that rounds.
   localparam int unsigned SHIFT = MANTISSA + COLOUR_FRACTION - ACCUMULATOR - 1;
   localparam int unsigned PART_BITS = PRODUCT_BITS - SHIFT;
+  localparam int unsigned FAR = (PART_BITS + 3) / 4;  // more than 4 FAR - 1 places leave nothing
 
   logic [COLOUR:6] blend_q;
   logic [MANTISSA-1:0] address_q, mantissa_q;
-  logic [COLOUR:6][EXPONENT_BITS-1:0] exponent_q;
+  logic [COLOUR-1:6][EXPONENT_BITS-1:0] exponent_q;
+  logic [3:0] near_q;     // one bit: places below a multiple of four
+  logic [FAR-1:0] far_q;  // one bit or none: that multiple
   lane_colour_t colour_q;
   logic [2:0][PRODUCT_BITS-1:0] product_q;
 
@@ -372,7 +374,13 @@ module flk_lane
   end
 
   always_ff @(posedge clk_i) begin
-    exponent_q <= {exponent_q[7:6], total[TOTAL_BITS-1:SUM]};
+    exponent_q <= {exponent_q[6], total[TOTAL_BITS-1:SUM]};
+    for (int unsigned k = 0; k < 4; k++) begin
+      near_q[k] <= exponent_q[7][1:0] == 2'(k);
+    end
+    for (int unsigned k = 0; k < FAR; k++) begin
+      far_q[k] <= exponent_q[7][EXPONENT_BITS-1:2] == (EXPONENT_BITS - 2)'(k);
+    end
     address_q  <= total[SUM-1-:MANTISSA];
     mantissa_q <= {1'b1, EXP2[address_q]};
     colour_q   <= colour_i;
@@ -393,8 +401,15 @@ module flk_lane
       c_now |= c_q[p] & {(3 * C_BITS) {select_c_q[p]}};
     end
     for (int unsigned c = 0; c < 3; c++) begin
-      automatic logic [PART_BITS-1:0] part;  // with the place that rounds
-      part = PART_BITS'(product_q[c] >> SHIFT >> exponent_q[COLOUR]);
+      automatic logic [PART_BITS-1:0] near, part;  // with the place that rounds
+      near = '0;
+      part = '0;
+      for (int unsigned k = 0; k < 4; k++) begin
+        near |= PART_BITS'(product_q[c] >> (SHIFT + k)) & {PART_BITS{near_q[k]}};
+      end
+      for (int unsigned k = 0; k < FAR; k++) begin
+        part |= (near >> (4 * k)) & {PART_BITS{far_q[k]}};
+      end
       {c_next[c], unused_place[c]} = {c_now[c], 1'b1} + (C_BITS + 1)'(part);
     end
   end
