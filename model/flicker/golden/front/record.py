@@ -27,6 +27,10 @@ class RecordKind(str, Enum):
     FACTORED16 = "factored-16"
     CONIC32 = "conic-32"
 
+    @staticmethod
+    def of(form: Form) -> RecordKind:
+        return RecordKind.FACTORED16 if form is Form.FACTORED else RecordKind.CONIC32
+
     @property
     def form(self) -> Form:
         return Form.FACTORED if self is RecordKind.FACTORED16 else Form.CONIC
