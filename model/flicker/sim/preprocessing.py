@@ -96,8 +96,8 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
 
 @dataclass(eq=False)
 class RtlFront:
-    """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold noise, that of
-    `before`: records and memory as they were.
+    """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
+    noise, that of `before`: records and memory as they were.
 
     counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate.
     """
@@ -147,7 +147,8 @@ def front_rtl(
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
-    kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so many times; what the last leaves counts.
+    kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
+    many times; what the last leaves counts.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
