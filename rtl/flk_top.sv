@@ -19,7 +19,7 @@ module flk_top
   import flk_top_pkg::*;
 #(
   parameter  int unsigned Stage          = STAGE_CHANNELS,  // the next ones are its parameters
-  parameter  int unsigned Form           = FORM_FACTORED,   // of the records too: 16 bytes, conic 32
+  parameter  int unsigned Form           = FORM_FACTORED,   // of records too: 16 bytes, conic 32
   parameter  int unsigned Precision      = PRECISION_FIXED,
   parameter  int unsigned FifoDepth      = FIFO_DEPTH,
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,

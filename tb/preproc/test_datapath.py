@@ -152,7 +152,9 @@ FIELDS = splat.Projection._fields
 
 
 @numba.njit
-def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, inverse, shift, key_low, M, N, C, out, places, conic):
+def _projected(
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, inverse, shift, key_low, M, N, C, out, places, conic,
+):
     for j in range(len(q)):
         p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, limit,
                               width, height, const, M, N)

@@ -1,8 +1,8 @@
 """The whole front end in RTL against the golden model: memory after the frame, byte by byte, and the counters.
 
-State space: formats, list kinds, both forms of records, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters all culled, one Gaussian,
-a Gaussian over 4096x4096 (SLOW=1), a camera inside a cluster, errors of the memory by address, list memory that runs out, a table that points beyond the
-records. Registers and memories begin random; bytes that no one should write are compared too.
+State space: formats, list kinds, records of 16 and of 32 bytes, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters
+all culled, one Gaussian, a Gaussian over 4096x4096 (SLOW=1), a camera inside a cluster, errors of the memory by address, list memory that runs out, a table
+that points beyond the records. Registers and memories begin random; bytes that no one should write are compared too.
 """
 
 from __future__ import annotations

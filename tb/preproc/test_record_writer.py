@@ -10,6 +10,8 @@ import pytest
 from flicker_tb.runner import build_and_test
 
 
-@pytest.mark.parametrize("parameters", [{}, {"RecordBits": 177, "Quarters": 2}], ids=["16 bytes", "32 bytes"])
+@pytest.mark.parametrize("parameters", [
+    pytest.param({}, id="16 bytes"), pytest.param({"RecordBits": 177, "Quarters": 2}, id="32 bytes", marks=pytest.mark.slow),
+])
 def test_record_writer(parameters: dict[str, int]) -> None:
     build_and_test("flk_record_writer", "cocotb_record_writer", parameters=parameters, inner=False)
