@@ -37,6 +37,7 @@ common/flk_ff_rom.sv
 common/flk_ff_rsqrt.sv
 common/flk_ff_sqrt.sv
 common/flk_ff_to_fixed.sv
+common/flk_ff_to_fp16.sv
 common/flk_fifo.sv
 common/flk_fixed_mul.sv
 common/flk_fixed_to_fp.sv

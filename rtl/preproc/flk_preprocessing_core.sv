@@ -1025,15 +1025,11 @@ module flk_preprocessing_core
     );
 
     for (genvar k = 0; k < 3; k++) begin : gen_shape
-      flk_fp_convert #(
-        .SrcExpBits(8),
-        .SrcManBits(SHAPE_MAN_BITS),
-        .DstExpBits(5),
-        .DstManBits(10),
-        .DstFn     (1'b0)
+      flk_ff_to_fp16 #(
+        .ManBits(SHAPE_MAN_BITS)
       ) i_shape (
-        .src_i(recorded_q.shape[k]),
-        .dst_o(fields_in.shape[16*k+:16])
+        .x_i(recorded_q.shape[k]),
+        .y_o(fields_in.shape[16*k+:16])
       );
     end
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from ... import layout
 from ...arithmetic.ff_stages import STAGES
 from ...datapath.units import PIPELINES
-from ...golden.front.setup import FORMATS as FRONT_FORMATS
 from ...params import (
     CHANNELS,
     CORES,
@@ -72,7 +71,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_preprocessing_core": [
         MEMORY, "flk_geometry_decode", "flk_projection", "flk_projection_conic", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
         "flk_colour_group", "flk_colour_constant", "flk_colour_term", "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
-        "flk_opacity_to_fp16", "flk_fp_convert",
+        "flk_opacity_to_fp16", "flk_ff_to_fp16",
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
@@ -256,6 +255,7 @@ def _ff() -> list[Unit]:
         if bits > min(FF_MAN_BITS):
             units.append(unit("flk_ff_narrow", f"{bits} to {bits - 4} bit", FromBits=bits, ManBits=bits - 4))
         units += [unit("flk_ff_ldexp", f"{bits} bit", ManBits=bits), unit("flk_ff_from_fp16", f"{bits} bit", ManBits=bits)]
+    units.append(unit("flk_ff_to_fp16", f"{FF_MAN_BITS[0]} bit", ManBits=FF_MAN_BITS[0]))
     units.append(unit("flk_fixed_mul", "13 x 14 bit", ABits=13, BBits=14, Drop=12, OutBits=14, Stages=1))
     units.append(unit("flk_phase_mux", "10 bit", Width=10))
     units.append(unit("flk_ff_rom", "recip, 19 bit", Function=0, Group=2))
@@ -322,10 +322,6 @@ def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_opacity_to_fp16"),
-        unit(
-            "flk_fp_convert", f"ff of {FRONT_FORMATS.shape} bit to fp16", SrcExpBits=8, SrcManBits=FRONT_FORMATS.shape, SrcFn=0, DstExpBits=5, DstManBits=10,
-            DstFn=0, DstSaturate=1,
-        ),
         unit("flk_coefficient"), unit("flk_event_counter"),
         unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),

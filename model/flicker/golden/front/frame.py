@@ -34,7 +34,7 @@ from .colour import (
 )
 from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
-from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
+from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means, to_fp16
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
 from .splat import conic_one, constants, largest_component, pixels, place_largest, project_one
 
@@ -384,8 +384,7 @@ def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.
     records = np.zeros((len(words), 32), np.uint8)
     records[:, :8] = words.astype("<i4").view(np.uint8)
     beyond = (np.abs(halves) > 65504.0).any(axis=1)
-    numbers = np.clip(halves, -65504.0, 65504.0).astype(np.float16)
-    records[:, 8:22] = numbers.view(np.uint8)
+    records[:, 8:22] = to_fp16(halves).view(np.uint8)
     records[:, 22] = flags[:, 2]
     adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "value beyond FP16 clamped": int(beyond.sum())}
     return records, {k: v for k, v in adjusted.items() if v}

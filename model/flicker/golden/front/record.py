@@ -122,6 +122,11 @@ def _decode_means(fields):
     return out
 
 
+def to_fp16(numbers: np.ndarray) -> np.ndarray:
+    """float16: nearest, ties to even, at most 65504."""
+    return np.clip(numbers, -65504.0, 65504.0).astype(np.float16)
+
+
 def fp16_features(splats: Splats) -> np.ndarray:
     """uint16 (N, 9) in the order of `feature_t` (blue first among the colours), means left 0: `flk_record_to_splat` but for the means."""
     gauss = np.zeros((len(splats.opacity), 9), np.uint16)
