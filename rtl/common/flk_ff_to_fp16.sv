@@ -12,7 +12,7 @@ module flk_ff_to_fp16 #(
     $error("flk_ff_to_fp16: ManBits must be more than 10");
   end
 
-  localparam logic [7:0] SUBNORMAL = 8'd112;  // largest exponent of FP16's subnormal numbers, code 0
+  localparam logic [7:0] SUBNORMAL = 8'd112;  // largest exponent of subnormal FP16 numbers
   localparam logic [7:0] LEAST = 8'd102;      // of numbers of which half a step and more is left
   localparam logic [7:0] LARGEST = 8'd142;    // code 30
   localparam int unsigned MAX_DROP = 11;      // SUBNORMAL + 1 - LEAST
