@@ -1,15 +1,18 @@
 // flk_record_writer: the lines are the beats, once each and in order (fv_stream on address and quarters);
-// a record, whichever pick_i chooses when it is taken, is in its quarter of its beat's line and that
-// line marks it. Each quarter takes a record in every cycle in which one is offered to it; no memory is
-// read and written at one address. The assertions l_* link registers and places, for induction.
+// a record, whichever pick_i chooses when it is taken, is in its quarter of its beat's line (with
+// Quarters = 2 in its half) and that line marks it. Each quarter takes a record in every cycle in which one
+// is offered to it; no memory is read and written at one address. The assertions l_* link registers and
+// places, for induction.
 //
 // What is assumed is the unit's contract: places are assigned in order of the ring, at most all of its
-// beats at a time that were not freed; a beat's quarters are fixed when it is assigned (wants_i), and its
+// beats at a time that were not freed; a beat's records are fixed when it is assigned (wants_i), and its
 // item comes after that, in order; each of its records is offered by one lane, once.
 module fv_record_writer
   import flk_preproc_pkg::*;
 #(
+  parameter  int unsigned Quarters   = 1,
   localparam int unsigned RecordBits = 2,
+  localparam int unsigned Records    = 4 / Quarters,
   localparam int unsigned Beats      = 1 << PLACE_BEAT_BITS
 ) (
   input logic                             clk_i,
@@ -18,7 +21,7 @@ module fv_record_writer
   input logic                             pick_beat_i,
   input logic [1:0]                       lane_i,
   input logic                             assign_i,
-  input logic [3:0]                       wants_i,
+  input logic [Records-1:0]               wants_i,
   input logic [LANES-1:0]                 in_valid_i,
   input place_t [LANES-1:0]               in_place_i,
   input logic [LANES-1:0][RecordBits-1:0] in_record_i,
@@ -32,14 +35,27 @@ module fv_record_writer
   logic                       rst_n, idle, beat_ready, freed, out_valid, line;
   logic [LANES-1:0]           in_ready, taken;
   logic [3:0]                 out_strobe;
-  logic [3:0][RecordBits-1:0] out_data;
+  logic [Records-1:0][RecordBits-1:0] out_data;
   logic [BEAT_BITS-1:0]       out_beat;
   record_beat_t               beat;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
+  // A place's record among those of its beat, and quarters of records.
+
+  function automatic logic [1:0] record_of(place_t place);
+    return place.quarter >> (Quarters - 1);
+  endfunction
+
+  function automatic logic [3:0] quarters_of(logic [Records-1:0] records);
+    for (int unsigned q = 0; q < 4; q++) begin
+      quarters_of[q] = records[q/Quarters];
+    end
+  endfunction
+
   flk_record_writer #(
-    .RecordBits(RecordBits)
+    .RecordBits(RecordBits),
+    .Quarters  (Quarters)
   ) dut (
     .clk_i,
     .rst_ni      (rst_n),
@@ -66,11 +82,11 @@ module fv_record_writer
 
   logic [PLACE_BEAT_BITS-1:0]   oldest_q, item_q, next;
   logic [CountBits-1:0]         assigned_q, known_q;  // not freed; of these with item
-  logic [Beats-1:0][3:0]        wants_q, to_come_q;   // quarters; of these not taken
+  logic [Beats-1:0][Records-1:0] wants_q, to_come_q;  // records; of these not taken
 
   assign next = oldest_q + PLACE_BEAT_BITS'(assigned_q);
   assign item_q = oldest_q + PLACE_BEAT_BITS'(known_q);
-  assign beat = '{beat: beat_i, quarters: wants_q[item_q]};
+  assign beat = '{beat: beat_i, quarters: quarters_of(wants_q[item_q])};
 
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
@@ -84,7 +100,7 @@ module fv_record_writer
       known_q    <= known_q + CountBits'(beat_valid_i) - CountBits'(freed);
       for (int unsigned k = 0; k < LANES; k++) begin
         if (taken[k]) begin
-          to_come_q[in_place_i[k].beat][in_place_i[k].quarter] <= 1'b0;
+          to_come_q[in_place_i[k].beat][record_of(in_place_i[k])] <= 1'b0;
         end
       end
       if (assign_i) begin
@@ -121,7 +137,8 @@ module fv_record_writer
       assume (!assign_i || assigned_q < CountBits'(Beats) && wants_i != '0);
       assume (!beat_valid_i || known_q < assigned_q);
       for (int unsigned k = 0; k < LANES; k++) begin
-        assume (!in_valid_i[k] || to_come_q[in_place_i[k].beat][in_place_i[k].quarter]);
+        assume (!in_valid_i[k] || to_come_q[in_place_i[k].beat][record_of(in_place_i[k])]);
+        assume (!in_valid_i[k] || in_place_i[k].quarter == record_of(in_place_i[k]) << (Quarters - 1));
         assume (!offered_q[k] ||
                 in_valid_i[k] && in_place_i[k] == place_q[k] && in_record_i[k] == record_q[k]);
         for (int unsigned j = 0; j < k; j++) begin
@@ -159,7 +176,7 @@ module fv_record_writer
   // The chosen record: lines that leave before its own.
 
   logic                  follow_q;
-  logic [1:0]            lane_q, quarter_q;
+  logic [1:0]            lane_q, which_q;
   logic [CountBits-1:0]  ahead_q, ahead;
   logic [PLACE_BEAT_BITS-1:0] head;  // first beat that is not read
   logic [RecordBits-1:0] value_q;
@@ -184,7 +201,7 @@ module fv_record_writer
       ahead_q <= ahead_q - CountBits'(line);
     end else begin
       ahead_q   <= ahead;
-      quarter_q <= in_place_i[lane_q].quarter;
+      which_q   <= record_of(in_place_i[lane_q]);
       value_q   <= in_record_i[lane_q];
     end
   end
@@ -197,8 +214,8 @@ module fv_record_writer
 
   logic [CountBits-1:0]                       items, waiting;  // with the output register; without
   logic [Beats:0][BEAT_BITS+3:0]              item;            // oldest first
-  logic [3:0][Beats-1:0]                      there;
-  logic [3:0][Beats-1:0][RecordBits-1:0]      stored;
+  logic [Records-1:0][Beats-1:0]              there;
+  logic [Records-1:0][Beats-1:0][RecordBits-1:0] stored;
   logic                                       fetched;
   logic [PLACE_BEAT_BITS:0]                   used;
   logic [PLACE_BEAT_BITS-1:0]                 follow_at;
@@ -213,10 +230,10 @@ module fv_record_writer
     assign item[i] = fetched && i == 0 ? dut.i_beats.out_q
                    : dut.i_beats.words_q[PLACE_BEAT_BITS'(i) - PLACE_BEAT_BITS'(fetched)];
   end
-  for (genvar q = 0; q < 4; q++) begin : gen_stored
-    assign there[q] = dut.gen_quarter[q].there_q;
+  for (genvar r = 0; r < Records; r++) begin : gen_stored
+    assign there[r] = dut.gen_record[r].there_q;
     for (genvar b = 0; b < Beats; b++) begin : gen_beat
-      assign stored[q][b] = dut.gen_quarter[q].i_records.storage_q[b];
+      assign stored[r][b] = dut.gen_record[r].i_records.storage_q[b];
     end
   end
 
@@ -225,7 +242,8 @@ module fv_record_writer
       // The specification.
       a_room: assert (beat_ready);
       if (follow_q && ahead_q == '0 && out_valid) begin
-        a_record: assert (out_strobe[quarter_q] && out_data[quarter_q] == value_q);
+        a_record: assert (out_strobe == (out_strobe | quarters_of(Records'(1) << which_q)) &&
+                          out_data[which_q] == value_q);
       end
       if (idle) begin
         a_idle: assert (!follow_q && entries == '0);
@@ -244,10 +262,13 @@ module fv_record_writer
           l_kept: assert (item[beat_ahead - CountBits'(out_valid)] == watched);
         end
       end
+      if (follow_q) begin
+        l_which: assert (32'(which_q) < Records);
+      end
       if (follow_q && !(ahead_q == '0 && out_valid)) begin
         l_ahead: assert (ahead_q - CountBits'(out_valid) < assigned_q - CountBits'(freed));
-        l_there: assert (there[quarter_q][follow_at] && wants_q[follow_at][quarter_q]);
-        l_value: assert (stored[quarter_q][follow_at] == value_q);
+        l_there: assert (there[which_q][follow_at] && wants_q[follow_at][which_q]);
+        l_value: assert (stored[which_q][follow_at] == value_q);
       end
 
       c_ring: cover (follow_q && ahead_q == CountBits'(Beats) && line);
@@ -258,37 +279,39 @@ module fv_record_writer
   for (genvar b = 0; b < Beats; b++) begin : gen_place
     logic [PLACE_BEAT_BITS-1:0] distance;
     logic                       live;
+    logic [Records-1:0]         here;
     assign distance = PLACE_BEAT_BITS'(b) - head;
     assign live     = CountBits'(distance) < assigned_q - CountBits'(freed);
+    for (genvar r = 0; r < Records; r++) begin : gen_here
+      assign here[r] = there[r][b];
+    end
     always_comb begin
       if (rst_n) begin
         if (live) begin
           l_wants: assert (wants_q[b] != '0 && (to_come_q[b] & ~wants_q[b]) == '0);
-          l_records: assert ({there[3][b], there[2][b], there[1][b], there[0][b]} ==
-                             (wants_q[b] & ~to_come_q[b]));
+          l_records: assert (here == (wants_q[b] & ~to_come_q[b]));
         end else begin
-          l_none: assert (to_come_q[b] == '0 && !there[3][b] && !there[2][b] && !there[1][b] &&
-                          !there[0][b]);
+          l_none: assert (to_come_q[b] == '0 && here == '0);
         end
         if (CountBits'(distance) < waiting) begin
-          l_quarters: assert (item[distance][3:0] == wants_q[b]);
+          l_quarters: assert (item[distance][3:0] == quarters_of(wants_q[b]));
         end
       end
     end
   end
 
-  for (genvar q = 0; q < 4; q++) begin : gen_takes
+  for (genvar r = 0; r < Records; r++) begin : gen_takes
     logic [LANES-1:0] wants;
     for (genvar k = 0; k < LANES; k++) begin : gen_lane
-      assign wants[k] = in_valid_i[k] && in_place_i[k].quarter == 2'(q);
+      assign wants[k] = in_valid_i[k] && record_of(in_place_i[k]) == 2'(r);
     end
     always_comb begin
       if (rst_n) begin
         a_takes: assert (wants == '0 || (wants & in_ready) != '0);
         a_one: assert (((wants & in_ready) & ((wants & in_ready) - 1'b1)) == '0);
-        a_apart: assert (!(dut.take && dut.beat.quarters[q] && dut.written[q]) ||
-                         dut.written_at[q] != dut.head_q);
-        l_first: assert (2'(dut.gen_quarter[q].i_arbiter.first_q) < 2'(LANES));
+        a_apart: assert (!(dut.take && dut.beat.quarters[r*Quarters] && dut.written[r]) ||
+                         dut.written_at[r] != dut.head_q);
+        l_first: assert (2'(dut.gen_record[r].i_arbiter.first_q) < 2'(LANES));
       end
     end
   end

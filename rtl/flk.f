@@ -37,6 +37,7 @@ common/flk_ff_rom.sv
 common/flk_ff_rsqrt.sv
 common/flk_ff_sqrt.sv
 common/flk_ff_to_fixed.sv
+common/flk_ff_to_fp16.sv
 common/flk_fifo.sv
 common/flk_fixed_mul.sv
 common/flk_fixed_to_fp.sv
@@ -51,6 +52,7 @@ common/flk_line_writer.sv
 common/flk_log_opacity.sv
 common/flk_log_opacity_pipe.sv
 common/flk_lzc.sv
+common/flk_opacity_to_fp16.sv
 common/flk_pair_fifo.sv
 common/flk_phase_mux.sv
 common/flk_pipe_reg.sv
@@ -115,6 +117,7 @@ preproc/flk_mean_field.sv
 preproc/flk_preprocessing.sv
 preproc/flk_preprocessing_core.sv
 preproc/flk_projection.sv
+preproc/flk_projection_conic.sv
 preproc/flk_record_writer.sv
 preproc/flk_shape_field.sv
 preproc/flk_splat_band.sv

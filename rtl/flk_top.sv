@@ -19,6 +19,7 @@ module flk_top
   import flk_top_pkg::*;
 #(
   parameter  int unsigned Stage          = STAGE_CHANNELS,  // the next ones are its parameters
+  parameter  int unsigned Form           = FORM_FACTORED,   // of records too: 16 bytes, conic 32
   parameter  int unsigned Precision      = PRECISION_FIXED,
   parameter  int unsigned FifoDepth      = FIFO_DEPTH,
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
@@ -400,6 +401,7 @@ module flk_top
   logic [COUNTER_BITS-1:0]      stage_data;
 
   flk_preprocessing #(
+    .Form    (Form),
     .Pointers(Pointers),
     .IdBits  (IdBits)
   ) i_front (
@@ -470,7 +472,7 @@ module flk_top
 
   flk_rendering #(
     .Stage         (Stage),
-    .Form          (FORM_FACTORED),
+    .Form          (Form),
     .Precision     (Precision),
     .FifoDepth     (FifoDepth),
     .CtuFifoDepth  (CtuFifoDepth),
@@ -610,7 +612,7 @@ module flk_top
 
   assign to_host.descriptor_locked           = locked;
   assign to_host.capability.stage.next       = 4'(Stage);
-  assign to_host.capability.form.next        = 2'(FORM_FACTORED);
+  assign to_host.capability.form.next        = 2'(Form);
   assign to_host.capability.precision.next   = 2'(Precision);
   assign to_host.capability.vrus.next        = 4'(VrusPerChannel);
   assign to_host.capability.mask_generator.next =

@@ -477,6 +477,13 @@ def stage() -> str:
         "  if (Stage >= RENDER_STAGES) begin : gen_check_stage",
         '    $error("flk_stage: Stage must be one of STAGE_*");',
         "  end",
+        *(
+            line for name, entry in p.STAGES.items() if entry.element == p.RECORD_ELEMENT for line in (
+                f"  if (Stage == STAGE_{name.upper()} && Form != FORM_FACTORED) begin : gen_check_{name}",
+                f'    $error("flk_stage: {name} take records of 16 bytes, in factored form");',
+                "  end",
+            )
+        ),
         "",
         "  " + " else ".join(cases),
         "",

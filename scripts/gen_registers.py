@@ -25,7 +25,7 @@ from systemrdl import RDLCompiler
 from systemrdl.node import AddrmapNode, FieldNode, RegNode
 
 from flicker.markdown import table
-from flicker.params import CatMode
+from flicker.params import CatMode, Form
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "rtl" / "regs" / "flk_registers.rdl"
@@ -108,10 +108,13 @@ def c_header(top: AddrmapNode, enums: dict[str, Any]) -> str:
             if isinstance(value := field.get_property("reset"), int):
                 define(f"{name}_{field.inst_name.upper()}_RESET", f"0x{value:x}u")
         lines.append("")
-    lines.append("/* Modes of the contribution test (frame.mode). */")
-    for mode in CatMode:
-        define(f"FLK_CAT_{mode.name}", str(int(mode)))
-    lines.append("")
+    for text, prefix, values in (
+        ("Forms of the Gaussian weight and of records (capability.form).", "FORM", Form), ("Modes of the contribution test (frame.mode).", "CAT", CatMode),
+    ):
+        lines.append(f"/* {text} */")
+        for value in values:
+            define(f"FLK_{prefix}_{value.name}", str(int(value)))
+        lines.append("")
     for name, enum in enums.items():
         lines.append(f"/* {ENUMS[name][1].capitalize()}. */")
         for member in enum:

@@ -55,6 +55,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_lane": [{"Lanes": 16}, {"Lanes": 32}],
     "flk_frame_writer": [{"Lanes": 32}, {"Lanes": 128}],
     "flk_stage": [{"Stage": 1}],
+    "flk_preprocessing": [{"Form": 0}],
     "flk_rendering": [{"Stage": 1}],
     "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],

@@ -42,7 +42,7 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_MODE] = "frame: unknown mode or pixel format",
     [FLK_FRAME_ALIGN] = "frame: address or size not a multiple of 64",
     [FLK_FRAME_RANGE] = "frame: a region ends beyond 40 bits",
-    [FLK_FRAME_RECORDS] = "frame: region of records too small",
+    [FLK_FRAME_RECORDS] = "frame: region of records too small, or more records than the chip counts",
     [FLK_FRAME_CHUNKS] = "frame: chunks not 1 to 2^24",
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
@@ -69,7 +69,7 @@ static uint32_t blocks(uint32_t count, uint32_t size)
 /* Byte places of the image header. */
 enum { AT_VERSION = 8, AT_FORMAT = 10, AT_DEGREE = 12, AT_GAUSSIANS = 16, AT_CLUSTERS = 20, AT_SLOTS = 24, AT_BEATS = 28, AT_PARTS = 32 };
 enum { AT_LOW = 80, AT_HIGH = 92, AT_SIGMA = 104, AT_RESERVED = 108, AT_CRC = 252, HEADER_BYTES = 256 };
-enum { VERSION = 1, SLOT_STEP = 16, SLOT_LIMIT = 1 << 24, CLUSTER_LIMIT = 256, MAX_DEGREE = 3, TABLE_BYTES = 32, RECORD_BYTES = 16 };
+enum { VERSION = 1, SLOT_STEP = 16, SLOT_LIMIT = 1 << 24, CLUSTER_LIMIT = 256, MAX_DEGREE = 3, TABLE_BYTES = 32 };
 
 static uint32_t read16(const uint8_t *at)
 {
@@ -268,6 +268,7 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
 
 /* ---- sizes of regions ------------------------------------------------------------------------------------------------------------------- */
 
+enum { FACTORED_RECORD_BYTES = 16, CONIC_RECORD_BYTES = 32 };
 enum { WRITERS = 4, CHUNK_BYTES = 512, CHUNK_ENTRIES = 72, POINTERS_PER_LINE = 16, MAX_CHUNKS = 1 << 24 };
 
 /* Lists of each writer: every other tile in both directions. */
@@ -276,9 +277,9 @@ static uint32_t lists_of(uint32_t width, uint32_t height)
   return blocks(width, PAIR) * blocks(height, PAIR);
 }
 
-uint64_t flk_record_bytes(const flk_scene_t *scene)
+uint64_t flk_record_bytes(const flk_scene_t *scene, uint32_t form)
 {
-  return (uint64_t)scene->slots * RECORD_BYTES;
+  return (uint64_t)scene->slots * (form == FLK_FORM_CONIC ? CONIC_RECORD_BYTES : FACTORED_RECORD_BYTES);
 }
 
 uint32_t flk_list_chunks(uint32_t width, uint32_t height, uint64_t entries)
@@ -330,10 +331,11 @@ static int overlap(const span_t *a, const span_t *b)
   return a->base < b->base + b->size && b->base < a->base + a->size;
 }
 
-flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other, uint32_t lists)
+flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other, uint32_t form, uint32_t lists)
 {
   const flk_camera_t *const camera = &frame->camera;
   const flk_region_t *const region = &frame->region;
+  const uint64_t record_bytes = flk_record_bytes(frame->scene, form);
   span_t span[SPANS], others[SPANS];
 
   if (camera->width < 1 || camera->width > FLK_MAX_PICTURE || camera->height < 1 || camera->height > FLK_MAX_PICTURE)
@@ -342,7 +344,7 @@ flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other,
     return FLK_FRAME_MODE;
   if (region->chunks < 1 || region->chunks > MAX_CHUNKS)
     return FLK_FRAME_CHUNKS;
-  if (region->record_bytes < flk_record_bytes(frame->scene))
+  if (region->record_bytes < record_bytes || record_bytes / BEAT > FLK_RECORD_BEATS_VALUE_MASK)
     return FLK_FRAME_RECORDS;
   if (frame->stride < flk_least_stride(camera->width, frame->pixel_format) || frame->stride % 32 != 0 || frame->stride > FLK_STRIDE_VALUE_MASK)
     return FLK_FRAME_STRIDE;
@@ -430,7 +432,7 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   const flk_scene_t *const scene = frame->scene;
   const flk_region_t *const region = &frame->region;
   flk_camera_registers_t camera;
-  flk_status_t status = flk_frame_check(frame, other, device->lists);
+  flk_status_t status = flk_frame_check(frame, other, device->form, device->lists);
   if (status == FLK_OK)
     status = flk_camera_registers(&camera, &frame->camera);
   if (status == FLK_OK)

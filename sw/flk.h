@@ -41,7 +41,7 @@ typedef enum {
   FLK_FRAME_MODE,    /* unknown mode of the contribution test, or unknown pixel format */
   FLK_FRAME_ALIGN,   /* an address or a size that is no multiple of 64 */
   FLK_FRAME_RANGE,   /* a region that ends beyond 40 bits */
-  FLK_FRAME_RECORDS, /* region of records too small for the scene */
+  FLK_FRAME_RECORDS, /* region of records too small for the scene, or the scene too large for the chip's records */
   FLK_FRAME_CHUNKS,  /* chunks not 1 to 2^24 */
   FLK_FRAME_STRIDE,  /* stride too small, too large or no multiple of 32 */
   FLK_FRAME_OVERLAP, /* regions that overlap */
@@ -106,7 +106,8 @@ uint32_t flk_ff_bits(double x, unsigned mantissa);
 
 enum { FLK_RGB8, FLK_RGBA16F }; /* pixel format: 3 bytes over the background; red, green, blue, alpha in FP16 */
 
-uint64_t flk_record_bytes(const flk_scene_t *scene);
+/* form: of the chip (flk_device_t), FLK_FORM_*; records have 32 bytes in conic form, 16 in factored form. */
+uint64_t flk_record_bytes(const flk_scene_t *scene, uint32_t form);
 /* Chunks of each list writer for `entries` Gaussians in tiles, all together, in the worst order; two for each Gaussian of the scene are a good guess. When a frame ends with
  * list_memory, there were more: four times as many chunks, once more. */
 uint32_t flk_list_chunks(uint32_t width, uint32_t height, uint64_t entries);
@@ -139,8 +140,8 @@ typedef struct {
 } flk_frame_t;
 
 /* What would make a wrong picture or write beyond regions. other: frame that may be under way beside this one, whose region this one must not touch; or NULL.
- * lists: of a list writer of the chip (flk_device_t), 0: not known. The camera is checked by flk_frame_write. */
-flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other, uint32_t lists);
+ * form, lists: of the chip (flk_device_t); lists 0: not known. The camera is checked by flk_frame_write. */
+flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other, uint32_t form, uint32_t lists);
 
 /* ---- chip ------------------------------------------------------------------------------------------------------------------------------- */
 

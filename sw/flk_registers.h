@@ -319,6 +319,10 @@
 #define FLK_LIMIT_VALUE_SHIFT 0
 #define FLK_LIMIT_VALUE_RESET 0x0u
 
+/* Forms of the Gaussian weight and of records (capability.form). */
+#define FLK_FORM_CONIC 0
+#define FLK_FORM_FACTORED 1
+
 /* Modes of the contribution test (frame.mode). */
 #define FLK_CAT_OFF 0
 #define FLK_CAT_DENSE 1

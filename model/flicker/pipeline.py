@@ -20,7 +20,7 @@ from .golden.lanes.lists import RecordLists, float_lists, front_lists
 from .golden.lanes.render import COUNTS as LANE_COUNTS
 from .golden.lanes.render import LaneFrame, render_lanes
 from .golden.render import render_golden
-from .params import CHANNELS, CORES, Coords, Form, RenderConfig
+from .params import CHANNELS, CORES, Coords, RenderConfig
 from .progress import Steps
 from .scene.files import scene_kind
 from .scene.gaussians import Scene
@@ -136,18 +136,16 @@ def bit_true_front(view: View, config: RenderConfig, front: Front, options: Fron
     32-byte ones for the conic."""
     if config.coords is Coords.ABSOLUTE:
         raise FlickerError("coords absolute: for --front float only; records hold means in 1/128 pixel")
-    kind = RecordKind.FACTORED16 if config.form == Form.FACTORED else RecordKind.CONIC32
-    if front is Front.RTL and kind is not RecordKind.FACTORED16:
-        raise FlickerError("--front rtl: writes records of 16 bytes, for --form factored; those of the conic form come from --front golden")
+    kind = RecordKind.of(config.form)
     with steps.step("packing the scene"):
         packed = packed_scene(view, options.format)
     if front is Front.GOLDEN:
         with steps.step("preprocessing with the golden model"):
             return run_front(packed, view.camera, options.lists, kind), {}
-    with steps.step("building the front end's simulator (once)"):
-        build_front()
+    with steps.step("building the front end's simulator (once for each form)"):
+        build_front(kind=kind)
     with steps.step("preprocessing with the RTL"):
-        frame, rtl = front_frame(packed, view.camera, options.lists)
+        frame, rtl = front_frame(packed, view.camera, options.lists, kind)
     return frame, {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 

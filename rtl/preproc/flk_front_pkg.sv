@@ -26,6 +26,7 @@ package flk_front_pkg;
   localparam int unsigned CLUSTER_HEADER_LATENCY = 8;
   localparam int unsigned GEOMETRY_DECODE_LATENCY = 14;
   localparam int unsigned PROJECTION_LATENCY = 72;
+  localparam int unsigned PROJECTION_CONIC_LATENCY = 72;
   localparam int unsigned SPLAT_BOUNDS_LATENCY = 20;
   localparam int unsigned SPLAT_BAND_LATENCY = 26;
   localparam int unsigned COLOUR_BASIS_LATENCY = 20;

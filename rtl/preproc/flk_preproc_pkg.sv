@@ -97,32 +97,16 @@ package flk_preproc_pkg;
     logic [3:0][2:0][15:0]   raw;      // by coefficient, channel
   } colour_part_t;
 
-  // Where a survivor's record goes: beat and quarter of a ring of beats that are being put together.
+  // Bits of a record that are not always zero: all of 16 bytes in factored form, the lowest of 32 in conic form.
+  localparam int unsigned FACTORED_RECORD_BITS = 128;
+  localparam int unsigned CONIC_RECORD_BITS = 177;
+
+  // Where a survivor's record goes: beat and quarter of a ring of beats that are being put together. A record of 32
+  // bytes takes two quarters; the place is that of the first.
   typedef struct packed {
     logic [PLACE_BEAT_BITS-1:0] beat;
     logic [1:0]                 quarter;
   } place_t;
-
-  // What waits for a survivor's colours.
-  typedef struct packed {
-    logic [SEQ_BITS-1:0]    seq;
-    logic [NUMBER_BITS-1:0] number;
-    place_t                 place;
-    logic [23:0]            key;
-    logic                   clipped;  // the mean was saturated
-    logic                   spiky;
-    logic signed [30:0]     x;
-    logic signed [30:0]     y;
-    shape_t                 sx;
-    shape_t                 sy;
-    shape_t                 l0;
-    shape_t                 l1;
-    shape_t                 l2;
-    shape_t                 i0;
-    shape_t                 kappa;
-    shape_t                 lean;
-    colour_t [2:0]          direction;
-  } waiting_t;
 
   // A splat to be listed.
   typedef struct packed {

@@ -3,14 +3,17 @@
 // Four cores behind three AXI4 read ports (cluster table, geometry, colours) and one write port. A
 // frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
 // for a cycle when all has been written and answered, error_o and the counters then stay until the
-// next start. Everything that is written is the same for every timing.
+// next start. Everything that is written is the same for every timing. Form: records of 16 bytes in
+// factored form, or of 32 in conic form.
 // error_o: bits of FRONT_ERROR_*. An error of the memory ends the frame early where it was met;
 // a cluster beyond the records' region writes nothing; a list writer without a chunk writes no more.
 // Nothing is written outside the regions of records, lists and pointers.
 module flk_preprocessing
+  import flk_param_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
+  parameter  int unsigned Form     = FORM_FACTORED,
   parameter  int unsigned Pointers = 2048,  // lists of a writer
   parameter  int unsigned Gather   = 256,   // lines that are written together
   parameter  int unsigned IdBits   = 4,
@@ -87,12 +90,20 @@ module flk_preprocessing
   input  logic [1:0]         b_resp_i
 );
 
-  localparam int unsigned LATENCY = GEOMETRY_DECODE_LATENCY + PROJECTION_LATENCY;
+  localparam int unsigned ProjectionLatency =
+      (Form == FORM_FACTORED) ? PROJECTION_LATENCY : PROJECTION_CONIC_LATENCY;
+  localparam int unsigned Latency = GEOMETRY_DECODE_LATENCY + ProjectionLatency;
   localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS);
   localparam int unsigned RING = 1 << PLACE_BEAT_BITS;
   localparam int unsigned ListAddrBits = BEAT_BITS;
+  // A record: what is not always zero, how many quarters of a beat it takes, how many there are in a beat.
+  localparam int unsigned RecordBits =
+      (Form == FORM_FACTORED) ? FACTORED_RECORD_BITS : CONIC_RECORD_BITS;
+  localparam int unsigned Quarters = (Form == FORM_FACTORED) ? 1 : 2;
+  localparam int unsigned Records = 4 / Quarters;
+  localparam int unsigned InBeatBits = $clog2(Records);
 
-  if (GEOMETRY_DECODE_LATENCY % 2 != 0 || PROJECTION_LATENCY % 2 != 0) begin : gen_check
+  if (GEOMETRY_DECODE_LATENCY % 2 != 0 || ProjectionLatency % 2 != 0) begin : gen_check
     $error("flk_preprocessing: latencies of the front must be multiples of its interval, 2");
   end
 
@@ -257,7 +268,7 @@ module flk_preprocessing
   cluster_index_t         cluster_q, cluster, oldest, exit, exit_q;
   place_of_cluster_t [COLOUR_CLUSTERS-1:0] clusters_q;
   side_t                  side_in, side;
-  logic [LATENCY-1:0]     front_valid_q;
+  logic [Latency-1:0]     front_valid_q;
   logic                   exit_valid, go;
 
   assign cluster     = group.first ? cluster_q + 1'b1 : cluster_q;
@@ -268,7 +279,7 @@ module flk_preprocessing
   assign take_end    = group_valid && group_ready && group_end;
   // Records of a cluster beyond their region: none of its Gaussians is used.
   assign beyond      = 25'({group.cluster.first, 4'b0}) + 25'(group.cluster.last) >=
-                       25'({registers_i.record_beats, 2'b0});
+                       25'({registers_i.record_beats, {InBeatBits{1'b0}}});
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -280,7 +291,7 @@ module flk_preprocessing
     end else begin
       if (front_en) begin
         front_phase_q <= !front_phase_q;
-        front_valid_q <= {front_valid_q[LATENCY-2:0], enter};
+        front_valid_q <= {front_valid_q[Latency-2:0], enter};
       end
       if (start) begin
         cluster_q <= '1;
@@ -312,7 +323,7 @@ module flk_preprocessing
 
   flk_delay #(
     .Width($bits(side_t)),
-    .Depth(LATENCY / 2)
+    .Depth(Latency / 2)
   ) i_side (
     .clk_i,
     .en_i(front_en && !front_phase_q),
@@ -346,10 +357,11 @@ module flk_preprocessing
   logic [8:0]                        rank_q;  // survivors of the cluster so far
   logic [PLACE_BEAT_BITS-1:0]        ring_q;  // beat that is open
   logic [PLACE_BEAT_BITS:0]          taken_q; // beats told to the writer and not freed
-  logic                              freed, full, partial, colour_room, record_room;
-  logic [3:0]                        fill;
+  logic                              freed, partial, colour_room, record_room;
+  logic [3:0]                        fill;   // records of the open beat and of those behind it
+  logic [Quarters-1:0]               full;   // beats
   logic                              beat_valid, beat_ready, telling;
-  logic                              told_full_q, left_q, told_partial_q;
+  logic                              told_full_q, more_q, second_q, left_q, told_partial_q;
   logic                              gone_q, last_q, cut;
   logic [2:0]                        count_q;
   record_beat_t                      told;
@@ -359,7 +371,7 @@ module flk_preprocessing
   logic [LANES-1:0][SEQ_BITS-1:0]    seq;
   survivors_t                        survivors;
 
-  assign exit_valid = front_valid_q[LATENCY-1];
+  assign exit_valid = front_valid_q[Latency-1];
   assign alive      = side.used & ~lane_near & ~lane_outside;
   assign of         = clusters_q[side.cluster[HeaderBits-1:0]];
   assign exit       = exit_valid ? side.cluster : exit_q;
@@ -372,9 +384,9 @@ module flk_preprocessing
     end
   end
 
-  assign fill    = 4'(rank_q[1:0]) + 4'(count);  // of the open beat, before it goes
-  assign full    = fill[2];
-  assign partial = side.last && fill[1:0] != '0;
+  assign fill    = 4'(rank_q[InBeatBits-1:0]) + 4'(count);
+  assign full    = Quarters'(fill >> InBeatBits);
+  assign partial = side.last && fill[InBeatBits-1:0] != '0;
 
   // What a lane's survivor gets is known for each number of survivors before it; that number comes late.
   logic [LANES-1:0][NUMBER_BITS-1:0] numbers;
@@ -383,10 +395,10 @@ module flk_preprocessing
 
   for (genvar k = 0; k < LANES; k++) begin : gen_numbers
     logic [2:0] at;
-    assign at                = 3'(rank_q[1:0]) + 3'(k);
+    assign at                = 3'(rank_q[InBeatBits-1:0]) + 3'(k);
     assign numbers[k]        = {of.first, 4'b0} + NUMBER_BITS'(rank_q) + NUMBER_BITS'(k);
-    assign places[k].beat    = ring_q + PLACE_BEAT_BITS'(at[2]);
-    assign places[k].quarter = at[1:0];
+    assign places[k].beat    = ring_q + PLACE_BEAT_BITS'(at >> InBeatBits);
+    assign places[k].quarter = 2'(at[InBeatBits-1:0]) << (Quarters - 1);
     assign seqs[k]           = issued_q + SEQ_BITS'(k);
   end
 
@@ -405,8 +417,10 @@ module flk_preprocessing
     end
   end
 
-  // Two more beats may be needed, and the open one has a place too.
-  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - 3);
+  // So many beats may be needed at most: those of four records, the open one, and one that is told in this cycle.
+  // Behind two full beats a third one may still have to be told.
+  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - (LANES / Records + 2)) &&
+                        (Quarters == 1 || !left_q);
   assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
   assign front_en     = !exit_valid || go;
   assign front_idle   = front_valid_q == '0 && !telling && !gone_q && rank_q == '0;
@@ -440,58 +454,68 @@ module flk_preprocessing
       if (gone_q) begin
         issued_q <= issued_q + SEQ_BITS'(count_q);
         rank_q   <= last_q ? '0 : rank_q + 9'(count_q);
-        ring_q   <= ring_q + PLACE_BEAT_BITS'(told_full_q) + PLACE_BEAT_BITS'(left_q);
+        ring_q   <= ring_q + PLACE_BEAT_BITS'(told_full_q) + PLACE_BEAT_BITS'(more_q) +
+                    PLACE_BEAT_BITS'(left_q);
       end
     end
   end
 
-  // The beat that is full is told in the cycle after its group, the one that a cluster leaves open in the next, which is before
-  // the next group; where they lie is added up on the way to the writer, the lower half of the address first.
+  // A full beat is told in the cycle after its group, a second one, or the one that a cluster leaves open, in the next, which is
+  // before the next group; the open one behind two full ones a cycle later. Where they lie is added up on the way to the writer,
+  // the lower half of the address first.
   localparam int unsigned LowBits = BEAT_BITS / 2;
   localparam int unsigned HighBits = BEAT_BITS - LowBits;
+  localparam int unsigned OffsetBits = NUMBER_BITS - InBeatBits;
 
-  logic                 after_full_q;
-  logic [1:0]           fill_q;
-  logic [19:0]          first_q;
-  logic [6:0]           row_q;
-  logic [2:0]           tell_q;  // stages with a beat
-  logic [2:0][3:0]      quarters_q;
-  logic [21:0]          offset_q;  // of a beat among those of records
-  logic [LowBits:0]     low_q;
-  logic [21-LowBits:0]  offset_high_q;
-  logic [BEAT_BITS-1:0] told_beat_q;
+  logic [Quarters-1:0]           after_q;  // full beats that have been told of the group
+  logic [InBeatBits-1:0]         fill_q;
+  logic [19:0]                   first_q;
+  logic [8-InBeatBits:0]         row_q;
+  logic [2:0]                    tell_q;  // stages with a beat
+  logic [2:0][3:0]               quarters_q;
+  logic [OffsetBits-1:0]         offset_q;  // of a beat among those of records
+  logic [LowBits:0]              low_q;
+  logic [OffsetBits-1-LowBits:0] offset_high_q;
+  logic [BEAT_BITS-1:0]          told_beat_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       told_full_q    <= 1'b0;
+      more_q         <= 1'b0;
+      second_q       <= 1'b0;
       left_q         <= 1'b0;
       told_partial_q <= 1'b0;
       tell_q         <= '0;
     end else begin
-      told_full_q    <= go && full;
-      left_q         <= (go && partial) || (cut && rank_q[1:0] != '0);
-      told_partial_q <= left_q;
+      told_full_q    <= (go && full != '0) || more_q;
+      more_q         <= Quarters == 2 && go && full[Quarters-1];
+      second_q       <= more_q;
+      left_q         <= (go && partial) || (cut && rank_q[InBeatBits-1:0] != '0) ||
+                        (left_q && more_q);
+      told_partial_q <= left_q && !more_q;
       tell_q         <= {tell_q[1:0], told_full_q || told_partial_q};
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (go || cut) begin
-      fill_q  <= go ? fill[1:0] : rank_q[1:0];
-      row_q   <= rank_q[8:2];
+      fill_q  <= go ? fill[InBeatBits-1:0] : rank_q[InBeatBits-1:0];
+      row_q   <= rank_q[8:InBeatBits];
       count_q <= go ? count : '0;
       last_q  <= cut || side.last;
     end
     if (go) begin
       first_q <= of.first;
     end
-    after_full_q  <= told_full_q;
-    offset_q      <= {first_q, 2'b0} + 22'(row_q) + 22'(told_partial_q && after_full_q);
+    after_q       <= Quarters'(told_full_q) + Quarters'(second_q);
+    offset_q      <= {first_q, {4 - InBeatBits{1'b0}}} + OffsetBits'(row_q) +
+                     OffsetBits'((told_partial_q || second_q) ? after_q : '0);
     low_q         <= {1'b0, registers_i.records_beat[LowBits-1:0]} + {1'b0, offset_q[LowBits-1:0]};
-    offset_high_q <= offset_q[21:LowBits];
+    offset_high_q <= offset_q[OffsetBits-1:LowBits];
     told_beat_q   <= {registers_i.records_beat[BEAT_BITS-1:LowBits] + HighBits'(offset_high_q) +
                       HighBits'(low_q[LowBits]), low_q[LowBits-1:0]};
-    quarters_q    <= {quarters_q[1:0], told_partial_q ? (4'd1 << fill_q) - 4'd1 : 4'hf};
+    quarters_q    <= {quarters_q[1:0], told_partial_q
+                      ? (4'd1 << (2'(fill_q) << (Quarters - 1))) - 4'd1 : 4'hf};
   end
 
   assign telling       = told_full_q || left_q || told_partial_q || tell_q != '0;
@@ -543,13 +567,15 @@ module flk_preprocessing
 
   logic   [LANES-1:0]               record_valid, record_ready, entry_valid, entry_ready;
   place_t [LANES-1:0]               record_place;
-  logic   [LANES-1:0][127:0]        record;
+  logic   [LANES-1:0][RecordBits-1:0] record;
   entry_t [LANES-1:0]               entry;
   logic   [LANES-1:0][SEQ_BITS-1:0] progress;
   logic   [LANES-1:0]               saturated, clipped, faint, unlisted;
 
   for (genvar k = 0; k < LANES; k++) begin : gen_lanes
-    flk_preprocessing_core i_core (
+    flk_preprocessing_core #(
+      .Form(Form)
+    ) i_core (
       .clk_i,
       .rst_ni,
       .setup_i       (registers_i.lane),
@@ -598,19 +624,20 @@ module flk_preprocessing
   logic [BEAT_BITS-1:0] line_beat;
   logic [Width-1:0]     line_data;
   logic [3:0]           line_strobe;
+  logic [Records-1:0][RecordBits-1:0] line_record;
 
   // Lanes that want the same quarter take turns; two records of each wait, so that no lane's colours stand for
   // another's record, nor for the time of that choice.
   logic   [LANES-1:0]        queued_valid, queued_ready;
   place_t [LANES-1:0]        queued_place;
-  logic   [LANES-1:0][127:0] queued_record;
+  logic   [LANES-1:0][RecordBits-1:0] queued_record;
 
   for (genvar k = 0; k < LANES; k++) begin : gen_records
     logic       unused_full;
     logic [1:0] unused_usage;
 
     flk_fifo #(
-      .Width($bits(place_t) + 128),
+      .Width($bits(place_t) + RecordBits),
       .Depth(2)
     ) i_queue (
       .clk_i,
@@ -628,7 +655,10 @@ module flk_preprocessing
     );
   end
 
-  flk_record_writer i_records (
+  flk_record_writer #(
+    .RecordBits(RecordBits),
+    .Quarters  (Quarters)
+  ) i_records (
     .clk_i,
     .rst_ni,
     .idle_o      (records_idle),
@@ -643,9 +673,13 @@ module flk_preprocessing
     .out_valid_o (line_valid),
     .out_ready_i (line_ready),
     .out_beat_o  (line_beat),
-    .out_data_o  (line_data),
+    .out_data_o  (line_record),
     .out_strobe_o(line_strobe)
   );
+
+  for (genvar r = 0; r < Records; r++) begin : gen_line
+    assign line_data[r*(Width/Records)+:Width/Records] = (Width / Records)'(line_record[r]);
+  end
 
   // ---- lists ----------------------------------------------------------------------------------------
 

@@ -3,9 +3,10 @@
 // Front: a Gaussian as it lies in memory goes through decoding and projection. All lanes move
 // together: front_en_i, front_phase_i and the cluster's numbers come from outside, low_i and step_i
 // GEOMETRY_DECODE_LATENCY enabled cycles after the words. alive_o stands when the outputs of
-// flk_projection do; push_i then takes the survivor with its seq, record number and place;
-// ready_o: there is room for it.
-// Back: with its colours (parts, in order) a survivor becomes a record and entries of tile lists.
+// flk_projection (of records in conic form flk_projection_conic) do; push_i then takes the survivor
+// with its seq, record number and place; ready_o: there is room for it.
+// Back: with its colours (parts, in order) a survivor becomes a record in the form that Form says, and
+// entries of tile lists. record_o: without the zeros above that fill a record of 32 bytes.
 // Spherical harmonics of those that wait are ready when their colours come. progress_o: no entry of
 // this lane with a seq before it is to come; issued_i is the next seq that will be given to any lane.
 // Counters are pulses: a survivor whose mean was saturated, whose colour was clipped, whose opacity
@@ -14,12 +15,16 @@
 // four (3), a band of tiles a cycle, an entry a cycle. No combinational path from ready to ready but
 // within the streams' own stages.
 module flk_preprocessing_core
+  import flk_param_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
+  parameter  int unsigned Form       = FORM_FACTORED,
   parameter  int unsigned Waiting    = 128,  // survivors that wait for colours
   parameter  int unsigned Unfinished = 256,  // survivors that are not listed yet
-  localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS)
+  localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS),
+  localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? FACTORED_RECORD_BITS
+                                                               : CONIC_RECORD_BITS
 ) (
   input  logic                        clk_i,
   input  logic                        rst_ni,
@@ -54,7 +59,7 @@ module flk_preprocessing_core
   output logic                        record_valid_o,
   input  logic                        record_ready_i,
   output place_t                      record_place_o,
-  output logic [127:0]                record_o,
+  output logic [RecordBits-1:0]       record_o,
   // Entries
   output logic                        entry_valid_o,
   input  logic                        entry_ready_i,
@@ -68,12 +73,39 @@ module flk_preprocessing_core
   output logic                        unlisted_o
 );
 
+  if (Form != FORM_FACTORED && Form != FORM_CONIC) begin : gen_check_form
+    $error("flk_preprocessing_core: Form must be FORM_CONIC or FORM_FACTORED");
+  end
+
   // ---- front ----------------------------------------------------------------------------------------
+
+  // Of the shape in a record beside l2, which lists take too: l0, l1, or a / 2, b, c / 2.
+  localparam int unsigned Shapes = (Form == FORM_FACTORED) ? 2 : 3;
+
+  // A survivor that waits for its colours; its direction goes ahead of the rest.
+  typedef struct packed {
+    logic [SEQ_BITS-1:0]    seq;
+    logic [NUMBER_BITS-1:0] number;
+    place_t                 place;
+    logic [23:0]            key;
+    logic                   spiky;
+    logic signed [30:0]     x;
+    logic signed [30:0]     y;
+    shape_t                 sx;
+    shape_t                 sy;
+    shape_t [Shapes-1:0]    shape;
+    shape_t                 l2;
+    shape_t                 i0;
+    shape_t                 kappa;
+    shape_t                 lean;
+  } survivor_t;
 
   position_t [2:0] q;
   shape_t [2:0]    s;
   shape_t [3:0]    quat;
-  waiting_t        waiting;
+  survivor_t       survivor_in, survivor;
+  colour_t [2:0]   direction_in, direction;
+  logic            far;  // the mean was saturated
 
   flk_geometry_decode i_decode (
     .clk_i,
@@ -103,113 +135,158 @@ module flk_preprocessing_core
     .qz_o          (quat[3])
   );
 
-  flk_projection i_projection (
-    .clk_i,
-    .en_i         (front_en_i),
-    .phase_i      (front_phase_i),
-    .low_0_i      (low_i[0]),
-    .low_1_i      (low_i[1]),
-    .low_2_i      (low_i[2]),
-    .step_0_i     (step_i[0]),
-    .step_1_i     (step_i[1]),
-    .step_2_i     (step_i[2]),
-    .q_0_i        (q[0]),
-    .q_1_i        (q[1]),
-    .q_2_i        (q[2]),
-    .s_0_i        (s[0]),
-    .s_1_i        (s[1]),
-    .s_2_i        (s[2]),
-    .qw_i         (quat[0]),
-    .qx_i         (quat[1]),
-    .qy_i         (quat[2]),
-    .qz_i         (quat[3]),
-    .view_00_i    (setup_i.view[0][0]),
-    .view_01_i    (setup_i.view[0][1]),
-    .view_02_i    (setup_i.view[0][2]),
-    .view_10_i    (setup_i.view[1][0]),
-    .view_11_i    (setup_i.view[1][1]),
-    .view_12_i    (setup_i.view[1][2]),
-    .view_20_i    (setup_i.view[2][0]),
-    .view_21_i    (setup_i.view[2][1]),
-    .view_22_i    (setup_i.view[2][2]),
-    .focal_0_i    (setup_i.focal[0]),
-    .focal_1_i    (setup_i.focal[1]),
-    .row_x_0_i    (setup_i.row_x[0]),
-    .row_x_1_i    (setup_i.row_x[1]),
-    .row_x_2_i    (setup_i.row_x[2]),
-    .row_x_z_0_i  (setup_i.row_x_z[0]),
-    .row_x_z_1_i  (setup_i.row_x_z[1]),
-    .row_x_z_2_i  (setup_i.row_x_z[2]),
-    .row_y_0_i    (setup_i.row_y[0]),
-    .row_y_1_i    (setup_i.row_y[1]),
-    .row_y_2_i    (setup_i.row_y[2]),
-    .row_y_z_0_i  (setup_i.row_y_z[0]),
-    .row_y_z_1_i  (setup_i.row_y_z[1]),
-    .row_y_z_2_i  (setup_i.row_y_z[2]),
-    .limit_0_i    (setup_i.limit[0]),
-    .limit_1_i    (setup_i.limit[1]),
-    .width_i      (setup_i.width),
-    .height_i     (setup_i.height),
-    .key_shift_i,
-    .key_low_i,
-    .near_o,
-    .outside_o,
-    .far_o        (waiting.clipped),
-    .x_o          (waiting.x),
-    .y_o          (waiting.y),
-    .sx_o         (waiting.sx),
-    .sy_o         (waiting.sy),
-    .l0_o         (waiting.l0),
-    .l1_o         (waiting.l1),
-    .l2_o         (waiting.l2),
-    .spiky_o      (waiting.spiky),
-    .i0_o         (waiting.i0),
-    .kappa_o      (waiting.kappa),
-    .lean_o       (waiting.lean),
-    .key_o        (waiting.key),
-    .direction_0_o(waiting.direction[0]),
-    .direction_1_o(waiting.direction[1]),
-    .direction_2_o(waiting.direction[2])
-  );
+  if (Form == FORM_FACTORED) begin : gen_projection
+    flk_projection i_projection (
+      .clk_i,
+      .en_i         (front_en_i),
+      .phase_i      (front_phase_i),
+      .low_0_i      (low_i[0]),
+      .low_1_i      (low_i[1]),
+      .low_2_i      (low_i[2]),
+      .step_0_i     (step_i[0]),
+      .step_1_i     (step_i[1]),
+      .step_2_i     (step_i[2]),
+      .q_0_i        (q[0]),
+      .q_1_i        (q[1]),
+      .q_2_i        (q[2]),
+      .s_0_i        (s[0]),
+      .s_1_i        (s[1]),
+      .s_2_i        (s[2]),
+      .qw_i         (quat[0]),
+      .qx_i         (quat[1]),
+      .qy_i         (quat[2]),
+      .qz_i         (quat[3]),
+      .view_00_i    (setup_i.view[0][0]),
+      .view_01_i    (setup_i.view[0][1]),
+      .view_02_i    (setup_i.view[0][2]),
+      .view_10_i    (setup_i.view[1][0]),
+      .view_11_i    (setup_i.view[1][1]),
+      .view_12_i    (setup_i.view[1][2]),
+      .view_20_i    (setup_i.view[2][0]),
+      .view_21_i    (setup_i.view[2][1]),
+      .view_22_i    (setup_i.view[2][2]),
+      .focal_0_i    (setup_i.focal[0]),
+      .focal_1_i    (setup_i.focal[1]),
+      .row_x_0_i    (setup_i.row_x[0]),
+      .row_x_1_i    (setup_i.row_x[1]),
+      .row_x_2_i    (setup_i.row_x[2]),
+      .row_x_z_0_i  (setup_i.row_x_z[0]),
+      .row_x_z_1_i  (setup_i.row_x_z[1]),
+      .row_x_z_2_i  (setup_i.row_x_z[2]),
+      .row_y_0_i    (setup_i.row_y[0]),
+      .row_y_1_i    (setup_i.row_y[1]),
+      .row_y_2_i    (setup_i.row_y[2]),
+      .row_y_z_0_i  (setup_i.row_y_z[0]),
+      .row_y_z_1_i  (setup_i.row_y_z[1]),
+      .row_y_z_2_i  (setup_i.row_y_z[2]),
+      .limit_0_i    (setup_i.limit[0]),
+      .limit_1_i    (setup_i.limit[1]),
+      .width_i      (setup_i.width),
+      .height_i     (setup_i.height),
+      .key_shift_i,
+      .key_low_i,
+      .near_o,
+      .outside_o,
+      .far_o        (far),
+      .x_o          (survivor_in.x),
+      .y_o          (survivor_in.y),
+      .sx_o         (survivor_in.sx),
+      .sy_o         (survivor_in.sy),
+      .l0_o         (survivor_in.shape[0]),
+      .l1_o         (survivor_in.shape[1]),
+      .l2_o         (survivor_in.l2),
+      .spiky_o      (survivor_in.spiky),
+      .i0_o         (survivor_in.i0),
+      .kappa_o      (survivor_in.kappa),
+      .lean_o       (survivor_in.lean),
+      .key_o        (survivor_in.key),
+      .direction_0_o(direction_in[0]),
+      .direction_1_o(direction_in[1]),
+      .direction_2_o(direction_in[2])
+    );
+  end else begin : gen_projection_conic
+    flk_projection_conic i_projection (
+      .clk_i,
+      .en_i         (front_en_i),
+      .phase_i      (front_phase_i),
+      .low_0_i      (low_i[0]),
+      .low_1_i      (low_i[1]),
+      .low_2_i      (low_i[2]),
+      .step_0_i     (step_i[0]),
+      .step_1_i     (step_i[1]),
+      .step_2_i     (step_i[2]),
+      .q_0_i        (q[0]),
+      .q_1_i        (q[1]),
+      .q_2_i        (q[2]),
+      .s_0_i        (s[0]),
+      .s_1_i        (s[1]),
+      .s_2_i        (s[2]),
+      .qw_i         (quat[0]),
+      .qx_i         (quat[1]),
+      .qy_i         (quat[2]),
+      .qz_i         (quat[3]),
+      .view_00_i    (setup_i.view[0][0]),
+      .view_01_i    (setup_i.view[0][1]),
+      .view_02_i    (setup_i.view[0][2]),
+      .view_10_i    (setup_i.view[1][0]),
+      .view_11_i    (setup_i.view[1][1]),
+      .view_12_i    (setup_i.view[1][2]),
+      .view_20_i    (setup_i.view[2][0]),
+      .view_21_i    (setup_i.view[2][1]),
+      .view_22_i    (setup_i.view[2][2]),
+      .focal_0_i    (setup_i.focal[0]),
+      .focal_1_i    (setup_i.focal[1]),
+      .row_x_0_i    (setup_i.row_x[0]),
+      .row_x_1_i    (setup_i.row_x[1]),
+      .row_x_2_i    (setup_i.row_x[2]),
+      .row_x_z_0_i  (setup_i.row_x_z[0]),
+      .row_x_z_1_i  (setup_i.row_x_z[1]),
+      .row_x_z_2_i  (setup_i.row_x_z[2]),
+      .row_y_0_i    (setup_i.row_y[0]),
+      .row_y_1_i    (setup_i.row_y[1]),
+      .row_y_2_i    (setup_i.row_y[2]),
+      .row_y_z_0_i  (setup_i.row_y_z[0]),
+      .row_y_z_1_i  (setup_i.row_y_z[1]),
+      .row_y_z_2_i  (setup_i.row_y_z[2]),
+      .limit_0_i    (setup_i.limit[0]),
+      .limit_1_i    (setup_i.limit[1]),
+      .width_i      (setup_i.width),
+      .height_i     (setup_i.height),
+      .key_shift_i,
+      .key_low_i,
+      .near_o,
+      .outside_o,
+      .far_o        (far),
+      .x_o          (survivor_in.x),
+      .y_o          (survivor_in.y),
+      .sx_o         (survivor_in.sx),
+      .sy_o         (survivor_in.sy),
+      .l2_o         (survivor_in.l2),
+      .conic_0_o    (survivor_in.shape[0]),
+      .conic_1_o    (survivor_in.shape[1]),
+      .conic_2_o    (survivor_in.shape[2]),
+      .spiky_o      (survivor_in.spiky),
+      .i0_o         (survivor_in.i0),
+      .kappa_o      (survivor_in.kappa),
+      .lean_o       (survivor_in.lean),
+      .key_o        (survivor_in.key),
+      .direction_0_o(direction_in[0]),
+      .direction_1_o(direction_in[1]),
+      .direction_2_o(direction_in[2])
+    );
+  end
 
-  assign waiting.seq    = seq_i;
-  assign waiting.number = number_i;
-  assign waiting.place  = place_i;
-  assign saturated_o    = push_i && waiting.clipped;
+  assign survivor_in.seq    = seq_i;
+  assign survivor_in.number = number_i;
+  assign survivor_in.place  = place_i;
+  assign saturated_o        = push_i && far;
 
   // ---- survivors that wait --------------------------------------------------------------------------
 
-  // Directions go ahead of the rest.
-  typedef struct packed {
-    logic [SEQ_BITS-1:0]    seq;
-    logic [NUMBER_BITS-1:0] number;
-    place_t                 place;
-    logic [23:0]            key;
-    logic                   spiky;
-    logic signed [30:0]     x;
-    logic signed [30:0]     y;
-    shape_t                 sx;
-    shape_t                 sy;
-    shape_t                 l0;
-    shape_t                 l1;
-    shape_t                 l2;
-    shape_t                 i0;
-    shape_t                 kappa;
-    shape_t                 lean;
-  } survivor_t;
-
-  survivor_t       survivor_in, survivor;
-  colour_t [2:0]   direction;
   logic            survivor_valid, survivor_ready, survivor_room, survivors_empty;
   logic            direction_valid, direction_ready, direction_room, directions_empty;
   logic            seq_room;
 
-  assign survivor_in = '{
-    seq: waiting.seq, number: waiting.number, place: waiting.place, key: waiting.key,
-    spiky: waiting.spiky, x: waiting.x, y: waiting.y, sx: waiting.sx, sy: waiting.sy,
-    l0: waiting.l0, l1: waiting.l1, l2: waiting.l2, i0: waiting.i0, kappa: waiting.kappa,
-    lean: waiting.lean
-  };
   assign ready_o = survivor_room && direction_room && seq_room;
 
   flk_sram_fifo #(
@@ -237,7 +314,7 @@ module flk_preprocessing_core
     .clear_i    (1'b0),
     .in_valid_i (push_i),
     .in_ready_o (direction_room),
-    .in_data_i  (waiting.direction),
+    .in_data_i  (direction_in),
     .out_valid_o(direction_valid),
     .out_ready_i(direction_ready),
     .out_data_o (direction),
@@ -477,7 +554,8 @@ module flk_preprocessing_core
 
   localparam int unsigned TermCycles = 1 + COLOUR_TERM_LATENCY;  // behind the group's sums
   localparam int unsigned TotalBits = $bits(term_t) + 3;        // the constant part and three terms
-  localparam int unsigned Drop = TERM_FRACTION - 9;              // a record has 9 fraction bits
+  // In a record: a code of 10 bits of which 9 are fraction, or FP16.
+  localparam int unsigned ColourBits = (Form == FORM_FACTORED) ? 10 : 16;
 
   typedef struct packed {
     logic term;   // a degree has ended
@@ -492,7 +570,7 @@ module flk_preprocessing_core
   end_t [TermCycles-1:0] end_q;
   end_t                  ended;
   logic                  total_valid_q, rgb_valid_q;
-  logic [2:0][9:0]       rgb;
+  logic [2:0][ColourBits-1:0] rgb;
   logic [2:0]            clipped;
   logic                  rgb_valid, rgb_ready;
 
@@ -524,9 +602,8 @@ module flk_preprocessing_core
   for (genvar c = 0; c < 3; c++) begin : gen_channels
     term_t                       term;
     logic signed [TotalBits-1:0] total_q;
-    logic signed [TotalBits-1:0] rounded;
-    logic [9:0]                  code_q;
-    logic                        clipped_q;
+    logic [ColourBits-1:0]       code_d, code_q;
+    logic                        clipped_d, clipped_q;
 
     flk_colour_term i_term (
       .clk_i,
@@ -537,7 +614,39 @@ module flk_preprocessing_core
       .term_o   (term)
     );
 
-    assign rounded = (total_q + TotalBits'(1 << (Drop - 1))) >>> Drop;
+    if (Form == FORM_FACTORED) begin : gen_code
+      localparam int unsigned Drop = TERM_FRACTION - 9;
+      logic signed [TotalBits-1:0] rounded;
+
+      assign rounded   = (total_q + TotalBits'(1 << (Drop - 1))) >>> Drop;
+      assign clipped_d = rounded > TotalBits'(1023);
+
+      always_comb begin
+        if (rounded < 0) begin
+          code_d = '0;
+        end else begin
+          code_d = rounded > TotalBits'(1023) ? '1 : rounded[9:0];
+        end
+      end
+    end else begin : gen_fp16
+      // A colour below 2^(TotalBits - 1 - TERM_FRACTION) = 512 has its FP16 number.
+      logic [TotalBits-2:0] magnitude;
+
+      assign magnitude = total_q[TotalBits-1] ? '0 : total_q[TotalBits-2:0];
+      assign clipped_d = 1'b0;
+
+      flk_fixed_to_fp #(
+        .MagBits (TotalBits - 1),
+        .FracBits(TERM_FRACTION),
+        .ExpBits (5),
+        .ManBits (10),
+        .Fn      (1'b0)
+      ) i_colour (
+        .sign_i(1'b0),
+        .mag_i (magnitude),
+        .dst_o (code_d)
+      );
+    end
 
     always_ff @(posedge clk_i) begin
       if (colour_en && ended.term) begin
@@ -545,12 +654,8 @@ module flk_preprocessing_core
                  + TotalBits'(term);
       end
       if (colour_en) begin
-        clipped_q <= rounded > TotalBits'(1023);
-        if (rounded < 0) begin
-          code_q <= '0;
-        end else begin
-          code_q <= rounded > TotalBits'(1023) ? '1 : rounded[9:0];
-        end
+        clipped_q <= clipped_d;
+        code_q    <= code_d;
       end
     end
 
@@ -558,17 +663,17 @@ module flk_preprocessing_core
     assign clipped[c] = clipped_q;
   end
 
-  // Opacity codes come through the bounds' pipeline, which is longer: colours wait for them here, not
-  // in their pipeline, which would stand.
+  // Opacity codes of a factored record come through the bounds' pipeline, which is longer: colours wait
+  // for them here, not in their pipeline, which would stand.
   logic            rgb_room, colour_clipped;
-  logic [2:0][9:0] colour;
+  logic [2:0][ColourBits-1:0] colour;
   logic [3:0]      unused_usage_rgb;
   logic            unused_full_rgb, unused_empty_rgb;
 
   assign colour_en = !rgb_valid_q || rgb_room;
 
   flk_fifo #(
-    .Width(31),
+    .Width(1 + 3 * ColourBits),
     .Depth(8)
   ) i_rgb (
     .clk_i,
@@ -613,12 +718,11 @@ module flk_preprocessing_core
   logic                            bounded_valid, side_valid, side_empty, outside_bounds;
   logic                            bounds_en, bounds_phase_q, bounds_out, bounds_take;
   logic [SPLAT_BOUNDS_LATENCY-1:0] bounds_valid_q;
-  logic [7:0]                      code, record_code;
+  logic [7:0]                      code;
   logic                            walk_room, walk_valid, walk_ready, code_room, code_valid;
   logic                            bounded_empty, walk_empty, code_empty;
-  logic                            unused_full, unused_full_walk, unused_full_code;
+  logic                            unused_full, unused_full_walk;
   logic [1:0]                      unused_usage, unused_usage_walk;
-  logic [4:0]                      unused_usage_code;
 
   flk_fifo #(
     .Width($bits(bounded_t)),
@@ -793,14 +897,17 @@ module flk_preprocessing_core
 
   // ---- record ---------------------------------------------------------------------------------------
 
+  // Fields of a record but the colours: factored 23 bits an axis and l2, l1, l0; conic the mean as it is and, in FP16,
+  // opacity, c / 2, b, a / 2.
+  localparam int unsigned MeanBits = (Form == FORM_FACTORED) ? 23 : 31;
+  localparam int unsigned ShapeBits = (Form == FORM_FACTORED) ? 14 + 15 + 14 : 4 * 16;
+
   typedef struct packed {
-    place_t      place;
-    logic        spiky;
-    logic [13:0] l2;
-    logic [14:0] l1;
-    logic [13:0] l0;
-    logic [22:0] y;
-    logic [22:0] x;
+    place_t               place;
+    logic                 spiky;
+    logic [ShapeBits-1:0] shape;
+    logic [MeanBits-1:0]  y;
+    logic [MeanBits-1:0]  x;
   } fields_t;
 
   // The survivor stands a cycle in registers: the queue's memory is too slow for the fields.
@@ -809,14 +916,13 @@ module flk_preprocessing_core
     logic               spiky;
     logic signed [30:0] x;
     logic signed [30:0] y;
-    shape_t             l0;
-    shape_t             l1;
-    shape_t             l2;
+    shape_t [2:0]       shape;
   } recorded_t;
 
-  recorded_t recorded_q;
-  fields_t   fields_in, fields;
-  logic      fields_valid, fields_empty, fields_room, recorded_valid_q;
+  recorded_t    recorded_q;
+  shape_t [2:0] recorded_shape;
+  fields_t      fields_in, fields;
+  logic         fields_valid, fields_empty, fields_room, recorded_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -830,31 +936,15 @@ module flk_preprocessing_core
     if (survivor_ready) begin
       recorded_q <= '{
         place: survivor.place, spiky: survivor.spiky, x: survivor.x, y: survivor.y,
-        l0: survivor.l0, l1: survivor.l1, l2: survivor.l2
+        shape: recorded_shape
       };
     end
   end
 
   assign record_room = fields_room && !recorded_valid_q;
 
-  assign fields_in.place    = recorded_q.place;
-  assign fields_in.spiky    = recorded_q.spiky;
-  assign fields_in.l1[14]   = recorded_q.l1[SHAPE_MAN_BITS+8];
-
-  flk_mean_field i_x_field (.x_i(recorded_q.x), .field_o(fields_in.x));
-  flk_mean_field i_y_field (.x_i(recorded_q.y), .field_o(fields_in.y));
-  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (
-    .x_i    (recorded_q.l0),
-    .field_o(fields_in.l0)
-  );
-  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l1_field (
-    .x_i    (recorded_q.l1),
-    .field_o(fields_in.l1[13:0])
-  );
-  flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (
-    .x_i    (recorded_q.l2),
-    .field_o(fields_in.l2)
-  );
+  assign fields_in.place = recorded_q.place;
+  assign fields_in.spiky = recorded_q.spiky;
 
   flk_sram_fifo #(
     .Width($bits(fields_t)),
@@ -872,29 +962,88 @@ module flk_preprocessing_core
     .empty_o    (fields_empty)
   );
 
-  flk_fifo #(
-    .Width(8),
-    .Depth(16)
-  ) i_codes (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (bounds_out && side_valid && walk_room),
-    .in_ready_o (code_room),
-    .in_data_i  (code),
-    .out_valid_o(code_valid),
-    .out_ready_i(record_valid_o && record_ready_i),
-    .out_data_o (record_code),
-    .usage_o    (unused_usage_code),
-    .full_o     (unused_full_code),
-    .empty_o    (code_empty)
-  );
+  if (Form == FORM_FACTORED) begin : gen_factored
+    logic [7:0] record_code;
+    logic       unused_full_code;
+    logic [4:0] unused_usage_code;
+
+    assign recorded_shape       = {survivor.l2, survivor.shape};
+    assign fields_in.shape[28]  = recorded_q.shape[1][SHAPE_MAN_BITS+8];  // sign of l1
+
+    flk_mean_field i_x_field (.x_i(recorded_q.x), .field_o(fields_in.x));
+    flk_mean_field i_y_field (.x_i(recorded_q.y), .field_o(fields_in.y));
+    flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l0_field (
+      .x_i    (recorded_q.shape[0]),
+      .field_o(fields_in.shape[13:0])
+    );
+    flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l1_field (
+      .x_i    (recorded_q.shape[1]),
+      .field_o(fields_in.shape[27:14])
+    );
+    flk_shape_field #(.ManBits(SHAPE_MAN_BITS)) i_l2_field (
+      .x_i    (recorded_q.shape[2]),
+      .field_o(fields_in.shape[42:29])
+    );
+
+    flk_fifo #(
+      .Width(8),
+      .Depth(16)
+    ) i_codes (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (bounds_out && side_valid && walk_room),
+      .in_ready_o (code_room),
+      .in_data_i  (code),
+      .out_valid_o(code_valid),
+      .out_ready_i(record_valid_o && record_ready_i),
+      .out_data_o (record_code),
+      .usage_o    (unused_usage_code),
+      .full_o     (unused_full_code),
+      .empty_o    (code_empty)
+    );
+
+    assign record_o = {fields.spiky, colour, record_code, fields.shape, fields.y, fields.x};
+  end else begin : gen_conic
+    // The opacity is in the record as it is in the image, in FP16: it waits for nothing.
+    logic [15:0] opacity_q, opacity;
+
+    assign recorded_shape = survivor.shape;
+    assign code_room      = 1'b1;
+    assign code_valid     = 1'b1;
+    assign code_empty     = 1'b1;
+
+    always_ff @(posedge clk_i) begin
+      if (survivor_ready) begin
+        opacity_q <= part_q.opacity;
+      end
+    end
+
+    flk_opacity_to_fp16 i_opacity (
+      .code_i   (opacity_q[7:0]),
+      .opacity_o(opacity)
+    );
+
+    for (genvar k = 0; k < 3; k++) begin : gen_shape
+      flk_ff_to_fp16 #(
+        .ManBits(SHAPE_MAN_BITS)
+      ) i_shape (
+        .x_i(recorded_q.shape[k]),
+        .y_o(fields_in.shape[16*k+:16])
+      );
+    end
+
+    assign fields_in.shape[63:48] = setup_i.chunked ? opacity : opacity_q;
+    assign fields_in.x            = recorded_q.x;
+    assign fields_in.y            = recorded_q.y;
+
+    assign record_o = {fields.spiky, colour, fields.shape, 32'($signed(fields.y)),
+                       32'($signed(fields.x))};
+  end
 
   assign record_valid_o = rgb_valid && fields_valid && code_valid;
   assign rgb_ready      = record_ready_i && fields_valid && code_valid;
   assign record_place_o = fields.place;
-  assign record_o       = {fields.spiky, colour, record_code, fields.l2, fields.l1,
-                           fields.l0, fields.y, fields.x};
   assign clipped_o      = record_valid_o && record_ready_i && colour_clipped;
 
   assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty &&

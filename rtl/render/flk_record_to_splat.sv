@@ -215,22 +215,10 @@ module flk_record_to_splat
       );
     end
 
-    // code / 255 is the eight bits of the code, repeated without end behind the point. What follows the
-    // rounding bit is never 0, so that bit alone decides.
-    logic [3:0] zeros;
-    logic [10:0] normal;  // behind the leading one: mantissa and rounding bit
-    logic [14:0] rounded;
-
-    flk_lzc #(
-      .Width(8)
-    ) i_zeros (
-      .value_i(fields.opacity),
-      .count_o(zeros)
+    flk_opacity_to_fp16 i_opacity (
+      .code_i   (fields.opacity),
+      .opacity_o(opacity)
     );
-
-    assign normal  = 11'(({3{fields.opacity}} << zeros) >> 12);
-    assign rounded = {5'd14 - 5'(zeros), normal[10:1]} + 15'(normal[0]);
-    assign opacity = (fields.opacity == '0) ? '0 : {1'b0, rounded};
 
     assign splat.spiky           = fields.spiky;
     assign splat.feature.red     = colour[0];

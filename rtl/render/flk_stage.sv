@@ -47,6 +47,9 @@ module flk_stage
   if (Stage >= RENDER_STAGES) begin : gen_check_stage
     $error("flk_stage: Stage must be one of STAGE_*");
   end
+  if (Stage == STAGE_LANES && Form != FORM_FACTORED) begin : gen_check_lanes
+    $error("flk_stage: lanes take records of 16 bytes, in factored form");
+  end
 
   if (Stage == STAGE_CHANNELS) begin : gen_channels
     logic        [CORES-1:0] valid, ready, finished;

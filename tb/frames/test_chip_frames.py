@@ -3,8 +3,8 @@
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
-Parameter space: a stage of 32 lanes; with SLOW=1 of channels too, with modes that travel with their frame, and real scenes (tb/frames/test_rendering.py has
-the rendering half with channels). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
+Parameter space: a stage of 32 lanes; with SLOW=1 of channels too, with modes that travel with their frame, the paper's configuration, with records of 32
+bytes, and real scenes (tb/frames/test_rendering.py has the rendering half with channels). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PixelFormat, least_stride
-from flicker.golden.front.frame import OUTCOMES, FrontFrame, Outcome, run_front
+from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
+from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
-from flicker.params import CORES, CatMode, RenderConfig
+from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -43,6 +44,10 @@ from flicker.sim.memory import CHANNELS, Order, PortConfig, WriteOrder
 LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
 CONFIG = RenderConfig(stage="lanes")
 CHANNELS_CONFIG = RenderConfig()
+ALL_CONFIGS = [
+    pytest.param(config, id=name, marks=[pytest.mark.slow] * (config is not CONFIG))
+    for name, config in (("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL))
+]
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
     (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders
@@ -63,8 +68,10 @@ def small(count: int = 500) -> PackedScene:
     ), PackedFormat.CHUNK).packed
 
 
-def golden(packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8) -> tuple[FrontFrame, GoldenFrame]:
-    front = run_front(packed, view)
+def golden(
+    packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8, lists: ListKind = ListKind.ELLIPSE,
+) -> tuple[FrontFrame, GoldenFrame]:
+    front = run_front(packed, view, lists, RecordKind.of(config.form))
     return front, render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config, format_, BLUE)
 
 
@@ -72,10 +79,12 @@ def session(packed: PackedScene | None = None, **options) -> ChipSession:
     return ChipSession(small() if packed is None else packed, options.pop("config", CONFIG), seed=seed(), **options)
 
 
-def check(chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> ChipFrame:
+def check(
+    chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG, lists: ListKind = ListKind.ELLIPSE,
+) -> ChipFrame:
     """A frame by itself, with its front end's counters."""
-    done = chip.render(view, format_, background=BLUE, limit=LIMIT)
-    compare(chip, view, done, format_, config)
+    done = chip.render(view, format_, background=BLUE, lists=lists, limit=LIMIT)
+    compare(chip, view, done, format_, config, lists)
     return done
 
 
@@ -85,8 +94,11 @@ def of_cores(values: np.ndarray, cols: int) -> np.ndarray:
     return np.array([grid[k // 2 :: 2, k % 2 :: 2].sum() for k in range(CORES)])
 
 
-def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG) -> None:
-    front, want = golden(chip.packed, view, config, format_)
+def compare(
+    chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG,
+    lists: ListKind = ListKind.ELLIPSE,
+) -> None:
+    front, want = golden(chip.packed, view, config, format_, lists)
     assert done.error == 0
     assert np.array_equal(done.buffer, want.buffer)
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
@@ -95,12 +107,12 @@ def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelForm
     # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i is of sorting
     # unit i mod 4, which delivers what the core that needs most of the tile's list needs.
     counters = params.STAGES[config.stage].counters
-    taken, lists = done.stage[:, counters.index("gaussians_in")], want.frame.lists
-    lengths, needed = (of_cores(values, lists.cols) for values in (np.diff(lists.start), want.frame.needed))
+    taken, of_frame = done.stage[:, counters.index("gaussians_in")], want.frame.lists
+    lengths, needed = (of_cores(values, of_frame.cols) for values in (np.diff(of_frame.start), want.frame.needed))
     whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu" and not config.by_lanes
     assert may_be_given(taken, lengths, needed, whole).all(), (taken, needed, lengths)
     delivered = np.asarray(done.rendering["entries"])
-    least = want.frame.needed.reshape(lists.rows // 2, 2, lists.cols // 2, 2).max(axis=(1, 3)).ravel()
+    least = want.frame.needed.reshape(of_frame.rows // 2, 2, of_frame.cols // 2, 2).max(axis=(1, 3)).ravel()
     assert all(delivered[k] >= least[k::4].sum() for k in range(4)), (delivered, least)
     assert taken.sum() <= CORES * delivered.sum() and delivered.sum() <= counts["entries"]
     for name in ("blended", "pixels_finished") if config.by_lanes else ("minitiles_sent", "pixels_finished"):
@@ -109,12 +121,15 @@ def compare(chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelForm
     assert done.stamps["taken"] < done.stamps["front_done"] < done.stamps["rendering_start"] < done.stamps["rendering_done"]
 
 
-@pytest.mark.parametrize("config", [CONFIG, pytest.param(CHANNELS_CONFIG, marks=pytest.mark.slow)], ids=lambda c: c.stage)
+@pytest.mark.parametrize("config", ALL_CONFIGS)
 def test_demo_scene(config: RenderConfig) -> None:
+    """The paper's configuration with its format and lists."""
     view = load_view(DEMO, 0, (160, 90))
-    packed = packed_scene(view, PackedFormat.CHUNK)
+    format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
+    packed = packed_scene(view, format_)
     with session(packed, config=config) as chip:
-        done = check(chip, view.camera, config=config)
+        assert Form(int(chip.device.form)) is config.form
+        done = check(chip, view.camera, config=config, lists=lists)
         assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
         traffic = chip.purposes()
         assert traffic["table"].read_bytes and traffic["records"].write_bytes and not any(t.errors for t in traffic.values())
@@ -181,7 +196,7 @@ def test_back_to_back(overlap: bool) -> None:
         assert chip.field("frames", "started") == chip.field("frames", "finished") == 4
 
 
-@pytest.mark.parametrize("config", [CONFIG, pytest.param(CHANNELS_CONFIG, marks=pytest.mark.slow)], ids=lambda c: c.stage)
+@pytest.mark.parametrize("config", ALL_CONFIGS)
 def test_modes_travel_with_their_frame(config: RenderConfig) -> None:
     """Two frames under way, the second one's mode (which lanes do not have), format and background written while the first is rendered."""
     with session(config=config) as chip:
@@ -428,7 +443,7 @@ def test_silent_memory(channel: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("config", [CONFIG, CHANNELS_CONFIG], ids=lambda c: c.stage)
+@pytest.mark.parametrize("config", [pytest.param(CONFIG, id="lanes"), pytest.param(CHANNELS_CONFIG, id="channels")])
 @pytest.mark.parametrize("real,size", LARGE, ids=lambda value: value.folder if isinstance(value, RealView) else f"{value[0]}x{value[1]}")
 def test_real_scenes(real: RealView, size: tuple[int, int], config: RenderConfig) -> None:
     """With LPDDR4: all at 320x180, two at 640x360, flowers at 1280x720 (some 15 minutes)."""

@@ -373,8 +373,8 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--lists", "box"], "--lists: for --front golden and rtl only"),
     (["--front", "golden", "--faithful", "--lists", "box"], "--faithful: fixes the configuration, so it cannot be combined with --lists"),
     (["--front", "golden", "--coords", "absolute"], "coords absolute: for --front float only"),
-    (["--front", "rtl", "--form", "conic"], "--front rtl: writes records of 16 bytes, for --form factored"),
-    (["--front", "rtl", "--faithful"], "--front rtl: writes records of 16 bytes, for --form factored"),
+    (["--front", "rtl", "--stage", "lanes", "--form", "conic"], "--stage lanes: takes records of 16 bytes"),
+    (["--engine", "chip", "--stage", "lanes", "--faithful"], "--stage lanes: takes records of 16 bytes"),
 ])
 def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:
     from flicker.scene.files import save_ply
@@ -386,15 +386,21 @@ def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_command_gives_the_same_picture_with_the_rtl(tmp_path: Path) -> None:
-    """`--front rtl` against `--front golden`: builds the simulator without assertions."""
+@pytest.mark.parametrize("options", [[], ["--form", "conic"], ["--faithful"]], ids=" ".join)
+def test_command_gives_the_same_picture_with_the_rtl(options: list[str], tmp_path: Path) -> None:
+    """`--front rtl` against `--front golden`, `--engine chip` against `chip-golden`."""
     from flicker.scene.files import save_ply
 
     save_ply(random_scene(4, 3000), tmp_path / "scene.ply")
-    for front in ("golden", "rtl"):
-        result = CliRunner().invoke(app, ["render", str(tmp_path / "scene.ply"), "--size", "160x90", "--front", front, "--out", str(tmp_path / f"{front}.png")])
-        assert result.exit_code == 0, result.output
-    assert (tmp_path / "rtl.png").read_bytes() == (tmp_path / "golden.png").read_bytes()
+    for kind, names in (("--front", ("golden", "rtl")), ("--engine", ("chip-golden", "chip"))):
+        pictures = []
+        for name in names:
+            result = CliRunner().invoke(
+                app, ["render", str(tmp_path / "scene.ply"), "--size", "160x90", kind, name, "--out", str(tmp_path / f"{name}.png"), *options],
+            )
+            assert result.exit_code == 0, result.output
+            pictures.append((tmp_path / f"{name}.png").read_bytes())
+        assert pictures[0] == pictures[1]
 
 
 def test_packed_file_renders_as_its_scene(tmp_path: Path) -> None:

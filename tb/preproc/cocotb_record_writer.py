@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cocotb
@@ -10,19 +11,15 @@ from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
 from flicker_tb.bench import Bench
 
-LANES, RECORD = 4, 128
+LANES = 4
 
 
 @dataclass
 class Beat:
-    """records: by quarter, those that come."""
+    """records: by place in the beat, those that come."""
 
     address: int
     records: dict[int, int]
-
-    @property
-    def quarters(self) -> int:
-        return sum(1 << q for q in self.records)
 
 
 class Writer:
@@ -33,6 +30,9 @@ class Writer:
         self.rng = self.bench.rng
         self.place_bits = len(dut.in_place_i) // LANES
         self.ring = 1 << self.place_bits - 2
+        self.record_bits = len(dut.in_record_i) // LANES
+        self.records = len(dut.out_data_o) // self.record_bits  # of a beat
+        self.quarters = 4 // self.records  # of a record
         for name in ("in_valid", "in_place", "in_record", "beat_valid", "beat_data", "out_ready"):
             getattr(dut, f"{name}_i").value = 0
 
@@ -43,12 +43,20 @@ class Writer:
     def beats(self, count: int, full: bool = False) -> list[Beat]:
         beats = []
         for _ in range(count):
-            quarters = range(4) if full or self.rng.random() < 0.5 else self.rng.sample(range(4), self.rng.randrange(1, 5))
-            beats.append(Beat(self.rng.getrandbits(34), {q: self.rng.getrandbits(RECORD) for q in quarters}))
+            every = range(self.records)
+            come = every if full or self.rng.random() < 0.5 else self.rng.sample(every, self.rng.randrange(1, self.records + 1))
+            beats.append(Beat(self.rng.getrandbits(34), {r: self.record() for r in come}))
         return beats
 
+    def record(self) -> int:
+        return self.rng.getrandbits(self.record_bits)
+
+    def marked(self, records: Iterable[int]) -> int:
+        """Quarters of records."""
+        return sum(((1 << self.quarters) - 1) << self.quarters * r for r in records)
+
     async def run(self, beats: list[Beat], idle: list[str], stall: str, beat_idle: str = "never", shuffle: bool = True, lane_of=None, stop: int = 0) -> int:
-        """All beats; cycles from the first record's transfer to the last line's. idle: of the lanes. lane_of: (beat, quarter) to lane."""
+        """All beats; cycles from the first record's transfer to the last line's. idle: of the lanes. lane_of: (beat, record) to lane."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         lanes: list[list[tuple[int, int, int]]] = [[] for _ in range(LANES)]  # place, record
         idles, stop_line, stop_beat = [stalls.make(p, rng) for p in idle], stalls.make(stall, rng), stalls.make(beat_idle, rng)
@@ -60,19 +68,19 @@ class Writer:
         while lines < len(beats):
             while assigned < len(beats) and assigned - freed < self.ring:
                 beat, at = beats[assigned], (self.head + assigned) % self.ring
-                for q, record in beat.records.items():
-                    lanes[rng.randrange(LANES) if lane_of is None else lane_of(assigned, q)].append((at, q, record))
-                items.append(beat.address << 4 | beat.quarters)
+                for r, record in beat.records.items():
+                    lanes[rng.randrange(LANES) if lane_of is None else lane_of(assigned, r)].append((at, self.quarters * r, record))
+                items.append(beat.address << 4 | self.marked(beat.records))
                 assigned += 1
             valid = places = records = 0
             for k in range(LANES):
                 if offered[k] is None and lanes[k] and not next(idles[k]):
                     offered[k] = lanes[k].pop(rng.randrange(len(lanes[k])) if shuffle else 0)
                 shown = offered[k]
-                at, q, record = (rng.randrange(self.ring), rng.getrandbits(2), rng.getrandbits(RECORD)) if shown is None else shown
+                at, q, record = (rng.randrange(self.ring), rng.getrandbits(2), self.record()) if shown is None else shown
                 valid |= (shown is not None) << k
                 places |= (at << 2 | q) << self.place_bits * k
-                records |= record << RECORD * k
+                records |= record << self.record_bits * k
             item_offered = item_offered or bool(items and not next(stop_beat))
             ready = not next(stop_line)
             dut.in_valid_i.value, dut.in_place_i.value, dut.in_record_i.value = valid, places, records
@@ -99,8 +107,8 @@ class Writer:
                 assert held in (None, got), "line changed before its transfer"
                 held = None if ready else got
                 if ready:
-                    shown_records = {q: data >> RECORD * q & (1 << RECORD) - 1 for q in range(4) if strobe >> q & 1}
-                    assert got[0] == beat.address and shown_records == beat.records, f"line {lines}"
+                    shown_records = {r: data >> self.record_bits * r & (1 << self.record_bits) - 1 for r in beat.records}
+                    assert (got[0], strobe, shown_records) == (beat.address, self.marked(beat.records), beat.records), f"line {lines}"
                     lines += 1
                     inside -= len(shown_records)
             else:
@@ -132,27 +140,27 @@ async def records(dut, kind):
 
 
 @cocotb.test()
-async def one_quarter(dut):
-    """All lanes want the same quarter in every cycle: a record a cycle, the lanes in turn."""
+async def one_place(dut):
+    """All lanes want the same place of a beat in every cycle: a record a cycle, the lanes in turn."""
     test = Writer(dut)
     await test.reset()
-    for q in range(4):
-        beats = [Beat(n, {q: test.rng.getrandbits(RECORD)}) for n in range(120)]
+    for r in range(test.records):
+        beats = [Beat(n, {r: test.record()}) for n in range(120)]
         cycles = await test.run(beats, ["never"] * 4, "never", shuffle=False, lane_of=lambda beat, _: beat % 4)
         assert cycles <= 120 + 4, cycles
 
 
 @cocotb.test()
 async def rate(dut):
-    """Four records and a line a cycle; a line three cycles after its beat, two after its last record."""
+    """All records of a beat and a line a cycle; a line three cycles after its beat, two after its last record."""
     test = Writer(dut)
     await test.reset()
-    cycles = await test.run(test.beats(1, full=True), ["never"] * 4, "never", lane_of=lambda beat, q: q)
+    cycles = await test.run(test.beats(1, full=True), ["never"] * 4, "never", lane_of=lambda beat, r: r)
     assert cycles == 3
     beats = test.beats(2, full=True)
-    cycles = await test.run(beats, ["never"] * 4, "never", shuffle=False, lane_of=lambda beat, q: 0)  # eight cycles of records
-    assert cycles == 7 + 2
-    cycles = await test.run(test.beats(200, full=True), ["never"] * 4, "never", shuffle=False, lane_of=lambda beat, q: q)
+    cycles = await test.run(beats, ["never"] * 4, "never", shuffle=False, lane_of=lambda beat, r: 0)  # a record a cycle
+    assert cycles == 2 * test.records - 1 + 2
+    cycles = await test.run(test.beats(200, full=True), ["never"] * 4, "never", shuffle=False, lane_of=lambda beat, r: r)
     assert cycles <= 200 + 3, cycles
 
 

@@ -21,6 +21,7 @@ from flicker.front.view import DEMO, load_view
 from flicker.golden.front import colour, cull, frame, reach, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
+from flicker.params import Form
 from flicker.scene.packed import PackedFormat, PackedScene
 from flicker.scene.packing import pack
 
@@ -151,7 +152,9 @@ FIELDS = splat.Projection._fields
 
 
 @numba.njit
-def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, inverse, shift, key_low, M, N, C, out, places):
+def _projected(
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, inverse, shift, key_low, M, N, C, out, places, conic,
+):
     for j in range(len(q)):
         p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, limit,
                               width, height, const, M, N)
@@ -164,14 +167,15 @@ def _projected(low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
         out[j, 8], out[j, 9], out[j, 10] = ff_round(p.d0, C), ff_round(p.d1, C), ff_round(p.d2, C)
+        conic[j, 0], conic[j, 1], conic[j, 2] = splat.conic_one(p, N)
 
 
-def projected(s: Sample, low, step, q, scales, quat) -> tuple[np.ndarray, np.ndarray]:
+def projected(s: Sample, low, step, q, scales, quat) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
-    out, places = np.zeros((len(q), 11)), np.zeros((len(q), 7), np.int64)
+    out, places, conic = np.zeros((len(q), 11)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
     _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.limit, t.width, t.height, splat.constants(FORMATS),
-               inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places)
-    return out, places
+               inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places, conic)
+    return out, places, conic
 
 
 def projection_inputs(s: Sample) -> tuple[np.ndarray, ...]:
@@ -180,7 +184,8 @@ def projection_inputs(s: Sample) -> tuple[np.ndarray, ...]:
             np.stack([g[f"q{k}"] for k in "wxyz"], 1))
 
 
-def test_projection() -> None:
+@pytest.mark.parametrize("form", list(Form), ids=lambda form: form.name.lower())
+def test_projection(form: Form) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(3)
     real = [a[: SOME // 2] for a in projection_inputs(s)]
     n = SOME // 2
@@ -189,7 +194,7 @@ def test_projection() -> None:
     odd.append(np.stack([wild(rng, n, S, 110, 140) for _ in range(4)], 1))
     far = [triple(P, 1, 254), triple(P, 1, 254), triple(P, 1, 254), np.abs(triple(S, 1, 254)), np.stack([wild(rng, n, S) for _ in range(4)], 1)]
     inputs = [np.concatenate(parts) for parts in zip(real, odd, far)]
-    out, places = projected(s, *inputs)
+    out, places, conic = projected(s, *inputs)
     t = s.setup
     registers = {f"view_{i}{j}": t.view[i, j] for i in range(3) for j in range(3)} | {f"focal_{k}": t.focal[k] for k in range(2)}
     for name in ("row_x", "row_x_z", "row_y", "row_y_z"):
@@ -197,11 +202,15 @@ def test_projection() -> None:
     registers |= {f"limit_{k}": t.limit[k] for k in range(2)}
     registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": ff_round(s.culled.nearest, P)}
     low, step, q, scales, quat = inputs
-    got = bench("flk_projection")(
+    got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic")(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},
     )
     want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key", "far"))}
     want |= {name: out[:, k] for k, name in enumerate(("sx", "sy", "l0", "l1", "l2", "i0", "kappa", "lean"))} | of("direction", out[:, 8:])
+    if form is Form.CONIC:
+        assert (np.abs(conic[places[:, 0] == 0]) < 65504.0).all()  # FP16 holds them
+        del want["l0"], want["l1"]
+        want |= of("conic", conic)
     near = places[:, 0] == 1
     assert near.any() and not near.all() and places[~near, 1].any() and not places[~near, 1].all()
     same(got, want)
@@ -221,7 +230,7 @@ def _bounded(x, y, sx, sy, lean, code, box, width, height, logs, sigmas, cut, N,
 
 def seen(s: Sample) -> tuple[np.ndarray, np.ndarray]:
     """Projections of the sample that are neither near nor outside."""
-    out, places = projected(s, *projection_inputs(s))
+    out, places, _ = projected(s, *projection_inputs(s))
     on = (places[:, 0] == 0) & (places[:, 1] == 0)
     return out[on], places[on]
 
@@ -366,5 +375,5 @@ def test_units_are_named_in_this_file() -> None:
     from flicker.datapath.units import PIPELINES
 
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
-        "cluster_test", "cluster_header", "geometry_decode", "projection", "splat_bounds", "splat_band", "colour_basis", "colour_group", "colour_constant",
-        "colour_term")}
+        "cluster_test", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis", "colour_group",
+        "colour_constant", "colour_term")}

@@ -25,9 +25,10 @@ from flicker.arithmetic.ff import ff_bits, ff_round
 from flicker.chip_registers import REGISTERS, ResultError
 from flicker.errors import FlickerError
 from flicker.golden.frame_buffer import PixelFormat, least_stride
+from flicker.golden.front.record import RecordKind
 from flicker.golden.front.setup import CLUSTER_M, FrameSetup
 from flicker.golden.lists import CHUNK_LINES, LINE_BYTES, MAX_CHUNKS, WRITERS, list_chunks, pointer_lines
-from flicker.params import TILE, CatMode
+from flicker.params import TILE, CatMode, Form
 from flicker.scene import packed as packed_module
 from flicker.scene.camera import Camera, orbit_camera
 from flicker.scene.demo import generate
@@ -53,7 +54,7 @@ from flicker.sim.driver import (
     u16,
     u32,
 )
-from flicker.sim.preprocessing import RECORD_BYTES, Regions
+from flicker.sim.preprocessing import Regions
 
 SEED = int(os.environ.get("FLICKER_SEED", "1"))
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-ffp-contract=off")
@@ -154,8 +155,8 @@ def test_scene(lib: ctypes.CDLL, packed: PackedScene, guarded: Any) -> None:
         assert list(scene.low) == header["low"].tolist() and list(scene.high) == header["high"].tolist() and scene.sigma == header["sigma"]
     for address in (64, 1, 1 << 40, (1 << 40) - 4096 * (len(image) // 4096), 1 << 63):
         assert open_scene(lib, guarded(image), len(image), address)[0] == "IMAGE_ADDRESS"
-    regions = Regions.of(packed, camera_of(), 1)
-    assert lib.flk_record_bytes(ctypes.byref(scene)) == regions.record_bytes
+    for kind in RecordKind:
+        assert lib.flk_record_bytes(ctypes.byref(scene), int(kind.form)) == Regions.of(packed, camera_of(), 1, kind).record_bytes
 
 
 def changed(image: bytes, sealed: bool = True, **fields: Any) -> bytes:
@@ -427,14 +428,16 @@ def chip(lib: ctypes.CDLL) -> Chip:
     return chip
 
 
-def good_frame(lib: ctypes.CDLL, packed: PackedScene, width: int = 640, height: int = 360, form: int = 0) -> tuple[CFrame, CScene]:
+def good_frame(
+    lib: ctypes.CDLL, packed: PackedScene, width: int = 640, height: int = 360, form: int = 0, records: Form = Form.FACTORED,
+) -> tuple[CFrame, CScene]:
     """Regions one after the other, above 2^32; the scene must outlive the frame."""
     image = packed.image()
     data = ctypes.create_string_buffer(image, len(image))
     status, scene = open_scene(lib, ctypes.addressof(data), len(image), 0x12_3456_7000)
     assert status == "OK"
     chunks = lib.flk_list_chunks(width, height, 2 * scene.gaussians)
-    region = CRegion(chunks=chunks, record_bytes=lib.flk_record_bytes(ctypes.byref(scene)))
+    region = CRegion(chunks=chunks, record_bytes=lib.flk_record_bytes(ctypes.byref(scene), int(records)))
     region.records = scene.address + scene.bytes
     region.lists = region.records + region.record_bytes
     region.pointers = region.lists + lib.flk_list_bytes(chunks)
@@ -445,8 +448,8 @@ def good_frame(lib: ctypes.CDLL, packed: PackedScene, width: int = 640, height: 
     return frame, scene
 
 
-def check_frame(lib: ctypes.CDLL, frame: CFrame, other: CFrame | None = None, lists: int = 0) -> str:
-    return STATUSES[lib.flk_frame_check(ctypes.byref(frame), ctypes.byref(other) if other is not None else None, u32(lists))]
+def check_frame(lib: ctypes.CDLL, frame: CFrame, other: CFrame | None = None, lists: int = 0, form: Form = Form.FACTORED) -> str:
+    return STATUSES[lib.flk_frame_check(ctypes.byref(frame), ctypes.byref(other) if other is not None else None, u32(form), u32(lists))]
 
 
 def test_each_fault_of_a_frame(lib: ctypes.CDLL, chunk: PackedScene) -> None:
@@ -506,6 +509,18 @@ def test_each_fault_of_a_frame(lib: ctypes.CDLL, chunk: PackedScene) -> None:
             place(moved, far[moved])
 
 
+def test_records_of_either_form(lib: ctypes.CDLL, chunk: PackedScene) -> None:
+    """A chip of the conic form wants twice as much; more records than its register counts are refused."""
+    frame, scene = good_frame(lib, chunk)
+    assert check_frame(lib, frame) == "OK" and check_frame(lib, frame, form=Form.CONIC) == "FRAME_RECORDS"
+    frame, scene = good_frame(lib, chunk, records=Form.CONIC)
+    assert check_frame(lib, frame) == check_frame(lib, frame, form=Form.CONIC) == "OK"
+    frame.region.records, frame.region.record_bytes = 1 << 38, 1 << 36
+    for slots, fits in (((1 << 24) - 16, "OK"), (1 << 24, "FRAME_RECORDS")):
+        scene.slots = slots
+        assert check_frame(lib, frame) == "OK" and check_frame(lib, frame, form=Form.CONIC) == fits
+
+
 def test_two_frames_under_way(lib: ctypes.CDLL, chunk: PackedScene) -> None:
     first, scene = good_frame(lib, chunk)
     second, again = good_frame(lib, chunk)
@@ -550,7 +565,7 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
     region = frame.region
     for name, address in (("records", region.records), ("lists", region.lists), ("pointers", region.pointers), ("frame_buffer", frame.frame_buffer)):
         assert chip.get(f"{name}_low") | chip.get(f"{name}_high") << 32 == address
-    assert chip.get("clusters") == len(packed.table) and chip.get("record_beats") * 64 == len(packed.geometry) * RECORD_BYTES
+    assert chip.get("clusters") == len(packed.table) and chip.get("record_beats") * 64 == len(packed.geometry) * RecordKind.FACTORED16.bytes
     assert chip.get("chunks") == list_chunks(width, height, 2 * len(packed)) and chip.get("stride") == least_stride(width, form)
     for name, numbers in expected_numbers(camera_of(width, height)).items():
         assert [chip.get(name, i) for i in range(REGISTERS[name].count)] == numbers, name

@@ -56,7 +56,7 @@ def _ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
 def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     """All beats of a frame, by purpose, at the addresses of `Regions.of`. image: of `front_memory`."""
     packed, camera = frame.packed, frame.camera
-    regions = Regions.of(packed, camera, image.lists.chunks)
+    regions = Regions.of(packed, camera, image.lists.chunks, frame.kind)
     base, at = {}, (regions.image + HEADER_BYTES) // BEAT
     for name, part in packed.sections().items():
         base[name] = at

@@ -15,7 +15,7 @@ from ..golden.chip import render_chip
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
 from ..golden.lanes.render import LaneFrame
-from ..params import CHANNELS, CORES, Coords, Form, RenderConfig
+from ..params import CHANNELS, CORES, Coords, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_scene
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -61,8 +61,6 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
             sent = golden.frame.total("minitiles_sent")
             stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
         return _frame_image(golden.buffer, camera), stats
-    if config.form is not Form.FACTORED:
-        raise FlickerError("--engine chip: the front end in RTL writes records of 16 bytes, for --form factored; --engine chip-golden takes the conic form too")
     with steps.step("packing the scene"):
         packed = packed_scene(view, options.format)
     with steps.step("building the chip's simulator (once per configuration)"):
@@ -107,7 +105,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
-        "format": chip.packed.format.value, "records": RecordKind.FACTORED16.value, "clusters": chip.scene.clusters,
+        "format": chip.packed.format.value, "records": RecordKind.of(config.form).value, "clusters": chip.scene.clusters,
         "clusters_kept": chip.scene.clusters - count("culled_clusters"), "visible": count("survivors") - count("unlisted"), "list_entries": count("entries"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),

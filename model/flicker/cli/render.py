@@ -149,7 +149,7 @@ def render(
     lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
-    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU [default: {_default('form')}]")] = None,
+    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU, and of the chip's records [default: {_default('form')}]")] = None,
     fifo_depth: Annotated[int | None, typer.Option(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,

@@ -12,7 +12,7 @@ from typing import Any
 from ..arithmetic.ff import ff_round, ff_sub
 from ..golden.front import colour, cull, frame, reach, splat
 from ..golden.front.setup import CLUSTER_M, FORMATS, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
-from ..params import SUBTILE
+from ..params import SUBTILE, Form
 from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
 MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
@@ -110,7 +110,8 @@ def geometry_decode(formats: FrontFormats) -> Graph:
     return g
 
 
-def projection(formats: FrontFormats) -> Graph:
+def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
+    """form: of the shape that records get. Lists take l2 with either."""
     g = Graph()
     P, S = formats.position, formats.shape
     low, step = g.inputs("low", Ff(P), (3,)), g.inputs("step", Ff(P), (3,))
@@ -130,14 +131,22 @@ def projection(formats: FrontFormats) -> Graph:
     _name(steady)
     g.output("near", p.near)
     g.output("outside", (x0 > x1) | (y0 > y1))
-    for name in ("far", "x", "y", "sx", "sy", "l0", "l1", "l2", "spiky"):
+    factored = ("l0", "l1") if form == Form.FACTORED else ()
+    for name in ("far", "x", "y", "sx", "sy", *factored, "l2", "spiky"):
         g.output(name, getattr(p, name))
+    if form == Form.CONIC:
+        for k, value in enumerate(retrace(splat.conic_one)(p, S)):
+            g.output(f"conic_{k}", value)
     for name, value in steady._asdict().items():
         g.output(name, value)
     g.output("key", retrace(frame.depth_key)(p.t2, shift, key_low, P))
     for k, value in enumerate((p.d0, p.d1, p.d2)):
         g.output(f"direction_{k}", g.ff_round(value, formats.colour))
     return g
+
+
+def projection_conic(formats: FrontFormats) -> Graph:
+    return projection(formats, Form.CONIC)
 
 
 def bounds(formats: FrontFormats) -> Graph:
@@ -257,6 +266,10 @@ PIPELINES = [
     Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
     Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, depth key, what its bounds need."),
+    Pipeline(
+        "flk_projection_conic", 2, projection_conic,
+        "Projection of a Gaussian for records in conic form: mean, a / 2, b, c / 2, depth key, what its bounds need.",
+    ),
     Pipeline("flk_splat_bounds", 2, bounds, "Opacity code and bounds of a splat."),
     Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
     Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction."),

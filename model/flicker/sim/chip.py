@@ -19,7 +19,7 @@ from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
 from ..golden.lists import writer_columns
-from ..params import CORES, COUNTER_INDEX_BITS, TILE, Form, RenderConfig
+from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
 from . import driver, half, preprocessing, rendering
@@ -42,12 +42,9 @@ LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCount
 
 def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content."""
-    if config.form is not Form.FACTORED:
-        raise FlickerError("chip: form conic needs records of 32 bytes, which the front end in RTL does not write")
-    parameters = {name: value for name, value in config.chip_parameters().items() if name != "Form"}
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
-        "flk_top", {**parameters, "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",
+        "flk_top", {**config.chip_parameters(), "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",
     )
 
 
@@ -190,7 +187,7 @@ class ChipSession(Half):
         lib, width, height = self.driver, camera.width, camera.height
         chunks = lib.flk_list_chunks(width, height, ENTRIES * self.scene.gaussians) if chunks is None else chunks
         stride = stride or lib.flk_least_stride(width, int(format_))
-        record_bytes = lib.flk_record_bytes(ctypes.byref(self.scene))
+        record_bytes = lib.flk_record_bytes(ctypes.byref(self.scene), self.device.form)
         region = driver.CRegion(
             self.allocate(record_bytes, "records"), record_bytes, self.allocate(lib.flk_list_bytes(chunks), "lists"), chunks,
             self.allocate(lib.flk_pointer_bytes(width, height), "pointers"),

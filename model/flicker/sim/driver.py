@@ -82,6 +82,7 @@ def library() -> ctypes.CDLL:
         getattr(lib, name).restype = u32
     lib.flk_scene_open.argtypes = [ctypes.POINTER(CScene), ctypes.c_void_p, ctypes.c_size_t, u64, ctypes.c_uint]
     lib.flk_ff_bits.argtypes = [double, ctypes.c_uint]
+    lib.flk_record_bytes.argtypes = [ctypes.POINTER(CScene), u32]
     lib.flk_list_chunks.argtypes = [u32, u32, u64]
     lib.flk_pointer_bytes.argtypes = [u32, u32]
     lib.flk_frame_bytes.argtypes = [u32, u32]

@@ -25,7 +25,6 @@ from . import half
 from .half import BEAT, PAGE, Fields, Half, MemoryOptions
 from .memory import PortConfig, PurposeCounts
 
-RECORD_BYTES = 16
 PORTS = ("table", "geometry", "colour", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
@@ -55,15 +54,15 @@ class Regions:
     pointer_bytes: int
 
     @staticmethod
-    def of(packed: PackedScene, camera: Camera, chunks: int) -> Regions:
+    def of(packed: PackedScene, camera: Camera, chunks: int, kind: RecordKind = RecordKind.FACTORED16) -> Regions:
         step = lambda n: -(-n // PAGE) * PAGE  # noqa: E731
         cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
         image = 1 << 28
         records = image + step(len(packed.image()))
         slots = -(-(int(packed.first[-1]) + int(packed.counts[-1])) // SLOTS_PER_STEP) * SLOTS_PER_STEP
-        lists = records + step(slots * RECORD_BYTES)
+        lists = records + step(slots * kind.bytes)
         pointers = lists + step(max(chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES)
-        return Regions(image, records, slots * RECORD_BYTES, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
+        return Regions(image, records, slots * kind.bytes, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 
 def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int) -> Fields:
@@ -97,8 +96,8 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
 
 @dataclass(eq=False)
 class RtlFront:
-    """What a frame left. records: uint8 (slots, 16). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold noise, that of
-    `before`: records and memory as they were.
+    """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
+    noise, that of `before`: records and memory as they were.
 
     counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate.
     """
@@ -121,12 +120,12 @@ class RtlFront:
         return int(self.counters["cycles"])
 
 
-def build(pointers: int = SMALL_POINTERS) -> Path:
+def build(pointers: int = SMALL_POINTERS, kind: RecordKind = RecordKind.FACTORED16) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content.
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
-    return half.build("flk_preprocessing", {"Pointers": pointers}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
+    return half.build("flk_preprocessing", {"Form": int(kind.form), "Pointers": pointers}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -137,6 +136,7 @@ def front_rtl(
     camera: Camera,
     lists: ListKind = ListKind.ELLIPSE,
     *,
+    kind: RecordKind = RecordKind.FACTORED16,
     chunks: int,
     memory: MemoryOptions | None = None,
     regions: Regions | None = None,
@@ -147,13 +147,14 @@ def front_rtl(
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
-    chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so many times; what the last leaves counts.
+    kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
+    many times; what the last leaves counts.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
     """
-    regions = regions or Regions.of(packed, camera, chunks)
+    regions = regions or Regions.of(packed, camera, chunks, kind)
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     own = writer_columns(cols) * -(-rows // 2)
-    library = build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS)
+    library = build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS, kind)
     with Half("front end", library, dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         data = image or packed.image()
         at = regions.image
@@ -168,19 +169,21 @@ def front_rtl(
             (regions.pointers, regions.pointer_bytes, 6),
         ):
             sim.load(base, size, b"", purpose)
-        before = _records(sim, regions), _lines(sim, regions)
+        before = _records(sim, regions, kind), _lines(sim, regions)
         counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), COUNTERS, frames, limit)
         return RtlFront(
-            _records(sim, regions), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
+            _records(sim, regions, kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,
         )
 
 
-def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE) -> tuple[FrontFrame, RtlFront]:
+def front_frame(
+    packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16,
+) -> tuple[FrontFrame, RtlFront]:
     """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices."""
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     chunks = list_chunks(camera.width, camera.height, 2 * len(packed))
-    while (rtl := front_rtl(packed, camera, lists, chunks=chunks)).error >> LIST_ERROR & 1:
+    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks)).error >> LIST_ERROR & 1:
         chunks *= 4
     if rtl.error:
         raise FlickerError("front end: " + ", ".join(text for k, text in enumerate(ERRORS) if rtl.error >> k & 1))
@@ -195,7 +198,7 @@ def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.
     }
     adjusted = {"mean beyond 2^22 pixels": count["saturated"], "colour above 2 clipped": count["clipped"]}
     frame = FrontFrame(
-        camera, packed, RecordKind.FACTORED16, len(packed.table) - int(count["culled_clusters"]),
+        camera, packed, kind, len(packed.table) - int(count["culled_clusters"]),
         np.full(len(number), -1, np.int64),  # a record does not say whose it is
         number.astype(np.int64),
         rtl.records[number], key, splat.astype(np.int32), np.repeat(np.arange(cols * rows, dtype=np.int32), np.diff(read.start)), read.mask,
@@ -204,8 +207,8 @@ def front_frame(packed: PackedScene, camera: Camera, lists: ListKind = ListKind.
     return frame, rtl
 
 
-def _records(sim: Half, regions: Regions) -> np.ndarray:
-    return sim.read(regions.records, regions.record_bytes).reshape(-1, RECORD_BYTES)
+def _records(sim: Half, regions: Regions, kind: RecordKind) -> np.ndarray:
+    return sim.read(regions.records, regions.record_bytes).reshape(-1, kind.bytes)
 
 
 def _lines(sim: Half, regions: Regions) -> np.ndarray:

@@ -69,8 +69,9 @@ COMPOSED: dict[str, list[str]] = {
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
     "flk_preprocessing_core": [
-        MEMORY, "flk_geometry_decode", "flk_projection", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
+        MEMORY, "flk_geometry_decode", "flk_projection", "flk_projection_conic", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
         "flk_colour_group", "flk_colour_constant", "flk_colour_term", "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
+        "flk_opacity_to_fp16", "flk_ff_to_fp16",
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
@@ -164,6 +165,10 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
         "flk_projection": ["width_i[12]", "height_i[12]"],
+        "flk_projection_conic": ["width_i[12]", "height_i[12]"],
+        "flk_opacity_to_fp16": ["opacity_o[15]"],
+        # A record of two quarters lies at the first.
+        "flk_record_writer": [f"in_place_i[{9 * lane}]" for lane in range(4)] if parameters.get("Quarters") == 2 else [],
         "flk_splat_setup": ["record_i[127]"],  # what is spiky the lanes do not ask
         "flk_row_mask": [f"splat_i[{bit}]" for bit in range(30)],  # colours
         "flk_lane_core": [f"in_elem_i[{153 * way + 151}]" for way in range(parameters.get("InWidth", 1))],  # record_i[127]
@@ -250,6 +255,7 @@ def _ff() -> list[Unit]:
         if bits > min(FF_MAN_BITS):
             units.append(unit("flk_ff_narrow", f"{bits} to {bits - 4} bit", FromBits=bits, ManBits=bits - 4))
         units += [unit("flk_ff_ldexp", f"{bits} bit", ManBits=bits), unit("flk_ff_from_fp16", f"{bits} bit", ManBits=bits)]
+    units.append(unit("flk_ff_to_fp16", f"{FF_MAN_BITS[0]} bit", ManBits=FF_MAN_BITS[0]))
     units.append(unit("flk_fixed_mul", "13 x 14 bit", ABits=13, BBits=14, Drop=12, OutBits=14, Stages=1))
     units.append(unit("flk_phase_mux", "10 bit", Width=10))
     units.append(unit("flk_ff_rom", "recip, 19 bit", Function=0, Group=2))
@@ -315,7 +321,8 @@ def _stage() -> list[Unit]:
 def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
-        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_coefficient"), unit("flk_event_counter"),
+        unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_opacity_to_fp16"),
+        unit("flk_coefficient"), unit("flk_event_counter"),
         unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
@@ -324,10 +331,13 @@ def _front() -> list[Unit]:
         unit("flk_sort_merge", "runs of 1024, selection", Run=1024, Lists=8, Select=1), unit("flk_sorting_unit"),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_splat_input"), unit("flk_pixel_out"), unit("flk_frame_writer"), unit("flk_frame_writer", "32 lanes", Lanes=LANE_COUNTS[0]),
-        unit("flk_record_writer"), unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
-        unit("flk_entry_buffer"), unit("flk_record_cache"), unit("flk_delivery"), unit("flk_preprocessing_core"), unit("flk_preprocessing"),
+        unit("flk_record_writer"), unit("flk_record_writer", "records of 32 bytes", RecordBits=177, Quarters=2),
+        unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
+        unit("flk_entry_buffer"), unit("flk_record_cache"), unit("flk_delivery"),
+        *(unit(top, config, **form) for top in ("flk_preprocessing_core", "flk_preprocessing") for config, form in (("default", {}), ("conic", {"Form": 0}))),
         unit("flk_tile_walk"), unit("flk_axi_read_mux"), unit("flk_line_writer"),
         unit("flk_rendering", "default", **RenderConfig().chip_parameters()),
+        unit("flk_rendering", "faithful", **FAITHFUL.chip_parameters()),
         unit("flk_rendering", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()),
     ]
 
@@ -366,6 +376,7 @@ def _top() -> list[Unit]:
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
         unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_top"),
+        unit("flk_top", "faithful", **FAITHFUL.chip_parameters()),
         unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()),
     ]
 

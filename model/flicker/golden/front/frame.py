@@ -34,9 +34,9 @@ from .colour import (
 )
 from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
-from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means
+from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means, to_fp16
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
-from .splat import constants, largest_component, pixels, place_largest, project_one
+from .splat import conic_one, constants, largest_component, pixels, place_largest, project_one
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
 SCALE_HEADER_BITS = 27  # of the low end, saturated
@@ -237,8 +237,7 @@ def _splats(
         rgb = np.empty(3, np.int64)
         colour_lane(i, lanes, values, p, factor, C, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
         if conic:
-            a = ff_mul(p.rdet, p.rdet, S)
-            halves[j, 0], halves[j, 1], halves[j, 2] = 0.5 * ff_mul(p.yy, a, S), -ff_mul(p.xy, a, S), 0.5 * ff_mul(p.xx, a, S)
+            halves[j, 0], halves[j, 1], halves[j, 2] = conic_one(p, S)
             halves[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
             for k in range(3):
                 halves[j, 4 + k] = max(rgb[k], 0) / (1 << TERM_FRACTION)
@@ -385,8 +384,7 @@ def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.
     records = np.zeros((len(words), 32), np.uint8)
     records[:, :8] = words.astype("<i4").view(np.uint8)
     beyond = (np.abs(halves) > 65504.0).any(axis=1)
-    numbers = np.clip(halves, -65504.0, 65504.0).astype(np.float16)
-    records[:, 8:22] = numbers.view(np.uint8)
+    records[:, 8:22] = to_fp16(halves).view(np.uint8)
     records[:, 22] = flags[:, 2]
     adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "value beyond FP16 clamped": int(beyond.sum())}
     return records, {k: v for k, v in adjusted.items() if v}

@@ -27,6 +27,10 @@ class RecordKind(str, Enum):
     FACTORED16 = "factored-16"
     CONIC32 = "conic-32"
 
+    @staticmethod
+    def of(form: Form) -> RecordKind:
+        return RecordKind.FACTORED16 if form is Form.FACTORED else RecordKind.CONIC32
+
     @property
     def form(self) -> Form:
         return Form.FACTORED if self is RecordKind.FACTORED16 else Form.CONIC
@@ -116,6 +120,11 @@ def _decode_means(fields):
     for i in range(len(fields)):
         out[i] = decode_mean(fields[i])
     return out
+
+
+def to_fp16(numbers: np.ndarray) -> np.ndarray:
+    """float16: nearest, ties to even, at most 65504."""
+    return np.clip(numbers, -65504.0, 65504.0).astype(np.float16)
 
 
 def fp16_features(splats: Splats) -> np.ndarray:

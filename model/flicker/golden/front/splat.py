@@ -7,7 +7,8 @@ product, so that nothing cancels), and the shape comes from two reciprocal squar
 
     l2 = K / sqrt(yy)    l0 = K yy / sqrt(yy det)    l1 = -K xy / sqrt(yy det)    K^2 = log2(e) / 2
 
-so that (conic) / 2 log2(e) = L L^T with u = l0 dx + l1 dy, v = l2 dy. Sums of three are ((a + b) + c).
+so that (conic) / 2 log2(e) = L L^T with u = l0 dx + l1 dy, v = l2 dy. Sums of three are ((a + b) + c). The conic form (`conic_one`) takes the inverse of
+the covariance as it is: its determinant is the square of a reciprocal square root.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from collections import namedtuple
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_add, ff_from_int, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round, pick
+from ...arithmetic.ff import ff_add, ff_from_int, ff_ldexp, ff_mul, ff_neg, ff_recip, ff_round, ff_rsqrt, ff_sqrt, ff_sub, ff_to_fixed_round, pick
 from ...front.projection import DILATION, NEAR
 from ...params import SPIKY_AXIS_RATIO
 from .setup import MEAN_FRACTION, FrontFormats, rounded
@@ -144,6 +145,16 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
         s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy,
         radius_x, radius_y, near, far,
     )
+
+
+@numba.njit
+def conic_one(p, S):
+    """a / 2, b, c / 2 of the conic form, ff. p: Projection.
+
+    The dilation bounds them: a, c and the magnitude of b are at most 1 / DILATION, far below FP16's largest number.
+    """
+    over = ff_mul(p.rdet, p.rdet, S)
+    return ff_ldexp(ff_mul(p.yy, over, S), -1, S), ff_neg(ff_mul(p.xy, over, S)), ff_ldexp(ff_mul(p.xx, over, S), -1, S)
 
 
 @numba.njit
