@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from itertools import product
 
 import numpy as np
 
@@ -15,10 +16,11 @@ from flicker.chip.dram import DramConfig
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
-from flicker.golden.front.frame import run_front
+from flicker.golden.front.frame import ListKind, run_front
 from flicker.golden.front.memory import front_memory
+from flicker.golden.front.record import RecordKind
 from flicker.markdown import table
-from flicker.params import RenderConfig
+from flicker.params import NAMED_CONFIGS
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.packed import PackedFormat
@@ -32,13 +34,15 @@ SIZE = (640, 360)
 VIEWS = ("guitar", "stpeter")
 LIMIT = 0.1
 CHUNKS = 8000  # of a list writer: enough for these views
+# By name of the configuration: what the scene is packed in, and its lists (`flicker render`'s defaults with and without --faithful).
+BUILDS = {"default": (PackedFormat.CHUNK, ListKind.ELLIPSE), "faithful": (PackedFormat.FP16, ListKind.BOX)}
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
 
-def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS) -> list[ChipFrame]:
+def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE) -> list[ChipFrame]:
     """Three frames of one view, each started as soon as the chip takes it. chunks: of a list writer."""
     places = [chip.place(camera, chunks=chunks) for _ in range(2)]
-    frames = [chip.frame(camera, places[k % 2], tag=k + 1) for k in range(3)]
+    frames = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(3)]
     chip.start(frames[0])
     done = []
     for k, frame in enumerate(frames):
@@ -52,14 +56,16 @@ def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS) -> lis
 
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
-    config, dram = RenderConfig(), DramConfig()
-    views = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
-    for title, path, number in views:
+    dram = DramConfig()
+    places = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
+    for (name, (format_, lists)), (place, path, number) in product(BUILDS.items(), places):
+        config, title = NAMED_CONFIGS[name], f"{place}, {name}"
         view = load_view(path, number, SIZE)
         camera = view.camera
+        say(f"{title}: building the simulator")
         build(config, pointers_for(camera))
-        packed = packed_scene(view, PackedFormat.CHUNK)
-        front = run_front(packed, camera)
+        packed = packed_scene(view, format_)
+        front = run_front(packed, camera, lists, RecordKind.of(config.form))
         image = front_memory(front)
         golden = render_chip(front.subtile_lists(), config)
         first = preprocessing.estimate(front, image, dram)
@@ -67,14 +73,14 @@ def tables(say: Say) -> dict[str, str]:
         say(f"{title}: alone")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
             begin = time.process_time()
-            alone = chip.render(camera)
+            alone = chip.render(camera, lists=lists)
             seconds = time.process_time() - begin
             simulated = chip.usage().live["cycles"]
         assert alone.usage is not None
         moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
         say(f"{title}: three frames back to back")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
-            done = back_to_back(chip, camera)
+            done = back_to_back(chip, camera, lists=lists)
         for frame in (alone, *done):
             if frame.error or not np.array_equal(frame.buffer, golden.buffer):
                 raise FlickerError(f"{title}: the picture differs from the golden model's")
