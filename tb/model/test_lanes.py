@@ -12,6 +12,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 from zlib import crc32
 
+import numba
 import numpy as np
 import pytest
 from flicker_tb.command import flicker
@@ -294,6 +295,36 @@ def test_roots_are_never_too_small(formats):
     for code in range(1, 256):
         top = math.isqrt(max(int(t.bound[code]) - 1, 0))
         assert log_alpha(top, 0, t.lo[code], t) <= t.limit < log_alpha(top + 1, 0, t.lo[code], t)
+
+
+@numba.njit
+def pairs_beyond(t):
+    """Pairs of an opacity and a v, with the largest |u| that passes the lane's test: how many, and how many whose row is empty or does not reach that far."""
+    pairs = beyond = 0
+    for code in range(256):
+        u = 1 << t.uv + 2
+        for size in range(1 << t.uv + 2):
+            while u >= 0 and log_alpha(u, size, t.lo[code], t) > t.limit:
+                u -= 1
+            if u < 0:
+                break
+            for v in (size, -size):
+                y = v >> t.drop
+                least = y if y >= 0 else -1 - y
+                rest = t.mask_bound[code] - 1 - least * least
+                pairs += 1
+                if rest < 0 or u >> t.drop > root_up(rest, t):
+                    beyond += 1
+    return pairs, beyond
+
+
+@by_width
+def test_radius_holds_every_pair(formats):
+    """Steps (i) to (iii) of the proof that masks miss nothing (docs/lanes.md), gone through whole: all opacities, all v, the largest u of each."""
+    t = tables(formats)
+    pairs, beyond = pairs_beyond(t)
+    assert pairs > 1000 << formats.uv and beyond == 0
+    assert pairs_beyond(t._replace(mask_bound=t.mask_bound - (1 << 2 * formats.mask - 4)))[1] > 0  # not by a margin that would hold anything
 
 
 @by_width
