@@ -19,9 +19,9 @@ from flicker.scene.packed import PackedFormat
 
 from .common import Say, titled_views
 
-# One number of mantissa bits changed at a time.
-TRIED = [FORMATS, *(FrontFormats(position=b) for b in (15, 17, 19, 23)), *(FrontFormats(shape=b) for b in (10, 11, 15, 19)),
-         *(FrontFormats(colour=b) for b in (10, 11, 15))]
+# The default, one number of mantissa bits changed at a time, and all of them wider.
+TRIED = [FORMATS, *(FrontFormats(position=b) for b in (15, 17, 21, 23)), *(FrontFormats(shape=b) for b in (10, 13, 15, 19)),
+         *(FrontFormats(colour=b) for b in (10, 13, 15)), FrontFormats(21, 13, 13)]
 
 
 def _blended(frame: FrontFrame) -> np.ndarray:
