@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from flicker import markdown
+from flicker.cost.chip_area import UM2_PER_BIT
 from flicker.cost.stamp import LIBERTY, rtl_stamp
-from flicker.cost.synth.report import UM2_PER_BIT
 from flicker.cost.synth.run import Runner
 from flicker.cost.synth.units import MEMORY
 

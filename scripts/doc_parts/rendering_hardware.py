@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import estimate
+from flicker.chip.rendering import TileLists, estimate
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
@@ -46,6 +46,7 @@ def tables(say: Say) -> dict[str, str]:
         image = front_memory(front)
         golden = render_chip(front.subtile_lists(), config)
         row = least_stride(view.camera.width, PixelFormat.RGB8)
+        lists = TileLists.of(front, image)
         lengths = np.diff(golden.frame.lists.start)
         for name, dram in MEMORIES.items():
             say(f"{title}: {name}")
@@ -54,7 +55,7 @@ def tables(say: Say) -> dict[str, str]:
             seconds = time.process_time() - begin
             if not np.array_equal(rtl.buffer[:, :row], golden.buffer[:, :row]) or not may_be_given(rtl.given, lengths, golden.frame.needed, False).all():
                 raise FlickerError(f"{title}: the picture differs from the golden model's")
-            model = estimate(front, image, config, dram, PORT.latency, PORT.max_reads)
+            model = estimate(lists, config, dram, PORT.latency, PORT.max_reads)
             moved = {n: (BEAT if n != "records" else BEAT // 2) * (c.read_beats + c.write_beats) for n, c in rtl.traffic.items()}
             if any(moved[n] != model.bytes[n] for n in PURPOSES if n != "records"):
                 raise FlickerError(f"{title}: bytes differ from the chip model's: {moved}, {model.bytes}")

@@ -10,7 +10,7 @@ import pytest
 
 from flicker.chip import rendering as model
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import Rendering, estimate, tile_lists
+from flicker.chip.rendering import Rendering, TileLists, estimate, tile_lists
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
@@ -32,7 +32,7 @@ def frame() -> tuple[FrontFrame, FrontImage]:
 
 
 def modelled(config: RenderConfig, dram: DramConfig | None = None, **options) -> Rendering:
-    return estimate(*frame(), config, dram, **options)
+    return estimate(TileLists.of(*frame()), config, dram, **options)
 
 
 @pytest.mark.parametrize("change", [

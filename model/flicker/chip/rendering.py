@@ -12,26 +12,33 @@ order of entries within a merge, arbitration between list readers.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 
 from ..explore.generators.contribution import cat_masks
+from ..front.records import SubtileLists
 from ..golden.chip import whole_pairs
-from ..golden.frame_buffer import PAIR, PixelFormat
+from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
+from ..golden.lanes.lists import front_lists
 from ..golden.list_reader import read_tile
-from ..golden.lists import CHUNK_LINES, ENTRY_BITS
+from ..golden.lists import CHUNK_LINES, ENTRY_BITS, POINTERS_PER_LINE, pointer_place
 from ..golden.masked import render_masked
 from ..golden.render import stream_order
 from ..golden.sorting import CAPACITY, sort_list
-from ..params import CORES, TILE, CatMode, RenderConfig, vru_stages
+from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
+from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
 from ..perf.sorting import latency
+from ..sim.preprocessing import Regions
 from .constants import CLOCK_HZ
-from .dram import DramConfig
+from .dram import READ as DRAM_READ
+from .dram import WRITE as DRAM_WRITE
+from .dram import DramConfig, Stream
 
 BEAT = 64
 RECORD_LINE = 32
@@ -75,6 +82,28 @@ def _lookup(line, held, turn, ways):
 
 
 @numba.njit(cache=True)
+def _moves(line, ask, channels, interleave, page, banks, rcd, rp, ras, rrd, burst, row, activated, last, bus):
+    """The cycle in which a line of records moves on its channel of the DRAM, asked for in cycle `ask`. Requests of a channel go one after the other and leave
+    rows open; addresses and times are those of sim/dram.hpp, without its window and without what else moves. row, activated: by channel and bank; last
+    (activation), bus: by channel; times are cycles of the chip, float64."""
+    place = line * RECORD_LINE // interleave
+    channel = place % channels
+    number = (place // channels * interleave + line * RECORD_LINE % interleave) // page
+    own = number // banks
+    bank = (number ^ own) % banks
+    at = ask
+    if row[channel, bank] != own:
+        at = max(at, last[channel] + rrd)
+        if row[channel, bank] >= 0:
+            at = max(at, activated[channel, bank] + ras) + rp
+        row[channel, bank] = own
+        activated[channel, bank] = last[channel] = at
+    at = max(at, activated[channel, bank] + rcd)
+    bus[channel] = max(at, bus[channel] + burst)
+    return bus[channel]
+
+
+@numba.njit(cache=True)
 def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
     """The first cycle from t on in which core k's mask generator may take a batch: its pipeline moves, and no feature FIFO is full."""
     ring, fifo = arrived.shape[1], written.shape[2]
@@ -101,12 +130,14 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 def _frame(
     tile_start, record, mask, lines_start, chunk_entries, sort_delay, reading_start, reading_size, reading_cuts, element_start, element_mask, element_cycles,
     finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token, depth, blend,
-    out_delay, per_vru,
+    out_delay, per_vru, base, memory, missed,
 ):
-    """Cycles of a frame; lines of records; readings of each list (T,); records given to each core of each tile (T, 4).
+    """Cycles of a frame; lines of records; readings of each list (T,); records given to each core of each tile (T, 4). missed: takes the lines of records in
+    the order in which they are read.
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
-    elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros.
+    elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
+    first record; memory: of `_moves`, channels 0 for one without banks.
     """
     tiles = len(tile_start) - 1
     ring = 256
@@ -136,6 +167,8 @@ def _frame(
     # Cache
     held = np.full((sets, ways), -1, np.int64)
     turn = np.zeros(sets, np.int64)
+    open_row, activated = np.full((16, 16), -1, np.int64), np.full((16, 16), -1e9)
+    last_activated, bus = np.full(16, -1e9), np.full(16, -1e9)
     lookups, misses = 0, 0
     last_found, found_before, last_line, last_ask = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
     found_at = np.zeros(DEPTH, np.int64)
@@ -347,10 +380,13 @@ def _frame(
                     last_ask = ask
                     if refresh[0] and ask >= refresh[0] and ask % refresh[0] < refresh[1]:
                         ask += refresh[1] - ask % refresh[0]
+                    if memory[0]:
+                        ask = np.int64(np.ceil(_moves(base + line, float(ask), *memory, open_row, activated, last_activated, bus)))
                     last_line = max(ask + READ + line_latency, last_line + 1)
                     line_at[misses % PLACES] = last_line
                     come = max(come, last_line + 3)
                     line_used[misses % PLACES] = max(come, last_found)
+                    missed[misses] = line
                     misses += 1
             come = max(come, max(last_found, found_before + 1))
             # All queues have places.
@@ -399,11 +435,13 @@ def _frame(
 
 @dataclass(frozen=True, eq=False)
 class Rendering:
-    """A frame of the rendering half. bytes: by purpose. given: int64 (S,), records that a core gets of each sub-tile, in the order of `whole_pairs`."""
+    """A frame of the rendering half. bytes: by purpose. given: int64 (S,), records that a core gets of each sub-tile, in the order of `whole_pairs`.
+    traffic: bursts of the DRAM by purpose, each in its order; empty of a perfect memory."""
 
     cycles: int
     bytes: dict[str, int]
     given: np.ndarray
+    traffic: list[Stream]
 
 
 def tile_lists(frame: FrontFrame, cols: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -425,77 +463,176 @@ def frame_beats(width: int, height: int, format_: PixelFormat, stride: int) -> i
     return int(pairs * (4 + np.arange(rows) * (stride // 32) % 2).sum())
 
 
-def estimate(
-    frame: FrontFrame, image: FrontImage, config: RenderConfig, dram: DramConfig | None, latency_cycles: int = 20, reads: int = 64,
-    format_: PixelFormat = PixelFormat.RGB8, stride: int = 0,
-) -> Rendering:
-    """Cycles and bytes of a frame. dram: None: a perfect memory. latency_cycles, reads: of its ports, `PortConfig.latency` and `max_reads`."""
-    lists = whole_pairs(frame.subtile_lists())
-    cols, rows = lists.cols // 2, lists.rows // 2
-    order, core_start = stream_order(lists)
-    mask, cycles, _ = cat_masks(lists, config, order, core_start)
-    if config.mask_generator == "all":
-        mask, cycles = np.full_like(mask, 15), np.ones_like(cycles)
-    _, _, pixel_finish = render_masked(lists, order, mask, None)
-    finish, finish_op = np.empty((2, 4 * cols * rows, 4), np.int64)
-    finish_events(pixel_finish, lists.start, config.pixels_per_vru, finish, finish_op)
+@dataclass(frozen=True, eq=False)
+class TileLists:
+    """What lies in memory for the rendering half, whatever renders: lists of the walk's T tiles, `cols` in a row, in whole pairs.
 
-    def by_tile(values: np.ndarray) -> np.ndarray:
-        """Of sub-tiles, to (T, 4, ...)."""
-        parts = values.reshape(rows, 2, cols, 2, *values.shape[1:])
-        return np.ascontiguousarray(np.moveaxis(parts, 2, 1).reshape(rows * cols, CORES, *values.shape[1:]))
+    start (T + 1,), record, mask: sorted entries. lines (T,): of each list; of list t, chunks chunk_start[t] to chunk_start[t + 1] have chunk_entries entries,
+    and readings reading_start[t] and on take reading_size entries after reading_cuts cuts. addresses: lines of all lists, in the order of the walk.
+    """
 
-    start, record, entry_mask = tile_lists(frame, cols)
-    picture = -(-lists.width // TILE)
-    listed = (np.arange(rows * cols) % cols < picture).astype(np.bool_)
-    tables = image.lists
-    chunks: list[int] = []
-    chunk_start, lines = [0], np.zeros(rows * cols, np.int64)
-    reading_start, sizes, cuts = [0], [], []
-    for t in range(rows * cols):
-        length = int(start[t + 1] - start[t])
-        if length:
-            elements = read_tile(tables.memory, tables.pointers, tables.cols, t % cols, t // cols, tables.chunks).lines
-            lines[t] = len(elements)
-            used = [line.used for line in elements]
-            first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
-            chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
-            if length > CAPACITY:
-                entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in elements for k in range(line.used)]
-                found = sort_list(np.array(entries, np.uint64)).readings
-                sizes += [len(r.gathered) for r in found]
-                cuts += [len(r.limits) for r in found]
+    frame: FrontFrame
+    lists: SubtileLists
+    cols: int
+    rows: int
+    start: np.ndarray
+    record: np.ndarray
+    mask: np.ndarray
+    lines: np.ndarray
+    addresses: np.ndarray
+    chunk_start: np.ndarray
+    chunk_entries: np.ndarray
+    reading_start: np.ndarray
+    reading_size: np.ndarray
+    reading_cuts: np.ndarray
+    regions: Regions
+
+    @staticmethod
+    def of(frame: FrontFrame, image: FrontImage) -> TileLists:
+        cols, rows = -(-frame.camera.width // PAIR) * (PAIR // TILE), -(-frame.camera.height // TILE)
+        start, record, mask = tile_lists(frame, cols)
+        tables = image.lists
+        chunks: list[int] = []
+        addresses: list[np.ndarray] = []
+        chunk_start, lines = [0], np.zeros(rows * cols, np.int64)
+        reading_start, sizes, cuts = [0], [], []
+        for t in range(rows * cols):
+            length = int(start[t + 1] - start[t])
+            if length:
+                read = read_tile(tables.memory, tables.pointers, tables.cols, t % cols, t // cols, tables.chunks)
+                lines[t] = len(read.lines)
+                addresses += [first + np.arange(count) for first, count in read.requests]
+                used = [line.used for line in read.lines]
+                first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
+                chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
+                if length > CAPACITY:
+                    entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in read.lines for k in range(line.used)]
+                    found = sort_list(np.array(entries, np.uint64)).readings
+                    sizes += [len(r.gathered) for r in found]
+                    cuts += [len(r.limits) for r in found]
+                else:
+                    sizes.append(length)
+                    cuts.append(0)
             else:
-                sizes.append(length)
+                sizes.append(0)
                 cuts.append(0)
-        else:
-            sizes.append(0)
-            cuts.append(0)
-        chunk_start.append(len(chunks))
-        reading_start.append(len(sizes))
-    delay = np.array([latency(min(int(n), CAPACITY)) for n in np.diff(start)])
-    # Rows stay open: an access finds another one than its own.
-    other_row = -(-dram.trp * CLOCK_HZ // (dram.rate // 2)) if dram else 0
+            chunk_start.append(len(chunks))
+            reading_start.append(len(sizes))
+        return TileLists(
+            frame, whole_pairs(frame.subtile_lists()), cols, rows, start, record, mask, lines,
+            np.concatenate([np.zeros(0, np.int64), *addresses]), np.array(chunk_start), np.array(chunks, np.int64), np.array(reading_start), np.array(sizes),
+            np.array(cuts), Regions.of(frame.packed, frame.camera, tables.chunks, frame.kind),
+        )
 
-    def alone(size: int) -> int:
-        """Latency of a lone read."""
-        return latency_cycles + (dram.idle_cycles(size) + other_row if dram else 0)
+    def by_tile(self, values: np.ndarray) -> np.ndarray:
+        """Of sub-tiles, to (T, 4, ...)."""
+        parts = values.reshape(self.rows, 2, self.cols, 2, *values.shape[1:])
+        return np.ascontiguousarray(np.moveaxis(parts, 2, 1).reshape(self.rows * self.cols, CORES, *values.shape[1:]))
 
-    refresh = tuple(clocks * CLOCK_HZ // (dram.rate // 2) for clocks in (dram.trefi, dram.trfc)) if dram and dram.refresh else (0, 0)
-    blend, last = vru_stages(config.form)
-    early = config.cat != CatMode.AUTO or config.mask_generator != "ctu"
-    clock, misses, readings, given = _frame(
-        start, record, entry_mask, np.array(chunk_start), np.array(chunks, np.int64), delay, np.array(reading_start), np.array(sizes), np.array(cuts),
-        by_tile(lists.start[:-1]), mask.astype(np.int64), cycles.astype(np.int64), by_tile(finish), by_tile(finish_op), listed,
-        RECORD_LINE // frame.kind.bytes, 256, 4, READ + alone(BEAT), alone(RECORD_LINE), refresh, reads, early, config.generator.latency(config),
-        config.ctu_fifo_depth, config.generator.one_token, config.fifo_depth, blend, last + 1, config.pixels_per_vru,
+    def traffic(self, readings: np.ndarray, missed: np.ndarray, format_: PixelFormat, stride: int) -> list[Stream]:
+        """Bursts by purpose. readings (T,): of each list; missed: lines of records that are read, in order."""
+        ends = np.cumsum(self.lines)
+        first = np.repeat(ends - self.lines, readings)
+        count = np.repeat(self.lines, readings)
+        line = self.addresses[np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())]
+        cols = self.cols // 2
+        wide = PAIR * format_.bytes
+        pairs = np.repeat(np.arange(self.rows) * TILE, cols)[:, None] + np.arange(TILE)  # rows of pixels
+        base = self.regions.pointers + self.regions.pointer_bytes
+        place = base + pairs * stride + np.tile(np.arange(cols), self.rows)[:, None] * wide
+        picture = -(-self.frame.camera.width // TILE)
+        t = np.arange(self.rows * self.cols)
+        pointer = np.asarray(pointer_place(np.minimum(t % self.cols, picture - 1) + picture * (t // self.cols), picture))
+        return [
+            Stream.ranges("pointers", self.regions.pointers + BEAT * (pointer // POINTERS_PER_LINE), np.full(len(pointer), BEAT), DRAM_READ),
+            Stream.ranges("lists", self.regions.lists + BEAT * line, np.full(len(line), BEAT), DRAM_READ),
+            Stream.ranges("records", self.regions.records + RECORD_LINE * missed, np.full(len(missed), RECORD_LINE), DRAM_READ),
+            Stream.ranges("frame", place.ravel(), np.full(place.size, wide), DRAM_WRITE),
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Cores:
+    """What `_frame` needs of a rendering stage. mask, cycles: int64 (E,), mini-tiles of an element's channels, cycles of its test; finish: int (S, 64) position
+    of the element that finishes a pixel. pace: cycles that a channel takes for an element. alone: cycles of the stage if a core got a record in every cycle it
+    wants one, 0 where the pass over the frame has them."""
+
+    mask: np.ndarray
+    cycles: np.ndarray
+    finish: np.ndarray
+    pace: int
+    generator_latency: int
+    generator_fifo: int
+    one_token: bool
+    finished_after: int
+    leaves_after: int
+    alone: int = 0
+
+    @staticmethod
+    def of(tables: TileLists, config: RenderConfig) -> _Cores:
+        if config.by_lanes:
+            work = lane_work(whole_pairs(front_lists(tables.frame)))
+            ones = np.ones(int(work.start[-1]), np.int64)
+            alone = simulate_lanes(work, config.with_(in_width=1), leave=True).cycles
+            return _Cores(15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, alone)
+        lists = tables.lists
+        order, core_start = stream_order(lists)
+        mask, cycles, _ = cat_masks(lists, config, order, core_start)
+        if config.mask_generator == "all":
+            mask, cycles = np.full_like(mask, 15), np.ones_like(cycles)
+        _, _, finish = render_masked(lists, order, mask, None)
+        blend, last = vru_stages(config.form)
+        return _Cores(
+            mask.astype(np.int64), cycles.astype(np.int64), finish, config.pixels_per_vru, config.generator.latency(config), config.ctu_fifo_depth,
+            config.generator.one_token, blend, last + 1,
+        )
+
+
+def estimate(
+    tables: TileLists, config: RenderConfig, dram: DramConfig | None, latency_cycles: int = 20, reads: int = 256, format_: PixelFormat = PixelFormat.RGB8,
+    stride: int | None = None,
+) -> Rendering:
+    """Cycles and bytes of a frame. dram: None: a perfect memory. latency_cycles, reads: of the memory's ports, `PortConfig.latency` and
+    `max_reads`, by default those of `sim.chip.PORT`. stride: bytes from
+    row to row; None: as few as a row needs.
+
+    Lanes take a record a cycle each core here, and the frame as long as they need alone at least: their queues and what they wait for are not followed.
+    """
+    lists = tables.lists
+    cores = _Cores.of(tables, config)
+    subtiles = lists.cols * lists.rows
+    finish, finish_op = np.empty((2, subtiles, 4), np.int64)
+    finish_events(cores.finish, lists.start, cores.pace, finish, finish_op)
+    picture = -(-lists.width // TILE)
+    listed = (np.arange(len(tables.lines)) % tables.cols < picture).astype(np.bool_)
+    delay = np.array([latency(min(int(n), CAPACITY)) for n in np.diff(tables.start)])
+    # Rows stay open: a line of a list finds another one than its own.
+    each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
+    list_latency = latency_cycles + (dram.idle_cycles(BEAT) + math.ceil(dram.trp * each) if dram else 0)
+    line_latency = latency_cycles + (math.ceil((dram.rl + dram.burst_clocks) * each) if dram else 0)
+    memory = (
+        (dram.channels, dram.interleave_bytes, dram.page_bytes, dram.banks, *(each * t for t in (dram.trcd, dram.trp, dram.tras, dram.trrd, dram.tccd)))
+        if dram else (0, 1, 1, 1, 0.0, 0.0, 0.0, 0.0, 0.0)
     )
+    refresh = tuple(clocks * CLOCK_HZ // (dram.rate // 2) for clocks in (dram.trefi, dram.trfc)) if dram and dram.refresh else (0, 0)
+    early = config.by_lanes or config.cat != CatMode.AUTO or config.mask_generator != "ctu"
+    missed = np.empty(len(tables.record), np.int64)
+    clock, misses, readings, given = _frame(
+        tables.start, tables.record, tables.mask, tables.chunk_start, tables.chunk_entries, delay, tables.reading_start, tables.reading_size,
+        tables.reading_cuts, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
+        RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
+        cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
+        tables.regions.records // RECORD_LINE, memory, missed,
+    )
+    stride = stride or least_stride(lists.width, format_)
     moved = {
-        "lists": BEAT * int((readings * lines).sum()), "pointers": BEAT * rows * cols, "records": RECORD_LINE * int(misses),
+        "lists": BEAT * int((readings * tables.lines).sum()), "pointers": BEAT * len(tables.lines), "records": RECORD_LINE * int(misses),
         "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
     }
-    total = int(clock) + END + latency_cycles
+    total = max(int(clock), cores.alone) + END + latency_cycles
+    traffic: list[Stream] = []
     if dram:
         total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
-    grid = given.reshape(rows, cols, 2, 2).transpose(0, 2, 1, 3).reshape(-1)
-    return Rendering(total, moved, grid)
+        traffic = tables.traffic(readings, missed[:misses], format_, stride)
+    grid = given.reshape(tables.rows, tables.cols, 2, 2).transpose(0, 2, 1, 3).reshape(-1)
+    return Rendering(total, moved, grid, traffic)

@@ -258,7 +258,7 @@ def frame_cost(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dic
     """Cycles of each half of the chip, bytes of both by purpose."""
     image = front_memory(front)
     first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(front, image, CONFIG, dram)
+    second = rendering.estimate(rendering.TileLists.of(front, image), CONFIG, dram)
     bytes_ = dict(first.bytes)
     for name, more in second.bytes.items():
         bytes_[name] = bytes_.get(name, 0) + more

@@ -36,8 +36,8 @@ MAX_VRUS = CORES * CHANNELS * PIXEL_MASK_BITS
 
 @dataclass(frozen=True)
 class Part:
-    """A synthesised unit. ge: gate equivalents. load: capacitance of its input pins without clock pins; clock_free, clock_gated: of
-    the clock pins that always toggle, and of those behind clock gates; all in inputs of the unit inverter."""
+    """A synthesised unit. ge: gate equivalents; sram_bits: of memories behind `flk_sram`, which are not in it. load: capacitance of its input pins without
+    clock pins; clock_free, clock_gated: of the clock pins that always toggle, and of those behind clock gates; all in inputs of the unit inverter."""
 
     ge: float
     mem_bits: int = 0
@@ -45,6 +45,7 @@ class Part:
     load: float = 0.0
     clock_free: float = 0.0
     clock_gated: float = 0.0
+    sram_bits: int = 0
 
 
 def _read(path: Path) -> dict[tuple[str, str], dict[str, str]]:
@@ -57,7 +58,8 @@ def parts() -> dict[tuple[str, str], Part]:
     """Synthesised parts by (unit, configuration), of this package's table, which `make synth && make docs PART=areas` writes."""
     return {
         key: Part(
-            float(row["ge"]), int(row["mem_bits"]), int(row["ff"]), *(float(row.get(name) or 0) for name in ("load", "clock_free", "clock_gated")),
+            float(row["ge"]), int(row["mem_bits"]), int(row["ff"]), sram_bits=int(row.get("sram_bits") or 0),
+            **{name: float(row.get(name) or 0) for name in ("load", "clock_free", "clock_gated")},
         )
         for key, row in _read(TABLE).items()
     }

@@ -47,42 +47,63 @@ def tile_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> Sub
     return _with_entries(lists, projected, start, entry, pairs(tiles))
 
 
+@numba.njit
+def _obb_meets(mean_x, mean_y, xx, xy, yy, x0, y0, x1, y1):
+    """Whether a splat of mean and covariance is listed in a rectangle of pixel centres, edges included."""
+    half_x, half_y = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+    mid = 0.5 * (xx + yy)
+    gap = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+    long = mid + gap
+    short = (xx * yy - xy * xy) / long
+    if long <= OBB_AXIS_RATIO**2 * short:
+        return True
+    # Unit vector of the long axis, from the row of (cov - short I) that does not vanish.
+    if xx > yy:
+        ax, ay = xx - short, xy
+    else:
+        ax, ay = xy, yy - short
+    norm = np.sqrt(ax * ax + ay * ay)
+    ax /= norm
+    ay /= norm
+    dx = mean_x - (x0 + half_x)
+    dy = mean_y - (y0 + half_y)
+    # Separating axes: the two of the oriented box and, as its own bounding box, the two of the picture.
+    e0 = _SIGMAS * np.sqrt(long)
+    e1 = _SIGMAS * np.sqrt(short)
+    return (
+        abs(dx * ax + dy * ay) <= e0 + half_x * abs(ax) + half_y * abs(ay)
+        and abs(dy * ax - dx * ay) <= e1 + half_x * abs(ay) + half_y * abs(ax)
+        and abs(dx) <= half_x + e0 * abs(ax) + e1 * abs(ay)
+        and abs(dy) <= half_y + e0 * abs(ay) + e1 * abs(ax)
+    )
+
+
 @numba.njit(parallel=True, cache=True)
 def _obb_keep(mean, cov, start, entry, cols, width, height, keep):
     for s in numba.prange(len(start) - 1):
         x0 = (s % cols) * SUBTILE
         y0 = (s // cols) * SUBTILE
-        half_x = 0.5 * (min(x0 + SUBTILE, width) - 1 - x0)
-        half_y = 0.5 * (min(y0 + SUBTILE, height) - 1 - y0)
+        x1, y1 = min(x0 + SUBTILE, width) - 1, min(y0 + SUBTILE, height) - 1
         for n in range(start[s], start[s + 1]):
             i = entry[n]
-            xx, xy, yy = cov[i, 0], cov[i, 1], cov[i, 2]
-            mid = 0.5 * (xx + yy)
-            gap = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
-            long = mid + gap
-            short = (xx * yy - xy * xy) / long
-            if long <= OBB_AXIS_RATIO**2 * short:
-                keep[n] = True
-                continue
-            # Unit vector of the long axis, from the row of (cov - short I) that does not vanish.
-            if xx > yy:
-                ax, ay = xx - short, xy
-            else:
-                ax, ay = xy, yy - short
-            norm = np.sqrt(ax * ax + ay * ay)
-            ax /= norm
-            ay /= norm
-            dx = mean[i, 0] - (x0 + half_x)
-            dy = mean[i, 1] - (y0 + half_y)
-            # Separating axes: the two of the oriented box and, as its own bounding box, the two of the picture.
-            e0 = _SIGMAS * np.sqrt(long)
-            e1 = _SIGMAS * np.sqrt(short)
-            keep[n] = (
-                abs(dx * ax + dy * ay) <= e0 + half_x * abs(ax) + half_y * abs(ay)
-                and abs(dy * ax - dx * ay) <= e1 + half_x * abs(ay) + half_y * abs(ax)
-                and abs(dx) <= half_x + e0 * abs(ax) + e1 * abs(ay)
-                and abs(dy) <= half_y + e0 * abs(ay) + e1 * abs(ax)
-            )
+            keep[n] = _obb_meets(mean[i, 0], mean[i, 1], cov[i, 0], cov[i, 1], cov[i, 2], x0, y0, x1, y1)
+
+
+@numba.njit(parallel=True, cache=True)
+def obb_masks(mean, cov, splat, tile, mask, cols, width, height):
+    """Masks of the front end's list entries, without the sub-tiles that a splat's oriented box does not meet. Arrays as in `FrontFrame`; mean float64
+    (R, 2), pixels, cov (R, 3); cols: of tiles."""
+    out = np.zeros(len(mask), np.uint8)
+    for e in numba.prange(len(mask)):
+        i = splat[e]
+        for k in range(4):
+            if mask[e] >> k & 1:
+                x0 = tile[e] % cols * TILE + k % 2 * SUBTILE
+                y0 = tile[e] // cols * TILE + k // 2 * SUBTILE
+                x1, y1 = min(x0 + SUBTILE, width) - 1, min(y0 + SUBTILE, height) - 1
+                if _obb_meets(mean[i, 0], mean[i, 1], cov[i, 0], cov[i, 1], cov[i, 2], x0, y0, x1, y1):
+                    out[e] |= 1 << k
+    return out
 
 
 def obb_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:

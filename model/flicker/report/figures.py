@@ -22,6 +22,8 @@ from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 from ..budget.curve import Curve  # noqa: E402
+from ..cost.area import part  # noqa: E402
+from ..cost.chip_area import CHIPS, PAPER_MM2, UM2_PER_BIT, UM2_PER_GE, components, in_all, square_millimetres  # noqa: E402
 from ..errors import FlickerError  # noqa: E402
 from ..explore.configurations import CONFIGURATIONS  # noqa: E402
 from ..explore.facts import MAPS, TILE_SIZES  # noqa: E402
@@ -34,13 +36,11 @@ from .claims import (  # noqa: E402
     NARROW,
     NO_CTU,
     NO_CTU_64,
-    PAPER_AREA,
     PAPER_PRUNED_PSNR,
     PAPER_VANILLA_PSNR,
     SMOOTH,
     SPARSE,
     SPIKY,
-    UM2_PER_GE,
     VANILLA,
     WIDE,
     test_loss,
@@ -291,6 +291,10 @@ def fifo_depth(views: Sequence[ViewResult]) -> Figure | None:
     )
 
 
+# Facts of a configuration in a whole chip, in this order (`chip.compare.chip_estimates`).
+SYSTEM = ("front_cycles", "render_cycles", "dram_cycles", "interval_cycles", "latency_cycles", "bottleneck", "dram_bytes")
+
+
 def whole_system(views: Sequence[ViewResult]) -> Figure | None:
     """Figure 10."""
     views = [v for v in views if GSCORE in v.facts.get("chip", {})]
@@ -301,7 +305,7 @@ def whole_system(views: Sequence[ViewResult]) -> Figure | None:
     for v in views:
         base = v.facts["chip"][GSCORE]
         for name, fact in v.facts["chip"].items():
-            rows.append([v.target.scene.name, v.target.view, name, fact["render_cycles"], fact["interval_cycles"], fact["latency_cycles"], fact["bottleneck"], fact["dram_bytes"],
+            rows.append([v.target.scene.name, v.target.view, name, *(fact[key] for key in SYSTEM),
                          base["interval_cycles"] / fact["interval_cycles"], fact["energy_uj"], _ratio(base["energy_uj"], fact["energy_uj"])])
     figure, (a, b) = _axes(2, 5.4)
     chip = [v.facts["chip"] for v in views]
@@ -311,10 +315,11 @@ def whole_system(views: Sequence[ViewResult]) -> Figure | None:
           {GSCORE: 1, FAITHFUL: 2.6})
     a.legend(fontsize=6, ncols=2)
     return Figure(
-        "fig10_whole_system", "Whole system", "10", "The proposed front end, sorting and memory of docs/chip_model.md around each rendering stage: a model, no RTL. Cycles "
-        "between frames; energy of the rendering stage and of DRAM traffic (front end and sorting have no energy model). The paper's speed is its average, its "
-        "energy its maximum. Jetson XNX: published only, 1/14.4 of FLICKER's speed on average.",
-        ["scene", "view", "config", "render_cycles", "interval_cycles", "latency_cycles", "bottleneck", "dram_bytes", "speed_vs_gscore", "energy_uj", "efficiency_vs_gscore"],
+        "fig10_whole_system", "Whole system", "10", "The chip that exists as RTL, by the models of its halves that are held to it (docs/chip.md), around each rendering "
+        "stage. Stages in conic form have the paper's front end (FP16 scene, 3-sigma boxes, 32-byte records; GSCore lists by its oriented boxes), the others the "
+        "default one (chunks, ellipses, 16 bytes). Cycles between frames; energy of the rendering stage and of DRAM traffic (front end and sorting have no energy "
+        "model). The paper's speed is its average, its energy its maximum. Jetson XNX: published only, 1/14.4 of FLICKER's speed on average.",
+        ["scene", "view", "config", *SYSTEM, "speed_vs_gscore", "energy_uj", "efficiency_vs_gscore"],
         rows, figure,
     )
 
@@ -341,15 +346,21 @@ def contribution_test(views: Sequence[ViewResult]) -> Figure | None:
 
 def area(areas: dict[tuple[str, str], float]) -> Figure:
     """Table 2."""
-    note = "Square millimetres here: 0.5 um2 per GE, an estimate (docs/synthesis.md). Parts without RTL are left empty."
-    units = {"contribution test units": ("ctu", "conic mixed"), "rendering cores": ("rendering_core", "conic")}
+    note = (
+        f"Square millimetres here: {UM2_PER_GE} um2 per GE and {UM2_PER_BIT:.3f} um2 per bit of SRAM, estimates without wires (docs/synthesis.md). "
+        "Feature buffer and others: all of the chip but the units above."
+    )
+    chips = {chip: components(chip, lambda unit: (part(*unit).ge, part(*unit).sram_bits)) for chip in CHIPS} if areas else {}
     if not areas:
         note += " No areas of this repository."
-    rows = []
-    for part, published in PAPER_AREA.items():
-        ge = areas.get(units[part]) if part in units else None
-        rows.append([part, published, None if ge is None else 4 * ge, None if ge is None else 4 * ge * UM2_PER_GE / 1e6])
-    return Figure("table2_area", "Table 2: area", "Table 2", note, ["component", "paper_mm2", "ge", "mm2_estimate"], rows)
+    rows = [
+        [name, published, *(value for parts in chips.values() for value in (*parts[name], square_millimetres(*parts[name])))]
+        for name, published in PAPER_MM2.items()
+    ]
+    total = [(sum(p[0] for p in parts.values()), sum(p[1] for p in parts.values()), in_all(parts)) for parts in chips.values()]
+    rows.append(["In all", sum(PAPER_MM2.values()), *(value for values in total for value in values)])
+    columns = [f"{chip}_{what}" for chip in chips for what in ("ge", "sram_bits", "mm2_estimate")]
+    return Figure("table2_area", "Table 2: area", "Table 2", note, ["component", "paper_mm2", *columns], rows)
 
 
 def stability_table(result: Stability) -> Figure:

@@ -13,28 +13,9 @@ from rich.console import Console
 from rich.table import Table
 
 from ... import markdown
+from ..chip_area import CHIPS, OTHERS, PAPER_MM2, UM2_PER_BIT, UM2_PER_GE, components, in_all, square_millimetres
 from .run import Runner
 from .units import FIFO_DEPTHS, FORMS, PRECISIONS, Unit, channel_config, vru_config
-
-# 28 nm from gate equivalents: a NAND2 of about 0.5 um2 (9-track cells, 0.9 um x 0.56 um), no allowance for routing.
-UM2_PER_GE = 0.5
-# SRAM: a 6T bit cell of 0.127 um2, half of a macro being bit cells.
-UM2_PER_BIT = 0.127 / 0.5
-
-# The paper's Table 2a, mm2 in 28 nm.
-PAPER = {
-    "Preprocessing core x4": 0.76, "Sorting unit x4": 0.16, "Contribution test unit x4": 0.09, "Rendering core x4": 0.96,
-    "Feature buffer and others (288 KB)": 1.50,
-}
-
-# Units that a component of it is here. The cores are part of the front end.
-OWN: dict[str, dict[tuple[str, str], int]] = {
-    "Preprocessing core x4": {("preprocessing_core", "default"): 4},
-    "Sorting unit x4": {("sorting_unit", "default"): 4},
-    "Feature buffer and others (288 KB)": {
-        ("top", "default"): 1, ("preprocessing_core", "default"): -4, ("sorting_unit", "default"): -4, ("render_stage", "factored fixed"): -1,
-    },
-}
 
 CSV_COLUMNS = ("unit", "config", "ge", "ge_seq", "ge_comb", "mem_bits", "sram_bits", "ff", "fo4")
 
@@ -191,32 +172,28 @@ class Comparison:
         )
 
     def paper(self) -> Sheet:
-        total = sum(PAPER.values())
-        rows = []
-        for name, area in PAPER.items():
-            ours = {
-                "Contribution test unit x4": [4 * self.ge("ctu", "conic mixed"), 4 * self.ge("ctu", "factored fixed")],
-                "Rendering core x4": [4 * self.ge("rendering_core", form) for form in FORMS],
-            }.get(name)
-            cells = [f"{ge * UM2_PER_GE / 1e6:.2f}" for ge in ours] if ours else ["", self._with_memories(OWN[name])]
-            rows.append([name, f"{area:.2f}", f"{area / total:.0%}", *cells])
+        total = sum(PAPER_MM2.values())
+        chips = {chip: components(chip, lambda unit: (self.by_name[unit]["ge"], self.by_name[unit]["sram_bits"])) for chip in CHIPS}
+        rows = [
+            [name, f"{area:.2f}", f"{area / total:.0%}", *(self._with_memories(*parts[name]) for parts in chips.values())]
+            for name, area in PAPER_MM2.items()
+        ]
+        rows.append(["In all", f"{total:.2f}", "", *(f"{in_all(parts):.2f}" for parts in chips.values())])
         ratio = [
             self.ge("ctu", config) / self.ge("rendering_core", form)
             for config, form in (("conic mixed", "conic"), ("factored fixed", "factored"))
         ]
-        rows.append(["CTU / rendering core", f"{0.09 / 0.96:.1%}", "", *(f"{value:.1%}" for value in ratio)])
+        rows.append(["CTU without FIFO / rendering core", f"{0.09 / 0.96:.1%}", "", *(f"{value:.1%}" for value in ratio)])
         return Sheet(
             "Beside the paper's Table 2 (mm2 in 28 nm)",
-            ["component", "paper", "share", "here, conic mixed (estimate)", "here, factored fixed (estimate)"], rows,
+            ["component", "paper", "share", *(f"here, {chip} (estimate)" for chip in chips)], rows,
             f"Estimate: {UM2_PER_GE} um2 per GE + {UM2_PER_BIT:.3f} um2 per bit of SRAM, nothing for wires. The paper's numbers are from Design Compiler and a "
-            "memory compiler. Others here: all of the chip but cores, sorting units and rendering stage.",
+            f"memory compiler. {OTHERS.split(' (')[0]} here: all of the chip but the units above.",
         )
 
-    def _with_memories(self, units: dict[tuple[str, str], int]) -> str:
-        """Logic + SRAM of so many of each unit, mm2, and the SRAM's size."""
-        results = [(self.by_name[unit], count) for unit, count in units.items()]
-        ge, bits = (sum(count * result[key] for result, count in results) for key in ("ge", "sram_bits"))
-        return f"{ge * UM2_PER_GE / 1e6:.2f} + {bits * UM2_PER_BIT / 1e6:.2f} ({bits / 8192:.0f} KB)"
+    def _with_memories(self, ge: float, bits: int) -> str:
+        """Logic + SRAM, mm2, and the SRAM's size."""
+        return f"{square_millimetres(ge):.2f}" + (f" + {square_millimetres(0, bits):.2f} ({bits / 8192:.0f} KB)" if bits else "")
 
     def summary(self) -> Sheet:
         """For the README: area and longest path of the main units, default and as in the paper."""

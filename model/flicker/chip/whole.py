@@ -1,0 +1,46 @@
+"""A frame of the chip that exists as RTL: both of its halves, by models that are held to it, and the memory that they share (docs/chip.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .dram import DramConfig, interleave, simulate
+from .preprocessing import Preprocessing
+from .rendering import Rendering
+
+
+@dataclass(frozen=True, eq=False)
+class WholeFrame:
+    """front, back: the halves, each with the memory to itself. dram_cycles: of the DRAM for the traffic of both."""
+
+    front: Preprocessing
+    back: Rendering
+    dram_cycles: int
+
+    @property
+    def bytes(self) -> dict[str, int]:
+        """That the DRAM moves, by purpose: whole bursts, of the frame buffer fewer than beats of the bus."""
+        found = dict(self.front.bytes)
+        for stream in self.back.traffic:
+            found[stream.name] = found.get(stream.name, 0) + stream.moved_bytes
+        return found
+
+    @property
+    def latency(self) -> int:
+        """Cycles of a frame alone: a list is complete only when the front end has seen all Gaussians."""
+        return self.front.cycles + self.back.cycles
+
+    @property
+    def interval(self) -> int:
+        """Cycles from frame to frame when the front end works on the next one while one is rendered."""
+        return max(self.front.cycles, self.back.cycles, self.dram_cycles)
+
+    @property
+    def bottleneck(self) -> str:
+        """What sets the interval."""
+        return {self.dram_cycles: "DRAM", self.back.cycles: "rendering", self.front.cycles: "front end"}[self.interval]
+
+
+def whole_frame(front: Preprocessing, back: Rendering, dram: DramConfig) -> WholeFrame:
+    """Both halves, estimated with this memory."""
+    return WholeFrame(front, back, front.dram + simulate(*interleave(back.traffic), dram).cycles)

@@ -1,0 +1,113 @@
+"""Machines in whole chips: what their halves and the shared memory come to, GSCore's lists, what has no chip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scene_samples import random_scene
+
+from flicker.chip import preprocessing, rendering
+from flicker.chip.compare import FRONTS, by_oriented_boxes, chip_estimates, stage_of
+from flicker.chip.dram import DramConfig
+from flicker.chip.whole import WholeFrame, whole_frame
+from flicker.errors import FlickerError
+from flicker.explore.configurations import get_configuration, group
+from flicker.front.lists import obb_lists
+from flicker.front.view import DEMO, View, load_view
+from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.front.memory import front_memory
+from flicker.golden.front.record import RecordKind
+from flicker.golden.front.setup import MEAN_FRACTION
+from flicker.golden.lanes.lists import front_lists
+from flicker.params import Form, RenderConfig
+from flicker.perf.lanes import lane_work, simulate_lanes
+from flicker.pipeline import packed_scene
+from flicker.sim.preprocessing import Regions
+
+SIZE = (160, 90)
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    return load_view(DEMO, 0, SIZE)
+
+
+@pytest.fixture(scope="module")
+def conic(view: View) -> FrontFrame:
+    format_, lists = FRONTS[Form.CONIC]
+    return run_front(packed_scene(view, format_), view.camera, lists, RecordKind.CONIC32)
+
+
+def test_oriented_boxes(view: View, conic: FrontFrame) -> None:
+    """Entries of the boxes on whose sub-tiles the exploration's GSCore lists the same splats, no others, none without a sub-tile."""
+    found = by_oriented_boxes(conic)
+    assert 0 < len(found.entry_mask) < len(conic.entry_mask) and found.entry_mask.all()
+    splats = conic.splats()
+    half_a, b, half_c = splats.shape.T
+    cov = np.linalg.inv(np.stack([np.stack([2 * half_a, b], axis=1), np.stack([b, 2 * half_c], axis=1)], axis=1))
+    projected = SimpleNamespace(mean=splats.mean / (1 << MEAN_FRACTION), cov2d=np.stack([cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1]], axis=1))
+    lists, expected = found.subtile_lists(), obb_lists(conic.subtile_lists(), projected, view.camera)
+    assert np.array_equal(lists.start, expected.start) and np.array_equal(lists.entry, expected.entry)
+    with pytest.raises(FlickerError, match="conic form only"):
+        by_oriented_boxes(run_front(packed_scene(view, FRONTS[Form.FACTORED][0]), view.camera))
+
+
+def test_stages() -> None:
+    """Every configuration of figure 10 has a chip; one without RTL has none."""
+    stages = {name: stage_of(get_configuration(name)) for name in group("chip")}
+    assert stages["faithful"].form is Form.CONIC and stages["faithful"].mask_generator == "ctu"
+    assert stages["gscore-conic"] == stages["no-ctu-64-conic"] and stages["gscore-conic"].vrus_per_channel == 4
+    assert stages["log-lanes-64"].lanes == 64
+    with pytest.raises(FlickerError, match="rows-ellipse: no RTL of its rendering stage"):
+        stage_of(get_configuration("rows-ellipse"))
+
+
+def test_estimates(view: View) -> None:
+    """An interval is the longest of the halves and their memory; GSCore's lists are shorter than boxes, the paper's records longer than the default's."""
+    found = chip_estimates(view, ["no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "log-lanes"])
+    for fact in found.values():
+        parts = {"front end": fact["front_cycles"], "rendering": fact["render_cycles"], "DRAM": fact["dram_cycles"]}
+        assert fact["interval_cycles"] == max(parts.values()) == parts[fact["bottleneck"]]
+        assert fact["latency_cycles"] == fact["front_cycles"] + fact["render_cycles"]
+        assert fact["dram_cycles"] > fact["dram_bytes"] / 51.2
+    assert found["gscore-conic"]["dram_bytes"] < found["no-ctu-64-conic"]["dram_bytes"]
+    assert found["gscore-conic"]["render_cycles"] < found["no-ctu-64-conic"]["render_cycles"]
+    assert found["flicker"]["dram_bytes"] < 0.7 * found["faithful"]["dram_bytes"]
+    assert found["faithful"]["front_cycles"] == found["no-ctu-64-conic"]["front_cycles"] != found["gscore-conic"]["front_cycles"]
+
+
+def _whole(front: FrontFrame, config: RenderConfig) -> WholeFrame:
+    image, dram = front_memory(front), DramConfig()
+    return whole_frame(preprocessing.estimate(front, image, dram), rendering.estimate(rendering.TileLists.of(front, image), config, dram), dram)
+
+
+def test_traffic(conic: FrontFrame) -> None:
+    """Bursts of the rendering half are its bytes, but those of the frame buffer, whose beats are not all full."""
+    frame = _whole(conic, stage_of(get_configuration("faithful")))
+    moved = {stream.name: stream.moved_bytes for stream in frame.back.traffic}
+    width, height = -(-SIZE[0] // 32) * 32, -(-SIZE[1] // 16) * 16
+    assert moved == frame.back.bytes | {"frame": 3 * width * height} and moved["frame"] < frame.back.bytes["frame"]
+    assert sum(frame.bytes.values()) == sum(frame.front.bytes.values()) + sum(moved.values())
+    assert frame.bytes["lists"] == frame.front.bytes["lists"] + moved["lists"]
+    records = next(stream for stream in frame.back.traffic if stream.name == "records")
+    regions = Regions.of(conic.packed, conic.camera, front_memory(conic).lists.chunks, conic.kind)
+    listed = regions.records // 32 + np.unique(conic.number[conic.entry_splat])  # a record is a line
+    assert np.isin(records.burst, listed).all() and len(np.unique(records.burst)) > 0.9 * len(listed)
+
+
+def test_lanes(view: View) -> None:
+    """Many small splats come too slowly for lanes, by lists and memory; few large ones are visited as slowly as in the stage alone."""
+    config, dense = RenderConfig(stage="lanes", lanes=32), run_front(packed_scene(view, FRONTS[Form.FACTORED][0]), view.camera)
+    scene = random_scene(1, 60)
+    large = View(view.camera, replace(scene, scales=np.full_like(scene.scales, 0.7), opacities=np.full_like(scene.opacities, 0.03)))
+    few = run_front(packed_scene(large, FRONTS[Form.FACTORED][0]), view.camera)
+    cycles = []
+    for front in (dense, few):
+        tables = rendering.TileLists.of(front, front_memory(front))
+        alone = simulate_lanes(lane_work(front_lists(front)), config.with_(in_width=1), leave=True).cycles
+        cycles.append((alone, *(rendering.estimate(tables, config, dram).cycles for dram in (None, DramConfig()))))
+    assert cycles[0][0] < cycles[0][1] < cycles[0][2]
+    assert cycles[1][0] < cycles[1][1] < cycles[1][0] + 200
