@@ -32,10 +32,11 @@ from flicker.sim.half import MemoryOptions
 from .common import Say, folder_of_scenes
 from .rendering_hardware import LINES_LIMIT
 
-SIZE = (640, 360)
+SIZE, LARGE = (640, 360), (1280, 720)
 VIEWS = ("guitar", "stpeter")
+LARGE_VIEW = "flowers"  # the default chip alone
 LIMIT = 0.1
-CHUNKS = 8000  # of a list writer: enough for these views
+CHUNKS = 24_000  # of a list writer: enough for these views
 # By name of the configuration: what the scene is packed in, and its lists (`flicker render`'s defaults with and without --faithful).
 BUILDS = {"default": (PackedFormat.CHUNK, ListKind.ELLIPSE), "faithful": (PackedFormat.FP16, ListKind.BOX)}
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
@@ -60,10 +61,13 @@ def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists:
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
     dram = DramConfig()
-    places = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
-    for (name, (format_, lists)), (place, path, number) in product(BUILDS.items(), places):
-        config, title = NAMED_CONFIGS[name], f"{place}, {name}"
-        view = load_view(path, number, SIZE)
+    real = {v.folder: (v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS}
+    small = [(*place, SIZE) for place in ((f"{DEMO} 0", DEMO, 0), *(real[folder] for folder in VIEWS))]
+    todo = [*product(BUILDS, small), ("default", (*real[LARGE_VIEW], LARGE))]
+    for name, (place, path, number, size) in todo:
+        config, title = NAMED_CONFIGS[name], f"{place}, {name}" + (f", {size[0]}x{size[1]}" if size != SIZE else "")
+        format_, lists = BUILDS[name]
+        view = load_view(path, number, size)
         camera = view.camera
         say(f"{title}: building the simulator")
         build(config, pointers_for(camera))

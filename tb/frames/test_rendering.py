@@ -203,6 +203,12 @@ def test_pauses_and_dram() -> None:
     check((96, 54), memory=memory, frames=2)
 
 
+def test_slow_writes() -> None:
+    """A memory that takes a line now and then: cores wait with their tiles for places in the frame writer, which holds four pairs."""
+    slow = {**PORTS, "write": replace(PORTS["write"], stall={"W": 0.95}, seed=seed())}
+    check((320, 32), memory=MemoryOptions(None, slow))
+
+
 @pytest.mark.parametrize("part", PURPOSES)
 def test_errors_of_the_memory(part: str) -> None:
     """The frame ends with a code; the next one, of a mended memory, is right."""

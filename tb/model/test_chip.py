@@ -5,6 +5,7 @@ Random scenes, seeded by FLICKER_SEED; small enough for seconds. Not covered: wh
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -352,9 +353,12 @@ def test_command(tmp_path):
     options = ["--size", "64x48", "--schemes", "--keys", "--formats", "--constants", "--out", str(tmp_path / "a.json")]
     done = CliRunner().invoke(app, ["chip", str(path), *options])
     assert done.exit_code == 0, done.output
-    for text in ("linked-tile", "bottleneck", "hand out records", "fp16-local"):
+    for text in ("linked-tile", "bottleneck", "hand out records", "fp16-local", "exists as RTL"):
         assert text in done.output
-    assert '"interval_cycles"' in (tmp_path / "a.json").read_text()
+    written = json.loads((tmp_path / "a.json").read_text())
+    assert written["interval_cycles"] > 0 and written["rtl"]["interval_cycles"] >= written["rtl"]["dram_cycles"] > 0
+    done = CliRunner().invoke(app, ["chip", str(path), "--size", "64x48", "--config", "faithful"])  # the paper's chip reads fp16
+    assert done.exit_code == 0 and "exists as RTL" not in done.output
     for wrong, text in ((["--scheme", "x"], "--scheme"), (["--memory", "x"], "--memory"), (["--view", "9"], "view 9")):
         failed = CliRunner().invoke(app, ["chip", str(path), *wrong])
         assert isinstance(failed.exception, FlickerError) and text in str(failed.exception)

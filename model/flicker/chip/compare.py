@@ -57,6 +57,12 @@ def stage_of(configuration: Configuration) -> RenderConfig:
     return configuration.render_config
 
 
+def has_chip(configuration: Configuration, memory: str) -> bool:
+    """Whether `chip_estimates` has the configuration with a scene in this format."""
+    known = isinstance(configuration.stage, SubtileVrus) or configuration.render_config is not None
+    return known and memory == FRONTS[configuration.form][0].value
+
+
 def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     """The same frame with GSCore's lists: only sub-tiles that a splat's oriented box meets; entries of none are left out."""
     if frame.kind is not RecordKind.CONIC32:

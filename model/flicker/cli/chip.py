@@ -51,6 +51,17 @@ def _show_frame(estimate) -> None:
     console.print(f"latency  {estimate.latency_cycles:,} cycles, {estimate.latency_fps:.0f} FPS without overlap of frames")
 
 
+def _show_built(fact: dict) -> None:
+    table = _table("the chip that exists as RTL, by the models held to it", "what", "")
+    for what, key in (
+        ("front end, cycles", "front_cycles"), ("rendering, cycles", "render_cycles"), ("DRAM for both, cycles", "dram_cycles"),
+        ("interval, cycles", "interval_cycles"), ("latency, cycles", "latency_cycles"), ("bytes", "dram_bytes"),
+    ):
+        table.add_row(what, f"{fact[key]:,}")
+    table.add_row("bottleneck", fact["bottleneck"])
+    console.print(table)
+
+
 def chip(
     scene: Annotated[Path, typer.Argument(help="scene file")],
     cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
@@ -67,8 +78,8 @@ def chip(
     constants: Annotated[bool, typer.Option("--constants", help="list the constants with their sources")] = False,
     out: Annotated[Path | None, typer.Option(help="the estimate as JSON")] = None,
 ) -> None:
-    """Estimate a whole frame: culling, memory, lists, sorting, rendering."""
-    from ..chip.compare import estimate
+    """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, also by its own models."""
+    from ..chip.compare import chip_estimates, estimate, has_chip
     from ..chip.constants import constant_table
     from ..chip.execute import run_scheme, scheme_rows
     from ..chip.frame import ChipConfig, frame_estimate, prepare
@@ -95,6 +106,10 @@ def chip(
         frame = frame_estimate(prepared, render_cycles, setting)
     console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, scheme {scheme}")
     _show_frame(frame)
+    built = {}
+    if render_cycles is None and scheme == RECOMMENDED and has_chip(configuration, memory):
+        built = chip_estimates(loaded, [config])[config]
+        _show_built(built)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])
         results = [run_scheme(prepared.splats, s, prepared.needed) for s in SCHEMES.values()]
@@ -121,5 +136,5 @@ def chip(
             table.add_row(name, f"{value:,}", source)
         console.print(table)
     if out is not None:
-        text = json.dumps(frame.as_dict() | {"scene": str(scene), "view": view, "config": config, "memory": memory, "scheme": scheme}, indent=2)
+        text = json.dumps(frame.as_dict() | {"scene": str(scene), "view": view, "config": config, "memory": memory, "scheme": scheme, "rtl": built}, indent=2)
         write_atomically(out, lambda path: path.write_text(text + "\n"))
