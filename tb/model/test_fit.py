@@ -296,6 +296,62 @@ def test_transforms(nerf, shots) -> None:
     same_cameras(half.camera, data.tests[0].camera.resized(24, 20))
 
 
+LENS = {"k1": 0.12, "k2": -0.05, "k3": 0.01, "p1": 0.004, "p2": -0.003, "cx": 66.0, "cy": 48.5, "fl_x": 90.0, "fl_y": 88.0}
+
+
+def pattern(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A smooth picture of directions."""
+    return np.stack([0.5 + 0.4 * np.sin(9 * x + 2), 0.5 + 0.4 * np.cos(11 * y), 0.5 + 0.4 * np.sin(7 * (x + y))], axis=2)
+
+
+def seen_by(lens: dict, width: int, height: int) -> np.ndarray:
+    """What a lens makes of `pattern`: the direction of each pixel by repeated correction."""
+    u, v = np.meshgrid((np.arange(width) + 0.5 - lens["cx"]) / lens["fl_x"], (np.arange(height) + 0.5 - lens["cy"]) / lens["fl_y"])
+    x, y = u.copy(), v.copy()
+    for _ in range(60):
+        r = x * x + y * y
+        radial = 1 + lens["k1"] * r + lens["k2"] * r**2 + lens["k3"] * r**3
+        x += u - (x * radial + 2 * lens["p1"] * x * y + lens["p2"] * (r + 2 * x * x))
+        y += v - (y * radial + lens["p1"] * (r + 2 * y * y) + 2 * lens["p2"] * x * y)
+    return pattern(x, y)
+
+
+def test_undistort(nerf, shots, tmp_path) -> None:
+    """A known lens, its principal point off the middle: the pictures are then those of a pinhole, and can be fitted to; a lens of no effect changes nothing."""
+    width, height = 128, 96
+    bent = tmp_path / "bent"
+    bent.mkdir()
+    for k in range(4):
+        save_png(bent / f"{k}.png", seen_by(LENS, width, height))
+    frames = [{"file_path": f"{k}.png", "transform_matrix": pose(shots[k][0])} for k in range(4)]
+    (bent / "transforms.json").write_text(json.dumps(LENS | {"w": width, "h": height, "aabb_scale": 4, "frames": frames}))
+    with pytest.raises(FlickerError, match=r"cx: 66 is 2.0 pixels off the middle, 64: .* flicker undistort"):
+        load_dataset(bent)
+    done = flicker("undistort", bent, "-o", tmp_path / "flat")
+    assert done.returncode == 0 and "4 photographs" in done.stdout, done.stderr
+    data = load_dataset(tmp_path / "flat")
+    camera = data.tests[0].camera
+    assert 0.8 * width < camera.width < width and 0.8 * height < camera.height < height and (camera.fx, camera.fy) == pytest.approx((90.0, 88.0))
+    x, y = np.meshgrid((np.arange(camera.width) + 0.5 - camera.width / 2) / 90.0, (np.arange(camera.height) + 0.5 - camera.height / 2) / 88.0)
+    for shot in data.tests + data.fitted:
+        assert psnr(shot.load(), pattern(x, y)) > 45
+    assert psnr(seen_by(LENS, camera.width, camera.height), pattern(x, y)) < 30  # the lens matters
+    assert json.loads((tmp_path / "flat" / "transforms.json").read_text())["aabb_scale"] == 4
+    done = flicker("undistort", bent / "transforms.json", "-o", tmp_path / "small", "--size", 64)
+    small = load_dataset(tmp_path / "small").tests[0]
+    assert done.returncode == 0 and (small.camera.width, small.camera.fx) == (64, pytest.approx(90.0 * 64 / camera.width))
+    assert flicker("undistort", nerf, "-o", tmp_path / "same").returncode == 0
+    for a, b in zip(load_dataset(nerf).tests, load_dataset(tmp_path / "same").tests):
+        same_cameras(a.camera, b.camera)
+        assert np.array_equal(a.load(), b.load())
+    for source, out, text in ((bent, "flat", "flat: is there already, and not empty"), (tmp_path, "new", "no transforms.json; COLMAP")):
+        done = flicker("undistort", source, "-o", tmp_path / out)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and text in done.stderr
+    (bent / "transforms.json").write_text(json.dumps(LENS | {"k1": 9.0, "k2": 40.0, "frames": frames}))
+    done = flicker("undistort", bent, "-o", tmp_path / "new")
+    assert done.returncode == 2 and "frames[0]: its lens leaves less than 50%" in done.stderr and not (tmp_path / "new").exists()
+
+
 def test_colmap(shots, tmp_path) -> None:
     points = np.random.default_rng(seed()).uniform(-1, 1, (50, 3))
     points[3, 1] = np.nan

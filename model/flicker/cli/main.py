@@ -18,11 +18,12 @@ from .render import demo, render
 from .report import report
 from .stability import stability
 from .sweep import sweep
+from .undistort import undistort
 from .view import view
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
-for command in (render, demo, view, pack, chip, cost, fit, budget, report, stability, sweep):
+for command in (render, demo, view, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
     app.command()(command)
 
 

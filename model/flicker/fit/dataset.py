@@ -19,7 +19,7 @@ from .colmap import read_cameras, read_images, read_points
 TEST_EVERY = 8  # photographs 0, 8, 16, ... are for testing
 LEAST = 3  # photographs: one for testing, two to fit
 CENTRE = 0.5  # pixels that the principal point, or a pixel by distortion, may be off
-_DISTORTIONS = ("k1", "k2", "k3", "k4", "p1", "p2")
+DISTORTIONS = ("k1", "k2", "k3", "k4", "p1", "p2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,8 @@ def _shot(where: str, picture: Path, root: Path, size: int | None, width: float 
     w, h = width or own_width, height or own_height
     for name, value, side in (("cx", centre[0], w), ("cy", centre[1], h)):
         if value is not None and not abs(value - side / 2) <= CENTRE:
-            raise FlickerError(f"{where}: {name}: {value:g} is {abs(value - side / 2):.1f} pixels off the middle, {side / 2:g}: crop the pictures around it")
+            off = f"{abs(value - side / 2):.1f} pixels off the middle, {side / 2:g}"
+            raise FlickerError(f"{where}: {name}: {value:g} is {off}: crop the pictures around it, or flicker undistort")
     if abs(h * own_width / w - own_height) > 1.0:
         raise FlickerError(f"{where}: {picture} is {own_width}x{own_height}, not of the shape of the camera's {w:g}x{h:g}")
     shrink = min(1.0, size / max(own_width, own_height)) if size else 1.0
@@ -121,7 +122,33 @@ def _number(where: str, values: dict, key: str) -> float | None:
     return float(value)
 
 
-def _transforms(path: Path, size: int | None) -> list[Shot]:
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame of a transforms.json. where: for messages. data: as it stands in the file; number: its numbers, those of the whole file where it has none;
+    picture: file; picture_size: (width, height) in pixels."""
+
+    where: str
+    data: dict
+    number: dict[str, float | None]
+    picture: Path
+    picture_size: tuple[int, int]
+
+    def focal(self, w: float, h: float) -> tuple[float, float]:
+        """Focal lengths (x, y) of a picture of w x h pixels."""
+        angle_x, angle_y = self.number["camera_angle_x"], self.number["camera_angle_y"]
+        fx = self.number["fl_x"] or w / 2 / math.tan((angle_x or 0.0) / 2)
+        return fx, self.number["fl_y"] or (fx if self.number["fl_x"] or angle_y is None else h / 2 / math.tan(angle_y / 2))
+
+    def pose(self) -> np.ndarray:
+        """float64 (3, 4): camera to world, x right, y up, z back. FlickerError."""
+        matrix = np.array(self.data.get("transform_matrix"), object)
+        if matrix.shape not in ((4, 4), (3, 4)) or not all(isinstance(v, int | float) for v in matrix.flat):
+            raise FlickerError(f"{self.where}: transform_matrix: not 4x4 numbers")
+        return matrix[:3].astype(np.float64)
+
+
+def frames_of(path: Path) -> tuple[dict, list[Frame]]:
+    """A transforms.json and its frames, whose pictures are there. FlickerError, naming file and field."""
     try:
         data = json.loads(path.read_bytes())
     except OSError as error:
@@ -131,13 +158,13 @@ def _transforms(path: Path, size: int | None) -> list[Shot]:
     frames = data.get("frames") if isinstance(data, dict) else None
     if not isinstance(frames, list):
         raise FlickerError(f"{path}: frames: not a list")
-    shots = []
+    found = []
     for n, frame in enumerate(frames):
         where = f"{path}: frames[{n}]"
         if not isinstance(frame, dict):
             raise FlickerError(f"{where}: not an object")
         both = data | frame  # a frame may have a lens of its own
-        number = {key: _number(where, both, key) for key in ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", *_DISTORTIONS)}
+        number = {key: _number(where, both, key) for key in ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", *DISTORTIONS)}
         if not isinstance(frame.get("file_path"), str):
             raise FlickerError(f"{where}: file_path: not a text")
         for key in ("w", "h", "fl_x", "fl_y"):
@@ -148,22 +175,25 @@ def _transforms(path: Path, size: int | None) -> list[Shot]:
                 raise FlickerError(f"{where}: {key}: {value:g} is not between 0 and pi")
         if number["fl_x"] is None and number["camera_angle_x"] is None:
             raise FlickerError(f"{where}: neither fl_x nor camera_angle_x")
+        picture = _found(f"{where}: file_path", path.parent, frame["file_path"])
+        found.append(Frame(where, frame, number, picture, picture_size(picture)))
+    return data, found
 
-        def focal(w: float, h: float, number: dict = number, where: str = where) -> tuple[float, float]:
-            angle_x, angle_y = number["camera_angle_x"], number["camera_angle_y"]
-            fx = number["fl_x"] or w / 2 / math.tan(angle_x / 2)
-            fy = number["fl_y"] or (fx if number["fl_x"] or angle_y is None else h / 2 / math.tan(angle_y / 2))
-            _check_lens(where, number, w / 2 / fx, h / 2 / fy, fx)
+
+def _transforms(path: Path, size: int | None) -> list[Shot]:
+    shots = []
+    for frame in frames_of(path)[1]:
+
+        def focal(w: float, h: float, frame: Frame = frame) -> tuple[float, float]:
+            fx, fy = frame.focal(w, h)
+            _check_lens(frame.where, frame.number, w / 2 / fx, h / 2 / fy, fx)
             return fx, fy
 
-        matrix = np.array(frame.get("transform_matrix"), object)
-        if matrix.shape not in ((4, 4), (3, 4)) or not all(isinstance(v, int | float) for v in matrix.flat):
-            raise FlickerError(f"{where}: transform_matrix: not 4x4 numbers")
-        pose = matrix[:3].astype(np.float64)
+        pose, number = frame.pose(), frame.number
         # Right, up, back to right, down, forward.
         shots.append(_shot(
-            where, _found(f"{where}: file_path", path.parent, frame["file_path"]), path.parent, size, number["w"], number["h"],
-            (number["cx"], number["cy"]), focal, pose[:, 3], pose[:, :3] * np.array([1.0, -1.0, -1.0]),
+            frame.where, frame.picture, path.parent, size, number["w"], number["h"], (number["cx"], number["cy"]), focal, pose[:, 3],
+            pose[:, :3] * np.array([1.0, -1.0, -1.0]),
         ))
     return shots
 
@@ -171,11 +201,11 @@ def _transforms(path: Path, size: int | None) -> list[Shot]:
 def _check_lens(where: str, number: dict[str, float | None], x: float, y: float, focal: float) -> None:
     """FlickerError where distortion moves a corner at the tangents (x, y) by more than `CENTRE` pixels, at worst."""
     r = math.hypot(x, y)
-    k1, k2, k3, k4, p1, p2 = (abs(number[key] or 0.0) for key in _DISTORTIONS)
+    k1, k2, k3, k4, p1, p2 = (abs(number[key] or 0.0) for key in DISTORTIONS)
     shift = focal * (k1 * r**3 + k2 * r**5 + k3 * r**7 + k4 * r**9 + 3 * (p1 + p2) * r**2)
     if shift > CENTRE:
-        key = next(key for key in _DISTORTIONS if number[key])
-        raise FlickerError(f"{where}: {key}: the lens distorts by up to {shift:.1f} pixels: undistort the pictures first")
+        key = next(key for key in DISTORTIONS if number[key])
+        raise FlickerError(f"{where}: {key}: the lens distorts by up to {shift:.1f} pixels: flicker undistort first")
 
 
 def _colmap(root: Path, size: int | None) -> list[Shot]:
