@@ -47,6 +47,7 @@ from doc_parts import (
     stability,
     subnormals,
     synthesis,
+    system,
     view,
 )
 from doc_parts.common import Say, scenes_missing
@@ -110,6 +111,7 @@ PARTS = (
     Part("front_hardware", "front end's RTL: cycles and bytes", ("cycles", "traffic"), front_hardware.tables, scenes_missing),
     Part("rendering_hardware", "rendering half's RTL beside the chip model", ("cycles",), rendering_hardware.tables, scenes_missing),
     Part("chip_hardware", "frames of the whole chip in RTL beside the chip model", ("cycles", "traffic"), chip_hardware.tables, scenes_missing),
+    Part("system", "rendering stages in whole chips", ("",), system.tables, scenes_missing),
     Part("chip_lanes", "frames of the whole chip with lanes in RTL", ("cycles",), chip_lanes.tables, scenes_missing),
     Part("chip_queues", "the rendering half with lanes by the depth of its queues", ("",), chip_lanes.queue_tables, scenes_missing),
     Part("record_cache", "lines that the record cache reads", ("sizes", "walks"), record_cache.tables, scenes_missing),

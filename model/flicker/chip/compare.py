@@ -31,7 +31,7 @@ from . import preprocessing, rendering
 from .dram import DramConfig
 from .execute import SchemeResult
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate
-from .whole import WholeFrame, whole_frame
+from .whole import whole_frame
 
 # The front end by form of the stage: what the scene is packed in, and how splats are listed (the command line's defaults with and without --faithful).
 FRONTS = {Form.FACTORED: (PackedFormat.CHUNK, ListKind.ELLIPSE), Form.CONIC: (PackedFormat.FP16, ListKind.BOX)}
@@ -107,7 +107,7 @@ def chip_estimates(view: View, names: Sequence[str]) -> dict[str, dict]:
     for name in names:
         configuration = get_configuration(name)
         front, tables = fronts.of(configuration.form, configuration.lists == "obb", dram)
-        frame: WholeFrame = whole_frame(front, rendering.estimate(tables, stage_of(configuration), dram), dram)
+        frame = whole_frame(front, rendering.estimate(tables, stage_of(configuration), dram), dram)
         facts[name] = {
             "front_cycles": frame.front.cycles, "render_cycles": frame.back.cycles, "interval_cycles": frame.interval, "latency_cycles": frame.latency,
             "bottleneck": frame.bottleneck, "dram_bytes": sum(frame.bytes.values()), "dram_cycles": frame.dram_cycles,

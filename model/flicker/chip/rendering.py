@@ -6,8 +6,8 @@ are those of the RTL; masks and finishing records those of the golden model, and
 left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its last reading; lines
 of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
 
-Left out: conflicts of banks in the cache, beats that wait for each other in the memory (a lone access has its latency, and all together the peak rate), the
-order of entries within a merge, arbitration between list readers.
+Left out: conflicts of banks in the cache; in the memory, that records wait for anything but each other (their lines go to channels and banks, lists have the
+latency of a lone access, and all together the peak rate); the order of entries within a merge, arbitration between list readers.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
 from ..perf.sorting import latency
 from ..sim.preprocessing import Regions
-from .constants import CLOCK_HZ
+from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import READ as DRAM_READ
 from .dram import WRITE as DRAM_WRITE
 from .dram import DramConfig, Stream
@@ -167,8 +167,9 @@ def _frame(
     # Cache
     held = np.full((sets, ways), -1, np.int64)
     turn = np.zeros(sets, np.int64)
-    open_row, activated = np.full((16, 16), -1, np.int64), np.full((16, 16), -1e9)
-    last_activated, bus = np.full(16, -1e9), np.full(16, -1e9)
+    channels, banks = memory[0], memory[3]
+    open_row, activated = np.full((channels, banks), -1, np.int64), np.full((channels, banks), -1e9)
+    last_activated, bus = np.full(channels, -1e9), np.full(channels, -1e9)
     lookups, misses = 0, 0
     last_found, found_before, last_line, last_ask = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
     found_at = np.zeros(DEPTH, np.int64)
@@ -380,7 +381,7 @@ def _frame(
                     last_ask = ask
                     if refresh[0] and ask >= refresh[0] and ask % refresh[0] < refresh[1]:
                         ask += refresh[1] - ask % refresh[0]
-                    if memory[0]:
+                    if channels:
                         ask = np.int64(np.ceil(_moves(base + line, float(ask), *memory, open_row, activated, last_activated, bus)))
                     last_line = max(ask + READ + line_latency, last_line + 1)
                     line_at[misses % PLACES] = last_line
@@ -542,9 +543,11 @@ class TileLists:
         place = base + pairs * stride + np.tile(np.arange(cols), self.rows)[:, None] * wide
         picture = -(-self.frame.camera.width // TILE)
         t = np.arange(self.rows * self.cols)
-        pointer = np.asarray(pointer_place(np.minimum(t % self.cols, picture - 1) + picture * (t // self.cols), picture))
+        pointer = np.asarray(pointer_place(np.minimum(t % self.cols, picture - 1) + picture * (t // self.cols), picture)) // POINTERS_PER_LINE
+        step = BEAT // LINE_BYTES
+        pointers = ((self.regions.pointers // LINE_BYTES + step * pointer)[:, None] + np.arange(step)).ravel()
         return [
-            Stream.ranges("pointers", self.regions.pointers + BEAT * (pointer // POINTERS_PER_LINE), np.full(len(pointer), BEAT), DRAM_READ),
+            Stream("pointers", pointers, np.full(len(pointers), DRAM_READ, np.int8), BEAT * len(t)),
             Stream.ranges("lists", self.regions.lists + BEAT * line, np.full(len(line), BEAT), DRAM_READ),
             Stream.ranges("records", self.regions.records + RECORD_LINE * missed, np.full(len(missed), RECORD_LINE), DRAM_READ),
             Stream.ranges("frame", place.ravel(), np.full(place.size, wide), DRAM_WRITE),
