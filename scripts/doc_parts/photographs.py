@@ -13,7 +13,8 @@ import numpy as np
 
 from flicker.budget.score import Score, scores
 from flicker.explore.evaluate import evaluate
-from flicker.explore.points import SceneFile
+from flicker.explore.points import Point, SceneFile
+from flicker.explore.store import Store
 from flicker.fit.dataset import Dataset, load_dataset
 from flicker.fit.parameters import Parameters
 from flicker.fit.train import Options, Trainer
@@ -100,7 +101,17 @@ def scenes_of(photographs: Photographs, say: Say) -> tuple[dict[str, Path], Path
     return found, data.tests[0].path.parent
 
 
+def _row(point: Point, store: Store) -> dict:
+    """Of the store that reports and sweeps share."""
+    row = store.load(point.key)
+    if row is None:
+        row = evaluate(point.target.load(), point.configuration).row
+        store.put(point.key, row)
+    return row
+
+
 def tables(say: Say) -> dict[str, str]:
+    store = Store()
     cells: list[list[str]] = [[title] for _, _, title in ROWS]
     for photographs in SCENES:
         found, pictures = scenes_of(photographs, say)
@@ -108,7 +119,7 @@ def tables(say: Say) -> dict[str, str]:
         for row, (name, configuration, _) in enumerate(ROWS):
             say(f"{photographs.name}: {name}, {configuration or 'float64'}")
             scene = SceneFile(str(found[name]), photos=str(pictures))
-            rows = [evaluate(scene.target(view).load(), configuration or "faithful").row for view in range(scene.views())]
+            rows = [_row(Point(scene.target(view), configuration or "faithful"), store) for view in range(scene.views())]
             prefix = "" if configuration else "reference_"
             psnr, ssim = (float(np.mean([r[f"{prefix}photo_{key}"] for r in rows])) for key in ("psnr_db", "ssim"))
             begun = psnr if (name, configuration) == ("pruned", "") else begun
