@@ -40,18 +40,20 @@ BUILDS = {"default": (PackedFormat.CHUNK, ListKind.ELLIPSE), "faithful": (Packed
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
 
-def back_to_back(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE) -> list[ChipFrame]:
-    """Four frames of one view, each started as soon as the chip takes it: while the third is rendered the front end works on the fourth, as in a longer
-    row of frames. chunks: of a list writer."""
+def back_to_back(
+    chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE, frames: int = 4,
+) -> list[ChipFrame]:
+    """Frames of one view, each started as soon as the chip takes it: while the last but one is rendered the front end works on the last, as in a longer row
+    of frames. chunks: of a list writer."""
     places = [chip.place(camera, chunks=chunks) for _ in range(2)]
-    frames = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(4)]
-    chip.start(frames[0])
+    row = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(frames)]
+    chip.start(row[0])
     done = []
-    for k, frame in enumerate(frames):
-        if k + 1 < len(frames):
+    for k, frame in enumerate(row):
+        if k + 1 < frames:
             while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
                 chip.step(500)
-            chip.start(frames[k + 1])
+            chip.start(row[k + 1])
         done.append(chip.finish(frame))
     return done
 
