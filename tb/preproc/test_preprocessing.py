@@ -23,6 +23,7 @@ from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lists import ListError
 from flicker.pipeline import packed_scene
+from flicker.scene import packing
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
 from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -158,6 +159,16 @@ def test_cases(name: str, kind: RecordKind) -> None:
     assert len(golden.gaussian) > 0 or name in ("behind", "near", "outside")
     if name == "bright":  # FP16 holds all colours
         assert (rtl.counters["clipped"] > 0) == (kind is RecordKind.FACTORED16) and golden.splats().rgb.max() > 1023 / 512 - 1e-6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_opacities_of_nothing(kind: RecordKind, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Opacities that a record rounds to 0, in no list of either kind. `pack` leaves them out; another packer may not."""
+    monkeypatch.setattr(packing, "VISIBLE", 0.0)
+    scene = some(400, opacities=np.random.default_rng(3).choice([0.4 / 255, 1 / 255, 0.3], 400))
+    for lists in ListKind:
+        golden, rtl = check(pack(scene, PackedFormat.FP16).packed, plain_camera(), lists, kind=kind)
+        assert rtl.counters["faint"] > 50 and len(golden.entry_tile) > 100
 
 
 def test_three_beats_of_a_group() -> None:
