@@ -13,6 +13,7 @@ import numpy as np
 
 from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig
+from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import whole_frame
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
@@ -72,7 +73,7 @@ def tables(say: Say) -> dict[str, str]:
         front = run_front(packed, camera, lists, RecordKind.of(config.form))
         image = front_memory(front)
         golden = render_chip(front.subtile_lists(), config)
-        second = rendering.estimate(rendering.TileLists.of(front, image), config, dram, PORT.latency, PORT.max_reads)
+        second = rendering.estimate(TileLists.of(front, image), config, dram, PORT.latency, PORT.max_reads)
         model = whole_frame(preprocessing.estimate(front, image, dram), second, dram)
         say(f"{title}: alone")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:

@@ -11,7 +11,8 @@ import time
 import numpy as np
 
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import TileLists, estimate
+from flicker.chip.rendering import estimate
+from flicker.chip.tile_lists import TileLists
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip

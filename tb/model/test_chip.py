@@ -357,8 +357,9 @@ def test_command(tmp_path):
         assert text in done.output
     written = json.loads((tmp_path / "a.json").read_text())
     assert written["interval_cycles"] > 0 and written["rtl"]["interval_cycles"] >= written["rtl"]["dram_cycles"] > 0
-    done = CliRunner().invoke(app, ["chip", str(path), "--size", "64x48", "--config", "faithful"])  # the paper's chip reads fp16
-    assert done.exit_code == 0 and "exists as RTL" not in done.output
+    for config, memory, has in (("faithful", "chunk", False), ("faithful", "fp16", True), ("gscore", "chunk", True), ("lanes", "chunk", False)):
+        done = CliRunner().invoke(app, ["chip", str(path), "--size", "64x48", "--config", config, "--memory", memory])
+        assert done.exit_code == 0 and ("exists as RTL" in done.output) == has, done.output
     for wrong, text in ((["--scheme", "x"], "--scheme"), (["--memory", "x"], "--memory"), (["--view", "9"], "view 9")):
         failed = CliRunner().invoke(app, ["chip", str(path), *wrong])
         assert isinstance(failed.exception, FlickerError) and text in str(failed.exception)

@@ -10,21 +10,23 @@ import pytest
 from scene_samples import random_scene
 
 from flicker.chip import preprocessing, rendering
-from flicker.chip.compare import FRONTS, by_oriented_boxes, chip_estimates, stage_of
+from flicker.chip.compare import FRONTS, by_oriented_boxes, chip_estimates, chip_stage
 from flicker.chip.dram import DramConfig
+from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import WholeFrame, whole_frame
 from flicker.errors import FlickerError
 from flicker.explore.configurations import get_configuration, group
 from flicker.front.lists import obb_lists
 from flicker.front.view import DEMO, View, load_view
-from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.front.frame import FrontFrame, ListKind, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.front.setup import MEAN_FRACTION
 from flicker.golden.lanes.lists import front_lists
-from flicker.params import Form, RenderConfig
+from flicker.params import FAITHFUL, Form, RenderConfig
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.pipeline import packed_scene
+from flicker.scene.packed import PackedFormat
 from flicker.sim.preprocessing import Regions
 
 SIZE = (160, 90)
@@ -41,28 +43,35 @@ def conic(view: View) -> FrontFrame:
     return run_front(packed_scene(view, format_), view.camera, lists, RecordKind.CONIC32)
 
 
-def test_oriented_boxes(view: View, conic: FrontFrame) -> None:
+@pytest.mark.parametrize("form", list(Form), ids=lambda form: form.name)
+def test_oriented_boxes(view: View, form: Form) -> None:
     """Entries of the boxes on whose sub-tiles the exploration's GSCore lists the same splats, no others, none without a sub-tile."""
-    found = by_oriented_boxes(conic)
-    assert 0 < len(found.entry_mask) < len(conic.entry_mask) and found.entry_mask.all()
-    splats = conic.splats()
-    half_a, b, half_c = splats.shape.T
-    cov = np.linalg.inv(np.stack([np.stack([2 * half_a, b], axis=1), np.stack([b, 2 * half_c], axis=1)], axis=1))
+    front = run_front(packed_scene(view, PackedFormat.FP16), view.camera, ListKind.BOX, RecordKind.of(form))
+    found = by_oriented_boxes(front)
+    assert 0 < len(found.entry_mask) < len(front.entry_mask) and found.entry_mask.all()
+    splats = front.splats()
+    s0, s1, s2 = splats.shape.T
+    if form is Form.CONIC:
+        inverse = np.stack([np.stack([2 * s0, s1], axis=1), np.stack([s1, 2 * s2], axis=1)], axis=1)
+    else:  # 2^-(u^2 + v^2)
+        rows = np.stack([np.stack([s0, s1], axis=1), np.stack([0 * s0, s2], axis=1)], axis=1)
+        inverse = 2 * np.log(2) * np.einsum("nki,nkj->nij", rows, rows)
+    cov = np.linalg.inv(inverse)
     projected = SimpleNamespace(mean=splats.mean / (1 << MEAN_FRACTION), cov2d=np.stack([cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1]], axis=1))
-    lists, expected = found.subtile_lists(), obb_lists(conic.subtile_lists(), projected, view.camera)
+    lists, expected = found.subtile_lists(), obb_lists(front.subtile_lists(), projected, view.camera)
     assert np.array_equal(lists.start, expected.start) and np.array_equal(lists.entry, expected.entry)
-    with pytest.raises(FlickerError, match="conic form only"):
-        by_oriented_boxes(run_front(packed_scene(view, FRONTS[Form.FACTORED][0]), view.camera))
 
 
-def test_stages() -> None:
-    """Every configuration of figure 10 has a chip; one without RTL has none."""
-    stages = {name: stage_of(get_configuration(name)) for name in group("chip")}
-    assert stages["faithful"].form is Form.CONIC and stages["faithful"].mask_generator == "ctu"
-    assert stages["gscore-conic"] == stages["no-ctu-64-conic"] and stages["gscore-conic"].vrus_per_channel == 4
-    assert stages["log-lanes-64"].lanes == 64
+def test_stages(view: View) -> None:
+    """Every configuration of figure 10 has a chip, GSCore in both forms; one without RTL has none."""
+    stages = {name: chip_stage(get_configuration(name)) for name in (*group("chip"), "gscore")}
+    assert stages["faithful"] == FAITHFUL and stages["gscore-conic"] == stages["no-ctu-64-conic"] != stages["gscore"]
+    for name, vrus in (("gscore", 4), ("gscore-conic", 4), ("no-ctu-32-conic", 2)):
+        assert (stages[name].mask_generator, stages[name].vrus_per_channel) == ("all", vrus)
+    assert stages["log-lanes-64"].lanes == 64 and stages["gscore"].form is Form.FACTORED
+    assert chip_stage(get_configuration("rows-ellipse")) is None
     with pytest.raises(FlickerError, match="rows-ellipse: no RTL of its rendering stage"):
-        stage_of(get_configuration("rows-ellipse"))
+        chip_estimates(view, ["rows-ellipse"])
 
 
 def test_estimates(view: View) -> None:
@@ -81,12 +90,12 @@ def test_estimates(view: View) -> None:
 
 def _whole(front: FrontFrame, config: RenderConfig) -> WholeFrame:
     image, dram = front_memory(front), DramConfig()
-    return whole_frame(preprocessing.estimate(front, image, dram), rendering.estimate(rendering.TileLists.of(front, image), config, dram), dram)
+    return whole_frame(preprocessing.estimate(front, image, dram), rendering.estimate(TileLists.of(front, image), config, dram), dram)
 
 
 def test_traffic(conic: FrontFrame) -> None:
     """Bursts of the rendering half are its bytes, but those of the frame buffer, whose beats are not all full."""
-    frame = _whole(conic, stage_of(get_configuration("faithful")))
+    frame = _whole(conic, FAITHFUL)
     moved = {stream.name: stream.moved_bytes for stream in frame.back.traffic}
     width, height = -(-SIZE[0] // 32) * 32, -(-SIZE[1] // 16) * 16
     assert moved == frame.back.bytes | {"frame": 3 * width * height} and moved["frame"] < frame.back.bytes["frame"]
@@ -106,7 +115,7 @@ def test_lanes(view: View) -> None:
     few = run_front(packed_scene(large, FRONTS[Form.FACTORED][0]), view.camera)
     cycles = []
     for front in (dense, few):
-        tables = rendering.TileLists.of(front, front_memory(front))
+        tables = TileLists.of(front, front_memory(front))
         alone = simulate_lanes(lane_work(front_lists(front)), config.with_(in_width=1), leave=True).cycles
         cycles.append((alone, *(rendering.estimate(tables, config, dram).cycles for dram in (None, DramConfig()))))
     assert cycles[0][0] < cycles[0][1] < cycles[0][2]

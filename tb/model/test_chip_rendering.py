@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from functools import cache
 
@@ -10,7 +11,8 @@ import pytest
 
 from flicker.chip import rendering as model
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import Rendering, TileLists, estimate, tile_lists
+from flicker.chip.rendering import Rendering, estimate
+from flicker.chip.tile_lists import TileLists, tile_lists
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
@@ -19,6 +21,7 @@ from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.params import CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
+from flicker.sim.chip import PORT
 from flicker.toolchain import ROOT
 
 SIZE = (112, 54)  # four pairs of tiles in a row, the last tile of which the picture lacks
@@ -61,6 +64,8 @@ def test_sizes() -> None:
     assert model.SLOTS == default("flk_rendering", "Chunks")
     for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
         assert (model.DEPTH, model.PLACES) == (default(unit, "Depth"), default(unit, "Places"))
+    given = inspect.signature(estimate).parameters
+    assert (given["latency_cycles"].default, given["reads"].default) == (PORT.latency, PORT.max_reads)
     margin = re.search(r"Margin = (\d+);", (ROOT / "rtl/sort/flk_delivery.sv").read_text())
     assert margin and model.MARGIN == int(margin[1])
 

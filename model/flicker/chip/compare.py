@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..explore.machine import Configuration, subtile_cycles
 from ..explore.stages.lanes import Lanes
 from ..explore.stages.subtile import SubtileVrus
 from ..front.lists import obb_masks
+from ..front.records import LOG2E
 from ..front.view import View
 from ..golden.front.frame import FrontFrame, ListKind, run_front
 from ..golden.front.memory import front_memory
@@ -31,6 +32,7 @@ from . import preprocessing, rendering
 from .dram import DramConfig
 from .execute import SchemeResult
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate
+from .tile_lists import TileLists
 from .whole import whole_frame
 
 # The front end by form of the stage: what the scene is packed in, and how splats are listed (the command line's defaults with and without --faithful).
@@ -47,31 +49,23 @@ def estimate(prepared: Prepared, configuration: Configuration, chip: ChipConfig 
     return frame_estimate(prepared, cycles, chip, scheme_result, own_places)
 
 
-def stage_of(configuration: Configuration) -> RenderConfig:
-    """The chip's rendering stage that does what a configuration does. GSCore's is the one without a test and with its VRUs: a channel of four VRUs takes a
-    splat of its sub-tile in four cycles, as all channels together do there. FlickerError for a configuration that the chip cannot have."""
+def chip_stage(configuration: Configuration) -> RenderConfig | None:
+    """The chip's rendering stage that does what a configuration does; None where the chip cannot have it. GSCore's is the one without a test and with its
+    VRUs: a channel of four VRUs takes a splat of its sub-tile in four cycles, as all channels together do there."""
     if isinstance(configuration.stage, SubtileVrus):
         return RenderConfig(**(configuration.generator.rtl() or {}), vrus_per_channel=configuration.stage.vrus_per_channel)
-    if configuration.render_config is None:
-        raise FlickerError(f"{configuration.name}: no RTL of its rendering stage, so no chip")
     return configuration.render_config
-
-
-def has_chip(configuration: Configuration, memory: str) -> bool:
-    """Whether `chip_estimates` has the configuration with a scene in this format."""
-    known = isinstance(configuration.stage, SubtileVrus) or configuration.render_config is not None
-    return known and memory == FRONTS[configuration.form][0].value
 
 
 def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     """The same frame with GSCore's lists: only sub-tiles that a splat's oriented box meets; entries of none are left out."""
-    if frame.kind is not RecordKind.CONIC32:
-        raise FlickerError("lists by oriented boxes: records in conic form only")
     splats = frame.splats()
-    half_a, b, half_c = splats.shape.T
-    over = 4.0 * half_a * half_c - b * b
+    s0, s1, s2 = splats.shape.T
+    # Inverse of the covariance: E = dx^2 a / 2 + b dx dy + dy^2 c / 2, or u^2 + v^2 = E log2(e) (docs/architecture.md).
+    a, b, c = (2.0 * s0, s1, 2.0 * s2) if frame.kind is RecordKind.CONIC32 else 2.0 / LOG2E * np.stack([s0 * s0, s0 * s1, s1 * s1 + s2 * s2])
+    over = a * c - b * b
     with np.errstate(divide="ignore", invalid="ignore"):
-        cov = np.stack([2.0 * half_c, -b, 2.0 * half_a], axis=1) / over[:, None]
+        cov = np.stack([c, -b, a], axis=1) / over[:, None]
     cov[~(over > 0.0)] = (1.0, 0.0, 1.0)  # rounded to no ellipse: listed by its box
     cols = -(-frame.camera.width // TILE)
     mask = obb_masks(
@@ -81,33 +75,26 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
-@dataclass(eq=False)
-class _Fronts:
-    """Front ends of a view that several machines share, the last one kept."""
-
-    view: View
-    _key: tuple | None = None
-    _found: tuple[preprocessing.Preprocessing, rendering.TileLists] | None = None
-
-    def of(self, form: Form, oriented: bool, dram: DramConfig) -> tuple[preprocessing.Preprocessing, rendering.TileLists]:
-        if self._found is None or self._key != (form, oriented):
-            format_, lists = FRONTS[form]
-            frame = run_front(packed_scene(self.view, format_), self.view.camera, lists, RecordKind.of(form))
-            frame = by_oriented_boxes(frame) if oriented else frame
-            image = front_memory(frame)
-            self._key, self._found = (form, oriented), (preprocessing.estimate(frame, image, dram), rendering.TileLists.of(frame, image))
-        return self._found
-
-
 def chip_estimates(view: View, names: Sequence[str]) -> dict[str, dict]:
     """Cycles, bytes and the bottleneck of configurations in whole frames, by name; front ends by the form of the stage (`FRONTS`), lists of GSCore by oriented
     boxes. FlickerError for one that the chip cannot have."""
-    dram, fronts = DramConfig(), _Fronts(view)
+    dram = DramConfig()
+    fronts: dict[tuple[Form, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
     facts = {}
     for name in names:
         configuration = get_configuration(name)
-        front, tables = fronts.of(configuration.form, configuration.lists == "obb", dram)
-        frame = whole_frame(front, rendering.estimate(tables, stage_of(configuration), dram), dram)
+        stage = chip_stage(configuration)
+        if stage is None:
+            raise FlickerError(f"{name}: no RTL of its rendering stage, so no chip")
+        key = configuration.form, configuration.lists == "obb"
+        if key not in fronts:
+            format_, lists = FRONTS[configuration.form]
+            front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
+            front = by_oriented_boxes(front) if key[1] else front
+            image = front_memory(front)
+            fronts[key] = preprocessing.estimate(front, image, dram), TileLists.of(front, image)
+        first, tables = fronts[key]
+        frame = whole_frame(first, rendering.estimate(tables, stage, dram), dram)
         facts[name] = {
             "front_cycles": frame.front.cycles, "render_cycles": frame.back.cycles, "interval_cycles": frame.interval, "latency_cycles": frame.latency,
             "bottleneck": frame.bottleneck, "dram_bytes": sum(frame.bytes.values()), "dram_cycles": frame.dram_cycles,

@@ -35,6 +35,7 @@ from ..scene.packing import Packing
 from . import preprocessing, rendering
 from .constants import CLOCK_HZ
 from .dram import DramConfig
+from .tile_lists import TileLists
 
 CONFIG = RenderConfig()  # of the rendering stage
 ENTRY_BYTES = 64 / 9  # nine entries in a line of 64 bytes
@@ -258,7 +259,7 @@ def frame_cost(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dic
     """Cycles of each half of the chip, bytes of both by purpose."""
     image = front_memory(front)
     first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(rendering.TileLists.of(front, image), CONFIG, dram)
+    second = rendering.estimate(TileLists.of(front, image), CONFIG, dram)
     bytes_ = dict(first.bytes)
     for name, more in second.bytes.items():
         bytes_[name] = bytes_.get(name, 0) + more

@@ -79,7 +79,7 @@ def chip(
     out: Annotated[Path | None, typer.Option(help="the estimate as JSON")] = None,
 ) -> None:
     """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, also by its own models."""
-    from ..chip.compare import chip_estimates, estimate, has_chip
+    from ..chip.compare import FRONTS, chip_estimates, chip_stage, estimate
     from ..chip.constants import constant_table
     from ..chip.execute import run_scheme, scheme_rows
     from ..chip.frame import ChipConfig, frame_estimate, prepare
@@ -107,7 +107,7 @@ def chip(
     console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, scheme {scheme}")
     _show_frame(frame)
     built = {}
-    if render_cycles is None and scheme == RECOMMENDED and has_chip(configuration, memory):
+    if render_cycles is None and scheme == RECOMMENDED and memory == FRONTS[configuration.form][0] and chip_stage(configuration) is not None:
         built = chip_estimates(loaded, [config])[config]
         _show_built(built)
     if schemes:

@@ -73,6 +73,12 @@ def part(unit: str, config: str) -> Part:
     return found
 
 
+def in_table(unit: tuple[str, str]) -> tuple[float, int]:
+    """GE and bits of SRAM of a part; FlickerError when it is not synthesised."""
+    found = part(*unit)
+    return found.ge, found.sram_bits
+
+
 # ---- names --------------------------------------------------------------------------------------
 
 _FLOATS = {"fp16": (5, 10, 0, 0), "e4m3": (4, 3, 1, 1), "e5m2": (5, 2, 0, 1), "e5m6": (5, 6, 0, 1), "e4m4": (4, 4, 1, 1), "e5m3": (5, 3, 0, 1)}

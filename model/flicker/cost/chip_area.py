@@ -29,7 +29,8 @@ CHIPS: dict[str, dict[str, Unit]] = {
 
 
 def components(chip: str, size: Callable[[Unit], tuple[float, int]]) -> dict[str, tuple[float, int]]:
-    """GE and bits of SRAM by component of `PAPER_MM2`; in sum the whole chip. size: of a synthesised unit."""
+    """GE and bits of SRAM by component of `PAPER_MM2`; in sum the whole chip. size: of a synthesised unit (`area.in_table`).
+    """
     found = {name: (4 * ge, 4 * bits) for name, (ge, bits) in ((name, size(unit)) for name, unit in CHIPS[chip].items())}
     ge, bits = size(("top", chip))
     return found | {OTHERS: (ge - sum(part[0] for part in found.values()), bits - sum(part[1] for part in found.values()))}

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -46,25 +47,28 @@ class Lens:
         x, y = width / w, height / h  # of the picture, which may be smaller than its camera says
         return Lens(width, height, (fx * x, fy * y), (cx * x, cy * y), tuple(frame.number[key] or 0.0 for key in DISTORTIONS))
 
-    def places(self, width: int, height: int) -> np.ndarray:
-        """float64 (2, height, width): row and column of this picture, centres of pixels at whole numbers, that a new one of that size shows."""
+    def places(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """float64 (2, ...): row and column of this picture, centres of pixels at whole numbers, in the directions (x, y, 1)."""
         (fx, fy), (k1, k2, k3, k4, p1, p2) = self.focal, self.coefficients
-        x = ((np.arange(width) + 0.5 - width / 2) / fx)[None, :]
-        y = ((np.arange(height) + 0.5 - height / 2) / fy)[:, None]
         r = x * x + y * y
         radial = 1.0 + r * (k1 + r * (k2 + r * (k3 + r * k4)))
         u = x * radial + 2 * p1 * x * y + p2 * (r + 2 * x * x)
         v = y * radial + p1 * (r + 2 * y * y) + 2 * p2 * x * y
         return np.stack([fy * v + self.centre[1] - 0.5, fx * u + self.centre[0] - 0.5])
 
-    def size(self) -> tuple[int, int]:
-        """Width and height of the new picture; less than LEAST_SHARE of the old one's where the lens shows nothing more."""
+    def directions(self, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+        """x (width,) and y (height,) of the pixels of a new picture."""
+        return (np.arange(width) + 0.5 - width / 2) / self.focal[0], (np.arange(height) + 0.5 - height / 2) / self.focal[1]
+
+    @cached_property
+    def new_size(self) -> tuple[int, int]:
+        """Width and height of the new picture; tiny where the lens is not what its numbers say."""
 
         def inside(share: float) -> bool:
-            width, height = _shared(self, share)
-            place = self.places(width, height)
-            border = np.concatenate([place[:, 0], place[:, -1], place[:, :, 0], place[:, :, -1]], axis=1)
-            return bool((border >= 0).all() and (border[0] <= self.height - 1).all() and (border[1] <= self.width - 1).all())
+            x, y = self.directions(*self._shared(share))
+            border = [self.places(x, np.full(len(x), end)) for end in (y[0], y[-1])] + [self.places(np.full(len(y), end), y) for end in (x[0], x[-1])]
+            row, column = np.concatenate(border, axis=1)
+            return bool((row >= 0).all() and (row <= self.height - 1).all() and (column >= 0).all() and (column <= self.width - 1).all())
 
         low, high = 0.0, 1.0
         if inside(high):
@@ -72,11 +76,10 @@ class Lens:
         for _ in range(20):
             middle = (low + high) / 2
             low, high = (middle, high) if inside(middle) else (low, middle)
-        return _shared(self, low)
+        return self._shared(low)
 
-
-def _shared(lens: Lens, share: float) -> tuple[int, int]:
-    return max(1, int(lens.width * share)), max(1, int(lens.height * share))
+    def _shared(self, share: float) -> tuple[int, int]:
+        return max(1, int(self.width * share)), max(1, int(self.height * share))
 
 
 def undistort(dataset: Path, out: Path, size: int | None = None, progress: Callable[[int, int], None] = lambda done, total: None) -> list[tuple[int, int]]:
@@ -94,15 +97,16 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
     lenses = [Lens.of(frame) for frame in frames]
     poses = [frame.pose() for frame in frames]
     for frame, lens in zip(frames, lenses):
-        if lens.size()[0] < LEAST_SHARE * lens.width:
+        if lens.new_size[0] < LEAST_SHARE * lens.width:
             raise FlickerError(f"{frame.where}: its lens leaves less than {LEAST_SHARE:.0%} of the picture's sides")
     written, sizes = [], []
     try:
         (out / "images").mkdir(parents=True, exist_ok=True)
         for n, (frame, lens, pose, name) in enumerate(zip(frames, lenses, poses, names)):
             progress(n, len(frames))
-            width, height = lens.size()
-            picture, place = load_picture(frame.picture), lens.places(width, height)
+            width, height = lens.new_size
+            picture, (x, y) = load_picture(frame.picture), lens.directions(width, height)
+            place = lens.places(x[None, :], y[:, None])
             picture = np.stack([map_coordinates(picture[..., k], place, order=1, mode="nearest") for k in range(3)], axis=2)
             shrink = min(1.0, size / max(width, height)) if size else 1.0
             used = max(1, round(width * shrink)), max(1, round(height * shrink))

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..cost.area import part
+from ..cost.area import in_table, part
 from ..cost.chip_area import components, in_all, square_millimetres
 from .collect import ViewResult, by_scene
 
@@ -378,7 +378,7 @@ def area_verdicts(areas: dict[tuple[str, str], float], rows: dict[str, dict]) ->
     except (KeyError, TypeError):
         verdicts.append(Verdict(*texts[2], {}, f"not evaluated: this run has no area of {FAITHFUL} and {NO_CTU_64}"))
         return verdicts
-    chip = in_all(components(FAITHFUL, lambda unit: (part(*unit).ge, part(*unit).sram_bits)))
+    chip = in_all(components(FAITHFUL, in_table))
     rest = chip - square_millimetres(part("render_stage", FAITHFUL).ge)
     total = [rest + square_millimetres(ge) for ge in (ours, other)]
     saved = 1 - total[0] / total[1]

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 
 from ..budget.curve import Curve  # noqa: E402
-from ..cost.area import part  # noqa: E402
+from ..cost.area import in_table  # noqa: E402
 from ..cost.chip_area import CHIPS, PAPER_MM2, UM2_PER_BIT, UM2_PER_GE, components, in_all, square_millimetres  # noqa: E402
 from ..errors import FlickerError  # noqa: E402
 from ..explore.configurations import CONFIGURATIONS  # noqa: E402
@@ -350,7 +350,7 @@ def area(areas: dict[tuple[str, str], float]) -> Figure:
         f"Square millimetres here: {UM2_PER_GE} um2 per GE and {UM2_PER_BIT:.3f} um2 per bit of SRAM, estimates without wires (docs/synthesis.md). "
         "Feature buffer and others: all of the chip but the units above."
     )
-    chips = {chip: components(chip, lambda unit: (part(*unit).ge, part(*unit).sram_bits)) for chip in CHIPS} if areas else {}
+    chips = {chip: components(chip, in_table) for chip in CHIPS} if areas else {}
     if not areas:
         note += " No areas of this repository."
     rows = [
