@@ -88,6 +88,14 @@ def test_estimates(view: View) -> None:
     assert found["faithful"]["front_cycles"] == found["no-ctu-64-conic"]["front_cycles"] != found["gscore-conic"]["front_cycles"]
 
 
+@pytest.mark.parametrize(("cycles", "bottleneck"), [((70, 50, 60), "front end"), ((50, 70, 60), "rendering"), ((50, 60, 70), "DRAM")])
+def test_bottlenecks(cycles: tuple[int, int, int], bottleneck: str) -> None:
+    """What takes longest sets the interval; a frame alone takes both halves."""
+    first = preprocessing.Preprocessing((), {}, 0, 0, cycles[0])
+    frame = WholeFrame(first, rendering.Rendering(cycles[1], {}, np.zeros(0), []), cycles[2])
+    assert (frame.interval, frame.bottleneck, frame.latency) == (70, bottleneck, cycles[0] + cycles[1])
+
+
 def _whole(front: FrontFrame, config: RenderConfig) -> WholeFrame:
     image, dram = front_memory(front), DramConfig()
     return whole_frame(preprocessing.estimate(front, image, dram), rendering.estimate(TileLists.of(front, image), config, dram), dram)

@@ -79,6 +79,23 @@ def test_cycles() -> None:
     assert perfect.cycles > 8 * sent / 16
 
 
+def test_reads_of_a_channel() -> None:
+    """Lines of 32 bytes on a channel of pages of 256 bytes and two banks, by hand: open rows, another bank, another row of a bank; rows by `ask`."""
+    rcd, rp, ras, rrd, burst = 10.0, 20.0, 40.0, 6.0, 4.0
+    row, activated, last, bus = np.full((2, 2), -1, np.int64), np.full((2, 2), -1e9), np.full(2, -1e9), np.full(2, -1e9)
+
+    def moves(line: int, ask: float) -> float:
+        return float(model._moves(line, ask, 2, 64, 256, 2, rcd, rp, ras, rrd, burst, row, activated, last, bus))
+
+    # Two lines of 64 bytes go to a channel, then two to the other; a page is 8 lines of a channel.
+    assert moves(0, 0.0) == rcd and moves(1, 0.0) == rcd + burst and moves(4, 0.0) == rcd + 2 * burst
+    assert moves(2, 0.0) == rcd and moves(3, 100.0) == 100.0  # the other channel, by itself
+    assert moves(16, 0.0) == rcd + 3 * burst  # the other bank: its row is opened meanwhile, rrd after the first
+    # Page 2 is row 1, whose banks are exchanged: bank 1, which was opened at rrd.
+    assert moves(32, 0.0) == rrd + ras + rp + rcd
+    assert moves(33, 0.0) == rrd + ras + rp + rcd + burst and moves(0, 0.0) == rrd + ras + rp + rcd + 2 * burst  # bank 0 is as it was
+
+
 def test_bytes() -> None:
     """Pointers and frame buffer of whole pairs of tiles; lines of lists at least once each, of records at least those that lists name."""
     found, (front, image) = modelled(RenderConfig(cat=CatMode.AUTO)), frame()

@@ -296,7 +296,7 @@ def test_transforms(nerf, shots) -> None:
     same_cameras(half.camera, data.tests[0].camera.resized(24, 20))
 
 
-LENS = {"k1": 0.12, "k2": -0.05, "k3": 0.01, "p1": 0.004, "p2": -0.003, "cx": 66.0, "cy": 48.5, "fl_x": 90.0, "fl_y": 88.0}
+LENS = {"k1": 0.12, "k2": -0.2, "k3": 0.15, "p1": 0.004, "p2": -0.003, "cx": 66.0, "cy": 48.5, "fl_x": 90.0, "fl_y": 88.0}
 
 
 def pattern(x: np.ndarray, y: np.ndarray) -> np.ndarray:
