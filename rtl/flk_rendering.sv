@@ -2,7 +2,7 @@
 //
 // What flk_preprocessing leaves is read back list by list: four list readers and sorting units take the tiles of the walk in turn,
 // delivery fetches records and gives them to four cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
-// puts finished pixels together. The walk goes row by row, in pairs of tiles; a tile that the picture lacks has an empty list.
+// puts finished pixels together. The walk goes in pairs of tiles (flk_tile_walk); a tile that the picture lacks has an empty list.
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
 // error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
@@ -146,7 +146,7 @@ module flk_rendering
 
   // ---- lists ----------------------------------------------------------------------------------------
 
-  logic                        walk_done, walk_next;
+  logic                        walk_done, walk_next, unused_second;
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
   logic [1:0]                  turn_q;
   logic [3:0]                  tile_ready, tile_valid;
@@ -173,7 +173,8 @@ module flk_rendering
     .rows_i  (registers_i.rows),
     .done_o  (walk_done),
     .tile_x_o(walk_x),
-    .tile_y_o(walk_y)
+    .tile_y_o(walk_y),
+    .second_o(unused_second)
   );
 
   assign walk_next = !walk_done && tile_ready[turn_q];
@@ -362,7 +363,7 @@ module flk_rendering
   core_pixel_t [CORES-1:0]                 pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic                       unused_done, open, next, valid;
+    logic                       unused_done, open, next, second, valid;
     logic [TILE_COORD_BITS-1:0] x, y;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
 
@@ -392,7 +393,8 @@ module flk_rendering
       if (!rst_ni) begin
         begun_q <= '0;
       end else begin
-        begun_q <= begun_q + ($clog2(Pairs + 1))'(next && x[0]) - ($clog2(Pairs + 1))'(pair_freed);
+        begun_q <= begun_q + ($clog2(Pairs + 1))'(next && second)
+                   - ($clog2(Pairs + 1))'(pair_freed);
       end
     end
 
@@ -407,7 +409,8 @@ module flk_rendering
       .rows_i  (registers_i.rows),
       .done_o  (unused_done),
       .tile_x_o(x),
-      .tile_y_o(y)
+      .tile_y_o(y),
+      .second_o(second)
     );
 
     assign subtile[k].col = SUBTILE_COORD_BITS'({x, 1'(k)});

@@ -129,7 +129,8 @@ module flk_axi_fetch #(
 
   // ---- port -----------------------------------------------------------------------------------------
 
-  logic unused_last;
+  logic               unused_last;
+  logic [TagBits-1:0] unused_tag;
 
   flk_axi_read #(
     .AddrBits(AddrBits),
@@ -162,6 +163,7 @@ module flk_axi_fetch #(
     .ar_len_o,
     .ar_size_o,
     .ar_burst_o,
+    .ar_tag_o   (unused_tag),
     .r_valid_i,
     .r_ready_o,
     .r_id_i,

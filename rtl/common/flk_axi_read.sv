@@ -5,7 +5,8 @@
 // beats come in order. Each beat has the tag of its request, a mark on the request's last beat,
 // and an error when the memory's answer was one. Latency of the addresses 2; beats pass
 // combinationally: r_valid_i and r_data_i to the output, out_ready_i to r_ready_o. Nothing is
-// stored of them: where the port is shared, the consumer has room for what it asked for. idle_o:
+// stored of them: where the port is shared, the consumer has room for what it asked for. ar_tag_o: tag
+// of the address that is offered, for a user that wants less than a whole beat of it. idle_o:
 // no request inside, no beat to come. No clear: what was asked for comes.
 module flk_axi_read #(
   parameter  int unsigned AddrBits = 40,
@@ -42,6 +43,7 @@ module flk_axi_read #(
   output logic [7:0]          ar_len_o,
   output logic [2:0]          ar_size_o,
   output logic [1:0]          ar_burst_o,
+  output logic [TagBits-1:0]  ar_tag_o,
   input  logic                r_valid_i,
   output logic                r_ready_o,
   input  logic [IdBits-1:0]   r_id_i,
@@ -105,6 +107,7 @@ module flk_axi_read #(
   assign ar_id_o     = IdBits'(Id);
   assign ar_size_o   = 3'($clog2(Bytes));
   assign ar_burst_o  = 2'b01;  // INCR
+  assign ar_tag_o    = split_tag;
 
   assign out_valid_o = r_valid_i && known;
   assign r_ready_o   = out_ready_i && known;

@@ -2,7 +2,7 @@
 //
 // Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Groups of its pixels go on by
 // themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any
-// of the next tile. All groups have the same order of tiles, which come in pairs: an even column, then the one right of it. A pair of
+// of the next tile. All groups have the same order of tiles, which come in pairs: an even column and the one right of it. A pair of
 // tiles, 32 x 16 pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in RGBA16F, whole
 // bursts of 32 bytes. Pixel formats: golden/frame_buffer.py.
 // Pairs of tiles are held, and no pixel waits: who gives a core its tiles keeps at most so many pairs begun there that were not
@@ -138,8 +138,15 @@ module flk_frame_writer
       assert property (@(posedge clk_i) disable iff (!rst_ni)
           taken |-> running_q && 32'(full_q[i]) < Pairs)
       else $error("flk_frame_writer: a pixel of a pair that has no place");
+      logic first_q;  // the tile of the pair that came first
+      always_ff @(posedge clk_i) begin
+        if (taken && !count_q[i][CountBits-1]) begin
+          first_q <= in_data_i[k].subtile.col[1];
+        end
+      end
       assert property (@(posedge clk_i) disable iff (!rst_ni)
-          taken |-> in_data_i[k].subtile.col[1] == count_q[i][CountBits-1])
+          taken && count_q[i] != '0 |->
+          in_data_i[k].subtile.col[1] == (first_q ^ count_q[i][CountBits-1]))
       else $error("flk_frame_writer: tiles do not come in pairs");
 `endif
     end

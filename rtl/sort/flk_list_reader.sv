@@ -276,9 +276,18 @@ module flk_list_reader #(
     end
   end
 
-  logic             beat_valid, beat_last, beat_error, write;
-  logic [Width-1:0] beat_data;
-  tag_t             beat_tag;
+  logic                beat_valid, beat_last, beat_error, write;
+  logic [Width-1:0]    beat_data;
+  tag_t                beat_tag, ask_tag;
+  logic [AddrBits-1:0] ask_addr;
+  logic [2:0]          ask_size;
+  logic                unused_addr;
+
+  // Of a pointer's line only the half that has it.
+  assign ar_addr_o = {ask_addr[AddrBits-1:Shift], ask_tag.pointer && ask_tag.which[WordBits-1],
+                      (Shift-1)'(0)};
+  assign ar_size_o = ask_size - 3'(ask_tag.pointer);
+  assign unused_addr = ^ask_addr[Shift-1:0];
 
   flk_axi_read #(
     .AddrBits(AddrBits),
@@ -307,10 +316,11 @@ module flk_list_reader #(
     .ar_valid_o,
     .ar_ready_i,
     .ar_id_o,
-    .ar_addr_o,
+    .ar_addr_o  (ask_addr),
     .ar_len_o,
-    .ar_size_o,
+    .ar_size_o  (ask_size),
     .ar_burst_o,
+    .ar_tag_o   (ask_tag),
     .r_valid_i,
     .r_ready_o,
     .r_id_i,

@@ -7,6 +7,7 @@ import numpy as np
 
 from flicker.golden.delivery import LINE_BYTES
 from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.walk import BAND, tile_walk
 from flicker.markdown import table
 from flicker.params import TILE
 from flicker.pipeline import packed_scene
@@ -16,7 +17,6 @@ from .common import Say, titled_views
 
 DEFAULT = (1024, 4)  # lines, ways
 SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (2048, 4))
-VIEWS = ("demo", "flowers")
 
 
 @numba.njit(cache=True)
@@ -35,13 +35,19 @@ def _lines(line, sets, ways):
 
 
 def _walks(cols: int, rows: int) -> dict[str, np.ndarray]:
-    """Tiles, row by row in the picture, in the order in which they are taken."""
+    """Numbers of tiles, row by row in the picture, in the order in which they are taken."""
     y, x = np.divmod(np.arange(cols * rows), cols)
     spread = lambda v: sum((v >> b & 1) << 2 * b for b in range(8))  # noqa: E731
+
+    def walk(band: int) -> np.ndarray:
+        wx, wy = tile_walk(-(-cols // 2), rows, band)
+        return (wx + cols * wy)[wx < cols]
+
     return {
         "row by row": np.arange(cols * rows),
-        **{f"bands of {h} rows, column by column": np.lexsort((y % h, x, y // h)) for h in (2, 4)},
+        "row by row, from the left and from the right in turn": np.lexsort((np.where(y % 2, -x, x), y)),
         "Z curve": np.argsort(spread(x) | spread(y) << 1, kind="stable"),
+        **{f"`tile_walk`, bands of {h} rows" + (" (the chip)" if h == BAND else ""): walk(h) for h in (2, 4, 8, 16)},
     }
 
 
@@ -57,20 +63,19 @@ def tables(say: Say) -> dict[str, str]:
     walks: dict[str, list[str]] = {}
     titles = []
     for title, view in titled_views(say):
-        if not title.startswith(VIEWS):
-            continue
         front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
         number, tile = _entries(front)
         per_line = LINE_BYTES // front.kind.bytes
         cores = np.bitwise_count(front.entry_mask).mean()
         titles.append(f"{title}: {len(number):,} entries, {cores:.2f} cores each, {len(np.unique(number // per_line)):,} lines")
-        for lines, ways in SIZES:
-            sizes[lines, ways].append(f"{_lines(number // per_line, lines // ways, ways):,}")
-        lines, ways = DEFAULT
         cols, rows = (-(-n // TILE) for n in (view.camera.width, view.camera.height))
         for name, walk in _walks(cols, rows).items():
             order = np.argsort(np.argsort(walk)[tile], kind="stable")
-            walks.setdefault(name, []).append(f"{_lines(number[order] // per_line, lines // ways, ways):,}")
+            line = number[order] // per_line
+            walks.setdefault(name, []).append(f"{_lines(line, DEFAULT[0] // DEFAULT[1], DEFAULT[1]):,}")
+            if name.endswith("(the chip)"):
+                for lines, ways in SIZES:
+                    sizes[lines, ways].append(f"{_lines(line, lines // ways, ways):,}")
     return {
         "sizes": table(["lines", "ways", *titles], [[f"{lines:,}", str(ways), *cells] for (lines, ways), cells in sizes.items()]),
         "walks": table(["tiles", *titles], [[name, *cells] for name, cells in walks.items()]),

@@ -57,7 +57,7 @@ def tables(say: Say) -> dict[str, str]:
             if not np.array_equal(rtl.buffer[:, :row], golden.buffer[:, :row]) or not may_be_given(rtl.given, lengths, golden.frame.needed, False).all():
                 raise FlickerError(f"{title}: the picture differs from the golden model's")
             model = estimate(lists, config, dram, PORT.latency, PORT.max_reads)
-            moved = {n: (BEAT if n != "records" else BEAT // 2) * (c.read_beats + c.write_beats) for n, c in rtl.traffic.items()}
+            moved = {n: BEAT * c.write_beats + c.read_bytes for n, c in rtl.traffic.items()}
             if any(moved[n] != model.bytes[n] for n in PURPOSES if n != "records"):
                 raise FlickerError(f"{title}: bytes differ from the chip model's: {moved}, {model.bytes}")
             lines = model.bytes["records"] / max(moved["records"], 1) - 1

@@ -125,6 +125,7 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
             # A sub-tile that finishes elsewhere in time makes a frame of other lookups.
             "records": (rtl.traffic["records"].read_beats if frames > 1 else rtl.counters["lines"], 0),
         }
+        assert rtl.traffic["pointers"].read_bytes == 32 * frames * tiles
         assert rtl.traffic["frame"].dram_masked_bytes == 0
     return rtl
 

@@ -57,7 +57,8 @@ class Writer:
         # By core and group: pair and pixel, in order; a core's stream takes from any of its groups.
         work: list[list[deque[tuple[int, int]]]] = [[deque() for _ in GROUPS] for _ in range(CORES)]
         for number, (x, y) in enumerate(pairs):
-            for tile in range(2):
+            first = rng.getrandbits(1) if walk == "any" else 0
+            for tile in (first, 1 - first):
                 for k in range(CORES):
                     col, row = 4 * x + 2 * tile + k % 2, 2 * y + k // 2
                     for m, group in enumerate(GROUPS):

@@ -19,17 +19,17 @@ import numba
 import numpy as np
 
 from ..explore.generators.contribution import cat_masks
-from ..golden.chip import whole_pairs
+from ..golden.chip import chip_walk, whole_pairs
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.lanes.lists import front_lists
 from ..golden.masked import render_masked
 from ..golden.render import stream_order
 from ..golden.sorting import CAPACITY
-from ..params import LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
+from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
 from ..perf.sorting import latency
-from .constants import CLOCK_HZ
+from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import DramConfig, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
 
@@ -469,7 +469,7 @@ class _Cores:
             alone = simulate_lanes(work, config.with_(in_width=1), leave=True).cycles
             return _Cores(15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, alone)
         lists = tables.lists
-        order, core_start = stream_order(lists)
+        order, core_start = stream_order(lists, walk=chip_walk(lists))
         mask, cycles, _ = cat_masks(lists, config, order, core_start)
         if config.mask_generator == "all":
             mask, cycles = np.full_like(mask, 15), np.ones_like(cycles)
@@ -496,8 +496,7 @@ def estimate(
     subtiles = lists.cols * lists.rows
     finish, finish_op = np.empty((2, subtiles, 4), np.int64)
     finish_events(cores.finish, lists.start, cores.pace, finish, finish_op)
-    picture = -(-lists.width // TILE)
-    listed = (np.arange(len(tables.lines)) % tables.cols < picture).astype(np.bool_)
+    listed = (tables.x < -(-lists.width // TILE)).astype(np.bool_)
     delay = np.array([latency(min(int(n), CAPACITY)) for n in np.diff(tables.start)])
     # Rows stay open: a line of a list finds another one than its own.
     each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
@@ -519,7 +518,7 @@ def estimate(
     )
     stride = stride or least_stride(lists.width, format_)
     moved = {
-        "lists": BEAT * int((readings * tables.lines).sum()), "pointers": BEAT * len(tables.lines), "records": RECORD_LINE * int(misses),
+        "lists": BEAT * int((readings * tables.lines).sum()), "pointers": LINE_BYTES * len(tables.lines), "records": RECORD_LINE * int(misses),
         "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
     }
     total = max(int(clock), cores.alone) + END + latency_cycles
@@ -527,5 +526,7 @@ def estimate(
     if dram:
         total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
         traffic = tables.traffic(readings, missed[:misses], format_, stride)
-    grid = given.reshape(tables.rows, tables.cols, 2, 2).transpose(0, 2, 1, 3).reshape(-1)
-    return Rendering(total, moved, grid, traffic)
+    grid = np.zeros((2 * tables.rows, 2 * tables.cols), np.int64)
+    for k in range(CORES):
+        grid[2 * tables.y + k // 2, 2 * tables.x + k % 2] = given[:, k]
+    return Rendering(total, moved, grid.ravel(), traffic)

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from ..explore.generators.contribution import cat_masks
-from ..golden.chip import whole_pairs
+from ..golden.chip import chip_walk, whole_pairs
 from ..golden.front.blend import alpha_at
 from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame, run_front
@@ -292,7 +292,7 @@ def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig
 def _entries(front: FrontFrame) -> tuple[np.ndarray, ...]:
     lists = front.subtile_lists()
     whole = whole_pairs(lists)
-    order, core_start = stream_order(whole)
+    order, core_start = stream_order(whole, walk=chip_walk(whole))
     mask, _, _ = cat_masks(whole, CONFIG, order, core_start)  # entries stand as in `lists`: the sub-tiles beyond are empty
     splats = front.splats()
     n = len(lists.entry)

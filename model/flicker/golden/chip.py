@@ -13,6 +13,7 @@ from .frame_buffer import PixelFormat, frame_buffer, least_stride
 from .lanes.lists import RecordLists
 from .lanes.render import LaneFrame, render_lanes
 from .render import Frame, render_golden
+from .walk import tile_walk
 
 Lists = TypeVar("Lists", SubtileLists, RecordLists)
 
@@ -23,6 +24,11 @@ def whole_pairs(lists: Lists) -> Lists:
     length = np.zeros((rows, cols), np.int64)
     length[: lists.rows, : lists.cols] = np.diff(lists.start).reshape(lists.rows, lists.cols)
     return replace(lists, start=np.concatenate([[0], np.cumsum(length)]), cols=cols, rows=rows)
+
+
+def chip_walk(lists: Lists) -> tuple[np.ndarray, np.ndarray]:
+    """`tile_walk` of lists in whole pairs."""
+    return tile_walk(lists.cols // 4, lists.rows // 2)
 
 
 @dataclass(eq=False)
@@ -38,9 +44,12 @@ def render_chip(
     stride: int | None = None,
 ) -> ChipFrame:
     """A frame, bit for bit; records of 16 bytes go to the lanes. stride: bytes from row to row; None: as few as a row needs."""
-    frame: Frame | LaneFrame = (
-        render_lanes(whole_pairs(lists)) if isinstance(lists, RecordLists) else render_golden(whole_pairs(lists), config)
-    )
+    frame: Frame | LaneFrame
+    if isinstance(lists, RecordLists):
+        frame = render_lanes(whole_pairs(lists))
+    else:
+        whole = whole_pairs(lists)
+        frame = render_golden(whole, config, chip_walk(whole))
     stride = stride or least_stride(lists.width, format_)
     buffer = frame_buffer(frame.pixels, frame.lists.cols, frame.lists.rows, lists.width, lists.height, format_, stride, background)
     return ChipFrame(frame, buffer)

@@ -174,13 +174,17 @@ class Streamed(Protocol):
     start: np.ndarray
 
 
-def stream_order(lists: Streamed, empty: bool = True) -> tuple[np.ndarray, np.ndarray]:
+def stream_order(lists: Streamed, empty: bool = True, walk: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Order in which the cores see sub-tiles: (sub-tile numbers core by core, start of each core's part). empty: with those whose list is empty.
 
-    Core k has column k % 2, row k / 2 of each tile; tiles go row by row.
+    Core k has column k % 2, row k / 2 of each tile. walk: columns and rows of tiles in their order; None: row by row.
     """
     grid = np.arange(lists.rows * lists.cols).reshape(lists.rows, lists.cols)
-    parts = [grid[k // 2 :: 2, k % 2 :: 2].ravel() for k in range(CORES)]
+    if walk is None:
+        parts = [grid[k // 2 :: 2, k % 2 :: 2].ravel() for k in range(CORES)]
+    else:
+        x, y = walk
+        parts = [grid[2 * y + k // 2, 2 * x + k % 2] for k in range(CORES)]
     if not empty:
         parts = [part[np.diff(lists.start)[part] > 0] for part in parts]
     return np.concatenate(parts), np.cumsum([0] + [len(p) for p in parts])
@@ -229,13 +233,13 @@ def assemble(lists: Grid, pixels: np.ndarray, background=(0.0, 0.0, 0.0)) -> np.
     return np.ascontiguousarray(rgb[: lists.height, : lists.width])
 
 
-def render_golden(lists: SubtileLists, config: RenderConfig) -> Frame:
-    """Render a frame bit for bit as the RTL does."""
+def render_golden(lists: SubtileLists, config: RenderConfig, walk: tuple[np.ndarray, np.ndarray] | None = None) -> Frame:
+    """Render a frame bit for bit as the RTL does. walk: of `stream_order`, on which the automatic mode depends."""
     n = lists.cols * lists.rows
     pixels = np.zeros((n, 64, 4), np.uint16)
     counts = np.zeros((n, N_COUNTS), np.int64)
     needed = np.zeros(n, np.int64)
-    order, core_start = stream_order(lists)
+    order, core_start = stream_order(lists, walk=walk)
     args = (lists.gauss, lists.spiky, lists.start, lists.entry, lists.mean)
     tail = (int(config.form), int(config.precision), pixels, counts, needed)
     if config.form != lists.form:

@@ -15,6 +15,7 @@ import numpy as np
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.front.memory import FrontImage
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS
+from ..golden.walk import tile_walk
 from ..params import CORES, TILE, RenderConfig
 from ..scene.camera import Camera
 from . import half
@@ -84,8 +85,9 @@ def rendering_rtl(
         ), COUNTERS, frames, limit)
         buffer = sim.read(base["frame"], stride * rows * TILE).reshape(rows * TILE, stride)
         given = np.zeros((2 * rows, 4 * pairs), np.int64)
+        x, y = tile_walk(pairs, rows)
         for k in range(CORES):
-            given[k // 2 :: 2, k % 2 :: 2] = sim.given(k, 2 * pairs * rows).reshape(rows, 2 * pairs)
+            given[2 * y + k // 2, 2 * x + k % 2] = sim.given(k, len(x))
         return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.efficiency)
 
 
