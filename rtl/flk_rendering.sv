@@ -25,6 +25,7 @@ module flk_rendering
   parameter  int unsigned Lanes          = 32,
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
+  parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
   parameter  int unsigned Chunks         = 16,   // in a list reader's memory
   parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
   parameter  int unsigned Queue          = 64,   // records of each core
@@ -237,7 +238,9 @@ module flk_rendering
       .r_last_i      (list_r_last_i)
     );
 
-    flk_sorting_unit i_sorter (
+    flk_sorting_unit #(
+      .Stages(SortStages)
+    ) i_sorter (
       .clk_i,
       .rst_ni,
       .clear_i     (1'b0),

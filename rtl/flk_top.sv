@@ -28,6 +28,11 @@ module flk_top
   parameter  int unsigned Lanes          = 32,
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
+  parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
+  parameter  int unsigned Chunks         = 16,
+  parameter  int unsigned Entries        = 512,
+  parameter  int unsigned Pairs          = 4,
+  parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
   parameter  int unsigned Pointers       = 2048,  // lists of a list writer: up to 1920x1088
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
   localparam int unsigned IdBits         = 4,
@@ -403,6 +408,7 @@ module flk_top
   flk_preprocessing #(
     .Form    (Form),
     .Pointers(Pointers),
+    .Waiting (Waiting),
     .IdBits  (IdBits)
   ) i_front (
     .clk_i               (front_clk),
@@ -481,6 +487,10 @@ module flk_top
     .Lanes         (Lanes),
     .Slots         (Slots),
     .Depth         (Depth),
+    .SortStages    (SortStages),
+    .Chunks        (Chunks),
+    .Entries       (Entries),
+    .Pairs         (Pairs),
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),

@@ -88,7 +88,7 @@ PARTS = (
     Part("constants", "constants of the chip model", ("",), chip.constant_tables, cheap=True),
     Part("dram", "access patterns on the DRAM model", ("",), chip.dram_tables),
     Part("synthesis", "tables of make synth", ("units", "summary"), synthesis.tables, synthesis.missing),
-    Part("chip_memory", "memories of the chip, unit by unit", ("",), chip_memory.tables),
+    Part("chip_memory", "memories of the chip, unit by unit", ("", "sizes"), chip_memory.tables),
     Part("library", "another cell library beside our own", ("",), synthesis.library_tables, synthesis.library_missing),
     Part("formal", "results of make formal", ("",), formal.tables, formal.missing),
     Part("mutants", "who kills the mutants of the hardware", ("",), mutants.tables, mutants.missing),

@@ -158,6 +158,39 @@ MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a la
 
 
 @dataclass(frozen=True)
+class ChipMemories:
+    """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/chip_memory.md).
+
+    sorted_entries: longest list that a sorting unit takes in one reading. list_chunks: in a list reader's memory. sorted_ahead: entries of a sorting unit that
+    wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours.
+    """
+
+    sorted_entries: int = 2048
+    list_chunks: int = 16
+    sorted_ahead: int = 512
+    pairs: int = 4
+    survivors: int = 128
+
+    @property
+    def sort_stages(self) -> int:
+        """Merging steps of a sorting unit."""
+        return (self.sorted_entries // SORT_CELLS).bit_length() - 1
+
+    def rendering_parameters(self) -> dict[str, int]:
+        """Of `flk_rendering` and `flk_top`, those that are not their defaults."""
+        values = {"SortStages": self.sort_stages, "Chunks": self.list_chunks, "Entries": self.sorted_ahead, "Pairs": self.pairs}
+        return values if self != ChipMemories() else {}
+
+    def front_parameters(self) -> dict[str, int]:
+        """Of `flk_preprocessing` and `flk_top`, likewise."""
+        return {"Waiting": self.survivors} if self != ChipMemories() else {}
+
+
+SORT_CELLS = 16  # entries of a sorting unit's first runs
+CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64)}  # small: within the paper's 288 KB
+
+
+@dataclass(frozen=True)
 class RenderConfig:
     """One configuration of the rendering stage.
 
@@ -166,7 +199,7 @@ class RenderConfig:
     is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
     mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `lanes` of all cores; `in_width` elements
-    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue.
+    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue. `memories`, of the whole chip: key of CHIP_MEMORIES.
     """
 
     form: Form = Form.FACTORED
@@ -181,9 +214,10 @@ class RenderConfig:
     lanes: int = LANE_COUNTS[0]
     in_width: int = 2
     slots: int = 20
+    memories: str = "default"
 
     def __post_init__(self) -> None:
-        for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES)):
+        for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES), ("memories", CHIP_MEMORIES)):
             if getattr(self, field) not in table:
                 raise FlickerError(f"configuration: {field} must be one of {', '.join(table)}, not {getattr(self, field)}")
         if not self.generator.tests and self.cat != CatMode.OFF:
@@ -238,10 +272,15 @@ class RenderConfig:
         return {name: values[name] for name in STAGES[self.stage].parameters}
 
     def chip_parameters(self) -> dict[str, int]:
-        """Module parameters of the rendering half and the chip: the stage and what it is built with. A core gets one record a cycle there."""
+        """Module parameters of the rendering half and the chip: the stage, what it is built with, memories of the rendering half that are not the default ones.
+        A core gets one record a cycle there."""
         parameters = self.rtl_parameters()
         parameters.pop("InWidth", None)
-        return {"Stage": list(STAGES).index(self.stage), **parameters}
+        return {"Stage": list(STAGES).index(self.stage), **parameters, **self.chip_memories.rendering_parameters()}
+
+    @property
+    def chip_memories(self) -> ChipMemories:
+        return CHIP_MEMORIES[self.memories]
 
     def with_(self, **changes) -> RenderConfig:
         """A copy with some fields changed."""

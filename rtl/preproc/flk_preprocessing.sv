@@ -16,6 +16,7 @@ module flk_preprocessing
   parameter  int unsigned Form     = FORM_FACTORED,
   parameter  int unsigned Pointers = 2048,  // lists of a writer
   parameter  int unsigned Gather   = 256,   // lines that are written together
+  parameter  int unsigned Waiting  = 128,   // survivors of a lane that wait for colours
   parameter  int unsigned IdBits   = 4,
   localparam int unsigned Width    = 512,
   localparam int unsigned Bytes    = Width / 8,
@@ -574,7 +575,8 @@ module flk_preprocessing
 
   for (genvar k = 0; k < LANES; k++) begin : gen_lanes
     flk_preprocessing_core #(
-      .Form(Form)
+      .Form   (Form),
+      .Waiting(Waiting)
     ) i_core (
       .clk_i,
       .rst_ni,

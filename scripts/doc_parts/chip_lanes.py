@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import ENTRIES, PAIRS, QUEUE
+from flicker.chip.rendering import QUEUE
 from flicker.errors import FlickerError
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import UNITS
@@ -17,7 +17,7 @@ from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
 from flicker.markdown import table
-from flicker.params import CORES, STAGES, RenderConfig
+from flicker.params import CORES, STAGES, ChipMemories, RenderConfig
 from flicker.perf.lanes import LaneCycles, lane_work, simulate_lanes
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import SLOT_LIMIT, PackedFormat
@@ -73,7 +73,7 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: LaneCycles) -> tupl
 
 ENTRY_BITS = (SLOT_LIMIT - 1).bit_length() + CORES + 1  # number, mask, and the bit that marks an end
 RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
-DEFAULT = {"Entries": ENTRIES, "Queue": QUEUE, "Pairs": PAIRS}
+DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": QUEUE, "Pairs": ChipMemories().pairs}
 # Entries that each sorting unit's buffer holds, records that each core's queue holds, pairs of tiles in the frame writer; the memory.
 HELD: tuple[tuple[dict[str, int], DramConfig | None], ...] = (
     ({"Entries": 4}, None), ({}, None), ({"Queue": 128}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None), ({}, MEMORIES["51.2 GB/s"]),

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import fields
 
 from flicker import markdown
 from flicker.cost.chip_area import UM2_PER_BIT
 from flicker.cost.stamp import LIBERTY, rtl_stamp
 from flicker.cost.synth.run import Runner
 from flicker.cost.synth.units import MEMORY
+from flicker.errors import FlickerError
+from flicker.params import CHIP_MEMORIES, ChipMemories, RenderConfig
 
 from .common import Say
 
@@ -55,8 +58,17 @@ def tables(say: Say) -> dict[str, str]:
     for side, total in sums.items():
         rows.append([SIDES[side], "all", "", *_sizes(total)])
     rows.append(["chip", "all", f"{sum(found.values())} memories", *_sizes(sum(sums.values()))])
+    config = RenderConfig(memories="small")
+    small = memories(runner, runner.add(TOP, config.chip_parameters() | config.chip_memories.front_parameters()))
+    bits = {name: sum(words * width * count for (_, _, words, width), count in of.items()) for name, of in (("default", found), ("small", small))}
+    sizes = [
+        [f"`{name}`", *(f"{value:,}" for value in vars(CHIP_MEMORIES[name]).values()), *_sizes(bits[name])] for name in CHIP_MEMORIES
+    ]
     head = f"Planned from RTL {rtl_stamp()}.\n\n"
-    return {"": head + markdown.table(["half", "unit", "memories, words x bits", "bits", "KB", "mm2"], rows)
+    if bits["small"] > PAPER_KB * 8192:
+        raise FlickerError(f"small memories: {bits['small']:,} bits, more than the paper's {PAPER_KB} KB")
+    names = ["memories", *(f.name.replace("_", " ") for f in fields(ChipMemories)), "bits", "KB", "mm2"]
+    return {"sizes": markdown.table(names, sizes), "": head + markdown.table(["half", "unit", "memories, words x bits", "bits", "KB", "mm2"], rows)
             + f"\n\nThe paper: {PAPER_KB} KB of feature buffers and others, {PAPER_KB * 8192:,} bits."}
 
 

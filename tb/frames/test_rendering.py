@@ -27,7 +27,7 @@ from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.golden.lanes.lists import front_lists
 from flicker.golden.list_reader import read_tile
 from flicker.golden.lists import ENTRY_BITS
-from flicker.golden.sorting import sort_list
+from flicker.golden.sorting import CAPACITY, sort_list
 from flicker.params import TILE, CatMode, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
@@ -52,12 +52,12 @@ def view_of(width: int, height: int, scene: str = "some") -> tuple[FrontFrame, F
         view = load_view(DEMO, 0, (width, height) if scene == "demo" else (96, 54))
         front = run_front(packed_scene(view, PackedFormat.CHUNK), replace(view.camera, width=width, height=height))
     else:
-        layers = scene == "layers"
-        rng, n = np.random.default_rng(seed()), LAYERS if layers else 500
+        layers, haze = scene == "layers", scene == "haze"
+        rng, n = np.random.default_rng(seed()), LAYERS if layers else 1300 if haze else 500
         made = Scene(
             means=np.stack([*rng.uniform(-1.5, 1.5, (2, n)), rng.uniform(1.0, 6.0, n) * (-1 if scene == "behind" else 1)], axis=1),
-            scales=rng.uniform(2.0, 3.0, (n, 3)) if layers else rng.uniform(0.01, 0.1, (n, 3)), quats=rng.normal(size=(n, 4)),
-            opacities=rng.uniform(0.9 if layers else 0.01, 1.0, n), sh=rng.normal(scale=0.3, size=(n, 4, 3)),
+            scales=rng.uniform(2.0, 3.0, (n, 3)) if layers or haze else rng.uniform(0.01, 0.1, (n, 3)), quats=rng.normal(size=(n, 4)),
+            opacities=rng.uniform(0.9 if layers else 0.01, 0.02 if haze else 1.0, n), sh=rng.normal(scale=0.3, size=(n, 4, 3)),
         )
         front = run_front(pack(made, PackedFormat.CHUNK).packed, Camera(width, height, 80.0, 80.0, np.zeros(3), np.eye(3)))
     return front, front_memory(front)
@@ -79,14 +79,14 @@ class Lists:
     once: int = 0
 
 
-def lists_read(image: FrontImage) -> Lists:
-    """A list of more than 2,048 entries is read more than once."""
+def lists_read(image: FrontImage, capacity: int) -> Lists:
+    """A list of more than `capacity` entries is read more than once."""
     lists, found = image.lists, Lists()
     for y in range(lists.rows):
         for x in range(lists.cols):
             elements = read_tile(lists.memory, lists.pointers, lists.cols, x, y, lists.chunks).lines
             entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in elements for k in range(line.used)]
-            times = len(sort_list(entries).readings)
+            times = len(sort_list(entries, capacity).readings)
             used = len(elements) if entries else 0
             found = Lists(found.readings + times, found.lines + times * used, found.lists + 1, found.once + used)
     return found
@@ -106,7 +106,7 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
     if not options.get("memory", MemoryOptions()).fail:
         frames, pairs, rows = options.get("frames", 1), -(-size[0] // PAIR), -(-size[1] // TILE)
         tiles = 2 * pairs * rows
-        due = lists_read(image)
+        due = lists_read(image, config.chip_memories.sorted_entries)
         starts = np.arange(rows * TILE) * (golden.buffer.shape[1] // 32) % 2  # a row of RGBA16F that begins within a beat has one more
         written = pairs * (2 * len(starts) if format_ is PixelFormat.RGB8 else (4 + starts).sum())
         lengths = np.diff(golden.frame.lists.start)
@@ -150,7 +150,7 @@ def test_opaque_layers() -> None:
     """Lists of thousands of opaque splats: few are looked up, and lists that would be read five times are left."""
     rtl = check((32, 32), scene="layers")
     front, image = view_of(32, 32, "layers")
-    due = lists_read(image)
+    due = lists_read(image, CAPACITY)
     assert left_out(rtl, front) > 0.9 and rtl.counters["lines"] < 0.2 * len(front.number)
     assert rtl.counters["readings"].sum() < due.readings and rtl.traffic["lists"].read_beats < due.lines
 
@@ -181,6 +181,17 @@ def test_modes() -> None:
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
     check((24, 16), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
+
+
+def test_small_memories() -> None:
+    """A list of more entries than the sorting unit takes in one reading, a reader of few chunks, a frame writer of two pairs; DRAM behind ports that pause."""
+    config = CONFIG.with_(memories="small")
+    tiles = 4
+    assert (np.bincount(view_of(32, 32, "haze")[0].entry_tile) > config.chip_memories.sorted_entries).sum() == tiles
+    rtl = check((32, 32), config, scene="haze")
+    assert rtl.counters["readings"].sum() == 2 * tiles and check((32, 32), scene="haze").counters["readings"].sum() == tiles
+    shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
+    check((96, 54), config, memory=MemoryOptions(DramConfig().timing, paused(shares)), frames=2)
 
 
 @pytest.mark.slow

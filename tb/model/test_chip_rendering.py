@@ -18,7 +18,8 @@ from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
-from flicker.params import CatMode, RenderConfig
+from flicker.golden.walk import tile_walk
+from flicker.params import CatMode, ChipMemories, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.chip import PORT
@@ -35,7 +36,7 @@ def frame() -> tuple[FrontFrame, FrontImage]:
 
 
 def modelled(config: RenderConfig, dram: DramConfig | None = None, **options) -> Rendering:
-    return estimate(TileLists.of(*frame()), config, dram, **options)
+    return estimate(TileLists.of(*frame(), config.chip_memories.sorted_entries), config, dram, **options)
 
 
 @pytest.mark.parametrize("change", [
@@ -58,16 +59,32 @@ def test_sizes() -> None:
         assert found, f"{module}: {name}"
         return int(found[1])
 
-    assert model.ENTRIES == default("flk_rendering", "Entries") == default("sort/flk_entry_buffer", "Depth")
+    sizes = ChipMemories()
+    for top in ("flk_rendering", "flk_top"):
+        assert (sizes.sort_stages, sizes.list_chunks) == (default(top, "SortStages"), default(top, "Chunks"))
+        assert (sizes.sorted_ahead, sizes.pairs) == (default(top, "Entries"), default(top, "Pairs"))
+    for top in ("flk_top", "preproc/flk_preprocessing", "preproc/flk_preprocessing_core"):
+        assert sizes.survivors == default(top, "Waiting")
+    assert sizes.sort_stages == default("sort/flk_sorting_unit", "Stages") and sizes.sorted_ahead == default("sort/flk_entry_buffer", "Depth")
     assert model.QUEUE == default("flk_rendering", "Queue") == default("sort/flk_delivery", "Queue")
-    assert model.PAIRS == default("flk_rendering", "Pairs")
-    assert model.SLOTS == default("flk_rendering", "Chunks")
     for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
         assert (model.DEPTH, model.PLACES) == (default(unit, "Depth"), default(unit, "Places"))
     given = inspect.signature(estimate).parameters
     assert (given["latency_cycles"].default, given["reads"].default) == (PORT.latency, PORT.max_reads)
     margin = re.search(r"Margin = (\d+);", (ROOT / "rtl/sort/flk_delivery.sv").read_text())
     assert margin and model.MARGIN == int(margin[1])
+
+
+def test_small_memories() -> None:
+    """Lists of more entries than the sorting unit takes are read again."""
+    tables = TileLists.of(*frame(), 64)
+    with pytest.raises(ValueError, match="capacity of 64"):
+        estimate(tables, RenderConfig(), None)
+    assert tables.capacity == 64 and len(tables.reading_size) > len(tables.lines)
+    lengths = np.diff(tables.start)
+    assert (np.add.reduceat(tables.reading_size, tables.reading_start[:-1]) == lengths).all()
+    small, default = modelled(RenderConfig(memories="small")), modelled(RenderConfig())
+    assert small.bytes["lists"] > 1.5 * default.bytes["lists"] and small.cycles > default.cycles  # lists of up to 10,000 entries
 
 
 def test_cycles() -> None:
@@ -99,8 +116,8 @@ def test_reads_of_a_channel() -> None:
 def test_bytes() -> None:
     """Pointers and frame buffer of whole pairs of tiles; lines of lists at least once each, of records at least those that lists name."""
     found, (front, image) = modelled(RenderConfig(cat=CatMode.AUTO)), frame()
-    start, record, _ = tile_lists(front, 8)
+    start, record, _ = tile_lists(front, *tile_walk(4, 4))
     assert len(start) == 8 * 4 + 1 and start[-1] == len(front.entry_tile)
-    assert found.bytes["pointers"] == 64 * 8 * 4 and found.bytes["frame"] == 64 * 2 * 4 * 64
+    assert found.bytes["pointers"] == 32 * 8 * 4 and found.bytes["frame"] == 64 * 2 * 4 * 64
     assert found.bytes["records"] >= 32 * len(np.unique(record // 2))
     assert found.bytes["lists"] >= 64 * sum(len(w) for w in image.lists.writes)

@@ -18,7 +18,7 @@ from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.front.setup import FrameSetup
 from ..golden.lists import ENTRY_BITS, pointer_lines
-from ..params import TILE
+from ..params import TILE, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
 from .dram import READ, WRITE, DramConfig, Stream, simulate
@@ -29,7 +29,7 @@ CLUSTER_CYCLES = 4  # of the cluster test; the frame begins with a pass over all
 GROUP_CYCLES = 2  # a group of four enters the front
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
-WAITING = 128  # survivors of a lane between front and entries
+WAITING = ChipMemories().survivors  # of a lane between front and entries
 MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
 GATHER = 256  # lines that are written together
 
@@ -243,8 +243,8 @@ class UnitCycles:
     all: int
 
 
-def unit_cycles(frame: FrontFrame) -> UnitCycles:
-    """Cycles of a frame if the memory were perfect."""
+def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
+    """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries."""
     packed = frame.packed
     keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)).keep)
     groups = -(-packed.counts[keep] // LANES)
@@ -264,15 +264,15 @@ def unit_cycles(frame: FrontFrame) -> UnitCycles:
     band = (frame.entry_splat.astype(np.int64)[:, None] << 20 | y[:, None].astype(np.int64) << 1 | np.arange(2))[half]
     bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
     front, went = _unit_cycles(
-        group, lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, WAITING, MERGE_DEPTH, LATENCY,
+        group, lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, waiting, MERGE_DEPTH, LATENCY,
     )
     first_pass = CLUSTER_CYCLES * len(packed.table)
     return UnitCycles(first_pass, place.astype(np.float64), went, int(max(front, GROUP_CYCLES * start[-1])) + first_pass)
 
 
-def phases(units: UnitCycles, beats: Sequence[Beats], dram: int) -> int:
+def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING) -> int:
     """Cycles of a frame whose traffic takes the DRAM `dram` cycles, beats at an even rate."""
-    step = WAITING * LANES
+    step = waiting * LANES
     bounds = np.arange(step, len(units.went), step)  # the first survivor of each phase but the first
     unit = np.diff(np.concatenate([[0], units.went[bounds], [units.all - units.first_pass]]))
     due = np.concatenate([b.due for b in beats])
@@ -307,12 +307,12 @@ class Preprocessing:
         ]
 
 
-def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None) -> Preprocessing:
-    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory."""
+def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, waiting: int = WAITING) -> Preprocessing:
+    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. waiting: survivors of a lane between front and entries."""
     beats = traffic(frame, image)
     used = {b.name: b.bytes for b in beats}
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    units = unit_cycles(frame)
+    units = unit_cycles(frame, waiting)
     dram = dram_cycles(beats, config) if config else 0
-    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram))
+    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, waiting))

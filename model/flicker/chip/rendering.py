@@ -24,7 +24,6 @@ from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.lanes.lists import front_lists
 from ..golden.masked import render_masked
 from ..golden.render import stream_order
-from ..golden.sorting import CAPACITY
 from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
@@ -40,11 +39,9 @@ CLEAR = 68  # of the record cache, at the beginning of a frame
 READ = 4  # registers from a request to the port and behind it
 CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/list_reader.md)
 FIRST = 17  # a tile's first line beside two accesses
-SLOTS, CONTEXTS = 16, 4  # chunks in a list reader, lists under way
-SORTED_LISTS, SORTED_ENTRIES = 8, 2 * CAPACITY  # that a sorting unit holds
-CUT = 3 * CAPACITY // 2 + 38  # that a reading stops for
-ENTRIES = 512  # of a sorting unit that wait for delivery, in the buffer's memories
-BUFFER = ENTRIES + 2  # with those at its outputs
+CONTEXTS = 4  # lists under way in a list reader
+SORTED_LISTS = 8  # that a sorting unit holds, in twice its capacity
+OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
@@ -54,7 +51,7 @@ QUEUED = 3  # through a queue
 ELASTIC = 4  # registers between a queue and the stage: latency and places
 TOLD = 4  # from a sub-tile's last finished pixel to delivery
 DROPPED = 8  # from there to the end of a list that all cores have finished
-PAIRS, PAIR_CYCLES, PAIR_GAP = 4, 128, 4  # of tiles in the frame writer
+PAIR_CYCLES, PAIR_GAP = 128, 4  # of tiles in the frame writer
 END = 60  # from the last line of a picture to its answer, beside the memory's latency
 
 NEVER = np.int64(1) << 60
@@ -121,17 +118,20 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 def _frame(
     tile_start, record, mask, lines_start, chunk_entries, sort_delay, reading_start, reading_size, reading_cuts, element_start, element_mask, element_cycles,
     finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token, depth, blend,
-    out_delay, per_vru, base, memory, missed,
+    out_delay, per_vru, base, memory, sizes, missed,
 ):
     """Cycles of a frame; lines of records; readings of each list (T,); records given to each core of each tile (T, 4). missed: takes the lines of records in
     the order in which they are read.
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
     elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
-    first record; memory: of `_moves`, channels 0 for one without banks.
+    first record; memory: of `_moves`, channels 0 for one without banks. sizes: capacity of a sorting unit, chunks in a list reader, entries that wait behind a
+    sorting unit, pairs of tiles in the frame writer.
     """
     tiles = len(tile_start) - 1
     ring = 256
+    capacity, slots, buffer, held_pairs = sizes
+    cut = 3 * capacity // 2 + 38  # cycles that a reading stops for
     # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
     gate_end = np.zeros(tiles, np.int64)
     out_end = np.zeros(tiles, np.int64)
@@ -149,7 +149,7 @@ def _frame(
     part_gate = np.zeros((reading_start[1:] - reading_start[:-1]).max() + 1, np.int64)  # end of each reading
     # Buffers: when the unit gave its last entry, and when entries were taken
     emitted = np.zeros(4, np.int64)
-    removed, removals = np.zeros((4, BUFFER), np.int64), np.zeros(4, np.int64)
+    removed, removals = np.zeros((4, buffer), np.int64), np.zeros(4, np.int64)
     # Queues: when found; element in its list, or -1, the end; when taken
     found = np.zeros((4, QUEUE), np.int64)
     which = np.zeros((4, QUEUE), np.int64)
@@ -197,7 +197,7 @@ def _frame(
                 t_now = core_tile[k]
                 if got[k] == put[k]:
                     break
-                if t_now // 2 >= PAIRS and pair_free[t_now // 2 - PAIRS] == NEVER:
+                if t_now // 2 >= held_pairs and pair_free[t_now // 2 - held_pairs] == NEVER:
                     break
                 q = got[k] % QUEUE
                 n = count[k]
@@ -205,8 +205,8 @@ def _frame(
                 if n >= ELASTIC:
                     leave = max(leave, accepted[k, (n - ELASTIC) % ring])
                 go = leave + ELASTIC
-                if t_now // 2 >= PAIRS:
-                    go = max(go, pair_free[t_now // 2 - PAIRS] + ELASTIC)
+                if t_now // 2 >= held_pairs:
+                    go = max(go, pair_free[t_now // 2 - held_pairs] + ELASTIC)
                 taken[k] = leave
                 freed[k, q] = leave
                 got[k] += 1
@@ -296,17 +296,17 @@ def _frame(
             if t_c >= 4 * SORTED_LISTS:
                 gate = max(gate, out_end[t_c - 4 * SORTED_LISTS])
             for j in range(lines_start[t_c], lines_start[t_c + 1]):
-                came = max(came, chunk_free[u, chunk_count[u] % SLOTS]) + CHAIN + read_latency
+                came = max(came, chunk_free[u, chunk_count[u] % slots]) + CHAIN + read_latency
                 gate = max(gate, came) + chunk_entries[j]
-                chunk_free[u, chunk_count[u] % SLOTS] = gate
+                chunk_free[u, chunk_count[u] % slots] = gate
                 chunk_count[u] += 1
-            # What lies SORTED_ENTRIES before has left.
+            # What lies twice its capacity before has left.
             total = n
             before = t_c - 4
-            while before >= 0 and total <= SORTED_ENTRIES:
+            while before >= 0 and total <= 2 * capacity:
                 total += tile_start[before + 1] - tile_start[before]
                 before -= 4
-            if before >= 0 and total > SORTED_ENTRIES:
+            if before >= 0 and total > 2 * capacity:
                 gate = max(gate, out_end[before + 4])
             gate += 1
             gate_end[t_c] = gate
@@ -317,17 +317,17 @@ def _frame(
             part_end = at + n
             ready = gate - n + sort_delay[t_c] - 1
             if parts > 1:
-                part_gate[0] = gate + reading_cuts[r] * CUT
+                part_gate[0] = gate + reading_cuts[r] * cut
                 part_end = at + reading_size[r]
                 ready = part_gate[0] + sort_delay[t_c]
-                part_gate[1] = part_gate[0] + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+                part_gate[1] = part_gate[0] + FIRST + read_latency + n + reading_cuts[r + 1] * cut
             if t_c >= 4:
                 ready = max(ready, out_end[t_c - 4] + 1)
         is_end = at == tile_start[t_c + 1]
         # The unit gives an entry a cycle, while its buffer has a place; two a cycle are looked up.
         give = max(emitted[u] + 1, ready)
-        if removals[u] >= BUFFER:
-            give = max(give, removed[u, removals[u] % BUFFER] + 1)
+        if removals[u] >= buffer:
+            give = max(give, removed[u, removals[u] % buffer] + 1)
         t = max(give + BUFFERED, max(looked, looked_before + 1))
         if lookups >= DEPTH:
             t = max(t, found_at[lookups % DEPTH])
@@ -356,7 +356,7 @@ def _frame(
                 looked = looked_before = t + inside // 2
                 continue
         emitted[u] = give
-        removed[u, removals[u] % BUFFER] = t
+        removed[u, removals[u] % buffer] = t
         removals[u] += 1
         looked_before, looked = looked, t
         if kept:
@@ -421,7 +421,7 @@ def _frame(
             readings[t_c] = part + 1
             gate_end[t_c] = part_gate[part]
             if part + 1 < parts:
-                part_gate[part + 1] = max(part_gate[part], t) + FIRST + read_latency + n + reading_cuts[r + 1] * CUT
+                part_gate[part + 1] = max(part_gate[part], t) + FIRST + read_latency + n + reading_cuts[r + 1] * cut
     return writer, misses, readings, given
 
 
@@ -497,7 +497,10 @@ def estimate(
     finish, finish_op = np.empty((2, subtiles, 4), np.int64)
     finish_events(cores.finish, lists.start, cores.pace, finish, finish_op)
     listed = (tables.x < -(-lists.width // TILE)).astype(np.bool_)
-    delay = np.array([latency(min(int(n), CAPACITY)) for n in np.diff(tables.start)])
+    sizes = config.chip_memories
+    if tables.capacity != sizes.sorted_entries:
+        raise ValueError(f"lists are read for a capacity of {tables.capacity}, the configuration's is {sizes.sorted_entries}")
+    delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages) for n in np.diff(tables.start)])
     # Rows stay open: a line of a list finds another one than its own.
     each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
     list_latency = latency_cycles + (dram.idle_cycles(BEAT) + math.ceil(dram.trp * each) if dram else 0)
@@ -514,7 +517,7 @@ def estimate(
         tables.reading_cuts, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
         RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
         cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
-        tables.regions.records // RECORD_LINE, memory, missed,
+        tables.regions.records // RECORD_LINE, memory, (sizes.sorted_entries, sizes.list_chunks, sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
     )
     stride = stride or least_stride(lists.width, format_)
     moved = {

@@ -61,10 +61,12 @@ class TileLists:
     reading_start: np.ndarray
     reading_size: np.ndarray
     reading_cuts: np.ndarray
+    capacity: int
     regions: Regions
 
     @staticmethod
-    def of(frame: FrontFrame, image: FrontImage) -> TileLists:
+    def of(frame: FrontFrame, image: FrontImage, capacity: int = CAPACITY) -> TileLists:
+        """capacity: of a sorting unit, entries."""
         cols, rows = -(-frame.camera.width // PAIR) * (PAIR // TILE), -(-frame.camera.height // TILE)
         x, y = tile_walk(cols // 2, rows)
         start, record, mask = tile_lists(frame, x, y)
@@ -82,9 +84,9 @@ class TileLists:
                 used = [line.used for line in read.lines]
                 first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
                 chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
-                if length > CAPACITY:
+                if length > capacity:
                     entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in read.lines for k in range(line.used)]
-                    found = sort_list(np.array(entries, np.uint64)).readings
+                    found = sort_list(np.array(entries, np.uint64), capacity).readings
                     sizes += [len(r.gathered) for r in found]
                     cuts += [len(r.limits) for r in found]
                 else:
@@ -98,7 +100,7 @@ class TileLists:
         return TileLists(
             frame, whole_pairs(frame.subtile_lists()), cols, rows, x, y, start, record, mask, lines,
             np.concatenate([np.zeros(0, np.int64), *addresses]), np.array(chunk_start), np.array(chunks, np.int64), np.array(reading_start), np.array(sizes),
-            np.array(cuts), Regions.of(frame.packed, frame.camera, tables.chunks, frame.kind),
+            np.array(cuts), capacity, Regions.of(frame.packed, frame.camera, tables.chunks, frame.kind),
         )
 
     def by_tile(self, values: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from ..params import (
+    CHIP_MEMORIES,
     FAITHFUL,
     LANE_COUNTS,
     MAX_FIFO_DEPTH,
@@ -55,6 +56,7 @@ FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden", "RTL": 
 FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
 ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
 StageChoice = Enum("StageChoice", {name.upper(): name for name in STAGES}, type=str)  # type: ignore[misc]
+MemoriesChoice = Enum("MemoriesChoice", {name.upper(): name for name in CHIP_MEMORIES}, type=str)  # type: ignore[misc]
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
@@ -153,6 +155,7 @@ def render(
     fifo_depth: Annotated[int | None, typer.Option(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
+    memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
@@ -165,6 +168,8 @@ def render(
     whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
+    if memories is not None and engine is not EngineChoice.CHIP:
+        raise FlickerError("--memories: for --engine chip only")
     if not whole and front in (None, FrontChoice.FLOAT):
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
             raise FlickerError(f"{names}: for --front golden and rtl only")
@@ -183,6 +188,7 @@ def render(
         coords=Coords[coords.name],
         stage=_stage(stage, engine, lanes, of_stage),
         lanes=base.lanes if lanes is None else lanes,
+        memories=base.memories if memories is None else memories.value,
     )
     if out is not None and out.suffix.lower() != ".png":
         raise FlickerError(f"--out: {out}: only .png is written")

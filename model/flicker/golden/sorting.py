@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import FlickerError
+from ..params import SORT_CELLS, ChipMemories
 from .lists import ENTRY_BITS, MASK_BITS
 
-CELLS = 16  # entries of a first run
-STAGES = 7  # of merging: runs of 16 become runs of 2048
+CELLS = SORT_CELLS
+STAGES = ChipMemories().sort_stages  # of merging: runs of 16 become runs of 2048
 CAPACITY = CELLS << STAGES
 
 

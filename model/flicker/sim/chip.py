@@ -44,7 +44,8 @@ def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) ->
     """Shared library of the simulator, with the design's assertions; cached by content."""
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
-        "flk_top", {**config.chip_parameters(), "Pointers": pointers}, settings, ["--inline-mult", "20000"], define="-DFLK_CHIP",
+        "flk_top", {**config.chip_parameters(), **config.chip_memories.front_parameters(), "Pointers": pointers}, settings, ["--inline-mult", "20000"],
+        define="-DFLK_CHIP",
     )
 
 
