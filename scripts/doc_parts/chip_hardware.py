@@ -72,10 +72,7 @@ def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, s
     flowers = next(v for v in REAL_VIEWS if v.folder == "flowers")
     return [
         *((*place, SIZE, CHUNKS, name) for name, place in product(BUILDS, at)),
-        *(
-            (f"{flowers.title}, 1280x720", flowers.path(folder_of_scenes()), flowers.number, None, FLOWERS_CHUNKS, name)
-            for name in ("default", "small memories")
-        ),
+        (f"{flowers.title}, 1280x720", flowers.path(folder_of_scenes()), flowers.number, None, FLOWERS_CHUNKS, "default"),
     ]
 
 

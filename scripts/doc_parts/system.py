@@ -12,15 +12,22 @@ from .common import Say, load
 GSCORE = "gscore-conic"  # whose frames a second are 1
 
 
+SMALL = ("faithful", "flicker", "log-lanes", "log-lanes-64")  # shown with small memories too
+
+
 def tables(say: Say) -> dict[str, str]:
-    rows: dict[str, list[str]] = {name: [f"`{name}`", get_configuration(name).title] for name in group("chip")}
+    names = group("chip")
+    rows: dict[tuple[str, str], list[str]] = {(name, "default"): [f"`{name}`", get_configuration(name).title] for name in names}
+    rows |= {(name, "small"): [f"`{name}`", f"{get_configuration(name).title}; `small` memories"] for name in SMALL}
     for view in REAL_VIEWS:
         say(view.title)
-        facts = chip_estimates(load(view), list(rows))
-        for name, fact in facts.items():
+        loaded = load(view)
+        facts = {"default": chip_estimates(loaded, names), "small": chip_estimates(loaded, SMALL, "small")}
+        for (name, memories), row in rows.items():
+            fact = facts[memories][name]
             interval = fact["interval_cycles"]
-            rows[name].append(
-                f"{interval / 1e6:.2f} M, {facts[GSCORE]['interval_cycles'] / interval:.2f}x, {fact['bottleneck']}: {fact['front_cycles'] / 1e6:.2f} / "
-                f"{fact['render_cycles'] / 1e6:.2f} / {fact['dram_cycles'] / 1e6:.2f}, {fact['dram_bytes'] / 1e6:.1f} MB"
+            row.append(
+                f"{interval / 1e6:.2f} M, {facts['default'][GSCORE]['interval_cycles'] / interval:.2f}x, {fact['bottleneck']}: "
+                f"{fact['front_cycles'] / 1e6:.2f} / {fact['render_cycles'] / 1e6:.2f} / {fact['dram_cycles'] / 1e6:.2f}, {fact['dram_bytes'] / 1e6:.1f} MB"
             )
     return {"": table(["configuration", "what", *(view.title for view in REAL_VIEWS)], [tuple(row) for row in rows.values()])}

@@ -24,7 +24,7 @@ from ..golden.front.frame import FrontFrame, ListKind, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import MEAN_FRACTION
-from ..params import TILE, Form, RenderConfig
+from ..params import CHIP_MEMORIES, TILE, Form, RenderConfig
 from ..perf.render_stage import StageCycles
 from ..pipeline import packed_scene
 from ..scene.packed import PackedFormat
@@ -75,10 +75,10 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
-def chip_estimates(view: View, names: Sequence[str]) -> dict[str, dict]:
+def chip_estimates(view: View, names: Sequence[str], memories: str = "default") -> dict[str, dict]:
     """Cycles, bytes and the bottleneck of configurations in whole frames, by name; front ends by the form of the stage (`FRONTS`), lists of GSCore by oriented
-    boxes. FlickerError for one that the chip cannot have."""
-    dram = DramConfig()
+    boxes. memories: `RenderConfig.memories`. FlickerError for one that the chip cannot have."""
+    dram, sizes = DramConfig(), CHIP_MEMORIES[memories]
     fronts: dict[tuple[Form, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
     facts = {}
     for name in names:
@@ -92,9 +92,9 @@ def chip_estimates(view: View, names: Sequence[str]) -> dict[str, dict]:
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
             front = by_oriented_boxes(front) if key[1] else front
             image = front_memory(front)
-            fronts[key] = preprocessing.estimate(front, image, dram), TileLists.of(front, image)
+            fronts[key] = preprocessing.estimate(front, image, dram, sizes.survivors), TileLists.of(front, image, sizes.sorted_entries)
         first, tables = fronts[key]
-        frame = whole_frame(first, rendering.estimate(tables, stage, dram), dram)
+        frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
         facts[name] = {
             "front_cycles": frame.front.cycles, "render_cycles": frame.back.cycles, "interval_cycles": frame.interval, "latency_cycles": frame.latency,
             "bottleneck": frame.bottleneck, "dram_bytes": sum(frame.bytes.values()), "dram_cycles": frame.dram_cycles,
