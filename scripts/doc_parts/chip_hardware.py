@@ -40,11 +40,10 @@ LIMIT = 0.1
 CHUNKS = 8000  # of a list writer: enough for these views
 LOOSE = ("records", "lists")  # of lists: those that are read more than once may be left before
 FLOWERS_CHUNKS = 24_000  # of that view whole
-# By name: the configuration, what the scene is packed in, and its lists (`flicker render`'s defaults, with --faithful, with --memories small).
+# By name: the configuration, what the scene is packed in, and its lists (`flicker render`'s defaults, and with --faithful).
 BUILDS = {
     "default": (RenderConfig(), PackedFormat.CHUNK, ListKind.ELLIPSE),
     "faithful": (FAITHFUL, PackedFormat.FP16, ListKind.BOX),
-    "small memories": (RenderConfig().with_(memories="small"), PackedFormat.CHUNK, ListKind.ELLIPSE),
 }
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
