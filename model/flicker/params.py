@@ -177,7 +177,7 @@ class ChipMemories:
         return (self.sorted_entries // SORT_CELLS).bit_length() - 1
 
     def rendering_parameters(self) -> dict[str, int]:
-        """Of `flk_rendering` and `flk_top`, those that are not their defaults."""
+        """Of `flk_rendering` and `flk_top`; none where all sizes are the default ones."""
         values = {"SortStages": self.sort_stages, "Chunks": self.list_chunks, "Entries": self.sorted_ahead, "Pairs": self.pairs}
         return values if self != ChipMemories() else {}
 

@@ -40,17 +40,20 @@ module flk_tile_walk #(
   assign end_row   = rows_i - 1'b1;
   assign last_band = {1'b0, y_q[CoordBits-1:BandBits], {BandBits{1'b1}}} >= end_row;
 
+  logic last;  // tile of the picture
+
+  assign last = second_q && last_row && last_pair && last_band;
+
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      done_q   <= 1'b1;
-      right_q  <= 1'b0;
-      up_q     <= 1'b0;
-      second_q <= 1'b0;
-      half_q   <= 1'b0;
-      pair_q   <= '0;
-      y_q      <= '0;
-    end else if (start_i) begin
-      done_q   <= 1'b0;
+      done_q <= 1'b1;
+    end else if (start_i || (next_i && last)) begin
+      done_q <= !start_i;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (start_i) begin
       right_q  <= 1'b0;
       up_q     <= 1'b0;
       second_q <= 1'b0;
@@ -70,7 +73,6 @@ module flk_tile_walk #(
         pair_q <= right_q ? pair_q - 1'b1 : pair_q + 1'b1;
       end else begin
         // The first row of the next band.
-        done_q  <= last_band;
         right_q <= !right_q;
         up_q    <= 1'b0;
         half_q  <= !right_q;

@@ -38,7 +38,6 @@ SIZE = (640, 360)
 VIEWS = ("guitar", "stpeter")
 LIMIT = 0.1
 CHUNKS = 8000  # of a list writer: enough for these views
-LOOSE = ("records", "lists")  # of lists: those that are read more than once may be left before
 FLOWERS_CHUNKS = 24_000  # of that view whole
 # By name: the configuration, what the scene is packed in, and its lists (`flicker render`'s defaults, and with --faithful).
 BUILDS = {
@@ -71,7 +70,7 @@ def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, s
     at = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
     flowers = next(v for v in REAL_VIEWS if v.folder == "flowers")
     whole = (f"{flowers.title}, 1280x720", flowers.path(folder_of_scenes()), flowers.number, None, FLOWERS_CHUNKS, "default")
-    return [*((*place, SIZE, CHUNKS, name) for name, place in product(BUILDS, at)), *([whole] if os.environ.get("SLOW") else [])]
+    return [*((*place, SIZE, CHUNKS, name) for name, place in product(BUILDS, at)), *([whole] if os.environ.get("SLOW") == "1" else [])]
 
 
 def tables(say: Say) -> dict[str, str]:
@@ -89,7 +88,10 @@ def tables(say: Say) -> dict[str, str]:
         image = front_memory(front)
         golden = render_chip(front.subtile_lists(), config)
         sizes = config.chip_memories
-        second = rendering.estimate(TileLists.of(front, image, sizes.sorted_entries), config, dram, PORT.latency, PORT.max_reads)
+        lists_there = TileLists.of(front, image, sizes.sorted_entries)
+        second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
+        # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
+        loose = {"records"} | ({"lists"} if len(lists_there.reading_size) > len(lists_there.lines) else set())
         model = whole_frame(preprocessing.estimate(front, image, dram, sizes.survivors), second, dram)
         say(f"{title}: alone")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
@@ -99,9 +101,9 @@ def tables(say: Say) -> dict[str, str]:
             simulated = chip.usage().live["cycles"]
         assert alone.usage is not None
         moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
-        for purpose, size in model.bytes.items():
-            if abs(size / moved[purpose] - 1) > (LIMIT if purpose in LOOSE else 0.0):
-                raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {size:,}")
+        for purpose, due in model.bytes.items():
+            if abs(due / moved[purpose] - 1) > (LIMIT if purpose in loose else 0.0):
+                raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
         say(f"{title}: four frames back to back")
         with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
             done = back_to_back(chip, camera, chunks, lists)

@@ -46,7 +46,7 @@ CONFIG = RenderConfig(stage="lanes")
 CHANNELS_CONFIG = RenderConfig()
 ALL_CONFIGS = [
     pytest.param(config, id=name, marks=[pytest.mark.slow] * (config is not CONFIG))
-    for name, config in (("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL))
+    for name, config in (("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL), ("small", CONFIG.with_(memories="small")))
 ]
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [

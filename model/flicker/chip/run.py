@@ -105,7 +105,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
-        "format": chip.packed.format.value, "records": RecordKind.of(config.form).value, "clusters": chip.scene.clusters,
+        "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value, "clusters": chip.scene.clusters,
         "clusters_kept": chip.scene.clusters - count("culled_clusters"), "visible": count("survivors") - count("unlisted"), "list_entries": count("entries"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),
