@@ -15,7 +15,7 @@ from flicker.errors import FlickerError
 from flicker.front.entries import tile_entries
 from flicker.front.projection import project
 from flicker.golden import lists as golden
-from flicker.golden.lists import ListError, ListImage, pointer_lines, pointer_place, read_lists, write_lists
+from flicker.golden.lists import HELD_POINTERS, ListError, ListImage, pointer_lines, pointer_place, read_lists, write_lists
 from flicker.params import ALPHA_MIN
 
 
@@ -30,8 +30,8 @@ class Entries:
             self.key[rng.integers(0, splats, 3)] = (1 << 24) - 1
             self.record[-1] = (1 << 24) - 1
 
-    def write(self, chunks: int | None = None) -> ListImage:
-        return write_lists(self.splat, self.tile, self.mask, self.key, self.record, self.cols, self.rows, chunks)
+    def write(self, chunks: int | None = None, held: int = HELD_POINTERS) -> ListImage:
+        return write_lists(self.splat, self.tile, self.mask, self.key, self.record, self.cols, self.rows, chunks, held)
 
     def of(self, tile: int) -> list[tuple[int, int, int]]:
         here = self.tile == tile
@@ -233,6 +233,70 @@ def test_out_of_list_memory_ends_the_frame(name):
         untouched = np.ones(len(image.memory), bool)
         untouched[np.concatenate(image.writes)] = False
         assert not image.memory[untouched].any()
+
+
+def store(given: Entries, image: ListImage, writer: int, held: int) -> tuple[list[tuple[int, int, int]], list[int]]:
+    """The store of pointers in plain Python: what moves, by the lines of the lists in order; lines written at the end."""
+    places: dict[int, int] = {}
+    spilled: set[int] = set()
+    moves = []
+    owner = {line: t for t, lines in chains(given, image, writer).items() for line in lines}
+    for n, line in enumerate(image.writes[writer].tolist()):
+        mine = owner[line] // 16
+        old = places.get(mine % held)
+        if old != mine:
+            spilled |= {old} if old is not None else set()
+            if old is not None or mine in spilled:
+                moves.append((n, -1 if old is None else old, mine if mine in spilled else -1))
+            places[mine % held] = mine
+    return moves, [k for k in range(pointer_lines(given.cols, given.rows) // 4) if k not in spilled or places.get(k % held) == k]
+
+
+def chains(given: Entries, image: ListImage, writer: int) -> dict[int, list[int]]:
+    """Lines of memory of each list of a writer, by its number."""
+    out: dict[int, list[int]] = {}
+    for tile in np.unique(given.tile).tolist():
+        x, y = tile % given.cols, tile // given.cols
+        pointer = int(image.pointers[pointer_place(tile, given.cols)])
+        if x % 2 + y % 2 * 2 != writer or not pointer:
+            continue
+        lines = out.setdefault(y // 2 * -(-given.cols // 2) + x // 2, [])
+        chunk, used = pointer & 0xFFFFFF, pointer >> 24
+        while used:
+            first = (4 * chunk + writer) * 8
+            lines += range(first, first + used)
+            _, link, linked, _ = headers(image, first)
+            chunk, used = link, 8 if linked else 0
+    return out
+
+
+@pytest.mark.parametrize("held", [16, 64, 256])
+@pytest.mark.parametrize("name", ["random", "large boxes", "one splat over 4096x4096", "tiles of one set in turn", "last tile"])
+def test_pointers_beyond_those_held(name, held):
+    """Memory does not depend on how many pointers are held; what is spilled and fetched is that of a plain store."""
+    given = CASES[name]
+    few, all_ = given.write(held=held), given.write(held=16384)
+    assert not all_.spilled.any() and not all_.fetched.any() and all(len(m) == 0 for m in all_.moves)
+    for part in ("memory", "pointers", "entries", "lines", "evicted", "taken", "failed"):
+        assert np.array_equal(getattr(few, part), getattr(all_, part)), part
+    for writer in range(4):
+        moves, closed = store(given, few, writer, held // 16) if pointer_lines(given.cols, given.rows) // 4 > held // 16 else ([], all_.closed[writer].tolist())
+        assert [tuple(m) for m in few.moves[writer].tolist()] == moves and few.closed[writer].tolist() == closed
+        assert few.spilled[writer] == sum(m[1] >= 0 for m in moves) and few.fetched[writer] == sum(m[2] >= 0 for m in moves)
+    if name in ("random", "large boxes"):
+        assert few.spilled.min() > 20 or held == 256
+        assert few.fetched.min() > 10 or held == 256
+
+
+def test_a_writer_that_fails_leaves_what_it_spilled():
+    given = CASES["large boxes"]
+    full = given.write(held=16)
+    image = given.write(int(full.taken.min()) // 2, held=16)
+    assert image.failed.all() and image.spilled.all()
+    table = image.pointers.reshape(-1, 4, 16)
+    for writer in range(4):
+        here = np.flatnonzero(table[:, writer].any(axis=1))
+        assert set(here) <= set(image.moves[writer][:, 1]) and len(image.closed[writer]) == 0
 
 
 def test_broken_lists_are_refused():

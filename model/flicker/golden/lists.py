@@ -4,6 +4,9 @@ Writer b serves the tiles with (column & 1) | (row & 1) << 1 == b; its tile (u, 
 in the order of the scene and collects them in a combiner of 64 sets (3 low bits of u and v) and 4 ways of one line each. A line is written when it has nine
 entries, when another tile needs its place (ways in turn), and at the end (by set and way). Every line is written once, whole. All depends on the writer's own
 entries alone, so memory is the same in every run.
+
+Pointers lie on the chip by lines of 16, line n in place n mod (held / 16). Where a writer has more than it holds, a line that is wanted takes the place of the
+one there, which goes to its place in the pointer table (it is spilled) and comes back when it is wanted again (it is fetched).
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ POINTER_BYTES = POINTER_BITS // 8
 POINTERS_PER_LINE = LINE_BYTES * 8 // POINTER_BITS
 MAX_TILES = 256  # along a side: pictures up to 4096 pixels
 MAX_CHUNKS = 1 << LINK_BITS  # of a writer
+HELD_POINTERS = 2048  # of a writer, on the chip: all of a picture up to 1080p
 
 _HEADER_SHIFT = HEADER_AT % 64
 assert HEADER_AT // 64 == 7 and ENTRY_BITS <= 64 and COUNT_BITS + LINK_BITS + 1 <= 64 - _HEADER_SHIFT
@@ -77,7 +81,9 @@ class ListImage:
     cols, rows: grid of tiles. chunks: that each writer may take; chunk c of writer b is bytes (4 c + b) * 512 to + 511 of the memory. memory: uint64 (32
     chunks, 8), lines of little-endian words; lines never written are zero. pointers: uint32 (16 * pointer_lines,). error: of the frame. Of each writer, int64
     (4,): entries taken, lines written, evicted (lines written because another tile needed their place), taken (chunks), failed (0 or 1: it ran out of chunks;
-    it wrote nothing more then, and no pointers). writes: of each writer, int64: the lines of the memory that it wrote, in order.
+    it wrote nothing more then, no pointers but those spilled before), spilled and fetched (lines of pointers). Of each writer, int64, in order: writes: the
+    lines of the memory that it wrote; moves (n, 3): lines that it had written by then, line of its pointers that was spilled and that was fetched, -1: none;
+    closed: lines of its pointers written at the end, all but those in memory and not held.
     """
 
     cols: int
@@ -91,18 +97,26 @@ class ListImage:
     evicted: np.ndarray
     taken: np.ndarray
     failed: np.ndarray
+    spilled: np.ndarray
+    fetched: np.ndarray
     writes: list[np.ndarray]
+    moves: list[np.ndarray]
+    closed: list[np.ndarray]
 
 
 @numba.njit(cache=True)
-def _write(entry_word, tile, cols, writer, chunks, memory, writes, newest, link, used, counters):
-    """One writer. entry_word: uint64 (E,), the entries' 52 bits. memory: uint64 (lines, 8), or empty to count only. Returns lines written."""
+def _write(entry_word, tile, cols, writer, chunks, memory, writes, moves, newest, link, used, place, table, spilled, counters):
+    """One writer. entry_word: uint64 (E,), the entries' 52 bits. memory: uint64 (lines, 8), or empty to count only, moves too.
+
+    newest, link, used: of each list. place: line of pointers in each place, -1: none. table: uint32 (lines, 16), what was spilled; spilled: bool (lines,).
+    """
     held = np.full(COMBINER_SETS * COMBINER_WAYS, -1, np.int64)
     count = np.zeros(len(held), np.int64)
     turn = np.zeros(COMBINER_SETS, np.int64)
     buffer = np.zeros((len(held), LINE_ENTRIES), np.uint64)
     words = np.zeros(8, np.uint64)
     n = 0
+    m = 0
     free = 0
     failed = False
     last = len(tile) + len(held)
@@ -136,6 +150,22 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, newest, link,
         for step in range(2):
             if full >= 0:
                 t = held[full]
+                line = t // POINTERS_PER_LINE
+                room = line % len(place)
+                if not failed and len(spilled) > len(place) and place[room] != line:
+                    old = place[room]
+                    if old >= 0:
+                        for i in range(old * POINTERS_PER_LINE, min((old + 1) * POINTERS_PER_LINE, len(used))):
+                            table[old, i % POINTERS_PER_LINE] = newest[i] | used[i] << LINK_BITS
+                        spilled[old] = True
+                        counters[5] += 1
+                    back = spilled[line]
+                    counters[6] += back
+                    if old >= 0 or back:
+                        if len(moves):
+                            moves[m] = n, old, line if back else -1
+                        m += 1
+                    place[room] = line
                 if not failed and (used[t] == 0 or used[t] == CHUNK_LINES):
                     if free == chunks:
                         failed = True
@@ -172,7 +202,7 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, newest, link,
     counters[1] = n
     counters[3] = free
     counters[4] = failed
-    return n
+    counters[7] = m
 
 
 def entry_words(splat: np.ndarray, mask: np.ndarray, key: np.ndarray, record: np.ndarray) -> np.ndarray:
@@ -186,12 +216,13 @@ def entry_words(splat: np.ndarray, mask: np.ndarray, key: np.ndarray, record: np
 
 def write_lists(
     splat: np.ndarray, tile: np.ndarray, mask: np.ndarray, key: np.ndarray, record: np.ndarray, cols: int, rows: int, chunks: int | None = None,
+    held: int = HELD_POINTERS,
 ) -> ListImage:
     """Execute the four writers.
 
     splat, tile, mask: (E,), entries in the order of the scene: number of the splat (into key and record), tile column + cols * row, 4-bit mask. key, record:
-    (S,), 24 bits each. cols, rows: grid of tiles, at most 256 each. chunks: of each writer; None: as many as the busiest one takes. Raises FlickerError for
-    what does not fit the formats.
+    (S,), 24 bits each. cols, rows: grid of tiles, at most 256 each. chunks: of each writer; None: as many as the busiest one takes. held: pointers of a
+    writer on the chip, a multiple of 16. Raises FlickerError for what does not fit the formats.
     """
     if not (1 <= cols <= MAX_TILES and 1 <= rows <= MAX_TILES):
         raise FlickerError(f"lists: {cols}x{rows} tiles, not 1x1 to {MAX_TILES}x{MAX_TILES} (pictures up to {MAX_TILES * TILE} pixels)")
@@ -202,27 +233,39 @@ def write_lists(
         raise FlickerError(f"lists: tile must be 0 to {cols * rows - 1}, found {tile.min()} to {tile.max()}")
     word = entry_words(splat, mask, key, record)
     own = writer_columns(cols) * (-(-rows // 2))
-    states = np.zeros((WRITERS, 3, own), np.int64)  # newest, link, used
-    counters = np.zeros((WRITERS, 5), np.int64)
+    lines = pointer_lines(cols, rows) // WRITERS
+    limit = MAX_CHUNKS if chunks is None else chunks
     none, nowhere = np.zeros((0, 8), np.uint64), np.zeros(0, np.int64)
+    counters = np.zeros((WRITERS, 8), np.int64)
+    pointers = np.zeros((lines, WRITERS, POINTERS_PER_LINE), np.uint32)
+
+    def run(b: int, memory: np.ndarray, writes: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Writer b; its pointers. Returns the lines of them that it wrote at the end."""
+        states, place = np.zeros((3, own), np.int64), np.full(held // POINTERS_PER_LINE, -1, np.int64)
+        table, spilled = np.zeros((lines, POINTERS_PER_LINE), np.uint32), np.zeros(lines, np.bool_)
+        counters[b] = 0
+        _write(word, tile, cols, b, limit, memory, writes, moves, *states, place, table, spilled, counters[b])
+        if counters[b, 4]:
+            closed = nowhere
+        else:
+            value = np.zeros((lines, POINTERS_PER_LINE), np.uint32)
+            value.ravel()[:own] = states[0] | states[2] << LINK_BITS
+            number = np.arange(lines)
+            closed = number[~spilled | (place[number % len(place)] == number)]
+            table[closed] = value[closed]
+        pointers[:, b] = table
+        return closed
+
     for b in range(WRITERS):
-        _write(word, tile, cols, b, MAX_CHUNKS if chunks is None else chunks, none, nowhere, *states[b], counters[b])
+        run(b, none, nowhere, nowhere.reshape(0, 3))
     if chunks is None:
         chunks = int(counters[:, 3].max())
     memory = np.zeros((chunks * WRITERS * CHUNK_LINES, 8), np.uint64)
-    pointers = np.zeros(pointer_lines(cols, rows) * POINTERS_PER_LINE, np.uint32)
     writes = [np.zeros(n, np.int64) for n in counters[:, 1]]
-    states[:] = 0
-    counters[:] = 0
-    for b in range(WRITERS):
-        _write(word, tile, cols, b, chunks, memory, writes[b], *states[b], counters[b])
-        if not counters[b, 4]:
-            lines = pointers.reshape(-1, WRITERS, POINTERS_PER_LINE)[:, b]
-            value = np.zeros(lines.size, np.uint32)
-            value[:own] = states[b, 0] | states[b, 2] << LINK_BITS
-            lines[:] = value.reshape(lines.shape)
+    moves = [np.zeros((n, 3), np.int64) for n in counters[:, 7]]
+    closed = [run(b, memory, writes[b], moves[b]) for b in range(WRITERS)]
     error = ListError.OUT_OF_MEMORY if counters[:, 4].any() else ListError.NONE
-    return ListImage(cols, rows, chunks, memory, pointers, error, *counters.T.copy(), writes)  # type: ignore[call-arg]
+    return ListImage(cols, rows, chunks, memory, pointers.ravel(), error, *counters.T[:7].copy(), writes, moves, closed)  # type: ignore[call-arg]
 
 
 # ---- reading -----------------------------------------------------------------------------------
