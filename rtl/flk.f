@@ -114,6 +114,7 @@ preproc/flk_geometry_decode.sv
 preproc/flk_geometry_fetch.sv
 preproc/flk_list_writer.sv
 preproc/flk_mean_field.sv
+preproc/flk_pointer_port.sv
 preproc/flk_preprocessing.sv
 preproc/flk_preprocessing_core.sv
 preproc/flk_projection.sv

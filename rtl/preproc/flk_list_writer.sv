@@ -7,7 +7,17 @@
 // Throughput: an entry a cycle. A line is at the output five cycles after the entry that causes it.
 // At the end a cycle for each line of the combiner and each pointer of pointer_lines_i. After reset,
 // max(Pointers, sets) cycles until idle_o. One request a line, whole: address in lines, and data.
-// in_ready_o depends combinationally on out_ready_i; no other path.
+// in_ready_o depends combinationally on out_ready_i, the pointer's write on move_write_i; no other path.
+//
+// A frame of more lists than Pointers ("large"): the pointers are a store of lines, line n in place n
+// modulo Pointers / a line's pointers. Each line of entries that goes waits two cycles in stage D for
+// the tag of its place. If another line of pointers is there, it is moved to its place in the
+// pointer table, and the wanted one comes from there if it was there before; else it is zeros.
+// Who moves (flk_pointer_port) gets a request with the numbers of both lines, reads (move_read_i,
+// the pointer a cycle later) and writes pointers of the place, and says move_done_i; all stands for
+// so long. At the end lines that are in the table and not held are left out, two cycles each and
+// two more than a cycle a pointer for the others, and idle_o comes max(Pointers, sets) cycles after
+// done_o. After failed_o nothing is moved; lines that were moved before stay in the table.
 //
 // Pipeline, moving as a whole when the output register is free: A entry taken, number of its list;
 // B row of the set is read; C hit, free way or the way in turn, row written, pointer read; D pointer
@@ -19,7 +29,8 @@ module flk_list_writer #(
   parameter  int unsigned SetBitsU    = 3,     // bits of the tile's column that choose a set
   parameter  int unsigned SetBitsV    = 3,     // of its row
   parameter  int unsigned Ways        = 4,
-  parameter  int unsigned Pointers    = 2048,  // lists at most, a multiple of a line's pointers
+  parameter  int unsigned Pointers    = 2048,  // held, a multiple of a line's pointers
+  parameter  int unsigned Lists       = 16384, // at most, a multiple of Pointers
   parameter  int unsigned CoordBits   = 7,     // of u and v
   parameter  int unsigned ChunkLines  = 8,
   parameter  int unsigned ChunkBits   = 24,
@@ -28,8 +39,9 @@ module flk_list_writer #(
   parameter  int unsigned LineBits    = 512,
   parameter  int unsigned PointerBits = 32,
   parameter  int unsigned AddressBits = 34,
-  localparam int unsigned ListBits    = $clog2(Pointers),
-  localparam int unsigned LinesBits   = $clog2(Pointers * PointerBits / LineBits + 1)
+  localparam int unsigned ListBits    = $clog2(Lists),
+  localparam int unsigned LinesBits   = $clog2(Lists * PointerBits / LineBits + 1),
+  localparam int unsigned IndexBits   = $clog2(LineBits / PointerBits)  // of a pointer in its line
 ) (
   input  logic                   clk_i,
   input  logic                   rst_ni,
@@ -59,7 +71,20 @@ module flk_list_writer #(
   output logic                   out_valid_o,
   input  logic                   out_ready_i,
   output logic [AddressBits-1:0] out_address_o,
-  output logic [LineBits-1:0]    out_data_o
+  output logic [LineBits-1:0]    out_data_o,
+  // Lines of pointers to and from their table
+  output logic                   move_valid_o,
+  input  logic                   move_ready_i,
+  output logic                   move_put_o,       // a line goes: its number
+  output logic [LinesBits-1:0]   move_put_line_o,
+  output logic                   move_get_o,       // the wanted line comes; else it is zeros
+  output logic [LinesBits-1:0]   move_get_line_o,
+  input  logic [IndexBits-1:0]   move_index_i,
+  input  logic                   move_read_i,
+  output logic [PointerBits-1:0] move_pointer_o,
+  input  logic                   move_write_i,
+  input  logic [PointerBits-1:0] move_pointer_i,
+  input  logic                   move_done_i
 );
 
   localparam int unsigned Sets = 1 << (SetBitsU + SetBitsV);
@@ -69,11 +94,19 @@ module flk_list_writer #(
   localparam int unsigned CountBits = $clog2(LineEntries + 1);
   localparam int unsigned UsedBits = $clog2(ChunkLines + 1);
   localparam int unsigned PerLine = LineBits / PointerBits;
-  localparam int unsigned PerLineBits = $clog2(PerLine);
+  localparam int unsigned PerLineBits = IndexBits;
+  localparam int unsigned HeldBits = Pointers > 1 ? $clog2(Pointers) : 1;
+  localparam int unsigned Places = Pointers / PerLine;  // of lines of pointers
+  localparam int unsigned PlacesBits = Places > 1 ? $clog2(Places) : 1;
+  localparam int unsigned Sharing = Lists / Pointers;   // lines that share a place
+  localparam int unsigned TagBits = Sharing > 1 ? $clog2(Sharing) : 1;
   localparam int unsigned HeaderAt = LineEntries * EntryBits;
   localparam int unsigned HeaderCount = 4;
+  // Lists of a set have these bits in common.
+  localparam int unsigned Common = SetBitsU < SetBitsV ? SetBitsU : SetBitsV;
   localparam int unsigned Clear = Pointers > Sets ? Pointers : Sets;
-  localparam int unsigned Steps = Clear > Sets * Ways ? Clear : Sets * Ways;
+  localparam int unsigned Most = Clear > Lists ? Clear : Lists;
+  localparam int unsigned Steps = Most > Sets * Ways ? Most : Sets * Ways;
   localparam int unsigned StepBits = $clog2(Steps + 1);
 
   if (Ways < 2 || Ways != 1 << WayBits) begin : gen_check_ways
@@ -81,6 +114,10 @@ module flk_list_writer #(
   end
   if (PerLine < 2 || PerLine != 1 << PerLineBits || Pointers % PerLine != 0) begin : gen_check_table
     $error("flk_list_writer: Pointers must be a multiple of a line's pointers (2, 4, 8, ...)");
+  end
+  if (Lists < Pointers || Sharing != 1 << $clog2(Sharing) || Lists != Pointers * Sharing ||
+      (Sharing > 1 && Pointers != 1 << $clog2(Pointers))) begin : gen_check_lists
+    $error("flk_list_writer: Lists must be Pointers, or both powers of two");
   end
   if (ChunkLines < 2 || (ChunkLines & (ChunkLines - 1)) != 0) begin : gen_check_chunk
     $error("flk_list_writer: ChunkLines must be a power of two, at least 2");
@@ -97,19 +134,28 @@ module flk_list_writer #(
   state_e                 state_d, state_q;
   logic [StepBits-1:0]    step_d, step_q;
   logic                   advance, take, take_end, flushing, walking, busy;
-  logic                   start;
+  logic                   start, last_line;
 
   logic [1:0]             writer_q;
   logic [CoordBits:0]     columns_q;
   logic [LinesBits-1:0]   pointer_lines_q;
   logic [ChunkBits:0]     chunks_q;
   logic [AddressBits-1:0] base_q, pointer_base_q;  // base_q: of lists, then of pointers
+  logic                   large_q;
+
+  // A line of pointers, of an event in stage D or of the walk at the end: its place is read, its tag
+  // compared; then it is moved, and the pointer is read again, or it is walked.
+  typedef enum logic [2:0] {LOOK, COMPARE, ASK, MOVE, AGAIN, WALK} look_e;
+
+  look_e look_q;
+  logic  skip;    // the line of the walk is in the table
 
   assign start    = state_q == IDLE && start_i;
   assign take     = in_valid_i && in_ready_o && !in_end_i;
   assign take_end = in_valid_i && in_ready_o && in_end_i;
   assign flushing = state_q == OPEN_LINES;
-  assign walking  = state_q == POINTERS;
+  assign walking  = state_q == POINTERS && (!large_q || look_q == WALK);
+  assign last_line = LinesBits'(step_q >> PerLineBits) == pointer_lines_q - 1'b1;
 
   always_comb begin
     state_d = state_q;
@@ -147,16 +193,22 @@ module flk_list_writer #(
         end
       end
       POINTERS: begin
-        if (advance) begin
+        if (advance && walking) begin
           step_d = step_q + 1'b1;
-          if (step_q == (StepBits'(pointer_lines_q) << PerLineBits) - 1'b1) begin
+          if (last_line && (&step_q[PerLineBits-1:0])) begin
+            state_d = LAST;
+          end
+        end else if (skip) begin
+          step_d = step_q + StepBits'(PerLine);
+          if (last_line) begin
             state_d = LAST;
           end
         end
       end
       LAST: begin
+        step_d = '0;
         if (!busy) begin
-          state_d = IDLE;
+          state_d = large_q ? CLEAR : IDLE;
         end
       end
       default: state_d = CLEAR;
@@ -180,6 +232,7 @@ module flk_list_writer #(
       pointer_lines_q <= pointer_lines_i;
       chunks_q        <= chunks_i;
       pointer_base_q  <= pointer_base_i;
+      large_q         <= 32'(pointer_lines_i) > Places;
     end
     if (start) begin
       base_q <= list_base_i;
@@ -293,7 +346,8 @@ module flk_list_writer #(
 
   for (genvar w = 0; w < Ways; w++) begin : gen_ways
     localparam logic [Ways-1:0] LOWER = Ways'((1 << w) - 1);
-    assign c_hits[w]  = row.way[w].count != '0 && row.way[w].list == b_list_q;
+    assign c_hits[w]  = row.way[w].count != '0 &&
+                        row.way[w].list[ListBits-1:Common] == b_list_q[ListBits-1:Common];
     assign c_frees[w] = row.way[w].count == '0;
     assign c_one[w]   = b_flush_q ? b_way_q == WayBits'(w)
                       : c_hits[w] || (!c_hit && (c_frees == '0 ? row.turn == WayBits'(w)
@@ -373,7 +427,7 @@ module flk_list_writer #(
   // Pointers are read for every entry, by the list of the line that may have to go, and in turn at the end, when each is
   // cleared behind its reading.
   pointer_t            pointer, pointer_d;
-  logic                walk_q, walk_last_q, walk_clear;
+  logic                walk_q, walk_last_q, walk_blank_q, walk_clear;
   logic [ListBits-1:0] walk_list_q;
   logic                pointer_write, begins, enough, sends;
   logic [ChunkBits:0]  taken_d, taken_q, taken_more;
@@ -401,24 +455,144 @@ module flk_list_writer #(
 
   always_ff @(posedge clk_i) begin
     if (advance && walking) begin
-      walk_list_q <= ListBits'(step_q);
+      walk_list_q  <= ListBits'(step_q);
+      walk_blank_q <= blank_q;
     end
   end
+
+  // ---- D: the place of the pointer's line -----------------------------------------------------------
+
+  typedef struct packed {
+    logic [Sharing-1:0] stored;  // lines that are or were in the table
+    logic               held;
+    logic [TagBits-1:0] tag;     // which one is held
+  } place_t;
+
+  logic                  hold_q;  // an event in stage D waits for its pointer
+  logic                  blank_q; // the line of the walk was never wanted
+  place_t                place_read, place_d;
+  logic [ListBits-1:0]   look_list;
+  logic [TagBits-1:0]    look_tag;
+  logic [PlacesBits-1:0] look_place;
+  logic [HeldBits-1:0]   moved_at;
+  logic                  here, placing;
+
+  assign look_list  = hold_q ? d_list_q : ListBits'(step_q);
+  assign look_tag   = TagBits'(look_list >> $clog2(Pointers));
+  assign look_place = PlacesBits'(look_list >> PerLineBits);
+  assign here       = place_read.held && place_read.tag == look_tag;
+  assign placing    = hold_q && look_q == COMPARE && !here && !failed_q;
+  assign skip       = state_q == POINTERS && look_q == COMPARE && !here &&
+                      place_read.stored[look_tag];
+
+  always_comb begin
+    place_d = '{stored: place_read.stored, held: 1'b1, tag: look_tag};
+    if (place_read.held) begin
+      place_d.stored[place_read.tag] = 1'b1;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      hold_q  <= 1'b0;
+      look_q  <= LOOK;
+      blank_q <= 1'b0;
+    end else if (hold_q) begin
+      unique case (look_q)
+        LOOK: look_q <= COMPARE;
+        COMPARE: begin
+          if (placing && (place_read.held || place_read.stored[look_tag])) begin
+            look_q <= ASK;
+          end else begin
+            look_q <= LOOK;
+            hold_q <= 1'b0;
+          end
+        end
+        ASK: begin
+          if (move_ready_i) begin
+            look_q <= MOVE;
+          end
+        end
+        MOVE: begin
+          if (move_done_i) begin
+            look_q <= AGAIN;
+          end
+        end
+        default: begin  // AGAIN
+          look_q <= LOOK;
+          hold_q <= 1'b0;
+        end
+      endcase
+    end else if (state_q == POINTERS && large_q) begin
+      unique case (look_q)
+        LOOK: look_q <= COMPARE;
+        COMPARE: begin
+          look_q  <= skip ? LOOK : WALK;
+          blank_q <= !here;
+        end
+        default: begin  // WALK
+          if (advance && (&step_q[PerLineBits-1:0])) begin
+            look_q <= LOOK;
+          end
+        end
+      endcase
+    end else begin
+      hold_q  <= advance && b_valid_q && c_event && large_q;
+      look_q  <= LOOK;
+      blank_q <= 1'b0;
+    end
+  end
+
+  flk_sram #(
+    .Width($bits(place_t)),
+    .Depth(Places)
+  ) i_places (
+    .clk_i,
+    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Places)) || placing),
+    .wr_addr_i(state_q == CLEAR ? PlacesBits'(step_q) : look_place),
+    .wr_data_i(state_q == CLEAR ? '0 : place_d),
+    .rd_en_i  (look_q == LOOK && (hold_q || (state_q == POINTERS && large_q))),
+    .rd_addr_i(look_place),
+    .rd_data_o(place_read)
+  );
+
+  // The place as it was stays at the memory's output until the line has moved.
+  function automatic logic [LinesBits-1:0] line_of(input logic [TagBits-1:0] tag);
+    return (LinesBits'(tag) << $clog2(Places)) | LinesBits'(look_place);
+  endfunction
+
+  assign move_valid_o    = hold_q && look_q == ASK;
+  assign move_put_o      = place_read.held;
+  assign move_put_line_o = line_of(place_read.tag);
+  assign move_get_o      = place_read.stored[look_tag];
+  assign move_get_line_o = line_of(look_tag);
+  assign move_pointer_o  = PointerBits'(pointer);
+  assign moved_at        = HeldBits'({look_place, move_index_i});
+
+  // ---- D: pointers ----------------------------------------------------------------------------------
+
+  logic [HeldBits-1:0] read_at;  // of all reads but those by c_list
+
+  assign read_at = hold_q ? (look_q == AGAIN ? HeldBits'(d_list_q) : moved_at) : HeldBits'(step_q);
 
   flk_sram #(
     .Width($bits(pointer_t)),
     .Depth(Pointers)
   ) i_pointers (
     .clk_i,
-    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear),
-    .wr_addr_i(state_q == CLEAR ? ListBits'(step_q) : walk_clear ? walk_list_q : d_list_q),
-    .wr_data_i(state_q == CLEAR || walk_clear ? '0 : pointer_d),
-    .rd_en_i  (advance && (b_valid_q || walking)),
-    .rd_addr_i(walking ? ListBits'(step_q) : c_list),
+    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear ||
+               move_write_i),
+    .wr_addr_i(state_q == CLEAR ? HeldBits'(step_q) : move_write_i ? moved_at :
+               walk_clear ? HeldBits'(walk_list_q) : HeldBits'(d_list_q)),
+    .wr_data_i(move_write_i ? pointer_t'(move_pointer_i) :
+               state_q == CLEAR || walk_clear ? '0 : pointer_d),
+    .rd_en_i  (hold_q ? move_read_i || look_q == AGAIN : advance && (b_valid_q || walking)),
+    .rd_addr_i(hold_q || state_q == POINTERS ? read_at : HeldBits'(c_list)),
     .rd_data_o(pointer)
   );
 
-  assign walk_clear    = advance && walk_q;
+  // After a large frame all is cleared.
+  assign walk_clear    = advance && walk_q && !large_q;
   assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
   assign enough        = !begins || taken_q != chunks_q;
   assign sends         = d_event_q && enough && !failed_q;
@@ -481,7 +655,7 @@ module flk_list_writer #(
       was_word_q   <= e_word_q;
     end
     if (advance && (d_event_q || walk_q)) begin
-      e_pointer_q <= pointer;
+      e_pointer_q <= walk_q && walk_blank_q ? '0 : pointer;
       e_begins_q  <= begins;
       e_at_q      <= e_at_d;
     end
@@ -528,7 +702,7 @@ module flk_list_writer #(
   logic [AddressBits-1:0] address_q;
   logic [LineBits-1:0]    data_q;
 
-  assign advance = !out_valid_q || out_ready_i;
+  assign advance = (!out_valid_q || out_ready_i) && !hold_q;
   assign busy    = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
                    walk_q || e_walk_q || out_valid_q;
 
@@ -537,6 +711,8 @@ module flk_list_writer #(
       out_valid_q <= 1'b0;
     end else if (advance) begin
       out_valid_q <= e_sends_q || e_walk_last_q;
+    end else if (out_ready_i) begin
+      out_valid_q <= 1'b0;
     end
   end
 
@@ -607,8 +783,8 @@ module flk_list_writer #(
   else $error("flk_list_writer: start while a frame is under way");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      start |-> 32'(pointer_lines_i) <= Pointers / PerLine)
-  else $error("flk_list_writer: more pointers than Pointers");
+      start |-> 32'(pointer_lines_i) <= Lists / PerLine)
+  else $error("flk_list_writer: more pointers than Lists");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       take |-> (CoordBits + 1)'(in_u_i) < columns_q)
@@ -627,6 +803,13 @@ module flk_list_writer #(
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       d_event_q && b_valid_q && c_event |-> c_list != d_list_q)
   else $error("flk_list_writer: two lines of a list in neighbouring stages");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      move_read_i || move_write_i || move_done_i |-> hold_q && look_q == MOVE)
+  else $error("flk_list_writer: pointers are moved that it did not ask for");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni) hold_q |-> d_event_q && large_q)
+  else $error("flk_list_writer: the pipeline stands without an event");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) e_event_q |-> e_count_q != '0)
   else $error("flk_list_writer: a line without entries");

@@ -1,4 +1,4 @@
-"""cocotb tests of flk_list_writer; setting: pointers."""
+"""cocotb tests of flk_list_writer; settings: pointers (held), lists (at most)."""
 
 from __future__ import annotations
 
@@ -24,15 +24,68 @@ class Frame:
         n = len(tile)
         splat, mask = np.arange(n), np.array([rng.randrange(1, 16) for _ in range(n)], np.int64)
         key, record = (np.array([rng.getrandbits(24) for _ in range(n)], np.int64) for _ in range(2))
-        image = write_lists(splat, tile, mask, key, record, cols, rows, chunks)
+        image = write_lists(splat, tile, mask, key, record, cols, rows, chunks, config()["pointers"])
         self.chunks, self.image = image.chunks, image
         self.items = [(0, int(a), int(b), int(w)) for a, b, w in zip(u, v, entry_words(splat, mask, key, record))] + [(1, 0, 0, rng.getrandbits(52))]
         self.written = [(LIST_BASE + int(line), int.from_bytes(image.memory[line].tobytes(), "little")) for line in image.writes[writer]]
         self.pointer_lines = pointer_lines(cols, rows) // 4
-        if not image.failed[writer]:
-            for line in range(self.pointer_lines):
-                part = image.pointers[64 * line + 16 * writer :][:16]
-                self.written.append((POINTER_BASE + 4 * line + writer, int.from_bytes(part.tobytes(), "little")))
+        self.table = [int.from_bytes(part.tobytes(), "little") for part in image.pointers.reshape(-1, 4, 16)[:, writer]]
+        self.written += [(POINTER_BASE + 4 * line + writer, self.table[line]) for line in image.closed[writer].tolist()]
+
+
+class Mover:
+    """Who moves lines of pointers: takes a request after a while, reads the line that goes pointer by pointer, keeps it, gives the one that comes. `lines`: the
+    table, None: noise. moves: of the frame: lines written until then, numbers as in `ListImage.moves`."""
+
+    def __init__(self, dut, bench, lines):
+        self.dut, self.bench, self.lines = dut, bench, lines
+        self.table: dict[int, int] = {}
+        self.moves: list[tuple[int, int, int]] = []
+        self.slow = True
+        for name in ("ready", "index", "read", "write", "pointer", "done"):
+            getattr(dut, f"move_{name}_i").value = 0
+        cocotb.start_soon(self.run())
+
+    async def wait(self):
+        for _ in range(self.bench.rng.choice((0, 0, 1, 2, 30)) if self.slow else 0):
+            await RisingEdge(self.dut.clk_i)
+
+    async def run(self):
+        dut, rng = self.dut, self.bench.rng
+        while True:
+            await RisingEdge(dut.clk_i)
+            if not int(dut.rst_ni.value) or not int(dut.move_valid_o.value):
+                continue
+            await self.wait()
+            dut.move_ready_i.value = 1
+            await RisingEdge(dut.clk_i)
+            if not int(dut.rst_ni.value):
+                dut.move_ready_i.value = 0
+                continue
+            put, get = (int(getattr(dut, f"move_{n}_line_o").value) if int(getattr(dut, f"move_{n}_o").value) else -1 for n in ("put", "get"))
+            assert put >= 0 or get >= 0
+            self.moves.append((len(self.lines), put, get))
+            dut.move_ready_i.value = 0
+            await self.wait()
+            if put >= 0:
+                word = 0
+                for i in range(17):
+                    dut.move_read_i.value = i < 16
+                    dut.move_index_i.value = i % 16
+                    await RisingEdge(dut.clk_i)
+                    if i:  # the pointer of the cycle before is there in this one
+                        word |= int(dut.move_pointer_o.value) << 32 * (i - 1)
+                self.table[put] = word
+            await self.wait()
+            word = self.table[get] if get >= 0 else 0
+            for i in range(16):
+                dut.move_write_i.value = 1
+                dut.move_index_i.value = i
+                dut.move_pointer_i.value = word >> 32 * i & 0xFFFFFFFF
+                dut.move_done_i.value = i == 15
+                await RisingEdge(dut.clk_i)
+            dut.move_write_i.value = dut.move_done_i.value = 0
+            dut.move_index_i.value = rng.randrange(16)
 
 
 class Writer:
@@ -46,6 +99,7 @@ class Writer:
         self.out: list[tuple[int, int]] = []
         self.output = Monitor(lines, self.out.append)
         self.input = Monitor(entries)
+        self.mover = Mover(dut, self.bench, self.out)
         dut.start_i.value = 0
         for name, value in (("writer", 0), ("columns", 0), ("pointer_lines", 0), ("chunks", 0), ("list_base", LIST_BASE), ("pointer_base", POINTER_BASE)):
             getattr(dut, f"{name}_i").value = value
@@ -65,25 +119,35 @@ class Writer:
             port = getattr(dut, f"{name}_i")
             port.value = value ^ (1 << len(port)) - 1
         self.out.clear()
+        self.mover.moves.clear()
+        self.mover.table.clear()
         self.source.send(frame.items)
 
     async def run(self, frame: Frame) -> None:
         """A whole frame, and what it must have written."""
         dut, image, w = self.dut, frame.image, frame.writer
         await self.start(frame)
-        limit = 4000 + 40 * (len(frame.items) + 256 + 16 * frame.pointer_lines)
+        limit = 4000 + 40 * (len(frame.items) + 256 + 16 * frame.pointer_lines) + 200 * len(image.moves[w])
         await self.bench.until(lambda: int(dut.done_o.value) == 1, limit, "done")
         for i, (got, due) in enumerate(zip(self.out, frame.written)):
             assert got == due, f"line {i}: address {got[0] - LIST_BASE:#x}, data {got[1]:#x}; due {due[0] - LIST_BASE:#x}, {due[1]:#x}"
         assert len(self.out) == len(frame.written), f"{len(self.out)} lines, {len(frame.written)} due"
+        moves = [tuple(m) for m in image.moves[w].tolist()]
+        assert [m[1:] for m in self.mover.moves] == [m[1:] for m in moves], "lines of pointers moved"
+        assert all(due - 2 <= got <= due for (got, *_), (due, *_) in zip(self.mover.moves, moves))
+        left = self.mover.table | {(address - POINTER_BASE) // 4: data for address, data in self.out[image.lines[w] :]}
+        assert all(left.get(line, 0) == due for line, due in enumerate(frame.table)), "pointers"
         counters = {"entries": image.entries, "lines": image.lines, "evicted": image.evicted, "taken": image.taken, "failed": image.failed}
         for name, value in counters.items():
             assert int(getattr(dut, f"{name}_o").value) == value[w], f"{name}: {int(getattr(dut, f'{name}_o').value)}, due {value[w]}"
 
 
 def size(rng, pointers: int) -> tuple[int, int]:
-    """A picture whose pointers fit."""
+    """A picture with so many lists of a writer at most; one time in four of almost so many, where more than some fit."""
     while True:
+        if config()["lists"] > config()["pointers"] and rng.random() < 0.25:
+            cols = rng.randrange(2, min(256, pointers))
+            return cols, max(1, min(256, 2 * (pointers // -(-cols // 2)) - rng.randrange(3)))
         cols, rows = rng.choice(((2, 2), (33, 6), (1, 3), (128, 1), (127, 2), (80, 6))) if rng.random() < 0.7 else (rng.randrange(1, 120), rng.randrange(1, 60))
         if pointer_lines(cols, rows) * 4 <= pointers:
             return cols, rows
@@ -123,7 +187,7 @@ async def frames(dut, idle, stall):
     await test.bench.reset()
     evicted = 0
     for entries in (0, 1, 300, 2000, 30, 9, 10, 1200):
-        frame = random_frame(rng, config()["pointers"], entries, wide=entries in (300, 1200))
+        frame = random_frame(rng, config()["lists"], entries, wide=entries in (300, 1200))
         await test.run(frame)
         evicted += int(frame.image.evicted[frame.writer])
     assert evicted > 100
@@ -137,7 +201,7 @@ async def out_of_memory(dut, idle, stall):
     rng = test.bench.rng
     await test.bench.reset()
     for _ in range(3):
-        full = random_frame(rng, config()["pointers"], 800)
+        full = random_frame(rng, config()["lists"], 800)
         need = int(full.image.taken[full.writer])
         for chunks in (need, need - 1, rng.randrange(need), 0, need + 5):
             tiles = [(u, v) for end, u, v, _ in full.items if not end]
@@ -151,10 +215,46 @@ async def one_set(dut):
     """Nine tiles of one set, one entry each in turn, and each line of one tile: the pipeline's registers stand in for the memories in every cycle."""
     test = Writer(dut)
     await test.bench.reset()
-    cols, rows = (256, 1) if config()["pointers"] == 2048 else (96, 1)
+    cols, rows = (256, 1) if config()["lists"] >= 128 else (96, 1)
     for turns in (9, 5, 4, 3, 2, 1):
         tiles = [(8 * (i % turns) % (cols // 2), 0) for i in range(400)]
         await test.run(Frame(test.bench.rng, 0, cols, rows, tiles))
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall"), PATTERNS))
+async def spilled(dut, idle, stall):
+    """More lists than pointers that are held: lines of pointers that share a place in turn, that come back, that are never wanted; chunks that do not suffice
+    in the midst of it; small frames between."""
+    test = Writer(dut, idle, stall)
+    rng = test.bench.rng
+    held, lists = config()["pointers"], config()["lists"]
+    await test.bench.reset()
+    moved = np.zeros(2, np.int64)
+    failed = skipped = 0
+    for k in range(6):
+        writer = rng.randrange(4)
+        cols = min(256, 2 * rng.randrange(max(1, lists // 512), 40))
+        rows = min(256, 2 * (lists // (cols // 2)))
+        width, height = cols // 2, rows // 2
+        assert held < width * height <= lists
+        some = [(n % width, n // width) for n in range(rng.randrange(16), width * height, held)]  # of one place
+        tiles: list[tuple[int, int]] = []
+        while len(tiles) < 700:
+            at = rng.randrange(width * height)
+            few = some if rng.random() < 0.5 else [(at % width, at // width)]
+            tiles += [rng.choice(few) for _ in range(rng.randrange(1, 30))]
+        frame = Frame(rng, writer, cols, rows, tiles)
+        if k % 3 == 2:
+            frame = Frame(rng, writer, cols, rows, tiles, rng.randrange(int(frame.image.taken[writer])))
+        test.mover.slow = k % 2 == 0
+        await test.run(frame)
+        moved += frame.image.spilled[writer], frame.image.fetched[writer]
+        failed += bool(frame.image.failed[writer] and frame.image.spilled[writer])
+        skipped += frame.pointer_lines - len(frame.image.closed[writer]) > 0 and not frame.image.failed[writer]
+        if k == 3:
+            await test.run(random_frame(rng, held, 300))
+    assert moved.min() > 50 and failed and skipped
 
 
 @cocotb.test()
@@ -176,7 +276,7 @@ async def reset_in_a_frame(dut):
     rng = test.bench.rng
     await test.bench.reset()
     for _ in range(2):
-        frame = random_frame(rng, config()["pointers"], 400)
+        frame = random_frame(rng, config()["lists"], 400)
         await test.start(frame)
         sent = test.source.sent
         await test.bench.until(lambda: test.source.sent - sent > rng.randrange(100, 350), 5000, "entries")
@@ -184,4 +284,4 @@ async def reset_in_a_frame(dut):
         await test.bench.cycles(2)
         test.source.drop()
         await test.bench.reset()
-        await test.run(random_frame(rng, config()["pointers"], 500))
+        await test.run(random_frame(rng, config()["lists"], 500))

@@ -2,8 +2,9 @@
 begin random.
 
 State space: entries of one tile and of tiles in turn (hits, free ways, evictions, full lines, a line closed in the cycle after its last entry), chunks begun
-and full, no entries, memory that runs out at every place, idle and back-pressure patterns, reset in a frame. Parameter space: 64 pointers; with SLOW=1 2048 for
-whole frames and the rate only; the format is fixed. Not covered: counters of more than 2**16, chunk numbers of more than 12 bits.
+and full, no entries, memory that runs out at every place, idle and back-pressure patterns, reset in a frame; lines of pointers that are moved to their table
+and back, by an agent of any speed. Parameter space: 64 pointers for as many lists, 32 for 256; with SLOW=1 2048 for 16,384, whole frames, those with moves and
+the rate only; the format is fixed. Not covered: counters of more than 2**16, chunk numbers of more than 12 bits.
 """
 
 from __future__ import annotations
@@ -12,14 +13,20 @@ import pytest
 from flicker_tb.runner import build_and_test, refused
 
 
-@pytest.mark.parametrize("pointers", [64, pytest.param(2048, marks=pytest.mark.slow)])
-def test_list_writer(pointers: int) -> None:
-    tests = ["frames", "rate"] if pointers == 2048 else []
-    build_and_test("flk_list_writer", "cocotb_list_writer", parameters={"Pointers": pointers}, config={"pointers": pointers}, tests=tests)
+TESTS = ["frames", "out_of_memory", "one_set", "rate", "reset_in_a_frame", "spilled"]
+
+
+@pytest.mark.parametrize(("pointers", "lists", "tests"), [
+    (64, 64, TESTS[:-1]), (32, 256, TESTS), pytest.param(2048, 16384, ["frames", "rate", "spilled"], marks=pytest.mark.slow),
+])
+def test_list_writer(pointers: int, lists: int, tests: list[str]) -> None:
+    parameters = {"Pointers": pointers, "Lists": lists}
+    build_and_test("flk_list_writer", "cocotb_list_writer", parameters=parameters, config={"pointers": pointers, "lists": lists}, tests=tests)
 
 
 @pytest.mark.parametrize(("parameters", "message"), [
-    ({"Ways": 3}, "Ways must be a power of two"), ({"Pointers": 40}, "Pointers must be a multiple"), ({"ChunkLines": 6}, "ChunkLines must be a power of two"),
+    ({"Ways": 3}, "Ways must be a power of two"), ({"Pointers": 40}, "Pointers must be a multiple"), ({"Pointers": 48, "Lists": 96}, "Lists must be"),
+    ({"Pointers": 64, "Lists": 32}, "Lists must be"), ({"ChunkLines": 6}, "ChunkLines must be a power of two"),
     ({"LineEntries": 10}, "must fit a line"),
 ])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
