@@ -33,7 +33,8 @@ module flk_top
   parameter  int unsigned Entries        = 512,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
-  parameter  int unsigned Pointers       = 2048,  // lists of a list writer: up to 1920x1088
+  parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
+  parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
   localparam int unsigned IdBits         = 4,
   localparam int unsigned PortIdBits     = IdBits + 3,
@@ -229,7 +230,7 @@ module flk_top
   end
 
   flk_frame_control #(
-    .Pointers(Pointers)
+    .Lists(Lists)
   ) i_control (
     .clk_i,
     .rst_ni,
@@ -408,6 +409,7 @@ module flk_top
   flk_preprocessing #(
     .Form    (Form),
     .Pointers(Pointers),
+    .Lists   (Lists),
     .Waiting (Waiting),
     .IdBits  (IdBits)
   ) i_front (
@@ -458,6 +460,35 @@ module flk_top
     .colour_r_data_i     (r_data),
     .colour_r_resp_i     (r_resp),
     .colour_r_last_i     (r_last),
+    .pointer_ar_valid_o  (ar_valid[READ_POINTERS]),
+    .pointer_ar_ready_i  (ar_ready[READ_POINTERS]),
+    .pointer_ar_id_o     (ar_id[READ_POINTERS]),
+    .pointer_ar_addr_o   (ar_addr[READ_POINTERS]),
+    .pointer_ar_len_o    (ar_len[READ_POINTERS]),
+    .pointer_ar_size_o   (ar_size[READ_POINTERS]),
+    .pointer_ar_burst_o  (unused_ar_burst[READ_POINTERS]),
+    .pointer_r_valid_i   (r_valid[READ_POINTERS]),
+    .pointer_r_ready_o   (r_ready[READ_POINTERS]),
+    .pointer_r_id_i      (r_id),
+    .pointer_r_data_i    (r_data),
+    .pointer_r_resp_i    (r_resp),
+    .pointer_r_last_i    (r_last),
+    .pointer_aw_valid_o  (aw_valid[WRITE_POINTERS]),
+    .pointer_aw_ready_i  (aw_ready[WRITE_POINTERS]),
+    .pointer_aw_id_o     (aw_id[WRITE_POINTERS]),
+    .pointer_aw_addr_o   (aw_addr[WRITE_POINTERS]),
+    .pointer_aw_len_o    (aw_len[WRITE_POINTERS]),
+    .pointer_aw_size_o   (aw_size[WRITE_POINTERS]),
+    .pointer_aw_burst_o  (unused_aw_burst[WRITE_POINTERS]),
+    .pointer_w_valid_o   (w_valid[WRITE_POINTERS]),
+    .pointer_w_ready_i   (w_ready[WRITE_POINTERS]),
+    .pointer_w_data_o    (w_data[WRITE_POINTERS]),
+    .pointer_w_strb_o    (w_strb[WRITE_POINTERS]),
+    .pointer_w_last_o    (unused_w_last[WRITE_POINTERS]),
+    .pointer_b_valid_i   (b_valid[WRITE_POINTERS]),
+    .pointer_b_ready_o   (b_ready[WRITE_POINTERS]),
+    .pointer_b_id_i      (b_id),
+    .pointer_b_resp_i    (b_resp),
     .aw_valid_o          (aw_valid[WRITE_FRONT]),
     .aw_ready_i          (aw_ready[WRITE_FRONT]),
     .aw_id_o             (aw_id[WRITE_FRONT]),
@@ -560,6 +591,7 @@ module flk_top
 
   // Words of a frame: the first field of the counters' structures first.
   assign front_words = {
+    front_counters.fetched, front_counters.spilled,
     32'(front_counters.key_low), 32'(front_counters.key_shift),
     32'(front_counters.taken[3]), 32'(front_counters.taken[2]),
     32'(front_counters.taken[1]), 32'(front_counters.taken[0]),
@@ -628,7 +660,7 @@ module flk_top
   assign to_host.capability.mask_generator.next =
       4'(MaskGenerator);
   assign to_host.capability.log2_lanes.next  = 4'($clog2(Lanes));
-  assign to_host.capability.log2_lists.next  = 4'($clog2(Pointers));
+  assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
   assign to_host.capability.log2_beat.next   = 4'($clog2(Width / 8));
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;

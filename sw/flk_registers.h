@@ -332,7 +332,7 @@
 #define FLK_CAT_AUTO 5
 
 /* Bits of result.error. */
-#define FLK_ERROR_FRONT_READ 0  /* a read of the front end failed (scene) */
+#define FLK_ERROR_FRONT_READ 0  /* a read of the front end failed (scene, pointers) */
 #define FLK_ERROR_FRONT_WRITE 1  /* a write of the front end failed (records, lists, pointers) */
 #define FLK_ERROR_RECORD_REGION 2  /* records beyond their region */
 #define FLK_ERROR_LIST_MEMORY 3  /* out of list memory */
@@ -343,7 +343,7 @@
 #define FLK_ERROR_ABORTED 8  /* aborted */
 #define FLK_ERROR_TIMED_OUT 9  /* time-out: neither half moved for so many cycles as timeout says */
 #define FLK_ERROR_TEXTS { \
-  [0] = "a read of the front end failed (scene)", \
+  [0] = "a read of the front end failed (scene, pointers)", \
   [1] = "a write of the front end failed (records, lists, pointers)", \
   [2] = "records beyond their region", \
   [3] = "out of list memory", \
@@ -376,31 +376,37 @@
 #define FLK_COUNTER_LIST_TAKEN 26  /* chunks taken, of each of 4 list writers */
 #define FLK_COUNTER_KEY_SHIFT 30  /* depth keys: shift of the frame, two's complement */
 #define FLK_COUNTER_KEY_LOW 31  /* depth keys: least depth of the frame */
-#define FLK_COUNTER_RENDERING_CYCLES 32  /* cycles of the rendering half, start to end */
-#define FLK_COUNTER_SORTED_ENTRIES 33  /* entries delivered, of each of 4 sorting units */
-#define FLK_COUNTER_SORTED_READINGS 37  /* readings of lists, of each of 4 sorting units */
-#define FLK_COUNTER_SORTED_DROPPED 41  /* entries of finished tiles dropped, of each of 4 sorting units */
-#define FLK_COUNTER_RECORD_LINES 45  /* lines of 32 bytes that the record cache read */
-#define FLK_COUNTER_STAMP_TAKEN 46  /* cycle (live_cycles) in which the frame was taken */
-#define FLK_COUNTER_STAMP_FRONT_DONE 47  /* cycle in which it left the front end */
-#define FLK_COUNTER_STAMP_RENDERING_START 48  /* cycle in which it entered the rendering half */
-#define FLK_COUNTER_STAMP_RENDERING_DONE 49  /* cycle in which it left the rendering half */
+#define FLK_COUNTER_POINTERS_SPILLED 32  /* lines of list pointers written to make room for others, of all list writers */
+#define FLK_COUNTER_POINTERS_FETCHED 33  /* lines of list pointers read back */
+#define FLK_COUNTER_RENDERING_CYCLES 34  /* cycles of the rendering half, start to end */
+#define FLK_COUNTER_SORTED_ENTRIES 35  /* entries delivered, of each of 4 sorting units */
+#define FLK_COUNTER_SORTED_READINGS 39  /* readings of lists, of each of 4 sorting units */
+#define FLK_COUNTER_SORTED_DROPPED 43  /* entries of finished tiles dropped, of each of 4 sorting units */
+#define FLK_COUNTER_RECORD_LINES 47  /* lines of 32 bytes that the record cache read */
+#define FLK_COUNTER_STAMP_TAKEN 48  /* cycle (live_cycles) in which the frame was taken */
+#define FLK_COUNTER_STAMP_FRONT_DONE 49  /* cycle in which it left the front end */
+#define FLK_COUNTER_STAMP_RENDERING_START 50  /* cycle in which it entered the rendering half */
+#define FLK_COUNTER_STAMP_RENDERING_DONE 51  /* cycle in which it left the rendering half */
 #define FLK_COUNTER_LIVE_CYCLES 64  /* cycles */
 #define FLK_COUNTER_LIVE_RECORD_BEATS 65  /* beats read, of 32 bytes: records */
 #define FLK_COUNTER_LIVE_LIST_BEATS 66  /* beats read: lists and pointers */
-#define FLK_COUNTER_LIVE_COLOUR_BEATS 67  /* beats read: colours */
-#define FLK_COUNTER_LIVE_GEOMETRY_BEATS 68  /* beats read: headers and geometry */
-#define FLK_COUNTER_LIVE_TABLE_BEATS 69  /* beats read: cluster table */
-#define FLK_COUNTER_LIVE_FRAME_WRITTEN 70  /* beats written: frame buffer */
-#define FLK_COUNTER_LIVE_FRONT_WRITTEN 71  /* beats written: records, lists, pointers */
-#define FLK_COUNTER_LIVE_RECORD_WAITS 72  /* cycles in which an address waits: records */
-#define FLK_COUNTER_LIVE_LIST_WAITS 73  /* cycles in which an address waits: lists */
-#define FLK_COUNTER_LIVE_COLOUR_WAITS 74  /* cycles in which an address waits: colours */
-#define FLK_COUNTER_LIVE_GEOMETRY_WAITS 75  /* cycles in which an address waits: geometry */
-#define FLK_COUNTER_LIVE_TABLE_WAITS 76  /* cycles in which an address waits: cluster table */
-#define FLK_COUNTER_LIVE_FRAME_ADDRESS_WAITS 77  /* cycles in which an address waits: frame buffer */
-#define FLK_COUNTER_LIVE_FRONT_ADDRESS_WAITS 78  /* cycles in which an address waits: records, lists, pointers */
-#define FLK_COUNTER_LIVE_DATA_WAITS 79  /* cycles in which data to be written wait at the memory */
+#define FLK_COUNTER_LIVE_POINTER_BEATS 67  /* beats read: list pointers of the front end */
+#define FLK_COUNTER_LIVE_COLOUR_BEATS 68  /* beats read: colours */
+#define FLK_COUNTER_LIVE_GEOMETRY_BEATS 69  /* beats read: headers and geometry */
+#define FLK_COUNTER_LIVE_TABLE_BEATS 70  /* beats read: cluster table */
+#define FLK_COUNTER_LIVE_FRAME_WRITTEN 71  /* beats written: frame buffer */
+#define FLK_COUNTER_LIVE_POINTER_WRITTEN 72  /* beats written: list pointers that made room for others */
+#define FLK_COUNTER_LIVE_FRONT_WRITTEN 73  /* beats written: records, lists, pointers */
+#define FLK_COUNTER_LIVE_RECORD_WAITS 74  /* cycles in which an address waits: records */
+#define FLK_COUNTER_LIVE_LIST_WAITS 75  /* cycles in which an address waits: lists */
+#define FLK_COUNTER_LIVE_POINTER_WAITS 76  /* cycles in which an address waits: list pointers of the front end, read */
+#define FLK_COUNTER_LIVE_COLOUR_WAITS 77  /* cycles in which an address waits: colours */
+#define FLK_COUNTER_LIVE_GEOMETRY_WAITS 78  /* cycles in which an address waits: geometry */
+#define FLK_COUNTER_LIVE_TABLE_WAITS 79  /* cycles in which an address waits: cluster table */
+#define FLK_COUNTER_LIVE_FRAME_ADDRESS_WAITS 80  /* cycles in which an address waits: frame buffer */
+#define FLK_COUNTER_LIVE_SPILL_ADDRESS_WAITS 81  /* cycles in which an address waits: list pointers that make room for others */
+#define FLK_COUNTER_LIVE_FRONT_ADDRESS_WAITS 82  /* cycles in which an address waits: records, lists, pointers */
+#define FLK_COUNTER_LIVE_DATA_WAITS 83  /* cycles in which data to be written wait at the memory */
 #define FLK_COUNTER_STAGE 128  /* rendering stage: 32 words of each of 4 cores, in the order of CNT_* (docs/render_stage.md) or LANE_CNT_* (docs/lane_stage.md) */
 
 #endif

@@ -85,7 +85,9 @@ module flk_axi_split #(
   // A burst ends at a page's end or before it.
   assign next_page    = line_q[LineBits-1:PageBits] + (LineBits - PageBits)'(to_page <= LONGEST);
   assign next_beat    = line_q[PageBits-1:0] + PageBits'(limit);
-  assign line_d       = load ? in_addr_i[AddrBits-1:BeatShift] : {next_page, next_beat};
+  // Requests of one beat are one burst each.
+  assign line_d       = load || BeatBits == 1 ? in_addr_i[AddrBits-1:BeatShift]
+                                              : {next_page, next_beat};
   assign left_d       = load ? in_beats_i : left_q - BeatBits'(limit);
   assign out_valid_d  = move || (out_valid_q && !out_ready_i);
 

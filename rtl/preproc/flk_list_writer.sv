@@ -41,7 +41,9 @@ module flk_list_writer #(
   parameter  int unsigned AddressBits = 34,
   localparam int unsigned ListBits    = $clog2(Lists),
   localparam int unsigned LinesBits   = $clog2(Lists * PointerBits / LineBits + 1),
-  localparam int unsigned IndexBits   = $clog2(LineBits / PointerBits)  // of a pointer in its line
+  localparam int unsigned IndexBits   = $clog2(LineBits / PointerBits), // of a pointer in its line
+  localparam int unsigned MoveBits    = $clog2(ChunkLines + 1) + ChunkBits,
+  localparam int unsigned NumberBits  = LinesBits > 1 ? LinesBits - 1 : 1  // of a line of pointers
 ) (
   input  logic                   clk_i,
   input  logic                   rst_ni,
@@ -76,14 +78,14 @@ module flk_list_writer #(
   output logic                   move_valid_o,
   input  logic                   move_ready_i,
   output logic                   move_put_o,       // a line goes: its number
-  output logic [LinesBits-1:0]   move_put_line_o,
+  output logic [NumberBits-1:0]  move_put_line_o,
   output logic                   move_get_o,       // the wanted line comes; else it is zeros
-  output logic [LinesBits-1:0]   move_get_line_o,
+  output logic [NumberBits-1:0]  move_get_line_o,
   input  logic [IndexBits-1:0]   move_index_i,
   input  logic                   move_read_i,
-  output logic [PointerBits-1:0] move_pointer_o,
+  output logic [MoveBits-1:0]    move_pointer_o,
   input  logic                   move_write_i,
-  input  logic [PointerBits-1:0] move_pointer_i,
+  input  logic [MoveBits-1:0]    move_pointer_i,
   input  logic                   move_done_i
 );
 
@@ -148,7 +150,9 @@ module flk_list_writer #(
   typedef enum logic [2:0] {LOOK, COMPARE, ASK, MOVE, AGAIN, WALK} look_e;
 
   look_e look_q;
-  logic  skip;    // the line of the walk is in the table
+  logic  hold_q;   // an event in stage D waits for its pointer
+  logic  blank_q;  // the line of the walk was never wanted
+  logic  skip;     // or it is in the table
 
   assign start    = state_q == IDLE && start_i;
   assign take     = in_valid_i && in_ready_o && !in_end_i;
@@ -433,15 +437,8 @@ module flk_list_writer #(
   logic [ChunkBits:0]  taken_d, taken_q, taken_more;
   logic                failed_d, failed_q;
 
-  always_comb begin
-    c_list = '0;
-    for (int unsigned w = 0; w < Ways; w++) begin
-      c_list |= c_one[w] ? row.way[w].list : '0;
-    end
-    if (!b_flush_q && !c_evict) begin
-      c_list = b_list_q;
-    end
-  end
+  // The way that may have to go is known before it is known whether it goes.
+  assign c_list = b_flush_q || c_evict ? row.way[b_flush_q ? b_way_q : row.turn].list : b_list_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -468,8 +465,6 @@ module flk_list_writer #(
     logic [TagBits-1:0] tag;     // which one is held
   } place_t;
 
-  logic                  hold_q;  // an event in stage D waits for its pointer
-  logic                  blank_q; // the line of the walk was never wanted
   place_t                place_read, place_d;
   logic [ListBits-1:0]   look_list;
   logic [TagBits-1:0]    look_tag;
@@ -557,8 +552,8 @@ module flk_list_writer #(
   );
 
   // The place as it was stays at the memory's output until the line has moved.
-  function automatic logic [LinesBits-1:0] line_of(input logic [TagBits-1:0] tag);
-    return (LinesBits'(tag) << $clog2(Places)) | LinesBits'(look_place);
+  function automatic logic [NumberBits-1:0] line_of(input logic [TagBits-1:0] tag);
+    return (NumberBits'(tag) << $clog2(Places)) | NumberBits'(look_place);
   endfunction
 
   assign move_valid_o    = hold_q && look_q == ASK;
@@ -566,7 +561,7 @@ module flk_list_writer #(
   assign move_put_line_o = line_of(place_read.tag);
   assign move_get_o      = place_read.stored[look_tag];
   assign move_get_line_o = line_of(look_tag);
-  assign move_pointer_o  = PointerBits'(pointer);
+  assign move_pointer_o  = pointer;
   assign moved_at        = HeldBits'({look_place, move_index_i});
 
   // ---- D: pointers ----------------------------------------------------------------------------------
@@ -702,6 +697,30 @@ module flk_list_writer #(
   logic [AddressBits-1:0] address_q;
   logic [LineBits-1:0]    data_q;
 
+  // base_q + e_at_q in three parts, each with and without a carry.
+  localparam int unsigned PartBits = (AddressBits + 2) / 3;
+  logic [2:0][PartBits-1:0] base, at, sum;
+  logic [PartBits:0]        plain, more;
+  logic                     carry;
+
+  assign base = (3 * PartBits)'(base_q);
+  assign at   = (3 * PartBits)'(e_at_q);
+
+  always_comb begin
+    carry = 1'b0;
+    plain = '0;
+    more  = '0;
+    for (int unsigned k = 0; k < 3; k++) begin
+      plain  = {1'b0, base[k]} + {1'b0, at[k]};
+      more   = (PartBits + 1)'(({1'b0, base[k], 1'b1} + {1'b0, at[k], 1'b1}) >> 1);
+      sum[k] = carry ? more[PartBits-1:0] : plain[PartBits-1:0];
+      carry  = carry ? more[PartBits] : plain[PartBits];
+    end
+  end
+
+  logic unused_sum;
+  assign unused_sum = ^(sum >> AddressBits);
+
   assign advance = (!out_valid_q || out_ready_i) && !hold_q;
   assign busy    = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
                    walk_q || e_walk_q || out_valid_q;
@@ -719,7 +738,7 @@ module flk_list_writer #(
   always_ff @(posedge clk_i) begin
     if (advance && (e_event_q || e_walk_q)) begin
       data_q    <= e_walk_q ? {PointerBits'(e_pointer_q), data_q[LineBits-1:PointerBits]} : line;
-      address_q <= base_q + e_at_q;
+      address_q <= AddressBits'(sum);
     end
   end
 

@@ -6,23 +6,25 @@
 // end of a request nothing is under way. One of in_put_i and in_get_i is 1 at least.
 // For the writer that is served: index_o and read_o ask for a pointer, which is in_pointer_i in the
 // next cycle; index_o, write_o and pointer_o are one for it; done_o, with the last of these, ends its
-// request. A put takes 17 cycles and the memory's answer, a get the memory's answer, both 16 and 4.
+// request. A put takes 17 cycles and the memory's answer, a get 2 and the memory's answer, both 17 more.
 // Line n of writer b is line base_i + 4 n + b of memory; base_i stays for the frame.
 // Errors of the memory are kept until start_i, which comes while nothing is asked for. After one,
 // zeros stand for what is read: what comes of it are lists of the writer's own chunks, in any case.
 // Combinational: in_valid_i to in_ready_o, memory's ready to the next state; outputs from registers.
 module flk_pointer_port #(
   parameter  int unsigned Writers     = 4,
-  parameter  int unsigned LinesBits   = 11,
+  parameter  int unsigned NumberBits  = 10,  // of a line
   parameter  int unsigned AddressBits = 34,  // of a line
   parameter  int unsigned PointerBits = 32,
+  parameter  int unsigned MoveBits    = 28,  // of a pointer that are not always zero
   parameter  int unsigned IdBits      = 4,
   localparam int unsigned Width       = 512,
   localparam int unsigned Bytes       = Width / 8,
   localparam int unsigned AddrBits    = AddressBits + $clog2(Bytes),
   localparam int unsigned WriterBits  = $clog2(Writers),
   localparam int unsigned PerLine     = Width / PointerBits,
-  localparam int unsigned IndexBits   = $clog2(PerLine)
+  localparam int unsigned IndexBits   = $clog2(PerLine),
+  localparam int unsigned AtBits      = NumberBits + WriterBits
 ) (
   input  logic                                clk_i,
   input  logic                                rst_ni,
@@ -36,14 +38,14 @@ module flk_pointer_port #(
   input  logic [Writers-1:0]                  in_valid_i,
   output logic [Writers-1:0]                  in_ready_o,
   input  logic [Writers-1:0]                  in_put_i,
-  input  logic [Writers-1:0][LinesBits-1:0]   in_put_line_i,
+  input  logic [Writers-1:0][NumberBits-1:0]  in_put_line_i,
   input  logic [Writers-1:0]                  in_get_i,
-  input  logic [Writers-1:0][LinesBits-1:0]   in_get_line_i,
+  input  logic [Writers-1:0][NumberBits-1:0]  in_get_line_i,
   output logic [IndexBits-1:0]                index_o,
   output logic [Writers-1:0]                  read_o,
-  input  logic [Writers-1:0][PointerBits-1:0] in_pointer_i,
+  input  logic [Writers-1:0][MoveBits-1:0]    in_pointer_i,
   output logic [Writers-1:0]                  write_o,
-  output logic [PointerBits-1:0]              pointer_o,
+  output logic [MoveBits-1:0]                 pointer_o,
   output logic [Writers-1:0]                  done_o,
   // AXI4
   output logic                                ar_valid_o,
@@ -82,18 +84,20 @@ module flk_pointer_port #(
   end
 
   typedef struct packed {
-    logic                 put;
-    logic [LinesBits-1:0] put_line;
-    logic                 get;
-    logic [LinesBits-1:0] get_line;
+    logic                  put;
+    logic [NumberBits-1:0] put_line;
+    logic                  get;
+    logic [NumberBits-1:0] get_line;
   } request_t;
 
-  // TURN: the sum of the second address.
+  // TURN: two cycles for the sum of an address.
   typedef enum logic [2:0] {IDLE, GATHER, PUT, TURN, GET, GIVE} state_e;
 
   state_e                  state_q;
   request_t [Writers-1:0]  requests;
-  request_t                chosen, request_q;
+  request_t                chosen;
+  logic                    get_q;
+  logic [NumberBits-1:0]   get_line_q;
   logic [WriterBits-1:0]   index, owner_q;
   logic [Writers-1:0]      owner;  // one bit
   logic                    chosen_valid, take;
@@ -103,6 +107,8 @@ module flk_pointer_port #(
   logic                    ask_ready, data_ready, put_done, put_error, get_valid, get_error;
   logic                    get_ready, read_error_q, write_error_q;
   logic                    last;
+  logic [AtBits-1:0]       at_q;      // of a line, from base_i
+  logic [AtBits:0]         low_q;
   logic [AddressBits-1:0]  address_q;
   logic [Width-1:0]        line_q, get_data;
 
@@ -164,14 +170,18 @@ module flk_pointer_port #(
             data_q <= 1'b0;
           end
           if (put_done) begin
-            state_q <= request_q.get ? TURN : GIVE;
+            state_q <= get_q ? TURN : GIVE;
           end
         end
         TURN: begin
-          state_q <= GET;
-          ask_q   <= 1'b1;
+          step_q <= step_q + 1'b1;
+          if (step_q[0]) begin
+            state_q <= GET;
+            ask_q   <= 1'b1;
+          end
         end
         GET: begin
+          step_q <= '0;
           if (get_ready) begin
             ask_q <= 1'b0;
           end
@@ -191,23 +201,30 @@ module flk_pointer_port #(
 
   always_ff @(posedge clk_i) begin
     if (take) begin
-      owner_q   <= index;
-      request_q <= chosen;
+      owner_q    <= index;
+      get_q      <= chosen.get;
+      get_line_q <= chosen.get_line;
     end
-    address_q <= base_i + AddressBits'({state_q == TURN || state_q == GET ? request_q.get_line
-                                                                          : request_q.put_line,
-                                        owner_q});
+    // The sum of an address, its lower part first.
+    if (take) begin
+      at_q <= {chosen.put ? chosen.put_line : chosen.get_line, index};
+    end else if (state_q == PUT && put_done) begin
+      at_q <= {get_line_q, owner_q};
+    end
+    low_q     <= {1'b0, base_i[AtBits-1:0]} + {1'b0, at_q};
+    address_q <= {base_i[AddressBits-1:AtBits] + (AddressBits - AtBits)'(low_q[AtBits]),
+                  low_q[AtBits-1:0]};
     if (state_q == GET) begin
       line_q <= get_error || read_error_q || write_error_q ? '0 : get_data;
     end else if (gathered_q || state_q == GIVE) begin
-      line_q <= {in_pointer_i[owner_q], line_q[Width-1:PointerBits]};
+      line_q <= {PointerBits'(in_pointer_i[owner_q]), line_q[Width-1:PointerBits]};
     end
   end
 
   assign index_o   = step_q[IndexBits-1:0];
   assign read_o    = state_q == GATHER && !step_q[IndexBits] ? owner : '0;
   assign write_o   = state_q == GIVE ? owner : '0;
-  assign pointer_o = request_q.get ? line_q[PointerBits-1:0] : '0;
+  assign pointer_o = get_q ? line_q[MoveBits-1:0] : '0;
   assign done_o    = state_q == GIVE && last ? owner : '0;
 
   // ---- memory ---------------------------------------------------------------------------------------
@@ -331,7 +348,8 @@ module flk_pointer_port #(
   assert property (@(posedge clk_i) disable iff (!rst_ni) take |-> chosen.put || chosen.get)
   else $error("flk_pointer_port: a request without a line");
 
-  assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> state_q == IDLE && !chosen_valid)
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      start_i |-> state_q == IDLE && !chosen_valid)
   else $error("flk_pointer_port: start while a line moves");
 `endif
 

@@ -188,6 +188,8 @@ package flk_preproc_pkg;
     logic [3:0][24:0]  taken;           // chunks
     logic signed [7:0] key_shift;
     position_t         key_low;
+    logic [31:0]       spilled;         // lines of pointers, by all list writers
+    logic [31:0]       fetched;
   } front_counters_t;
 
 endpackage

@@ -1,20 +1,22 @@
 // Preprocessing: from a packed scene in memory to records and tile lists (docs/front_end.md).
 //
-// Four cores behind three AXI4 read ports (cluster table, geometry, colours) and one write port. A
-// frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
+// Four cores behind three AXI4 read ports (cluster table, geometry, colours), one write port and one
+// of both kinds, for list pointers of pictures with more lists than Pointers a writer. A frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
 // for a cycle when all has been written and answered, error_o and the counters then stay until the
 // next start. Everything that is written is the same for every timing. Form: records of 16 bytes in
 // factored form, or of 32 in conic form.
 // error_o: bits of FRONT_ERROR_*. An error of the memory ends the frame early where it was met;
 // a cluster beyond the records' region writes nothing; a list writer without a chunk writes no more.
-// Nothing is written outside the regions of records, lists and pointers.
+// Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
+// registers is at most Lists / 16.
 module flk_preprocessing
   import flk_param_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Form     = FORM_FACTORED,
-  parameter  int unsigned Pointers = 2048,  // lists of a writer
+  parameter  int unsigned Pointers = 2048,  // of a list writer, held on the chip
+  parameter  int unsigned Lists    = 16384, // of a writer, at most
   parameter  int unsigned Gather   = 256,   // lines that are written together
   parameter  int unsigned Waiting  = 128,   // survivors of a lane that wait for colours
   parameter  int unsigned IdBits   = 4,
@@ -72,6 +74,36 @@ module flk_preprocessing
   input  logic [Width-1:0]   colour_r_data_i,
   input  logic [1:0]         colour_r_resp_i,
   input  logic               colour_r_last_i,
+  // List pointers, where not all are held
+  output logic               pointer_ar_valid_o,
+  input  logic               pointer_ar_ready_i,
+  output logic [IdBits-1:0]  pointer_ar_id_o,
+  output logic [AddrBits-1:0] pointer_ar_addr_o,
+  output logic [7:0]         pointer_ar_len_o,
+  output logic [2:0]         pointer_ar_size_o,
+  output logic [1:0]         pointer_ar_burst_o,
+  input  logic               pointer_r_valid_i,
+  output logic               pointer_r_ready_o,
+  input  logic [IdBits-1:0]  pointer_r_id_i,
+  input  logic [Width-1:0]   pointer_r_data_i,
+  input  logic [1:0]         pointer_r_resp_i,
+  input  logic               pointer_r_last_i,
+  output logic               pointer_aw_valid_o,
+  input  logic               pointer_aw_ready_i,
+  output logic [IdBits-1:0]  pointer_aw_id_o,
+  output logic [AddrBits-1:0] pointer_aw_addr_o,
+  output logic [7:0]         pointer_aw_len_o,
+  output logic [2:0]         pointer_aw_size_o,
+  output logic [1:0]         pointer_aw_burst_o,
+  output logic               pointer_w_valid_o,
+  input  logic               pointer_w_ready_i,
+  output logic [Width-1:0]   pointer_w_data_o,
+  output logic [Bytes-1:0]   pointer_w_strb_o,
+  output logic               pointer_w_last_o,
+  input  logic               pointer_b_valid_i,
+  output logic               pointer_b_ready_o,
+  input  logic [IdBits-1:0]  pointer_b_id_i,
+  input  logic [1:0]         pointer_b_resp_i,
   // Records, lists, pointers
   output logic               aw_valid_o,
   input  logic               aw_ready_i,
@@ -720,14 +752,26 @@ module flk_preprocessing
   logic [3:0][31:0]         list_entries, list_lines, list_evicted;
   logic [3:0][24:0]         list_taken;
   logic [3:0]               unused_done;
-  localparam int unsigned   LinesBits = $clog2(Pointers / 16 + 1);
+  localparam int unsigned   LinesBits = $clog2(Lists / 16 + 1);
+  localparam int unsigned   NumberBits = LinesBits - 1;  // of a line of pointers
+  localparam int unsigned   MoveBits = 28;  // of a pointer
+
+  // Lines of pointers that move
+  logic [3:0]                move_valid, move_ready, move_put, move_get;
+  logic [3:0]                move_read, move_write, move_done;
+  logic [3:0][NumberBits-1:0] move_put_line, move_get_line;
+  logic [3:0]                move_index;
+  logic [3:0][MoveBits-1:0]  move_from;
+  logic [MoveBits-1:0]       move_to;
+  logic                      pointer_read_error, pointer_write_error;
 
   for (genvar b = 0; b < 4; b++) begin : gen_lists
     logic [ListAddrBits-1:0] address;
     logic [Width-1:0]        data;
 
     flk_list_writer #(
-      .Pointers(Pointers)
+      .Pointers(Pointers),
+      .Lists   (Lists)
     ) i_list (
       .clk_i,
       .rst_ni,
@@ -754,10 +798,79 @@ module flk_preprocessing
       .out_valid_o    (out_valid[b]),
       .out_ready_i    (out_ready[b]),
       .out_address_o  (address),
-      .out_data_o     (data)
+      .out_data_o     (data),
+      .move_valid_o   (move_valid[b]),
+      .move_ready_i   (move_ready[b]),
+      .move_put_o     (move_put[b]),
+      .move_put_line_o(move_put_line[b]),
+      .move_get_o     (move_get[b]),
+      .move_get_line_o(move_get_line[b]),
+      .move_index_i   (move_index),
+      .move_read_i    (move_read[b]),
+      .move_pointer_o (move_from[b]),
+      .move_write_i   (move_write[b]),
+      .move_pointer_i (move_to),
+      .move_done_i    (move_done[b])
     );
     assign out[b] = {address, 4'hf, data};
   end
+
+  flk_pointer_port #(
+    .NumberBits (NumberBits),
+    .AddressBits(BEAT_BITS),
+    .MoveBits   (MoveBits),
+    .IdBits     (IdBits)
+  ) i_pointers (
+    .clk_i,
+    .rst_ni,
+    .start_i      (start),
+    .base_i       (registers_i.pointers_beat),
+    .read_error_o (pointer_read_error),
+    .write_error_o(pointer_write_error),
+    .put_o        (counters_o.spilled),
+    .got_o        (counters_o.fetched),
+    .in_valid_i   (move_valid),
+    .in_ready_o   (move_ready),
+    .in_put_i     (move_put),
+    .in_put_line_i(move_put_line),
+    .in_get_i     (move_get),
+    .in_get_line_i(move_get_line),
+    .index_o      (move_index),
+    .read_o       (move_read),
+    .in_pointer_i (move_from),
+    .write_o      (move_write),
+    .pointer_o    (move_to),
+    .done_o       (move_done),
+    .ar_valid_o   (pointer_ar_valid_o),
+    .ar_ready_i   (pointer_ar_ready_i),
+    .ar_id_o      (pointer_ar_id_o),
+    .ar_addr_o    (pointer_ar_addr_o),
+    .ar_len_o     (pointer_ar_len_o),
+    .ar_size_o    (pointer_ar_size_o),
+    .ar_burst_o   (pointer_ar_burst_o),
+    .r_valid_i    (pointer_r_valid_i),
+    .r_ready_o    (pointer_r_ready_o),
+    .r_id_i       (pointer_r_id_i),
+    .r_data_i     (pointer_r_data_i),
+    .r_resp_i     (pointer_r_resp_i),
+    .r_last_i     (pointer_r_last_i),
+    .aw_valid_o   (pointer_aw_valid_o),
+    .aw_ready_i   (pointer_aw_ready_i),
+    .aw_id_o      (pointer_aw_id_o),
+    .aw_addr_o    (pointer_aw_addr_o),
+    .aw_len_o     (pointer_aw_len_o),
+    .aw_size_o    (pointer_aw_size_o),
+    .aw_burst_o   (pointer_aw_burst_o),
+    .w_valid_o    (pointer_w_valid_o),
+    .w_ready_i    (pointer_w_ready_i),
+    .w_data_o     (pointer_w_data_o),
+    .w_strb_o     (pointer_w_strb_o),
+    .w_last_o     (pointer_w_last_o),
+    .b_valid_i    (pointer_b_valid_i),
+    .b_ready_o    (pointer_b_ready_o),
+    .b_id_i       (pointer_b_id_i),
+    .b_resp_i     (pointer_b_resp_i)
+  );
 
   assign out_valid[4] = line_valid;
   assign line_ready   = out_ready[4];
@@ -900,8 +1013,8 @@ module flk_preprocessing
   assign counters_o.key_shift    = key_shift;
   assign counters_o.key_low      = key_low;
 
-  assign error_o = {|list_failed, beyond_q, write_error_q,
-                    cull_error || geometry_error || colour_error};
+  assign error_o = {|list_failed, beyond_q, write_error_q || pointer_write_error,
+                    cull_error || geometry_error || colour_error || pointer_read_error};
 
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,

@@ -16,7 +16,7 @@
 // says so until the next post. reset_i, with clear_i or in the cycle before it: frames count from 0.
 // A descriptor is refused where an address is no multiple of 64, the stride no multiple of 32 or less than a row of whole
 // pairs of tiles, a side 0 or beyond 4096, the mode not one of CAT_*, there is no cluster, or a list writer would have
-// more lists than Pointers.
+// more lists than Lists.
 // Combinational: start_i to refused_o, *_idle_i to *_start_o, copy_front_done_i to front_done_o; all else depends on registers alone.
 module flk_frame_control
   import flk_param_pkg::*;
@@ -24,7 +24,7 @@ module flk_frame_control
   import flk_rendering_pkg::*;
   import flk_top_pkg::*;
 #(
-  parameter int unsigned Pointers = 2048
+  parameter int unsigned Lists = 16384
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
@@ -180,7 +180,7 @@ module flk_frame_control
     if (take) begin
       front_error_q <= '0;
     end else if (front_q == CHECK && check_q == 2'd2) begin
-      front_error_q.descriptor <= misaligned_q || unfit_q || 32'(lists_q) > Pointers ||
+      front_error_q.descriptor <= misaligned_q || unfit_q || 32'(lists_q) > Lists ||
                                   frame_q.stride < row_bytes;
     end else if (front_q == RUN && front_done_i) begin
       front_error_q.front_read    <= front_error_i[FRONT_ERROR_READ];

@@ -43,22 +43,24 @@ package flk_top_pkg;
 
   // Counters: words of a frame, from each half, and those that run on. Numbers as in the enumeration counter_e of rtl/regs/flk_registers.rdl.
   localparam int unsigned COUNTER_FRONT = 0;
-  localparam int unsigned COUNTER_RENDERING = 32;
+  localparam int unsigned COUNTER_RENDERING = 34;
   localparam int unsigned COUNTER_LIVE = 64;
   localparam int unsigned COUNTER_STAGE = 128;
-  localparam int unsigned FRONT_WORDS = 32;
+  localparam int unsigned FRONT_WORDS = 34;
   localparam int unsigned RENDERING_WORDS = 18;
-  localparam int unsigned LIVE_WORDS = 16;
+  localparam int unsigned LIVE_WORDS = 20;
 
   // Managers of the memory port; the first reader and the first writer go first.
-  localparam int unsigned READERS = 5;
+  localparam int unsigned READERS = 6;
   localparam int unsigned READ_RECORDS = 0;
   localparam int unsigned READ_LISTS = 1;
-  localparam int unsigned READ_COLOURS = 2;
-  localparam int unsigned READ_GEOMETRY = 3;
-  localparam int unsigned READ_TABLE = 4;
-  localparam int unsigned WRITERS = 2;
+  localparam int unsigned READ_POINTERS = 2;  // of the front end
+  localparam int unsigned READ_COLOURS = 3;
+  localparam int unsigned READ_GEOMETRY = 4;
+  localparam int unsigned READ_TABLE = 5;
+  localparam int unsigned WRITERS = 3;
   localparam int unsigned WRITE_FRAME = 0;
-  localparam int unsigned WRITE_FRONT = 1;
+  localparam int unsigned WRITE_POINTERS = 1;
+  localparam int unsigned WRITE_FRONT = 2;
 
 endpackage

@@ -81,7 +81,7 @@ class Mover:
             for i in range(16):
                 dut.move_write_i.value = 1
                 dut.move_index_i.value = i
-                dut.move_pointer_i.value = word >> 32 * i & 0xFFFFFFFF
+                dut.move_pointer_i.value = word >> 32 * i & 0xFFFFFFF
                 dut.move_done_i.value = i == 15
                 await RisingEdge(dut.clk_i)
             dut.move_write_i.value = dut.move_done_i.value = 0

@@ -12,7 +12,6 @@ from __future__ import annotations
 import pytest
 from flicker_tb.runner import build_and_test, refused
 
-
 TESTS = ["frames", "out_of_memory", "one_set", "rate", "reset_in_a_frame", "spilled"]
 
 

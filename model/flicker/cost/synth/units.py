@@ -141,12 +141,12 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_exp_neg": ["g_o[15]"],  # so is a power
         "flk_exp_neg_pipe": ["g_o[15]"],
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
-        # Lines of 2048 pointers; answers come under the one identifier there is, and no access is exclusive.
+        # Answers come under the one identifier there is, and no access is exclusive.
         "flk_preprocessing": [
-            *(f"registers_i[{bit}]" for bit in range(16, 19)),
-            *(f"{port}r_{name}" for port in ("table_", "geometry_", "colour_") for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))),
-            "b_resp_i[0]", *(f"b_id_i[{bit}]" for bit in range(4)),
+            f"{port}{name}" for port in ("table_r_", "geometry_r_", "colour_r_", "pointer_r_", "pointer_b_", "b_")
+            for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))
         ],
+        "flk_pointer_port": [f"{channel}_{name}" for channel in "rb" for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))],
         "flk_preprocessing_core": ["part_i[267]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
@@ -278,7 +278,7 @@ def _cells() -> list[Unit]:
         unit("flk_registers"),
         # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/list_layout.md.
         unit("flk_sram", "64 x 52 bit, flip-flops", Width=52, Depth=64),
-        unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, CoordBits=3),
+        unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, Lists=16, CoordBits=3),
         unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
     ]
     return units
@@ -332,7 +332,7 @@ def _front() -> list[Unit]:
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_splat_input"), unit("flk_pixel_out"), unit("flk_frame_writer"), unit("flk_frame_writer", "32 lanes", Lanes=LANE_COUNTS[0]),
         unit("flk_record_writer"), unit("flk_record_writer", "records of 32 bytes", RecordBits=177, Quarters=2),
-        unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_list_reader"),
+        unit("flk_list_writer", "2048 pointers", Pointers=2048), unit("flk_pointer_port"), unit("flk_list_reader"),
         unit("flk_entry_buffer"), unit("flk_record_cache"), unit("flk_delivery"),
         *(unit(top, config, **form) for top in ("flk_preprocessing_core", "flk_preprocessing") for config, form in (("default", {}), ("conic", {"Form": 0}))),
         unit("flk_tile_walk"), unit("flk_axi_read_mux"), unit("flk_line_writer"),
