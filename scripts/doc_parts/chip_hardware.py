@@ -29,7 +29,7 @@ from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
-from flicker.sim.chip import PORT, ChipFrame, ChipSession, build, pointers_for
+from flicker.sim.chip import PORT, ChipFrame, ChipSession, build
 from flicker.sim.half import MemoryOptions
 
 from .common import Say, folder_of_scenes
@@ -82,7 +82,7 @@ def tables(say: Say) -> dict[str, str]:
         view = load_view(path, number, size)
         camera = view.camera
         say(f"{title}: building the simulator")
-        build(config, pointers_for(camera))
+        build(config)
         packed = packed_scene(view, format_)
         front = run_front(packed, camera, lists, RecordKind.of(config.form))
         image = front_memory(front)
@@ -94,7 +94,7 @@ def tables(say: Say) -> dict[str, str]:
         loose = {"records"} | ({"lists"} if len(lists_there.reading_size) > len(lists_there.lines) else set())
         model = whole_frame(preprocessing.estimate(front, image, dram, sizes.survivors), second, dram)
         say(f"{title}: alone")
-        with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
+        with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
             begin = time.process_time()
             alone = chip.render(camera, lists=lists)
             seconds = time.process_time() - begin
@@ -105,7 +105,7 @@ def tables(say: Say) -> dict[str, str]:
             if abs(due / moved[purpose] - 1) > (LIMIT if purpose in loose else 0.0):
                 raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
         say(f"{title}: four frames back to back")
-        with ChipSession(packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing)) as chip:
+        with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
             done = back_to_back(chip, camera, chunks, lists)
         for frame in (alone, *done):
             if frame.error or not np.array_equal(frame.buffer, golden.buffer):

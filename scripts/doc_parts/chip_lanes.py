@@ -22,7 +22,7 @@ from flicker.perf.lanes import LaneCycles, lane_work, simulate_lanes
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import SLOT_LIMIT, PackedFormat
 from flicker.scene.real import REAL_VIEWS
-from flicker.sim.chip import ChipFrame, ChipSession, pointers_for
+from flicker.sim.chip import ChipFrame, ChipSession
 from flicker.sim.half import MemoryOptions
 from flicker.sim.rendering import rendering_rtl
 
@@ -47,7 +47,7 @@ def tables(say: Say) -> dict[str, str]:
         stage = simulate_lanes(work, config.with_(in_width=1), leave=True)
         for memory, dram in MEMORIES.items():
             say(f"{real.title}: {lanes} lanes, memory of {memory}, three frames back to back")
-            with ChipSession(packed, config, pointers=pointers_for(view.camera), memory=MemoryOptions(dram.timing)) as chip:
+            with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
                 done = back_to_back(chip, view.camera, CHUNKS, frames=3)
             if any(frame.error or not np.array_equal(frame.buffer, golden) for frame in done):
                 raise FlickerError(f"{real.title}: the picture differs from the golden model's")

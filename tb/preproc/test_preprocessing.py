@@ -31,7 +31,7 @@ from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
-from flicker.sim.preprocessing import ERRORS, PORTS, Regions, RtlFront, front_frame
+from flicker.sim.preprocessing import ERRORS, LIST_ERROR, PORTS, Regions, RtlFront, front_frame
 from flicker.sim.preprocessing import front_rtl as any_front_rtl
 
 QUICK = MemoryOptions()
@@ -80,8 +80,13 @@ def check(
     for name in ("header", "geometry", "colour"):
         assert traffic["headers" if name == "header" else name] == (per(f"{name}_beats"), 0)
     assert traffic["records"] == (0, per("record_beats")) and traffic["lists"][1] == frames * int(np.sum(count["lines"]))
-    beats = {b.name: frames * len(b.beat) for b in chip_traffic(golden, image)}
-    assert beats == {n: sum(pair) for n, pair in traffic.items()}
+    for name, moved in (("spilled", image.lists.spilled), ("fetched", image.lists.fetched)):
+        assert count[name] == moved.sum(), name
+    beats = dict.fromkeys(traffic, (0, 0))
+    for b in chip_traffic(golden, image):
+        read, written = beats[b.name]
+        beats[b.name] = (read, written + frames * len(b.beat)) if b.write else (read + frames * len(b.beat), written)
+    assert beats == traffic
     return golden, rtl
 
 
@@ -186,10 +191,70 @@ def test_three_beats_of_a_group() -> None:
 
 @pytest.mark.slow
 def test_one_gaussian_over_the_largest_picture() -> None:
-    """65,536 tiles of a picture of 4096x4096: a build of its own, with more pointers."""
+    """65,536 tiles of a picture of 4096x4096."""
     packed = pack(some(1, means=[0.0, 0.0, 1.0], scales=100.0, opacities=0.9), PackedFormat.FP16).packed
     golden, rtl = check(packed, plain_camera(4096, 4096))
     assert len(golden.entry_tile) == 65536 and rtl.counters["entries"].sum() == 65536
+
+
+def wide(count: int = 400, **changes) -> tuple[PackedScene, Camera]:
+    """Gaussians all over a picture just above those whose pointers are held, and its camera."""
+    width, height = changes.pop("size", (2080, 1104))
+    rng = np.random.default_rng(seed())
+    z = rng.uniform(1.0, 6.0, count)
+    means = np.stack([rng.uniform(-0.6, 0.6, count) * z, rng.uniform(-0.6, 0.6, count) * height / width * z, z], axis=1)
+    scene = some(count, means=means, scales=rng.uniform(0.005, 0.05, (count, 3)), **changes)
+    return pack(scene, PackedFormat.CHUNK).packed, Camera(width, height, width, width, np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize("memory", [QUICK, lpddr4()], ids=["perfect", "lpddr4"])
+def test_pointers_beyond_those_held(memory: MemoryOptions) -> None:
+    """Lines of pointers go to their table and come back; two frames one after the other."""
+    packed, camera = wide()
+    _, rtl = check(packed, camera, memory=memory, frames=2)
+    assert rtl.counters["spilled"] > 100 and rtl.counters["fetched"] > 50
+
+
+def test_the_largest_picture() -> None:
+    """4096x4096 tiles, of a scene that is listed everywhere."""
+    packed, camera = wide(300, size=(4096, 4096))
+    golden, rtl = check(packed, camera)
+    assert len(golden.entry_tile) > 20_000 and rtl.counters["spilled"] > 1000 and rtl.counters["fetched"] > 500
+
+
+def test_out_of_list_memory_after_pointers_have_moved() -> None:
+    packed, camera = wide()
+    frame = run_front(packed, camera)
+    full = front_memory(frame).lists
+    image = front_memory(frame, int(full.taken.min()) * 2 // 3).lists
+    rtl = front_rtl(packed, camera, chunks=image.chunks, seed=seed())
+    assert image.failed.all() and image.fetched.all() and rtl.error == 1 << ERRORS.index("out of list memory")
+    assert rtl.counters["spilled"] == image.spilled.sum() and rtl.counters["fetched"] == image.fetched.sum()
+    lines = np.unique(np.concatenate(image.writes))
+    assert np.array_equal(rtl.memory[lines], image.memory[lines]) and np.array_equal(rtl.counters["lines"], image.lines)
+    for writer in range(4):
+        spilled = np.unique(image.moves[writer][:, 1])
+        spilled = spilled[spilled >= 0]
+        assert np.array_equal(rtl.pointers.reshape(-1, 4, 16)[spilled, writer], image.pointers.reshape(-1, 4, 16)[spilled, writer])
+
+
+@pytest.mark.parametrize("channel", ["read", "write"])
+def test_errors_where_pointers_move(channel: str) -> None:
+    """A line of pointers that cannot be written, or only not be read back: the frame ends with a code, writes nothing outside of its regions, and the next one is
+    right."""
+    packed, camera = wide()
+    image = front_memory(run_front(packed, camera)).lists
+    regions = Regions.of(packed, camera, image.chunks)
+    line = int(next(get for _, _, get in image.moves[0] if get >= 0)) * 4
+    memory = MemoryOptions(**{"fail_reads" if channel == "read" else "fail": [(regions.pointers + 64 * line, 64)]}, mended=True)
+    rtl = front_rtl(packed, camera, chunks=image.chunks, memory=memory, frames=2, seed=seed())
+    code = 1 << ERRORS.index(f"a {channel} failed")
+    assert rtl.errors[0] & code and rtl.errors[1] == 0
+    if channel == "read":
+        assert rtl.errors[0] & ~(1 << LIST_ERROR) == code  # lists that begin anew may take more chunks
+    lines = np.unique(np.concatenate(image.writes))
+    assert np.array_equal(rtl.memory[lines], image.memory[lines]) and np.array_equal(rtl.pointers, image.pointers)
+    untouched(rtl, rtl.records.any(axis=1) | True, lines)
 
 
 def test_out_of_list_memory() -> None:

@@ -388,8 +388,8 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", (3 << 8) | 1)
-        self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=11, log2_beat=6, log2_lanes=5)
+        self.set("version", (3 << 8) | 2)
+        self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
         self.bus = CBus(*self.calls, 0x1234)
@@ -603,9 +603,9 @@ def test_probe(lib: ctypes.CDLL) -> None:
     assert chip.probe() == "OK"
     device = chip.device
     assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (3, 1, 1, 2, 2, 3, 32)
-    assert (device.lists, device.beat) == (2048, 64)
+    assert (device.lists, device.beat) == (16384, 64)
     assert device.started == 0xFFFF and not chip.writes
-    chip.set("version", 2)
+    chip.set("version", 3)
     assert chip.probe() == "DEVICE_VERSION"
     chip.set("id", 0xFFFFFFFF)
     assert chip.probe() == "DEVICE_ID"

@@ -61,11 +61,11 @@ def writer_lists(d) -> int:
     return writer_columns(cols) * -(-rows // 2)
 
 
-def legal(d, pointers: int) -> bool:
+def legal(d, lists: int) -> bool:
     """The rules of the header."""
     return (
         all(d[name] % 64 == 0 for name in ADDRESSES) and d["stride"] % 32 == 0 and 1 <= d["width"] <= 4096 and 1 <= d["height"] <= 4096
-        and d["mode"] <= max(CatMode) and d["clusters"] > 0 and writer_lists(d) <= pointers and d["stride"] >= stride_of(d)
+        and d["mode"] <= max(CatMode) and d["clusters"] > 0 and writer_lists(d) <= lists and d["stride"] >= stride_of(d)
     )
 
 
@@ -141,7 +141,7 @@ class ControlTest:
     def __init__(self, dut, speeds, share_illegal=0.3, share_error=0.3):
         self.dut, self.bench = dut, Bench(dut)
         self.rng = self.bench.rng
-        self.pointers = int(dut.Pointers.value)
+        self.lists = int(dut.Lists.value)
         assert len(dut.descriptor_i) == sum(bits for _, bits in DESCRIPTOR)
         assert len(dut.front_o) == sum(bits for _, bits in FRONT) and len(dut.rendering_o) == sum(bits for _, bits in RENDERING)
         front, rendering, copy, self.acknowledge, self.host = (self.draw(mean) for mean in speeds)
@@ -192,7 +192,7 @@ class ControlTest:
             d |= {"mode": rng.randint(0, max(CatMode)), "clusters": rng.choice([1, 1 << 23, rng.randint(1, (1 << 24) - 1)])}
             least = stride_of(d)
             d["stride"] = rng.choice([least, least + 32, rng.randint(least // 32, 4095) * 32])
-            if legal(d, self.pointers):
+            if legal(d, self.lists):
                 return d
 
     def broken(self) -> dict[str, int]:
@@ -209,14 +209,14 @@ class ControlTest:
         wide = d | {"height": 1, "stride": (1 << 17) - 32}
         out += [wide | {"width": w} for w in (4097, 4112, 8191)]
         out += [d | {"width": 1, "height": h, "stride": 4096} for h in (4097, 4112, 8191)]
-        return [x for x in out if not legal(x, self.pointers)]
+        return [x for x in out if not legal(x, self.lists)]
 
     def new_frame(self) -> Frame:
         rng = self.rng
         d = self.wanted.pop(0) if self.wanted else self.broken() if rng.random() < self.share_illegal else self.descriptor()
         errors = [rng.randint(1, 15) if rng.random() < self.share_error else 0, rng.randint(1, 7) if rng.random() < self.share_error else 0]
         self.number += 1
-        return Frame(self.number, d, *errors, legal(d, self.pointers))
+        return Frame(self.number, d, *errors, legal(d, self.lists))
 
     # ---- a cycle ----
 
@@ -419,21 +419,21 @@ async def illegal_alone(dut):
     assert all(f.error == DESCRIPTOR_ERROR for f in test.posted)
     base = d | {"stride": (1 << 17) - 32}
     side = [base | {"width": w, "height": h} for w, h in ((1, 1), (4096, 16), (16, 4096), (4096, 1), (33, 33))]
-    rows = next(r for r in range(min(128, test.pointers), 0, -1) if test.pointers % r == 0 and test.pointers // r <= 128)
-    exact = base | {"width": 32 * (test.pointers // rows), "height": 32 * rows}
+    rows = next(r for r in range(min(128, test.lists), 0, -1) if test.lists % r == 0 and test.lists // r <= 128)
+    exact = base | {"width": 32 * (test.lists // rows), "height": 32 * rows}
     more = [exact | {"height": exact["height"] + 1}, exact | {"width": exact["width"] + 1}]
-    assert writer_lists(exact) == test.pointers
+    assert writer_lists(exact) == test.lists
     sizes = [*side, exact, *(x for x in more if max(x["width"], x["height"]) <= 4096)]
     narrow = [x | {"rgba": rgba, "stride": stride_of(x | {"rgba": rgba}) - less} for x in (*side[:1], exact) for rgba in (0, 1) for less in (0, 32)]
     test.wanted = [*sizes, *narrow]
     before = len(test.posted)
     await test.run(len(test.wanted))
     errors = [f.error for f in test.posted[before:]]
-    assert errors == [0 if legal(f.d, test.pointers) else DESCRIPTOR_ERROR for f in test.posted[before:]] and {0, DESCRIPTOR_ERROR} == set(errors)
+    assert errors == [0 if legal(f.d, test.lists) else DESCRIPTOR_ERROR for f in test.posted[before:]] and {0, DESCRIPTOR_ERROR} == set(errors)
     largest = test.descriptor() | {"width": 4096, "height": 4096, "rgba": 1, "stride": 32768}
     test.wanted = [largest]
     await test.run(1)
-    assert test.posted[-1].legal == (test.pointers >= 16384)
+    assert test.posted[-1].legal == (test.lists >= 16384)
 
 
 @cocotb.test()

@@ -7,7 +7,7 @@ from cocotb.triggers import ReadOnly, RisingEdge
 from flicker_tb.bench import Bench
 
 # Words of flk_top_pkg.
-FRONT_WORDS, RENDERING_WORDS, RENDERING_AT, STAGE_AT, STAGE_WORDS, BANK = 32, 18, 32, 128, 128, 256
+FRONT_WORDS, RENDERING_WORDS, RENDERING_AT, STAGE_AT, STAGE_WORDS, BANK = 34, 18, 34, 128, 128, 256
 LATENCY = 1
 
 

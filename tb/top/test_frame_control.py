@@ -11,6 +11,6 @@ import pytest
 from flicker_tb.runner import build_and_test
 
 
-@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"Pointers": 16384})), {"Pointers": 30}], ids=str)
+@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"Lists": 2048})), {"Lists": 30}], ids=str)
 def test_frame_control(parameters: dict[str, int]) -> None:
     build_and_test("flk_frame_control", "cocotb_frame_control", parameters=parameters)

@@ -17,7 +17,7 @@ from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.front.setup import FrameSetup
-from ..golden.lists import ENTRY_BITS, pointer_lines
+from ..golden.lists import ENTRY_BITS, WRITERS
 from ..params import TILE, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
@@ -36,7 +36,7 @@ GATHER = 256  # lines that are written together
 
 @dataclass(frozen=True, eq=False)
 class Beats:
-    """What one purpose moves, in order. beat: int64 (B,), address / 64. due: float64 (B,), Gaussians that entered the front when it moves. write: else read."""
+    """What one purpose moves, in order; pointers have two, written and read. beat: int64 (B,), address / 64. due: float64 (B,), Gaussians that entered the front when it moves. write: else read."""
 
     name: str
     beat: np.ndarray
@@ -46,6 +46,14 @@ class Beats:
     @property
     def bytes(self) -> int:
         return len(self.beat) * BEAT
+
+
+def bytes_of(beats: Sequence[Beats]) -> dict[str, int]:
+    """By purpose."""
+    out: dict[str, int] = {}
+    for b in beats:
+        out[b.name] = out.get(b.name, 0) + b.bytes
+    return out
 
 
 def _ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
@@ -92,15 +100,26 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     last = np.concatenate([record[1:] != record[:-1], [True]]) if len(record) else np.zeros(0, np.bool_)
     out.append(Beats("records", record[last], place[last].astype(np.float64), True))
     entries = place[frame.entry_splat] if len(frame.entry_splat) else np.zeros(1)
+    lists = image.lists
     lines, when = [], []
-    for own in image.lists.writes:
+    # Of pointers: address, when, written or not.
+    moved: list[tuple[np.ndarray, np.ndarray, bool]] = []
+    for b, (own, moves, closed) in enumerate(zip(lists.writes, lists.moves, lists.closed)):
+        share = np.concatenate([np.arange(len(own)) + 0.5, moves[:, 0]]) / max(len(own), 1)
+        due = entries[np.minimum(share * len(entries), len(entries) - 1).astype(np.int64)].astype(np.float64)
         lines.append(regions.lists // BEAT + own)
-        when.append(entries[np.minimum((np.arange(len(own)) + 0.5) / max(len(own), 1) * len(entries), len(entries) - 1).astype(np.int64)])
+        when.append(due[: len(own)])
+        for column, write in ((1, True), (2, False)):
+            some = moves[:, column] >= 0
+            moved.append((WRITERS * moves[some, column] + b, due[len(own) :][some], write))
+        moved.append((WRITERS * closed + b, np.full(len(closed), np.inf), True))
     order = np.argsort(np.concatenate(when), kind="stable")
-    out.append(Beats("lists", np.concatenate(lines)[order], np.concatenate(when)[order].astype(np.float64), True))
-    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
-    pointers = regions.pointers // BEAT + np.arange(pointer_lines(cols, rows))
-    out.append(Beats("pointers", pointers, np.full(len(pointers), np.inf), True))
+    out.append(Beats("lists", np.concatenate(lines)[order], np.concatenate(when)[order], True))
+    for write in (True, False):
+        at, due = (np.concatenate([part[k] for part in moved if part[2] is write]) for k in range(2))
+        order = np.lexsort((at, due))
+        if write or len(at):
+            out.append(Beats("pointers", regions.pointers // BEAT + at[order], due[order], write))
     return out
 
 
@@ -297,20 +316,21 @@ class Preprocessing:
 
     @property
     def bytes(self) -> dict[str, int]:
-        return {b.name: b.bytes for b in self.beats}
+        return bytes_of(self.beats)
 
     def streams(self, config: DramConfig) -> list[Stream]:
         """The same as bursts of the DRAM."""
         step = BEAT // config.burst_bytes
         return [
-            Stream(b.name, _bursts(b.beat, step), np.full(len(b.beat) * step, WRITE if b.write else READ, np.int8), self.used[b.name]) for b in self.beats
+            Stream(b.name, _bursts(b.beat, step), np.full(len(b.beat) * step, WRITE if b.write else READ, np.int8), min(b.bytes, self.used[b.name]))
+            for b in self.beats
         ]
 
 
 def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, waiting: int = WAITING) -> Preprocessing:
     """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. waiting: survivors of a lane between front and entries."""
     beats = traffic(frame, image)
-    used = {b.name: b.bytes for b in beats}
+    used = bytes_of(beats)
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
     units = unit_cycles(frame, waiting)

@@ -19,7 +19,7 @@ from ..params import CHANNELS, CORES, Coords, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_scene
 from ..progress import Steps
 from ..scene.camera import Camera
-from ..sim.chip import ChipFrame, ChipSession, build, pointers_for
+from ..sim.chip import ChipFrame, ChipSession, build
 from ..sim.half import MemoryOptions
 from .constants import CLOCK_HZ
 from .dram import DramConfig
@@ -64,11 +64,9 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
     with steps.step("packing the scene"):
         packed = packed_scene(view, options.format)
     with steps.step("building the chip's simulator (once per configuration)"):
-        build(config, pointers_for(camera))
+        build(config)
     dram = DramConfig()
-    with steps.bar("simulating the chip") as report, ChipSession(
-        packed, config, pointers=pointers_for(camera), memory=MemoryOptions(dram.timing),
-    ) as chip:
+    with steps.bar("simulating the chip") as report, ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
         seconds = time.process_time() - began

@@ -18,7 +18,7 @@ from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
-from ..golden.lists import writer_columns
+from ..golden.lists import HELD_POINTERS
 from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
@@ -40,8 +40,8 @@ STAMPS = [(counter.name.removeprefix("STAMP_").lower(), 1) for counter in ChipCo
 LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCounter if counter.name.startswith("LIVE_")]
 
 
-def build(config: RenderConfig, pointers: int = preprocessing.SMALL_POINTERS) -> Path:
-    """Shared library of the simulator, with the design's assertions; cached by content."""
+def build(config: RenderConfig, pointers: int = HELD_POINTERS) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content. pointers: of a list writer, held on the chip."""
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
         "flk_top", {**config.chip_parameters(), **config.chip_memories.front_parameters(), "Pointers": pointers}, settings, ["--inline-mult", "20000"],
@@ -99,7 +99,7 @@ class ChipSession(Half):
     """A chip with its memory, driven by sw/flk.c. Use as a context. FlickerError begins with "chip"."""
 
     def __init__(
-        self, packed: PackedScene, config: RenderConfig, *, pointers: int = preprocessing.SMALL_POINTERS, memory: MemoryOptions | None = None, seed: int = 1,
+        self, packed: PackedScene, config: RenderConfig, *, pointers: int = HELD_POINTERS, memory: MemoryOptions | None = None, seed: int = 1,
         image: bytes | None = None, port: PortConfig = PORT,
     ) -> None:
         super().__init__("chip", build(config, pointers), {"memory": port}, memory or MemoryOptions(), seed)
@@ -195,9 +195,9 @@ class ChipSession(Half):
         )
         return Place(region, self.allocate(lib.flk_frame_bytes(height, stride), "frame"), stride)
 
-    def fail(self, base: int, size: int) -> None:
-        """Bursts that touch a range are answered with an error from now on."""
-        self._lib.flk_half_fail(self._sim, base, size)
+    def fail(self, base: int, size: int, writes: bool = True) -> None:
+        """Bursts that touch a range, or reads alone, are answered with an error from now on."""
+        self._lib.flk_half_fail(self._sim, base, size, writes)
 
     def mend(self) -> None:
         """No range fails any more, and channels that had stopped go on."""
@@ -328,10 +328,3 @@ class ChipSession(Half):
     def purposes(self) -> dict[str, PurposeCounts]:
         """Traffic of all frames, by what lies there."""
         return self.traffic(PURPOSES)
-
-
-def pointers_for(camera: Camera) -> int:
-    """Lists of a list writer that a chip must have for a picture."""
-    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
-    own = writer_columns(cols) * -(-rows // 2)
-    return preprocessing.SMALL_POINTERS if own <= preprocessing.SMALL_POINTERS else preprocessing.LARGE_POINTERS

@@ -27,9 +27,9 @@ constexpr int PORTS = 1;
 #define FLK_WRITERS(X) X(2, )
 constexpr int PORTS = 3;
 #else
-#define FLK_READERS(X) X(0, table_) X(1, geometry_) X(2, colour_)
-#define FLK_WRITERS(X) X(3, )
-constexpr int PORTS = 4;
+#define FLK_READERS(X) X(0, table_) X(1, geometry_) X(2, colour_) X(3, pointer_)
+#define FLK_WRITERS(X) X(3, pointer_) X(4, )
+constexpr int PORTS = 5;
 #endif
 
 struct Sim {
@@ -177,8 +177,8 @@ int flk_half_read(Sim* sim, uint64_t base, uint64_t size, uint8_t* bytes) {
   return 1;
 }
 
-void flk_half_fail(Sim* sim, uint64_t base, uint64_t size) {
-  for (auto& port : sim->ports) port->fail_range(base, size, true, true, flk::SLVERR);
+void flk_half_fail(Sim* sim, uint64_t base, uint64_t size, int writes) {
+  for (auto& port : sim->ports) port->fail_range(base, size, true, writes != 0, flk::SLVERR);
 }
 
 void flk_half_mend(Sim* sim) {

@@ -24,12 +24,13 @@ Fields = Sequence[tuple[int, int]]  # value and width, the highest first
 
 @dataclass(frozen=True)
 class MemoryOptions:
-    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name. fail: (first byte, bytes) that answer with an error; mended: no longer in
-    the last frame."""
+    """timing: of the DRAM; None: a perfect memory. ports: options of a port by name. fail: (first byte, bytes) that answer with an error; fail_reads: reads
+    alone; mended: no longer in the last frame."""
 
     timing: Timing | None = None
     ports: Mapping[str, PortConfig] = field(default_factory=dict)
     fail: Sequence[tuple[int, int]] = ()
+    fail_reads: Sequence[tuple[int, int]] = ()
     mended: bool = False
 
 
@@ -60,7 +61,7 @@ def _library(path: Path) -> ctypes.CDLL:
         ("delete", None, pointer),
         ("load", ctypes.c_int, pointer, u64, u64, pointer, u64, ctypes.c_uint32),
         ("read", ctypes.c_int, pointer, u64, u64, pointer),
-        ("fail", None, pointer, u64, u64),
+        ("fail", None, pointer, u64, u64, ctypes.c_int),
         ("mend", None, pointer),
         ("given", ctypes.c_int, pointer, ctypes.c_int, pointer, ctypes.c_int),
         ("efficiency", ctypes.c_double, pointer),
@@ -119,8 +120,9 @@ class Half:
         counters: name, width, how many; the highest first. Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a
         rule of AXI is broken.
         """
-        for base, size in self.memory.fail:
-            self._lib.flk_half_fail(self._sim, base, size)
+        for ranges, writes in ((self.memory.fail, True), (self.memory.fail_reads, False)):
+            for base, size in ranges:
+                self._lib.flk_half_fail(self._sim, base, size, writes)
         word = 0
         for value, width in registers:
             assert 0 <= value < 1 << width

@@ -17,7 +17,7 @@ from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
-from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
+from ..golden.lists import CHUNK_LINES, HELD_POINTERS, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -25,11 +25,10 @@ from . import half
 from .half import BEAT, PAGE, Fields, Half, MemoryOptions
 from .memory import PortConfig, PurposeCounts
 
-PORTS = ("table", "geometry", "colour", "write")
+PORTS = ("table", "geometry", "colour", "pointer", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
 LIST_ERROR = 3  # bit of the last
-SMALL_POINTERS, LARGE_POINTERS = 2048, 16384  # lists of a writer: pictures up to 1080p, up to 4096x4096
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
 COUNTERS = (
@@ -38,6 +37,7 @@ COUNTERS = (
         "geometry_beats", "colour_beats", "record_beats",
     )),
     ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("key_shift", 8, 1), ("key_low", 9 + FORMATS.position, 1),
+    ("spilled", 32, 1), ("fetched", 32, 1),
 )
 
 
@@ -120,8 +120,8 @@ class RtlFront:
         return int(self.counters["cycles"])
 
 
-def build(pointers: int = SMALL_POINTERS, kind: RecordKind = RecordKind.FACTORED16) -> Path:
-    """Shared library of the simulator, with the design's assertions; cached by content.
+def build(kind: RecordKind = RecordKind.FACTORED16, pointers: int = HELD_POINTERS) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content. pointers: of a list writer, held on the chip.
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
@@ -138,6 +138,7 @@ def front_rtl(
     *,
     kind: RecordKind = RecordKind.FACTORED16,
     chunks: int,
+    pointers: int = HELD_POINTERS,
     memory: MemoryOptions | None = None,
     regions: Regions | None = None,
     image: bytes | None = None,
@@ -147,15 +148,12 @@ def front_rtl(
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
-    kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
+    kind: of the records, pointers: of a list writer, held on the chip, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
     many times; what the last leaves counts.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
-    cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
-    own = writer_columns(cols) * -(-rows // 2)
-    library = build(SMALL_POINTERS if own <= SMALL_POINTERS else LARGE_POINTERS, kind)
-    with Half("front end", library, dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+    with Half("front end", build(kind, pointers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         data = image or packed.image()
         at = regions.image
         sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
