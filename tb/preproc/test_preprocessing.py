@@ -216,8 +216,8 @@ def test_pointers_beyond_those_held(memory: MemoryOptions) -> None:
 
 
 def test_the_largest_picture() -> None:
-    """4096x4096 tiles, of a scene that is listed everywhere."""
-    packed, camera = wide(300, size=(4096, 4096))
+    """4096x4096 pixels, of a scene that is listed everywhere."""
+    packed, camera = wide(150, size=(4096, 4096))
     golden, rtl = check(packed, camera)
     assert len(golden.entry_tile) > 20_000 and rtl.counters["spilled"] > 1000 and rtl.counters["fetched"] > 500
 
@@ -226,7 +226,7 @@ def test_out_of_list_memory_after_pointers_have_moved() -> None:
     packed, camera = wide()
     frame = run_front(packed, camera)
     full = front_memory(frame).lists
-    image = front_memory(frame, int(full.taken.min()) * 2 // 3).lists
+    image = front_memory(frame, int(full.taken.min()) - 20).lists
     rtl = front_rtl(packed, camera, chunks=image.chunks, seed=seed())
     assert image.failed.all() and image.fetched.all() and rtl.error == 1 << ERRORS.index("out of list memory")
     assert rtl.counters["spilled"] == image.spilled.sum() and rtl.counters["fetched"] == image.fetched.sum()
@@ -254,7 +254,6 @@ def test_errors_where_pointers_move(channel: str) -> None:
         assert rtl.errors[0] & ~(1 << LIST_ERROR) == code  # lists that begin anew may take more chunks
     lines = np.unique(np.concatenate(image.writes))
     assert np.array_equal(rtl.memory[lines], image.memory[lines]) and np.array_equal(rtl.pointers, image.pointers)
-    untouched(rtl, rtl.records.any(axis=1) | True, lines)
 
 
 def test_out_of_list_memory() -> None:

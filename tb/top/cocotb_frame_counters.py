@@ -154,7 +154,7 @@ async def clears(dut):
     test = CountersTest(dut)
     dut.clear_i.value = 0
     await test.bench.reset()
-    for _ in range(30):
+    for _ in range(40):
         for side in (test.front, test.rendering):
             if test.rng.random() < 0.7:
                 side.ask(test.rng, test.now)
