@@ -169,7 +169,8 @@ module flk_pointer_port #(
           if (data_ready) begin
             data_q <= 1'b0;
           end
-          if (put_done) begin
+          // An answer without the data having gone: the port is being drained, a reset follows.
+          if (put_done && !data_q) begin
             state_q <= get_q ? TURN : GIVE;
           end
         end

@@ -20,7 +20,7 @@ from flicker_tb.runner import seed
 
 from flicker import params
 from flicker.chip.dram import DramConfig
-from flicker.chip_registers import ResultError
+from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
@@ -28,6 +28,7 @@ from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
+from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
 from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig
@@ -39,7 +40,7 @@ from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.chip import PORT, ChipFrame, ChipSession
 from flicker.sim.half import MemoryOptions
-from flicker.sim.memory import CHANNELS, Order, PortConfig, WriteOrder
+from flicker.sim.memory import CHANNELS, Order, PortConfig, PurposeCounts, WriteOrder
 
 LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
 CONFIG = RenderConfig(stage="lanes")
@@ -135,12 +136,78 @@ def test_demo_scene(config: RenderConfig) -> None:
         assert traffic["table"].read_bytes and traffic["records"].write_bytes and not any(t.errors for t in traffic.values())
         assert traffic["image header"].read_beats == 0
         assert done.usage is not None
-        live = done.usage.live
-        assert live["record_beats"] == done.rendering["lines"]
-        assert live["record_beats"] == traffic["records"].read_beats and live["table_beats"] == traffic["table"].read_beats
-        assert live["list_beats"] == traffic["lists"].read_beats + traffic["pointers"].read_beats
-        assert live["frame_written"] == traffic["frame"].write_beats
-        assert live["front_written"] == sum(traffic[name].write_beats for name in ("records", "lists", "pointers"))
+        live_beats(done, traffic)
+        assert not done.front["spilled"] and not done.usage.live["pointer_beats"] and not done.usage.live["pointer_written"]
+
+
+def live_beats(done: ChipFrame, traffic: dict[str, PurposeCounts]) -> None:
+    """What the port counted of a frame, and what the memory did."""
+    assert done.usage is not None
+    live = done.usage.live
+    assert live["record_beats"] == done.rendering["lines"]
+    assert live["record_beats"] == traffic["records"].read_beats and live["table_beats"] == traffic["table"].read_beats
+    assert live["list_beats"] + live["pointer_beats"] == traffic["lists"].read_beats + traffic["pointers"].read_beats
+    assert live["frame_written"] == traffic["frame"].write_beats
+    assert live["front_written"] + live["pointer_written"] == sum(traffic[name].write_beats for name in ("records", "lists", "pointers"))
+    assert (live["pointer_written"], live["pointer_beats"]) == (done.front["spilled"], done.front["fetched"])
+
+
+def large() -> Camera:
+    """A picture with more lists than pointers are held."""
+    return Camera(2080, 1440, 900.0, 900.0, np.zeros(3), np.eye(3))
+
+
+def test_pointers_beyond_those_held() -> None:
+    """A picture above 1080p, then one below it: lines of pointers go to memory and come back; all is counted."""
+    with session() as chip:
+        done = check(chip, large())
+        front, _ = golden(chip.packed, large())
+        lists = front_memory(front).lists
+        assert done.front["spilled"] == lists.spilled.sum() > 50 and done.front["fetched"] == lists.fetched.sum() > 20
+        live_beats(done, chip.purposes())
+        check(chip, camera())
+
+
+def test_pointers_that_cannot_be_read_back() -> None:
+    """An error of the front end, which ends; mended, the next frame is right."""
+    with session() as chip:
+        view = large()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=3)
+        chip.fail(frame.region.pointers, chip.driver.flk_pointer_bytes(view.width, view.height), writes=False)
+        chip.start(frame)
+        done = chip.finish(frame, LIMIT)
+        assert done.error & ~(1 << ResultError.LIST_MEMORY) == 1 << ResultError.FRONT_READ, done.errors
+        chip.mend()
+        check(chip, camera())
+
+
+def test_abort_while_pointers_move() -> None:
+    """At any time of a move, with pauses; the frame after it is right."""
+    rng = random.Random(f"{seed()} moves")
+    port = replace(PORT, stall={name: 0.3 for name in CHANNELS}, seed=seed())
+    with session(port=port) as chip:
+        view = large()
+        frame = chip.frame(view, chip.place(view), background=BLUE, tag=1)
+        for _ in range(8):
+            before = chip.usage().live
+            chip.start(frame)
+            for _ in range(10_000):
+                chip.step(20)
+                if chip.counter(ChipCounter.LIVE_POINTER_WRITTEN) - before["pointer_written"] > 3:
+                    break
+            else:
+                raise AssertionError("no pointers move")
+            chip.step(rng.randrange(200))
+            assert chip.field("status", "front_busy")
+            chip.driver.flk_abort(ctypes.byref(chip.device))
+            for _ in range(1000):
+                if not chip.field("status", "aborting"):
+                    break
+                chip.step(10)
+            assert chip.quiet and chip.field("interrupt", "aborted") and chip.field("status", "ready")
+            chip.set_register("interrupt", 31)
+        check(chip, camera())
+        check(chip, view)
 
 
 @pytest.mark.parametrize("number", range(5))
