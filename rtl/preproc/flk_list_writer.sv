@@ -474,7 +474,7 @@ module flk_list_writer #(
 
   assign look_list  = hold_q ? d_list_q : ListBits'(step_q);
   assign look_tag   = TagBits'(look_list >> $clog2(Pointers));
-  assign look_place = PlacesBits'(look_list >> PerLineBits);
+  assign look_place = Places > 1 ? PlacesBits'(look_list >> PerLineBits) : '0;
   assign here       = place_read.held && place_read.tag == look_tag;
   assign placing    = hold_q && look_q == COMPARE && !here && !failed_q;
   assign skip       = state_q == POINTERS && look_q == COMPARE && !here &&
