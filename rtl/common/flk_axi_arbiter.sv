@@ -18,8 +18,8 @@
 // Latency of addresses 1 and of read beats 1; write data 1, answers 0. Combinational: hold_i and valid of all managers
 // to their ar_ready_o, aw_ready_o; hold_i and w_ready_i to w_ready_o; b_* through. All else depends on registers alone.
 module flk_axi_arbiter #(
-  parameter  int unsigned Readers   = 5,
-  parameter  int unsigned Writers   = 2,
+  parameter  int unsigned Readers   = 6,
+  parameter  int unsigned Writers   = 3,
   parameter  int unsigned AddrBits  = 40,
   parameter  int unsigned Width     = 512,
   parameter  int unsigned IdBits    = 4,     // of a manager

@@ -6,7 +6,7 @@
 // end of a request nothing is under way. One of in_put_i and in_get_i is 1 at least.
 // For the writer that is served: index_o and read_o ask for a pointer, which is in_pointer_i in the
 // next cycle; index_o, write_o and pointer_o are one for it; done_o, with the last of these, ends its
-// request. A put takes 17 cycles and the memory's answer, a get 2 and the memory's answer, both 17 more.
+// request. A put takes 17 cycles and a write, a get 2 and a read; then 16 pointers go to the writer.
 // Line n of writer b is line base_i + 4 n + b of memory; base_i stays for the frame.
 // Errors of the memory are kept until start_i, which comes while nothing is asked for. After one,
 // zeros stand for what is read: what comes of it are lists of the writer's own chunks, in any case.

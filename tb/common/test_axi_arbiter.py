@@ -2,7 +2,7 @@
 
 A model of choice, order, drain and watch is compared in every cycle. State space: random requests of every manager with several identifiers, bursts of 1 to
 16 beats, narrow reads; memory perfect, LPDDR4 and of another project (cocotbext-axi), every order of answers, of addresses and data, pauses of every channel;
-drains at random times; each channel that stops. Parameter space: 2 to 5 readers, 2 and 3 writers, 64 to 512 bits, little patience, few orders
+drains at random times; each channel that stops. Parameter space: 2 to 6 readers, 2 and 3 writers, 64 to 512 bits, little patience, few orders
 (numbers other than the defaults and the chip's with SLOW=1). Not covered: 4095 bursts under way.
 """
 
@@ -13,7 +13,7 @@ from flicker_tb.runner import build, build_and_test, refused
 
 
 @pytest.mark.parametrize("parameters", [
-    {"Width": 64}, pytest.param({"Readers": 2, "Writers": 3, "Width": 128, "IdBits": 2, "AddrBits": 32, "Patience": 2, "Orders": 2}, marks=pytest.mark.slow),
+    {"Width": 64, "Readers": 5, "Writers": 2}, pytest.param({"Readers": 2, "Writers": 3, "Width": 128, "IdBits": 2, "AddrBits": 32, "Patience": 2, "Orders": 2}, marks=pytest.mark.slow),
 ], ids=str)
 def test_axi_arbiter(parameters: dict[str, int]) -> None:
     build_and_test("flk_axi_arbiter", "cocotb_axi_arbiter", parameters=parameters)
