@@ -10,7 +10,7 @@
 // Line n of writer b is line base_i + 4 n + b of memory; base_i stays for the frame.
 // Errors of the memory are kept until start_i, which comes while nothing is asked for. After one,
 // zeros stand for what is read: what comes of it are lists of the writer's own chunks, in any case.
-// Combinational: in_valid_i to in_ready_o, memory's ready to the next state; outputs from registers.
+// Combinational: in_valid_i to in_ready_o; all else depends on registers alone.
 module flk_pointer_port #(
   parameter  int unsigned Writers     = 4,
   parameter  int unsigned NumberBits  = 10,  // of a line
