@@ -1,10 +1,17 @@
 // flk_list_writer: of every frame that memory suffices for, each entry taken is written exactly once;
 // otherwise at most once. Lines go to chunks that were taken, of this writer; pointers to its lines of
-// the table. Numbers of chunks taken never exceed what there is.
+// the table. Numbers of chunks taken never exceed what there is. At the end of a frame that memory
+// suffices for, the table has every list's pointer, and each of its lines was written at most
+// once at the end.
+//
+// With two pointers on the chip for four lists (Pointers 2), lines of pointers move to the table and
+// back, by an agent of any speed.
 //
 // One entry of a frame, whichever pick_i chooses, has bit 0 set; the proof counts the places where it
 // is. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
-module fv_list_writer (
+module fv_list_writer #(
+  parameter int unsigned Pointers = 4
+) (
   input logic       clk_i,
   input logic       again_i,
   input logic       pick_i,
@@ -18,8 +25,12 @@ module fv_list_writer (
   input logic       in_u_i,
   input logic       in_v_i,
   input logic       in_value_i,
-  input logic       out_ready_i
+  input logic       out_ready_i,
+  input logic       mover_ready_i,
+  input logic       mover_step_i
 );
+
+  localparam bit Large = Pointers == 2;
 
   localparam logic [2:0] CLEAR = 3'd0;
   localparam logic [2:0] IDLE = 3'd1;
@@ -28,6 +39,13 @@ module fv_list_writer (
   localparam logic [2:0] DRAIN = 3'd4;
   localparam logic [2:0] POINTERS = 3'd5;
   localparam logic [2:0] LAST = 3'd6;
+  // Of look_q.
+  localparam logic [2:0] LOOK = 3'd0;
+  localparam logic [2:0] COMPARE = 3'd1;
+  localparam logic [2:0] ASK = 3'd2;
+  localparam logic [2:0] MOVE = 3'd3;
+  localparam logic [2:0] AGAIN = 3'd4;
+  localparam logic [2:0] WALK = 3'd5;
 
   logic        rst_n, idle, done, failed, in_ready, out_valid, tag;
   logic [2:0]  taken;
@@ -45,7 +63,8 @@ module fv_list_writer (
     .SetBitsU   (1),
     .SetBitsV   (0),
     .Ways       (2),
-    .Pointers   (4),
+    .Pointers   (Pointers),
+    .Lists      (4),
     .CoordBits  (1),
     .ChunkLines (2),
     .ChunkBits  (2),
@@ -80,16 +99,120 @@ module fv_list_writer (
     .out_valid_o    (out_valid),
     .out_ready_i,
     .out_address_o  (out_address),
-    .out_data_o     (out_data)
+    .out_data_o     (out_data),
+    .move_valid_o   (move_valid),
+    .move_ready_i   (move_ready),
+    .move_put_o     (move_put),
+    .move_put_line_o(move_put_line),
+    .move_get_o     (move_get),
+    .move_get_line_o(move_get_line),
+    .move_index_i   (mover_q[0]),
+    .move_read_i    (move_read),
+    .move_pointer_o (move_from),
+    .move_write_i   (move_write),
+    .move_pointer_i (move_to),
+    .move_done_i    (move_done)
   );
+
+  // Who moves lines of pointers, and the table.
+
+  typedef enum logic [1:0] {STANDS, READS, WRITES} mover_e;
+
+  mover_e          mover_state_q;
+  logic [1:0]      mover_q;          // pointers asked for, or given
+  logic            came_q;           // the one asked for last comes
+  logic            put_q, put_line_q, get_q, get_line_q, spilled_q, fetched_q;
+  logic [3:0][3:0] table_q;
+  logic [1:0]      written_q;        // lines, at the end
+  logic [3:0][3:0] due_q;            // each list's pointer
+  logic            move_valid, move_ready, move_put, move_put_line, move_get, move_get_line;
+  logic            move_read, move_write, move_done, out_pointers, out_line;
+  logic [3:0]      move_from, move_to;
+
+  assign move_ready = mover_state_q == STANDS && mover_ready_i;
+  assign move_read  = mover_state_q == READS && mover_step_i && !mover_q[1];
+  assign move_write = mover_state_q == WRITES && mover_step_i;
+  assign move_done  = move_write && mover_q[0];
+  assign move_to    = get_q ? table_q[{get_line_q, mover_q[0]}] : 4'd0;
+
+  assign out_pointers = out_valid && (state == POINTERS || state == LAST);
+  assign out_line     = pointer_at[2];
+
+  always_ff @(posedge clk_i or negedge rst_n) begin
+    if (!rst_n) begin
+      mover_state_q <= STANDS;
+      mover_q       <= 2'd0;
+      came_q        <= 1'b0;
+    end else begin
+      came_q <= move_read;
+      case (mover_state_q)
+        STANDS: begin
+          mover_q <= 2'd0;
+          if (move_valid && move_ready) begin
+            mover_state_q <= move_put ? READS : WRITES;
+          end
+        end
+        READS: begin
+          if (move_read) begin
+            mover_q <= mover_q + 2'd1;
+          end
+          if (mover_q[1] && !came_q) begin
+            mover_state_q <= WRITES;
+            mover_q       <= 2'd0;
+          end
+        end
+        default: begin
+          if (move_write) begin
+            mover_q <= mover_q + 2'd1;
+          end
+          if (move_done) begin
+            mover_state_q <= STANDS;
+          end
+        end
+      endcase
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (move_valid && move_ready) begin
+      put_q      <= move_put;
+      put_line_q <= move_put_line;
+      get_q      <= move_get;
+      get_line_q <= move_get_line;
+    end
+    if (came_q) begin
+      table_q[{put_line_q, mover_q[1]}] <= move_from;  // 1 or 2 were asked for
+    end
+    if (out_pointers && out_ready_i) begin
+      table_q[{out_line, 1'b0}] <= out_data[3:0];
+      table_q[{out_line, 1'b1}] <= out_data[11:8];
+    end
+    if (start_i && idle) begin
+      due_q     <= '0;
+      written_q <= '0;
+      spilled_q <= 1'b0;
+      fetched_q <= 1'b0;
+    end else begin
+      if (dut.pointer_write) begin
+        due_q[dut.d_list_q] <= dut.pointer_d;
+      end
+      if (out_pointers && out_ready_i) begin
+        written_q[out_line] <= 1'b1;
+      end
+      if (move_done) begin
+        spilled_q <= spilled_q || put_q;
+        fetched_q <= fetched_q || get_q;
+      end
+    end
+  end
 
   // What is held where. Places are set and way.
 
   logic [3:0][1:0]      count;   // entries of the open line
   logic [3:0][1:0]      list;
   logic [3:0][1:0]      stored;  // bit 0 of the entries in memory, by place and column
-  logic [3:0][1:0]      pointer_used;
-  logic [3:0][1:0]      pointer_chunk;
+  logic [3:0][3:0]      kept;    // the pointers on the chip
+  logic [3:0][3:0]      value;   // of each list, wherever it is
   logic [2:0]           state;
 
   assign state = dut.state_q;
@@ -103,8 +226,53 @@ module fv_list_writer (
   for (genvar p = 0; p < 4; p++) begin : gen_place
     assign stored[p] = {dut.gen_columns[1].i_column.storage_q[p][0],
                         dut.gen_columns[0].i_column.storage_q[p][0]};
-    assign pointer_used[p]  = dut.i_pointers.storage_q[p][3:2];
-    assign pointer_chunk[p] = dut.i_pointers.storage_q[p][1:0];
+    assign kept[p] = dut.i_pointers.storage_q[p % Pointers];
+  end
+
+  // The place of the two lines of pointers, as it is, and as it was before a line moves.
+  logic       held, tag_held, was_held, was_tag, line, moves;
+  logic [1:0] in_table, was_in_table, gone;
+
+  if (Large) begin : gen_place
+    assign {in_table, held, tag_held}       = dut.i_places.storage_q[0];
+    assign {was_in_table, was_held, was_tag} = dut.place_read;
+  end else begin : gen_places
+    assign {in_table, held, tag_held, was_in_table, was_held, was_tag} = '0;
+  end
+
+  assign line  = dut.d_list_q[1];  // that comes
+  assign moves = Large && dut.hold_q && (dut.look_q == ASK || dut.look_q == MOVE);
+  assign gone  = mover_state_q == READS ? mover_q - 2'(came_q) : mover_state_q == WRITES ? 2'd2 : 2'd0;
+
+  for (genvar p = 0; p < 4; p++) begin : gen_value
+    localparam bit Of = p / 2;
+    localparam bit At = p % 2;
+    always_comb begin
+      if (!Large) begin
+        value[p] = kept[p];
+      end else if (moves && line == Of) begin
+        value[p] = mover_state_q == WRITES && 2'(At) < mover_q ? kept[At]
+                 : was_in_table[Of] ? table_q[p] : 4'd0;
+      end else if (moves && was_held) begin
+        value[p] = 2'(At) < gone ? table_q[p] : kept[At];
+      end else if (!moves && held && tag_held == Of) begin
+        value[p] = kept[At];
+      end else begin
+        value[p] = in_table[Of] ? table_q[p] : 4'd0;
+      end
+    end
+  end
+
+  // Lists whose pointers are in stage E and, last, in the output register.
+  logic [1:0] e_list_q;
+  logic [3:0] walked;
+
+  assign walked = dut.walk_blank_q ? 4'd0 : dut.pointer;
+
+  always_ff @(posedge clk_i) begin
+    if (dut.advance) begin
+      e_list_q <= dut.walk_list_q;
+    end
   end
 
   // Bit 0 of column c of the line in place p, as stage D finds it, and as it will be.
@@ -191,6 +359,10 @@ module fv_list_writer (
       if (out_list) begin
         a_chunk: assert (3'(list_at >> 3) < taken && list_at[2:1] == dut.writer_q);
       end
+      a_table: assert (!(done && !failed) || table_q == due_q);
+      if (out_pointers) begin
+        a_once_more: assert (!written_q[out_line]);
+      end
       if (out_valid && !out_list) begin
         a_pointer: assert (pointer_at[1:0] == dut.writer_q && pointer_at[5:2] < 4'd2 && !failed);
       end
@@ -198,14 +370,86 @@ module fv_list_writer (
       // The chosen entry is in one place.
       l_sum: assert (state == CLEAR || 4'(delivered_q) + places <= 4'(picked_q));
       l_kept: assert (failed || 4'(delivered_q) + places == 4'(picked_q) || idle || state == CLEAR);
-      l_done: assert (!done || idle);
-      l_fresh: assert (state != CLEAR || (delivered_q == 2'd0 && !picked_q && taken == 3'd0 && !failed));
+      l_done: assert (!done || idle || Large && state == CLEAR);
+      l_fresh: assert (state != CLEAR || Large || (delivered_q == 2'd0 && !picked_q && taken == 3'd0 && !failed));
+      l_fresh_large: assert (state != CLEAR || delivered_q <= 2'(picked_q));
 
       // States.
       l_state: assert (state <= LAST);
       l_step: assert (dut.step_q <= 3'd4 && (state != OPEN_LINES || dut.step_q < 3'd4) &&
                       (state != POINTERS || dut.step_q < 3'd4) &&
-                      (state != CLEAR || dut.step_q < 3'd4));
+                      (state != CLEAR || dut.step_q < 3'(Pointers)));
+      l_size: assert (state == CLEAR || state == IDLE || dut.large_q == Large);
+
+      // Moves.
+      l_hold: assert (!dut.hold_q || (Large && dut.d_event_q &&
+                      (state == ENTRIES || state == OPEN_LINES || state == DRAIN)));
+      l_look: assert (dut.look_q == LOOK || (dut.hold_q ? dut.look_q <= AGAIN :
+                      Large && state == POINTERS && (dut.look_q == COMPARE || dut.look_q == WALK)));
+      l_mover: assert ((mover_state_q != STANDS) == (dut.hold_q && dut.look_q == MOVE));
+      l_moves: assert (mover_q <= 2'd2 && (mover_state_q != WRITES || mover_q <= 2'd1) &&
+                       mover_state_q <= WRITES && (mover_state_q != READS || put_q));
+      if (mover_state_q != STANDS) begin
+        l_request: assert (put_q == was_held && (!put_q || put_line_q == was_tag) &&
+                           get_q == was_in_table[line] && get_line_q == line);
+      end
+      l_came: assert (!came_q || (mover_state_q == READS && mover_q != 2'd0 &&
+                                  dut.pointer == kept[mover_q - 2'd1]));
+      if (Large && moves) begin
+        l_place: assert (held && tag_held == line && !dut.failed_q &&
+                         in_table == (was_in_table | (2'(was_held) << was_tag)) &&
+                         (was_held ? was_tag != line : was_in_table[line]));
+      end
+      if (Large && dut.hold_q && dut.look_q == COMPARE) begin
+        l_compare: assert ({was_in_table, was_held, was_tag} == {in_table, held, tag_held});
+      end
+      if (Large && dut.hold_q && dut.look_q == AGAIN) begin
+        l_again: assert (held && tag_held == line);
+      end
+      if (Large && dut.hold_q && dut.look_q <= COMPARE) begin
+        l_found: assert (held ? tag_held != line || dut.pointer == kept[{1'b0, dut.d_list_q[0]}]
+                              : dut.pointer == 4'd0);
+      end
+      if (Large && state != CLEAR && !held) begin
+        l_unused: assert (kept[0] == 4'd0 && kept[1] == 4'd0 && in_table == 2'd0);
+      end
+      if (Large && state == IDLE) begin
+        l_idle_place: assert (!held);
+      end
+      if (!Large && state != CLEAR) begin
+        l_no_place: assert (dut.i_places.storage_q[0] == '0 && dut.i_places.storage_q[1] == '0);
+      end
+
+      // The pointers at the end.
+      if (state == POINTERS && Large && dut.look_q == COMPARE) begin
+        l_compare_walk: assert ({was_in_table, was_held, was_tag} == {in_table, held, tag_held});
+      end
+      if (Large && state == POINTERS) begin
+        l_step_walk: assert (dut.look_q == WALK || !dut.step_q[0]);
+        if (dut.look_q == WALK) begin
+          l_kind: assert (dut.blank_q ? !(held && tag_held == dut.step_q[1]) && !in_table[dut.step_q[1]]
+                                      : held && tag_held == dut.step_q[1]);
+        end
+      end
+      l_blank: assert (!dut.blank_q || (Large && state == POINTERS || state == LAST));
+      if (dut.walk_q) begin
+        l_walk_value: assert (walked == due_q[dut.walk_list_q]);
+        l_walk_pair: assert (!dut.walk_list_q[0] || (dut.e_walk_q && e_list_q == {dut.walk_list_q[1], 1'b0}));
+        l_walk_last_is: assert (dut.walk_last_q == dut.walk_list_q[0]);
+      end
+      if (dut.e_walk_q) begin
+        l_e_value: assert (dut.e_pointer_q == due_q[e_list_q]);
+        l_e_last: assert (failed || dut.e_walk_last_q == e_list_q[0]);
+        l_e_at: assert (dut.e_at_q == {3'd0, e_list_q[1], dut.writer_q});
+        l_e_pair: assert (!e_list_q[0] || out_data[11:8] == due_q[{e_list_q[1], 1'b0}]);
+      end
+      if (state == POINTERS && dut.step_q[0]) begin
+        l_step_pair: assert (dut.walk_q && 3'(dut.walk_list_q) + 3'd1 == dut.step_q);
+      end
+      if (out_pointers) begin
+        l_out_value: assert (out_data[3:0] == due_q[{out_line, 1'b0}] &&
+                             out_data[11:8] == due_q[{out_line, 1'b1}]);
+      end
       l_lines: assert (state == CLEAR || state == IDLE || dut.pointer_lines_q == 2'd2 && dut.columns_q == 2'd2);
       if (state == CLEAR || state == IDLE || state == POINTERS || state == LAST) begin
         l_empty: assert (!dut.a_valid_q && !dut.b_valid_q && !dut.d_entry_q && !dut.d_event_q &&
@@ -223,11 +467,14 @@ module fv_list_writer (
       if (state == ENTRIES || state == OPEN_LINES || state == DRAIN) begin
         l_base: assert (dut.base_q == list_base_q);
       end
-      if (dut.walk_q || dut.e_walk_q || state == LAST) begin
+      if (dut.walk_q || dut.e_walk_q || (!Large && state == LAST)) begin
         l_base_then: assert (dut.base_q == dut.pointer_base_q);
       end
-      if (dut.walk_q) begin
+      if (dut.walk_q && !Large) begin
         l_walked: assert (state == POINTERS ? 3'(dut.walk_list_q) + 3'd1 == dut.step_q : dut.walk_list_q == 2'd3);
+      end
+      if (dut.walk_q && state == POINTERS) begin
+        l_walked_before: assert (3'(dut.walk_list_q) < dut.step_q);
       end
       l_flush: assert (!dut.a_valid_q || (dut.a_flush_q ? state == OPEN_LINES || state == DRAIN : state == ENTRIES));
       l_flush_b: assert (!(dut.b_valid_q && dut.b_flush_q) || state == OPEN_LINES || state == DRAIN);
@@ -255,8 +502,10 @@ module fv_list_writer (
       end
       if (dut.d_event_q) begin
         l_lists: assert (!(dut.b_valid_q && dut.c_event) || dut.c_list != dut.d_list_q);
-        l_pointer: assert (dut.pointer.used <= 2'd2 && (dut.pointer.used == 2'd0 || 3'(dut.pointer.chunk) < taken));
-        l_pointer_is: assert (dut.pointer == {pointer_used[dut.d_list_q], pointer_chunk[dut.d_list_q]});
+        if (!dut.hold_q && !dut.failed_q) begin
+          l_pointer_is: assert (dut.pointer == value[dut.d_list_q] &&
+                                (!Large || (held && tag_held == line)));
+        end
       end
       if (dut.e_entry_q) begin
         l_column_e: assert (dut.e_column_q == 2'(dut.e_event_q && dut.e_full_q));
@@ -270,6 +519,7 @@ module fv_list_writer (
       end
 
       c_written: cover (done && picked_q && !failed && taken == 3'd2);
+      c_moved: cover (!Large || (done && !failed && spilled_q && fetched_q));
       c_failed: cover (done && failed && delivered_q == 2'd1);
     end
   end
@@ -279,19 +529,38 @@ module fv_list_writer (
       if (rst_n) begin
         if (state == CLEAR) begin
           l_clear: assert (dut.step_q <= 3'(p >> 1) || count[p] == 2'd0);
-          l_clear_pointer: assert (dut.step_q <= 3'(p) || pointer_used[p] == 2'd0);
+          l_clear_pointer: assert (dut.step_q <= 3'(p) || kept[p] == 4'd0);
         end else begin
           l_count: assert (count[p] <= 2'd1);
           l_list: assert (count[p] == 2'd0 || list[p][0] == 1'(p >> 1));
           l_open: assert (count[p] == 2'd0 || state == ENTRIES || pending(2'(p)) ||
                           (state == OPEN_LINES && dut.step_q == 3'd0));
           l_gone: assert (!dut.d_event_q || count[p] == 2'd0 || list[p] != dut.d_list_q);
-          l_used: assert (pointer_used[p] <= 2'd2);
-          l_inside: assert (pointer_used[p] == 2'd0 || 3'(pointer_chunk[p]) < taken);
-          l_zero: assert (
-              !(state == IDLE || (state == LAST && !(dut.walk_q && dut.walk_list_q == 2'(p))) ||
-                (state == POINTERS && dut.step_q > 3'(p) &&
-                 !(dut.walk_q && dut.walk_list_q == 2'(p)))) || pointer_used[p] == 2'd0);
+          if (state != IDLE) begin
+            l_used: assert (due_q[p][3:2] <= 2'd2);
+            l_inside: assert (due_q[p] == 4'd0 || (due_q[p][3:2] != 2'd0 && 3'(due_q[p][1:0]) < taken));
+          end
+          if (state == IDLE || (!Large && (state == LAST || (state == POINTERS && dut.step_q > 3'(p))) &&
+                                !(dut.walk_q && dut.walk_list_q == 2'(p)))) begin
+            l_zero: assert (kept[p] == 4'd0);
+          end else begin
+            l_value: assert (value[p] == due_q[p]);
+          end
+          if (!failed && (state == LAST || (state == POINTERS && (dut.step_q >> 1) > 3'(p / 2)))) begin
+            l_settled: assert (table_q[p] == due_q[p] ||
+                (dut.walk_q && dut.walk_list_q == {1'(p / 2), 1'b1}) ||
+                (dut.e_walk_q && e_list_q == {1'(p / 2), 1'b1}) ||
+                (out_pointers && out_line == 1'(p / 2)));
+          end
+          if (state == ENTRIES || state == OPEN_LINES || state == DRAIN) begin
+            l_unwritten: assert (written_q == 2'd0);
+          end
+          // A line that is still to be written.
+          if ((state == POINTERS && (dut.step_q >> 1) <= 3'(p / 2)) ||
+              (dut.walk_q && dut.walk_list_q[1] == 1'(p / 2)) ||
+              (dut.e_walk_q && e_list_q[1] == 1'(p / 2)) || (out_pointers && out_line == 1'(p / 2))) begin
+            l_once_more: assert (!written_q[p / 2]);
+          end
         end
       end
     end
