@@ -2,7 +2,7 @@
 // otherwise at most once. Lines go to chunks that were taken, of this writer; pointers to its lines of
 // the table. Numbers of chunks taken never exceed what there is. At the end of a frame that memory
 // suffices for, the table has every list's pointer, and each of its lines was written at most
-// once at the end.
+// once at the end. Each line goes behind the line of its list that went before.
 //
 // With two pointers on the chip for four lists (Pointers 2), lines of pointers move to the table and
 // back, by an agent of any speed.
@@ -53,7 +53,22 @@ module fv_list_writer #(
   logic [15:0] out_data;
   logic        picked_q;
   logic [1:0]  delivered_q;
-  logic [5:0]  list_base_q;
+  logic [5:0]  list_base_q, list_at, pointer_at;
+  logic [2:0]  state;
+
+  // Who moves lines of pointers, and the table.
+  typedef enum logic [1:0] {STANDS, READS, WRITES} mover_e;
+
+  mover_e          mover_state_q;
+  logic [1:0]      mover_q;          // pointers asked for, or given
+  logic            came_q;           // the one asked for last comes
+  logic            put_q, put_line_q, get_q, get_line_q, spilled_q, fetched_q;
+  logic [3:0][3:0] table_q;
+  logic [1:0]      written_q;        // lines, at the end
+  logic [3:0][3:0] due_q;            // each list's pointer
+  logic            move_valid, move_ready, move_put, move_put_line, move_get, move_get_line;
+  logic            move_read, move_write, move_done, out_pointers, out_line;
+  logic [3:0]      move_from, move_to;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -113,21 +128,6 @@ module fv_list_writer #(
     .move_pointer_i (move_to),
     .move_done_i    (move_done)
   );
-
-  // Who moves lines of pointers, and the table.
-
-  typedef enum logic [1:0] {STANDS, READS, WRITES} mover_e;
-
-  mover_e          mover_state_q;
-  logic [1:0]      mover_q;          // pointers asked for, or given
-  logic            came_q;           // the one asked for last comes
-  logic            put_q, put_line_q, get_q, get_line_q, spilled_q, fetched_q;
-  logic [3:0][3:0] table_q;
-  logic [1:0]      written_q;        // lines, at the end
-  logic [3:0][3:0] due_q;            // each list's pointer
-  logic            move_valid, move_ready, move_put, move_put_line, move_get, move_get_line;
-  logic            move_read, move_write, move_done, out_pointers, out_line;
-  logic [3:0]      move_from, move_to;
 
   assign move_ready = mover_state_q == STANDS && mover_ready_i;
   assign move_read  = mover_state_q == READS && mover_step_i && !mover_q[1];
@@ -213,7 +213,6 @@ module fv_list_writer #(
   logic [3:0][1:0]      stored;  // bit 0 of the entries in memory, by place and column
   logic [3:0][3:0]      kept;    // the pointers on the chip
   logic [3:0][3:0]      value;   // of each list, wherever it is
-  logic [2:0]           state;
 
   assign state = dut.state_q;
 
@@ -233,10 +232,10 @@ module fv_list_writer #(
   logic       held, tag_held, was_held, was_tag, line, moves;
   logic [1:0] in_table, was_in_table, gone;
 
-  if (Large) begin : gen_place
+  if (Large) begin : gen_store
     assign {in_table, held, tag_held}       = dut.i_places.storage_q[0];
     assign {was_in_table, was_held, was_tag} = dut.place_read;
-  end else begin : gen_places
+  end else begin : gen_no_store
     assign {in_table, held, tag_held, was_in_table, was_held, was_tag} = '0;
   end
 
@@ -338,8 +337,6 @@ module fv_list_writer #(
     end
   end
 
-  logic [5:0] list_at, pointer_at;
-
   assign list_at    = out_address - list_base_q;
   assign pointer_at = out_address - dut.pointer_base_q;
 
@@ -359,6 +356,7 @@ module fv_list_writer #(
       if (out_list) begin
         a_chunk: assert (3'(list_at >> 3) < taken && list_at[2:1] == dut.writer_q);
       end
+      a_behind: assert (!dut.pointer_write || dut.pointer == due_q[dut.d_list_q]);
       a_table: assert (!(done && !failed) || table_q == due_q);
       if (out_pointers) begin
         a_once_more: assert (!written_q[out_line]);
@@ -416,8 +414,12 @@ module fv_list_writer #(
       if (Large && state == IDLE) begin
         l_idle_place: assert (!held);
       end
+      if (state == CLEAR) begin
+        l_clear_place: assert (dut.step_q == 3'd0 || dut.i_places.storage_q[0] == '0);
+        l_clear_place_1: assert (Large || dut.step_q <= 3'd1 || dut.i_places.storage_q[Large ? 0 : 1] == '0);
+      end
       if (!Large && state != CLEAR) begin
-        l_no_place: assert (dut.i_places.storage_q[0] == '0 && dut.i_places.storage_q[1] == '0);
+        l_no_place: assert (dut.i_places.storage_q[0] == '0 && dut.i_places.storage_q[Large ? 0 : 1] == '0);
       end
 
       // The pointers at the end.
@@ -445,6 +447,15 @@ module fv_list_writer #(
       end
       if (state == POINTERS && dut.step_q[0]) begin
         l_step_pair: assert (dut.walk_q && 3'(dut.walk_list_q) + 3'd1 == dut.step_q);
+      end
+      // In order.
+      if (out_pointers) begin
+        l_order_out: assert ((state == LAST || 3'(out_line) < (dut.step_q >> 1)) &&
+                             !(dut.walk_q && dut.walk_list_q[1] <= out_line) &&
+                             !(dut.e_walk_q && e_list_q[1] <= out_line));
+      end
+      if (dut.e_walk_q) begin
+        l_order_e: assert ((state == LAST || 3'(e_list_q) < dut.step_q) && !(dut.walk_q && dut.walk_list_q <= e_list_q));
       end
       if (out_pointers) begin
         l_out_value: assert (out_data[3:0] == due_q[{out_line, 1'b0}] &&
@@ -519,7 +530,7 @@ module fv_list_writer #(
       end
 
       c_written: cover (done && picked_q && !failed && taken == 3'd2);
-      c_moved: cover (!Large || (done && !failed && spilled_q && fetched_q));
+      c_moved: cover (!Large || (!failed && spilled_q && fetched_q));
       c_failed: cover (done && failed && delivered_q == 2'd1);
     end
   end

@@ -384,7 +384,7 @@ module flk_preprocessing
   // ---- survivors: numbers and places ----------------------------------------------------------------
 
   logic [LANES-1:0]                  lane_near, lane_outside, lane_ready, alive;
-  logic [LANES-1:0][2:0] ahead;   // survivors of the group in lanes before this one
+  logic [LANES-1:0][1:0] ahead;   // survivors of the group in lanes before this one
   logic [2:0]                        count;
   logic [SEQ_BITS-1:0]               issued_q;
   logic [8:0]                        rank_q;  // survivors of the cluster so far
@@ -412,7 +412,7 @@ module flk_preprocessing
   always_comb begin
     count = '0;
     for (int unsigned k = 0; k < LANES; k++) begin
-      ahead[k] = count;
+      ahead[k] = 2'(count);
       count     = count + 3'(alive[k]);
     end
   end
@@ -426,10 +426,19 @@ module flk_preprocessing
   place_t [LANES-1:0]                places;
   logic [LANES-1:0][SEQ_BITS-1:0]    seqs;
 
+  // first + rank / 16, and one more.
+  logic [NUMBER_BITS-5:0] high_number, more_number;
+  logic                   unused_carry;
+
+  assign high_number                 = of.first + (NUMBER_BITS - 4)'(rank_q[8:4]);
+  assign {more_number, unused_carry} = {of.first, 1'b1} + {(NUMBER_BITS - 4)'(rank_q[8:4]), 1'b1};
+
   for (genvar k = 0; k < LANES; k++) begin : gen_numbers
     logic [2:0] at;
+    logic [4:0] low_number;
     assign at                = 3'(rank_q[InBeatBits-1:0]) + 3'(k);
-    assign numbers[k]        = {of.first, 4'b0} + NUMBER_BITS'(rank_q) + NUMBER_BITS'(k);
+    assign low_number        = 5'(rank_q[3:0]) + 5'(k);
+    assign numbers[k]        = {low_number[4] ? more_number : high_number, low_number[3:0]};
     assign places[k].beat    = ring_q + PLACE_BEAT_BITS'(at >> InBeatBits);
     assign places[k].quarter = 2'(at[InBeatBits-1:0]) << (Quarters - 1);
     assign seqs[k]           = issued_q + SEQ_BITS'(k);
@@ -437,16 +446,9 @@ module flk_preprocessing
 
   always_comb begin
     for (int unsigned k = 0; k < LANES; k++) begin
-      number[k] = numbers[0];
-      place[k]  = places[0];
-      seq[k]    = seqs[0];
-      for (int unsigned n = 1; n <= k; n++) begin
-        if (ahead[k] == 3'(n)) begin
-          number[k] = numbers[n];
-          place[k]  = places[n];
-          seq[k]    = seqs[n];
-        end
-      end
+      number[k] = numbers[ahead[k]];
+      place[k]  = places[ahead[k]];
+      seq[k]    = seqs[ahead[k]];
     end
   end
 
