@@ -438,7 +438,7 @@ async def stops(dut, channel, timeout):
     test = WithMemory(dut, "never", timeout=NEVER, latency=4, stop_after={channel: 6})
     (test.make_reads if reads else test.make_writes)(20)
     await test.bench.reset()
-    await test.bench.cycles(100)
+    await test.bench.cycles(400)  # more than the others' at most 20 x 16 beats
     assert test.still > 0 and not test.stuck
     # The same again, with the time-out set from the start.
     await restart(test, {"stop_after": {channel: 6}, "latency": 1})

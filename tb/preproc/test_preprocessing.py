@@ -240,8 +240,8 @@ def test_out_of_list_memory_after_pointers_have_moved() -> None:
 
 @pytest.mark.parametrize("channel", ["read", "write"])
 def test_errors_where_pointers_move(channel: str) -> None:
-    """A line of pointers that cannot be written, or only not be read back: the frame ends with a code, writes nothing outside of its regions, and the next one is
-    right."""
+    """A line of pointers that cannot be written, or only not be read back: the frame ends with a code, writes nothing outside of its regions, and the next
+    one is right."""
     packed, camera = wide()
     image = front_memory(run_front(packed, camera)).lists
     regions = Regions.of(packed, camera, image.chunks)

@@ -88,7 +88,8 @@ def test_counters_are_the_description() -> None:
     }
     assert {name: numbers[name] for name in bases} == {name: int(base) for name, base in bases.items()}
     ends = {
-        "FRONT_WORDS": ChipCounter.POINTERS_FETCHED - ChipCounter.FRONT_CYCLES, "RENDERING_WORDS": ChipCounter.STAMP_RENDERING_DONE - ChipCounter.RENDERING_CYCLES,
+        "FRONT_WORDS": ChipCounter.POINTERS_FETCHED - ChipCounter.FRONT_CYCLES,
+        "RENDERING_WORDS": ChipCounter.STAMP_RENDERING_DONE - ChipCounter.RENDERING_CYCLES,
         "LIVE_WORDS": ChipCounter.LIVE_DATA_WAITS - ChipCounter.LIVE_CYCLES,
     }
     assert {name: numbers[name] for name in ends} == {name: last + 1 for name, last in ends.items()}

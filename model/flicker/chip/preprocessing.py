@@ -36,7 +36,8 @@ GATHER = 256  # lines that are written together
 
 @dataclass(frozen=True, eq=False)
 class Beats:
-    """What one purpose moves, in order; pointers have two, written and read. beat: int64 (B,), address / 64. due: float64 (B,), Gaussians that entered the front when it moves. write: else read."""
+    """What one purpose moves, in order; pointers have two, written and read. beat: int64 (B,), address / 64. due: float64 (B,), Gaussians that entered the
+    front when it moves. write: else read."""
 
     name: str
     beat: np.ndarray

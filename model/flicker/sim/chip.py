@@ -18,7 +18,6 @@ from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
-from ..golden.lists import HELD_POINTERS
 from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
@@ -40,11 +39,11 @@ STAMPS = [(counter.name.removeprefix("STAMP_").lower(), 1) for counter in ChipCo
 LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCounter if counter.name.startswith("LIVE_")]
 
 
-def build(config: RenderConfig, pointers: int = HELD_POINTERS) -> Path:
-    """Shared library of the simulator, with the design's assertions; cached by content. pointers: of a list writer, held on the chip."""
+def build(config: RenderConfig) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content."""
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
-        "flk_top", {**config.chip_parameters(), **config.chip_memories.front_parameters(), "Pointers": pointers}, settings, ["--inline-mult", "20000"],
+        "flk_top", {**config.chip_parameters(), **config.chip_memories.front_parameters()}, settings, ["--inline-mult", "20000"],
         define="-DFLK_CHIP",
     )
 
@@ -99,10 +98,10 @@ class ChipSession(Half):
     """A chip with its memory, driven by sw/flk.c. Use as a context. FlickerError begins with "chip"."""
 
     def __init__(
-        self, packed: PackedScene, config: RenderConfig, *, pointers: int = HELD_POINTERS, memory: MemoryOptions | None = None, seed: int = 1,
+        self, packed: PackedScene, config: RenderConfig, *, memory: MemoryOptions | None = None, seed: int = 1,
         image: bytes | None = None, port: PortConfig = PORT,
     ) -> None:
-        super().__init__("chip", build(config, pointers), {"memory": port}, memory or MemoryOptions(), seed)
+        super().__init__("chip", build(config), {"memory": port}, memory or MemoryOptions(), seed)
         lib = self._lib
         lib.flk_chip_register.argtypes = [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_int, ctypes.c_void_p]
         lib.flk_chip_wait.argtypes = [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int]

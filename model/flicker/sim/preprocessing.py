@@ -17,7 +17,7 @@ from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
-from ..golden.lists import CHUNK_LINES, HELD_POINTERS, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
+from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -120,12 +120,12 @@ class RtlFront:
         return int(self.counters["cycles"])
 
 
-def build(kind: RecordKind = RecordKind.FACTORED16, pointers: int = HELD_POINTERS) -> Path:
-    """Shared library of the simulator, with the design's assertions; cached by content. pointers: of a list writer, held on the chip.
+def build(kind: RecordKind = RecordKind.FACTORED16) -> Path:
+    """Shared library of the simulator, with the design's assertions; cached by content.
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
-    return half.build("flk_preprocessing", {"Form": int(kind.form), "Pointers": pointers}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
+    return half.build("flk_preprocessing", {"Form": int(kind.form)}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -138,7 +138,6 @@ def front_rtl(
     *,
     kind: RecordKind = RecordKind.FACTORED16,
     chunks: int,
-    pointers: int = HELD_POINTERS,
     memory: MemoryOptions | None = None,
     regions: Regions | None = None,
     image: bytes | None = None,
@@ -148,12 +147,12 @@ def front_rtl(
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
-    kind: of the records, pointers: of a list writer, held on the chip, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
+    kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
     many times; what the last leaves counts.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
-    with Half("front end", build(kind, pointers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+    with Half("front end", build(kind), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         data = image or packed.image()
         at = regions.image
         sizes = [HEADER_BYTES, *map(len, packed.sections().values())]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...params import TILE
-from ..lists import HELD_POINTERS, ListImage, write_lists
+from ..lists import ListImage, write_lists
 from .frame import FrontFrame
 
 SLOTS_PER_STEP = 16  # the slots of a cluster begin at a multiple of it, and so do its records
@@ -22,12 +22,12 @@ class FrontImage:
     lists: ListImage
 
 
-def front_memory(frame: FrontFrame, chunks: int | None = None, held: int = HELD_POINTERS) -> FrontImage:
-    """Memory after a frame. chunks: that each list writer may take; None: as many as the busiest one takes. held: pointers of a writer on the chip."""
+def front_memory(frame: FrontFrame, chunks: int | None = None) -> FrontImage:
+    """Memory after a frame. chunks: that each list writer may take; None: as many as the busiest one takes."""
     slots = int(frame.packed.first[-1]) + -(-int(frame.packed.counts[-1]) // SLOTS_PER_STEP) * SLOTS_PER_STEP
     records, written = np.zeros((slots, frame.kind.bytes), np.uint8), np.zeros(slots, np.bool_)
     records[frame.number] = frame.records
     written[frame.number] = True
     cols, rows = (-(-n // TILE) for n in (frame.camera.width, frame.camera.height))
-    lists = write_lists(frame.entry_splat, frame.entry_tile, frame.entry_mask, frame.key, frame.number, cols, rows, chunks, held)
+    lists = write_lists(frame.entry_splat, frame.entry_tile, frame.entry_mask, frame.key, frame.number, cols, rows, chunks)
     return FrontImage(records, written, lists)
