@@ -103,7 +103,7 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     entries = place[frame.entry_splat] if len(frame.entry_splat) else np.zeros(1)
     lists = image.lists
     lines, when = [], []
-    # Of pointers: address, when, written or not.
+    # Of pointers: lines, when, written or not.
     moved: list[tuple[np.ndarray, np.ndarray, bool]] = []
     for b, (own, moves, closed) in enumerate(zip(lists.writes, lists.moves, lists.closed)):
         share = np.concatenate([np.arange(len(own)) + 0.5, moves[:, 0]]) / max(len(own), 1)
@@ -117,10 +117,11 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     order = np.argsort(np.concatenate(when), kind="stable")
     out.append(Beats("lists", np.concatenate(lines)[order], np.concatenate(when)[order], True))
     for write in (True, False):
-        at, due = (np.concatenate([part[k] for part in moved if part[2] is write]) for k in range(2))
-        order = np.lexsort((at, due))
-        if write or len(at):
-            out.append(Beats("pointers", regions.pointers // BEAT + at[order], due[order], write))
+        pointers = np.concatenate([line for line, _, written in moved if written is write])
+        due = np.concatenate([at for _, at, written in moved if written is write])
+        order = np.lexsort((pointers, due))
+        if write or len(pointers):
+            out.append(Beats("pointers", regions.pointers // BEAT + pointers[order], due[order], write))
     return out
 
 
