@@ -10,7 +10,7 @@ from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
 from flicker.golden.lists import entry_words, pointer_lines, write_lists
 
-LIST_BASE, POINTER_BASE = 0x2_1234_5600, 0x1_0000_0077
+LIST_BASE, POINTER_BASE = 0x2_12FF_FFC0, 0x1_0000_0077  # lists: lines from 64 on carry through all parts of an address
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "alternate")]
 
 
