@@ -1,6 +1,7 @@
 """`make docs PART=chip_hardware`: frames of the verilated chip beside the chip model's halves, in docs/chip.md.
 
-With SLOW=1 flowers at 1280x720 too. An error: a frame buffer that differs from the golden model's; cycles of a frame that are more than 10 % off.
+With SLOW=1 flowers at 1280x720 too, with both kinds of refresh. An error: a frame buffer that differs from the golden model's; cycles of a
+frame that are more than 10 % off.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from flicker.chip import preprocessing, rendering
-from flicker.chip.dram import DramConfig
+from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import whole_frame
 from flicker.errors import FlickerError
@@ -65,20 +66,23 @@ def back_to_back(
     return done
 
 
-def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, str]]:
-    """Title, scene, view, size, chunks of a list writer, build."""
+def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, str, Refresh]]:
+    """Title, scene, view, size, chunks of a list writer, build, the memory's refresh."""
     at = [(f"{DEMO} 0", DEMO, 0), *((v.title, v.path(folder_of_scenes()), v.number) for v in REAL_VIEWS if v.folder in VIEWS)]
     flowers = next(v for v in REAL_VIEWS if v.folder == "flowers")
     whole = (f"{flowers.title}, 1280x720", flowers.path(folder_of_scenes()), flowers.number, None, FLOWERS_CHUNKS, "default")
-    return [*((*place, SIZE, CHUNKS, name) for name, place in product(BUILDS, at)), *([whole] if os.environ.get("SLOW") == "1" else [])]
+    return [
+        *((*place, SIZE, CHUNKS, name, Refresh.ALL_BANKS) for name, place in product(BUILDS, at)),
+        *((*whole, refresh) for refresh in (Refresh.ALL_BANKS, Refresh.PER_BANK) if os.environ.get("SLOW") == "1"),
+    ]
 
 
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
-    dram = DramConfig()
-    for place, path, number, size, chunks, name in _places():
+    for place, path, number, size, chunks, name, refresh in _places():
         config, format_, lists = BUILDS[name]
-        title = f"{place}, {name}"
+        dram = DramConfig(refresh=refresh)
+        title = f"{place}, {name}" + ("" if refresh == Refresh.ALL_BANKS else f", refresh {refresh}")
         view = load_view(path, number, size)
         camera = view.camera
         say(f"{title}: building the simulator")

@@ -216,7 +216,7 @@ def test_memories(number: int) -> None:
     rng = random.Random(f"{seed()} {number}")
     port = replace(
         PORT, seed=rng.getrandbits(30), latency=rng.randint(1, 60), max_reads=rng.choice([2, 9, 256]), max_writes=rng.choice([1, 5, 128]),
-        order=list(Order)[number % 3], write_order=list(WriteOrder)[number % 3],
+        order=list(Order)[number % 4], urgent=rng.choice([0, 14, 16]), write_order=list(WriteOrder)[number % 3],
         stall={name: rng.choice([0.0, 0.3, 0.7]) for name in CHANNELS}, run={name: rng.randint(1, 8) for name in CHANNELS},
     )
     with session(port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:

@@ -19,7 +19,7 @@ from flicker import markdown
 from flicker.chip import constants
 from flicker.chip.compare import estimate
 from flicker.chip.cull import cull
-from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Stream, interleave, port_config, simulate
+from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Refresh, Stream, interleave, port_config, simulate
 from flicker.chip.execute import run_scheme
 from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
@@ -90,7 +90,7 @@ def test_cluster_bounds_hold_their_members():
 
 # ---- DRAM --------------------------------------------------------------------------------------
 
-ONE = DramConfig(channels=1, refresh=False)
+ONE = DramConfig(channels=1, refresh=Refresh.NONE)
 PAGE = ONE.page_bytes // ONE.burst_bytes
 BANK = PAGE * ONE.banks  # bursts between rows of a bank
 
@@ -127,14 +127,38 @@ def test_dram_closed_forms():
 
 
 def test_dram_refresh_and_channels():
-    d = replace(ONE, refresh=True)
+    d = replace(ONE, refresh=Refresh.ALL_BANKS)
     n = 40 * PAGE
     r = simulate(np.arange(n), config=d)
     lost = r.clocks - simulate(np.arange(n), config=ONE).clocks
     assert r.refreshes == r.clocks // d.trefi
     assert r.refreshes * d.trfc <= lost <= r.refreshes * (d.trfc + d.trp_all + d.trcd + d.tras)
-    full = DramConfig(refresh=False)
+    full = DramConfig(refresh=Refresh.NONE)
     assert simulate(np.arange(8 * n), config=full).clocks == simulate(np.arange(n), config=ONE).clocks
+
+
+def test_dram_refresh_of_banks():
+    """A bank that all reads are of is the last of its round, and stops them for tRFCpb; where others have work, the bus hardly waits."""
+    d = replace(ONE, refresh=Refresh.PER_BANK)
+    n = 20_000
+    r = simulate(np.zeros(n, np.int64), config=d)
+    stop = d.trtp + d.trp + d.trfc_bank + d.trcd - d.tccd  # the row is closed, and opened behind the refresh
+    column, rounds = d.trcd, 0
+    for _ in range(n - 1):
+        column += d.tccd
+        if column >= (rounds + 1) * d.banks * (d.trefi // d.banks):
+            column += stop
+            rounds += 1
+    assert rounds > 20 and r.clocks == column + d.rl + d.burst_clocks
+    assert r.activates == 1 + rounds and r.refreshes == column // (d.trefi // d.banks)
+    stream = np.arange(40 * PAGE)
+    free, all_banks, per_bank = (simulate(stream, config=replace(d, refresh=refresh)) for refresh in Refresh)
+    assert per_bank.clocks - free.clocks < (all_banks.clocks - free.clocks) / 4
+    assert per_bank.refreshes == (per_bank.clocks - d.rl - d.burst_clocks) // (d.trefi // d.banks)
+    spread = np.arange(4000) * PAGE  # every activate takes a place in tRRD's order, and so does every refresh
+    limit = simulate(spread, config=ONE)
+    slowed = simulate(spread, config=d)
+    assert slowed.clocks >= limit.clocks + (slowed.refreshes - 1) * min(d.trrd, d.tfaw // 4)
 
 
 def test_dram_bounds():
@@ -165,7 +189,7 @@ def dram_streams() -> dict[str, tuple[np.ndarray, np.ndarray | int, DramConfig]]
         "all kinds": (some, kinds, DramConfig()),
         "masked writes": (some, MASKED_WRITE, DramConfig(window=8)),
         "one channel": (some, kinds, ONE),
-        "refresh": (rows_of_bank(400), READ, replace(ONE, refresh=True)),
+        "refresh": (rows_of_bank(400), READ, replace(ONE, refresh=Refresh.ALL_BANKS)),
         "narrow window": (runs, READ, DramConfig(window=1)),
         "four banks": (some, kinds, DramConfig(banks=4, interleave_bytes=256, tfaw=100)),
     }
@@ -193,8 +217,11 @@ def test_dram_results_are_kept():
 
 def test_dram_as_time_goes_on():
     """Bursts that all come at clock 0 take as long as in a list; what comes later has its data in bounds, and the bus carries one burst at a time."""
-    for name, (burst, kind, config) in dram_streams().items():
+    streams = dram_streams()
+    streams["refresh of banks"] = (streams["all kinds"][0], streams["all kinds"][1], DramConfig(channels=1, refresh=Refresh.PER_BANK))
+    for name, (burst, kind, config) in streams.items():
         kinds = np.broadcast_to(kind, burst.shape)
+        r = simulate(burst, kind, config)
         dram = Dram(config.timing)
         numbers = [dram.push(0, int(b) * config.burst_bytes, int(k)) for b, k in zip(burst, kinds)]
         for clock in range(0, 100_000, 997):
@@ -202,11 +229,11 @@ def test_dram_as_time_goes_on():
             assert all(done is None or done < clock + config.rl + config.burst_clocks for done in map(dram.done, numbers[::100]))
         dram.advance(1 << 40)
         counts = dram.counts()
-        assert (counts.clocks, counts.activates, counts.refreshes) == DRAM_RESULTS[name], name
+        assert (counts.clocks, counts.activates, counts.refreshes) == (r.clocks, r.activates, r.refreshes), name
         assert max(map(dram.done, numbers)) == counts.clocks
 
     rng = np.random.default_rng(seed())
-    d = replace(ONE, refresh=True)
+    d = replace(ONE, refresh=Refresh.ALL_BANKS)
     first = d.trcd + d.rl + d.burst_clocks
     for gap in (4, 40, 400):
         dram, clock, pushed = Dram(d.timing), 0, []
@@ -360,7 +387,7 @@ def test_command(tmp_path):
     for config, memory, has in (("faithful", "chunk", False), ("faithful", "fp16", True), ("gscore", "chunk", True), ("lanes", "chunk", False)):
         done = CliRunner().invoke(app, ["chip", str(path), "--size", "64x48", "--config", config, "--memory", memory])
         assert done.exit_code == 0 and ("exists as RTL" in done.output) == has, done.output
-    for wrong, text in ((["--scheme", "x"], "--scheme"), (["--memory", "x"], "--memory"), (["--view", "9"], "view 9")):
+    for wrong, text in ((["--scheme", "x"], "--scheme"), (["--memory", "x"], "--memory"), (["--refresh", "x"], "--refresh"), (["--view", "9"], "view 9")):
         failed = CliRunner().invoke(app, ["chip", str(path), *wrong])
         assert isinstance(failed.exception, FlickerError) and text in str(failed.exception)
 

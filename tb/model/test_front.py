@@ -375,6 +375,7 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--front", "golden", "--coords", "absolute"], "coords absolute: for --front float only"),
     (["--front", "rtl", "--stage", "lanes", "--form", "conic"], "--stage lanes: takes records of 16 bytes"),
     (["--engine", "chip-golden", "--memories", "small"], "--memories: for --engine chip only"),
+    (["--engine", "rtl", "--refresh", "per-bank"], "--refresh: for --engine chip only"),
     (["--engine", "chip", "--stage", "lanes", "--faithful"], "--stage lanes: takes records of 16 bytes"),
 ])
 def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ class Burst:
     addr: int
     beats: int
     id: int = 0
+    qos: int = 0
     data: list[tuple[bytes, int]] = field(default_factory=list)
     got: list[tuple[bytes, int]] = field(default_factory=list)
     resp: int | None = None
@@ -70,6 +71,7 @@ class Manager:
             if not channel.valid and queue and yes():
                 b = queue[0]
                 channel.valid, channel.addr, channel.len, channel.id, channel.size, channel.burst = 1, b.addr, b.beats - 1, b.id, self.size, INCR
+                channel.qos = b.qos
         if not q.w_valid and self.w and yes():
             data, q.w_strb, q.w_last = self.w[0]
             for k in range(self.width // 4):
@@ -130,6 +132,8 @@ def memory(perfect: bool = True, **options) -> tuple[Memory, Port]:
 CASES = [
     (512, True, Order.BY_ID, WriteOrder.ANY, {}),
     (512, False, Order.IN_ORDER, WriteOrder.ADDRESS_FIRST, {}),
+    (512, False, Order.WHOLE, WriteOrder.ANY, {}),
+    (64, True, Order.WHOLE, WriteOrder.ADDRESS_FIRST, {"R": 0.5, "B": 0.3}),
     (512, False, Order.BY_ID, WriteOrder.DATA_FIRST, {"AW": 0.5, "W": 0.5, "B": 0.5, "AR": 0.5, "R": 0.5}),
     (256, False, Order.INTERLEAVED, WriteOrder.ANY, {"R": 0.3, "W": 0.2}),
     (128, True, Order.INTERLEAVED, WriteOrder.DATA_FIRST, {"AW": 0.9, "W": 0.3}),
@@ -142,6 +146,7 @@ def test_random_bursts(bits, perfect, order, write_order, stall):
     """Against a dictionary of bytes; no burst overlaps another that is under way."""
     m, port = memory(
         perfect, data_bits=bits, id_bits=3, order=order, write_order=write_order, stall=stall, run={"R": 5}, latency=3, seed=seed(), max_reads=8, max_writes=5,
+        urgent=15,
     )
     manager = Manager(port, busy=0.7, number=bits)
     rng, width = manager.rng, bits // 8
@@ -175,7 +180,7 @@ def test_random_bursts(bits, perfect, order, write_order, stall):
             first = page + width * rng.randint(0, 4096 // width - beats)
             last = first + beats * width
             if all(last <= b.addr or b.addr + b.beats * width <= first for b, _ in active):
-                burst = Burst(first, beats, rng.randrange(8))
+                burst = Burst(first, beats, rng.randrange(8), rng.choice([0, 15]))
                 is_write = rng.random() < 0.5
                 if is_write:
                     strobes = [(1 << width) - 1, 0, rng.getrandbits(width)]
@@ -256,6 +261,48 @@ def test_dram_behind_a_port():
         fewer.read(Burst(1024 * k, 1))
     fewer.run()
     assert m.cycle - start > 70 * 100  # one after the other: latency, not rate
+
+
+def test_whole_bursts():
+    """WHOLE: no burst waits for the DRAM between its beats; BY_ID: some do. Both give what is there, the second sooner."""
+    gaps = {}
+    for order in (Order.BY_ID, Order.WHOLE):
+        m = Memory(TIMING)
+        m.allocate(0, 1 << 20)
+        manager = Manager(Port(m, port_config(order=order, max_reads=32)))
+        reads = [manager.read(Burst(32 * 1024 * k % (1 << 20) + 1024 * (k // 32), 16, id=k % 16)) for k in range(256)]
+        manager.run(100_000)
+        gaps[order] = [b.ended - b.first - 15 for b in reads]
+    assert not any(gaps[Order.WHOLE]) and sum(g > 0 for g in gaps[Order.BY_ID]) > 20
+
+
+@pytest.mark.parametrize("order", [Order.BY_ID, Order.WHOLE])
+def test_urgent_answers(order):
+    """What is urgent is answered before the rest, in any order among itself; a burst that has begun goes on."""
+    for urgent in (8, 16):
+        _, port = memory(order=order, urgent=urgent)
+        manager = Manager(port)
+        reads = [manager.read(Burst(BASE + 1024 * k, 16, id=k, qos=8 + k if k % 2 else 7)) for k in range(8)]
+        manager.run()
+        assert manager.order[0] is reads[0]
+        first = {id(b) for b in manager.order[1:5]}
+        assert (first == {id(b) for b in reads[1::2]}) == (urgent == 8)
+
+
+def test_urgent_bursts_pass_what_waits_for_the_dram():
+    """A read of each kind behind a crowd of others: the urgent one waits for a channel's queue, not for all that wait to get there."""
+    waits = {}
+    for kind, urgent, qos in (("alone", 8, 7), ("not urgent", 8, 7), ("urgent", 8, 8), ("urgency off", 16, 15)):
+        m = Memory(TIMING)
+        m.allocate(0, 1 << 22)
+        manager = Manager(Port(m, port_config(max_reads=256, urgent=urgent)))
+        crowd = [] if kind == "alone" else [manager.read(Burst(4096 * (7 * k % 1024), 16, id=0)) for k in range(200)]
+        manager.read(last := Burst((1 << 22) - 64, 1, id=1, qos=qos))
+        manager.run(100_000)
+        waits[kind] = last.ended - last.begun
+        assert m.counts().bursts == 32 * len(crowd) + 2
+    assert waits["urgent"] < waits["alone"] + TIMING.window * TIMING.half + 16 < waits["not urgent"] / 3
+    assert waits["urgency off"] == waits["not urgent"]
 
 
 # ---- answers with errors -----------------------------------------------------------------------
@@ -438,7 +485,7 @@ def test_last_is_checked():
 
 def test_waiting_channels_must_hold():
     for name in ("ar", "aw", "w"):
-        for field_name, value in (("valid", 0), ("addr", BASE + 64)) if name != "w" else (("valid", 0), ("last", 1), ("strb", 1), ("data", 5)):
+        for field_name, value in (("valid", 0), ("addr", BASE + 64), ("qos", 1)) if name != "w" else (("valid", 0), ("last", 1), ("strb", 1), ("data", 5)):
             _, port = memory(stop_after={name.upper(): 0})
             q = port.request
             where = q if name == "w" else getattr(q, name)

@@ -75,10 +75,10 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
-def chip_estimates(view: View, names: Sequence[str], memories: str = "default") -> dict[str, dict]:
+def chip_estimates(view: View, names: Sequence[str], memories: str = "default", dram: DramConfig | None = None) -> dict[str, dict]:
     """Cycles, bytes and the bottleneck of configurations in whole frames, by name; front ends by the form of the stage (`FRONTS`), lists of GSCore by oriented
     boxes. memories: `RenderConfig.memories`. FlickerError for one that the chip cannot have."""
-    dram, sizes = DramConfig(), CHIP_MEMORIES[memories]
+    dram, sizes = dram or DramConfig(), CHIP_MEMORIES[memories]
     fronts: dict[tuple[Form, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
     facts = {}
     for name in names:

@@ -31,6 +31,7 @@ DRAM_WL = 14
 DRAM_TDQSCK = 6
 DRAM_TREFI = 6246
 DRAM_TRFC = 448
+DRAM_TRFC_BANK = 224
 DRAM_INTERLEAVE_BYTES = 64
 DRAM_WINDOW = 32
 DRAM_BATCH_BURSTS = 256
@@ -108,6 +109,7 @@ SOURCES = {
     "DRAM_TDQSCK": _JEDEC,
     "DRAM_TREFI": _JEDEC,
     "DRAM_TRFC": _JEDEC + " (all banks, 280 ns)",
+    "DRAM_TRFC_BANK": _JEDEC + " (one bank, 140 ns)",
     "DRAM_INTERLEAVE_BYTES": "assumption: 64 bytes of consecutive addresses a channel",
     "DRAM_WINDOW": "assumption: bursts a channel's controller sees ahead, to open rows early",
     "DRAM_BATCH_BURSTS": "assumption: bursts of one purpose before the arbiter turns to the next (32 a channel)",

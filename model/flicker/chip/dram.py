@@ -1,14 +1,15 @@
 """LPDDR4 at the level of commands: how long a sequence of bursts takes.
 
-Rules and times of the DRAM are those of sim/dram.hpp (open page, one queue of `window` bursts a channel, row hits first, all-bank refresh), which is compiled
+Rules and times of the DRAM are those of sim/dram.hpp (open page, one queue of `window` bursts a channel, row hits first, refresh), which is compiled
 once and also stands behind the AXI ports of simulations: docs/memory_model.md. Numbers come from constants.py. Left out: the command bus, latency of the
-controller, dependences between bursts (the streams of a phase touch different arrays), per-bank refresh.
+controller, dependences between bursts (the streams of a phase touch different arrays).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
@@ -16,7 +17,15 @@ from ..errors import FlickerError
 from ..sim.memory import MASKED_WRITE, READ, WRITE, PortConfig, Timing, run_bursts
 from . import constants as c
 
-__all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Stream", "interleave", "port_config", "simulate"]
+__all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Refresh", "Stream", "interleave", "port_config", "simulate"]
+
+
+class Refresh(StrEnum):
+    """Whom a refresh command stops: nobody, as there is none; all banks of a channel for tRFCab every tREFI; one bank for tRFCpb every tREFI / banks."""
+
+    NONE = "none"
+    ALL_BANKS = "all-banks"
+    PER_BANK = "per-bank"
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,8 @@ class DramConfig:
     tdqsck: int = c.DRAM_TDQSCK
     trefi: int = c.DRAM_TREFI
     trfc: int = c.DRAM_TRFC
-    refresh: bool = True
+    trfc_bank: int = c.DRAM_TRFC_BANK
+    refresh: Refresh = Refresh.ALL_BANKS
 
     def __post_init__(self) -> None:
         for name in ("channels", "banks", "interleave_bytes", "page_bytes"):
@@ -81,7 +91,8 @@ class DramConfig:
             ccd_masked=self.tccd_masked, rtp=self.trtp,
             write_pre=self.wl + half + self.twr, write_read=self.wl + half + self.twtr + 1,
             read_write=self.rl + self.tdqsck + half + 1 - self.wl,
-            refi=self.trefi if self.refresh else 0, rfc=self.trfc, rl=self.rl, wl=self.wl, half=half,
+            refi=0 if self.refresh == Refresh.NONE else self.trefi, rfc=self.trfc, rfc_bank=self.trfc_bank if self.refresh == Refresh.PER_BANK else 0,
+            rl=self.rl, wl=self.wl, half=half,
             clock_hz=self.rate // 2, chip_hz=c.CLOCK_HZ,
         )
 

@@ -29,7 +29,7 @@ from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
 from ..perf.sorting import latency
 from .constants import CLOCK_HZ, LINE_BYTES
-from .dram import DramConfig, Stream
+from .dram import DramConfig, Refresh, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
 
 UNITS = 4
@@ -509,7 +509,9 @@ def estimate(
         (dram.channels, dram.interleave_bytes, dram.page_bytes, dram.banks, *(each * t for t in (dram.trcd, dram.trp, dram.tras, dram.trrd, dram.tccd)))
         if dram else (0, 1, 1, 1, 0.0, 0.0, 0.0, 0.0, 0.0)
     )
-    refresh = tuple(clocks * CLOCK_HZ // (dram.rate // 2) for clocks in (dram.trefi, dram.trfc)) if dram and dram.refresh else (0, 0)
+    refresh = (0, 0)  # one bank at a time delays few lines
+    if dram and dram.refresh == Refresh.ALL_BANKS:
+        refresh = (dram.trefi * CLOCK_HZ // (dram.rate // 2), dram.trfc * CLOCK_HZ // (dram.rate // 2))
     early = config.by_lanes or config.cat != CatMode.AUTO or config.mask_generator != "ctu"
     missed = np.empty(len(tables.record), np.int64)
     clock, misses, readings, given = _frame(

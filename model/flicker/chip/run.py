@@ -31,19 +31,21 @@ def _frame_image(buffer: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def render_on_chip(
-    view: View, engine: Engine, *, config: RenderConfig = RenderConfig(), options: FrontOptions | None = None, compare: bool = False,
-    steps: Steps | None = None,
+    view: View, engine: Engine, *, config: RenderConfig = RenderConfig(), options: FrontOptions | None = None, dram: DramConfig | None = None,
+    compare: bool = False, steps: Steps | None = None,
 ) -> Rendered:
-    """Render a view with an engine of the whole chip (`Engine.whole`); arguments as of `pipeline.render_view`."""
+    """Render a view with an engine of the whole chip (`Engine.whole`); dram: of `Engine.CHIP`; other arguments as of `pipeline.render_view`."""
     steps = steps or Steps()
-    image, more = _picture(view, engine, config, options or FrontOptions(), steps)
+    image, more = _picture(view, engine, config, options or FrontOptions(), dram or DramConfig(), steps)
     stats = basic_stats(view, engine, Front.RTL if engine is Engine.CHIP else Front.GOLDEN, config) | more
     if compare:
         stats |= compared(view, image, steps)
     return Rendered(image, stats)
 
 
-def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOptions, steps: Steps) -> tuple[np.ndarray, dict[str, Any]]:
+def _picture(
+    view: View, engine: Engine, config: RenderConfig, options: FrontOptions, dram: DramConfig, steps: Steps,
+) -> tuple[np.ndarray, dict[str, Any]]:
     """The frame buffer's picture and the statistics of the chip, or of its bit-true model."""
     if config.coords is Coords.ABSOLUTE:
         raise FlickerError(f"coords absolute: not for --engine {engine.value}; records hold means in 1/128 pixel")
@@ -65,7 +67,6 @@ def _picture(view: View, engine: Engine, config: RenderConfig, options: FrontOpt
         packed = packed_scene(view, options.format)
     with steps.step("building the chip's simulator (once per configuration)"):
         build(config)
-    dram = DramConfig()
     with steps.bar("simulating the chip") as report, ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
@@ -112,7 +113,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
         "subtile_pairs": int(core["gaussians_in"].sum()),
-        "cycles": cycles, "phases": phases, "dram_bytes": traffic, "dram_efficiency": efficiency,
+        "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
         "stalls": {
             **stage.pop("stalls"),
             **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},

@@ -71,6 +71,7 @@ def chip(
     config: Annotated[str, typer.Option(help="configuration of the rendering stage (flicker report --list)")] = "flicker",
     render_cycles: Annotated[int | None, typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
     memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
+    refresh: Annotated[str, typer.Option(help="what the DRAM refreshes at once: all-banks, per-bank, none")] = "all-banks",
     scheme: Annotated[str | None, typer.Option(help="lists and sorting [default: the recommended scheme]")] = None,
     schemes: Annotated[bool, typer.Option("--schemes", help="compare all schemes")] = False,
     formats: Annotated[bool, typer.Option("--formats", help="picture quality and bytes of the memory formats")] = False,
@@ -81,6 +82,7 @@ def chip(
     """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, also by its own models."""
     from ..chip.compare import FRONTS, chip_estimates, chip_stage, estimate
     from ..chip.constants import constant_table
+    from ..chip.dram import DramConfig, Refresh
     from ..chip.execute import run_scheme, scheme_rows
     from ..chip.frame import ChipConfig, frame_estimate, prepare
     from ..chip.schemes import RECOMMENDED, SCHEMES
@@ -93,22 +95,24 @@ def chip(
         raise FlickerError(f"--scheme: '{scheme}' is not one of {', '.join(SCHEMES)}")
     if memory not in [m.value for m in MemoryFormat]:
         raise FlickerError(f"--memory: '{memory}' is not one of {', '.join(m.value for m in MemoryFormat)}")
+    if refresh not in list(Refresh):
+        raise FlickerError(f"--refresh: '{refresh}' is not one of {', '.join(Refresh)}")
     if render_cycles is not None and render_cycles < 0:
         raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
     writable(out, "--out")
     configuration = get_configuration(config)
     loaded = load_view(scene, view, parse_size(size), cameras, up)
-    setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme])
+    setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme], dram=DramConfig(refresh=Refresh(refresh)))
     prepared = prepare(loaded, setting.cluster_size)
     if render_cycles is None:
         frame = estimate(prepared, configuration, setting)
     else:
         frame = frame_estimate(prepared, render_cycles, setting)
-    console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, scheme {scheme}")
+    console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, refresh {refresh}, scheme {scheme}")
     _show_frame(frame)
     built = {}
     if render_cycles is None and scheme == RECOMMENDED and memory == FRONTS[configuration.form][0] and chip_stage(configuration) is not None:
-        built = chip_estimates(loaded, [config])[config]
+        built = chip_estimates(loaded, [config], dram=setting.dram)[config]
         _show_built(built)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])
@@ -136,5 +140,6 @@ def chip(
             table.add_row(name, f"{value:,}", source)
         console.print(table)
     if out is not None:
-        text = json.dumps(frame.as_dict() | {"scene": str(scene), "view": view, "config": config, "memory": memory, "scheme": scheme, "rtl": built}, indent=2)
+        given = {"scene": str(scene), "view": view, "config": config, "memory": memory, "refresh": refresh, "scheme": scheme}
+        text = json.dumps(frame.as_dict() | given | {"rtl": built}, indent=2)
         write_atomically(out, lambda path: path.write_text(text + "\n"))

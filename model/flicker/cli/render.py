@@ -57,6 +57,7 @@ FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local
 ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
 StageChoice = Enum("StageChoice", {name.upper(): name for name in STAGES}, type=str)  # type: ignore[misc]
 MemoriesChoice = Enum("MemoriesChoice", {name.upper(): name for name in CHIP_MEMORIES}, type=str)  # type: ignore[misc]
+RefreshChoice = Enum("RefreshChoice", {"ALL_BANKS": "all-banks", "PER_BANK": "per-bank"}, type=str)
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
@@ -103,7 +104,8 @@ def summary(stats: dict, picture: Path | None) -> Table:
             table.add_row(f"  {name}", _number(cycles))
         for name, (read, written) in stats["dram_bytes"].items():
             table.add_row(f"  bytes of {name}", " + ".join(f"{_number(n)} {what}" for n, what in ((read, "read"), (written, "written")) if n))
-        table.add_row("memory", f"{sum(map(sum, stats['dram_bytes'].values())) / 1e6:.2f} MB, {stats['dram_efficiency']:.0%} of the peak rate")
+        moved = sum(map(sum, stats["dram_bytes"].values()))
+        table.add_row("memory", f"{moved / 1e6:.2f} MB, {stats['dram_efficiency']:.0%} of the peak rate, refresh {stats['refresh']}")
         for cause, cycles in stats["stalls"].items():
             if cycles:
                 table.add_row(f"  stalled: {cause}", _number(cycles))
@@ -156,6 +158,7 @@ def render(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
+    refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
@@ -168,8 +171,10 @@ def render(
     whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
-    if memories is not None and engine is not EngineChoice.CHIP:
-        raise FlickerError("--memories: for --engine chip only")
+    if engine is not EngineChoice.CHIP:
+        for option, value in (("--memories", memories), ("--refresh", refresh)):
+            if value is not None:
+                raise FlickerError(f"{option}: for --engine chip only")
     if not whole and front in (None, FrontChoice.FLOAT):
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
             raise FlickerError(f"{names}: for --front golden and rtl only")
@@ -197,6 +202,7 @@ def render(
     wanted = parse_size(size)
     steps = RichSteps()
     with steps.step("starting"):
+        from ..chip.dram import DramConfig, Refresh
         from ..chip.run import render_on_chip
         from ..front.view import load_view
         from ..golden.front.frame import ListKind
@@ -210,7 +216,8 @@ def render(
     with steps.step(f"loading {scene_title(scene)}"):
         loaded = load_view(scene, view, wanted, cameras, up)
     if whole:
-        result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, compare=compare is not None, steps=steps)
+        dram = DramConfig() if refresh is None else DramConfig(refresh=Refresh(refresh.value))
+        result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, dram=dram, compare=compare is not None, steps=steps)
     else:
         result = render_view(
             loaded, engine=Engine(engine.value), config=config, front=Front((front or FrontChoice.FLOAT).value), options=options, compare=compare is not None,

@@ -23,9 +23,10 @@ from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
 from . import driver, half, preprocessing, rendering
 from .half import PAGE, Half, MemoryOptions
-from .memory import PortConfig, PurposeCounts
+from .memory import Order, PortConfig, PurposeCounts
 
-PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False)
+# The memory's controller gives bursts once they are whole, and serves the rendering half's reads first (docs/memory_port.md: records 15, lists 14).
+PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False, order=Order.WHOLE, urgent=14)
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
 IMAGE = 1 << 28  # address of the scene
 ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more

@@ -2,8 +2,10 @@
 //
 // Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is served, the oldest among equals, so that row
 // hits go first, activates overlap with the data of other banks and the bus turns as rarely as the window allows; a burst is passed over at most 4 x window times.
-// All-bank refresh every tREFI. Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the
-// bank number exclusive-or'ed with the row. Left out: the command bus, latency of the controller, dependences between bursts, per-bank refresh.
+// Refresh: all banks of a channel every tREFI, for tRFCab; or one bank every tREFI / banks, for tRFCpb, while the others go on: of those that the round has still
+// to refresh the one that fewest bursts in the queue wait for. It counts as an activate for tRRD and tFAW.
+// Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed
+// with the row. Left out: the command bus, latency of the controller, dependences between bursts.
 //
 // Times are clocks of the command bus. Two ways to use it: `run` takes a list of bursts that all wait from clock 0 on; `Engine` takes them as they come
 // (`push`, in order of time) and decides no column command before `advance` has reached its clock, so that whatever comes earlier can still go first.
@@ -28,7 +30,8 @@ struct Timing {
   int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window;
   int64_t rcd, rp, rp_all, ras, rrd, faw, ccd, ccd_masked, rtp;
   int64_t write_pre, write_read, read_write;  // write to precharge, write to read, read to write
-  int64_t refi, rfc, rl, wl, half;            // refi 0: no refresh; half: clocks of a burst's data
+  int64_t refi, rfc, rfc_bank;                // refi 0: no refresh; rfc_bank 0: all banks at once, for rfc
+  int64_t rl, wl, half;                       // half: clocks of a burst's data
   int64_t clock_hz, chip_hz;                  // of the command bus, of the chip
 };
 
@@ -75,7 +78,7 @@ class Channel {
   static constexpr int64_t FAR = -(int64_t{1} << 40), NEVER = int64_t{1} << 60;
 
   explicit Channel(const Timing& t)
-      : t_(t), bank_(t.banks), queue_(2 * t.window), next_refresh_(t.refi) {}
+      : t_(t), bank_(t.banks), queue_(2 * t.window), next_refresh_(t.rfc_bank > 0 ? t.refi / t.banks : t.refi) {}
 
   bool empty() const { return waiting_ == 0; }
   bool full() const { return waiting_ == t_.window; }
@@ -103,8 +106,7 @@ class Channel {
     Bank& bank = bank_[burst.bank];
     passed_over_ = best_ > 0 ? passed_over_ + 1 : 0;
     if (activate_ >= 0) {
-      std::copy(activates_ + 1, activates_ + 4, activates_);
-      activates_[3] = activate_;
+      activated(activate_);
       ++counts.activates;
       bank.row = burst.row;
       bank.column = activate_ + t_.rcd;
@@ -137,6 +139,8 @@ class Channel {
     int64_t precharge = 0;  // earliest, when open
     int64_t column = 0;     // earliest, when open
     int64_t wrote = FAR;    // last write's column command
+    int64_t round = 0;      // its next refresh's, if banks are refreshed one by one
+    int waiting = 0;        // bursts, when that is chosen
   };
   struct Burst {
     int64_t row, arrived;
@@ -147,17 +151,47 @@ class Channel {
 
   void refresh() {
     while (t_.refi > 0 && std::max(last_column_ + t_.ccd, queue_[head_].arrived) >= next_refresh_) {
-      int64_t start = next_refresh_;
-      for (const Bank& bank : bank_) {
-        if (bank.row >= 0) start = std::max(start, bank.precharge);
+      if (t_.rfc_bank > 0) {
+        refresh_bank();
+      } else {
+        refresh_all();
       }
-      for (Bank& bank : bank_) {
-        bank.row = -1;
-        bank.activate = start + t_.rp_all + t_.rfc;
-      }
-      next_refresh_ += t_.refi;
       ++counts.refreshes;
     }
+  }
+
+  void refresh_all() {
+    int64_t start = next_refresh_;
+    for (const Bank& bank : bank_) {
+      if (bank.row >= 0) start = std::max(start, bank.precharge);
+    }
+    for (Bank& bank : bank_) {
+      bank.row = -1;
+      bank.activate = start + t_.rp_all + t_.rfc;
+    }
+    next_refresh_ += t_.refi;
+  }
+
+  void refresh_bank() {
+    for (Bank& bank : bank_) bank.waiting = 0;
+    for (int w = 0; w < waiting_; ++w) ++bank_[queue_[head_ + w].bank].waiting;
+    Bank* best = nullptr;
+    for (Bank& bank : bank_) {
+      if (bank.round == round_ && (!best || bank.waiting < best->waiting)) best = &bank;
+    }
+    const int64_t precharged = best->row >= 0 ? std::max(next_refresh_, best->precharge) + t_.rp : best->activate;
+    const int64_t start = std::max({next_refresh_, activates_[3] + t_.rrd, activates_[0] + t_.faw, precharged});
+    best->row = -1;
+    best->activate = start + t_.rfc_bank;
+    activated(start);
+    next_refresh_ += t_.refi / t_.banks;
+    ++best->round;
+    if (std::all_of(bank_.begin(), bank_.end(), [&](const Bank& bank) { return bank.round != round_; })) ++round_;
+  }
+
+  void activated(int64_t clock) {
+    std::copy(activates_ + 1, activates_ + 4, activates_);
+    activates_[3] = clock;
   }
 
   void choose() {
@@ -198,6 +232,7 @@ class Channel {
   int head_ = 0, waiting_ = 0;
   int64_t activates_[4] = {FAR, FAR, FAR, FAR};  // the last four
   int64_t last_column_ = FAR, next_refresh_;
+  int64_t round_ = 0;                            // of refreshes, every bank once
   int64_t passed_over_ = 0;
   int8_t last_kind_ = READ;
   bool chosen_ = false;  // the next command is known: that of the queue's entry `best_`
@@ -245,14 +280,15 @@ class Engine {
   int64_t cycle_of(int64_t clock) const { return (clock * cycles_ + clocks_ - 1) / clocks_; }
 
   // A burst (byte address, taken down to a multiple of burst_bytes) at a clock not before that of `advance` nor of another push. `done` stays until it has been told.
-  void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr) {
+  // `urgent`: it takes the next place in its channel's queue before all that are not.
+  void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr, bool urgent = false) {
     const Place p = map_(static_cast<int64_t>(address / static_cast<uint64_t>(t_.burst_bytes)));
     Lane& lane = lane_[p.channel];
     if (done) ++done->waiting;
-    if (lane.later.empty() && !lane.channel.full()) {
+    if (!lane.channel.full()) {  // then none waits for a place
       lane.channel.push(p.bank, p.row, kind, clock, done);
     } else {
-      lane.later.push_back({p.bank, p.row, clock, done, kind});
+      lane.later[!urgent].push_back({p.bank, p.row, clock, done, kind});
     }
   }
 
@@ -261,10 +297,12 @@ class Engine {
     for (Lane& lane : lane_) {
       while (!lane.channel.empty() && lane.channel.next() < clock) {
         lane.channel.step();
-        if (!lane.later.empty()) {
-          const Waiting& w = lane.later.front();
+        for (std::deque<Waiting>& later : lane.later) {
+          if (later.empty()) continue;
+          const Waiting& w = later.front();
           lane.channel.push(w.bank, w.row, w.kind, w.clock, w.done);
-          lane.later.pop_front();
+          later.pop_front();
+          break;
         }
       }
     }
@@ -295,7 +333,7 @@ class Engine {
   };
   struct Lane {
     Channel channel;
-    std::deque<Waiting> later;  // bursts that the controller's queue has no place for yet
+    std::deque<Waiting> later[2];  // bursts that the controller's queue has no place for yet: urgent ones, others
   };
   Timing t_;
   Map map_;

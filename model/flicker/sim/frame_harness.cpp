@@ -74,6 +74,9 @@ struct Sim {
   void sample() {
     FLK_READERS(FLK_SAMPLE_R)
     FLK_WRITERS(FLK_SAMPLE_W)
+#ifdef FLK_CHIP
+    FLK_AXI_SAMPLE_QOS(requests[0], *top, );
+#endif
   }
 
   void cycle(bool reset) {

@@ -130,7 +130,7 @@ class Memory {
 struct AxiAddress {
   uint64_t addr;
   uint32_t id;
-  uint8_t valid, len, size, burst;
+  uint8_t valid, len, size, burst, qos;
 };
 
 // What the design (the manager) drives in a cycle.
@@ -155,9 +155,9 @@ struct AxiReply {
 // Options of a port; sim/memory.py has the same fields in the same order and says what they mean.
 struct AxiConfig {
   int64_t data_bits = 512, id_bits = 4, latency = 1, max_reads = 32, max_writes = 32, max_beats = 256;
-  int64_t order = 0;        // 0: answers in the order of the addresses; 1: by id, seeded choice; 2: also beats of several ids interleaved
+  int64_t order = 0;        // 0: answers in the order of the addresses; 1: by id, seeded choice; 2: also beats of several ids interleaved; 3: as 1, bursts once whole
   int64_t write_order = 0;  // 0: data may come before addresses; 1: data wait for their address; 2: addresses wait for data
-  int64_t hazards = 1, seed = 1;
+  int64_t hazards = 1, urgent = 16, seed = 1;
   int64_t stall[AXI_CHANNELS] = {};                            // 256ths of the cycles
   int64_t run[AXI_CHANNELS] = {1, 1, 1, 1, 1};                 // mean cycles of a stall
   int64_t stop_after[AXI_CHANNELS] = {-1, -1, -1, -1, -1};     // transfers after which a channel answers no more; -1: never stops
@@ -284,7 +284,7 @@ class AxiPort {
   // ---- rules ----
 
   static bool same(const AxiAddress& a, const AxiAddress& b) {
-    return a.addr == b.addr && a.id == b.id && a.len == b.len && a.size == b.size && a.burst == b.burst;
+    return a.addr == b.addr && a.id == b.id && a.len == b.len && a.size == b.size && a.burst == b.burst && a.qos == b.qos;
   }
 
   void check_stable(const AxiRequest& q) {
@@ -324,6 +324,9 @@ class AxiPort {
   }
 
   // ---- accepting ----
+
+  // Its bursts take places of the DRAM's queues before others, its answer goes before others.
+  bool urgent(const AxiAddress& a) const { return a.qos >= c_.urgent; }
 
   // Bytes that a beat moves; reads may be narrower than the port.
   uint64_t step(const AxiAddress& a) const { return std::min<uint64_t>(bytes_, uint64_t{1} << a.size); }
@@ -374,7 +377,7 @@ class AxiPort {
         t.ready[k] = now_ + c_.latency;
         continue;
       }
-      count.dram_read_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * step(a), step(a), ~uint64_t{0}, dram::READ, t.done[k], count);
+      count.dram_read_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * step(a), step(a), ~uint64_t{0}, dram::READ, urgent(a), t.done[k], count);
     }
     count.errors += bad;
   }
@@ -431,14 +434,14 @@ class AxiPort {
       for (uint64_t b = 0; b < bytes_; ++b) {
         if (beat.strb >> b & 1) to[b] = from[b];
       }
-      if (!memory_.perfect) count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, bytes_, beat.strb, dram::WRITE, t.done[0], count);
+      if (!memory_.perfect) count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, bytes_, beat.strb, dram::WRITE, urgent(t.a), t.done[0], count);
     }
     count.errors += t.resp != OKAY;
     t.data.clear();
   }
 
   // A beat of `bytes` as bursts of the DRAM; bytes moved. A write without strobes moves none, one with some of a burst's bytes is masked.
-  uint64_t to_dram(uint64_t address, uint64_t bytes, uint64_t strb, int8_t kind, dram::Completion& done, AxiCounts& count) {
+  uint64_t to_dram(uint64_t address, uint64_t bytes, uint64_t strb, int8_t kind, bool urgent, dram::Completion& done, AxiCounts& count) {
     const uint64_t burst = memory_.engine.timing().burst_bytes, step = std::min(burst, bytes);
     const uint64_t all = step < 64 ? (uint64_t{1} << step) - 1 : ~uint64_t{0};
     uint64_t moved = 0;
@@ -449,7 +452,7 @@ class AxiPort {
         if (part == 0) continue;
         if (part != all || step < burst) how = dram::MASKED_WRITE;
       }
-      memory_.engine.push(memory_.engine.clock_of(static_cast<int64_t>(now_)), address + at, how, &done);
+      memory_.engine.push(memory_.engine.clock_of(static_cast<int64_t>(now_)), address + at, how, &done, urgent);
       moved += burst;
       if (how == dram::MASKED_WRITE) count.dram_masked_bytes += burst;
     }
@@ -481,7 +484,7 @@ class AxiPort {
     return stalled_[k];
   }
 
-  // The transaction whose turn it is, by the option `order`; nullptr: none. `done(t)`: it has something to give.
+  // The transaction whose turn it is, by the options `order` and `urgent`; nullptr: none. `done(t)`: it has something to give.
   template <class Done>
   Transaction* choose(List& list, Done done) {
     if (list.empty()) return nullptr;
@@ -492,6 +495,9 @@ class AxiPort {
       if (std::find(seen.begin(), seen.end(), t.a.id) != seen.end()) continue;
       seen.push_back(t.a.id);  // the oldest of its id
       if (done(t)) ready.push_back(&t);
+    }
+    if (std::any_of(ready.begin(), ready.end(), [&](const Transaction* t) { return urgent(t->a); })) {
+      ready.erase(std::remove_if(ready.begin(), ready.end(), [&](const Transaction* t) { return !urgent(t->a); }), ready.end());
     }
     return ready.empty() ? nullptr : ready[ready.size() == 1 ? 0 : random_.below(static_cast<uint32_t>(ready.size()))];
   }
@@ -536,7 +542,12 @@ class AxiPort {
       reply_.b_resp = static_cast<uint8_t>(random_.below(4));
     }
     if (!reply_.r_valid && !stall[R]) {
-      auto done = [&](const Transaction& t) { return there(t, t.next); };
+      // The next beat, or all that the option `order` wants.
+      auto done = [&](const Transaction& t) {
+        int k = c_.order == 3 ? t.beats : t.next + 1;
+        while (k > t.next && there(t, k - 1)) --k;
+        return k == t.next;
+      };
       reading_ = current_ && c_.order != 2 ? (done(*current_) ? current_ : nullptr) : choose(reads_, done);
       if (reading_) offer(*reading_);
     }
@@ -670,6 +681,12 @@ void store(T& port, const uint32_t* words) {
     (top).prefix##b_valid_i = (reply).b_valid;          \
     (top).prefix##b_id_i = (reply).b_id;                \
     (top).prefix##b_resp_i = (reply).b_resp;            \
+  } while (0)
+// Of a design that has them; without it they are 0.
+#define FLK_AXI_SAMPLE_QOS(request, top, prefix)        \
+  do {                                                  \
+    (request).ar.qos = (top).prefix##ar_qos_o;          \
+    (request).aw.qos = (top).prefix##aw_qos_o;          \
   } while (0)
 #define FLK_AXI_SAMPLE(request, top, prefix)            \
   do {                                                  \

@@ -31,7 +31,7 @@ class Timing(ctypes.Structure):
     _fields_ = [(name, c_int64) for name in (
         "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window",
         "rcd", "rp", "rp_all", "ras", "rrd", "faw", "ccd", "ccd_masked", "rtp", "write_pre", "write_read", "read_write",
-        "refi", "rfc", "rl", "wl", "half", "clock_hz", "chip_hz",
+        "refi", "rfc", "rfc_bank", "rl", "wl", "half", "clock_hz", "chip_hz",
     )]
 
 
@@ -46,7 +46,7 @@ class Counts(ctypes.Structure):
 
 
 class _Address(ctypes.Structure):
-    _fields_ = [("addr", c_uint64), ("id", c_uint32), ("valid", c_uint8), ("len", c_uint8), ("size", c_uint8), ("burst", c_uint8)]
+    _fields_ = [("addr", c_uint64), ("id", c_uint32), ("valid", c_uint8), ("len", c_uint8), ("size", c_uint8), ("burst", c_uint8), ("qos", c_uint8)]
 
 
 class Request(ctypes.Structure):
@@ -73,9 +73,10 @@ class Resp(IntEnum):
 
 
 class Order(IntEnum):
-    """Answers in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn."""
+    """Answers in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn; in any order across ids, and a read is
+    answered once all of its beats are there, so that none waits for the DRAM in the middle of another's burst."""
 
-    IN_ORDER, BY_ID, INTERLEAVED = range(3)
+    IN_ORDER, BY_ID, INTERLEAVED, WHOLE = range(4)
 
 
 class WriteOrder(IntEnum):
@@ -85,6 +86,7 @@ class WriteOrder(IntEnum):
 
 
 CHANNELS = ("AW", "W", "B", "AR", "R")
+_LISTS = ("stall", "run", "stop_after")  # options by channel
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,10 @@ class PortConfig:
 
     latency: cycles that are added to the DRAM's, or, in a perfect memory, all there are. max_reads, max_writes: transactions that may be under way.
     max_beats: longest burst that is legal. order, write_order: see there. hazards: a transaction that overlaps one under way, one of them a write, is an error
-    (writes of one id excepted). stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R). run: channel to mean length of such
-    a pause in cycles, default 1. stop_after: channel to transfers after which it is never ready or valid again. Random choices follow `seed`.
+    (writes of one id excepted). urgent: transactions of at least that AXI quality of service go before others where they wait for a place in a DRAM channel's
+    queue and where answers are chosen, except IN_ORDER; 16: none does. stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R).
+    run: channel to mean length of such a pause in cycles, default 1. stop_after: channel to transfers after which it is never ready or valid again. Random
+    choices follow `seed`.
     """
 
     data_bits: int = 512
@@ -106,19 +110,20 @@ class PortConfig:
     order: Order = Order.BY_ID
     write_order: WriteOrder = WriteOrder.ANY
     hazards: bool = True
+    urgent: int = 16
     seed: int = 1
     stall: Mapping[str, float] = field(default_factory=dict)
     run: Mapping[str, int] = field(default_factory=dict)
     stop_after: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("stall", "run", "stop_after"):
+        for name in _LISTS:
             if unknown := getattr(self, name).keys() - set(CHANNELS):
                 raise FlickerError(f"AXI port: {name}: no channel {min(unknown)}, they are {', '.join(CHANNELS)}")
 
     def structure(self) -> ctypes.Structure:
         """The same as `AxiConfig` of memory.hpp."""
-        values = {f.name: int(getattr(self, f.name)) for f in fields(self)[:10]}
+        values = {name: int(getattr(self, name)) for name in _NUMBERS}
         lists = {
             "stall": [round(256 * self.stall.get(k, 0)) for k in CHANNELS],
             "run": [self.run.get(k, 1) for k in CHANNELS],
@@ -127,8 +132,11 @@ class PortConfig:
         return _Config(**values, **{name: (c_int64 * len(CHANNELS))(*x) for name, x in lists.items()})
 
 
+_NUMBERS = [f.name for f in fields(PortConfig) if f.name not in _LISTS]
+
+
 class _Config(ctypes.Structure):
-    _fields_ = [(f.name, c_int64) for f in fields(PortConfig)[:10]] + [(f.name, c_int64 * len(CHANNELS)) for f in fields(PortConfig)[10:]]
+    _fields_ = [(name, c_int64) for name in _NUMBERS] + [(name, c_int64 * len(CHANNELS)) for name in _LISTS]
 
 
 class PurposeCounts(ctypes.Structure):
