@@ -51,11 +51,11 @@ def _walks(cols: int, rows: int) -> dict[str, np.ndarray]:
     }
 
 
-def _entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Record number and tile of every list entry, lists sorted."""
+def sorted_entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Record number, tile and mask of every list entry, lists sorted."""
     number = front.number[front.entry_splat]
     order = np.lexsort((number, front.key[front.entry_splat], front.entry_tile))
-    return number[order], front.entry_tile[order].astype(np.int64)
+    return number[order], front.entry_tile[order].astype(np.int64), front.entry_mask[order]
 
 
 def tables(say: Say) -> dict[str, str]:
@@ -64,7 +64,7 @@ def tables(say: Say) -> dict[str, str]:
     titles = []
     for title, view in titled_views(say):
         front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
-        number, tile = _entries(front)
+        number, tile, _ = sorted_entries(front)
         per_line = LINE_BYTES // front.kind.bytes
         cores = np.bitwise_count(front.entry_mask).mean()
         titles.append(f"{title}: {len(number):,} entries, {cores:.2f} cores each, {len(np.unique(number // per_line)):,} lines")

@@ -7,8 +7,13 @@ records of 32 bytes.
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.runner import build_and_test, refused, seed
+
+from flicker.chip.dram import DramConfig
+from flicker.golden.delivery import RecordCache
+from flicker.sim.delivery import deliver
 
 SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
 
@@ -22,3 +27,23 @@ def test_delivery(parameters: dict[str, int]) -> None:
 def test_illegal_parameters() -> None:
     with refused("Queue must be even, at least 8"):
         build_and_test("flk_delivery", "cocotb_delivery", parameters={"Queue": 6})
+
+
+def test_alone() -> None:
+    """`sim.delivery`: whole lists read the lines that the golden cache reads; cores that finish take what they need, and less is read."""
+    rng = np.random.default_rng(seed())
+    lengths = rng.integers(0, 600, 40)
+    start = np.concatenate([[0], np.cumsum(lengths)])
+    record, mask = rng.integers(0, 4000, start[-1]), rng.integers(0, 16, start[-1])
+    whole = deliver(start, record, mask, seed=seed())
+    cache = RecordCache()
+    assert whole.lines == sum(cache.lookup(int(r))[1] for r, m in zip(record, mask) if m)
+    given = np.array([(mask >> s & 1).sum() for s in range(4)])
+    assert whole.given == tuple(given) and whole.cycles >= max(given)
+    most = np.add.reduceat(np.stack([mask >> s & 1 for s in range(4)], axis=1), start[:-1][lengths > 0])
+    finished = np.zeros((40, 4), np.int64)
+    finished[lengths > 0] = most // 3
+    until = deliver(start, record, mask, finished, timing=DramConfig().timing, seed=seed())
+    assert until.lines < whole.lines and (np.array(until.given) >= finished.sum(axis=0)).all() and (np.array(until.given) < given).all()
+    with pytest.raises(ValueError, match="finished"):
+        deliver(start, record, mask, finished[:-1])

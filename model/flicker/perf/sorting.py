@@ -44,6 +44,9 @@ def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES) -
 
 def long_cycles(golden: SortedList, cells: int = CELLS, stages: int = STAGES) -> int:
     """Estimate for a list that does not fit, within some per cent: each reading takes an entry a cycle, each cut stops it until the cut is made."""
-    capacity = cells << stages
-    cuts = sum(len(r.limits) for r in golden.readings)
-    return len(golden.readings) * len(golden.order) + cuts * (3 * capacity // 2 + 38) + capacity
+    return reading_cycles(len(golden.order), len(golden.readings), sum(len(r.limits) for r in golden.readings), cells << stages)
+
+
+def reading_cycles(n: int, readings: int, cuts: int, capacity: int) -> int:
+    """The same by the numbers of its readings and cuts."""
+    return readings * n + cuts * (3 * capacity // 2 + 38) + capacity
