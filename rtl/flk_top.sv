@@ -205,7 +205,7 @@ module flk_top
   frame_error_t         frame_error;
   logic                 front_busy, rendering_busy;
   logic                 front_start, front_idle, front_end;
-  logic [3:0]           front_error;
+  logic [FRONT_ERRORS-1:0] front_error;
   front_registers_t     front;
   logic                 rendering_start, rendering_idle, rendering_end;
   logic [2:0]           rendering_error;

@@ -14,7 +14,7 @@
 #define FLK_VERSION_MAJOR_RESET 0x2u
 #define FLK_VERSION_MINOR_MASK 0x0000ff00u
 #define FLK_VERSION_MINOR_SHIFT 8
-#define FLK_VERSION_MINOR_RESET 0x0u
+#define FLK_VERSION_MINOR_RESET 0x1u
 
 #define FLK_CAPABILITY_OFFSET 0x008u
 #define FLK_CAPABILITY_STAGE_MASK 0x0000000fu
@@ -342,6 +342,7 @@
 #define FLK_ERROR_DESCRIPTOR 7  /* descriptor refused */
 #define FLK_ERROR_ABORTED 8  /* aborted */
 #define FLK_ERROR_TIMED_OUT 9  /* time-out: neither half moved for so many cycles as timeout says */
+#define FLK_ERROR_DAMAGED 10  /* the scene is damaged: a float of the cluster table or of a header is not finite */
 #define FLK_ERROR_TEXTS { \
   [0] = "a read of the front end failed (scene, pointers)", \
   [1] = "a write of the front end failed (records, lists, pointers)", \
@@ -353,6 +354,7 @@
   [7] = "descriptor refused", \
   [8] = "aborted", \
   [9] = "time-out: neither half moved for so many cycles as timeout says", \
+  [10] = "the scene is damaged: a float of the cluster table or of a header is not finite", \
 }
 
 /* Performance counters (counter_select). */

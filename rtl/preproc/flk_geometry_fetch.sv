@@ -7,8 +7,9 @@
 // the arrays begin) stay from start_i to done_o; the counts of beats until the next start.
 // An error of the memory: error_o rises and stays until the next start, no group is added, what is
 // under way is read and dropped, clusters are taken and dropped up to the one with in_end_i, an
-// end element follows. Words of Gaussians that do not exist mean nothing. Floats of a header with
-// exponent code 0 count as 0; exponent code 255 must not occur.
+// end element follows. A float of a header with exponent code 255, which no packed scene has: the
+// same, with damaged_o. Words of Gaussians that do not exist mean nothing. Floats of a header with
+// exponent code 0 count as 0.
 //
 // For each cluster its header and those beats of its geometry that hold Gaussians are read. Headers
 // and geometry wait in memories of their own, Clusters headers and BufferBeats beats of geometry;
@@ -41,6 +42,7 @@ module flk_geometry_fetch
   input  logic [BEAT_BITS-1:0] geometry_i,
   output logic                 done_o,
   output logic                 error_o,
+  output logic                 damaged_o,
   output logic [31:0]          header_beats_o,
   output logic [31:0]          geometry_beats_o,
   // Kept clusters
@@ -77,7 +79,7 @@ module flk_geometry_fetch
 
   state_e state_d, state_q;
   logic   start, fails, end_taken_q, end_moves, fetch_idle, out_free;
-  logic   out_valid_q, out_end_q, done_q, error_q;
+  logic   out_valid_q, out_end_q, done_q, error_q, damaged_q, not_finite_q;
 
   assign start = state_q == IDLE && start_i;
 
@@ -112,13 +114,15 @@ module flk_geometry_fetch
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      state_q <= IDLE;
-      error_q <= 1'b0;
-      done_q  <= 1'b0;
+      state_q   <= IDLE;
+      error_q   <= 1'b0;
+      damaged_q <= 1'b0;
+      done_q    <= 1'b0;
     end else begin
-      state_q <= state_d;
-      error_q <= !start && (error_q || fails);
-      done_q  <= state_q == LEAVE && out_ready_i;
+      state_q   <= state_d;
+      error_q   <= !start && (error_q || (beat_valid && beat_error));
+      damaged_q <= !start && (damaged_q || not_finite_q);
+      done_q    <= state_q == LEAVE && out_ready_i;
     end
   end
 
@@ -255,7 +259,7 @@ module flk_geometry_fetch
 
   logic header_beat_comes, geometry_beat_comes;
 
-  assign fails               = beat_valid && beat_error;
+  assign fails               = (beat_valid && beat_error) || not_finite_q;
   assign header_beat_comes   = beat_valid && beat_is_header;
   assign geometry_beat_comes = beat_valid && !beat_is_header;
 
@@ -313,6 +317,25 @@ module flk_geometry_fetch
   logic              header_take;
 
   assign word = beat_data;
+
+  // Words that are floats: of the first beat all but the fourth of each four, of FP16 the first three;
+  // of the second beat all but the fourth.
+  logic [15:0] not_finite;
+
+  always_comb begin
+    for (int unsigned k = 0; k < 16; k++) begin
+      not_finite[k] = &word[k][30:23] && (later_q ? k != 3 : k % 4 != 3 && (k < 3 || chunked_i));
+    end
+  end
+
+  // Seen while the header goes into its registers: no group of the cluster has left.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      not_finite_q <= 1'b0;
+    end else begin
+      not_finite_q <= header_beat_comes && !beat_error && state_q == RUN && not_finite != '0;
+    end
+  end
 
   always_comb begin
     shape_in.colour  = word[3];
@@ -654,6 +677,7 @@ module flk_geometry_fetch
   assign idle_o           = state_q == IDLE;
   assign done_o           = done_q;
   assign error_o          = error_q;
+  assign damaged_o        = damaged_q;
   assign out_valid_o      = out_valid_q;
   assign out_end_o        = out_end_q;
   assign out_group_o      = out_group_q;
@@ -665,14 +689,6 @@ module flk_geometry_fetch
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       state_q != IDLE |-> $stable({chunked_i, position_i, headers_i, geometry_i}))
   else $error("flk_geometry_fetch: registers changed in a frame");
-
-  for (genvar k = 0; k < 16; k++) begin : gen_finite
-    assert property (@(posedge clk_i) disable iff (!rst_ni)
-        header_beat_comes && !beat_error &&
-        (later_q ? k % 4 != 3 || k > 3 : k % 4 != 3 && (k < 3 || chunked_i)) |->
-        !(&word[k][30:23]))
-    else $error("flk_geometry_fetch: a header that is not finite");
-  end
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       (header_beat_comes |-> unused_shape_room && unused_colour_room) and

@@ -30,7 +30,7 @@ module flk_preprocessing
   output logic               idle_o,
   output logic               done_o,
   input  front_registers_t   registers_i,
-  output logic [3:0]         error_o,
+  output logic [FRONT_ERRORS-1:0] error_o,
   output front_counters_t    counters_o,
   // Cluster table
   output logic               table_ar_valid_o,
@@ -203,7 +203,7 @@ module flk_preprocessing
   kept_t             kept;
   logic              group_valid, group_ready, group_end;
   group_t            group;
-  logic              cull_error, geometry_error, colour_error;
+  logic              cull_error, geometry_error, colour_error, cull_damaged, geometry_damaged;
   logic signed [7:0] key_shift;
   position_t         key_low;
   logic              unused_bounds, unused_cull_done, unused_geometry_done;
@@ -220,6 +220,7 @@ module flk_preprocessing
     .clusters_i        (registers_i.clusters),
     .done_o            (unused_cull_done),
     .error_o           (cull_error),
+    .damaged_o         (cull_damaged),
     .bounds_valid_o    (unused_bounds),
     .key_shift_o       (key_shift),
     .key_low_o         (key_low),
@@ -257,6 +258,7 @@ module flk_preprocessing
     .geometry_i      (registers_i.geometry_beat),
     .done_o          (unused_geometry_done),
     .error_o         (geometry_error),
+    .damaged_o       (geometry_damaged),
     .header_beats_o  (counters_o.header_beats),
     .geometry_beats_o(counters_o.geometry_beats),
     .in_valid_i      (kept_valid),
@@ -1015,7 +1017,8 @@ module flk_preprocessing
   assign counters_o.key_shift    = key_shift;
   assign counters_o.key_low      = key_low;
 
-  assign error_o = {|list_failed, beyond_q, write_error_q || pointer_write_error,
+  assign error_o = {cull_damaged || geometry_damaged, |list_failed, beyond_q,
+                    write_error_q || pointer_write_error,
                     cull_error || geometry_error || colour_error || pointer_read_error};
 
   logic unused;

@@ -52,7 +52,7 @@ module flk_frame_control
   output logic                 front_start_o,
   input  logic                 front_idle_i,
   input  logic                 front_done_i,
-  input  logic [3:0]           front_error_i,
+  input  logic [FRONT_ERRORS-1:0] front_error_i,
   output front_registers_t     front_o,
   // Rendering half
   output logic                 rendering_start_o,
@@ -187,6 +187,7 @@ module flk_frame_control
       front_error_q.front_write   <= front_error_i[FRONT_ERROR_WRITE];
       front_error_q.record_region <= front_error_i[FRONT_ERROR_RECORDS];
       front_error_q.list_memory   <= front_error_i[FRONT_ERROR_LISTS];
+      front_error_q.damaged       <= front_error_i[FRONT_ERROR_DAMAGED];
     end
   end
 

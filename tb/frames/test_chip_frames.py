@@ -417,6 +417,23 @@ def test_scene_that_is_not_there() -> None:
         assert chip.finish(frame, LIMIT).error == 1 << ResultError.FRONT_READ
 
 
+def test_a_scene_damaged_after_it_was_opened() -> None:
+    """A bound that is not a number, which the driver has not seen: an error of its own, nothing rendered; the next frame is right."""
+    with session() as chip:
+        view = camera()
+        table = bytearray(chip.packed.sections()["table"])
+        table[4:8] = np.float32(np.nan).tobytes()
+        frame = chip.frame(view, chip.place(view), background=BLUE)
+        right = chip.scene.part[0]
+        chip.scene.part[0] = chip.allocate(len(table), "table", bytes(table))
+        before = chip.buffer(frame)
+        chip.start(frame)
+        done = chip.finish(frame, LIMIT)
+        assert done.error == 1 << ResultError.DAMAGED and done.errors[0].startswith("the scene is damaged") and np.array_equal(before, done.buffer)
+        chip.scene.part[0] = right
+        check(chip, view)
+
+
 def test_refused_descriptors() -> None:
     """Written past the driver: each ends with the error and touches nothing."""
     with session() as chip:

@@ -32,7 +32,7 @@ module cluster_cull_bench
   input  logic            mem_r_last_i
 );
 
-  logic error, bounds_valid, out_end, unused;
+  logic error, damaged, bounds_valid, out_end, unused;
   logic signed [7:0] key_shift;
   flk_front_pkg::position_t key_low;
   logic [31:0] clusters, gaussians;
@@ -41,9 +41,9 @@ module cluster_cull_bench
   assign in_ready_o = 1'b0;
   assign unused = ^{in_valid_i, in_data_i, registers_i[959:954]};
 
-  // Word by word: error and bounds valid, shift, lowest depth, culled clusters and Gaussians.
+  // Word by word: error, bounds valid and damaged, shift, lowest depth, culled clusters and Gaussians.
   assign status_o = 192'({
-    gaussians, clusters, 32'(key_low), 32'(key_shift), 30'b0, bounds_valid, error
+    gaussians, clusters, 32'(key_low), 32'(key_shift), 29'b0, damaged, bounds_valid, error
   });
   assign out_data_o = 96'({out_end, cluster});
 
@@ -59,6 +59,7 @@ module cluster_cull_bench
     .clusters_i        (registers_i[896+BEAT_BITS+:24]),
     .done_o,
     .error_o           (error),
+    .damaged_o         (damaged),
     .bounds_valid_o    (bounds_valid),
     .key_shift_o       (key_shift),
     .key_low_o         (key_low),

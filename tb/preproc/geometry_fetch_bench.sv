@@ -33,12 +33,12 @@ module geometry_fetch_bench
   input  logic            mem_r_last_i
 );
 
-  logic error, out_end, unused;
+  logic error, damaged, out_end, unused;
   logic [31:0] header_beats, geometry_beats;
   group_t group;
 
   assign unused = ^{in_data_i[95:55], registers_i[191:165]};
-  assign status_o = 192'({geometry_beats, header_beats, 31'b0, error});
+  assign status_o = 192'({geometry_beats, header_beats, 30'b0, damaged, error});
   assign out_data_o = 1440'({out_end, group});
 
   if ($bits(group_t) != 1347) begin : gen_check
@@ -59,6 +59,7 @@ module geometry_fetch_bench
     .geometry_i      (registers_i[130+:BEAT_BITS]),
     .done_o,
     .error_o         (error),
+    .damaged_o       (damaged),
     .header_beats_o  (header_beats),
     .geometry_beats_o(geometry_beats),
     .in_valid_i,

@@ -1,14 +1,15 @@
 """Cluster cull against the golden model: which clusters are kept and in what order, key scale and counts, under pauses on all sides.
 
 Covered: the demo scene, tables of numbers from all over their range (subnormal ones too) and of every length up to 40, none and all kept, one
-cluster, frames one after the other and after a reset in a frame, errors of the memory at each beat, rates.
-Not covered: numbers that are not finite (assertions refuse them), tables of more than 2**16 clusters.
+cluster, frames one after the other and after a reset in a frame, errors of the memory at each beat, numbers that are not finite, rates.
+Not covered: tables of more than 2**16 clusters.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -155,6 +156,32 @@ def test_errors() -> None:
             got = outcome.field(30, 24)[:-1]
             assert np.array_equal(got, want[: len(got)]) and (not len(got) or got[-1] < 2 * beat)
             check(unit.frame(registers(setup, other // BEAT, n), stall=stall), small, setup)
+
+
+def test_damaged_tables() -> None:
+    """A bound or a sigma that is infinite or not a number, in any entry: the frame ends and says so, nothing of that entry or behind it is kept, and the next
+    frame is whole."""
+    rng = np.random.default_rng([seed(), 33])
+    packed, setup = demo()
+    n = 37
+    table = packed.table[:n].copy()
+    small = scene(table)
+    want = np.flatnonzero(cull.cull(small, setup).keep)
+    unit, other = bench(), BASE + 0x10000
+    for turn, (name, k) in enumerate([*product(("low", "high"), range(3)), ("sigma", 0)]):
+        for entry in (0, n - 1, int(rng.integers(n))):
+            bad = table.copy()
+            if name == "sigma":
+                bad[name][entry] = rng.choice([0x7F80, 0x7FC0, 0xFFFF])
+            else:
+                bad[name].view(np.uint32)[entry, k] = rng.choice([0x7F800000, 0xFF800000, 0x7FC00001, 0xFFFFFFFF])
+            unit.open({BASE: contents(bad), other: contents(table)}, latency=1 + 20 * (turn % 4), **PORT)
+            for stall in ("never", "bursts"):
+                outcome = unit.frame(registers(setup, BASE // BEAT, n), stall=stall)
+                assert outcome.done and outcome.status[0] == 4, (name, k, entry)
+                assert outcome.field(54, 1).tolist() == [1]  # the first pass has seen it
+                check(unit.frame(registers(setup, other // BEAT, n), stall=stall), small, setup)
+    assert len(want)
 
 
 def test_reset_in_a_frame() -> None:

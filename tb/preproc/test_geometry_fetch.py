@@ -1,8 +1,9 @@
 """Geometry fetch against the image and the golden model's header values: every group, header field, word and count, under pauses on all sides.
 
 Covered: the demo scene in chunks and in FP16, clusters of every size, headers of numbers from all over their range (subnormal ones too), none, one cluster
-of one Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, rates.
-Not covered: numbers that are not finite (assertions refuse them), counts of more than 2**16 beats.
+of one Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, headers
+with numbers that are not finite, rates.
+Not covered: counts of more than 2**16 beats.
 """
 
 from __future__ import annotations
@@ -127,9 +128,9 @@ def expected(packed: PackedScene, setup: FrameSetup, kept: np.ndarray) -> dict[s
     }
 
 
-def check(outcome: Outcome, packed: PackedScene, setup: FrameSetup, kept: np.ndarray, whole: bool = True) -> None:
-    """whole: False for a frame in which the memory failed."""
-    assert outcome.done and outcome.status[0] == (not whole)
+def check(outcome: Outcome, packed: PackedScene, setup: FrameSetup, kept: np.ndarray, whole: bool = True, error: int = 1) -> None:
+    """whole: False for a frame in which the memory failed, or with another error (2: damaged)."""
+    assert outcome.done and outcome.status[0] == (0 if whole else error)
     got, want = fields(outcome), expected(packed, setup, kept)
     assert got["end"][:, 0].tolist() == [0] * (len(outcome.when) - 1) + [1]
     n = len(outcome.when) - 1
@@ -197,6 +198,35 @@ def test_errors(form: PackedFormat) -> None:
         idle, stall = rng.choice(list(PAUSES), 2)
         check(unit.frame(registers(packed, setup), items(packed, kept), idle, stall), packed, setup, kept, whole=False)
         check(unit.frame(registers(packed, setup, *other), items(packed, kept), idle, stall), packed, setup, kept)
+
+
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
+def test_damaged_headers(form: PackedFormat) -> None:
+    """A float that is infinite or none, in any header: the frame ends, what came before it is right, and the next frame is whole."""
+    rng = np.random.default_rng([seed(), 45])
+    setup = some_setup()
+    packed = wild(rng, form, rng.integers(1, 60, 14))
+    kept = np.arange(14)
+    parts = contents(packed)
+    other = {a + (1 << 32): data for a, data in parts.items()}
+    size = packed.format.header.itemsize
+    unit = bench()
+    for name in packed.format.header.names:
+        part, offset = packed.format.header.fields[name][:2]
+        if part.base != np.dtype("<f4"):
+            continue
+        for word in range(part.itemsize // 4):
+            cluster, value = int(rng.integers(14)), rng.choice([0x7F800000, 0xFF800000, 0x7FC00001, 0xFFFFFFFF])
+            data = bytearray(parts[HEADERS])
+            at = cluster * size + offset + 4 * word
+            data[at : at + 4] = int(value).to_bytes(4, "little")
+            unit.open(parts | {HEADERS: bytes(data)} | other, latency=1 + 20 * (word % 4), **PORT)
+            idle, stall = rng.choice(list(PAUSES), 2)
+            outcome = unit.frame(registers(packed, setup), items(packed, kept), idle, stall)
+            check(outcome, packed, setup, kept, whole=False, error=2)
+            groups = -(-packed.counts[:cluster] // 4)
+            assert len(outcome.when) - 1 <= groups.sum(), f"a group of the damaged cluster ({name}, {word})"
+            check(unit.frame(registers(packed, setup, *other), items(packed, kept), idle, stall), packed, setup, kept)
 
 
 def test_reset_in_a_frame() -> None:

@@ -326,6 +326,20 @@ def test_a_table_that_points_beyond_the_image() -> None:
     assert rtl.error & 1 << ERRORS.index("a read failed")
 
 
+@pytest.mark.parametrize("part", ["table", "headers"])
+def test_a_damaged_scene(part: str) -> None:
+    """Bounds, or numbers of a header, that are not finite: the frame ends with a code; the scene and all outside of the regions are untouched."""
+    packed = pack(some(1500), PackedFormat.CHUNK).packed
+    camera = plain_camera()
+    chunks = front_memory(run_front(packed, camera)).lists.chunks
+    image = bytearray(packed.image())
+    at = HEADER_BYTES + (len(packed.table.tobytes()) if part == "headers" else 0)
+    image[at : at + 4] = np.float32(np.nan).tobytes()  # low of the first cluster, or its origin
+    rtl = front_rtl(packed, camera, chunks=chunks, image=bytes(image), seed=seed())
+    assert rtl.error == 1 << ERRORS.index("the scene is damaged")
+    assert rtl.counters["survivors"] == 0 and np.array_equal(rtl.memory, rtl.before[1])
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_frame_read_back_from_memory(kind: RecordKind) -> None:
     """What `--front rtl` hands to the rendering stage is what `--front golden` does."""

@@ -176,10 +176,10 @@ class ChipSession(Half):
             self.load(at, size, data[offset : offset + size], purpose)
             at += size
 
-    def allocate(self, size: int, purpose: str) -> int:
-        """Address of new memory, noise at first."""
+    def allocate(self, size: int, purpose: str, data: bytes = b"") -> int:
+        """Address of new memory: the data, and noise behind them."""
         at = self._next
-        self.load(at, -(-max(size, 1) // 64) * 64, b"", PURPOSES.index(purpose))
+        self.load(at, -(-max(size, 1) // 64) * 64, data, PURPOSES.index(purpose))
         self._next += -(-max(size, 1) // PAGE) * PAGE
         return at
 

@@ -27,7 +27,7 @@ from .memory import PortConfig, PurposeCounts
 
 PORTS = ("table", "geometry", "colour", "pointer", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
-ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory")
+ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory", "the scene is damaged")
 LIST_ERROR = 3  # bit of the last
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
@@ -149,7 +149,7 @@ def front_rtl(
 
     kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
     many times; what the last leaves counts.
-    Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a rule of AXI is broken.
+    Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails, a rule of AXI is broken or the scene is no longer what it was.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
     with Half("front end", build(kind), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
@@ -168,6 +168,8 @@ def front_rtl(
             sim.load(base, size, b"", purpose)
         before = _records(sim, regions, kind), _lines(sim, regions)
         counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), COUNTERS, frames, limit)
+        if sim.read(regions.image, len(data)).tobytes() != data:
+            raise FlickerError(f"front end: it has written over the scene (seed {seed})")
         return RtlFront(
             _records(sim, regions, kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,
