@@ -190,6 +190,8 @@ module flk_cluster_cull
     .r_last_i
   );
 
+  logic not_finite_q;  // a float of an entry is not, see below
+
   assign fails = (beat_valid && beat_error) || not_finite_q;
 
   logic [0:0] unused_fifo_empty;
@@ -247,7 +249,6 @@ module flk_cluster_cull
 
   entry_t         entry;
   logic [6:0]     not_finite;  // box, sigma
-  logic           not_finite_q;
   logic           entry_valid_d, entry_valid_q, half_q, load, take;
   logic [23:0]    loads_q;  // entries of the pass still to be loaded
   cluster_t [2:0] low_q, high_q;
