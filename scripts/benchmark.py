@@ -26,12 +26,15 @@ from flicker.front.projection import project
 from flicker.front.records import SubtileLists, build_lists
 from flicker.front.reference import render_reference
 from flicker.front.view import DEMO, View, load_view
+from flicker.golden.front.frame import run_front
 from flicker.golden.lanes.lists import RecordLists, float_lists
 from flicker.golden.lanes.render import LaneFrame, render_lanes
 from flicker.golden.render import Frame, render_golden
 from flicker.params import CHANNELS, CORES, LANE_COUNTS, NAMED_CONFIGS, CatMode, Form, RenderConfig
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.scene.metrics import psnr
+from flicker.scene.packed import PackedFormat
+from flicker.scene.packing import pack_file
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.sim.render_stage import build, render_rtl
 
@@ -80,6 +83,13 @@ def tables(scene: str, number: int, size: tuple[int, int], cameras: Path | None,
     reference_s, reference = best(lambda: render_reference(projected, camera))
     base = project_s + reference_s
     steps = [["load", f"{load_s:.2f}", ""], ["project", f"{project_s:.2f}", ""], ["float64 reference, with projection", f"{base:.2f}", "1"]]
+    say(f"{name}: packing, bit-true front end")
+    for form in (PackedFormat.CHUNK, PackedFormat.FP16_LOCAL) if scene != DEMO else ():
+        pack_file(scene, form)
+        pack_s, packing = best(lambda: pack_file(scene, form))
+        run_front(packing.packed, camera)
+        front_s, _ = best(lambda: run_front(packing.packed, camera))
+        steps += [[f"pack, {form.value}, with loading", f"{pack_s:.2f}", ""], [f"bit-true front end, {form.value}", f"{front_s:.2f}", ""]]
     rtl_rows, model_rows = [], []
     for title, config in {
         "default": NAMED_CONFIGS["default"], "faithful": NAMED_CONFIGS["faithful"], "default, test off": NAMED_CONFIGS["default"].with_(cat=CatMode.OFF),

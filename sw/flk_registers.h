@@ -342,7 +342,8 @@
 #define FLK_ERROR_DESCRIPTOR 7  /* descriptor refused */
 #define FLK_ERROR_ABORTED 8  /* aborted */
 #define FLK_ERROR_TIMED_OUT 9  /* time-out: neither half moved for so many cycles as timeout says */
-#define FLK_ERROR_DAMAGED 10  /* the scene is damaged: a float of the cluster table or of a header is not finite */
+#define FLK_ERROR_BAD_TABLE 10  /* the scene is damaged: a float of the cluster table is not finite */
+#define FLK_ERROR_BAD_HEADER 11  /* the scene is damaged: a float of a cluster's header is not finite */
 #define FLK_ERROR_TEXTS { \
   [0] = "a read of the front end failed (scene, pointers)", \
   [1] = "a write of the front end failed (records, lists, pointers)", \
@@ -354,7 +355,8 @@
   [7] = "descriptor refused", \
   [8] = "aborted", \
   [9] = "time-out: neither half moved for so many cycles as timeout says", \
-  [10] = "the scene is damaged: a float of the cluster table or of a header is not finite", \
+  [10] = "the scene is damaged: a float of the cluster table is not finite", \
+  [11] = "the scene is damaged: a float of a cluster's header is not finite", \
 }
 
 /* Performance counters (counter_select). */

@@ -84,7 +84,8 @@ class ResultError(IntEnum):
     DESCRIPTOR = 7  # descriptor refused
     ABORTED = 8  # aborted
     TIMED_OUT = 9  # time-out: neither half moved for so many cycles as timeout says
-    DAMAGED = 10  # the scene is damaged: a float of the cluster table or of a header is not finite
+    BAD_TABLE = 10  # the scene is damaged: a float of the cluster table is not finite
+    BAD_HEADER = 11  # the scene is damaged: a float of a cluster's header is not finite
 
 
 class ChipCounter(IntEnum):

@@ -78,7 +78,7 @@ module flk_geometry_fetch
   typedef enum logic [1:0] {IDLE, RUN, FAILED, LEAVE} state_e;
 
   state_e state_d, state_q;
-  logic   start, fails, end_taken_q, end_moves, fetch_idle, out_free;
+  logic   start, fails, unread, end_taken_q, end_moves, fetch_idle, out_free;
   logic   out_valid_q, out_end_q, done_q, error_q, damaged_q, not_finite_q;
 
   assign start = state_q == IDLE && start_i;
@@ -120,7 +120,7 @@ module flk_geometry_fetch
       done_q    <= 1'b0;
     end else begin
       state_q   <= state_d;
-      error_q   <= !start && (error_q || (beat_valid && beat_error));
+      error_q   <= !start && (error_q || unread);
       damaged_q <= !start && (damaged_q || not_finite_q);
       done_q    <= state_q == LEAVE && out_ready_i;
     end
@@ -259,7 +259,8 @@ module flk_geometry_fetch
 
   logic header_beat_comes, geometry_beat_comes;
 
-  assign fails               = (beat_valid && beat_error) || not_finite_q;
+  assign unread              = beat_valid && beat_error;
+  assign fails               = unread || not_finite_q;
   assign header_beat_comes   = beat_valid && beat_is_header;
   assign geometry_beat_comes = beat_valid && !beat_is_header;
 

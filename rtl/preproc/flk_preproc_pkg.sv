@@ -166,8 +166,9 @@ package flk_preproc_pkg;
   localparam int unsigned FRONT_ERROR_WRITE = 1;    // or a write
   localparam int unsigned FRONT_ERROR_RECORDS = 2;  // slots of a cluster lie beyond the records
   localparam int unsigned FRONT_ERROR_LISTS = 3;    // a list writer needed a chunk more than it has
-  localparam int unsigned FRONT_ERROR_DAMAGED = 4;  // a float of table or header is not finite
-  localparam int unsigned FRONT_ERRORS = 5;
+  localparam int unsigned FRONT_ERROR_TABLE = 4;    // a float of the cluster table is not finite
+  localparam int unsigned FRONT_ERROR_HEADER = 5;   // or of a cluster's header
+  localparam int unsigned FRONT_ERRORS = 6;
 
   typedef struct packed {
     logic [31:0]       cycles;

@@ -1017,7 +1017,7 @@ module flk_preprocessing
   assign counters_o.key_shift    = key_shift;
   assign counters_o.key_low      = key_low;
 
-  assign error_o = {cull_damaged || geometry_damaged, |list_failed, beyond_q,
+  assign error_o = {geometry_damaged, cull_damaged, |list_failed, beyond_q,
                     write_error_q || pointer_write_error,
                     cull_error || geometry_error || colour_error || pointer_read_error};
 

@@ -187,7 +187,8 @@ module flk_frame_control
       front_error_q.front_write   <= front_error_i[FRONT_ERROR_WRITE];
       front_error_q.record_region <= front_error_i[FRONT_ERROR_RECORDS];
       front_error_q.list_memory   <= front_error_i[FRONT_ERROR_LISTS];
-      front_error_q.damaged       <= front_error_i[FRONT_ERROR_DAMAGED];
+      front_error_q.bad_table     <= front_error_i[FRONT_ERROR_TABLE];
+      front_error_q.bad_header    <= front_error_i[FRONT_ERROR_HEADER];
     end
   end
 

@@ -29,7 +29,8 @@ package flk_top_pkg;
 
   // Bits of a frame's error, in the order of the enumeration error_e of rtl/regs/flk_registers.rdl.
   typedef struct packed {
-    logic damaged;
+    logic bad_header;
+    logic bad_table;
     logic timed_out;
     logic aborted;
     logic descriptor;

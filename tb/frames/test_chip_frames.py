@@ -19,7 +19,8 @@ import pytest
 from flicker_tb.runner import seed
 
 from flicker import params
-from flicker.chip.dram import DramConfig
+from flicker.chip.dram import DramConfig, Refresh
+from flicker.chip.run import chip_stats
 from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
@@ -210,18 +211,44 @@ def test_abort_while_pointers_move() -> None:
         check(chip, view)
 
 
-@pytest.mark.parametrize("number", range(5))
-def test_memories(number: int) -> None:
-    """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one."""
-    rng = random.Random(f"{seed()} {number}")
-    port = replace(
+def any_port(rng: random.Random, number: int) -> PortConfig:
+    """Latency, pauses on every channel and places for transactions by chance; orders by number."""
+    return replace(
         PORT, seed=rng.getrandbits(30), latency=rng.randint(1, 60), max_reads=rng.choice([2, 9, 256]), max_writes=rng.choice([1, 5, 128]),
         order=list(Order)[number % 4], urgent=rng.choice([0, 14, 16]), write_order=list(WriteOrder)[number % 3],
         stall={name: rng.choice([0.0, 0.3, 0.7]) for name in CHANNELS}, run={name: rng.randint(1, 8) for name in CHANNELS},
     )
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_memories(number: int) -> None:
+    """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one."""
+    port = any_port(random.Random(f"{seed()} {number}"), number)
     with session(port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:
         check(chip, camera(), list(PixelFormat)[number % 2])
         check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", ALL_CONFIGS)
+@pytest.mark.parametrize("number", range(5))
+def test_demo_scene_under_pauses(number: int, config: RenderConfig) -> None:
+    """The same on the demo scene, with DRAM."""
+    view = load_view(DEMO, 0, (160, 90))
+    format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
+    port = any_port(random.Random(f"{seed()} {number} demo"), number)
+    with session(packed_scene(view, format_), config=config, port=port, memory=MemoryOptions(DramConfig().timing)) as chip:
+        check(chip, view.camera, config=config, lists=lists)
+
+
+def test_what_a_frame_tells() -> None:
+    """Shares of the DRAM's rate and bytes of the halves add up to those of the frame."""
+    dram = DramConfig(refresh=Refresh.PER_BANK)
+    with session(memory=MemoryOptions(dram.timing)) as chip:
+        stats = chip_stats(chip, chip.render(camera()), CONFIG, dram)
+    assert sum(stats["phases"][name] * stats["busy"][name]["DRAM"] for name in stats["phases"]) == pytest.approx(stats["dram_efficiency"] * stats["cycles"])
+    assert all(0 < share <= 1 for part in stats["busy"].values() for share in part.values())
+    assert stats["bottleneck"].startswith(max(stats["phases"], key=lambda name: stats["phases"][name])) and stats["refresh"] == "per-bank"
 
 
 def test_opaque_layers() -> None:
@@ -429,7 +456,7 @@ def test_a_scene_damaged_after_it_was_opened() -> None:
         before = chip.buffer(frame)
         chip.start(frame)
         done = chip.finish(frame, LIMIT)
-        assert done.error == 1 << ResultError.DAMAGED and done.errors[0].startswith("the scene is damaged") and np.array_equal(before, done.buffer)
+        assert done.error == 1 << ResultError.BAD_TABLE and done.errors[0].startswith("the scene is damaged") and np.array_equal(before, done.buffer)
         chip.scene.part[0] = right
         check(chip, view)
 

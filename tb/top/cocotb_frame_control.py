@@ -29,7 +29,7 @@ RENDERING = (
     ("records", 34), ("frame_buffer", 34), ("stride", 12),
 )
 # Bits of a frame's error, from bit 0: registers.md.
-RENDERING_BITS, DESCRIPTOR_ERROR, ABORTED, TIMED_OUT, DAMAGED = 4, 1 << 7, 1 << 8, 1 << 9, 10
+RENDERING_BITS, DESCRIPTOR_ERROR, ABORTED, TIMED_OUT, BAD_TABLE = 4, 1 << 7, 1 << 8, 1 << 9, 10
 
 
 def pack(fields, values) -> int:
@@ -98,7 +98,7 @@ class Frame:
     def error(self) -> int:
         if not self.legal:
             return DESCRIPTOR_ERROR
-        return self.front_error & 15 | self.front_error >> 4 << DAMAGED or self.rendering_error << RENDERING_BITS
+        return self.front_error & 15 | self.front_error >> 4 << BAD_TABLE or self.rendering_error << RENDERING_BITS
 
     @property
     def rendered(self) -> bool:
@@ -214,7 +214,7 @@ class ControlTest:
     def new_frame(self) -> Frame:
         rng = self.rng
         d = self.wanted.pop(0) if self.wanted else self.broken() if rng.random() < self.share_illegal else self.descriptor()
-        errors = [rng.randint(1, 31) if rng.random() < self.share_error else 0, rng.randint(1, 7) if rng.random() < self.share_error else 0]
+        errors = [rng.randint(1, 63) if rng.random() < self.share_error else 0, rng.randint(1, 7) if rng.random() < self.share_error else 0]
         self.number += 1
         return Frame(self.number, d, *errors, legal(d, self.lists))
 
@@ -244,7 +244,7 @@ class ControlTest:
             pins |= {"start": 0, "acknowledged": 0}
         # Data that nobody asks for are noise.
         noise = self.rng.getrandbits
-        front_error = self.in_front.front_error if pins["front_done"] and self.in_front else noise(5)
+        front_error = self.in_front.front_error if pins["front_done"] and self.in_front else noise(6)
         rendering_error = self.in_rendering.rendering_error if pins["rendering_done"] and self.in_rendering else noise(3)
         if self.pending:
             descriptor = pack(DESCRIPTOR, self.pending.d)

@@ -24,6 +24,8 @@ from ..sim.half import MemoryOptions
 from .constants import CLOCK_HZ
 from .dram import DramConfig
 
+SCENE = ("table", "headers", "geometry", "colour")  # what the front end reads
+
 
 def _frame_image(buffer: np.ndarray, camera: Camera) -> np.ndarray:
     """float64 (H, W, 3) of an RGB8 frame buffer."""
@@ -89,15 +91,20 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     traffic = {name: moved for name, moved in frame.usage.traffic.items() if any(moved)}
     cycles = stamps["rendering_done"] - stamps["taken"]
     efficiency = sum(map(sum, traffic.values())) * CLOCK_HZ / (cycles * dram.bytes_per_second)
+    # Bytes of each half: the front end reads the scene, writes records and lists; rendering reads these and writes the frame.
+    first = sum(read for name, (read, _) in traffic.items() if name in SCENE) + sum(written for name, (_, written) in traffic.items() if name != "frame")
+    moved = {"front end": first, "rendering": sum(map(sum, traffic.values())) - first}
+    peak = {name: moved[name] * CLOCK_HZ / (phases[name] * dram.bytes_per_second) for name in phases}
     tested = chip.scene.gaussians - count("culled_gaussians")
     # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each.
     busy = {
         "front end": {
             "lanes": tested / (2 * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
-            "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"],
+            "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
             "sorting units": int(np.max(rendering["entries"])) / phases["rendering"], "record cache's port": int(rendering["lines"]) / phases["rendering"],
+            "DRAM": peak["rendering"],
             **stage.pop("busy"),
         },
     }

@@ -27,7 +27,8 @@ from .memory import PortConfig, PurposeCounts
 
 PORTS = ("table", "geometry", "colour", "pointer", "write")
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
-ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory", "the scene is damaged")
+ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory",
+          "the cluster table is damaged", "a cluster's header is damaged")
 LIST_ERROR = 3  # bit of the last
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
