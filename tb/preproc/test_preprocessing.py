@@ -333,8 +333,10 @@ def test_a_damaged_scene(part: str) -> None:
     camera = plain_camera()
     chunks = front_memory(run_front(packed, camera)).lists.chunks
     image = bytearray(packed.image())
-    at = HEADER_BYTES + (len(packed.table.tobytes()) if part == "headers" else 0)
-    image[at : at + 4] = np.float32(np.nan).tobytes()  # low of the first cluster, or its origin
+    places = range(len(packed.table)) if part == "headers" else [0]  # of culled clusters no header is read
+    for k in places:
+        at = HEADER_BYTES + (len(packed.table.tobytes()) + k * packed.format.header.itemsize if part == "headers" else 0)
+        image[at : at + 4] = np.float32(np.nan).tobytes()  # low of the first cluster, or origins
     rtl = front_rtl(packed, camera, chunks=chunks, image=bytes(image), seed=seed())
     assert rtl.error == 1 << ERRORS.index("the cluster table is damaged" if part == "table" else "a cluster's header is damaged")
     assert rtl.counters["survivors"] == 0 and np.array_equal(rtl.memory, rtl.before[1])
