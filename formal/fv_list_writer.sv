@@ -4,11 +4,18 @@
 // suffices for, the table has every list's pointer, and each of its lines was written at most
 // once at the end. Each line goes behind the line of its list that went before.
 //
+// Chains, of one list, whichever list_i chooses: a chunk's first line goes to a chunk that no line went to before,
+// the lowest such one, and only when the list's chunk before it is full. It links to that one, which the list began
+// last and which has a lower number; the list's first chunk and all other lines have no link. So links end after fewer
+// steps than there are chunks. The list's pointer at the end is its newest chunk and the number of lines there. A line
+// has entries of one list alone, and no two lines of a frame's lists go to one address (at_i chooses it).
+//
 // With two pointers on the chip for four lists (Pointers 2), lines of pointers move to the table and
 // back, by an agent of any speed.
 //
 // One entry of a frame, whichever pick_i chooses, has bit 0 set; the proof counts the places where it
-// is. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
+// is. Bit 1 is set in all entries of the chosen list, which tells its lines at the output. At most as many chunks as
+// a link can name. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
 module fv_list_writer #(
   parameter int unsigned Pointers = 4
 ) (
@@ -24,7 +31,8 @@ module fv_list_writer #(
   input logic       in_end_i,
   input logic       in_u_i,
   input logic       in_v_i,
-  input logic       in_value_i,
+  input logic [1:0] list_i,
+  input logic [5:0] at_i,
   input logic       out_ready_i,
   input logic       mover_ready_i,
   input logic       mover_step_i
@@ -51,7 +59,9 @@ module fv_list_writer #(
   logic [2:0]  taken;
   logic [5:0]  out_address;
   logic [15:0] out_data;
-  logic        picked_q;
+  logic        picked_q, mark;
+  logic [1:0]  list_q;  // that is followed
+  logic [5:0]  at_q;    // the address, from list_base_q
   logic [1:0]  delivered_q;
   logic [5:0]  list_base_q, list_at, pointer_at;
   logic [2:0]  state;
@@ -72,7 +82,8 @@ module fv_list_writer #(
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
-  assign tag = pick_i && !picked_q;
+  assign tag  = pick_i && !picked_q;
+  assign mark = {in_v_i, in_u_i} == list_q;
 
   flk_list_writer #(
     .SetBitsU   (1),
@@ -110,7 +121,7 @@ module fv_list_writer #(
     .in_end_i,
     .in_u_i,
     .in_v_i,
-    .in_entry_i     ({in_value_i, tag}),
+    .in_entry_i     ({mark, tag}),
     .out_valid_o    (out_valid),
     .out_ready_i,
     .out_address_o  (out_address),
@@ -210,7 +221,7 @@ module fv_list_writer #(
 
   logic [3:0][1:0]      count;   // entries of the open line
   logic [3:0][1:0]      list;
-  logic [3:0][1:0]      stored;  // bit 0 of the entries in memory, by place and column
+  logic [3:0][1:0][1:0] stored;  // entries in memory, by place and column
   logic [3:0][3:0]      kept;    // the pointers on the chip
   logic [3:0][3:0]      value;   // of each list, wherever it is
 
@@ -223,8 +234,7 @@ module fv_list_writer #(
     end
   end
   for (genvar p = 0; p < 4; p++) begin : gen_place
-    assign stored[p] = {dut.gen_columns[1].i_column.storage_q[p][0],
-                        dut.gen_columns[0].i_column.storage_q[p][0]};
+    assign stored[p] = {dut.gen_columns[1].i_column.storage_q[p], dut.gen_columns[0].i_column.storage_q[p]};
     assign kept[p] = dut.i_pointers.storage_q[p % Pointers];
   end
 
@@ -274,19 +284,19 @@ module fv_list_writer #(
     end
   end
 
-  // Bit 0 of column c of the line in place p, as stage D finds it, and as it will be.
-  function automatic logic now(logic [1:0] p, logic c);
+  // Bit b of column c of the line in place p, as stage D finds it, and as it will be.
+  function automatic logic now(logic [1:0] p, logic c, logic b);
     if (dut.e_entry_q && dut.e_place_q == p && dut.e_column_q == 2'(c)) begin
-      return dut.e_word_q[0];
+      return dut.e_word_q[b];
     end
-    return stored[p][c];
+    return stored[p][c][b];
   endfunction
 
-  function automatic logic then_(logic [1:0] p, logic c);
+  function automatic logic then_(logic [1:0] p, logic c, logic b);
     if (dut.d_entry_q && dut.d_place_q == p && dut.d_column_q == 2'(c)) begin
-      return dut.d_word_q[0];
+      return dut.d_word_q[b];
     end
-    return now(p, c);
+    return now(p, c, b);
   endfunction
 
   // Places where the chosen entry is.
@@ -301,12 +311,12 @@ module fv_list_writer #(
     places += 4'(dut.b_valid_q && !dut.b_flush_q && dut.b_entry_q[0]);
     for (int unsigned p = 0; p < 4; p++) begin
       for (int unsigned c = 0; c < 2; c++) begin
-        places += 4'(2'(c) < count[p] && then_(2'(p), 1'(c)));
+        places += 4'(2'(c) < count[p] && then_(2'(p), 1'(c), 1'b0));
       end
     end
     for (int unsigned c = 0; c < 2; c++) begin
       if (dut.d_event_q && 2'(c) < dut.d_count_q) begin
-        places += 4'(dut.d_full_q && c == 1 ? dut.d_word_q[0] : now(dut.d_place_q, 1'(c)));
+        places += 4'(dut.d_full_q && c == 1 ? dut.d_word_q[0] : now(dut.d_place_q, 1'(c), 1'b0));
       end
       places += 4'(dut.e_event_q && 2'(c) < dut.e_count_q && dut.line[2*c]);
       places += 4'(out_list && 4'(c) < out_data[7:4] && out_data[2*c]);
@@ -339,6 +349,161 @@ module fv_list_writer #(
 
   assign list_at    = out_address - list_base_q;
   assign pointer_at = out_address - dut.pointer_base_q;
+
+  // ---- chains ---------------------------------------------------------------------------------------
+
+  logic [3:0] chain_q;               // the chosen list's pointer, by the lines that have left
+  logic [2:0] begun_q;               // chunks whose first line has left
+  logic       seen_q;                // a line has left to the chosen address
+  logic [1:0] line_list_q, f_list_q;  // lists of the lines in stages E and F
+  logic       chosen, first, e_chosen, frame;
+  logic [3:0] chain_out, chain_e;
+  logic [2:0] link;
+
+  assign chosen    = out_list && out_data[1];
+  assign first     = !list_at[0];
+  assign link      = out_data[10:8];
+  assign chain_out = {first ? 2'd1 : 2'd2, list_at[4:3]};
+  assign e_chosen  = dut.e_sends_q && line_list_q == list_q;
+  assign chain_e   = {dut.e_at_q[0] ? 2'd2 : 2'd1, dut.e_at_q[4:3]};
+  assign frame     = state != CLEAR && state != IDLE;
+
+  always_ff @(posedge clk_i) begin
+    list_q <= list_q;
+    at_q   <= at_q;
+    if (dut.advance) begin
+      line_list_q <= dut.d_list_q;
+      f_list_q  <= line_list_q;
+    end
+    if (start_i && idle) begin
+      chain_q <= '0;
+    end else if (chosen && out_ready_i) begin
+      chain_q <= chain_out;
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_n) begin
+    if (!rst_n) begin
+      begun_q <= '0;
+      seen_q  <= 1'b0;
+    end else if (start_i && idle) begin
+      begun_q <= '0;
+      seen_q  <= 1'b0;
+    end else if (out_list && out_ready_i) begin
+      begun_q <= begun_q + 3'(first);
+      seen_q  <= seen_q || list_at == at_q;
+    end
+  end
+
+  always_comb begin
+    m_list: assume (list_i == list_q && at_i == at_q);
+    m_chunks: assume (chunks_i <= 3'd4);
+    if (rst_n) begin
+      if (out_list) begin
+        a_count: assert (out_data[7:4] == 4'd1 || out_data[7:4] == 4'd2);
+        a_one_list: assert (out_data[7:4] == 4'd1 || out_data[3] == out_data[1]);
+        a_zero: assert (out_data[15:11] == 5'd0);
+        a_fresh: assert (!first || 3'(list_at >> 3) == begun_q);
+        a_down: assert (link[2] ? first && link[1:0] < list_at[4:3] : link == 3'd0);
+        a_single: assert (!seen_q || list_at != at_q);
+      end
+      if (chosen) begin
+        if (first) begin
+          a_full: assert (chain_q[3:2] == 2'd0 || chain_q[3:2] == 2'd2);
+          a_link: assert (link == (chain_q[3:2] == 2'd0 ? 3'd0 : {1'b1, chain_q[1:0]}));
+        end else begin
+          a_next: assert (chain_q == {2'd1, list_at[4:3]} && link == 3'd0);
+        end
+      end
+      if (done && !failed) begin
+        a_newest: assert (table_q[list_q] == chain_q);
+      end
+
+      // Marks.
+      l_mark_a: assert (!dut.a_valid_q || dut.a_flush_q || dut.a_entry_q[1] == (dut.a_list_q == list_q));
+      l_mark_b: assert (!dut.b_valid_q || dut.b_flush_q || dut.b_entry_q[1] == (dut.b_list_q == list_q));
+      if (dut.d_entry_q) begin
+        l_mark_d: assert (dut.d_word_q[1] ==
+                          ((dut.d_full_q ? dut.d_list_q : list[dut.d_place_q]) == list_q));
+      end
+      if (dut.d_event_q) begin
+        l_mark_line: assert (now(dut.d_place_q, 1'b0, 1'b1) == (dut.d_list_q == list_q) &&
+                             (dut.d_full_q || dut.d_count_q == 2'd1 ||
+                              now(dut.d_place_q, 1'b1, 1'b1) == (dut.d_list_q == list_q)));
+      end
+      if (dut.e_event_q) begin
+        l_mark_e: assert (dut.line[1] == (line_list_q == list_q) &&
+                          (dut.e_count_q == 2'd1 || dut.line[3] == (line_list_q == list_q)));
+        l_apart: assert (!dut.d_event_q || dut.d_list_q != line_list_q);
+        l_apart_f: assert (!out_list || f_list_q != line_list_q);
+      end
+      if (out_list) begin
+        l_mark_f: assert (out_data[1] == (f_list_q == list_q));
+        l_part: assert (list_at[5] == 1'b0);
+      end
+
+      // The chosen list's lines in stages E and F, and its pointer.
+      if (frame) begin
+        l_chunks: assert (dut.chunks_q <= 3'd4);
+        l_taken: assert (taken == begun_q + 3'(out_list && first) + 3'(dut.e_sends_q && dut.e_begins_q));
+        l_begun: assert (chain_q == 4'd0 ||
+                         (chain_q[3:2] != 2'd0 && chain_q[3:2] <= 2'd2 && 3'(chain_q[1:0]) < begun_q));
+      end
+      if (dut.e_sends_q) begin
+        l_first: assert (dut.e_begins_q == !dut.e_at_q[0] && dut.e_at_q[5] == 1'b0);
+        l_fresh_e: assert (!dut.e_begins_q || 3'(dut.e_at_q >> 3) == begun_q + 3'(out_list && first));
+        l_pointer_e: assert (dut.e_begins_q ? dut.e_pointer_q == 4'd0 || (dut.e_pointer_q[3:2] == 2'd2 &&
+                                              dut.e_pointer_q[1:0] < dut.e_at_q[4:3])
+                                            : dut.e_pointer_q == {2'd1, dut.e_at_q[4:3]});
+      end
+      if (frame || done) begin
+        l_chain: assert (due_q[list_q] == (e_chosen ? chain_e : chosen ? chain_out : chain_q));
+      end
+      if (e_chosen) begin
+        l_chain_e: assert (dut.e_pointer_q == chain_q);
+      end
+      // Addresses.
+      if (seen_q && frame) begin
+        l_seen: assert (at_q[5] == 1'b0 && 3'(at_q >> 3) < taken && at_q[2:1] == dut.writer_q &&
+                        !(dut.e_sends_q && dut.e_at_q == at_q));
+      end
+      if (dut.e_sends_q && out_list) begin
+        l_two: assert (dut.e_at_q != list_at);
+      end
+      c_link: cover (chosen && link == 3'b101 && seen_q);
+    end
+  end
+
+  // A line that was written is not where a list's next one goes.
+  function automatic logic behind(logic [3:0] pointer, logic [5:0] at);
+    return pointer[3:2] == 2'd0 || pointer[1:0] != at[4:3] || pointer[3:2] > 2'(at[0]);
+  endfunction
+
+  for (genvar p = 0; p < 4; p++) begin : gen_chain
+    for (genvar c = 0; c < 2; c++) begin : gen_mark
+      always_comb begin
+        if (rst_n && state != CLEAR) begin
+          l_mark: assert (2'(c) >= count[p] || then_(2'(p), 1'(c), 1'b1) == (list[p] == list_q));
+        end
+      end
+    end
+    for (genvar q = 0; q < p; q++) begin : gen_apart
+      always_comb begin
+        if (rst_n && frame) begin
+          l_own: assert (due_q[p] == 4'd0 || due_q[q] == 4'd0 || due_q[p][1:0] != due_q[q][1:0]);
+        end
+      end
+    end
+    always_comb begin
+      if (rst_n && frame) begin
+        l_behind_seen: assert (!seen_q || behind(due_q[p], at_q));
+        l_behind_e: assert (!dut.e_sends_q || behind(due_q[p], dut.e_at_q));
+        l_behind_f: assert (!out_list || behind(due_q[p], list_at));
+      end
+    end
+  end
+
+  // ---- what is where --------------------------------------------------------------------------------
 
   // An open line is still to be closed.
   function automatic logic pending(logic [1:0] p);
