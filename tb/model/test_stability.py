@@ -208,6 +208,7 @@ def test_families_do_what_they_say():
     inside = pack(case("cluster", 2).scene, PackedFormat.FP16_LOCAL).packed
     assert len(inside.table) == 1 and len(inside) == 256 and (inside.table["low"] < 0).all() and (inside.table["high"] > 0).all()  # the camera is at 0
     assert not (pack(case("cluster", 0).scene, PackedFormat.FP16_LOCAL).packed.table["low"] < 0).all()
+    assert case("behind", 0).projected.n_visible == 100 and case("behind", 3).projected.n_visible == 1 and case("behind", -1).projected.n_visible == 0
     crowd = case("one_tile", -1)
     frame = run_front(pack(crowd.scene, PackedFormat.FP16_LOCAL).packed, crowd.screen)
     assert crowd.screen.width == TILE and len(frame.packed.table) == 1 and len(frame.entry_tile) == 256 and len(np.unique(frame.splats().mean, axis=0)) < 8

@@ -269,6 +269,15 @@ def _cluster(extent: float, rng: np.random.Generator) -> Case:
     return _case(Scene(np.concatenate([front, rest]), scales, quats, rng.uniform(0.1, 0.8, n), (_colours(rng, n)[:, None] - 0.5) / _C0), camera)
 
 
+def _behind(share: float, rng: np.random.Generator) -> Case:
+    """Layers of which a share lies behind the camera, in mirrored places; with all of them nothing is visible."""
+    n = 100
+    camera = _camera()
+    depth, where = _layers(rng, n), rng.permutation(n) < round(share * n)
+    scene = _scene(_inside(rng, n), rng.uniform(1.0, 6.0, (n, 2)), rng.uniform(0, 3, n), depth, rng.uniform(0.1, 0.9, n), _colours(rng, n), camera)
+    return _case(replace(scene, means=np.where(where[:, None], -scene.means, scene.means)), camera)
+
+
 def _one_tile(extent: float, rng: np.random.Generator) -> Case:
     """The 256 Gaussians of a cluster about a point of the only tile, in layers."""
     n = 256
@@ -316,6 +325,7 @@ FAMILIES: dict[str, Family] = {f.name: f for f in (
     Family("sh", "spherical harmonics out of range", "largest coefficient", (0.02, 0.1, 0.3, 1, 3, 10, 100, 1e4), _harmonics),
     Family("inside", "camera inside Gaussians", "sigma / distance", (0.1, 0.3, 1, 3, 10, 30, 100), _inside_gaussian),
     Family("cluster", "camera inside a cluster", "half the cluster's extent", (2, 4, 10, 30, 100, 300, 1e3, 1e4), _cluster),
+    Family("behind", "Gaussians behind the camera", "share of them", (0.0, 0.5, 0.9, 0.99, 1.0), _behind),
     Family("one_tile", "a whole cluster in one tile", "extent in px", (16, 8, 4, 1, 0.1, 0.01, 0.0), _one_tile),
     Family("covering", "one Gaussian over a whole picture", "side of the picture in px", (64, 256, 1024, 2048, 4096), _covering),
 )}
