@@ -353,13 +353,10 @@ def test_frame_read_back_from_memory(kind: RecordKind) -> None:
     assert np.array_equal(lists.gauss[lists.entry], golden.gauss[golden.entry]) and np.array_equal(lists.spiky[lists.entry], golden.spiky[golden.entry])
 
 
-LARGE = ("flowers", "playbot", "stpeter")
-
-
-@pytest.mark.parametrize("real", [pytest.param(r, id=r.folder, marks=[pytest.mark.slow] * (r.folder in LARGE)) for r in REAL_VIEWS])
+@pytest.mark.parametrize("real", [pytest.param(r, id=r.folder) for r in REAL_VIEWS])
 @pytest.mark.parametrize("size", [(640, 360), pytest.param((320, 180), marks=pytest.mark.slow)], ids=lambda size: f"{size[0]}x{size[1]}")
 def test_real_scenes(real: RealView, size: tuple[int, int]) -> None:
-    """At 640x360, the larger ones with SLOW=1; all at 320x180 with SLOW=1, where many Gaussians of kept clusters lie beside the picture or have no pixel."""
+    """At 640x360, and at 320x180 with SLOW=1, where many Gaussians of kept clusters lie beside the picture or have no pixel."""
     folder = real_scenes()
     if folder is None:
         pytest.skip("FLICKER_SCENES is not set")
