@@ -190,7 +190,7 @@ module flk_cluster_cull
     .r_last_i
   );
 
-  logic not_finite_q;  // a float of an entry is not, see below
+  logic not_finite_q;  // the entry that was loaded has a float that is not
 
   assign fails = (beat_valid && beat_error) || not_finite_q;
 

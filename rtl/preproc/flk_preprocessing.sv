@@ -5,8 +5,9 @@
 // for a cycle when all has been written and answered, error_o and the counters then stay until the
 // next start. Everything that is written is the same for every timing. Form: records of 16 bytes in
 // factored form, or of 32 in conic form.
-// error_o: bits of FRONT_ERROR_*. An error of the memory ends the frame early where it was met;
-// a cluster beyond the records' region writes nothing; a list writer without a chunk writes no more.
+// error_o: bits of FRONT_ERROR_*. An error of the memory, or a float of the cluster table or a header
+// that is not finite, ends the frame early where it was met; a cluster beyond the records' region
+// writes nothing; a list writer without a chunk writes no more.
 // Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
 // registers is at most Lists / 16.
 module flk_preprocessing

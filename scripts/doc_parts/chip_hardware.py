@@ -49,16 +49,16 @@ PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "point
 
 
 def back_to_back(
-    chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE, frames: int = 4,
+    chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE,
 ) -> list[ChipFrame]:
-    """Frames of one view, each started as soon as the chip takes it: while the last but one is rendered the front end works on the last, as in a longer row
-    of frames. chunks: of a list writer."""
+    """Four frames of one view, each started as soon as the chip takes it: while the last but one is rendered the front end works on the last, as in a longer
+    row of frames. chunks: of a list writer."""
     places = [chip.place(camera, chunks=chunks) for _ in range(2)]
-    row = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(frames)]
+    row = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(4)]
     chip.start(row[0])
     done = []
     for k, frame in enumerate(row):
-        if k + 1 < frames:
+        if k + 1 < len(row):
             while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
                 chip.step(500)
             chip.start(row[k + 1])

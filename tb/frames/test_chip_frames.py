@@ -23,7 +23,7 @@ from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.run import chip_stats
 from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
-from flicker.front.view import DEMO, load_view
+from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
@@ -123,12 +123,17 @@ def compare(
     assert done.stamps["taken"] < done.stamps["front_done"] < done.stamps["rendering_start"] < done.stamps["rendering_done"]
 
 
+def demo(config: RenderConfig) -> tuple[View, PackedScene, ListKind]:
+    """The demo scene, small, as a configuration takes it."""
+    view = load_view(DEMO, 0, (160, 90))
+    format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
+    return view, packed_scene(view, format_), lists
+
+
 @pytest.mark.parametrize("config", ALL_CONFIGS)
 def test_demo_scene(config: RenderConfig) -> None:
     """The paper's configuration with its format and lists."""
-    view = load_view(DEMO, 0, (160, 90))
-    format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
-    packed = packed_scene(view, format_)
+    view, packed, lists = demo(config)
     with session(packed, config=config) as chip:
         assert Form(int(chip.device.form)) is config.form
         done = check(chip, view.camera, config=config, lists=lists)
@@ -234,10 +239,9 @@ def test_memories(number: int) -> None:
 @pytest.mark.parametrize("number", range(5))
 def test_demo_scene_under_pauses(number: int, config: RenderConfig) -> None:
     """The same on the demo scene, with DRAM."""
-    view = load_view(DEMO, 0, (160, 90))
-    format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
+    view, packed, lists = demo(config)
     port = any_port(random.Random(f"{seed()} {number} demo"), number)
-    with session(packed_scene(view, format_), config=config, port=port, memory=MemoryOptions(DramConfig().timing)) as chip:
+    with session(packed, config=config, port=port, memory=MemoryOptions(DramConfig().timing)) as chip:
         done = chip.render(view.camera, background=BLUE, lists=lists, limit=10 * LIMIT)
         compare(chip, view.camera, done, config=config, lists=lists)
 

@@ -159,14 +159,13 @@ def test_errors() -> None:
 
 
 def test_damaged_tables() -> None:
-    """A bound or a sigma that is infinite or not a number, in any entry: the frame ends and says so, nothing of that entry or behind it is kept, and the next
-    frame is whole."""
+    """A bound or a sigma that is infinite or not a number, in any entry: the first pass ends the frame and says so, nothing is kept, the next one is whole."""
     rng = np.random.default_rng([seed(), 33])
     packed, setup = demo()
     n = 37
     table = packed.table[:n].copy()
     small = scene(table)
-    want = np.flatnonzero(cull.cull(small, setup).keep)
+    assert cull.cull(small, setup).keep.any()
     unit, other = bench(), BASE + 0x10000
     for turn, (name, k) in enumerate([*product(("low", "high"), range(3)), ("sigma", 0)]):
         for entry in (0, n - 1, int(rng.integers(n))):
@@ -179,9 +178,8 @@ def test_damaged_tables() -> None:
             for stall in ("never", "bursts"):
                 outcome = unit.frame(registers(setup, BASE // BEAT, n), stall=stall)
                 assert outcome.done and outcome.status[0] == 4, (name, k, entry)
-                assert outcome.field(54, 1).tolist() == [1]  # the first pass has seen it
+                assert outcome.field(54, 1).tolist() == [1]
                 check(unit.frame(registers(setup, other // BEAT, n), stall=stall), small, setup)
-    assert len(want)
 
 
 def test_reset_in_a_frame() -> None:

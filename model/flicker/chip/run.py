@@ -91,7 +91,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     traffic = {name: moved for name, moved in frame.usage.traffic.items() if any(moved)}
     cycles = stamps["rendering_done"] - stamps["taken"]
     efficiency = sum(map(sum, traffic.values())) * CLOCK_HZ / (cycles * dram.bytes_per_second)
-    # Bytes of each half: the front end reads the scene, writes records and lists; rendering reads these and writes the frame.
+    # Bytes of each half: the front end reads the scene, writes records and lists; rendering reads these (pointers that the front end reads back
+    # are counted there too) and writes the frame.
     first = sum(read for name, (read, _) in traffic.items() if name in SCENE) + sum(written for name, (_, written) in traffic.items() if name != "frame")
     moved = {"front end": first, "rendering": sum(map(sum, traffic.values())) - first}
     peak = {name: moved[name] * CLOCK_HZ / (phases[name] * dram.bytes_per_second) for name in phases}
