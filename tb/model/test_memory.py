@@ -264,7 +264,7 @@ def test_dram_behind_a_port():
 
 
 def test_whole_bursts():
-    """WHOLE: no burst waits for the DRAM between its beats; BY_ID: some do. Both give what is there, the second sooner."""
+    """WHOLE: no burst waits for the DRAM between its beats; BY_ID: some do."""
     gaps = {}
     for order in (Order.BY_ID, Order.WHOLE):
         m = Memory(TIMING)
