@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from flicker.cost.area import parts
-from flicker.golden.front.blend import blend_records
-from flicker.golden.front.frame import FrontFrame, run_front
+from flicker.golden.front.frame import run_front
 from flicker.golden.front.setup import FORMATS, FrontFormats
 from flicker.golden.render import render_golden
 from flicker.markdown import table
@@ -18,19 +13,11 @@ from flicker.scene.metrics import psnr
 from flicker.scene.packed import PackedFormat
 
 from .common import Say, titled_views
+from .front_widths import Widths, blended, decibel, opacity_table
 
 # The default, one number of mantissa bits changed at a time, and all of them wider.
 TRIED = [FORMATS, *(FrontFormats(position=b) for b in (15, 17, 21, 23)), *(FrontFormats(shape=b) for b in (10, 13, 15, 19)),
          *(FrontFormats(colour=b) for b in (10, 13, 15)), FrontFormats(21, 13, 13)]
-
-
-def _blended(frame: FrontFrame) -> np.ndarray:
-    start, entry = frame.sorted_subtiles()
-    return blend_records(frame.splats(), frame.kind.form, start, entry, frame.camera.width, frame.camera.height)
-
-
-def _decibel(value: float) -> str:
-    return "equal" if math.isinf(value) else f"{value:.1f}"
 
 
 def _cells() -> str:
@@ -45,6 +32,7 @@ def tables(say: Say) -> dict[str, str]:
     pictures: list[tuple[str, ...]] = []
     outcomes: list[tuple[str, ...]] = []
     formats: dict[FrontFormats, list[str]] = {tried: [] for tried in TRIED}
+    widths = Widths()
     titles: list[str] = []
     kinds: list[str] = []
     for title, view in titled_views(say):
@@ -55,7 +43,7 @@ def tables(say: Say) -> dict[str, str]:
             frame = run_front(packed, view.camera)
             golden = render_golden(frame.subtile_lists(), RenderConfig(cat=CatMode.OFF)).image(view.background)
             default = render_golden(frame.subtile_lists(), RenderConfig()).image(view.background)
-            pictures.append((title, form.value, *(_decibel(psnr(image, view.reference)) for image in (_blended(frame), golden, default))))
+            pictures.append((title, form.value, *(decibel(psnr(image, view.reference)) for image in (blended(frame, frame.splats()), golden, default))))
             if form is PackedFormat.CHUNK:
                 outcomes.append((title, f"{len(packed):,}", *(f"{n:,}" for n in frame.outcomes.values()), f"{len(frame.entry_tile):,}",
                                  f"{frame.adjusted.get('colour above 2 clipped', 0):,}"))
@@ -63,11 +51,15 @@ def tables(say: Say) -> dict[str, str]:
             if form is PackedFormat.FP16_LOCAL:
                 for tried in TRIED:
                     say(f"{title}: {tried}")
-                    formats[tried].append(_decibel(psnr(_blended(run_front(packed, view.camera, formats=tried)), view.reference)))
+                    other = run_front(packed, view.camera, formats=tried)
+                    formats[tried].append(decibel(psnr(blended(other, other.splats()), view.reference)))
+            widths.add(title, view, packed, say)
     rows = [(str(f.position), str(f.shape), str(f.colour), *db) for f, db in formats.items()]
     return {
         "pictures": table(["view", "format", "records in float64", "golden stage, test off", "golden stage, default"], pictures),
         "outcomes": table(["view", "Gaussians", *kinds, "list entries", "colours clipped"], outcomes),
         "formats": table(["position", "shape", "colour", *titles], rows),
         "cells": _cells(),
+        "fixed": widths.table(say),
+        "opacity": opacity_table(say),
     }

@@ -17,6 +17,7 @@ from flicker.front.view import DEMO, View, load_view
 from flicker.golden.front import colour
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.cull import cull, key_scale
+from flicker.golden.front.fields import Fields, splats_of
 from flicker.golden.front.frame import FrontFrame, ListKind, depth_key, run_front
 from flicker.golden.front.record import MEAN_FIELD, RecordKind, decode_mean, decode_shape, encode_mean, encode_shape
 from flicker.golden.front.setup import FORMATS, MAX_KEY_SHIFT, FrameSetup, FrontFormats, rounded
@@ -26,7 +27,7 @@ from flicker.pipeline import Engine, Front, FrontOptions, render_view
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
 from flicker.scene.metrics import psnr
-from flicker.scene.packed import PackedFormat, decode
+from flicker.scene.packed import PackedFormat, PackedScene, decode
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, real_scenes
 
@@ -246,6 +247,77 @@ def test_conic_records(demo: View) -> None:
     assert psnr(picture(frame), demo.reference) > 45.0
 
 
+# ---- other widths ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def packed() -> PackedScene:
+    return pack(random_scene(11, 3000), PackedFormat.FP16_LOCAL).packed
+
+
+@pytest.fixture(scope="module")
+def default(packed: PackedScene) -> FrontFrame:
+    return run_front(packed, turned(6))
+
+
+@pytest.mark.parametrize("name", ["mean", "direction", "harmonics", "coefficient", "sums", "term", "key"])
+def test_each_width_matters_and_only_where_it_should(name: str, packed: PackedScene, default: FrontFrame) -> None:
+    """What changes with 3 bits fewer stays within their step; the rest stays as it is."""
+    bits = getattr(FORMATS, name) - (2 if name == "mean" else 3)
+    other = run_front(packed, turned(6), formats=dataclasses.replace(FORMATS, **{name: bits}))
+    a, b = default.splats(), other.splats()
+    if name == "mean":
+        assert (b.mean % 4 == 0).all() and np.abs(a.mean - b.mean).max() == 2.0
+        return
+    assert (a.mean == b.mean).all() and (a.shape == b.shape).all() and (a.opacity == b.opacity).all()
+    if name == "key":
+        assert (other.key == default.key >> 3).all() and default.key.max() >= 1 << 22
+        return
+    off = np.abs(default.unrounded[:, 4:] - other.unrounded[:, 4:])
+    assert (other.key == default.key).all() and 0.0 < np.median(off[off > 0]) and (off > 0).mean() > 0.3
+    assert off.max() < 2.0**-bits * {"direction": 16, "harmonics": 16, "coefficient": 16, "sums": 16 * 2.0**-11, "term": 4}[name]
+
+
+def test_finer_widths_come_closer_to_float64(packed: PackedScene, default: FrontFrame) -> None:
+    """Colours and means, all fixed point widened at once, records left out."""
+    exact = project(decode(packed), turned(6))
+    place = np.full(len(packed), -1)
+    place[exact.index] = np.arange(len(exact.index))
+    fine = FrontFormats(23, 11, 19, mean=9, direction=15, harmonics=15, coefficient=15, sums=7, term=16)
+    errors = []
+    for frame in (default, run_front(packed, turned(6), formats=fine)):
+        j = place[frame.gaussian]
+        near = (j >= 0) & (np.abs(exact.mean[j]) < 900).all(axis=1)  # 20 bits of 1/512 pixel
+        errors.append([np.abs(got - want[j])[near].max() for got, want in ((frame.splats().mean / 128, exact.mean), (frame.unrounded[:, 4:], exact.rgb))])
+    assert errors[1][0] < 0.3 * errors[0][0] and errors[1][1] < 0.2 * errors[0][1]
+
+
+@pytest.mark.parametrize("form", PackedFormat)
+def test_fields_of_default_widths_are_the_record(form: PackedFormat) -> None:
+    frame = run_front(pack(random_scene(12, 2000), form).packed, turned(3))
+    want, got = frame.splats(), splats_of(frame)
+    for field in dataclasses.fields(want):
+        assert (getattr(got, field.name) == getattr(want, field.name)).all(), field.name
+
+
+def test_fields_of_other_widths(default: FrontFrame) -> None:
+    """Each within half its step of what it is rounded from, on numbers of its step, and not those of the record."""
+    frame, want = default, default.splats()
+    fewer = splats_of(frame, Fields(shape=6, colour=6, opacity=5))
+    shape, opacity, rgb = frame.unrounded[:, :3], frame.unrounded[:, 3], frame.unrounded[:, 4:]
+    mantissa = np.ldexp(np.frexp(fewer.shape)[0], 7)
+    assert (mantissa == np.rint(mantissa)).all() and (np.abs(fewer.shape - shape) <= np.abs(shape) * 2.0**-7 + 2.0**-29).all()
+    assert (fewer.rgb * 64 == np.rint(fewer.rgb * 64)).all() and np.abs(fewer.rgb - np.minimum(rgb, 127 / 64)).max() <= 1 / 128
+    assert np.abs(fewer.opacity * 31 - np.rint(fewer.opacity * 31)).max() < 1e-12 and np.abs(fewer.opacity - opacity).max() <= 0.51 / 31
+    for name in ("shape", "opacity", "rgb"):
+        assert (getattr(fewer, name) != getattr(want, name)).mean() > 0.5
+    assert (splats_of(frame, Fields(opacity=None)).opacity == opacity).all()
+    more = splats_of(frame, Fields(opacity=12))
+    assert np.abs(more.opacity - opacity).max() < np.abs(want.opacity - opacity).max() / 4
+    with pytest.raises(FlickerError, match="records of 16 bytes"):
+        splats_of(dataclasses.replace(frame, unrounded=None))
+
+
 # ---- edges -------------------------------------------------------------------------------------------
 
 
@@ -353,6 +425,8 @@ def vars_of(scene: Scene) -> dict[str, np.ndarray]:
 def test_formats_are_checked() -> None:
     with pytest.raises(FlickerError, match="shape must have 10 to 23"):
         FrontFormats(shape=9)
+    with pytest.raises(FlickerError, match="mean must have 5 to 9 bits, not 10"):
+        FrontFormats(mean=10)
     assert FORMATS.position <= 23
 
 

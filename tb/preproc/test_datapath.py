@@ -16,7 +16,7 @@ from datapath_bench import Bench
 from flicker_tb.runner import seed
 
 from flicker.arithmetic.ff import ff_round, ff_value
-from flicker.datapath.units import DEGREE_SUM, SCALE_HEADER, SCALE_STEP
+from flicker.datapath.units import SCALE_HEADER, SCALE_STEP, degree_sum
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import colour, cull, frame, reach, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
@@ -361,9 +361,9 @@ def test_colour_constant(chunked: bool) -> None:
 
 @pytest.mark.parametrize("chunked", [True, False])
 def test_colour_term(chunked: bool) -> None:
-    rng, n = random(9), 1500
-    sums = (rng.normal(size=n) * 2.0 ** rng.integers(0, 22, n)).astype(np.int64).clip(DEGREE_SUM.low, DEGREE_SUM.high)
-    sums[:2] = DEGREE_SUM.low, DEGREE_SUM.high
+    rng, n, limits = random(9), 1500, degree_sum(FORMATS)
+    sums = (rng.normal(size=n) * 2.0 ** rng.integers(0, 22, n)).astype(np.int64).clip(limits.low, limits.high)
+    sums[:2] = limits.low, limits.high
     step = wild(rng, n, C, 105, 130)
     want = np.array([colour.term(v, s if chunked else frame.FP16_STEP, C) for v, s in zip(sums.tolist(), step.tolist())])
     assert chunked != ((np.abs(want) < (1 << 19) - 1).all())

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..golden.front import colour
 from ..golden.front.setup import FORMATS, FrontFormats
 from .emit import module
-from .units import BASIS, CONSTANT, DEGREE_SUM, GROUP_FIRST, GROUP_FOURTH, PIPELINES, TERM
+from .units import PIPELINES, basis_range, constant_range, degree_sum, group_ranges, term_range
 
 PACKAGE = "preproc/flk_front_pkg.sv"
 
@@ -37,8 +36,12 @@ def _package(formats: FrontFormats, latencies: dict[str, int]) -> str:
     for name, bits in (("position", formats.position), ("shape", formats.shape), ("colour", formats.colour), ("cluster", 23)):
         lines.append(f"  typedef logic [{8 + bits}:0] {name}_t;")
     lines += ["", "  // Spherical harmonics, sums of products with coefficients, and what they add to a colour"]
-    lines += [f"  localparam int unsigned TERM_FRACTION = {colour.TERM_FRACTION};"]
-    kinds = {"basis": BASIS, "group_first": GROUP_FIRST, "group_fourth": GROUP_FOURTH, "degree_sum": DEGREE_SUM, "term": TERM, "constant": CONSTANT}
+    lines += [f"  localparam int unsigned TERM_FRACTION = {formats.term};"]
+    first, fourth = group_ranges(formats)
+    kinds = {
+        "basis": basis_range(formats), "group_first": first, "group_fourth": fourth, "degree_sum": degree_sum(formats), "term": term_range(formats),
+        "constant": constant_range(formats),
+    }
     for name, kind in kinds.items():
         lines.append(f"  typedef logic signed [{kind.bits - 1}:0] {name}_t;")
     lines += ["", "  // Cycles from an element to its outputs"]

@@ -11,18 +11,39 @@ from typing import Any
 
 from ..arithmetic.ff import ff_round, ff_sub
 from ..golden.front import colour, cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, FORMATS, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
+from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
 from ..params import SUBTILE, Form
 from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
-MEAN = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) + MAX_PICTURE * 64)  # what `project_one` may give
-REACH = Int(-(1 << (splat.MEAN_BITS - 1)), (1 << (splat.MEAN_BITS - 1)) - 1)
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
 SCALE_HEADER = Int(-(1 << frame.SCALE_HEADER_BITS - 1), (1 << frame.SCALE_HEADER_BITS - 1) - 1)  # low end of log2 scales
 SCALE_STEP = Int(0, (1 << frame.SCALE_STEP_BITS) - 1)
 BANDS = MAX_PICTURE // SUBTILE
-BASIS = Int(-(1 << (colour.BASIS_BITS - 1)), (1 << (colour.BASIS_BITS - 1)) - 1)
-TERM = Int(-(1 << (colour.TERM_BITS - 1)), (1 << (colour.TERM_BITS - 1)) - 1)
+
+
+def _signed(bits: int) -> Int:
+    return Int(-(1 << (bits - 1)), (1 << (bits - 1)) - 1)
+
+
+def reach_range(formats: FrontFormats) -> Int:
+    """Of what is measured from a mean."""
+    return _signed(splat.MEAN_INTEGER + formats.mean)
+
+
+def mean_range(formats: FrontFormats) -> Int:
+    """What `project_one` may give."""
+    far = reach_range(formats)
+    return Int(far.low, far.high + 1 + (MAX_PICTURE << formats.mean - 1))
+
+
+def basis_range(formats: FrontFormats) -> Int:
+    """Of the spherical harmonics."""
+    return _signed(formats.harmonics + 1)
+
+
+def term_range(formats: FrontFormats) -> Int:
+    """Of what is added to a colour."""
+    return _signed(colour.TERM_INTEGER + formats.term)
 
 
 @dataclass(frozen=True)
@@ -80,7 +101,7 @@ def cluster_header(formats: FrontFormats) -> Graph:
         g.output(f"scale_low_{k}", g.to_fixed(scale_low[k], frame.SCALE_HEADER_FRACTION, SCALE_HEADER.bits, True))
         signed = g.to_fixed(scale_step[k], frame.SCALE_HEADER_FRACTION, SCALE_STEP.bits + 1, True)
         g.output(f"scale_step_{k}", g.wire(f"{SCALE_STEP.bits}'({{0}} & ~({{0}} >>> {SCALE_STEP.bits}))", SCALE_STEP, (signed,)))
-        g.output(f"dc_low_{k}", g.to_fixed(dc_low[k], colour.TERM_FRACTION, colour.TERM_BITS, True))
+        g.output(f"dc_low_{k}", g.to_fixed(dc_low[k], formats.term, term_range(formats).bits, True))
         g.output(f"dc_step_{k}", g.ff_round(dc_step[k], C))
         for degree in range(3):
             g.output(f"sh_step_{degree}{k}", g.ff_round(sh[degree][k], C))
@@ -123,10 +144,10 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
     shift, key_low = g.input("key_shift", Int(-128, MAX_KEY_SHIFT), True), g.input("key_low", Ff(P), True)
     const = splat.constants(formats).tolist()
-    p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S)
+    p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S, formats.mean)
     _name(p)
-    x0, x1 = retrace(splat.pixels)(p.x, p.radius_x, width)
-    y0, y1 = retrace(splat.pixels)(p.y, p.radius_y, height)
+    x0, x1 = retrace(splat.pixels)(p.x, p.radius_x, width, formats.mean)
+    y0, y1 = retrace(splat.pixels)(p.y, p.radius_y, height, formats.mean)
     steady = retrace(reach.steady_one)(p, reach.reach_tables(formats)[3], S)
     _name(steady)
     g.output("near", p.near)
@@ -139,7 +160,7 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
             g.output(f"conic_{k}", value)
     for name, value in steady._asdict().items():
         g.output(name, value)
-    g.output("key", retrace(frame.depth_key)(p.t2, shift, key_low, P))
+    g.output("key", retrace(frame.depth_key)(p.t2, shift, key_low, P, formats.key))
     for k, value in enumerate((p.d0, p.d1, p.d2)):
         g.output(f"direction_{k}", g.ff_round(value, formats.colour))
     return g
@@ -152,7 +173,7 @@ def projection_conic(formats: FrontFormats) -> Graph:
 def bounds(formats: FrontFormats) -> Graph:
     """Where a splat of a known opacity reaches."""
     g, S = Graph(), formats.shape
-    x, y = g.input("x", MEAN), g.input("y", MEAN)
+    x, y = (g.input(n, mean_range(formats)) for n in ("x", "y"))
     sx, sy, lean = (g.input(n, Ff(S)) for n in ("sx", "sy", "lean"))
     chunked, box = (g.input(n, BOOL, register=True) for n in ("chunked", "box"))
     opacity = g.input("opacity", HALF)  # code of a chunk, or FP16
@@ -164,7 +185,7 @@ def bounds(formats: FrontFormats) -> Graph:
     half = g.wire("{0} & 16'h7fff", HALF, (opacity,))
     code = g.pick(chunked, g.slice(opacity, 0, 8), retrace(frame.fp16_opacity)(g.from_fp16(half, S), S))
     code = g.wire("8'({0})", Int(0, 255), (code,))
-    r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S)
+    r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S, formats.mean)
     g.output("empty", (r.x0 > r.x1) | (r.y0 > r.y1))
     for name in ("x0", "x1", "y0", "y1"):  # in the picture, if it is not empty
         g.output(name, _bits(g, getattr(r, name)))
@@ -178,12 +199,12 @@ def band(formats: FrontFormats) -> Graph:
     """Sub-tiles of a band that a splat enters."""
     g, S = Graph(), formats.shape
     number, box = g.input("band", Int(0, BANDS - 1)), g.input("box", BOOL, register=True)
-    x, y, right = g.input("x", MEAN), g.input("y", MEAN), g.input("right", REACH)
+    x, y, right = (g.input(n, range_(formats)) for n, range_ in (("x", mean_range), ("y", mean_range), ("right", reach_range)))
     pixel = Int(0, MAX_PICTURE - 1)
     x0, x1, y0, y1 = (g.input(n, pixel) for n in ("x0", "x1", "y0", "y1"))
     l2, i0, kappa, limit = (g.input(n, Ff(S)) for n in ("l2", "i0", "kappa", "limit"))
     r = reach.Reach(x0, x1, y0, y1, i0, kappa, limit, right)
-    a, b = retrace(reach.band_columns)(number, box, x, y, l2, r, S)
+    a, b = retrace(reach.band_columns)(number, box, x, y, l2, r, S, formats.mean)
     g.output("empty", a > b)
     # A band that is not empty begins and ends in the picture.
     for name, column in (("first", a), ("last", b)):
@@ -201,15 +222,15 @@ def colour_basis(formats: FrontFormats) -> Graph:
     g, C = Graph(), formats.colour
     d = g.inputs("direction", Ff(C), (3,), late=True)
     out: list[Any] = [None] * 16
-    retrace(colour.basis_functions)(*d, 3, out, C)
+    retrace(colour.basis_functions)(*d, 3, out, C, formats.direction, formats.harmonics)
     for k in range(1, 16):
         g.output(f"basis_{k}", out[k])
     return g
 
 
-def _coefficient(g: Graph, chunked: Value, used: Value, raw: Value, zero: Value) -> Value:
-    """A coefficient as it stands in the image, as a whole number."""
-    top = (1 << (colour.COEFFICIENT_BITS - 1)) - 1
+def _coefficient(g: Graph, fraction: int, chunked: Value, used: Value, raw: Value, zero: Value) -> Value:
+    """A coefficient as it stands in the image, as a whole number. `flk_coefficient` has the default's bits."""
+    top = (1 << (colour.COEFFICIENT_INTEGER + fraction - 1)) - 1
     operator = Operator("flk_coefficient", ports=("chunked_i", "used_i", "raw_i", "zero_i", "y_o"), clocked=False)
     return g.make(Int(-top, top), operator, (chunked, used, raw, zero))
 
@@ -218,12 +239,13 @@ def colour_group(formats: FrontFormats) -> Graph:
     """Four coefficients of three channels times their functions."""
     g = Graph()
     chunked = g.input("chunked", BOOL, register=True)
-    basis = g.inputs("basis", BASIS, (4,))
+    basis = g.inputs("basis", basis_range(formats), (4,))
     raw = g.inputs("raw", HALF, (4, 3))  # code of a chunk, or FP16
     zero = g.input("zero", Int(0, 511), late=True)
     used = g.inputs("used", BOOL, (4,))
     for c in range(3):
-        first, fourth = retrace(colour.group_sums)(basis, [_coefficient(g, chunked, used[k], raw[k][c], zero) for k in range(4)])
+        coefficient = [_coefficient(g, formats.coefficient, chunked, used[k], raw[k][c], zero) for k in range(4)]
+        first, fourth = retrace(colour.group_sums)(basis, coefficient, formats.harmonics - formats.sums)
         g.output(f"first_{c}", first)
         g.output(f"fourth_{c}", fourth)
     return g
@@ -234,11 +256,11 @@ def colour_constant(formats: FrontFormats) -> Graph:
     g, C = Graph(), formats.colour
     chunked = g.input("chunked", BOOL, register=True)
     dc = g.inputs("dc", HALF, (3,))
-    low, step = g.inputs("low", TERM, (3,), late=True), g.inputs("step", Ff(C), (3,), late=True)
+    low, step = g.inputs("low", term_range(formats), (3,), late=True), g.inputs("step", Ff(C), (3,), late=True)
     for k in range(3):
         code = g.pick(chunked, g.from_fixed(g.slice(dc[k], 0, 8), 0, C), g.from_fp16(dc[k], C))
-        a, b = g.pick(chunked, low[k], 1 << (colour.TERM_FRACTION - 1)), g.pick(chunked, step[k], colour.constant_factor(formats))
-        g.output(f"constant_{k}", retrace(colour.constant_part)(a, b, code, C))
+        a, b = g.pick(chunked, low[k], 1 << (formats.term - 1)), g.pick(chunked, step[k], colour.constant_factor(formats))
+        g.output(f"constant_{k}", retrace(colour.constant_part)(a, b, code, C, formats.term))
     return g
 
 
@@ -246,20 +268,27 @@ def colour_term(formats: FrontFormats) -> Graph:
     """What a degree adds to a channel."""
     g, C = Graph(), formats.colour
     chunked = g.input("chunked", BOOL, register=True)
-    sum_, step = g.input("sum", DEGREE_SUM), g.input("step", Ff(C), late=True)
-    g.output("term", retrace(colour.term)(sum_, g.pick(chunked, step, frame.FP16_STEP), C))
+    sum_, step = g.input("sum", degree_sum(formats)), g.input("step", Ff(C), late=True)
+    g.output("term", retrace(colour.term)(sum_, g.pick(chunked, step, 2.0**-formats.coefficient), C, formats.sums, formats.term))
     return g
 
 
-def _sums() -> tuple[Int, Int]:
+def group_ranges(formats: FrontFormats) -> tuple[Int, Int]:
     """What a group's sum of three products and its fourth may be."""
-    outputs = colour_group(FORMATS).outputs
+    outputs = colour_group(formats).outputs
     return outputs["first_0"].range, outputs["fourth_0"].range
 
 
-GROUP_FIRST, GROUP_FOURTH = _sums()
-DEGREE_SUM = Int(2 * (GROUP_FIRST.low + GROUP_FOURTH.low), 2 * (GROUP_FIRST.high + GROUP_FOURTH.high))  # of two groups
-CONSTANT = Int(2 * TERM.low, 2 * TERM.high)
+def degree_sum(formats: FrontFormats) -> Int:
+    """Of two groups."""
+    first, fourth = group_ranges(formats)
+    return Int(2 * (first.low + fourth.low), 2 * (first.high + fourth.high))
+
+
+def constant_range(formats: FrontFormats) -> Int:
+    """Of a colour's constant part."""
+    one = term_range(formats)
+    return Int(2 * one.low, 2 * one.high)
 
 PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),

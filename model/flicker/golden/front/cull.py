@@ -65,24 +65,24 @@ class Culled:
 NEAR_FF = float(rounded(NEAR, CLUSTER_M))
 
 
-def key_scale(nearest: float, farthest: float) -> int:
-    """Key shift: the finest step 2^-shift with which the depths from nearest to farthest have keys of 24 bits, at most `MAX_KEY_SHIFT`.
+def key_scale(nearest: float, farthest: float, bits: int = KEY_BITS) -> int:
+    """Key shift: the finest step 2^-shift with which the depths from nearest to farthest have keys of `bits` bits, at most `MAX_KEY_SHIFT`.
 
-    It is 23 less the exponent of the distance.
+    It is one less than the bits, less the exponent of the distance.
     """
     span = float(ff_sub(farthest, nearest, CLUSTER_M))
-    return min(KEY_BITS - int(np.frexp(span)[1]), MAX_KEY_SHIFT) if span > 0.0 else MAX_KEY_SHIFT
+    return min(bits - int(np.frexp(span)[1]), MAX_KEY_SHIFT) if span > 0.0 else MAX_KEY_SHIFT
 
 
 def cull(packed: PackedScene, setup: FrameSetup) -> Culled:
     """Test the clusters of a scene."""
-    table = packed.table
+    table, bits = packed.table, setup.formats.key
     low, high = image_floats(table["low"]), image_floats(table["high"])
     keep, depth = np.zeros(len(table), np.bool_), np.zeros((len(table), 2))
     _cull(low, high, image_floats(packed.sigma), setup.position, setup.normal, setup.offset, setup.reach, keep, depth)
     if not keep.any():
-        return Culled(keep, NEAR_FF, NEAR_FF, key_scale(NEAR_FF, NEAR_FF))
+        return Culled(keep, NEAR_FF, NEAR_FF, key_scale(NEAR_FF, NEAR_FF, bits))
     nearest = max(float(depth[keep, 0].min()), NEAR_FF)
     farthest = max(float(depth[keep, 1].max()), nearest)
-    return Culled(keep, nearest, farthest, key_scale(nearest, farthest))
+    return Culled(keep, nearest, farthest, key_scale(nearest, farthest, bits))
 

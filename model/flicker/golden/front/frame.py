@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numba
@@ -22,8 +22,7 @@ from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .colour import (
     COEFFICIENT_FRACTION,
     COLOUR_LIMIT,
-    TERM_BITS,
-    TERM_FRACTION,
+    TERM_INTEGER,
     basis_functions,
     colour_code,
     constant_factor,
@@ -35,7 +34,7 @@ from .colour import (
 from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means, to_fp16
-from .setup import CLUSTER_M, FORMATS, KEY_BITS, FrameSetup, FrontFormats, image_floats
+from .setup import CLUSTER_M, FORMATS, KEY_BITS, MEAN_FRACTION, FrameSetup, FrontFormats, image_floats
 from .splat import conic_one, constants, largest_component, pixels, place_largest, project_one
 
 SCALE_HEADER_FRACTION = 20  # fraction bits of log2 scale's low end and step
@@ -93,12 +92,12 @@ def lanes_of(packed: PackedScene) -> Lanes:
 
 
 @numba.njit(cache=True)
-def _cluster_values(origin, step, position, dc, sh, M, P, C, out_low, out_step, out_dc_low, out_dc_step, out_sh):
+def _cluster_values(origin, step, position, dc, sh, M, P, C, fraction, out_low, out_step, out_dc_low, out_dc_step, out_sh):
     for i in range(origin.shape[0]):
         for k in range(3):
             out_low[i, k] = ff_round(ff_sub(origin[i, k], position[k], M), P)
             out_step[i, k] = ff_round(step[i, k], P)
-            out_dc_low[i, k] = ff_to_fixed_round(dc[i, k, 0], TERM_FRACTION, TERM_BITS)
+            out_dc_low[i, k] = ff_to_fixed_round(dc[i, k, 0], fraction, fraction + TERM_INTEGER)
             out_dc_step[i, k] = ff_round(dc[i, k, 1], C)
             for d in range(3):
                 out_sh[i, d, k] = ff_round(sh[i, d, k], C)
@@ -120,7 +119,7 @@ def cluster_values(packed: PackedScene, setup: FrameSetup) -> ClusterValues:
     else:
         origin, given = image_floats(h["origin"]), np.ones((n, 3))
         given_dc, given_sh = np.zeros((n, 3, 2)), np.ones((n, 3, 3))
-    _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, low, step, dc_low, dc_step, sh)
+    _cluster_values(origin, given, setup.position, given_dc, given_sh, CLUSTER_M, f.position, f.colour, f.term, low, step, dc_low, dc_step, sh)
     return ClusterValues(low, step, fixed[0], fixed[1], dc_low, dc_step, sh)
 
 
@@ -147,7 +146,7 @@ def _quaternion(chunked, c, M):
 
 
 @numba.njit
-def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S):
+def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, fraction=MEAN_FRACTION):
     """Projection of Gaussian i."""
     c = lanes.cluster[i]
     s = np.empty(3)
@@ -156,19 +155,20 @@ def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, 
     w, x, y, z = _quaternion(lanes.chunked, lanes.quat[i], S)
     return project_one(
         values.low[c], values.step[c], lanes.q[i], s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S,
+        fraction,
     )
 
 
 @numba.njit
-def depth_key(depth, shift, low, M):
+def depth_key(depth, shift, low, M, bits=KEY_BITS):
     """Key of a depth: its steps of 2^-shift beyond the lowest depth, saturated. The difference keeps the order; numbers next to each other may share a key."""
-    return max(ff_to_fixed_floor(ff_ldexp(ff_sub(depth, low, M), shift, M), 0, KEY_BITS + 1), 0)
+    return max(ff_to_fixed_floor(ff_ldexp(ff_sub(depth, low, M), shift, M), 0, bits + 1), 0)
 
 
 @numba.njit
-def fp16_opacity(opacity, M):
-    """Code of an opacity, an ff number."""
-    return min(ff_to_fixed_round(ff_mul(255.0, opacity, M), 0, 16), OPACITY_LIMIT)
+def fp16_opacity(opacity, M, limit=OPACITY_LIMIT):
+    """Code of an opacity, an ff number; that of 1 is `limit`."""
+    return min(ff_to_fixed_round(ff_mul(1.0 * limit, opacity, M), 0, 16), limit)
 
 
 @numba.njit
@@ -180,69 +180,70 @@ def opacity_code(chunked, opacity, M):
 
 
 @numba.njit
-def colour_lane(i, lanes, values, p, factor, M, basis, coefficient, rgb):
-    """Colour of Gaussian i into rgb (3,), whole numbers of 13 fraction bits; it may be negative. factor: of the constant function. basis, coefficient:
+def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
+    """Colour of Gaussian i into rgb (3,), whole numbers of w.term (13) fraction bits; it may be negative. factor: of the constant function. basis, coefficient:
     (17,) of whole numbers, overwritten."""
     c, count = lanes.cluster[i], lanes.count[i]
     basis[:], coefficient[:] = 0, 0
     degree = 0 if count == 1 else (1 if count == 4 else (2 if count == 9 else 3))
     if degree:
-        basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), degree, basis, M)
+        basis_functions(ff_round(p.d0, M), ff_round(p.d1, M), ff_round(p.d2, M), degree, basis, M, w.direction, w.harmonics)
+    drop, half_step = w.harmonics - w.sums, 2.0**-w.coefficient
     for channel in range(3):
-        low = pick(lanes.chunked, values.dc_low[c, channel], 1 << (TERM_FRACTION - 1))
+        low = pick(lanes.chunked, values.dc_low[c, channel], 1 << (w.term - 1))
         step = pick(lanes.chunked, values.dc_step[c, channel], factor)
-        total = constant_part(low, step, ff_round(lanes.dc[i, channel], M), M)
+        total = constant_part(low, step, ff_round(lanes.dc[i, channel], M), M, w.term)
         for j in range(1, count):
             value = np.float64(lanes.sh[i, j - 1, channel])
-            coefficient[j] = np.int64(value) if lanes.chunked else half_coefficient(value)
-        a, b = group_sums(basis[1:5], coefficient[1:5])
-        e, f = group_sums(basis[5:9], coefficient[5:9])
-        g, h = group_sums(basis[9:13], coefficient[9:13])
-        k, l = group_sums(basis[13:17], coefficient[13:17])  # noqa: E741
+            coefficient[j] = np.int64(value) if lanes.chunked else half_coefficient(value, w.coefficient)
+        a, b = group_sums(basis[1:5], coefficient[1:5], drop)
+        e, f = group_sums(basis[5:9], coefficient[5:9], drop)
+        g, h = group_sums(basis[9:13], coefficient[9:13], drop)
+        k, l = group_sums(basis[13:17], coefficient[13:17], drop)  # noqa: E741
         sums = (a, b + e + f, g + h + k + l)
         for d in range(degree):
-            total += term(sums[d], pick(lanes.chunked, values.sh_step[c, d, channel], FP16_STEP), M)
+            total += term(sums[d], pick(lanes.chunked, values.sh_step[c, d, channel], half_step), M, w.sums, w.term)
         rgb[channel] = total
 
 
 @numba.njit(parallel=True, cache=True)
 def _splats(
     index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, factor, logs, sigmas, cut, inverse, box, conic,
-    shift, key_low, P, S, C, outcome, key, words, halves, entries, flags, places, numbers,
+    shift, key_low, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
     none = np.empty(0, np.int32)
     for j in numba.prange(len(index)):
         i = index[j]
-        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S)
+        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, w.mean)
         if p.near:
             outcome[j] = Outcome_NEAR
             continue
-        x0, x1 = pixels(p.x, p.radius_x, width)
-        y0, y1 = pixels(p.y, p.radius_y, height)
+        x0, x1 = pixels(p.x, p.radius_x, width, w.mean)
+        y0, y1 = pixels(p.y, p.radius_y, height, w.mean)
         if x0 > x1 or y0 > y1:
             outcome[j] = Outcome_OUTSIDE
             continue
         code = opacity_code(lanes.chunked, lanes.opacity[i], S)
         steady = steady_one(p, inverse, S)
-        r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S)
-        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none) if code > 0 else 0
+        r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S, w.mean)
+        count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none, w.mean) if code > 0 else 0
         outcome[j] = Outcome_LISTED if count > 0 else (Outcome_MISSED if code > 0 else Outcome_FAINT)
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
-        key[j] = depth_key(p.t2, shift, key_low, P)
+        key[j] = depth_key(p.t2, shift, key_low, P, w.key)
         flags[j, 0] = p.far
         rgb = np.empty(3, np.int64)
-        colour_lane(i, lanes, values, p, factor, C, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
+        colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
+        unrounded[j, 0], unrounded[j, 1], unrounded[j, 2] = conic_one(p, S) if conic else (p.l0, p.l1, p.l2)
+        unrounded[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
+        for k in range(3):
+            unrounded[j, 4 + k] = max(rgb[k], 0) / (1 << w.term)
+        flags[j, 2] = p.spiky
         if conic:
-            halves[j, 0], halves[j, 1], halves[j, 2] = conic_one(p, S)
-            halves[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
-            for k in range(3):
-                halves[j, 4 + k] = max(rgb[k], 0) / (1 << TERM_FRACTION)
             words[j, 0], words[j, 1] = p.x, p.y
-            flags[j, 2] = p.spiky
             continue
         x, y = encode_mean(p.x), encode_mean(p.y)
         low = np.uint64(x) | np.uint64(y) << np.uint64(23)
@@ -251,7 +252,7 @@ def _splats(
         low |= np.uint64(l1 & 15) << np.uint64(60)
         high = np.uint64(l1 >> 4) | np.uint64(p.l1 < 0.0) << np.uint64(10) | np.uint64(l2) << np.uint64(11) | np.uint64(code) << np.uint64(25)
         for k in range(3):
-            v = colour_code(rgb[k])
+            v = colour_code(rgb[k], w.term)
             if v > COLOUR_LIMIT:
                 v = COLOUR_LIMIT
                 flags[j, 1] = True
@@ -261,11 +262,11 @@ def _splats(
 
 
 @numba.njit(parallel=True, cache=True)
-def _entries(start, places, numbers, box, cols, S, tile, mask):
+def _entries(start, places, numbers, box, cols, S, fraction, tile, mask):
     """Entries of the splats that `_splats` left in places and numbers, those of the j-th from place start[j] on."""
     for j in numba.prange(len(start) - 1):
         a, b = places[j], numbers[j]
-        tiles_of(box, a[0], a[1], b[0], Reach(a[2], a[3], a[4], a[5], b[1], b[2], b[3], a[6]), cols, S, start[j], tile, mask)
+        tiles_of(box, a[0], a[1], b[0], Reach(a[2], a[3], a[4], a[5], b[1], b[2], b[3], a[6]), cols, S, start[j], tile, mask, fraction)
 
 
 @dataclass(eq=False)
@@ -278,6 +279,7 @@ class FrontFrame:
     key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
     clusters_kept: of the cluster test. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
+    unrounded: float64 (R, 7), what shape (3), opacity and colour (3) of the records are rounded from; None where the RTL made the frame.
     """
 
     camera: Camera
@@ -293,10 +295,14 @@ class FrontFrame:
     entry_mask: np.ndarray
     outcomes: dict[str, int]
     adjusted: dict[str, int]
+    unrounded: np.ndarray | None = None
+    formats: FrontFormats = FORMATS
 
     def splats(self) -> Splats:
-        """What the records mean."""
-        return decode_records(self.records, self.kind)
+        """What the records mean. Means are float64 where the format has other than 1/128 pixel."""
+        splats = decode_records(self.records, self.kind)
+        off = MEAN_FRACTION - self.formats.mean
+        return replace(splats, mean=splats.mean * 2.0**off) if off else splats
 
     def sorted_subtiles(self) -> tuple[np.ndarray, np.ndarray]:
         """start int64 (S + 1,), record int32: records of each sub-tile, row by row, by key, equal keys in record order."""
@@ -350,41 +356,42 @@ def run_front(
     n = len(index)
     outcome, key, words = np.zeros(n, np.int8), np.zeros(n, np.uint32), np.zeros((n, 2), np.int64)
     conic = kind is RecordKind.CONIC32
-    halves, entries, flags = np.zeros((n, 7) if conic else (0, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
+    unrounded, entries, flags = np.zeros((n, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
     places, numbers = np.zeros((n, 7), np.int64), np.zeros((n, 4))
     registers = (setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit, setup.width, setup.height, constants(formats))
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
-        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C,
-        outcome, key, words, halves, entries, flags, places, numbers,
+        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C, formats.widths,
+        outcome, key, words, unrounded, entries, flags, places, numbers,
     )
     kept = np.flatnonzero(outcome >= Outcome.FAINT)
     gaussian = index[kept]
     start = np.concatenate([[0], np.cumsum(entries[kept])])
     tile, mask = np.empty(start[-1], np.int32), np.empty(start[-1], np.uint8)
-    _entries(start, places[kept], numbers[kept], box, -(-camera.width // TILE), S, tile, mask)
+    _entries(start, places[kept], numbers[kept], box, -(-camera.width // TILE), S, formats.mean, tile, mask)
     cluster = packed.cluster[gaussian]
     before = np.searchsorted(cluster, np.arange(len(packed.table)))
     number = packed.first[cluster] + np.arange(len(gaussian)) - before[cluster]
     outcomes = {OUTCOMES[Outcome.CULLED]: len(packed) - n}
     outcomes |= {OUTCOMES[k]: int((outcome == k).sum()) for k in range(1, 6)}
-    records, adjusted = _records(kind, words[kept], halves[kept] if conic else halves, flags[kept])
+    unrounded = unrounded[kept]
+    records, adjusted = _records(kind, words[kept], unrounded, flags[kept])
     return FrontFrame(
         camera, packed, kind, int(culled.keep.sum()), gaussian, number, records, key[kept],
-        np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted,
+        np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted, unrounded, formats,
     )
 
 
-def _records(kind: RecordKind, words: np.ndarray, halves: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
+def _records(kind: RecordKind, words: np.ndarray, unrounded: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
     """uint8 (R, bytes) and what did not fit."""
     if kind is RecordKind.FACTORED16:
         adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "colour above 2 clipped": int(flags[:, 1].sum())}
         return np.ascontiguousarray(words).view(np.uint8).reshape(-1, 16), {k: v for k, v in adjusted.items() if v}
     records = np.zeros((len(words), 32), np.uint8)
     records[:, :8] = words.astype("<i4").view(np.uint8)
-    beyond = (np.abs(halves) > 65504.0).any(axis=1)
-    records[:, 8:22] = to_fp16(halves).view(np.uint8)
+    beyond = (np.abs(unrounded) > 65504.0).any(axis=1)
+    records[:, 8:22] = to_fp16(unrounded).view(np.uint8)
     records[:, 22] = flags[:, 2]
     adjusted = {"mean beyond 2^22 pixels": int(flags[:, 0].sum()), "value beyond FP16 clamped": int(beyond.sum())}
     return records, {k: v for k, v in adjusted.items() if v}

@@ -18,7 +18,7 @@ import numpy as np
 from ...arithmetic.ff import ff_add, ff_from_fixed, ff_mul, ff_sqrt, ff_sub, ff_to_fixed_round, pick
 from ...params import SUBTILE, TILE
 from .setup import MEAN_FRACTION, FrontFormats, rounded
-from .splat import MEAN_BITS, SHAPE_SCALE, pixels
+from .splat import MEAN_INTEGER, SHAPE_SCALE, pixels
 
 SIGMAS = 3.0
 _BAND = SUBTILE - 1
@@ -51,57 +51,57 @@ def steady_one(p, inverse, S):
 
 
 @numba.njit
-def reach_one(x, y, sx, sy, steady, code, box, width, height, logs, sigmas, cut, S):
+def reach_one(x, y, sx, sy, steady, code, box, width, height, logs, sigmas, cut, S, fraction=MEAN_FRACTION):
     """Bounds of a splat. x, y: mean in 1/128 pixel. sx, sy: ff, standard deviations. code: 255 times the opacity."""
-    far = pick(box, SIGMAS, cut[code])
-    x0, x1 = pixels(x, ff_to_fixed_round(ff_mul(far, sx, S), MEAN_FRACTION, MEAN_BITS), width)
-    y0, y1 = pixels(y, ff_to_fixed_round(ff_mul(far, sy, S), MEAN_FRACTION, MEAN_BITS), height)
-    right = ff_to_fixed_round(ff_mul(sigmas[code], steady.lean, S), MEAN_FRACTION, MEAN_BITS)
+    far, bits = pick(box, SIGMAS, cut[code]), fraction + MEAN_INTEGER
+    x0, x1 = pixels(x, ff_to_fixed_round(ff_mul(far, sx, S), fraction, bits), width, fraction)
+    y0, y1 = pixels(y, ff_to_fixed_round(ff_mul(far, sy, S), fraction, bits), height, fraction)
+    right = ff_to_fixed_round(ff_mul(sigmas[code], steady.lean, S), fraction, bits)
     return Reach(x0, x1, y0, y1, steady.i0, steady.kappa, logs[code], right)
 
 
 @numba.njit
-def half_chord(dy, l2, i0, kappa, limit, S):
+def half_chord(dy, l2, i0, kappa, limit, S, fraction=MEAN_FRACTION):
     """Where the ellipse is dy (1/128 pixel) below the mean: its middle and half its width there, ff."""
-    d = ff_from_fixed(dy, MEAN_FRACTION, S)
+    d = ff_from_fixed(dy, fraction, S)
     v = ff_mul(l2, d, S)
     return ff_mul(kappa, d, S), ff_mul(i0, ff_sqrt(ff_sub(limit, ff_mul(v, v, S), S), S), S)
 
 
 @numba.njit
-def band_columns(band, box, x, y, l2, r, S):
+def band_columns(band, box, x, y, l2, r, S, fraction=MEAN_FRACTION):
     """First and last pixel column that the splat enters in a band with rows of its own, rows 8 band to 8 band + 7; the first is past the last where
     there is none. r: Reach."""
-    low, high = (max(band * SUBTILE, r.y0) << MEAN_FRACTION) - y, (min(band * SUBTILE + _BAND, r.y1) << MEAN_FRACTION) - y
-    middle, half = half_chord(min(max(r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
-    right = x + ff_to_fixed_round(ff_add(middle, half, S), MEAN_FRACTION, MEAN_BITS)
-    middle, half = half_chord(min(max(-r.right, low), high), l2, r.i0, r.kappa, r.limit, S)
-    left = x + ff_to_fixed_round(ff_sub(middle, half, S), MEAN_FRACTION, MEAN_BITS)
-    one = 1 << MEAN_FRACTION
-    return pick(box, r.x0, max((left + one - 1) >> MEAN_FRACTION, r.x0)), pick(box, r.x1, min(right >> MEAN_FRACTION, r.x1))
+    low, high = (max(band * SUBTILE, r.y0) << fraction) - y, (min(band * SUBTILE + _BAND, r.y1) << fraction) - y
+    middle, half = half_chord(min(max(r.right, low), high), l2, r.i0, r.kappa, r.limit, S, fraction)
+    right = x + ff_to_fixed_round(ff_add(middle, half, S), fraction, fraction + MEAN_INTEGER)
+    middle, half = half_chord(min(max(-r.right, low), high), l2, r.i0, r.kappa, r.limit, S, fraction)
+    left = x + ff_to_fixed_round(ff_sub(middle, half, S), fraction, fraction + MEAN_INTEGER)
+    one = 1 << fraction
+    return pick(box, r.x0, max((left + one - 1) >> fraction, r.x0)), pick(box, r.x1, min(right >> fraction, r.x1))
 
 
 @numba.njit
-def band_subtiles(band, box, x, y, l2, r, S):
+def band_subtiles(band, box, x, y, l2, r, S, fraction=MEAN_FRACTION):
     """First and last sub-tile column that is entered in a band; the first is past the last where there is none."""
     if max(band * SUBTILE, r.y0) > min(band * SUBTILE + _BAND, r.y1):
         return 1, 0
-    a, b = band_columns(band, box, x, y, l2, r, S)
+    a, b = band_columns(band, box, x, y, l2, r, S, fraction)
     if a > b:
         return 1, 0
     return a // SUBTILE, b // SUBTILE
 
 
 @numba.njit
-def tiles_of(box, x, y, l2, r, cols, S, start, tile, mask):
+def tiles_of(box, x, y, l2, r, cols, S, start, tile, mask, fraction=MEAN_FRACTION):
     """Write the entries of a splat, tile row by tile row, from place `start` of tile and mask (no writing where they are empty); their number.
 
     mask: bit 2 (row of sub-tiles) + column.
     """
     n = 0
     for row in range(r.y0 // TILE, r.y1 // TILE + 1):
-        a0, a1 = band_subtiles(2 * row, box, x, y, l2, r, S)
-        b0, b1 = band_subtiles(2 * row + 1, box, x, y, l2, r, S)
+        a0, a1 = band_subtiles(2 * row, box, x, y, l2, r, S, fraction)
+        b0, b1 = band_subtiles(2 * row + 1, box, x, y, l2, r, S, fraction)
         if a0 > a1:
             low, high = b0, b1
         elif b0 > b1:

@@ -59,20 +59,20 @@ def decode_mean(field):
 
 
 @numba.njit
-def encode_shape(v):
-    """14 bits of a positive ff number: exponent (bias 30) and 9 bits of mantissa; too small: 0, too large: the largest."""
-    r = ff_round(v, SHAPE_MANTISSA)
+def encode_shape(v, bits=SHAPE_MANTISSA):
+    """14 bits of a positive ff number: exponent (bias 30) and 9 `bits` of mantissa; too small: 0, too large: the largest."""
+    r = ff_round(v, bits)
     if r <= 0.0:
         return 0
     mantissa, exponent = math.frexp(r)
-    code = ((exponent - 1 + SHAPE_BIAS) << SHAPE_MANTISSA) + np.int64((2.0 * mantissa - 1.0) * (1 << SHAPE_MANTISSA))
-    return 0 if code < 1 << SHAPE_MANTISSA else min(code, (1 << (SHAPE_MANTISSA + 5)) - 1)
+    code = ((exponent - 1 + SHAPE_BIAS) << bits) + np.int64((2.0 * mantissa - 1.0) * (1 << bits))
+    return 0 if code < 1 << bits else min(code, (1 << (bits + 5)) - 1)
 
 
-def decode_shape(code: np.ndarray) -> np.ndarray:
+def decode_shape(code: np.ndarray, bits: int = SHAPE_MANTISSA) -> np.ndarray:
     """float64 of the 14 bits."""
-    exponent, mantissa = code >> SHAPE_MANTISSA, code & ((1 << SHAPE_MANTISSA) - 1)
-    return np.where(exponent > 0, np.ldexp(1.0 + mantissa / (1 << SHAPE_MANTISSA), exponent.astype(np.int32) - SHAPE_BIAS), 0.0)
+    exponent, mantissa = code >> bits, code & ((1 << bits) - 1)
+    return np.where(exponent > 0, np.ldexp(1.0 + mantissa / (1 << bits), exponent.astype(np.int32) - SHAPE_BIAS), 0.0)
 
 
 @dataclass(frozen=True, eq=False)

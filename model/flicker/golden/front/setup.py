@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -22,19 +23,42 @@ _RADIUS_MARGIN = 3.0 * np.sqrt(DILATION + np.sqrt(0.1)) + 2.0
 _SLACK = 1.0 + 2.0**-14
 
 
+# What numba functions take of `FrontFormats`: whole numbers' bits.
+Widths = namedtuple("Widths", "mean direction harmonics coefficient sums term key")
+_RANGES = {"mean": (5, 9), "direction": (8, 15), "harmonics": (8, 15), "coefficient": (8, 15), "sums": (2, 7), "term": (10, 16), "key": (8, 30)}
+
+
 @dataclass(frozen=True)
 class FrontFormats:
-    """Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape,
-    lists. colour: SH."""
+    """Bits of the front end's numbers. The RTL is that of the defaults; other formats are for measurements.
+
+    Mantissa bits of the ff numbers. position: from the mean in the world to the mean on the screen and the depth. shape: covariance, shape,
+    lists. colour: SH.
+    Fraction bits of fixed point. mean: pixels on the screen. direction, harmonics: of the view and of the functions in it. coefficient: of one that was FP16.
+    sums: of a degree's products, in units of its coefficients. term: of what is added to a colour. key: bits of the depth key.
+    """
 
     position: int = 19
     shape: int = 11
     colour: int = 11
+    mean: int = MEAN_FRACTION
+    direction: int = 12
+    harmonics: int = 11
+    coefficient: int = 11
+    sums: int = 5
+    term: int = 13
+    key: int = KEY_BITS
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if not 10 <= (bits := getattr(self, field.name)) <= CLUSTER_M:
-                raise FlickerError(f"front end: {field.name} must have 10 to {CLUSTER_M} mantissa bits, not {bits}")
+            low, high = _RANGES.get(field.name, (10, CLUSTER_M))
+            if not low <= (bits := getattr(self, field.name)) <= high:
+                raise FlickerError(f"front end: {field.name} must have {low} to {high} bits, not {bits}")
+
+    @property
+    def widths(self) -> Widths:
+        """Of all that is no ff number."""
+        return Widths(*(getattr(self, name) for name in Widths._fields))
 
 
 FORMATS = FrontFormats()

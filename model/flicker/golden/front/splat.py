@@ -26,8 +26,8 @@ from .setup import MEAN_FRACTION, FrontFormats, rounded
 
 SHAPE_SCALE = math.sqrt(0.5 * math.log2(math.e))
 LARGEST_REST = 1023 * 1023 * 2  # what three rotation codes 2 code - 1023 leave for the square of the largest: (1023 sqrt(2))^2
-MEAN_BITS = 30  # of a mean in 1/128 pixel, saturated: 2^22 pixels on either side of the middle
-MEAN_TOP = (1 << (MEAN_BITS - 1)) - 1
+MEAN_INTEGER = 23  # of a mean in pixels, with its sign, saturated: 2^22 on either side of the middle
+MEAN_BITS = MEAN_INTEGER + MEAN_FRACTION
 _TRACE_FACTOR = (SPIKY_AXIS_RATIO**2 + 1.0) ** 2 / SPIKY_AXIS_RATIO**2  # trace^2 / det where the axis ratio is that of the threshold
 
 
@@ -74,9 +74,9 @@ Projection = namedtuple(
 
 
 @numba.njit
-def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S):
+def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, fraction=MEAN_FRACTION):
     """Projection of a Gaussian. d0c: (3,) of the cluster, ff (P bits), stepc: (3,); q: (3,) ff numbers of the mean; s: (3,) ff (S bits); w to z:
-    quaternion, any length.
+    quaternion, any length. fraction: of means and radii, 1/128 pixel where it is 7.
 
     Without `near` (nearer than 0.2) the other values mean nothing.
     """
@@ -90,10 +90,11 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     iz = ff_recip(t2, P)
     tx = ff_mul(t0, iz, P)
     ty = ff_mul(t1, iz, P)
-    half = 1 << (MEAN_FRACTION - 1)
-    off_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), MEAN_FRACTION, MEAN_BITS)
-    off_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), MEAN_FRACTION, MEAN_BITS)
-    far = (off_x >= MEAN_TOP) | (off_x < -MEAN_TOP) | (off_y >= MEAN_TOP) | (off_y < -MEAN_TOP)
+    half, bits = 1 << (fraction - 1), fraction + MEAN_INTEGER
+    top = (1 << (bits - 1)) - 1
+    off_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), fraction, bits)
+    off_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), fraction, bits)
+    far = (off_x >= top) | (off_x < -top) | (off_y >= top) | (off_y < -top)
     screen_x, screen_y = off_x + (width - 1) * half, off_y + (height - 1) * half
     ax = min(max(ff_round(tx, S), ff_neg(limit[0])), limit[0])
     ay = min(max(ff_round(ty, S), ff_neg(limit[1])), limit[1])
@@ -138,8 +139,8 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     l0 = ff_mul(yy, m, S)
     l1 = ff_neg(ff_mul(xy, m, S))
     sx, sy = ff_mul(xx, rxx, S), ff_mul(yy, ryy, S)
-    radius_x = ff_to_fixed_round(ff_mul(3.0, sx, S), MEAN_FRACTION, MEAN_BITS)
-    radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), MEAN_FRACTION, MEAN_BITS)
+    radius_x = ff_to_fixed_round(ff_mul(3.0, sx, S), fraction, bits)
+    radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), fraction, bits)
     return Projection(
         d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
         s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy,
@@ -158,8 +159,8 @@ def conic_one(p, S):
 
 
 @numba.njit
-def pixels(centre, reach, size):
+def pixels(centre, reach, size, fraction=MEAN_FRACTION):
     """First and last pixel centre of 0..size - 1 within centre +- reach, both in 1/128 pixel; the first is past the last where there is none."""
-    first = -((reach - centre) >> MEAN_FRACTION)  # rounded up
-    last = (centre + reach) >> MEAN_FRACTION
+    first = -((reach - centre) >> fraction)  # rounded up
+    last = (centre + reach) >> fraction
     return max(first, 0), min(last, size - 1)
