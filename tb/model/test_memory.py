@@ -15,7 +15,7 @@ import pytest
 from flicker_tb.runner import seed
 
 from flicker.chip.constants import DRAM_LATENCY_CYCLES
-from flicker.chip.dram import DramConfig, port_config
+from flicker.chip.dram import DramConfig, Refresh, port_config
 from flicker.errors import FlickerError
 from flicker.sim.memory import Memory, Order, Port, PortConfig, Resp, WriteOrder
 
@@ -303,6 +303,25 @@ def test_urgent_bursts_pass_what_waits_for_the_dram():
         assert m.counts().bursts == 32 * len(crowd) + 2
     assert waits["urgent"] < waits["alone"] + TIMING.window * TIMING.half + 16 < waits["not urgent"] / 3
     assert waits["urgency off"] == waits["not urgent"]
+
+
+def test_urgent_bursts_have_a_lead_in_the_queue():
+    """An urgent write among reads of its row: the turn of the bus may cost as many clocks as the lead, and no more."""
+    turn = TIMING.read_write - TIMING.ccd  # what a write among reads costs
+    ended = {}
+    for lead in (0, turn - 1, turn + 1):
+        m = Memory(DramConfig(refresh=Refresh.NONE, urgent_lead=lead).timing)
+        m.allocate(0, 1 << 22)
+        manager = Manager(Port(m, port_config(max_reads=256, hazards=False, urgent=8)))
+        one_channel = DramConfig().channels * DramConfig().interleave_bytes
+        crowd = [manager.read(Burst(one_channel * k, 1, id=0)) for k in range(14)]
+        for _ in range(60):  # the row is open, reads move
+            manager.step()
+        manager.write(write := Burst(one_channel * 15, 1, id=1, qos=8, data=[(bytes(64), (1 << 64) - 1)]))
+        manager.run(100_000)
+        ended[lead] = sum(c.ended > write.ended for c in crowd)
+        assert m.counts().activates == 1
+    assert ended[0] == ended[turn - 1] == 0 < ended[turn + 1]
 
 
 # ---- answers with errors -----------------------------------------------------------------------

@@ -2,6 +2,7 @@
 //
 // Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is served, the oldest among equals, so that row
 // hits go first, activates overlap with the data of other banks and the bus turns as rarely as the window allows; a burst is passed over at most 4 x window times.
+// Urgent bursts are chosen as if their data could move `lead` clocks earlier.
 // Refresh: all banks of a channel every tREFI, for tRFCab; or one bank every tREFI / banks, for tRFCpb, while the others go on: of those that the round has still
 // to refresh the one that fewest bursts in the queue wait for. It counts as an activate for tRRD and tFAW.
 // Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed
@@ -27,7 +28,7 @@ enum Kind : int8_t { READ = 0, WRITE = 1, MASKED_WRITE = 2 };
 
 // Organisation and timing, as chip/dram.py hands them in: sim/memory.py has the same fields in the same order. Clocks unless named otherwise.
 struct Timing {
-  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window;
+  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window, lead;
   int64_t rcd, rp, rp_all, ras, rrd, faw, ccd, ccd_masked, rtp;
   int64_t write_pre, write_read, read_write;  // write to precharge, write to read, read to write
   int64_t refi, rfc, rfc_bank;                // refi 0: no refresh; rfc_bank 0: all banks at once, for rfc
@@ -84,12 +85,13 @@ class Channel {
   bool full() const { return waiting_ == t_.window; }
 
   // A burst that waits from `clock` on, or from the column command that freed its place. Not when full.
-  void push(int64_t bank, int64_t row, int8_t kind, int64_t clock = 0, Completion* done = nullptr) {
+  void push(int64_t bank, int64_t row, int8_t kind, int64_t clock = 0, Completion* done = nullptr, bool urgent = false) {
     if (head_ + waiting_ == static_cast<int>(queue_.size())) {  // at least half of the places lie before the queue
       std::copy(queue_.begin() + head_, queue_.begin() + head_ + waiting_, queue_.begin());
       head_ = 0;
     }
-    queue_[head_ + waiting_++] = {row, std::max({clock, last_column_, int64_t{0}}), done, static_cast<int32_t>(bank), kind};
+    queue_[head_ + waiting_++] = {row, std::max({clock, last_column_, int64_t{0}}), done, static_cast<int32_t>(bank), kind, urgent};
+    urgent_ += urgent;
     chosen_ = false;
   }
 
@@ -124,6 +126,7 @@ class Channel {
     }
     last_column_ = column_;
     last_kind_ = burst.kind;
+    urgent_ -= burst.urgent;
     for (int w = best_; w > 0; --w) queue_[head_ + w] = queue_[head_ + w - 1];
     ++head_;
     --waiting_;
@@ -147,6 +150,7 @@ class Channel {
     Completion* done;
     int32_t bank;
     int8_t kind;
+    bool urgent;
   };
 
   void refresh() {
@@ -201,8 +205,8 @@ class Channel {
     const int64_t write_min = last_column_ + (last_kind_ == READ ? t_.read_write : t_.ccd);
     const bool patient = passed_over_ < 4 * t_.window;
     best_ = 0;
-    column_ = NEVER;
     activate_ = 0;
+    int64_t best = NEVER;
     for (int w = 0; w < waiting_; ++w) {
       const Burst& burst = queue_[head_ + w];
       const Bank& bank = bank_[burst.bank];
@@ -215,11 +219,13 @@ class Channel {
       }
       column = std::max({column, burst.arrived, burst.kind == READ ? read_min : write_min});
       if (burst.kind == MASKED_WRITE) column = std::max(column, bank.wrote + t_.ccd_masked);
-      if (column < column_) {
+      const int64_t rank = column - (burst.urgent ? t_.lead : 0);
+      if (rank < best) {
         best_ = w;
+        best = rank;
         column_ = column;
         activate_ = activate;
-        if (column == last_column_ + t_.ccd) break;  // nothing can be earlier
+        if (column == last_column_ + t_.ccd && (burst.urgent || urgent_ == 0)) break;  // nothing can be earlier
       }
       if (!patient) break;  // the oldest has waited long enough
     }
@@ -229,7 +235,7 @@ class Channel {
   Timing t_;
   std::vector<Bank> bank_;
   std::vector<Burst> queue_;  // `waiting_` from `head_` on, oldest first
-  int head_ = 0, waiting_ = 0;
+  int head_ = 0, waiting_ = 0, urgent_ = 0;
   int64_t activates_[4] = {FAR, FAR, FAR, FAR};  // the last four
   int64_t last_column_ = FAR, next_refresh_;
   int64_t round_ = 0;                            // of refreshes, every bank once
@@ -280,15 +286,15 @@ class Engine {
   int64_t cycle_of(int64_t clock) const { return (clock * cycles_ + clocks_ - 1) / clocks_; }
 
   // A burst (byte address, taken down to a multiple of burst_bytes) at a clock not before that of `advance` nor of another push. `done` stays until it has been told.
-  // `urgent`: it takes the next place in its channel's queue before all that are not.
+  // `urgent`: it takes the next place in its channel's queue before all that are not, and has a lead there.
   void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr, bool urgent = false) {
     const Place p = map_(static_cast<int64_t>(address / static_cast<uint64_t>(t_.burst_bytes)));
     Lane& lane = lane_[p.channel];
     if (done) ++done->waiting;
     if (!lane.channel.full()) {  // then none waits for a place
-      lane.channel.push(p.bank, p.row, kind, clock, done);
+      lane.channel.push(p.bank, p.row, kind, clock, done, urgent);
     } else {
-      lane.later[!urgent].push_back({p.bank, p.row, clock, done, kind});
+      lane.later[!urgent].push_back({p.bank, p.row, clock, done, kind, urgent});
     }
   }
 
@@ -300,7 +306,7 @@ class Engine {
         for (std::deque<Waiting>& later : lane.later) {
           if (later.empty()) continue;
           const Waiting& w = later.front();
-          lane.channel.push(w.bank, w.row, w.kind, w.clock, w.done);
+          lane.channel.push(w.bank, w.row, w.kind, w.clock, w.done, w.urgent);
           later.pop_front();
           break;
         }
@@ -330,6 +336,7 @@ class Engine {
     int64_t bank, row, clock;
     Completion* done;
     int8_t kind;
+    bool urgent;
   };
   struct Lane {
     Channel channel;
