@@ -485,9 +485,33 @@ def test_tune_through_a_machine(nerf, tmp_path) -> None:
         Trainer(data, options, Parameters.of(tuned.scene())).restore(tmp_path / "state.npz")
 
 
+def _least_scales(parameters: Parameters, cameras: list[Camera], pixels: float) -> np.ndarray:
+    """(N,): the size of `pixels` in the camera that sees a Gaussian largest."""
+    distance = np.stack([np.linalg.norm(parameters.means.astype(np.float64) - camera.position, axis=1) / max(camera.fx, camera.fy) for camera in cameras])
+    return pixels * distance.min(axis=0)
+
+
+def test_least_size(nerf) -> None:
+    """No Gaussian is smaller than asked for, from the beginning, while others come, and in the end; those that are larger stay."""
+    data = load_dataset(nerf)
+    cameras = [shot.camera for shot in data.fitted]
+    given = Parameters.of(scene_of_shots())
+    before = given.values.copy()
+    held = Trainer(data, Options(iterations=10, tune=True, least=0.8), given)
+    least = np.log(_least_scales(given, cameras, 0.8))[:, None]
+    assert 0 < (given.log_scales < least).mean() < 1
+    np.testing.assert_allclose(held.parameters.log_scales, np.maximum(given.log_scales, least), atol=1e-5)
+    np.testing.assert_array_equal(given.values, before)
+    for pixels in (0.0, 3.0):
+        grown = Trainer(data, Options(iterations=300, gaussians=800, degree=1, least=pixels))
+        grown.run()
+        small = np.exp(grown.parameters.log_scales).min(axis=1) < _least_scales(grown.parameters, cameras, 3.0) * (1 - 1e-4)
+        assert len(grown.parameters) > grown.first and small.any() == (pixels == 0.0)
+
+
 def test_poisoned_scene(nerf) -> None:
     """Gaussians with numbers that are not finite, or that would give such pictures, are taken out and counted; the others learn as without them."""
-    data, options = load_dataset(nerf), Options(iterations=200, gaussians=600, degree=1)
+    data, options = load_dataset(nerf), Options(iterations=200, gaussians=600, degree=1, least=0.1)
     clean = Trainer(data, options)
     poison = np.repeat(clean.parameters.values[:1], 6, axis=0)
     for k, (column, value) in enumerate(((MEAN, np.nan), (SCALE + 1, np.inf), (QUAT + 2, np.nan), (LOGIT, np.nan), (SH + 5, np.inf), (SH, 1e30))):

@@ -30,6 +30,7 @@ def fit(
     out: Annotated[Path, typer.Option("--out", "-o", help="scene, .ply; cameras.json of the test photographs goes beside it")],
     scene: Annotated[Path | None, typer.Option("--from", help="scene of these photographs to fine-tune, as in the last third of a fit")] = None,
     through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
+    least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,
     size: Annotated[int, typer.Option(help="longer side of the pictures in pixels; larger ones are averaged, none is enlarged", min=16)] = 640,
     gaussians: Annotated[int, typer.Option(help="at most so many; of --from, as many as it has", min=4)] = 100_000,
@@ -55,19 +56,20 @@ def fit(
     writable(checkpoint, "--checkpoint")
     if resume and checkpoint is None:
         raise FlickerError("--resume: from which --checkpoint?")
-    options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through)
+    options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through, least)
     data = load_dataset(dataset, size)
     text = cameras_text([shot.camera for shot in data.tests])
     cameras = _cameras_beside(out, text)
     steps = RichSteps()
     with steps.step("reading photographs"):
-        trainer = Trainer(data, options, None if scene is None else Parameters.of(load_scene(scene)))
+        given = None if scene is None else Parameters.of(load_scene(scene))
+        trainer = Trainer(data, options, given)
     if checkpoint is not None and resume and checkpoint.exists():
         trainer.restore(checkpoint)
     shot = data.tests[0].camera
     beginning = scene or ("random places" if data.points is None else f"{len(data.points):,} points of COLMAP")
     console.print(f"{dataset}: {len(data.fitted)} photographs to fit, {len(data.tests)} for testing, {shot.width}x{shot.height}; starts from {beginning}")
-    before = None if scene is None else trainer.quality(trainer.scene())
+    before = None if given is None else trainer.quality(given.scene())
     if data.dropped and scene is None:
         console.print(f"{data.dropped:,} points were left out: not finite")
     if trainer.iteration:

@@ -30,6 +30,7 @@ from ..scene.photos import BLACK
 from . import density
 from .adam import Adam
 from .dataset import Dataset
+from .least import LeastSize
 from .loss import loss_and_slope
 from .parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from .render import backward, render
@@ -51,7 +52,7 @@ class Options:
     """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own.
 
     tune: the last third of a fit, of a scene that is there: none of its Gaussians is split or removed. through: name of the configuration whose masks the
-    pictures are drawn with; None: all pixels are visited.
+    pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no Gaussian falls below (`LeastSize`).
     """
 
     iterations: int = 4000
@@ -62,6 +63,7 @@ class Options:
     exposure: bool = False
     tune: bool = False
     through: str | None = None
+    least: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class Trainer:
         self.dataset, self.options = dataset, options
         self.machine = None if options.through is None else through(options.through)
         self.rng = np.random.default_rng(options.seed)
-        self.parameters = start(dataset, options.gaussians, options.degree, self.rng) if parameters is None else parameters
+        self.parameters = start(dataset, options.gaussians, options.degree, self.rng) if parameters is None else Parameters(parameters.values.copy())
         self.first = len(self.parameters)
         self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes()).hexdigest()
         self.moments = Adam.of(self.parameters.values)
@@ -103,6 +105,8 @@ class Trainer:
         self.order = np.zeros(0, np.int64)  # photographs that come next
         self.score, self.seen = np.zeros(self.first), np.zeros(self.first)
         self.extent = extent_of([shot.camera for shot in dataset.fitted])
+        self._least = LeastSize(options.least, [shot.camera for shot in dataset.fitted])
+        self._least.hold(self.parameters.values)
         self._photos = [shot.load(options.background) for shot in dataset.fitted]
         self._test_photos = [shot.load(options.background) for shot in dataset.tests]
 
@@ -149,6 +153,7 @@ class Trainer:
             loss, slope = loss_and_slope(frame.image, photo)
         found = backward(frame, slope, (self.degree + 1) ** 2)
         refused = self.moments.step(self.parameters.values, found.index, found.values, self.rates())
+        self._least.hold(self.parameters.values, found.index)
         self.score[found.index] += np.hypot(found.screen[:, 0] * camera.width / 2, found.screen[:, 1] * camera.height / 2)
         self.seen[found.index] += 1
         self.iteration += 1
@@ -182,6 +187,7 @@ class Trainer:
         share = min(1.0, (self.iteration - begin + density.EVERY) / (0.7 * (end - begin) + 1))
         most = int(self.first + share * max(0, self.options.gaussians - self.first))
         keep, new = density.refine(self.parameters, self.score / np.maximum(self.seen, 1), self.extent, most, self.rng)
+        self._least.hold(new)
         self._select(keep, new)
         self._select(density.in_order(self.parameters))
         self.score[:], self.seen[:] = 0, 0
