@@ -79,7 +79,7 @@ def chip(
     constants: Annotated[bool, typer.Option("--constants", help="list the constants with their sources")] = False,
     out: Annotated[Path | None, typer.Option(help="the estimate as JSON")] = None,
 ) -> None:
-    """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, also by its own models."""
+    """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, first by the models that are held to it."""
     from ..chip.compare import FRONTS, chip_estimates, chip_stage, estimate
     from ..chip.constants import constant_table
     from ..chip.dram import DramConfig, Refresh
@@ -109,11 +109,12 @@ def chip(
     else:
         frame = frame_estimate(prepared, render_cycles, setting)
     console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, refresh {refresh}, scheme {scheme}")
-    _show_frame(frame)
     built = {}
     if render_cycles is None and scheme == RECOMMENDED and memory == FRONTS[configuration.form][0] and chip_stage(configuration) is not None:
         built = chip_estimates(loaded, [config], dram=setting.dram)[config]
         _show_built(built)
+        console.print("by the parametric model, which no RTL holds (docs/chip_model.md)")
+    _show_frame(frame)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])
         results = [run_scheme(prepared.splats, s, prepared.needed) for s in SCHEMES.values()]
