@@ -352,7 +352,6 @@ module fv_axi_fetch #(
       l_quiet: assert (quiet_q == '0 || out_is || (left_is && quiet_q == 2'd1) || idle);
 
       // Links: bursts.
-      l_usage: assert (count_q <= UnderBits'(Bursts) && dut.i_read.i_under_way.usage_q == count_q);
       l_beat: assert (count_q == '0 ? beat_q == '0 : beat_q <= under_q[0].len);
 
       c_piece: cover (ask && !last && 32'(beats) < MaxBeats && count_q != '0);
@@ -364,32 +363,29 @@ module fv_axi_fetch #(
     end
   end
 
-  // The list of the unit, from the oldest entry.
-  localparam int unsigned PtrBits = Bursts > 1 ? $clog2(Bursts) : 1;
-  localparam logic [PtrBits+1:0] DEPTH = (PtrBits + 2)'(Bursts);
-
-  function automatic logic [PtrBits+1:0] slot(logic [PtrBits+1:0] distance);
-    logic [PtrBits+1:0] at;
-    at = (PtrBits + 2)'(dut.i_read.i_under_way.read_q) + distance;
-    return at >= DEPTH ? at - DEPTH : at;
-  endfunction
-
-  always_comb begin
-    if (rst_n) begin
-      l_pointers: assert ((PtrBits + 2)'(dut.i_read.i_under_way.read_q) < DEPTH &&
-                          (PtrBits + 2)'(dut.i_read.i_under_way.write_q) ==
-                          slot((PtrBits + 2)'(count_q)));
-    end
-  end
+  logic [Bursts-1:0][1:0] list, storage;
 
   for (genvar k = 0; k < Bursts; k++) begin : gen_entry
+    assign list[k]    = under_q[k].tag;
+    assign storage[k] = 2'(dut.i_read.i_under_way.storage_q[k]);
     always_comb begin
       if (rst_n && UnderBits'(k) < count_q) begin
-        l_entry: assert (2'(dut.i_read.i_under_way.storage_q[PtrBits'(slot((PtrBits + 2)'(k)))]) ==
-                         under_q[k].tag);
         l_length: assert (under_q[k].len < 8'(MaxBeats));
       end
     end
   end
+
+  fv_fifo_list #(
+    .Width(2),
+    .Depth(Bursts)
+  ) i_list (
+    .rst_ni   (rst_n),
+    .count_i  (count_q),
+    .list_i   (list),
+    .usage_i  (dut.i_read.i_under_way.usage_q),
+    .read_i   (dut.i_read.i_under_way.read_q),
+    .write_i  (dut.i_read.i_under_way.write_q),
+    .storage_i(storage)
+  );
 
 endmodule

@@ -266,53 +266,48 @@ module fv_axi_write #(
   end
 
   if (Tagged) begin : gen_lists
-    // The lists of the unit, from the oldest entry.
-    localparam int unsigned PtrBits = Bursts > 1 ? $clog2(Bursts) : 1;
-    localparam logic [PtrBits+1:0] DEPTH = (PtrBits + 2)'(Bursts);
+    logic [BegunBits-1:0]   lengths;
+    logic [Bursts-1:0][2:0] answer_list, answer_storage;
+    logic [Bursts-1:0][7:0] length_list, length_storage;
 
-    logic [BegunBits-1:0] lengths;
-    logic [PtrBits-1:0]   answer_at, length_at;  // their oldest entries
-
-    assign lengths   = count_q - written_q;
-    assign answer_at = dut.gen_listed.i_answers.read_q;
-    assign length_at = dut.gen_listed.i_lengths.read_q;
-
-    function automatic logic [PtrBits+1:0] slot(logic [PtrBits-1:0] oldest,
-                                                logic [BegunBits-1:0] distance);
-      logic [PtrBits+1:0] at;
-      at = (PtrBits + 2)'(oldest) + (PtrBits + 2)'(distance);
-      return at >= DEPTH ? at - DEPTH : at;
-    endfunction
-
-    always_comb begin
-      if (rst_n) begin
-        l_usage: assert (dut.gen_listed.i_answers.usage_q == count_q &&
-                         dut.gen_listed.i_lengths.usage_q == lengths);
-        l_answers: assert ((PtrBits + 2)'(answer_at) < DEPTH &&
-                           (PtrBits + 2)'(dut.gen_listed.i_answers.write_q) ==
-                           slot(answer_at, count_q));
-        l_lengths: assert ((PtrBits + 2)'(length_at) < DEPTH &&
-                           (PtrBits + 2)'(dut.gen_listed.i_lengths.write_q) ==
-                           slot(length_at, lengths));
-        if (due_q) begin
-          l_due: assert (dut.done_error_q == due_error_q && dut.done_tag_q == due_tag_q);
-        end
-      end
-    end
+    assign lengths = count_q - written_q;
 
     for (genvar k = 0; k < Bursts; k++) begin : gen_entry
-      logic [PtrBits-1:0] answer_slot, length_slot;
-      assign answer_slot = PtrBits'(slot(answer_at, BegunBits'(k)));
-      assign length_slot = PtrBits'(slot(length_at, BegunBits'(k)));
-      always_comb begin
-        if (rst_n && BegunBits'(k) < count_q) begin
-          l_answer: assert (dut.gen_listed.i_answers.storage_q[answer_slot] ==
-                            {begun_q[k].last, begun_q[k].tag});
-        end
-        if (rst_n && BegunBits'(k) < lengths) begin
-          l_length: assert (dut.gen_listed.i_lengths.storage_q[length_slot] ==
-                            begun_q[written_q + BegunBits'(k)].len);
-        end
+      assign answer_list[k]    = {begun_q[k].last, begun_q[k].tag};
+      assign answer_storage[k] = dut.gen_listed.i_answers.storage_q[k];
+      assign length_list[k]    = begun_q[written_q + BegunBits'(k)].len;
+      assign length_storage[k] = dut.gen_listed.i_lengths.storage_q[k];
+    end
+
+    fv_fifo_list #(
+      .Width(3),
+      .Depth(Bursts)
+    ) i_answers (
+      .rst_ni   (rst_n),
+      .count_i  (count_q),
+      .list_i   (answer_list),
+      .usage_i  (dut.gen_listed.i_answers.usage_q),
+      .read_i   (dut.gen_listed.i_answers.read_q),
+      .write_i  (dut.gen_listed.i_answers.write_q),
+      .storage_i(answer_storage)
+    );
+
+    fv_fifo_list #(
+      .Width(8),
+      .Depth(Bursts)
+    ) i_lengths (
+      .rst_ni   (rst_n),
+      .count_i  (lengths),
+      .list_i   (length_list),
+      .usage_i  (dut.gen_listed.i_lengths.usage_q),
+      .read_i   (dut.gen_listed.i_lengths.read_q),
+      .write_i  (dut.gen_listed.i_lengths.write_q),
+      .storage_i(length_storage)
+    );
+
+    always_comb begin
+      if (rst_n && due_q) begin
+        l_due: assert (dut.done_error_q == due_error_q && dut.done_tag_q == due_tag_q);
       end
     end
   end else begin : gen_counts

@@ -182,7 +182,7 @@ def _instances(formats: FrontFormats) -> Counter[Unit]:
 # ---- opacity ------------------------------------------------------------------------------------
 
 OPACITIES = (8, 10, 12)
-# Scenes whose opacities are no multiples of 1/255: our own, and fits; (folder, camera, as large as the camera's own picture).
+# Scenes whose opacities are no multiples of 1/255, beside our own: fits, at the size of their photographs.
 FITTED = ("lego", "kunkun")
 FAINT = {"faint": (4, 1.5, 1.1), "layers": (100, 1000, 10000)}
 
