@@ -310,7 +310,7 @@ def test_urgent_bursts_have_a_lead_in_the_queue():
     turn = TIMING.read_write - TIMING.ccd  # what a write among reads costs
     ended = {}
     for lead in (0, turn - 1, turn + 1):
-        m = Memory(DramConfig(refresh=Refresh.NONE, urgent_lead=lead).timing)
+        m = Memory(DramConfig(refresh=Refresh.NONE, urgent_lead=lead, write_places=0).timing)
         m.allocate(0, 1 << 22)
         manager = Manager(Port(m, port_config(max_reads=256, hazards=False, urgent=8)))
         one_channel = DramConfig().channels * DramConfig().interleave_bytes
@@ -322,6 +322,28 @@ def test_urgent_bursts_have_a_lead_in_the_queue():
         ended[lead] = sum(c.ended > write.ended for c in crowd)
         assert m.counts().activates == 1
     assert ended[0] == ended[turn - 1] == 0 < ended[turn + 1]
+
+
+def test_gathered_writes_are_answered_before_they_move():
+    """As soon as a channel has places for their bursts; those beyond wait for one. Without places of their own they are answered once they are written."""
+    ended = {}
+    for places in (0, 8, 64):
+        m = Memory(DramConfig(refresh=Refresh.NONE, write_places=places).timing)
+        m.allocate(0, 1 << 20)
+        manager = Manager(Port(m, port_config(max_writes=64)))
+        one_channel = DramConfig().channels * DramConfig().interleave_bytes  # two bursts each
+        writes = [manager.write(Burst(one_channel * k, 1, data=[(bytes([k] * 64), (1 << 64) - 1)])) for k in range(8)]
+        manager.run()
+        ended[places] = [w.ended - w.begun for w in writes]
+        assert m.read(one_channel * 7, 64) == bytes([7] * 64)
+        for _ in range(200):
+            manager.step()
+        assert m.counts().bursts == 16
+    latency = port_config().latency
+    assert max(ended[64]) <= latency + 2
+    assert max(ended[8][:4]) <= latency + 2 < ended[8][4]
+    assert min(ended[0]) >= latency + DramConfig().idle_cycles() - 10
+    assert all(a >= b >= c for a, b, c in zip(ended[0], ended[8], ended[64]))
 
 
 # ---- answers with errors -----------------------------------------------------------------------
@@ -596,6 +618,8 @@ def test_bytes_by_purpose():
     manager.write(Burst(BASE + 8192, 4, 3, data=[(bytes(64), s) for s in (every, 0, 1, (1 << 33) - 1)]))
     manager.write(Burst(BASE + 4096 + 1024, 1, 3, data=[(bytes(64), every)]))
     manager.run()
+    for _ in range(200):  # gathered writes move
+        manager.step()
     one, two, three, region = (port.counts(k) for k in (1, 2, 3, 100))
     assert (one.read_bursts, one.read_beats, one.read_bytes, one.dram_read_bytes) == (1, 3, 192, 192)
     assert two.read_bytes == 64

@@ -1,14 +1,16 @@
 // LPDDR4 at the level of commands: when the bursts of a memory move.
 //
-// Open-page policy, one queue of `window` bursts a channel. Of those waiting the one whose data can move first is served, the oldest among equals, so that row
-// hits go first, activates overlap with the data of other banks and the bus turns as rarely as the window allows; a burst is passed over at most 4 x window times.
+// Open-page policy. A channel has a queue of `window` reads and one of `writes` writes. Writes are gathered: they move while no read waits, or once three
+// quarters of their places are taken, until a quarter is. Of a queue the burst whose data can move first is served, the oldest among equals, so that row hits go
+// first and activates overlap with the data of other banks; a burst is passed over at most 4 x its queue's places times. With `writes` 0 both kinds share the
+// `window`, and the bus turns as rarely as that allows.
 // Urgent bursts are chosen as if their data could move `lead` clocks earlier.
 // Refresh: all banks of a channel every tREFI, for tRFCab; or one bank every tREFI / banks, for tRFCpb, while the others go on: of those that the round has still
 // to refresh the one that fewest bursts in the queue wait for. It counts as an activate for tRRD and tFAW.
 // Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed
 // with the row. Left out: the command bus, latency of the controller, dependences between bursts.
 //
-// Times are clocks of the command bus. Two ways to use it: `run` takes a list of bursts that all wait from clock 0 on; `Engine` takes them as they come
+// Times are clocks of the command bus. Two ways to use it: `run` takes a list of bursts that all wait from clock 0 on and enter the queues in this order; `Engine` takes them as they come
 // (`push`, in order of time) and decides no column command before `advance` has reached its clock, so that whatever comes earlier can still go first.
 // Numbers come from flicker/chip/constants.py through chip/dram.py; docs/memory_model.md.
 #pragma once
@@ -28,7 +30,7 @@ enum Kind : int8_t { READ = 0, WRITE = 1, MASKED_WRITE = 2 };
 
 // Organisation and timing, as chip/dram.py hands them in: sim/memory.py has the same fields in the same order. Clocks unless named otherwise.
 struct Timing {
-  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window, lead;
+  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window, writes, lead;
   int64_t rcd, rp, rp_all, ras, rrd, faw, ccd, ccd_masked, rtp;
   int64_t write_pre, write_read, read_write;  // write to precharge, write to read, read to write
   int64_t refi, rfc, rfc_bank;                // refi 0: no refresh; rfc_bank 0: all banks at once, for rfc
@@ -36,7 +38,8 @@ struct Timing {
   int64_t clock_hz, chip_hz;                  // of the command bus, of the chip
 };
 
-// Tells whoever pushed a burst that its data have moved: `waiting` bursts are still to come, those that came were through at `clock`.
+// Tells whoever pushed a burst that its data have moved, or, of a write that is gathered, that it has a place: `waiting` bursts are still to come, those that
+// came were through at `clock`; 0: they had their places when they were pushed.
 struct Completion {
   int64_t clock = 0;
   int32_t waiting = 0;
@@ -79,19 +82,22 @@ class Channel {
   static constexpr int64_t FAR = -(int64_t{1} << 40), NEVER = int64_t{1} << 60;
 
   explicit Channel(const Timing& t)
-      : t_(t), bank_(t.banks), queue_(2 * t.window), next_refresh_(t.rfc_bank > 0 ? t.refi / t.banks : t.refi) {}
+      : t_(t), bank_(t.banks), queue_{Queue(t.window), Queue(t.writes)}, next_refresh_(t.rfc_bank > 0 ? t.refi / t.banks : t.refi) {}
 
-  bool empty() const { return waiting_ == 0; }
-  bool full() const { return waiting_ == t_.window; }
+  // Number of the queue that bursts of this kind are in.
+  int queue_of(int8_t kind) const { return kind != READ && t_.writes > 0; }
+  bool empty() const { return queue_[0].waiting + queue_[1].waiting == 0; }
+  bool full(int queue) const { return queue_[queue].waiting == queue_[queue].places; }
 
-  // A burst that waits from `clock` on, or from the column command that freed its place. Not when full.
+  // A burst that waits from `clock` on, or from the column command that freed its place. Not when its queue is full.
   void push(int64_t bank, int64_t row, int8_t kind, int64_t clock = 0, Completion* done = nullptr, bool urgent = false) {
-    if (head_ + waiting_ == static_cast<int>(queue_.size())) {  // at least half of the places lie before the queue
-      std::copy(queue_.begin() + head_, queue_.begin() + head_ + waiting_, queue_.begin());
-      head_ = 0;
+    Queue& q = queue_[queue_of(kind)];
+    if (q.head + q.waiting == static_cast<int>(q.burst.size())) {  // at least half of the places lie before the queue
+      std::copy(q.burst.begin() + q.head, q.burst.begin() + q.head + q.waiting, q.burst.begin());
+      q.head = 0;
     }
-    queue_[head_ + waiting_++] = {row, std::max({clock, last_column_, int64_t{0}}), done, static_cast<int32_t>(bank), kind, urgent};
-    urgent_ += urgent;
+    q.burst[q.head + q.waiting++] = {row, std::max({clock, last_column_, int64_t{0}}), done, static_cast<int32_t>(bank), kind, urgent};
+    q.urgent += urgent;
     chosen_ = false;
   }
 
@@ -101,12 +107,13 @@ class Channel {
     return column_;
   }
 
-  // Issues the next column command. Not when empty.
-  void step() {
+  // Issues the next column command; the queue that has a place now. Not when empty.
+  int step() {
     if (!chosen_) choose();
-    const Burst burst = queue_[head_ + best_];
+    Queue& q = queue_[writing_];
+    const Burst burst = q.burst[q.head + best_];
     Bank& bank = bank_[burst.bank];
-    passed_over_ = best_ > 0 ? passed_over_ + 1 : 0;
+    q.passed_over = best_ > 0 ? q.passed_over + 1 : 0;
     if (activate_ >= 0) {
       activated(activate_);
       ++counts.activates;
@@ -126,12 +133,15 @@ class Channel {
     }
     last_column_ = column_;
     last_kind_ = burst.kind;
-    urgent_ -= burst.urgent;
-    for (int w = best_; w > 0; --w) queue_[head_ + w] = queue_[head_ + w - 1];
-    ++head_;
-    --waiting_;
+    q.urgent -= burst.urgent;
+    for (int w = best_; w > 0; --w) q.burst[q.head + w] = q.burst[q.head + w - 1];
+    ++q.head;
+    --q.waiting;
     chosen_ = false;
+    return writing_;
   }
+
+  int64_t last_column() const { return last_column_; }  // clock of the last column command
 
   Counts counts;
 
@@ -152,9 +162,23 @@ class Channel {
     int8_t kind;
     bool urgent;
   };
+  struct Queue {
+    explicit Queue(int64_t n) : places(static_cast<int>(n)), burst(2 * n) {}
+    int places;
+    std::vector<Burst> burst;  // `waiting` from `head` on, oldest first
+    int head = 0, waiting = 0, urgent = 0;
+    int64_t passed_over = 0;
+  };
 
-  void refresh() {
-    while (t_.refi > 0 && std::max(last_column_ + t_.ccd, queue_[head_].arrived) >= next_refresh_) {
+  // Whether writes or reads move next.
+  void turn() {
+    const int reads = queue_[0].waiting, writes = queue_[1].waiting;
+    if (writes == 0 || (reads > 0 && writes <= queue_[1].places / 4)) writing_ = false;
+    if (writes > 0 && (reads == 0 || writes >= queue_[1].places - queue_[1].places / 4)) writing_ = true;
+  }
+
+  void refresh(const Queue& q) {
+    while (t_.refi > 0 && std::max(last_column_ + t_.ccd, q.burst[q.head].arrived) >= next_refresh_) {
       if (t_.rfc_bank > 0) {
         refresh_bank();
       } else {
@@ -178,7 +202,9 @@ class Channel {
 
   void refresh_bank() {
     for (Bank& bank : bank_) bank.waiting = 0;
-    for (int w = 0; w < waiting_; ++w) ++bank_[queue_[head_ + w].bank].waiting;
+    for (const Queue& q : queue_) {
+      for (int w = 0; w < q.waiting; ++w) ++bank_[q.burst[q.head + w].bank].waiting;
+    }
     Bank* best = nullptr;
     for (Bank& bank : bank_) {
       if (bank.round == round_ && (!best || bank.waiting < best->waiting)) best = &bank;
@@ -199,16 +225,18 @@ class Channel {
   }
 
   void choose() {
-    refresh();
+    turn();
+    const Queue& q = queue_[writing_];
+    refresh(q);
     const int64_t activate_min = std::max(activates_[3] + t_.rrd, activates_[0] + t_.faw);
     const int64_t read_min = last_column_ + (last_kind_ != READ ? t_.write_read : t_.ccd);
     const int64_t write_min = last_column_ + (last_kind_ == READ ? t_.read_write : t_.ccd);
-    const bool patient = passed_over_ < 4 * t_.window;
+    const bool patient = q.passed_over < 4 * q.places;
     best_ = 0;
     activate_ = 0;
     int64_t best = NEVER;
-    for (int w = 0; w < waiting_; ++w) {
-      const Burst& burst = queue_[head_ + w];
+    for (int w = 0; w < q.waiting; ++w) {
+      const Burst& burst = q.burst[q.head + w];
       const Bank& bank = bank_[burst.bank];
       int64_t activate = -1, column = bank.column;
       if (bank.row != burst.row) {
@@ -225,7 +253,7 @@ class Channel {
         best = rank;
         column_ = column;
         activate_ = activate;
-        if (column == last_column_ + t_.ccd && (burst.urgent || urgent_ == 0)) break;  // nothing can be earlier
+        if (column == last_column_ + t_.ccd && (burst.urgent || q.urgent == 0)) break;  // nothing can be earlier
       }
       if (!patient) break;  // the oldest has waited long enough
     }
@@ -234,19 +262,18 @@ class Channel {
 
   Timing t_;
   std::vector<Bank> bank_;
-  std::vector<Burst> queue_;  // `waiting_` from `head_` on, oldest first
-  int head_ = 0, waiting_ = 0, urgent_ = 0;
+  Queue queue_[2];        // reads, or all bursts if writes have no places; writes
+  bool writing_ = false;  // which of them is served
   int64_t activates_[4] = {FAR, FAR, FAR, FAR};  // the last four
   int64_t last_column_ = FAR, next_refresh_;
   int64_t round_ = 0;                            // of refreshes, every bank once
-  int64_t passed_over_ = 0;
   int8_t last_kind_ = READ;
-  bool chosen_ = false;  // the next command is known: that of the queue's entry `best_`
+  bool chosen_ = false;  // the next command is known: that of the served queue's entry `best_`
   int best_ = 0;
   int64_t column_ = 0, activate_ = 0;  // its clocks; no activate: -1
 };
 
-// Bursts that all wait from clock 0 on, in this order; counts: of each channel.
+// Bursts that all wait from clock 0 on and enter the queues in this order: one whose queue is full holds those behind it back. counts: of each channel.
 inline void run(const Timing& t, int64_t size, const int64_t* burst, const int8_t* kind, Counts* counts) {
   const Map map(t);
   const int64_t cores = std::max(1u, std::thread::hardware_concurrency());
@@ -257,7 +284,7 @@ inline void run(const Timing& t, int64_t size, const int64_t* burst, const int8_
       if (threads > 1 && map.channel(burst[i]) % threads != first) continue;
       const Place p = map(burst[i]);
       Channel& channel = channels[p.channel];
-      if (channel.full()) channel.step();
+      while (channel.full(channel.queue_of(kind[i]))) channel.step();
       channel.push(p.bank, p.row, kind[i]);
     }
     for (int64_t k = first; k < t.channels; k += threads) {
@@ -290,11 +317,14 @@ class Engine {
   void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr, bool urgent = false) {
     const Place p = map_(static_cast<int64_t>(address / static_cast<uint64_t>(t_.burst_bytes)));
     Lane& lane = lane_[p.channel];
-    if (done) ++done->waiting;
-    if (!lane.channel.full()) {  // then none waits for a place
-      lane.channel.push(p.bank, p.row, kind, clock, done, urgent);
-    } else {
-      lane.later[!urgent].push_back({p.bank, p.row, clock, done, kind, urgent});
+    const int queue = lane.channel.queue_of(kind);
+    const Waiting burst{p.bank, p.row, clock, done, kind, urgent};
+    if (lane.channel.full(queue)) {
+      if (done) ++done->waiting;
+      lane.later[queue][!urgent].push_back(burst);
+    } else {  // then none waits for a place
+      if (done && queue == 0) ++done->waiting;
+      enter(lane, burst);
     }
   }
 
@@ -302,11 +332,15 @@ class Engine {
   void advance(int64_t clock) {
     for (Lane& lane : lane_) {
       while (!lane.channel.empty() && lane.channel.next() < clock) {
-        lane.channel.step();
-        for (std::deque<Waiting>& later : lane.later) {
+        const int queue = lane.channel.step();
+        for (std::deque<Waiting>& later : lane.later[queue]) {
           if (later.empty()) continue;
-          const Waiting& w = later.front();
-          lane.channel.push(w.bank, w.row, w.kind, w.clock, w.done, w.urgent);
+          const Waiting& burst = later.front();
+          if (burst.done && queue == 1) {
+            burst.done->clock = std::max(burst.done->clock, lane.channel.last_column());
+            --burst.done->waiting;
+          }
+          enter(lane, burst);
           later.pop_front();
           break;
         }
@@ -340,8 +374,14 @@ class Engine {
   };
   struct Lane {
     Channel channel;
-    std::deque<Waiting> later[2];  // bursts that the controller's queue has no place for yet: urgent ones, others
+    std::deque<Waiting> later[2][2];  // bursts that a queue of the controller has no place for yet, by queue: urgent ones, others
   };
+
+  // Writes that are gathered tell of their place, not of their data.
+  static void enter(Lane& lane, const Waiting& w) {
+    lane.channel.push(w.bank, w.row, w.kind, w.clock, lane.channel.queue_of(w.kind) == 1 ? nullptr : w.done, w.urgent);
+  }
+
   Timing t_;
   Map map_;
   std::vector<Lane> lane_;

@@ -29,7 +29,7 @@ class Timing(ctypes.Structure):
     """Organisation and timing of the DRAM: bytes, clocks of the command bus, hertz. `flicker.chip.dram.DramConfig.timing` makes one."""
 
     _fields_ = [(name, c_int64) for name in (
-        "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window", "lead",
+        "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window", "writes", "lead",
         "rcd", "rp", "rp_all", "ras", "rrd", "faw", "ccd", "ccd_masked", "rtp", "write_pre", "write_read", "read_write",
         "refi", "rfc", "rfc_bank", "rl", "wl", "half", "clock_hz", "chip_hz",
     )]
