@@ -113,7 +113,7 @@ SOURCES = {
     "DRAM_TRFC": _JEDEC + " (all banks, 280 ns)",
     "DRAM_TRFC_BANK": _JEDEC + " (one bank, 140 ns)",
     "DRAM_INTERLEAVE_BYTES": "assumption: 64 bytes of consecutive addresses a channel",
-    "DRAM_WINDOW": "assumption: bursts a channel's controller sees ahead, to open rows early",
+    "DRAM_WINDOW": "assumption: reads a channel's controller sees ahead, to open rows early",
     "DRAM_WRITE_PLACES": "assumption: writes a channel's controller gathers and answers at once, to turn the bus more rarely; as gem5's memory controller",
     "DRAM_URGENT_LEAD": "assumption: clocks by which bursts of urgent transactions may move later than others and still go first",
     "DRAM_BATCH_BURSTS": "assumption: bursts of one purpose before the arbiter turns to the next (32 a channel)",
