@@ -485,6 +485,20 @@ def test_tune_through_a_machine(nerf, tmp_path) -> None:
         Trainer(data, options, Parameters.of(tuned.scene())).restore(tmp_path / "state.npz")
 
 
+def test_rates_of_tuning(nerf) -> None:
+    """A scene that is tuned has the rates of a fit from a share on: 2/3, or as asked for."""
+    data, given = load_dataset(nerf), Parameters.of(scene_of_shots())
+    whole = Trainer(data, Options(iterations=300), given)
+    for begin in (None, 0.0, 0.5):
+        options = Options(iterations=100, tune=True)
+        tuned = Trainer(data, options if begin is None else replace(options, begin=begin), given)
+        first = 2 / 3 if begin is None else begin
+        for share in (0.0, 0.5, 1.0):
+            tuned.iteration = round(100 * share)
+            whole.iteration = round(300 * (first + (1 - first) * share))
+            np.testing.assert_allclose(tuned.rates(), whole.rates(), rtol=1e-5)
+
+
 def _least_scales(parameters: Parameters, cameras: list[Camera], pixels: float) -> np.ndarray:
     """(N,): the size of `pixels` in the camera that sees a Gaussian largest."""
     distance = np.stack([np.linalg.norm(parameters.means.astype(np.float64) - camera.position, axis=1) / max(camera.fx, camera.fy) for camera in cameras])
@@ -566,6 +580,7 @@ def test_command(nerf, tmp_path) -> None:
     assert "its masks are not of 4x4 mini-tiles" in fit("--through", "log-lanes", code=2)
     assert "configuration 'fiathful' is unknown; close names: faithful" in fit("--through", "fiathful", code=2)
     assert "--resume: from which --checkpoint?" in fit("--resume", code=2)
+    assert "--begin: of which scene, --from?" in fit("--begin", 0.5, code=2)
     assert "holds other cameras" in fit("--size", 30, code=2)
     assert "background: expected black" in fit("--background", "blue", code=2)
     done = flicker("fit", nerf, "-o", tmp_path / "a.spz")

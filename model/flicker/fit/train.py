@@ -51,7 +51,7 @@ _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
 class Options:
     """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own.
 
-    tune: the last third of a fit, of a scene that is there: none of its Gaussians is split or removed. through: name of the configuration whose masks the
+    tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on. through: name of the configuration whose masks the
     pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no Gaussian falls below (`LeastSize`).
     """
 
@@ -64,6 +64,7 @@ class Options:
     tune: bool = False
     through: str | None = None
     least: float = 0.0
+    begin: float = 2 / 3
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class Trainer:
         """float32 (P,): learning rates of this iteration."""
         done = self.iteration / self.options.iterations
         if self.options.tune:
-            done = (2.0 + done) / 3.0
+            done = self.options.begin + (1.0 - self.options.begin) * done
         falling = _LAST_RATE ** max(0.0, 3.0 * done - 2.0)
         rates = np.empty(self.parameters.values.shape[1])
         first, last = _MEAN_RATES
