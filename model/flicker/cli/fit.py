@@ -29,7 +29,7 @@ def fit(
     dataset: Annotated[Path, typer.Argument(help="folder with transforms.json, or with sparse/0 and images/ of COLMAP; or a transforms.json")],
     out: Annotated[Path, typer.Option("--out", "-o", help="scene, .ply; cameras.json of the test photographs goes beside it")],
     scene: Annotated[Path | None, typer.Option("--from", help="scene of these photographs to fine-tune, as in the last third of a fit")] = None,
-    begin: Annotated[float | None, typer.Option(help="of --from: share of a fit whose learning rates are passed; 0: those of a whole fit; default: 2/3", min=0.0, max=1.0)] = None,
+    begin: Annotated[float | None, typer.Option(help="of --from: share of a fit whose learning rates are passed; default: 2/3", min=0.0, max=1.0)] = None,
     through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,

@@ -51,8 +51,9 @@ _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
 class Options:
     """gaussians: at most so many. degree: of the SH. background: RGB in [0, 1]. exposure: each photograph has an affine colour of its own.
 
-    tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on. through: name of the configuration whose masks the
-    pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no Gaussian falls below (`LeastSize`).
+    tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on.
+    through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
+    Gaussian falls below (`LeastSize`).
     """
 
     iterations: int = 4000
