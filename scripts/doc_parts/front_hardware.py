@@ -25,6 +25,7 @@ MEMORIES = {
     "perfect, latency 20": None,
     "LPDDR4, 20 cycles on top": DramConfig(),
     "LPDDR4, refresh bank by bank": DramConfig(refresh=Refresh.PER_BANK),
+    "LPDDR4, reads and writes in one queue": DramConfig(write_places=0),
 }
 
 

@@ -305,6 +305,23 @@ def test_urgent_bursts_pass_what_waits_for_the_dram():
     assert waits["urgency off"] == waits["not urgent"]
 
 
+@pytest.mark.parametrize("places", [0, 64])
+def test_urgent_reads_have_a_lead_in_the_queue(places):
+    """An urgent read of another row among row hits that came before it: without a lead it is the last, with one it waits for its row alone."""
+    before = {}
+    for lead in (0, 24):
+        m = Memory(DramConfig(refresh=Refresh.NONE, urgent_lead=lead, write_places=places).timing)
+        m.allocate(0, 1 << 22)
+        manager = Manager(Port(m, port_config(max_reads=256, urgent=8)))
+        one_channel = DramConfig().channels * DramConfig().interleave_bytes
+        crowd = [manager.read(Burst(one_channel * k, 1, id=0)) for k in range(15)]
+        manager.read(urgent := Burst(DramConfig().channels * DramConfig().page_bytes, 1, id=1, qos=8))
+        manager.run(100_000)
+        before[lead] = sum(c.ended < urgent.ended for c in crowd)
+        assert m.counts().activates == 2
+    assert before[24] <= 6 and before[0] == 15
+
+
 def test_urgent_bursts_have_a_lead_in_the_queue():
     """An urgent write among reads of its row: the turn of the bus may cost as many clocks as the lead, and no more."""
     turn = TIMING.read_write - TIMING.ccd  # what a write among reads costs
