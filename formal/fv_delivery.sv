@@ -1,8 +1,10 @@
 // flk_delivery, one core that finishes no tile early: every entry with the core's bit, and every end, reaches the core once,
-// unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others do not. The cache keeps the order and
+// unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others do not. Of two elements that are given
+// together the older is no end. The cache keeps the order and
 // is arbitrary otherwise, the queues are stand-ins. The assertions l_* say what is where, for induction.
 module fv_delivery #(
-  parameter int unsigned Core = 0
+  parameter int unsigned Core    = 0,
+  parameter int unsigned InWidth = 1
 ) (
   input logic                 clk_i,
   input logic                 again_i,
@@ -21,9 +23,12 @@ module fv_delivery #(
   localparam int unsigned Held = Queued + Cached + 2;  // queue, cache, entries taken
 
   logic            rst_n;
-  logic [3:0]      in_ready, finish, out_valid, out_end, finished;
-  logic [3:0]      out_record;  // of one bit: its number
+  logic [3:0]      in_ready, finish, finished;
   logic [3:0][1:0] in_valid;
+
+  logic [3:0][InWidth-1:0] out_valid, out_end;
+  logic [3:0][InWidth-1:0] out_record;  // of one bit: its number
+  logic [InWidth-1:0][1:0] out_element;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -37,6 +42,7 @@ module fv_delivery #(
   flk_delivery #(
     .RecordBits(1),
     .NumberBits(1),
+    .InWidth   (InWidth),
     .Queue     (Queue)
   ) dut (
     .clk_i,
@@ -99,7 +105,8 @@ module fv_delivery #(
   fv_stream #(
     .Width   (2),
     .Capacity(Held),
-    .In      (2)
+    .In      (2),
+    .Out     (InWidth)
   ) i_stream (
     .clk_i,
     .rst_ni     (rst_n),
@@ -108,19 +115,25 @@ module fv_delivery #(
     .push_i     (wanted),
     .in_data_i  ({is_end[1], entry[1][4], is_end[0], entry[0][4]}),
     .out_valid_i(out_valid[Core]),
-    .out_ready_i(out_ready_i[Core]),
-    .out_data_i ({out_end[Core], out_record[Core]}),
+    .out_ready_i({InWidth{out_ready_i[Core]}}),
+    .out_data_i (out_element),
     .inside_o   (count),
     .watching_o (watching),
     .ahead_o    (ahead),
     .watched_o  (watched)
   );
 
+  for (genvar w = 0; w < InWidth; w++) begin : gen_out
+    assign out_element[w] = {out_end[Core][w], out_record[Core][w]};
+  end
+
   logic [4:0] queued;  // in the core's queue
   logic [1:0] push;
+  logic [4:0] popped;  // in the cycle before
 
   assign queued = 5'(dut.gen_core[Core].i_queue.used_q);
   assign push   = dut.gen_core[Core].push;
+  assign popped = 5'(dut.pop_q[Core][0]) + 5'(dut.pop_q[Core][1]);
 
   // All that is inside, the oldest first, and which of it is the core's.
 
@@ -173,10 +186,12 @@ module fv_delivery #(
       a_room: assert (queued + 5'(push[0]) + 5'(push[1]) <= 5'(Queue));
       l_inside: assert (5'(count) == at);
       l_cached: assert (cached <= 3'(Cached));
-      l_used: assert (5'(dut.used_q[Core]) == queued + 5'(dut.pop_q[Core]) && 5'(dut.used_q[Core]) <= 5'(Queue));
+      l_used: assert (5'(dut.used_q[Core]) == queued + popped && 5'(dut.used_q[Core]) <= 5'(Queue));
       l_room: assert (!dut.room_q || 5'(dut.used_q[Core]) <= 5'(Queue - 4));
       l_next: assert (!dut.i_cache.ready_q || 5'(dut.used_q[Core]) <= 5'(Queue - 2));
-      l_pop: assert (!dut.pop_end_q[Core] || dut.pop_q[Core]);
+      l_pop: assert (!dut.pop_end_q[Core] || dut.pop_q[Core][0]);
+      l_pops: assert (!dut.pop_q[Core][1] || (InWidth == 2 && dut.pop_q[Core][0]));
+      a_together: assert (!out_valid[Core][InWidth-1] || InWidth == 1 || !out_end[Core][0]);
       l_ends: assert (5'(dut.ends_q[Core]) == ends + 5'(dut.pop_end_q[Core]));
       l_opened: assert (5'(dut.opened_q[Core]) == opened + 5'(dut.pop_end_q[Core]));
       l_finished: assert (!dut.finished_q[Core]);
@@ -185,7 +200,8 @@ module fv_delivery #(
       l_watched: assert (!watching || found);
       l_right: assert (right == '1);
       a_finish: assert (finish == '0);
-      c_end: cover (out_valid[Core] && out_ready_i[Core] && out_end[Core] && unit_q == 2'd3);
+      c_end: cover (out_ready_i[Core] && (out_valid[Core] & out_end[Core]) != '0 && unit_q == 2'd3);
+      c_all: cover (out_ready_i[Core] && (&out_valid[Core]) && unit_q == 2'd3);
       c_full: cover (!dut.room_q && dut.i_cache.ready_q);
     end
   end

@@ -60,6 +60,7 @@ common/flk_priority_arbiter.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
 common/flk_sram_fifo.sv
+common/flk_sram_single.sv
 common/flk_stream_arbiter.sv
 common/flk_weight.sv
 ctu/flk_ctu.sv

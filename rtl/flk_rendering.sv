@@ -25,6 +25,7 @@ module flk_rendering
   parameter  int unsigned Lanes          = 32,
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
+  parameter  int unsigned InWidth        = 1,    // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
   parameter  int unsigned Chunks         = 16,   // in a list reader's memory
   parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
@@ -313,13 +314,14 @@ module flk_rendering
 
   // ---- records --------------------------------------------------------------------------------------
 
-  logic [CORES-1:0]                 record_valid, record_ready, record_end;
-  logic [CORES-1:0][RecordBits-1:0] record;
-  logic [CORES-1:0]                 finished;
-  logic [31:0]                      cache_lines;
+  logic [CORES-1:0]                              record_ready, finished;
+  logic [CORES-1:0][InWidth-1:0]                 record_valid, record_end;
+  logic [CORES-1:0][InWidth-1:0][RecordBits-1:0] record;
+  logic [31:0]                                   cache_lines;
 
   flk_delivery #(
     .RecordBits(RecordBits),
+    .InWidth   (InWidth),
     .Queue     (Queue),
     .AddrBits  (AddrBits),
     .IdBits    (IdBits)
@@ -359,37 +361,40 @@ module flk_rendering
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
-  logic        [CORES-1:0]                 own_valid, own_ready, own_end, own_finished, pixel_valid;
-  logic        [CORES-1:0][RecordBits-1:0] own_record;
-  subtile_t    [CORES-1:0]                 subtile;
-  logic                                    pair_freed;
-  core_pixel_t [CORES-1:0]                 pixel;
+  logic        [CORES-1:0]                              own_ready, own_finished, pixel_valid;
+  logic        [CORES-1:0][InWidth-1:0]                 own_valid, own_end;
+  logic        [CORES-1:0][InWidth-1:0][RecordBits-1:0] own_record;
+  subtile_t    [CORES-1:0]                              subtile;
+  logic                                                 pair_freed;
+  core_pixel_t [CORES-1:0]                              pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
     logic                       unused_done, open, next, second, valid;
+    logic [InWidth-1:0]         own, ends;
     logic [TILE_COORD_BITS-1:0] x, y;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
 
     // The frame writer has a place for what the core is given.
     assign open         = 32'(begun_q) < Pairs;
-    assign own_valid[k] = valid && open;
-    assign next         = own_valid[k] && own_ready[k] && own_end[k];
+    assign own_valid[k] = own & {InWidth{valid && open}};
+    assign ends         = own & own_end[k];
+    assign next         = valid && open && own_ready[k] && ends != '0;
 
-    // The stage speaks of the element that it takes, delivery of the one after it.
-    assign finished[k] = own_finished[k] && !(valid && own_end[k]);
+    // The stage speaks of the elements that it takes, delivery of the one after them.
+    assign finished[k] = own_finished[k] && !(valid && ends != '0);
 
     flk_pipe_reg #(
-      .Width(1 + RecordBits)
+      .Width(InWidth * (2 + RecordBits))
     ) i_record (
       .clk_i,
       .rst_ni,
       .clear_i    (1'b0),
-      .in_valid_i (record_valid[k]),
+      .in_valid_i (record_valid[k][0]),
       .in_ready_o (record_ready[k]),
-      .in_data_i  ({record_end[k], record[k]}),
+      .in_data_i  ({record_valid[k], record_end[k], record[k]}),
       .out_valid_o(valid),
       .out_ready_i(open && own_ready[k]),
-      .out_data_o ({own_end[k], own_record[k]})
+      .out_data_o ({own, own_end[k], own_record[k]})
     );
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -429,7 +434,7 @@ module flk_rendering
     .VrusPerChannel(VrusPerChannel),
     .MaskGenerator (MaskGenerator),
     .Lanes         (Lanes),
-    .InWidth       (1),
+    .InWidth       (InWidth),
     .Slots         (Slots),
     .Depth         (Depth)
   ) i_stage (

@@ -28,6 +28,7 @@ module flk_top
   parameter  int unsigned Lanes          = 32,
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
+  parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
   parameter  int unsigned Chunks         = 16,
   parameter  int unsigned Entries        = 512,
@@ -518,6 +519,7 @@ module flk_top
     .Lanes         (Lanes),
     .Slots         (Slots),
     .Depth         (Depth),
+    .InWidth       (InWidth),
     .SortStages    (SortStages),
     .Chunks        (Chunks),
     .Entries       (Entries),

@@ -478,6 +478,13 @@ def stage() -> str:
         '    $error("flk_stage: Stage must be one of STAGE_*");',
         "  end",
         *(
+            line for name, entry in p.STAGES.items() if "InWidth" not in entry.parameters for line in (
+                f"  if (Stage == STAGE_{name.upper()} && InWidth != 1) begin : gen_check_{name}_width",
+                f'    $error("flk_stage: {name} take one record a cycle and core, so InWidth must be 1");',
+                "  end",
+            )
+        ),
+        *(
             line for name, entry in p.STAGES.items() if entry.element == p.RECORD_ELEMENT for line in (
                 f"  if (Stage == STAGE_{name.upper()} && Form != FORM_FACTORED) begin : gen_check_{name}",
                 f'    $error("flk_stage: {name} take records of 16 bytes, in factored form");',

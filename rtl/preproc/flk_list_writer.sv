@@ -538,18 +538,27 @@ module flk_list_writer #(
     end
   end
 
-  flk_sram #(
+  logic place_read_en, place_write;
+
+  assign place_read_en = look_q == LOOK && (hold_q || (state_q == POINTERS && large_q));
+  assign place_write   = (state_q == CLEAR && step_q < StepBits'(Places)) || placing;
+
+  flk_sram_single #(
     .Width($bits(place_t)),
     .Depth(Places)
   ) i_places (
     .clk_i,
-    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Places)) || placing),
-    .wr_addr_i(state_q == CLEAR ? PlacesBits'(step_q) : look_place),
+    .en_i     (place_read_en || place_write),
+    .write_i  (place_write),
+    .addr_i   (state_q == CLEAR ? PlacesBits'(step_q) : look_place),
     .wr_data_i(state_q == CLEAR ? '0 : place_d),
-    .rd_en_i  (look_q == LOOK && (hold_q || (state_q == POINTERS && large_q))),
-    .rd_addr_i(look_place),
     .rd_data_o(place_read)
   );
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni) !(place_read_en && place_write))
+  else $error("flk_list_writer: a place is read and written at once");
+`endif
 
   // The place as it was stays at the memory's output until the line has moved.
   function automatic logic [NumberBits-1:0] line_of(input logic [TagBits-1:0] tag);

@@ -47,6 +47,9 @@ module flk_stage
   if (Stage >= RENDER_STAGES) begin : gen_check_stage
     $error("flk_stage: Stage must be one of STAGE_*");
   end
+  if (Stage == STAGE_CHANNELS && InWidth != 1) begin : gen_check_channels_width
+    $error("flk_stage: channels take one record a cycle and core, so InWidth must be 1");
+  end
   if (Stage == STAGE_LANES && Form != FORM_FACTORED) begin : gen_check_lanes
     $error("flk_stage: lanes take records of 16 bytes, in factored form");
   end

@@ -7,6 +7,8 @@
 // ahead of the queues, as far as the cache has places, and the memory's latency is not waited for.
 // The head of the stream waits while any core's queue is nearly full.
 // in_*: of each unit, the oldest entry and the one behind it; in_ready_o takes all that is valid.
+// out_*: to each core, up to InWidth elements of one list, the older lower; out_ready_i takes all that are valid, and a second may join
+// the one that waits. The end of a list is the last of those that are given together.
 // finished_i of a core, a level, is about the tile whose elements it is taking, until it has taken its
 // end; in the cycle after that it is about the next tile. Records of such a tile that are not in its
 // queue yet do not come; an entry that no core wants is not looked up. When all four cores are finished
@@ -18,6 +20,7 @@
 module flk_delivery #(
   parameter  int unsigned RecordBits = 128,
   parameter  int unsigned NumberBits = 24,
+  parameter  int unsigned InWidth    = 1,    // elements that a core takes in a cycle, 1 or 2
   parameter  int unsigned Queue      = 64,   // records, of each core
   parameter  int unsigned Banks      = 4,    // of the cache
   parameter  int unsigned Sets       = 64,
@@ -47,11 +50,11 @@ module flk_delivery #(
   input  logic [3:0][1:0][NumberBits+Cores-1:0] in_entry_i,
   output logic [3:0]                            finish_o,
   // Cores
-  output logic [Cores-1:0]                  out_valid_o,
-  input  logic [Cores-1:0]                  out_ready_i,
-  output logic [Cores-1:0]                  out_end_o,
-  output logic [Cores-1:0][RecordBits-1:0]  out_record_o,
-  input  logic [Cores-1:0]                  finished_i,
+  output logic [Cores-1:0][InWidth-1:0]                 out_valid_o,
+  input  logic [Cores-1:0]                              out_ready_i,
+  output logic [Cores-1:0][InWidth-1:0]                 out_end_o,
+  output logic [Cores-1:0][InWidth-1:0][RecordBits-1:0] out_record_o,
+  input  logic [Cores-1:0]                              finished_i,
   // AXI4
   output logic                              ar_valid_o,
   input  logic                              ar_ready_i,
@@ -74,6 +77,9 @@ module flk_delivery #(
 
   if (Queue < 8 || Queue % 2 != 0) begin : gen_check_queue
     $error("flk_delivery: Queue must be even, at least 8");
+  end
+  if (InWidth != 1 && InWidth != 2) begin : gen_check_width
+    $error("flk_delivery: InWidth must be 1 or 2");
   end
 
   typedef struct packed {
@@ -99,7 +105,8 @@ module flk_delivery #(
   logic [Cores-1:0][EndBits-1:0]  opened_q;
   logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
   logic [Cores-1:0]               finished_q, unopened, unended;
-  logic [Cores-1:0]               pop, pop_q, pop_end_q;  // counted a cycle later: ready comes late
+  logic [Cores-1:0][1:0]          pop, pop_q;        // counted a cycle later: ready comes late
+  logic [Cores-1:0]               pop_end_q;
   logic                           ready_q;           // the cache is
 
   assign e_move      = (e_valid_q & ~leaves) == '0;
@@ -235,15 +242,20 @@ module flk_delivery #(
   end
 
   for (genvar s = 0; s < Cores; s++) begin : gen_core
-    logic [1:0]          push, ended, unused_ready;
-    logic                unused_valid;   // of the record behind the oldest
-    logic [RecordBits:0] unused_record;
+    logic [1:0]               push, ended, unused_ready, queue_valid, given;
+    logic [1:0][RecordBits:0] element;
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
     assign full[s]     = 32'(used_q[s]) > Queue - Margin;
     assign ended       = found_valid & {found[1].last, found[0].last};
-    assign pop[s]      = out_valid_o[s] && out_ready_i[s];
+    assign given       = queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
+    assign pop[s]      = given & {2{out_ready_i[s]}};
+
+    for (genvar w = 0; w < InWidth; w++) begin : gen_way
+      assign out_valid_o[s][w] = given[w];
+      assign {out_end_o[s][w], out_record_o[s][w]} = element[w];
+    end
 
     // What is behind an end is not of the tile that the core takes.
     assign push[0] = found_valid[0] && found[0].mask[s] &&
@@ -261,9 +273,9 @@ module flk_delivery #(
       .in_valid_i (push),
       .in_ready_o (unused_ready),  // there is room
       .in_data_i  ({found[1].last, found_record[1], found[0].last, found_record[0]}),
-      .out_valid_o({unused_valid, out_valid_o[s]}),
-      .out_ready_i({1'b0, out_ready_i[s]}),
-      .out_data_o ({unused_record, out_end_o[s], out_record_o[s]}),
+      .out_valid_o(queue_valid),
+      .out_ready_i(pop[s]),
+      .out_data_o (element),
       .empty_o    (queue_empty[s])
     );
 
@@ -273,19 +285,20 @@ module flk_delivery #(
         opened_q[s]   <= '0;
         ends_q[s]     <= '0;
         finished_q[s] <= 1'b0;
-        pop_q[s]      <= 1'b0;
+        pop_q[s]      <= '0;
         pop_end_q[s]  <= 1'b0;
       end else if (stop) begin
         used_q[s]     <= '0;
         opened_q[s]   <= '0;
         ends_q[s]     <= '0;
         finished_q[s] <= 1'b0;
-        pop_q[s]      <= 1'b0;
+        pop_q[s]      <= '0;
         pop_end_q[s]  <= 1'b0;
       end else begin
         pop_q[s]      <= pop[s];
-        pop_end_q[s]  <= pop[s] && out_end_o[s];
-        used_q[s]     <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(pop_q[s]);
+        pop_end_q[s]  <= (pop[s] & {element[1][RecordBits], element[0][RecordBits]}) != '0;
+        used_q[s]     <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1])
+                         - FillBits'(pop_q[s][0]) - FillBits'(pop_q[s][1]);
         opened_q[s]   <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
         ends_q[s]     <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
                          - FillBits'(pop_end_q[s]);
@@ -303,8 +316,8 @@ module flk_delivery #(
     else $error("flk_delivery: ends or places");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        out_valid_o[s] && !out_ready_i[s] && !stop |=>
-        out_valid_o[s] && $stable({out_end_o[s], out_record_o[s]}))
+        out_valid_o[s][0] && !out_ready_i[s] && !stop |=>
+        out_valid_o[s][0] && $stable({out_end_o[s][0], out_record_o[s][0]}))
     else $error("flk_delivery: output changed before its transfer");
 `endif
   end

@@ -9,7 +9,7 @@ from flicker import markdown
 from flicker.cost.chip_area import UM2_PER_BIT
 from flicker.cost.stamp import LIBERTY, rtl_stamp
 from flicker.cost.synth.run import Runner
-from flicker.cost.synth.units import MEMORY
+from flicker.cost.synth.units import MEMORIES
 from flicker.errors import FlickerError
 from flicker.params import CHIP_MEMORIES, ChipMemories, RenderConfig
 
@@ -24,14 +24,14 @@ SIDES = {"i_front": "front end", "i_rendering": "rendering", "": "top"}
 SHAPES = 4  # so many kinds of memories are listed in a row
 
 
-def memories(runner: Runner, key: str, side: str = "", owner: str = TOP) -> Counter[tuple[str, str, int, int]]:
-    """Of a planned unit: (side, unit, words, bits of a word) to their number."""
-    found: Counter[tuple[str, str, int, int]] = Counter()
+def memories(runner: Runner, key: str, side: str = "", owner: str = TOP) -> Counter[tuple[str, str, str, int, int]]:
+    """Of a planned unit: (side, unit, module, words, bits of a word) to their number."""
+    found: Counter[tuple[str, str, str, int, int]] = Counter()
     for instance, child in runner.tasks[key]["children"].items():
         job = runner.tasks[child]
         below = side or (instance if instance in SIDES else "")
-        if job["top"] == MEMORY:
-            found[below, owner, job["parameters"]["Depth"], job["parameters"]["Width"]] += 1
+        if job["top"] in MEMORIES:
+            found[below, owner, job["top"], job["parameters"]["Depth"], job["parameters"]["Width"]] += 1
         else:
             found += memories(runner, child, below, owner if job["top"] in HOLDERS else job["top"])
     return found
@@ -49,18 +49,18 @@ def tables(say: Say) -> dict[str, str]:
     runner = Runner(LIBERTY)
     found = memories(runner, runner.add(TOP, {}))
     rows, sums = [], Counter[str]()
-    units = sorted({(side, unit) for side, unit, _, _ in found}, key=lambda x: (list(SIDES).index(x[0]), x[1]))
-    for side, unit in units:
-        kinds = sorted((count, words, bits) for (s, u, words, bits), count in found.items() if (s, u) == (side, unit))
+    units = sorted({(side, unit, module) for side, unit, module, _, _ in found}, key=lambda x: (list(SIDES).index(x[0]), *x[1:]))
+    for side, unit, module in units:
+        kinds = sorted((count, words, bits) for (*holder, words, bits), count in found.items() if holder == [side, unit, module])
         total = sum(count * words * bits for count, words, bits in kinds)
         sums[side] += total
-        rows.append([SIDES[side], f"`{unit}`", _shapes(kinds), *_sizes(total)])
+        rows.append([SIDES[side], f"`{unit}`", _shapes(kinds), MEMORIES[module], *_sizes(total)])
     for side, total in sums.items():
-        rows.append([SIDES[side], "all", "", *_sizes(total)])
-    rows.append(["chip", "all", f"{sum(found.values())} memories", *_sizes(sum(sums.values()))])
+        rows.append([SIDES[side], "all", "", "", *_sizes(total)])
+    rows.append(["chip", "all", f"{sum(found.values())} memories", "", *_sizes(sum(sums.values()))])
     config = RenderConfig(memories="small")
     small = memories(runner, runner.add(TOP, config.chip_parameters() | config.chip_memories.front_parameters()))
-    bits = {name: sum(words * width * count for (_, _, words, width), count in of.items()) for name, of in (("default", found), ("small", small))}
+    bits = {name: sum(words * width * count for (*_, words, width), count in of.items()) for name, of in (("default", found), ("small", small))}
     sizes = [
         [f"`{name}`", *(f"{value:,}" for value in vars(CHIP_MEMORIES[name]).values()), *_sizes(bits[name])] for name in CHIP_MEMORIES
     ]
@@ -68,7 +68,7 @@ def tables(say: Say) -> dict[str, str]:
     if bits["small"] > PAPER_KB * 8192:
         raise FlickerError(f"small memories: {bits['small']:,} bits, more than the paper's {PAPER_KB} KB")
     names = ["memories", *(f.name.replace("_", " ") for f in fields(ChipMemories)), "bits", "KB", "mm2"]
-    return {"sizes": markdown.table(names, sizes), "": head + markdown.table(["half", "unit", "memories, words x bits", "bits", "KB", "mm2"], rows)
+    return {"sizes": markdown.table(names, sizes), "": head + markdown.table(["half", "unit", "memories, words x bits", "ports", "bits", "KB", "mm2"], rows)
             + f"\n\nThe paper: {PAPER_KB} KB of feature buffers and others, {PAPER_KB * 8192:,} bits."}
 
 

@@ -1,6 +1,6 @@
-"""Memory with a write and a read port: what was written is read a cycle later and stays; a read beside a write of the same address gives no one's data.
+"""Memories: what was written is read a cycle later and stays; of two ports, a read beside a write of the same address gives no one's data.
 
-State space: random traffic on few addresses, both ports free. Parameter space: one word, a depth that is no power of two, words wider than a machine word.
+State space: random traffic on few addresses, all ports free. Parameter space: one word, a depth that is no power of two, words wider than a machine word.
 """
 
 from __future__ import annotations
@@ -9,11 +9,14 @@ import pytest
 from flicker_tb.runner import build_and_test, refused
 
 
+@pytest.mark.parametrize("module", ["flk_sram", "flk_sram_single"])
 @pytest.mark.parametrize(("width", "depth"), [(1, 1), (52, 6), (146, 16)])
-def test_sram(width: int, depth: int) -> None:
-    build_and_test("flk_sram", "cocotb_sram", parameters={"Width": width, "Depth": depth}, config={"width": width, "depth": depth})
+def test_sram(module: str, width: int, depth: int) -> None:
+    test = "one_port" if module == "flk_sram_single" else "random_traffic"
+    build_and_test(module, "cocotb_sram", parameters={"Width": width, "Depth": depth}, config={"width": width, "depth": depth}, tests=[test])
 
 
-def test_illegal_parameters() -> None:
+@pytest.mark.parametrize("module", ["flk_sram", "flk_sram_single"])
+def test_illegal_parameters(module: str) -> None:
     with refused("must be at least 1"):
-        build_and_test("flk_sram", "cocotb_sram", parameters={"Width": 0})
+        build_and_test(module, "cocotb_sram", parameters={"Width": 0})

@@ -1,8 +1,9 @@
 """Delivery: every core gets the records of the entries with its bit, in order, tile by tile; none twice, none more after it is finished than were on their way.
 
 State space: lists of 0 to 300 entries, masks of all kinds, cores of different pace, idle and back-pressure patterns, memory with and without pauses; cores that
-finish with their tiles at random, none or all of them; latency; clear at any time. Parameter space: short queues and a small cache; with SLOW=1 the default,
-records of 32 bytes.
+finish with their tiles at random, none or all of them; latency; clear at any time. Parameter space: short queues and a small cache; two elements a
+cycle for a core; with SLOW=1 the default,
+records of 32 bytes, both together.
 """
 
 from __future__ import annotations
@@ -16,17 +17,20 @@ from flicker.golden.delivery import RecordCache
 from flicker.sim.delivery import deliver
 
 SMALL = {"Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
+WIDE = {"InWidth": 2, "Queue": 32}
 
 
-@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256})), SMALL])
+@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256}, SMALL | {"InWidth": 2})), SMALL, WIDE])
 def test_delivery(parameters: dict[str, int]) -> None:
-    tests = [] if not parameters else ["tiles", "finishing", "all_finished", "latency", "clear"]
+    tests = [] if parameters in ({}, WIDE) else ["tiles", "finishing", "all_finished", "latency", "clear"]
     build_and_test("flk_delivery", "cocotb_delivery", parameters=parameters, tests=tests)
 
 
 def test_illegal_parameters() -> None:
     with refused("Queue must be even, at least 8"):
         build_and_test("flk_delivery", "cocotb_delivery", parameters={"Queue": 6})
+    with refused("InWidth must be 1 or 2"):
+        build_and_test("flk_delivery", "cocotb_delivery", parameters={"InWidth": 3})
 
 
 def test_alone() -> None:

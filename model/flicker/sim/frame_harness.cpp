@@ -104,13 +104,13 @@ struct Sim {
   }
 
 #ifdef FLK_RENDERING
-  // Records that delivery gives to each core, by sub-tile (rendering.vlt).
+  // Records that delivery gives to each core, FLK_RENDERING at a time at most, by sub-tile (rendering.vlt).
   void count_records() {
     const auto& root = *top->rootp;
-    const unsigned moved = root.flk_rendering__DOT__record_valid & root.flk_rendering__DOT__record_ready;
-    for (int k = 0; moved && k < CORES; ++k) {
-      if (!(moved >> k & 1)) continue;
-      if (root.flk_rendering__DOT__record_end >> k & 1) {
+    for (int e = 0; root.flk_rendering__DOT__record_valid >> e; ++e) {
+      const int k = e / FLK_RENDERING;
+      if (!(root.flk_rendering__DOT__record_valid >> e & root.flk_rendering__DOT__record_ready >> k & 1)) continue;
+      if (root.flk_rendering__DOT__record_end >> e & 1) {
         given[k].push_back(records[k]);
         records[k] = 0;
       } else {

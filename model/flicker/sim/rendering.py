@@ -51,7 +51,8 @@ class RtlRendering:
 def build(config: RenderConfig, parameters: Mapping[str, int] | None = None) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content. parameters: of `flk_rendering`, further ones."""
     settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering")]
-    return half.build("flk_rendering", config.chip_parameters() | dict(parameters or {}), settings, define="-DFLK_RENDERING")
+    values = {"InWidth": 1} | config.chip_parameters() | dict(parameters or {})
+    return half.build("flk_rendering", values, settings, define=f"-DFLK_RENDERING={values['InWidth']}")
 
 
 def rendering_rtl(

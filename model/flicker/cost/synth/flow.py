@@ -16,6 +16,7 @@ from ...errors import FlickerError
 from ...toolchain import FILELIST
 from .liberty import CLOCK_GATE, Library
 from .timing import Timing
+from .units import SINGLE
 
 # Longest path wanted, in FO4; gates are made larger only where a path needs it.
 CLOCK_FO4 = 60
@@ -219,7 +220,11 @@ def macro(job: dict) -> dict:
     library = Library(Path(job["liberty"]))
     width, depth = job["parameters"]["Width"], job["parameters"]["Depth"]
     address = max((depth - 1).bit_length(), 1)
-    widths = {"clk_i": 1, "wr_en_i": 1, "wr_addr_i": address, "wr_data_i": width, "rd_en_i": 1, "rd_addr_i": address, "rd_data_o": width}
+    if job["top"] == SINGLE:
+        ports = {"en_i": 1, "write_i": 1, "addr_i": address}
+    else:
+        ports = {"wr_en_i": 1, "wr_addr_i": address, "rd_en_i": 1, "rd_addr_i": address}
+    widths = {"clk_i": 1, **ports, "wr_data_i": width, "rd_data_o": width}
     load = max(library.flip_flop.loads.values())
     inputs = {
         name: {"loads": [load] * bits, "captures": [None if name == "clk_i" else (MACRO_SETUP * library.fo4, "storage")] * bits}

@@ -23,7 +23,7 @@ from pathlib import Path
 from ...errors import FlickerError
 from ...toolchain import BUILD, locked, sources_of
 from ..stamp import words
-from .units import COMPOSED, MEMORY, Unit, open_bits
+from .units import COMPOSED, MEMORIES, Unit, open_bits
 
 FOLDER = BUILD / "synth"
 UNITS = FOLDER / "units"
@@ -87,10 +87,10 @@ class Runner:
 
     def add(self, top: str, parameters: dict[str, int], part: bool = False) -> str:
         """Plan a unit and its parts; returns its key. part: it is one of another unit, where a memory is a macro."""
-        identity = (top, tuple(sorted(parameters.items())), part and top == MEMORY)
+        identity = (top, tuple(sorted(parameters.items())), part and top in MEMORIES)
         if identity in self.keys:
             return self.keys[identity]
-        job = self._job(top, parameters, "macro" if part and top == MEMORY else "synthesise")
+        job = self._job(top, parameters, "macro" if part and top in MEMORIES else "synthesise")
         for instance, module, everything in self._children(top, parameters) if top in COMPOSED else []:
             text = next(path for path in sources_of(top) if path.stem == module).read_text()
             own = re.findall(r"^\s*parameter\s+[\w\s]*?(\w+)\s*=", text, re.M)

@@ -33,7 +33,9 @@ PRECISIONS = {"fixed": 3, "fp16": 0, "mixed": 1, "fp8": 2}
 FEATURE_BITS = layout.bits("feature_elem")
 FIFO_DEPTHS = (4, 8, 16, 32, 64, 128)
 
-MEMORY = "flk_sram"  # a macro where it is a part of another unit
+MEMORY = "flk_sram"
+SINGLE = "flk_sram_single"
+MEMORIES = {MEMORY: "1 write, 1 read", SINGLE: "1"}  # macros where they are parts of another unit, and what ports they have
 
 # Operators that the pipelines of the front end are put together from.
 FF_OPERATORS = [*STAGES, "flk_ff_to_fixed", "flk_ff_from_fixed", "flk_fixed_mul", "flk_phase_mux", "flk_delay_ram"]
@@ -52,7 +54,7 @@ COMPOSED: dict[str, list[str]] = {
     **{p.module: list(FF_OPERATORS) for p in PIPELINES},
     "flk_sram_fifo": [MEMORY],
     "flk_delay_ram": [MEMORY],
-    "flk_list_writer": [MEMORY],
+    "flk_list_writer": [MEMORY, SINGLE],
     "flk_frame_writer": [MEMORY, "flk_pixel_out"],
     "flk_list_reader": [MEMORY, "flk_axi_read"],
     "flk_pair_fifo": ["flk_sram_fifo"],
@@ -278,6 +280,7 @@ def _cells() -> list[Unit]:
         unit("flk_registers"),
         # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/list_layout.md.
         unit("flk_sram", "64 x 52 bit, flip-flops", Width=52, Depth=64),
+        unit("flk_sram_single", "64 x 52 bit, flip-flops", Width=52, Depth=64),
         unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, Lists=16, CoordBits=3),
         unit("flk_bitonic_sorter", "16 x 32+16 bit", Lanes=16, KeyWidth=32, PayloadWidth=16, StagesPerReg=1),
     ]
