@@ -52,6 +52,7 @@ module fv_delivery #(
     .idle_o       (),
     .error_o      (),
     .lines_o      (),
+    .waits_o      (),
     .record_base_i('0),
     .in_valid_i   (in_valid),
     .in_ready_o   (in_ready),

@@ -153,6 +153,7 @@ module flk_rendering
   logic [1:0]                  turn_q;
   logic [3:0]                  tile_ready, tile_valid;
   logic [3:0]                  ask_valid, ask_ready, beat_valid, beat_ready;
+  logic [3:0]                  list_valid, list_ready;  // lines
   logic [3:0][AddrBits-1:0]    ask_addr;
   logic [3:0][7:0]             ask_len;
   logic [3:0][2:0]             ask_size;
@@ -190,7 +191,7 @@ module flk_rendering
   end
 
   for (genvar u = 0; u < 4; u++) begin : gen_unit
-    logic              line_valid, line_ready, line_last, next_valid, next_ready, next_again;
+    logic              line_last, next_valid, next_ready, next_again;
     logic [8:0][51:0]  line_entries;
     logic [3:0]        line_count;
     logic [IdBits-1:0] unused_id;
@@ -216,8 +217,8 @@ module flk_rendering
       .tile_ready_o  (tile_ready[u]),
       .tile_x_i      (walk_x),
       .tile_y_i      (walk_y),
-      .out_valid_o   (line_valid),
-      .out_ready_i   (line_ready),
+      .out_valid_o   (list_valid[u]),
+      .out_ready_i   (list_ready[u]),
       .out_entries_o (line_entries),
       .out_count_o   (line_count),
       .out_last_o    (line_last),
@@ -250,8 +251,8 @@ module flk_rendering
       .entries_o   (entries[u]),
       .readings_o  (readings[u]),
       .dropped_o   (dropped[u]),
-      .in_valid_i  (line_valid),
-      .in_ready_o  (line_ready),
+      .in_valid_i  (list_valid[u]),
+      .in_ready_o  (list_ready[u]),
       .in_entries_i(line_entries),
       .in_count_i  (line_count),
       .in_last_i   (line_last),
@@ -318,6 +319,7 @@ module flk_rendering
   logic [CORES-1:0][InWidth-1:0]                 record_valid, record_end;
   logic [CORES-1:0][InWidth-1:0][RecordBits-1:0] record;
   logic [31:0]                                   cache_lines;
+  logic [3:0]                                    delivery_waits;
 
   flk_delivery #(
     .RecordBits(RecordBits),
@@ -333,6 +335,7 @@ module flk_rendering
     .idle_o       (delivery_idle),
     .error_o      (record_error),
     .lines_o      (cache_lines),
+    .waits_o      (delivery_waits),
     .record_base_i({registers_i.records_beat, 1'b0}),
     .in_valid_i   (entry_valid),
     .in_ready_o   (entry_ready),
@@ -366,22 +369,24 @@ module flk_rendering
   logic        [CORES-1:0][InWidth-1:0][RecordBits-1:0] own_record;
   subtile_t    [CORES-1:0]                              subtile;
   logic                                                 pair_freed;
+  // Of a core: it has a record; there is a place for what it gives.
+  logic        [CORES-1:0]                              has, open;
   core_pixel_t [CORES-1:0]                              pixel;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_core
-    logic                       unused_done, open, next, second, valid;
+    logic                       unused_done, next, second;
     logic [InWidth-1:0]         own, ends;
     logic [TILE_COORD_BITS-1:0] x, y;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
 
     // The frame writer has a place for what the core is given.
-    assign open         = 32'(begun_q) < Pairs;
-    assign own_valid[k] = own & {InWidth{valid && open}};
+    assign open[k]      = 32'(begun_q) < Pairs;
+    assign own_valid[k] = own & {InWidth{has[k] && open[k]}};
     assign ends         = own & own_end[k];
-    assign next         = valid && open && own_ready[k] && ends != '0;
+    assign next         = has[k] && open[k] && own_ready[k] && ends != '0;
 
     // The stage speaks of the elements that it takes, delivery of the one after them.
-    assign finished[k] = own_finished[k] && !(valid && ends != '0);
+    assign finished[k] = own_finished[k] && !(has[k] && ends != '0);
 
     flk_pipe_reg #(
       .Width(InWidth * (2 + RecordBits))
@@ -392,8 +397,8 @@ module flk_rendering
       .in_valid_i (record_valid[k][0]),
       .in_ready_o (record_ready[k]),
       .in_data_i  ({record_valid[k], record_end[k], record[k]}),
-      .out_valid_o(valid),
-      .out_ready_i(open && own_ready[k]),
+      .out_valid_o(has[k]),
+      .out_ready_i(open[k] && own_ready[k]),
       .out_data_o ({own, own_end[k], own_record[k]})
     );
 
@@ -531,7 +536,44 @@ module flk_rendering
 
   // ---- counters -------------------------------------------------------------------------------------
 
-  logic [31:0] cycles_q;
+  localparam int unsigned Waits = 9;
+
+  logic [31:0]            cycles_q;
+  logic [Waits-1:0][3:0]  wait_q;   // by sorting unit or core
+  logic [Waits-1:0][31:0] waited;
+  logic [CORES-1:0]       first_valid;
+
+  for (genvar k = 0; k < CORES; k++) begin : gen_first
+    assign first_valid[k] = record_valid[k][0];
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      wait_q <= '0;
+    end else begin
+      wait_q[0] <= list_valid & ~list_ready;
+      wait_q[1] <= sorted_valid & ~sorted_ready;
+      wait_q[2] <= 4'(delivery_waits[0] && state_q == RUN && !pixels_done);
+      wait_q[3] <= 4'(delivery_waits[1]);
+      wait_q[4] <= 4'(delivery_waits[2]);
+      wait_q[5] <= 4'(delivery_waits[3]);
+      wait_q[6] <= first_valid & ~record_ready;
+      wait_q[7] <= has & ~open;
+      wait_q[8] <= 4'(line_valid && !line_ready);
+    end
+  end
+
+  for (genvar e = 0; e < Waits; e++) begin : gen_waits
+    flk_event_counter #(
+      .CountBits(3)
+    ) i_waited (
+      .clk_i,
+      .rst_ni,
+      .clear_i(start),
+      .count_i(3'($countones(wait_q[e]))),
+      .value_o(waited[e])
+    );
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -548,6 +590,16 @@ module flk_rendering
   assign counters_o.readings = readings;
   assign counters_o.dropped  = dropped;
   assign counters_o.lines    = cache_lines;
+
+  assign counters_o.list_waits    = waited[0];
+  assign counters_o.sorted_waits  = waited[1];
+  assign counters_o.entry_missing = waited[2];
+  assign counters_o.entry_waits   = waited[3];
+  assign counters_o.queue_waits   = waited[4];
+  assign counters_o.cache_waits   = waited[5];
+  assign counters_o.record_waits  = waited[6];
+  assign counters_o.pair_waits    = waited[7];
+  assign counters_o.frame_waits   = waited[8];
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

@@ -593,6 +593,10 @@ module flk_top
 
   // Words of a frame: the first field of the counters' structures first.
   assign front_words = {
+    front_counters.beat_waits, front_counters.line_waits, front_counters.merged_waits,
+    front_counters.entry_waits, front_counters.record_waits, front_counters.colour_waits,
+    front_counters.request_waits, front_counters.place_waits, front_counters.lane_waits,
+    front_counters.group_missing, front_counters.cluster_waits,
     front_counters.fetched, front_counters.spilled,
     32'(front_counters.key_low), 32'(front_counters.key_shift),
     32'(front_counters.taken[3]), 32'(front_counters.taken[2]),
@@ -604,6 +608,10 @@ module flk_top
     front_counters.outside, front_counters.too_near, front_counters.culled_gaussians,
     front_counters.culled_clusters, front_counters.cycles};
   assign rendering_words = {
+    rendering_counters.frame_waits, rendering_counters.pair_waits, rendering_counters.record_waits,
+    rendering_counters.cache_waits, rendering_counters.queue_waits, rendering_counters.entry_waits,
+    rendering_counters.entry_missing, rendering_counters.sorted_waits,
+    rendering_counters.list_waits,
     stamps, rendering_counters.lines, rendering_counters.dropped, rendering_counters.readings,
     rendering_counters.entries, rendering_counters.cycles};
 

@@ -21,6 +21,7 @@ module flk_record_cache #(
   output logic                        idle_o,
   output logic                        error_o,
   output logic [31:0]                 lines_o,
+  output logic [1:0]                  waits_o,
   input  logic [AddrBits-6:0]         record_base_i,
   input  logic [1:0]                  in_valid_i,
   output logic [1:0]                  in_ready_o,

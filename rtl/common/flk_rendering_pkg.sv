@@ -26,6 +26,16 @@ package flk_rendering_pkg;
     logic [3:0][31:0] readings;  // of lists
     logic [3:0][31:0] dropped;   // of finished tiles
     logic [31:0]      lines;     // of 32 bytes that the record cache read
+    // Cycles in which something waits, added up over sorting units and cores.
+    logic [31:0]      list_waits;      // a line of a list for its sorting unit
+    logic [31:0]      sorted_waits;    // a sorted entry for its buffer
+    logic [31:0]      entry_missing;   // delivery for an entry, until all pixels are there
+    logic [31:0]      entry_waits;     // an entry for delivery
+    logic [31:0]      queue_waits;     // a record for a core's queue
+    logic [31:0]      cache_waits;     // for its line
+    logic [31:0]      record_waits;    // at the end of its queue for the core
+    logic [31:0]      pair_waits;      // before a core for a place in the frame writer
+    logic [31:0]      frame_waits;     // a line of the frame buffer for its write
   } rendering_counters_t;
 
 endpackage

@@ -193,6 +193,18 @@ package flk_preproc_pkg;
     position_t         key_low;
     logic [31:0]       spilled;         // lines of pointers, by all list writers
     logic [31:0]       fetched;
+    // Cycles in which something waits, added up over lanes and list writers.
+    logic [31:0]       cluster_waits;   // a cluster for the fetch of geometry
+    logic [31:0]       group_missing;   // the projection for a group
+    logic [31:0]       lane_waits;      // a projected group for the lanes
+    logic [31:0]       place_waits;     // for places of records
+    logic [31:0]       request_waits;   // for the fetch of colours
+    logic [31:0]       colour_waits;    // colours for a lane
+    logic [31:0]       record_waits;    // a record for its queue
+    logic [31:0]       entry_waits;     // an entry for the merge
+    logic [31:0]       merged_waits;    // for a list writer
+    logic [31:0]       line_waits;      // a line of a list for its write
+    logic [31:0]       beat_waits;      // a line of records for its write
   } front_counters_t;
 
 endpackage

@@ -942,14 +942,15 @@ module flk_preprocessing
 
   // ---- errors and counters --------------------------------------------------------------------------
 
-  localparam int unsigned Events = 8;
+  localparam int unsigned Events = 19;
 
   logic                            write_error_q;
   logic [31:0]                     cycles_q;
   logic [Events-1:0][LANES-1:0]    events_q;  // by lane
   logic [Events-1:0][31:0]         totals;
 
-  // What happens in the lanes is counted a few cycles later; after a frame's last event comes the end of its lists.
+  // What happens is counted a few cycles later; after a frame's last event comes the end of its lists, of its last wait that of its
+  // writes.
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       events_q <= '0;
@@ -962,6 +963,19 @@ module flk_preprocessing
       events_q[5] <= faint;
       events_q[6] <= unlisted;
       events_q[7] <= LANES'(line_valid && line_ready);
+      // Waits: where a projected group has several reasons, the first one.
+      events_q[8]  <= LANES'(kept_valid && !kept_ready);
+      events_q[9]  <= LANES'(state_q == FRONT && !ended_q && front_en && !front_phase_q &&
+                             !group_valid);
+      events_q[10] <= LANES'(exit_valid && !(&lane_ready));
+      events_q[11] <= LANES'(exit_valid && (&lane_ready) && !record_room);
+      events_q[12] <= LANES'(exit_valid && (&lane_ready) && record_room && !colour_room);
+      events_q[13] <= part_valid & ~part_ready;
+      events_q[14] <= record_valid & ~record_ready;
+      events_q[15] <= entry_valid & ~entry_ready;
+      events_q[16] <= merged_valid & ~merged_ready;
+      events_q[17] <= out_valid[3:0] & ~out_ready[3:0];
+      events_q[18] <= LANES'(line_valid && !line_ready);
     end
   end
 
@@ -1010,6 +1024,17 @@ module flk_preprocessing
   assign counters_o.faint        = totals[5];
   assign counters_o.unlisted     = totals[6];
   assign counters_o.record_beats = totals[7];
+  assign counters_o.cluster_waits = totals[8];
+  assign counters_o.group_missing = totals[9];
+  assign counters_o.lane_waits    = totals[10];
+  assign counters_o.place_waits   = totals[11];
+  assign counters_o.request_waits = totals[12];
+  assign counters_o.colour_waits  = totals[13];
+  assign counters_o.record_waits  = totals[14];
+  assign counters_o.entry_waits   = totals[15];
+  assign counters_o.merged_waits  = totals[16];
+  assign counters_o.line_waits    = totals[17];
+  assign counters_o.beat_waits    = totals[18];
   assign counters_o.cycles       = cycles_q;
   assign counters_o.entries      = list_entries;
   assign counters_o.lines        = list_lines;

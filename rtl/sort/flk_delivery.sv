@@ -15,6 +15,8 @@
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
+// waits_o: in this cycle an entry could be taken and the unit in turn has none (bit 0); it has one that cannot be taken (1); the head of
+// the cache's queue waits for room in the cores' queues (2), or for its line (3).
 // Latency 7 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
 // and out_* come from registers through a multiplexer.
 module flk_delivery #(
@@ -42,6 +44,7 @@ module flk_delivery #(
   output logic                              idle_o,
   output logic                              error_o,
   output logic [31:0]                       lines_o,        // read from memory since start_i
+  output logic [3:0]                        waits_o,
   input  logic [AddrBits-Shift-1:0]         record_base_i,  // in 32 bytes
   // Sorting units
   input  logic [3:0][1:0]                       in_valid_i,
@@ -108,10 +111,13 @@ module flk_delivery #(
   logic [Cores-1:0][1:0]          pop, pop_q;        // counted a cycle later: ready comes late
   logic [Cores-1:0]               pop_end_q;
   logic                           ready_q;           // the cache is
+  logic [1:0]                     head_waits;
 
   assign e_move      = (e_valid_q & ~leaves) == '0;
   assign e_ready     = ready_q && e_move;
   assign e_take      = in_valid_i[unit_q][0] && e_ready;
+  assign waits_o     = {head_waits, in_valid_i[unit_q][0] && !e_ready,
+                        !in_valid_i[unit_q][0] && e_ready};
   assign e_end_taken = e_take && (in_valid_i[unit_q] & in_end_i[unit_q]) != '0;
 
   for (genvar k = 0; k < 2; k++) begin : gen_entry
@@ -194,6 +200,7 @@ module flk_delivery #(
     .idle_o      (cache_idle),
     .error_o,
     .lines_o,
+    .waits_o     (head_waits),
     .record_base_i,
     .in_valid_i  (look),
     .in_ready_o  (look_ready),

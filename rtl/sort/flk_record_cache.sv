@@ -14,6 +14,7 @@
 // Throughput: two elements a cycle, one where both are of the same bank (at the data: if both read, or both write, or
 // are of one place); a line a cycle from memory. Latency 4 without a miss in the queue. in_ready_o[1] depends on in_*; it is
 // never high without in_ready_o[0].
+// waits_o, of the head of the queue: bit 0, out_ready_i is low; bit 1, its line has not come.
 // Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
@@ -38,6 +39,7 @@ module flk_record_cache #(
   output logic                            idle_o,
   output logic                            error_o,
   output logic [31:0]                     lines_o,        // read since start_i
+  output logic [1:0]                      waits_o,
   input  logic [AddrBits-Shift-1:0]       record_base_i,  // in lines
   // Lookups
   input  logic [1:0]                      in_valid_i,
@@ -452,6 +454,7 @@ module flk_record_cache #(
   assign go_second = go_first && wait_valid[1] && apart &&
                      (!head[1].miss || (head[0].miss ? line_valid[1] : line_valid[0]));
   assign go        = {go_second, go_first};
+  assign waits_o   = {wait_valid[0] && out_ready_i && !go_first, wait_valid[0] && !out_ready_i};
   assign line_pop  = {go_second && head[1].miss && head[0].miss,
                       go_first && (head[0].miss || (go_second && head[1].miss))};
 

@@ -1,7 +1,8 @@
 // Counters of frames: kept in two banks of 256 words, copied when a half of the chip has ended a frame.
 //
 // front_valid_i and rendering_valid_i stay until *_done_o, high for a cycle; what is copied stays as long. The front end's
-// FRONT_WORDS go to words 0 on, the rendering half's RENDERING_WORDS to words COUNTER_RENDERING on, the stage's to words 128 on (core, then
+// FRONT_WORDS go to words 0 on, the last FRONT_WAITS of them to words COUNTER_FRONT_WAITS on, the rendering half's RENDERING_WORDS to words
+// COUNTER_RENDERING on, the stage's to words 128 on (core, then
 // index CNT_*): read through counter_addr_o, COUNTER_LATENCY cycles later. *_none_i: zeros instead.
 // value_o is the word addr_i of bank_i, a cycle later; of a word that is being written it is undefined. The front end goes first;
 // a copy takes a cycle a word.
@@ -95,6 +96,9 @@ module flk_frame_counters
       FRONT: begin
         write = 1'b1;
         bank  = front_bank_i;
+        if (32'(step_q) >= FRONT_WORDS - FRONT_WAITS) begin
+          index = step_q + IndexBits'(COUNTER_FRONT_WAITS - (FRONT_WORDS - FRONT_WAITS));
+        end
         word  = front_none_i ? '0 : front_words_i[step_q[$clog2(FRONT_WORDS)-1:0]];
       end
       RENDERING: begin

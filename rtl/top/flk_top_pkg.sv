@@ -47,9 +47,11 @@ package flk_top_pkg;
   localparam int unsigned COUNTER_FRONT = 0;
   localparam int unsigned COUNTER_RENDERING = 34;
   localparam int unsigned COUNTER_LIVE = 64;
+  localparam int unsigned COUNTER_FRONT_WAITS = 96;  // the last ones of the front end
   localparam int unsigned COUNTER_STAGE = 128;
-  localparam int unsigned FRONT_WORDS = 34;
-  localparam int unsigned RENDERING_WORDS = 18;
+  localparam int unsigned FRONT_WAITS = 11;
+  localparam int unsigned FRONT_WORDS = COUNTER_RENDERING + FRONT_WAITS;
+  localparam int unsigned RENDERING_WORDS = 27;
   localparam int unsigned LIVE_WORDS = 20;
 
   // Managers of the memory port; the first reader and the first writer go first.

@@ -101,6 +101,7 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
     rtl = rendering_rtl(image, front.camera, config, format_=format_, background=background, stride=row + 32 * gap, seed=seed(), limit=LIMIT, **options)
     assert rtl.errors[-1] == 0
     assert np.array_equal(rtl.buffer[:, :row], golden.buffer[:, :row])
+    assert rtl.waits == {name: rtl.counters[name] for name in rtl.waits}
     if len(front.entry_tile):
         assert np.ptp(golden.buffer[:, :row].reshape(-1, row), axis=0).any(), "a picture of one colour"
     if not options.get("memory", MemoryOptions()).fail:
@@ -189,6 +190,7 @@ def test_small_memories() -> None:
     tiles = 4
     assert (np.bincount(view_of(32, 32, "haze")[0].entry_tile) > config.chip_memories.sorted_entries).sum() == tiles
     rtl = check((32, 32), config, scene="haze")
+    assert rtl.counters["sorted_waits"] > 0
     assert rtl.counters["readings"].sum() == 2 * tiles and check((32, 32), scene="haze").counters["readings"].sum() == tiles
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
     check((96, 54), config, memory=MemoryOptions(DramConfig().timing, paused(shares)), frames=2)
@@ -212,13 +214,15 @@ def test_pauses_and_dram() -> None:
     """DRAM behind ports that pause; two frames one after the other."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
     memory = MemoryOptions(DramConfig().timing, paused(shares))
-    check((96, 54), memory=memory, frames=2)
+    rtl = check((96, 54), memory=memory, frames=2)
+    assert all(rtl.counters[f"{name}_waits"] > 0 for name in ("list", "entry", "queue", "cache", "record")) and rtl.counters["entry_missing"] > 0
 
 
 def test_slow_writes() -> None:
     """A memory that takes a line now and then: cores wait with their tiles for places in the frame writer, which holds four pairs."""
     slow = {**PORTS, "write": replace(PORTS["write"], stall={"W": 0.95}, seed=seed())}
-    check((320, 32), memory=MemoryOptions(None, slow))
+    rtl = check((320, 32), memory=MemoryOptions(None, slow))
+    assert rtl.counters["pair_waits"] > 0 and rtl.counters["frame_waits"] > 0
 
 
 @pytest.mark.parametrize("part", PURPOSES)

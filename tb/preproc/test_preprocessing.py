@@ -60,6 +60,7 @@ def check(
     image = front_memory(golden)
     rtl = front_rtl(packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed())
     assert rtl.error == 0 and "value beyond FP16 clamped" not in golden.adjusted
+    assert rtl.waits == {name: rtl.counters[name] for name in rtl.waits}
     written = image.written
     assert np.array_equal(rtl.records[written], image.records[written])
     lines = np.unique(np.concatenate([w for w in image.lists.writes])) if image.lists.chunks else np.zeros(0, np.int64)
@@ -133,7 +134,9 @@ def test_degrees_and_a_slow_memory(degree: int, kind: RecordKind) -> None:
     scene = some(3000, sh=rng.normal(scale=0.3, size=(3000, 16, 3)))
     sh = scene.sh[:, : (degree + 1) ** 2]
     form = PackedFormat.CHUNK if degree % 2 else PackedFormat.FP16
-    check(pack(dataclasses.replace(scene, sh=sh), form).packed, plain_camera(), memory=lpddr4(), frames=2, kind=kind)
+    _, rtl = check(pack(dataclasses.replace(scene, sh=sh), form).packed, plain_camera(), memory=lpddr4(), frames=2, kind=kind)
+    assert all(rtl.counters[f"{name}_waits"] > 0 for name in ("cluster", "colour", "entry", "merged", "line", "beat")) and rtl.counters["group_missing"] > 0
+    assert rtl.counters["place_waits"] + rtl.counters["request_waits"] > 0
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -84,12 +84,13 @@ def test_counters_are_the_description() -> None:
     numbers = {name: int(value) for name, value in re.findall(r"localparam int unsigned (\w+) = (\d+);", text)}
     bases = {
         "COUNTER_FRONT": ChipCounter.FRONT_CYCLES, "COUNTER_RENDERING": ChipCounter.RENDERING_CYCLES, "COUNTER_LIVE": ChipCounter.LIVE_CYCLES,
-        "COUNTER_STAGE": ChipCounter.STAGE,
+        "COUNTER_FRONT_WAITS": ChipCounter.FRONT_CLUSTER_WAITS, "COUNTER_STAGE": ChipCounter.STAGE,
     }
     assert {name: numbers[name] for name in bases} == {name: int(base) for name, base in bases.items()}
     ends = {
-        "FRONT_WORDS": ChipCounter.POINTERS_FETCHED - ChipCounter.FRONT_CYCLES,
-        "RENDERING_WORDS": ChipCounter.STAMP_RENDERING_DONE - ChipCounter.RENDERING_CYCLES,
+        "COUNTER_RENDERING": ChipCounter.POINTERS_FETCHED - ChipCounter.FRONT_CYCLES,  # the front end's words but waits
+        "FRONT_WAITS": ChipCounter.FRONT_BEAT_WAITS - ChipCounter.FRONT_CLUSTER_WAITS,
+        "RENDERING_WORDS": ChipCounter.FRAME_WAITS - ChipCounter.RENDERING_CYCLES,
         "LIVE_WORDS": ChipCounter.LIVE_DATA_WAITS - ChipCounter.LIVE_CYCLES,
     }
     assert {name: numbers[name] for name in ends} == {name: last + 1 for name, last in ends.items()}

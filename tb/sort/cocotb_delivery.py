@@ -81,6 +81,7 @@ class Delivery:
         self.records = 0
         self.late = 0
         self.together = 0  # pairs that a core took
+        self.waits = [0] * 4
 
     def give(self, tiles: list[Tile]) -> None:
         """Tiles of a frame, in the order of the walk."""
@@ -97,6 +98,7 @@ class Delivery:
         dut, edge = self.dut, RisingEdge(self.dut.clk_i)
         bits, number = 8 * self.bytes, len(dut.in_entry_i) // 8
         ready = 0
+        turn = 0  # of the unit that is taken from
         told: list[set[int]] = [set() for _ in range(CORES)]
         while True:
             await edge
@@ -107,8 +109,15 @@ class Delivery:
             if not self.tiles:
                 told = [set() for _ in range(CORES)]
             if dut.clear_i.value == 1:
-                ready = 0
+                ready = turn = 0
                 continue
+            # Waits
+            offered, taken, waits = self.units[turn].offered, int(dut.in_ready_o.value) >> turn & 1, int(dut.waits_o.value)
+            assert waits & 3 == (not offered and taken) + 2 * (offered > 0 and not taken), f"waits_o {waits:#x}, unit {turn}: {offered} offered, {taken} taken"
+            assert waits >> 2 != 3, "the head waits for two things"
+            self.waits = [n + (waits >> k & 1) for k, n in enumerate(self.waits)]
+            if offered and taken and any(self.units[turn].item(k)[0] for k in range(offered)):
+                turn = (turn + 1) % UNITS
             # Units
             moved, finish = int(dut.in_ready_o.value), int(dut.finish_o.value)
             for u, unit in enumerate(self.units):
@@ -239,6 +248,7 @@ async def pace(dut, slow):
     await test.bench.reset()
     await test.ready()
     await test.run(make(test.rng, 12, 120))
+    assert test.waits[2] > 200, f"waits {test.waits}"
 
 
 @cocotb.test()
@@ -279,6 +289,19 @@ async def rate_of_one(dut):
     await test.run(lists[:4])
     cycles = await test.run(lists)
     assert 8 * 400 / test.width <= cycles < 8 * 400 / test.width * 1.1 + 100, f"{cycles} cycles"
+
+
+@cocotb.test()
+async def waits(dut):
+    """Records that come late are waited for at the cache's head, and there alone, by cores that take all."""
+    test = Delivery(dut, latency=200)
+    await test.bench.reset()
+    await test.ready()
+    await test.run([[(2 * (100 * t + k), 1 << k % 4) for k in range(100)] for t in range(8)])
+    assert test.waits[2] == 0 and test.waits[3] > 200, f"waits {test.waits}"
+    before = test.waits[3]
+    await test.run([[(2 * k % 64, 1 << k % 4) for k in range(100)] for _ in range(8)])
+    assert test.waits[3] - before < 300, f"waits {test.waits}, {before} before: lines are in the cache"
 
 
 @cocotb.test()

@@ -7,7 +7,7 @@ from cocotb.triggers import ReadOnly, RisingEdge
 from flicker_tb.bench import Bench
 
 # Words of flk_top_pkg.
-FRONT_WORDS, RENDERING_WORDS, RENDERING_AT, STAGE_AT, STAGE_WORDS, BANK = 34, 18, 34, 128, 128, 256
+FRONT_WORDS, RENDERING_WORDS, RENDERING_AT, FRONT_WAITS_AT, STAGE_AT, STAGE_WORDS, BANK = 45, 27, 34, 96, 128, 128, 256
 LATENCY = 1
 
 
@@ -72,7 +72,9 @@ class CountersTest:
                 continue
             at = side.bank * BANK
             if side is self.front:
-                self.kept[at : at + FRONT_WORDS] = side.words or [0] * FRONT_WORDS
+                words = side.words or [0] * FRONT_WORDS
+                self.kept[at : at + RENDERING_AT] = words[:RENDERING_AT]
+                self.kept[at + FRONT_WAITS_AT : at + FRONT_WAITS_AT + FRONT_WORDS - RENDERING_AT] = words[RENDERING_AT:]
                 least = FRONT_WORDS
             else:
                 self.kept[at + RENDERING_AT : at + RENDERING_AT + RENDERING_WORDS] = side.words or [0] * RENDERING_WORDS
@@ -86,7 +88,8 @@ class CountersTest:
     def uncertain(self):
         """Words that a copy may be writing."""
         out = set()
-        for side, ranges in ((self.front, [(0, FRONT_WORDS)]), (self.rendering, [(RENDERING_AT, RENDERING_WORDS), (STAGE_AT, STAGE_WORDS)])):
+        waits = (FRONT_WAITS_AT, FRONT_WORDS - RENDERING_AT)
+        for side, ranges in ((self.front, [(0, RENDERING_AT), waits]), (self.rendering, [(RENDERING_AT, RENDERING_WORDS), (STAGE_AT, STAGE_WORDS)])):
             if side.valid:
                 out |= {side.bank * BANK + first + k for first, count in ranges for k in range(count)}
         return out

@@ -77,6 +77,21 @@ def _picture(
     return _frame_image(frame.buffer, camera), stats
 
 
+# Counters of waits of both halves: what is stalled.
+FRONT_WAITS = {
+    "cluster_waits": "front end, cluster for its geometry", "group_missing": "front end, projection for Gaussians",
+    "lane_waits": "front end, projected for lanes", "place_waits": "front end, projected for places of records",
+    "request_waits": "front end, projected for requests of colours", "colour_waits": "front end, colours for lanes", "record_waits": "front end, records",
+    "entry_waits": "front end, entries for the merge", "merged_waits": "front end, entries for list writers", "line_waits": "front end, lines of lists",
+    "beat_waits": "front end, lines of records",
+}
+RENDERING_WAITS = {
+    "list_waits": "lists for sorting units", "sorted_waits": "sorted entries for buffers", "entry_missing": "delivery for entries",
+    "entry_waits": "entries for delivery", "queue_waits": "records for cores' queues", "cache_waits": "records for their lines",
+    "record_waits": "records for cores", "pair_waits": "cores for the frame writer", "frame_waits": "lines of the frame buffer",
+}
+
+
 def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
     """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.
 
@@ -124,6 +139,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
         "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
         "stalls": {
             **stage.pop("stalls"),
+            **{text: int(front[name]) for name, text in FRONT_WAITS.items()}, **{text: int(rendering[name]) for name, text in RENDERING_WAITS.items()},
             **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
         },
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",

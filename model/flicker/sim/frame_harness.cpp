@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "Vtop.h"
-#ifdef FLK_RENDERING
+#ifndef FLK_CHIP
 #include "Vtop___024root.h"
 #endif
 #include "memory.hpp"
@@ -97,6 +97,9 @@ struct Sim {
 #ifdef FLK_RENDERING
     count_records();
 #endif
+#ifndef FLK_CHIP
+    count_waits();
+#endif
     memory.tick();
     for (int k = 0; k < PORTS; ++k) reset || away ? ports[k]->reset(requests[k], reset) : ports[k]->cycle(requests[k]);
     top->clk_i = 1;
@@ -104,7 +107,7 @@ struct Sim {
   }
 
 #ifdef FLK_RENDERING
-  // Records that delivery gives to each core, FLK_RENDERING at a time at most, by sub-tile (rendering.vlt).
+  // Records that delivery gives to each core, FLK_RENDERING at a time at most, by sub-tile (rendering_watched.vlt).
   void count_records() {
     const auto& root = *top->rootp;
     for (int e = 0; root.flk_rendering__DOT__record_valid >> e; ++e) {
@@ -117,6 +120,36 @@ struct Sim {
         ++records[k];
       }
     }
+  }
+#endif
+
+#ifndef FLK_CHIP
+  static int ones(unsigned bits) { return __builtin_popcount(bits); }
+
+  // What the design's counters of waits should say, in their order; those of which it knows nothing stay -1.
+  void count_waits() {
+    const auto& root = *top->rootp;
+#ifdef FLK_RENDERING
+#define FLK_OF(name) root.flk_rendering__DOT__##name
+    unsigned first = 0;
+    for (int k = 0; k < CORES; ++k) first |= (FLK_OF(record_valid) >> k * FLK_RENDERING & 1) << k;
+    const unsigned valid = FLK_OF(entry_valid) >> 2 * turn & 3, ready = FLK_OF(entry_ready) >> turn & 1;
+    const int now[WAITS] = {
+        ones(FLK_OF(list_valid) & ~FLK_OF(list_ready)), ones(FLK_OF(sorted_valid) & ~FLK_OF(sorted_ready)), ready && !valid && !FLK_OF(pixels_done),
+        valid && !ready, -1, -1, ones(first & ~FLK_OF(record_ready)), ones(FLK_OF(has) & ~FLK_OF(open)), FLK_OF(line_valid) && !FLK_OF(line_ready),
+    };
+    if (ready && (valid & FLK_OF(entry_end) >> 2 * turn)) turn = (turn + 1) % 4;
+#else
+#define FLK_OF(name) root.flk_preprocessing__DOT__##name
+    const bool leaves = FLK_OF(exit_valid), lanes = FLK_OF(lane_ready) == 15, places = FLK_OF(record_room);
+    const int now[WAITS] = {
+        FLK_OF(kept_valid) && !FLK_OF(kept_ready), -1, leaves && !lanes, leaves && lanes && !places, leaves && lanes && places && !FLK_OF(colour_room),
+        ones(FLK_OF(part_valid) & ~FLK_OF(part_ready)), ones(FLK_OF(record_valid) & ~FLK_OF(record_ready)), ones(FLK_OF(entry_valid) & ~FLK_OF(entry_ready)),
+        ones(FLK_OF(merged_valid) & ~FLK_OF(merged_ready)), ones(FLK_OF(out_valid) & ~FLK_OF(out_ready) & 15), FLK_OF(line_valid) && !FLK_OF(line_ready),
+    };
+#endif
+#undef FLK_OF
+    for (int k = 0; k < WAITS; ++k) waits[k] = now[k] < 0 ? -1 : waits[k] + now[k];
   }
 #endif
 
@@ -138,6 +171,13 @@ struct Sim {
   static constexpr int CORES = 4;
   std::vector<uint32_t> given[CORES];  // in this frame, of each list that has ended
   uint32_t records[CORES] = {};
+#ifdef FLK_RENDERING
+  static constexpr int WAITS = 9;
+#else
+  static constexpr int WAITS = 11;
+#endif
+  int64_t waits[WAITS] = {};  // in this frame
+  int turn = 0;               // sorting unit that delivery takes from
   std::string error;
   bool away = false;  // the memory is in reset, the design is not
 };
@@ -263,6 +303,8 @@ int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limi
     sim->top->start_i = 1;
     sim->cycle(false);
     sim->top->start_i = 0;
+    std::fill_n(sim->waits, Sim::WAITS, 0);
+    sim->turn = 0;
     bool done = false;
     for (uint64_t n = 0; n < limit && !done; ++n) {
       sim->cycle(false);
@@ -288,6 +330,12 @@ int flk_half_given(Sim* sim, int core, uint32_t* out, int size) {
   const auto& lists = sim->given[core];
   std::copy_n(lists.begin(), std::min<size_t>(lists.size(), size), out);
   return static_cast<int>(lists.size());
+}
+
+// Cycles of the last frame in which something waited, as the harness counted them.
+int flk_half_waits(Sim* sim, int64_t* out) {
+  std::copy_n(sim->waits, Sim::WAITS, out);
+  return Sim::WAITS;
 }
 
 double flk_half_efficiency(Sim* sim) { return sim->memory.efficiency(); }

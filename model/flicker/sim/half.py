@@ -64,6 +64,7 @@ def _library(path: Path) -> ctypes.CDLL:
         ("fail", None, pointer, u64, u64, ctypes.c_int),
         ("mend", None, pointer),
         ("given", ctypes.c_int, pointer, ctypes.c_int, pointer, ctypes.c_int),
+        ("waits", ctypes.c_int, pointer, pointer),
         ("efficiency", ctypes.c_double, pointer),
         ("counts", None, pointer, ctypes.c_uint32, pointer),
     ):
@@ -158,6 +159,13 @@ class Half:
         if self._lib.flk_half_given(self._sim, core, out.ctypes.data, lists) != lists:
             raise self._failure(f"core {core} did not get {lists} lists")
         return out.astype(np.int64)
+
+    def waits(self, names: Sequence[str]) -> dict[str, int]:
+        """Counters of waits of the last frame as the harness counts them, those of `names` that it can; not of the chip."""
+        out = np.zeros(len(names), np.int64)
+        if self._lib.flk_half_waits(self._sim, out.ctypes.data) != len(names):
+            raise self._failure(f"not {len(names)} counters of waits")
+        return {name: int(value) for name, value in zip(names, out) if value >= 0}
 
     @property
     def efficiency(self) -> float:

@@ -32,7 +32,7 @@ ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond the
 LIST_ERROR = 3  # bit of the last
 
 # front_counters_t of flk_preproc_pkg, the first field in the highest bits.
-COUNTERS = (
+WORK = (
     *((name, 32, 1) for name in (
         "cycles", "culled_clusters", "culled_gaussians", "too_near", "outside", "survivors", "faint", "unlisted", "saturated", "clipped", "header_beats",
         "geometry_beats", "colour_beats", "record_beats",
@@ -40,6 +40,11 @@ COUNTERS = (
     ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("key_shift", 8, 1), ("key_low", 9 + FORMATS.position, 1),
     ("spilled", 32, 1), ("fetched", 32, 1),
 )
+WAITS = tuple((name, 32, 1) for name in (
+    "cluster_waits", "group_missing", "lane_waits", "place_waits", "request_waits", "colour_waits", "record_waits", "entry_waits", "merged_waits", "line_waits",
+    "beat_waits",
+))
+COUNTERS = WORK + WAITS
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,8 @@ class RtlFront:
     """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
     noise, that of `before`: records and memory as they were.
 
-    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate.
+    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate. waits: of WAITS, as the harness counts
+    them, those that it can.
     """
 
     records: np.ndarray
@@ -111,6 +117,7 @@ class RtlFront:
     traffic: dict[str, PurposeCounts]
     efficiency: float
     before: tuple[np.ndarray, np.ndarray]
+    waits: dict[str, int]
 
     @property
     def error(self) -> int:
@@ -126,7 +133,8 @@ def build(kind: RecordKind = RecordKind.FACTORED16) -> Path:
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
-    return half.build("flk_preprocessing", {"Form": int(kind.form)}, [half.HERE / "preprocessing.vlt"], ["--inline-mult", "20000"])
+    settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "preprocessing_watched")]
+    return half.build("flk_preprocessing", {"Form": int(kind.form)}, settings, ["--inline-mult", "20000"])
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -176,6 +184,7 @@ def front_rtl(
         return RtlFront(
             _records(sim, regions, kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,
+            sim.waits([name for name, *_ in WAITS]),
         )
 
 

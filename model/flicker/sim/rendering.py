@@ -28,19 +28,25 @@ PURPOSES = ("lists", "pointers", "records", "frame")
 ERRORS = ("lists could not be read", "records could not be read", "a write failed")
 
 # Of flk_rendering_pkg, the first field in the highest bits.
-COUNTERS = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropped", 32, 4), ("lines", 32, 1))
+WORK = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropped", 32, 4), ("lines", 32, 1))
+WAITS = tuple((name, 32, 1) for name in (
+    "list_waits", "sorted_waits", "entry_missing", "entry_waits", "queue_waits", "cache_waits", "record_waits", "pair_waits", "frame_waits",
+))
+COUNTERS = WORK + WAITS
 
 
 @dataclass(eq=False)
 class RtlRendering:
     """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. errors: of each frame. traffic: by purpose.
-    given: int64 (S,), records that a core got of each sub-tile in the last frame; S as in `golden.chip.whole_pairs`."""
+    given: int64 (S,), records that a core got of each sub-tile in the last frame; S as in `golden.chip.whole_pairs`. waits: of WAITS, as the harness
+    counts them, those that it can."""
 
     buffer: np.ndarray
     counters: dict[str, int | np.ndarray]
     errors: list[int]
     traffic: dict[str, PurposeCounts]
     given: np.ndarray
+    waits: dict[str, int]
     efficiency: float
 
     @property
@@ -50,7 +56,7 @@ class RtlRendering:
 
 def build(config: RenderConfig, parameters: Mapping[str, int] | None = None) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content. parameters: of `flk_rendering`, further ones."""
-    settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering")]
+    settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering", "rendering_watched")]
     values = {"InWidth": 1} | config.chip_parameters() | dict(parameters or {})
     return half.build("flk_rendering", values, settings, define=f"-DFLK_RENDERING={values['InWidth']}")
 
@@ -89,7 +95,7 @@ def rendering_rtl(
         x, y = tile_walk(pairs, rows)
         for k in range(CORES):
             given[2 * y + k // 2, 2 * x + k % 2] = sim.given(k, len(x))
-        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.efficiency)
+        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.waits([name for name, *_ in WAITS]), sim.efficiency)
 
 
 def regions(image: FrontImage, frame_bytes: int) -> dict[str, int]:
