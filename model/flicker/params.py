@@ -199,7 +199,8 @@ class RenderConfig:
     is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
     mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `lanes` of all cores; `in_width` elements
-    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue. `memories`, of the whole chip: key of CHIP_MEMORIES.
+    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue. Of the whole chip: `delivered` records that a core gets
+    in a cycle there, and so takes, whatever `in_width`; `memories`, key of CHIP_MEMORIES.
     """
 
     form: Form = Form.FACTORED
@@ -214,6 +215,7 @@ class RenderConfig:
     lanes: int = LANE_COUNTS[0]
     in_width: int = 2
     slots: int = 20
+    delivered: int = 1
     memories: str = "default"
 
     def __post_init__(self) -> None:
@@ -234,6 +236,8 @@ class RenderConfig:
             raise FlickerError(f"configuration: lanes must be {', '.join(map(str, LANE_COUNTS[:-1]))} or {LANE_COUNTS[-1]}, not {self.lanes}")
         if self.in_width not in (1, 2):
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
+        if self.delivered not in ((1, 2) if self.by_lanes else (1,)):
+            raise FlickerError(f"configuration: delivered must be {'1 or 2' if self.by_lanes else '1 with stage ' + self.stage}, not {self.delivered}")
         for field in ("slots", "fifo_depth"):
             if self.by_lanes and not 2 <= (value := getattr(self, field)) <= MAX_LANE_ENTRIES:
                 raise FlickerError(f"configuration: {field} must be 2 to {MAX_LANE_ENTRIES} with stage lanes, not {value}")
@@ -272,10 +276,10 @@ class RenderConfig:
         return {name: values[name] for name in STAGES[self.stage].parameters}
 
     def chip_parameters(self) -> dict[str, int]:
-        """Module parameters of the rendering half and the chip: the stage, what it is built with, memories of the rendering half that are not the default ones.
-        A core gets one record a cycle there."""
+        """Module parameters of the rendering half and the chip: the stage, what it is built with, what is not the default of the rendering half's own."""
         parameters = self.rtl_parameters()
-        parameters.pop("InWidth", None)
+        if parameters.pop("InWidth", None) and self.delivered != 1:
+            parameters["InWidth"] = self.delivered
         return {"Stage": list(STAGES).index(self.stage), **parameters, **self.chip_memories.rendering_parameters()}
 
     @property

@@ -16,6 +16,7 @@ import numpy as np
 
 from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig, Refresh
+from flicker.chip.run import FRONT_WAITS, RENDERING_WAITS
 from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import whole_frame
 from flicker.errors import FlickerError
@@ -44,6 +45,12 @@ FLOWERS_CHUNKS = 24_000  # of that view whole
 BUILDS = {
     "default": (RenderConfig(), PackedFormat.CHUNK, ListKind.ELLIPSE),
     "faithful": (FAITHFUL, PackedFormat.FP16, ListKind.BOX),
+}
+UNITS = 4
+# Counters of waits that are sums over as many units.
+OF_ALL = {
+    *(("front", f"{name}_waits") for name in ("colour", "record", "entry", "merged", "line")),
+    *(("rendering", f"{name}_waits") for name in ("list", "sorted", "record", "pair")),
 }
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
@@ -79,6 +86,7 @@ def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, s
 
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
+    waits: dict[str, list[str]] = {}
     for place, path, number, size, chunks, name, refresh in _places():
         config, format_, lists = BUILDS[name]
         dram = DramConfig(refresh=refresh)
@@ -124,6 +132,11 @@ def tables(say: Say) -> dict[str, str]:
             title, f"{halves[0]:,}", f"{off[0]:+.1%}", f"{halves[1]:,}", f"{off[1]:+.1%}", f"{cycles:,}", f"{off[2]:+.1%}", f"{interval:,}", f"{off[3]:+.1%}",
             f"{interval / max(halves):.2f}", model.bottleneck, f"{simulated / seconds:,.0f}",
         ))
+        waits[title] = [
+            f"{int(counters[counter]) / (half * (UNITS if (side, counter) in OF_ALL else 1)):.1%}"
+            for side, texts, counters, half in (("front", FRONT_WAITS, alone.front, halves[0]), ("rendering", RENDERING_WAITS, alone.rendering, halves[1]))
+            for counter in texts
+        ]
         lines = model.bytes["records"] / moved["records"] - 1
         traffic.append((title, *(f"{moved[name] / 1e6:.2f}" for name in PURPOSES), f"{sum(moved.values()) / 1e6:.2f}", f"{lines:+.1%}"))
     return {
@@ -131,5 +144,6 @@ def tables(say: Say) -> dict[str, str]:
             ["view", "front end, cycles", "model off by", "rendering, cycles", "model off by", "frame, cycles", "model off by", "interval back to back",
              "model off by", "of the slower half alone", "what the model says it waits for", "simulated cycles a second of processor time"], rows,
         ),
+        "waits": table(["what waits", *waits], list(zip([*FRONT_WAITS.values(), *RENDERING_WAITS.values()], *waits.values()))),
         "traffic": table(["view, MB of the DRAM", *PURPOSES, "all", "records' model off by"], traffic),
     }

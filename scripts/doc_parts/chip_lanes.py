@@ -44,7 +44,7 @@ def tables(say: Say) -> dict[str, str]:
     for lanes in LANES:
         config = RenderConfig(stage="lanes", lanes=lanes)
         golden = render_chip(lists, config).buffer
-        stage = simulate_lanes(work, config.with_(in_width=1), leave=True)
+        stage = simulate_lanes(work, config.with_(in_width=config.delivered), leave=True)
         for memory, dram in MEMORIES.items():
             say(f"{real.title}: {lanes} lanes, memory of {memory}, four frames back to back")
             with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
@@ -73,10 +73,11 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: LaneCycles) -> tupl
 
 ENTRY_BITS = (SLOT_LIMIT - 1).bit_length() + CORES + 1  # number, mask, and the bit that marks an end
 RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
-DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": QUEUE, "Pairs": ChipMemories().pairs}
-# Entries that each sorting unit's buffer holds, records that each core's queue holds, pairs of tiles in the frame writer; the memory.
+DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": QUEUE, "Pairs": ChipMemories().pairs, "InWidth": 1}
+# Entries that each sorting unit's buffer holds, records that each core's queue holds, pairs of tiles in the frame writer, records a cycle; the memory.
 HELD: tuple[tuple[dict[str, int], DramConfig | None], ...] = (
-    ({"Entries": 4}, None), ({}, None), ({"Queue": 128}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None), ({}, MEMORIES["51.2 GB/s"]),
+    ({"Entries": 4}, None), ({}, None), ({"InWidth": 2}, None), ({"Queue": 128}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None),
+    ({}, MEMORIES["51.2 GB/s"]),
 )
 
 
@@ -96,5 +97,6 @@ def queue_tables(say: Say) -> dict[str, str]:
         bits = UNITS * held["Entries"] * ENTRY_BITS + CORES * held["Queue"] * RECORD_BITS
         rows.append((*(str(n) for n in held.values()), f"{bits:,}", "LPDDR4" if dram else "perfect", f"{rtl.cycles:,}", f"{rtl.counters['lines']:,}"))
     return {"": table(
-        ["entries in a buffer", "records in a queue", "pairs of tiles", "bits of both", "memory", "rendering half, cycles", "lines of records"], rows,
+        ["entries in a buffer", "records in a queue", "pairs of tiles", "records a cycle and core", "bits of both", "memory", "rendering half, cycles",
+         "lines of records"], rows,
     )}

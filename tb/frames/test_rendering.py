@@ -210,6 +210,17 @@ def test_stages(config: RenderConfig) -> None:
     check((32, 32), config, scene="layers")
 
 
+@pytest.mark.slow
+def test_two_records_a_cycle() -> None:
+    """Lanes that get two records of a list together: the same picture, sub-tiles that finish early, frames one after the other behind ports that pause."""
+    wide = LANES.with_(delivered=2)
+    rtl = check((96, 54), wide, scene="demo")
+    assert left_out(rtl, view_of(96, 54, "demo")[0]) > 0.14 and rtl.counters["dropped"].any()
+    shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
+    check((80, 40), wide, PixelFormat.RGBA16F, gap=1, memory=MemoryOptions(DramConfig().timing, paused(shares)), frames=2)
+    check((32, 32), wide, scene="layers")
+
+
 def test_pauses_and_dram() -> None:
     """DRAM behind ports that pause; two frames one after the other."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}

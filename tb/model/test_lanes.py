@@ -507,9 +507,13 @@ def test_refused():
         RenderConfig(stage="lane")
     for changes, message in (
         ({"in_width": 3}, "in_width must be 1 or 2, not 3"), ({"slots": 1}, "slots must be 2 to 64"), ({"fifo_depth": 65}, "fifo_depth must be 2 to 64"),
+        ({"delivered": 3}, "delivered must be 1 or 2, not 3"),
     ):
         with pytest.raises(FlickerError, match=message):
             RenderConfig(stage="lanes", **changes)
+    with pytest.raises(FlickerError, match="delivered must be 1 with stage channels, not 2"):
+        RenderConfig(delivered=2)
+    assert RenderConfig(stage="lanes", delivered=2).chip_parameters()["InWidth"] == 2 and "InWidth" not in RenderConfig(stage="lanes").chip_parameters()
 
 
 def test_engines(demo):

@@ -466,7 +466,7 @@ class _Cores:
         if config.by_lanes:
             work = lane_work(whole_pairs(front_lists(tables.frame)))
             ones = np.ones(int(work.start[-1]), np.int64)
-            alone = simulate_lanes(work, config.with_(in_width=1), leave=True).cycles
+            alone = simulate_lanes(work, config.with_(in_width=config.delivered), leave=True).cycles
             return _Cores(15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, alone)
         lists = tables.lists
         order, core_start = stream_order(lists, walk=chip_walk(lists))
@@ -489,7 +489,8 @@ def estimate(
     `max_reads`, by default those of `sim.chip.PORT`. stride: bytes from
     row to row; None: as few as a row needs.
 
-    Lanes take a record a cycle each core here, and the frame as long as they need alone at least: their queues and what they wait for are not followed.
+    Lanes take a record a cycle each core here, whatever `config.delivered`, and the frame as long as they need alone at least: their queues and what they wait
+    for are not followed.
     """
     lists = tables.lists
     cores = _Cores.of(tables, config)
