@@ -111,7 +111,7 @@ PARTS = (
          ("pictures", "outcomes", "formats", "cells", "fixed", "opacity"), front.tables, scenes_missing),
     Part("front_hardware", "front end's RTL: cycles and bytes", ("cycles", "traffic"), front_hardware.tables, scenes_missing),
     Part("rendering_hardware", "rendering half's RTL beside the chip model", ("cycles",), rendering_hardware.tables, scenes_missing),
-    Part("chip_hardware", "frames of the whole chip in RTL beside the chip model", ("cycles", "traffic"), chip_hardware.tables, scenes_missing),
+    Part("chip_hardware", "frames of the whole chip in RTL beside the chip model", ("cycles", "traffic", "waits"), chip_hardware.tables, scenes_missing),
     Part("system", "rendering stages in whole chips", ("",), system.tables, scenes_missing),
     Part("chip_lanes", "frames of the whole chip with lanes in RTL", ("cycles",), chip_lanes.tables, scenes_missing),
     Part("chip_queues", "the rendering half with lanes by the depth of its queues", ("",), chip_lanes.queue_tables, scenes_missing),

@@ -24,7 +24,7 @@ from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.refit import ViewMatrix, refit
 from flicker.budget.score import Score, scores
 from flicker.budget.tune import log_error_slope, quality
-from flicker.budget.views import HOLD_EVERY, cameras_of, reference_psnr
+from flicker.budget.views import HOLD_EVERY, cameras_of, machine_psnr, reference_psnr
 from flicker.budget.write import save
 from flicker.chip.scene_cost import scene_cost
 from flicker.errors import FlickerError
@@ -211,6 +211,20 @@ def test_keep() -> None:
     assert first and last and last.bytes < first.bytes and last.image_bytes < first.image_bytes and (last.lane_cycles or 0) > 0
 
 
+def test_through() -> None:
+    """All Gaussians, drawn through a contribution test: measured and tuned as the machine draws them, which wins back a part of what it loses."""
+    scene = small(600)
+    options = keeping(1.0, rounds=1, steps=0, last=100, degrees=0, through="flicker-sparse-fixed-factored")
+    found = start(scene, options)
+    found.run()
+    assert len(found.parameters) == 600
+    first, removal, *_, last = (row.decibels for row in found.rows)
+    machine = found.machine
+    assert machine is not None and first == removal == pytest.approx(np.mean(machine_psnr(scene, scene, found.held, machine)), abs=0.05)
+    assert last > first + 0.05 and last == pytest.approx(np.mean(machine_psnr(scene, found.scene(), found.held, machine)), abs=0.05)
+    assert np.mean(reference_psnr(scene, found.scene(), found.held)) != pytest.approx(last, abs=0.05)
+
+
 @pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), pytest.param(Goal(Kind.DB, 45.0), marks=pytest.mark.slow)])
 def test_interrupted(goal: Goal, tmp_path: Path) -> None:
     """Continued from any of its checkpoints, a run ends with the same bits and the same table."""
@@ -359,6 +373,9 @@ def test_command(tmp_path: Path) -> None:
     told = run("--keep", 0.4, *few, "--checkpoint", tmp_path / "state.npz", "--resume")
     assert "continues after 8 steps" in told and (tmp_path / "out.ply").read_bytes() == written
     assert Row(**kept["steps"][1]).step == "1: removal"
+    told = run("--keep", 0.9, *few, "--through", "faithful", "--json", tmp_path / "c.json")
+    drawn = json.loads((tmp_path / "c.json").read_text())["drawn_db"]
+    assert f"{np.mean(drawn['scene']):.2f} dB, the full scene {np.mean(drawn['full']):.2f} dB" in told
     before = sorted(tmp_path.iterdir())
     for wrong, text in (
         ((), "one is needed, not none"), (("--keep", 0.4, "--db", 40), "one is needed, not --keep and --db"), (("--keep", 1.4), "--keep: 1.4 is not above 0"),
@@ -366,7 +383,7 @@ def test_command(tmp_path: Path) -> None:
         (("--keep", 0.4, "--resume"), "--resume: from which --checkpoint?"), (("--keep", 0.4, "--views", tmp_path / "no.json"), "no.json: cannot be read"),
         (("--keep", 0.4, "--views", tmp_path / "no.json", "--count", 9), "--count: all cameras of"), (("--keep", 0.4, "--size", "ab"), "--size"),
         (("--keep", 0.4, "--up", "w"), "up: 'w'"), (("--keep", 0.4, "-o", tmp_path / "a.sog"), "gsply writes no SOG"),
-        (("--keep", 0.4, "-o", tmp_path / "no" / "a.ply"), "no such folder"), (("--keep", 0.4, "--frame", "0x9"), "width"),
+        (("--keep", 1, "--through", "log-lanes"), "its masks are not of 4x4"), (("--keep", 0.4, "-o", tmp_path / "no" / "a.ply"), "no such folder"), (("--keep", 0.4, "--frame", "0x9"), "width"),
     ):
         said = run(*wrong, code=2)
         assert text in said and said.count("\n") == 1, said

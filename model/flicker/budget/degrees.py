@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fit.parameters import Parameters
-from ..fit.render import render
+from ..fit.render import Draw, render
 from ..front.projection import colours
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -31,8 +31,8 @@ class Losses:
     shift: np.ndarray
 
 
-def losses(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None) -> Losses:
-    """What every Gaussian's degrees are worth in the cameras' pictures, the others being as they are."""
+def losses(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None, draw: Draw = render) -> Losses:
+    """What every Gaussian's degrees are worth in the cameras' pictures, made by `draw`, the others being as they are."""
     n, degrees = len(parameters), parameters.degree
     square, sum_, weight = np.zeros((n, degrees)), np.zeros((n, degrees, 3)), np.zeros(n)
     cut = [parameters.sh.copy() for _ in range(degrees)]
@@ -41,7 +41,7 @@ def losses(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | Non
     with (steps or Steps()).bar("SH coefficients") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            frame = render(parameters, camera)
+            frame = draw(parameters, camera)
             total, unused_tiles, unused_frames = np.zeros((n, COLUMNS)), np.zeros(n, np.int64), np.zeros(n, np.int64)
             score_frame(frame, total, unused_tiles, unused_frames)
             index = frame.index[total[frame.index, SQUARE] > 0]

@@ -17,6 +17,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,9 @@ import numpy as np
 from ..errors import FlickerError, one_line
 from ..fit.adam import Adam
 from ..fit.parameters import SH, Parameters
-from ..fit.render import render
+from ..fit.render import Draw, render
 from ..fit.start import extent_of
+from ..fit.through import through
 from ..progress import Steps
 from ..scene.camera import Camera, cameras_text
 from ..scene.clusters import reorder
@@ -64,7 +66,8 @@ class Phase(str, Enum):
 @dataclass(frozen=True)
 class Options:
     """rounds: removals on the way to a known goal. steps: of tuning after each. last: of the tuning at the end, at most. degrees: SH coefficients go as long as
-    they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted."""
+    they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted. through: name of the configuration
+    through whose contribution test the small scene is drawn; None: as the reference draws it."""
 
     goal: Goal
     by: Score = Score.CHANGE
@@ -75,6 +78,7 @@ class Options:
     seed: int = 1
     frame: tuple[int, int] = (1280, 720)
     form: PackedFormat = PackedFormat.CHUNK
+    through: str | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,8 @@ class Reducer:
         self.coefficients = np.full(self.full, self.parameters.sh.shape[1], np.int64)
         self.moments = Adam.of(self.parameters.values)
         self.extent = extent_of(self.fitted)
+        self.machine = None if options.through is None else through(options.through)
+        self._draw: Draw = render if self.machine is None else partial(render, through=self.machine)
         self.rng = np.random.default_rng(options.seed)
         self.order = np.zeros(0, np.int64)  # fitted cameras that come next
         self.phase, self.step, self.round, self.removed = Phase.REMOVE, 0, 0, 0
@@ -152,7 +158,7 @@ class Reducer:
 
     def measure(self) -> float:
         """Mean PSNR of the held-out views in dB, pictures of `fit.render`."""
-        return quality(self.parameters, self.held, self.wanted_held)
+        return quality(self.parameters, self.held, self.wanted_held, self._draw)
 
     def _told_row(self, step: str, decibels: float, cost: FrameCost | None = None) -> None:
         self.rows.append(Row(step, len(self.parameters), float(self.coefficients.mean()), decibels, cost))
@@ -180,7 +186,7 @@ class Reducer:
         """A round: those of the lowest score go, as many as bring the scene nearer to the goal."""
         goal, n = self.options.goal, len(self.parameters)
         if not self.rows:
-            self._told_row("full scene", float("inf"), self.frame_cost(lanes=True))
+            self._told_row("full scene", float("inf") if self.machine is None else self.measure(), self.frame_cost(lanes=True))
         self.round += 1
         if goal.kind is Kind.KEEP:
             known = self.round / self.options.rounds
@@ -205,7 +211,7 @@ class Reducer:
 
     def _cut(self, share: float) -> None:
         """Leave a share of the sum of prices, those of the highest score by price; of a budget of bytes, SH coefficients go at the same price of error."""
-        found = scores(self.parameters, self.fitted, self._steps)
+        found = scores(self.parameters, self.fitted, self._steps, self._draw)
         scale = self.options.frame[0] * self.options.frame[1] / (self.fitted[0].width * self.fitted[0].height)
         cost = price(found, self.options.goal.kind, scale, self.coefficients)
         score = found.by(self.options.by) / cost
@@ -218,7 +224,7 @@ class Reducer:
 
     def _cut_both(self, share: float, score: np.ndarray, cost: np.ndarray, seen: np.ndarray) -> None:
         """Gaussians and SH coefficients of clusters under one threshold of error by byte."""
-        lost = losses(self.parameters, self.fitted, self._steps)
+        lost = losses(self.parameters, self.fitted, self._steps, self._draw)
         found = cuts(self.parameters, self.coefficients, lost, seen)
         order = np.argsort(np.concatenate([score, found.error / found.bytes]), kind="stable")
         total = np.cumsum(np.concatenate([cost, found.bytes])[order])
@@ -235,7 +241,7 @@ class Reducer:
         view, self.order = int(self.order[0]), self.order[1:]
         factor = min(1.0, 10 ** ((_FULL_RATE - self.level) / 20)) if self.level else 1.0
         rate = rates.at(done, self.extent, self.parameters.values.shape[1]) * np.float32(factor)
-        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients)
+        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._draw)
         self.level = decibels if not self.level else 0.98 * self.level + 0.02 * decibels
         self.step += 1
         if len(broken):
@@ -278,8 +284,8 @@ class Reducer:
         self.phase = Phase.REFIT
         if self.options.degrees <= 0 or self.coefficients.max() == 1:
             return
-        error = sum(float(((np.clip(render(self.parameters, c).image, 0, 1) - np.clip(w, 0, 1)) ** 2).sum()) for c, w in zip(self.fitted, self.wanted))
-        lost = losses(self.parameters, self.fitted, self._steps)
+        error = sum(float(((np.clip(self._draw(self.parameters, c).image, 0, 1) - np.clip(w, 0, 1)) ** 2).sum()) for c, w in zip(self.fitted, self.wanted))
+        lost = losses(self.parameters, self.fitted, self._steps, self._draw)
         found, before = cuts(self.parameters, self.coefficients, lost, np.ones(len(self.parameters))), (self.parameters.values.copy(), self.coefficients.copy())
         order = np.argsort(found.error / found.bytes, kind="stable")
         cut(self.parameters, self.coefficients, lost, found, order[: np.searchsorted(np.cumsum(found.error[order]), self.options.degrees * error)])
@@ -292,7 +298,7 @@ class Reducer:
         """The held-out views say how far to go towards the least squares of the fitted ones."""
         self._keep_best(self.measure())
         assert self.best is not None
-        found, before = refit(self.parameters, self.fitted, self.wanted, self.coefficients, steps=self._steps), self.parameters.values
+        found, before = refit(self.parameters, self.fitted, self.wanted, self.coefficients, steps=self._steps, draw=self._draw), self.parameters.values
         for share in _REFIT_SHARES:
             self.parameters = Parameters(before + np.float32(share) * (found.values - before))
             decibels = self.measure()

@@ -19,7 +19,7 @@ import numpy as np
 from ..fit.chain import _basis
 from ..fit.parameters import MEAN, SH, Parameters
 from ..fit.raster import BLUE, GREEN, RED, visit
-from ..fit.render import Frame, render
+from ..fit.render import Draw, Frame, render
 from ..params import TILE
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -223,11 +223,12 @@ class ViewMatrix:
 
 def refit(
     parameters: Parameters, cameras: Sequence[Camera], pictures: Sequence[np.ndarray], coefficients: np.ndarray | None = None, *,
-    ridge: Sequence[float] = RIDGE, iterations: int = ITERATIONS, steps: Steps | None = None,
+    ridge: Sequence[float] = RIDGE, iterations: int = ITERATIONS, steps: Steps | None = None, draw: Draw = render,
 ) -> Parameters:
     """Parameters with the SH coefficients of a Gauss-Newton step; those of before where they fit the pictures no better.
 
     pictures: float32 (H, W, 3) of each camera, over black. coefficients: int64 (N,), how many of each Gaussian may change (the others stay); None: all.
+    draw: what makes a view's frame.
     """
     steps = steps or Steps()
     x0 = parameters.sh.astype(np.float64)
@@ -241,7 +242,7 @@ def refit(
             n = len(matrices)
             report(n, len(used))
             number = used[n]
-            frame = render(parameters, cameras[number])
+            frame = draw(parameters, cameras[number])
             image, wanted = frame.image, np.clip(pictures[number], 0.0, 1.0)
             mask = ~((image > 1.0) & (wanted >= 1.0))
             matrix = ViewMatrix.of(frame, mask)
@@ -283,5 +284,5 @@ def refit(
     after = 0.0
     for number in used:
         wanted = np.clip(pictures[number], 0.0, 1.0)
-        after += float(((np.clip(render(found, cameras[number]).image, 0.0, 1.0) - wanted) ** 2).sum())
+        after += float(((np.clip(draw(found, cameras[number]).image, 0.0, 1.0) - wanted) ** 2).sum())
     return found if after < before else parameters

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..fit.parameters import Parameters
 from ..fit.raster import BLUE, GREEN, RED, visit
-from ..fit.render import Frame, render
+from ..fit.render import Draw, Frame, render
 from ..params import TILE
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -117,13 +117,13 @@ def score_frame(frame: Frame, total: np.ndarray, tiles: np.ndarray, frames: np.n
     frames[frame.index[tiles[frame.index] > before]] += 1
 
 
-def scores(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None) -> Scores:
-    """Look at Gaussians through cameras, over black."""
+def scores(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None, draw: Draw = render) -> Scores:
+    """Look at Gaussians through cameras, over black. draw: what makes a view's frame."""
     total, tiles, frames = np.zeros((len(parameters), COLUMNS)), np.zeros(len(parameters), np.int64), np.zeros(len(parameters), np.int64)
     with (steps or Steps()).bar("scores") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            score_frame(render(parameters, camera), total, tiles, frames)
+            score_frame(draw(parameters, camera), total, tiles, frames)
     return Scores(
         total[:, WEIGHT], total[:, PEAK], total[:, CHANGE], total[:, PIXELS], tiles.astype(np.float64), frames.astype(np.float64), len(cameras),
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..fit.adam import Adam
 from ..fit.parameters import LOGIT, QUAT, SCALE, SH, Parameters
-from ..fit.render import backward, render
+from ..fit.render import Draw, backward, render
 from ..scene.camera import Camera
 from ..scene.metrics import psnr
 
@@ -55,14 +55,14 @@ def log_error_slope(image: np.ndarray, wanted: np.ndarray) -> tuple[float, np.nd
 
 
 def tune_step(
-    parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray,
+    parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray, draw: Draw = render,
 ) -> tuple[float, np.ndarray]:
     """One view; parameters and moments change in place. PSNR of the view before, in dB, and Gaussians that have to be taken out: int64 numbers of those with
     a number or a derivative that is not finite; these have not been moved.
 
-    coefficients: int64 (N,), how many SH coefficients a channel each has; the others stay.
+    coefficients: int64 (N,), how many SH coefficients a channel each has; the others stay. draw: what makes the view's frame.
     """
-    frame = render(parameters, camera)
+    frame = draw(parameters, camera)
     error, slope = log_error_slope(frame.image, wanted)
     found = backward(frame, slope)
     gradient = found.values
@@ -71,6 +71,6 @@ def tune_step(
     return -10.0 * np.log10(max(error, _LEAST_ERROR)), found.index[refused | frame.bad]
 
 
-def quality(parameters: Parameters, cameras: list[Camera], wanted: list[np.ndarray]) -> float:
+def quality(parameters: Parameters, cameras: list[Camera], wanted: list[np.ndarray], draw: Draw = render) -> float:
     """Mean PSNR in dB, pictures over black clamped to [0, 1]; inf where all are equal."""
-    return float(np.mean([psnr(render(parameters, camera).image, picture) for camera, picture in zip(cameras, wanted)]))
+    return float(np.mean([psnr(draw(parameters, camera).image, picture) for camera, picture in zip(cameras, wanted)]))

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FlickerError
+from ..explore.machine import Configuration, run
 from ..front.projection import project
 from ..front.reference import render_reference
+from ..front.view import View
 from ..progress import Steps
 from ..scene.camera import DEFAULT_UP, Camera, load_cameras, orbit_camera
 from ..scene.gaussians import Scene
@@ -59,6 +61,16 @@ def cameras_of(
         cameras = orbits(scene, count, size or SIZE, up, seed)
     held = cameras[::HOLD_EVERY]
     return [camera for k, camera in enumerate(cameras) if k % HOLD_EVERY], held
+
+
+def machine_psnr(full: Scene, small: Scene, cameras: Sequence[Camera], machine: Configuration, steps: Steps | None = None) -> list[float]:
+    """dB of a scene as a machine draws it, bit-true, against the full one by the reference renderer, over black; of each camera."""
+    found = []
+    with (steps or Steps()).bar("pictures of the machine") as report:
+        for k, camera in enumerate(cameras):
+            report(k, len(cameras))
+            found.append(psnr(run(machine, View(camera, small, background=(0.0, 0.0, 0.0))).image, render_reference(project(full, camera), camera)))
+    return found
 
 
 def reference_psnr(full: Scene, small: Scene, cameras: Sequence[Camera], steps: Steps | None = None) -> list[float]:

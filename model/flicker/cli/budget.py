@@ -55,6 +55,7 @@ def budget(
     steps: Annotated[int, typer.Option(help="of tuning after each round, a view each", min=0)] = 150,
     last: Annotated[int, typer.Option(help="steps of tuning at the end, at most", min=0)] = 1500,
     degrees: Annotated[float, typer.Option(help="SH coefficients go up to this share of the squared error; 0: none", min=0, max=1)] = 0.02,
+    through: Annotated[str | None, typer.Option(help="configuration through whose contribution test the scene is drawn, as --through of flicker fit")] = None,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
     checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
@@ -69,8 +70,9 @@ def budget(
         from ..budget.goal import Goal, Kind
         from ..budget.reduce import Options, Reducer, sound
         from ..budget.score import Score
-        from ..budget.views import VIEWS, cameras_of, reference_psnr
+        from ..budget.views import VIEWS, cameras_of, machine_psnr, reference_psnr
         from ..budget.write import check_suffix, save
+        from ..fit.through import through as machine_of
         from ..front.view import DEMO
         from ..scene.demo import generate
         from ..scene.files import load_scene
@@ -79,6 +81,8 @@ def budget(
     (name, value), = given.items()
     goal = Goal(Kind(name), value)
     check_suffix(out)
+    if through is not None:
+        machine_of(through)
     for path, option in ((out, "--out"), (checkpoint, "--checkpoint"), (json_, "--json")):
         writable(path, option)
     if resume and checkpoint is None:
@@ -87,7 +91,7 @@ def budget(
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
     assert counted is not None
-    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value))
+    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
         full = generate() if scene == DEMO else load_scene(scene)
@@ -117,6 +121,7 @@ def budget(
     written = load_scene(out)
     decibels = reference_psnr(clean, written, held, progress)
     at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
+    drawn = None if reducer.machine is None else [machine_psnr(clean, of, held, reducer.machine, progress) for of in (clean, written)]
     _show(reducer.rows, seconds)
     table = Table(show_header=False)
     table.add_column(style="bold")
@@ -128,12 +133,14 @@ def budget(
     table.add_row("PSNR of the file on the held-out views, mean", f"{sum(decibels) / len(decibels):.2f} dB")
     table.add_row("  worst view", f"{min(decibels):.2f} dB")
     table.add_row(f"  at {counted[0]}x{counted[1]}, mean", f"{sum(at_frame) / len(at_frame):.2f} dB")
+    if drawn is not None:
+        table.add_row(f"as {through} draws it, mean", f"{sum(drawn[1]) / len(held):.2f} dB, the full scene {sum(drawn[0]) / len(held):.2f} dB")
     table.add_row("bytes", f"{out.stat().st_size:,}")
     console.print(table)
     if json_ is not None:
         text = json.dumps({
             "scene": scene, "goal": {goal.kind.value: goal.value}, "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
-            "held_out_db": decibels, "held_out_db_at_frame": at_frame,
+            "held_out_db": decibels, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
             "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
         }, indent=2)
         write_atomically(json_, lambda path: path.write_text(text + "\n"))

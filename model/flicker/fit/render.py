@@ -9,7 +9,7 @@ of alpha, of a colour, of the Jacobian, it is that of the side on which the valu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +97,9 @@ def render(
         mask = _masks(through, (index, table, rgb, bad), opacity, depth, camera, start, entry)
     raster.blend(rows, start, entry, mask, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
     return Frame(parameters, camera, image, transmittance, index, rows, start, entry, mask, used, bad, table)
+
+
+Draw = Callable[[Parameters, Camera], Frame]  # `render` over black, or through a machine's masks
 
 
 def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -> Gradient:
