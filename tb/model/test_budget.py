@@ -23,11 +23,12 @@ from flicker.budget.goal import Goal, Kind, chip_cost, price
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.refit import ViewMatrix, refit
 from flicker.budget.score import Score, scores
-from flicker.budget.tune import log_error_slope, quality
+from flicker.budget.tune import quality
 from flicker.budget.views import HOLD_EVERY, cameras_of, machine_psnr, reference_psnr
 from flicker.budget.write import save
 from flicker.chip.scene_cost import scene_cost
 from flicker.errors import FlickerError
+from flicker.fit.loss import log_error_slope
 from flicker.fit.parameters import LOGIT, SH, Parameters
 from flicker.fit.render import render
 from flicker.scene.camera import Camera, cameras_text, orbit_camera
@@ -383,7 +384,8 @@ def test_command(tmp_path: Path) -> None:
         (("--keep", 0.4, "--resume"), "--resume: from which --checkpoint?"), (("--keep", 0.4, "--views", tmp_path / "no.json"), "no.json: cannot be read"),
         (("--keep", 0.4, "--views", tmp_path / "no.json", "--count", 9), "--count: all cameras of"), (("--keep", 0.4, "--size", "ab"), "--size"),
         (("--keep", 0.4, "--up", "w"), "up: 'w'"), (("--keep", 0.4, "-o", tmp_path / "a.sog"), "gsply writes no SOG"),
-        (("--keep", 1, "--through", "log-lanes"), "its masks are not of 4x4"), (("--keep", 0.4, "-o", tmp_path / "no" / "a.ply"), "no such folder"), (("--keep", 0.4, "--frame", "0x9"), "width"),
+        (("--keep", 1, "--through", "log-lanes"), "its masks are not of 4x4"),
+        (("--keep", 0.4, "-o", tmp_path / "no" / "a.ply"), "no such folder"), (("--keep", 0.4, "--frame", "0x9"), "width"),
     ):
         said = run(*wrong, code=2)
         assert text in said and said.count("\n") == 1, said

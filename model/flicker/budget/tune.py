@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fit.adam import Adam
+from ..fit.loss import LEAST_ERROR, log_error_slope
 from ..fit.parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from ..fit.render import Draw, backward, render
 from ..scene.camera import Camera
@@ -19,7 +20,6 @@ from ..scene.metrics import psnr
 _MEAN_RATE = 2e-5  # of the scene's extent
 _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 3e-3, 1e-3, 2e-2, 2.5e-3, 1 / 20
 _LAST_RATE = 0.05
-_LEAST_ERROR = 1e-10  # of a view, mean square: 100 dB; nearer ones are not pulled harder
 
 
 @dataclass(frozen=True)
@@ -42,18 +42,6 @@ class Rates:
         return (rates * _LAST_RATE**done).astype(np.float32)
 
 
-def log_error_slope(image: np.ndarray, wanted: np.ndarray) -> tuple[float, np.ndarray]:
-    """Mean squared error of a picture (H, W, 3) to the wanted one, both clamped to [0, 1], and the derivative of its logarithm in the picture.
-
-    A channel beyond [0, 1] on the side of a wanted value that is at that end has no slope.
-    """
-    target = np.clip(wanted, 0.0, 1.0)
-    difference = np.clip(image, 0.0, 1.0) - target
-    error = float(np.mean(difference**2))
-    # Beyond the range the clamped difference still says which way to go.
-    return error, difference * (2.0 / (difference.size * max(error, _LEAST_ERROR)))
-
-
 def tune_step(
     parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray, draw: Draw = render,
 ) -> tuple[float, np.ndarray]:
@@ -68,7 +56,7 @@ def tune_step(
     gradient = found.values
     gradient[:, SH:][np.arange((gradient.shape[1] - SH) // 3).repeat(3) >= coefficients[found.index][:, None]] = 0.0
     refused = moments.step(parameters.values, found.index, gradient, rates)
-    return -10.0 * np.log10(max(error, _LEAST_ERROR)), found.index[refused | frame.bad]
+    return -10.0 * np.log10(max(error, LEAST_ERROR)), found.index[refused | frame.bad]
 
 
 def quality(parameters: Parameters, cameras: list[Camera], wanted: list[np.ndarray], draw: Draw = render) -> float:

@@ -32,6 +32,7 @@ def fit(
     begin: Annotated[float | None, typer.Option(help="of --from: share of a fit whose learning rates are passed; default: 2/3", min=0.0, max=1.0)] = None,
     through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
+    squared: Annotated[float, typer.Option(help="share of the iterations, at the end, in which squared errors are minimised", min=0.0, max=1.0)] = 0.0,
     iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,
     size: Annotated[int, typer.Option(help="longer side of the pictures in pixels; larger ones are averaged, none is enlarged", min=16)] = 640,
     gaussians: Annotated[int, typer.Option(help="at most so many; of --from, as many as it has", min=4)] = 100_000,
@@ -60,7 +61,7 @@ def fit(
     if begin is not None and scene is None:
         raise FlickerError("--begin: of which scene, --from?")
     options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through, least,
-                      Options.begin if begin is None else begin)
+                      Options.begin if begin is None else begin, squared)
     data = load_dataset(dataset, size)
     text = cameras_text([shot.camera for shot in data.tests])
     cameras = _cameras_beside(out, text)

@@ -31,7 +31,7 @@ from . import density
 from .adam import Adam
 from .dataset import Dataset
 from .least import LeastSize
-from .loss import loss_and_slope
+from .loss import log_error_slope, loss_and_slope
 from .parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from .render import backward, render
 from .start import extent_of, start
@@ -53,7 +53,8 @@ class Options:
 
     tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on.
     through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
-    Gaussian falls below (`LeastSize`).
+    Gaussian falls below (`LeastSize`). squared: share of the iterations, the last ones, in which the squared error is minimised (`log_error_slope`), with
+    moments that begin anew.
     """
 
     iterations: int = 4000
@@ -66,6 +67,7 @@ class Options:
     through: str | None = None
     least: float = 0.0
     begin: float = 2 / 3
+    squared: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,17 +144,21 @@ class Trainer:
         view, self.order = int(self.order[0]), self.order[1:]
         camera, photo = self.dataset.fitted[view].camera, self._photos[view]
         frame = render(self.parameters, camera, self.options.background, self.machine)
+        first = round((1.0 - self.options.squared) * self.options.iterations)  # that minimises the squared error
+        if self.iteration == first:
+            self.moments = Adam.of(self.parameters.values)
+        measure = loss_and_slope if self.iteration < first else log_error_slope
         if self.options.exposure:
             change = self.exposures[view].reshape(3, 4)
-            loss, slope = loss_and_slope(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
+            loss, slope = measure(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
             by_colour = np.einsum("hwi,hwj->ij", slope, frame.image, dtype=np.float64)
             gradient = np.concatenate([by_colour, slope.sum(axis=(0, 1), dtype=np.float64)[:, None]], axis=1).astype(np.float32)
             slope = slope @ change[:, :3]
-            first, last = _EXPOSURE_RATES
-            rate = np.full(12, first * (last / first) ** (self.iteration / self.options.iterations), np.float32)
+            fast, slow = _EXPOSURE_RATES
+            rate = np.full(12, fast * (slow / fast) ** (self.iteration / self.options.iterations), np.float32)
             self.exposure_moments.step(self.exposures, np.array([view]), gradient.reshape(1, 12), rate)
         else:
-            loss, slope = loss_and_slope(frame.image, photo)
+            loss, slope = measure(frame.image, photo)
         found = backward(frame, slope, (self.degree + 1) ** 2)
         refused = self.moments.step(self.parameters.values, found.index, found.values, self.rates())
         self._least.hold(self.parameters.values, found.index)
