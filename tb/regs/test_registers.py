@@ -13,6 +13,7 @@ import gen_registers
 from flicker_tb.runner import build_and_test
 
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
+from flicker.sim import preprocessing, rendering
 from flicker.toolchain import ROOT
 
 PACKAGE = ROOT / "rtl" / "regs" / "flk_registers_pkg.sv"
@@ -94,3 +95,19 @@ def test_counters_are_the_description() -> None:
         "LIVE_WORDS": ChipCounter.LIVE_DATA_WAITS - ChipCounter.LIVE_CYCLES,
     }
     assert {name: numbers[name] for name in ends} == {name: last + 1 for name, last in ends.items()}
+
+
+def test_waits_are_where_they_are_said_to_be() -> None:
+    """Counters of waits come in one order: fields of the halves' structures, words that the top makes of them, numbers, names that the harness reads."""
+    top = (ROOT / "rtl" / "flk_top.sv").read_text()
+    for half, package, waits, first, prefix in (
+        ("front", "preproc/flk_preproc_pkg", preprocessing.WAITS, ChipCounter.FRONT_CLUSTER_WAITS, "FRONT_"),
+        ("rendering", "common/flk_rendering_pkg", rendering.WAITS, ChipCounter.LIST_LINE_WAITS, ""),
+    ):
+        names = [name for name, *_ in waits]
+        struct = (ROOT / "rtl" / f"{package}.sv").read_text().split(f"}} {half}_counters_t;")[0].rsplit("typedef struct packed {", 1)[1]
+        assert re.findall(r"logic \[31:0\] +(\w+);", struct)[-len(names) :] == names
+        words = top.split(f"assign {half}_words = {{")[1].split("};")[0]
+        assert re.findall(rf"{half}_counters\.(\w+)", words)[: len(names)] == names[::-1]
+        numbers = [ChipCounter(first + k).name.removeprefix(prefix).lower() for k in range(len(names))]
+        assert [name.replace("list_line_waits", "list_waits") for name in numbers] == names
