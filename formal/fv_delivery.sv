@@ -1,7 +1,6 @@
 // flk_delivery, one core that finishes no tile early: every entry with the core's bit, and every end, reaches the core once,
 // unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others do not. Of two elements that are given
-// together the older is no end. The cache keeps the order and
-// is arbitrary otherwise, the queues are stand-ins. The assertions l_* say what is where, for induction.
+// together the older is no end. The cache keeps the order and is arbitrary otherwise, the queues are stand-ins. The assertions l_* say what is where, for induction.
 module fv_delivery #(
   parameter int unsigned Core    = 0,
   parameter int unsigned InWidth = 1

@@ -21,6 +21,7 @@ common/flk_clock_gate.sv
 common/flk_delay.sv
 common/flk_delay_ram.sv
 common/flk_event_counter.sv
+common/flk_event_counters.sv
 common/flk_exp_neg.sv
 common/flk_exp_neg_pipe.sv
 common/flk_ff_add.sv

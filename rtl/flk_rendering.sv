@@ -539,7 +539,7 @@ module flk_rendering
   localparam int unsigned Waits = 9;
 
   logic [31:0]            cycles_q;
-  logic [Waits-1:0][3:0]  wait_q;   // by sorting unit or core
+  logic [Waits-1:0][3:0]  waits;    // by sorting unit or core
   logic [Waits-1:0][31:0] waited;
   logic [CORES-1:0]       first_valid;
 
@@ -547,33 +547,26 @@ module flk_rendering
     assign first_valid[k] = record_valid[k][0];
   end
 
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      wait_q <= '0;
-    end else begin
-      wait_q[0] <= list_valid & ~list_ready;
-      wait_q[1] <= sorted_valid & ~sorted_ready;
-      wait_q[2] <= 4'(delivery_waits[0] && state_q == RUN && !pixels_done);
-      wait_q[3] <= 4'(delivery_waits[1]);
-      wait_q[4] <= 4'(delivery_waits[2]);
-      wait_q[5] <= 4'(delivery_waits[3]);
-      wait_q[6] <= first_valid & ~record_ready;
-      wait_q[7] <= has & ~open;
-      wait_q[8] <= 4'(line_valid && !line_ready);
-    end
-  end
+  assign waits[0] = list_valid & ~list_ready;
+  assign waits[1] = sorted_valid & ~sorted_ready;
+  assign waits[2] = 4'(delivery_waits[0] && state_q == RUN && !pixels_done);
+  assign waits[3] = 4'(delivery_waits[1]);
+  assign waits[4] = 4'(delivery_waits[2]);
+  assign waits[5] = 4'(delivery_waits[3]);
+  assign waits[6] = first_valid & ~record_ready;
+  assign waits[7] = has & ~open;
+  assign waits[8] = 4'(line_valid && !line_ready);
 
-  for (genvar e = 0; e < Waits; e++) begin : gen_waits
-    flk_event_counter #(
-      .CountBits(3)
-    ) i_waited (
-      .clk_i,
-      .rst_ni,
-      .clear_i(start),
-      .count_i(3'($countones(wait_q[e]))),
-      .value_o(waited[e])
-    );
-  end
+  flk_event_counters #(
+    .Counters(Waits),
+    .Sources (4)
+  ) i_waits (
+    .clk_i,
+    .rst_ni,
+    .clear_i (start),
+    .events_i(waits),
+    .values_o(waited)
+  );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

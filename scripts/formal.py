@@ -40,7 +40,7 @@ FORMAL = ROOT / "formal"
 PROOFS = FORMAL / "proofs.toml"
 FOLDER = toolchain.BUILD / "formal"
 TOOLS = Path(sys.executable).parent
-TIMEOUT = 400  # seconds for a task, on a busy machine
+TIMEOUT = 1500  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
               "standins", "cut", "fast", "fast_set", "long", "mutant_depth", "mutant"}

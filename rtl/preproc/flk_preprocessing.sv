@@ -946,59 +946,43 @@ module flk_preprocessing
 
   logic                            write_error_q;
   logic [31:0]                     cycles_q;
-  logic [Events-1:0][LANES-1:0]    events_q;  // by lane
+  logic [Events-1:0][LANES-1:0]    events;  // by lane
   logic [Events-1:0][31:0]         totals;
 
   // What happens is counted a few cycles later; after a frame's last event comes the end of its lists, of its last wait that of its
   // writes.
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      events_q <= '0;
-    end else begin
-      events_q[0] <= go ? side.used & lane_near : '0;
-      events_q[1] <= go ? side.used & ~lane_near & lane_outside : '0;
-      events_q[2] <= go ? alive : '0;
-      events_q[3] <= saturated;
-      events_q[4] <= clipped;
-      events_q[5] <= faint;
-      events_q[6] <= unlisted;
-      events_q[7] <= LANES'(line_valid && line_ready);
-      // Waits: where a projected group has several reasons, the first one.
-      events_q[8]  <= LANES'(kept_valid && !kept_ready);
-      events_q[9]  <= LANES'(state_q == FRONT && !ended_q && front_en && !front_phase_q &&
+  assign events[0] = go ? side.used & lane_near : '0;
+  assign events[1] = go ? side.used & ~lane_near & lane_outside : '0;
+  assign events[2] = go ? alive : '0;
+  assign events[3] = saturated;
+  assign events[4] = clipped;
+  assign events[5] = faint;
+  assign events[6] = unlisted;
+  assign events[7] = LANES'(line_valid && line_ready);
+  // Waits: where a projected group has several reasons, the first one.
+  assign events[8]  = LANES'(kept_valid && !kept_ready);
+  assign events[9]  = LANES'(state_q == FRONT && !ended_q && front_en && !front_phase_q &&
                              !group_valid);
-      events_q[10] <= LANES'(exit_valid && !(&lane_ready));
-      events_q[11] <= LANES'(exit_valid && (&lane_ready) && !record_room);
-      events_q[12] <= LANES'(exit_valid && (&lane_ready) && record_room && !colour_room);
-      events_q[13] <= part_valid & ~part_ready;
-      events_q[14] <= record_valid & ~record_ready;
-      events_q[15] <= entry_valid & ~entry_ready;
-      events_q[16] <= merged_valid & ~merged_ready;
-      events_q[17] <= out_valid[3:0] & ~out_ready[3:0];
-      events_q[18] <= LANES'(line_valid && !line_ready);
-    end
-  end
+  assign events[10] = LANES'(exit_valid && !(&lane_ready));
+  assign events[11] = LANES'(exit_valid && (&lane_ready) && !record_room);
+  assign events[12] = LANES'(exit_valid && (&lane_ready) && record_room && !colour_room);
+  assign events[13] = part_valid & ~part_ready;
+  assign events[14] = record_valid & ~record_ready;
+  assign events[15] = entry_valid & ~entry_ready;
+  assign events[16] = merged_valid & ~merged_ready;
+  assign events[17] = out_valid[3:0] & ~out_ready[3:0];
+  assign events[18] = LANES'(line_valid && !line_ready);
 
-  for (genvar e = 0; e < Events; e++) begin : gen_events
-    logic [2:0] many;
-
-    always_comb begin
-      many = '0;
-      for (int unsigned k = 0; k < LANES; k++) begin
-        many = many + 3'(events_q[e][k]);
-      end
-    end
-
-    flk_event_counter #(
-      .CountBits(3)
-    ) i_total (
-      .clk_i,
-      .rst_ni,
-      .clear_i(start),
-      .count_i(many),
-      .value_o(totals[e])
-    );
-  end
+  flk_event_counters #(
+    .Counters(Events),
+    .Sources (LANES)
+  ) i_counters (
+    .clk_i,
+    .rst_ni,
+    .clear_i (start),
+    .events_i(events),
+    .values_o(totals)
+  );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -2,8 +2,8 @@
 //
 // front_valid_i and rendering_valid_i stay until *_done_o, high for a cycle; what is copied stays as long. The front end's
 // FRONT_WORDS go to words 0 on, the last FRONT_WAITS of them to words COUNTER_FRONT_WAITS on, the rendering half's RENDERING_WORDS to words
-// COUNTER_RENDERING on, the stage's to words 128 on (core, then
-// index CNT_*): read through counter_addr_o, COUNTER_LATENCY cycles later. *_none_i: zeros instead.
+// COUNTER_RENDERING on, the stage's to words 128 on (core, then index CNT_*): read through counter_addr_o, COUNTER_LATENCY cycles
+// later. *_none_i: zeros instead.
 // value_o is the word addr_i of bank_i, a cycle later; of a word that is being written it is undefined. The front end goes first;
 // a copy takes a cycle a word.
 module flk_frame_counters

@@ -1,4 +1,4 @@
-"""cocotb test of flk_event_counter against a sum."""
+"""cocotb tests of flk_event_counter (counts) and flk_event_counters (sources) against sums."""
 
 from __future__ import annotations
 
@@ -42,3 +42,39 @@ async def counts(dut):
         for _ in range(LATENCY):
             await FallingEdge(dut.clk_i)
             assert int(dut.value_o.value) == 0
+
+
+@cocotb.test()
+async def sources(dut):
+    """Random bits of each source: each counter has the sum of its own; clear drops those on their way and of its cycle."""
+    rng = random.Random(random.getrandbits(64))
+    counters, width = int(dut.Counters.value), int(dut.Sources.value)
+    every = (1 << counters * width) - 1
+    dut.rst_ni.value = dut.clear_i.value = dut.events_i.value = 0
+    Clock(dut.clk_i, 10, unit="ns").start()
+    await FallingEdge(dut.clk_i)
+    dut.rst_ni.value = 1
+
+    async def quiet(cycles: int) -> list[int]:
+        dut.events_i.value = 0
+        for _ in range(cycles):
+            await FallingEdge(dut.clk_i)
+        value = int(dut.values_o.value)
+        return [value >> 32 * c & 0xFFFFFFFF for c in range(counters)]
+
+    for clears in range(3):
+        totals = [0] * counters
+        for cycle in range(1200):
+            events = rng.getrandbits(counters * width) | (every if cycle > 600 else 0)
+            dut.events_i.value = events
+            await FallingEdge(dut.clk_i)
+            totals = [total + (events >> width * c & (1 << width) - 1).bit_count() for c, total in enumerate(totals)]
+            if cycle % 50 == 49:
+                assert await quiet(LATENCY) == totals, (clears, cycle)
+        assert all(total > 2 << 8 for total in totals)
+        dut.events_i.value = every
+        await FallingEdge(dut.clk_i)
+        dut.clear_i.value = 1
+        await FallingEdge(dut.clk_i)
+        dut.clear_i.value = 0
+        assert await quiet(LATENCY + 1) == [0] * counters

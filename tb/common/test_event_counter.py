@@ -1,4 +1,5 @@
-"""Counter of events: one and several a cycle, carries into the upper bits, clear with events on their way. Not covered: counts of more than 2^13."""
+"""Counters of events: one and several a cycle, carries into the upper bits, clear with events on their way; several counters of several
+sources each. Not covered: counts of more than 2^13."""
 
 from __future__ import annotations
 
@@ -8,7 +9,12 @@ from flicker_tb.runner import build_and_test, refused
 
 @pytest.mark.parametrize("bits", [1, 3])
 def test_event_counter(bits: int) -> None:
-    build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": bits})
+    build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": bits}, tests=["counts"])
+
+
+@pytest.mark.parametrize(("counters", "sources"), [(1, 1), (3, 4), (2, 5)])
+def test_event_counters(counters: int, sources: int) -> None:
+    build_and_test("flk_event_counters", "cocotb_event_counter", parameters={"Counters": counters, "Sources": sources}, tests=["sources"])
 
 
 def test_illegal_parameters() -> None:

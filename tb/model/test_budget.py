@@ -221,8 +221,8 @@ def test_through() -> None:
     assert len(found.parameters) == 600
     first, removal, *_, last = (row.decibels for row in found.rows)
     machine = found.machine
-    assert machine is not None and first == removal == pytest.approx(np.mean(machine_psnr(scene, scene, found.held, machine)), abs=0.05)
-    assert last > first + 0.05 and last == pytest.approx(np.mean(machine_psnr(scene, found.scene(), found.held, machine)), abs=0.05)
+    assert machine is not None and first == removal == pytest.approx(np.mean(machine_psnr(scene, found.held, found.wanted_held, machine)), abs=0.05)
+    assert last > first + 0.05 and last == pytest.approx(np.mean(machine_psnr(found.scene(), found.held, found.wanted_held, machine)), abs=0.05)
     assert np.mean(reference_psnr(scene, found.scene(), found.held)) != pytest.approx(last, abs=0.05)
 
 

@@ -1,9 +1,8 @@
 """Delivery: every core gets the records of the entries with its bit, in order, tile by tile; none twice, none more after it is finished than were on their way.
 
 State space: lists of 0 to 300 entries, masks of all kinds, cores of different pace, idle and back-pressure patterns, memory with and without pauses; cores that
-finish with their tiles at random, none or all of them; latency; clear at any time. Parameter space: short queues and a small cache; two elements a
-cycle for a core; with SLOW=1 the default,
-records of 32 bytes, both together.
+finish with their tiles at random, none or all of them; latency; clear at any time. Parameter space: short queues and a small cache; two
+elements a cycle for a core; with SLOW=1 the default, records of 32 bytes, a small cache with two elements.
 """
 
 from __future__ import annotations

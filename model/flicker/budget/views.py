@@ -63,13 +63,15 @@ def cameras_of(
     return [camera for k, camera in enumerate(cameras) if k % HOLD_EVERY], held
 
 
-def machine_psnr(full: Scene, small: Scene, cameras: Sequence[Camera], machine: Configuration, steps: Steps | None = None) -> list[float]:
-    """dB of a scene as a machine draws it, bit-true, against the full one by the reference renderer, over black; of each camera."""
+def machine_psnr(
+    scene: Scene, cameras: Sequence[Camera], pictures: Sequence[np.ndarray], machine: Configuration, steps: Steps | None = None,
+) -> list[float]:
+    """dB of a scene as a machine draws it, bit-true, over black, against pictures (H, W, 3) of the cameras; of each camera."""
     found = []
     with (steps or Steps()).bar("pictures of the machine") as report:
-        for k, camera in enumerate(cameras):
+        for k, (camera, picture) in enumerate(zip(cameras, pictures)):
             report(k, len(cameras))
-            found.append(psnr(run(machine, View(camera, small, background=(0.0, 0.0, 0.0))).image, render_reference(project(full, camera), camera)))
+            found.append(psnr(run(machine, View(camera, scene, background=(0.0, 0.0, 0.0))).image, picture))
     return found
 
 

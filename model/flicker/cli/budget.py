@@ -121,7 +121,7 @@ def budget(
     written = load_scene(out)
     decibels = reference_psnr(clean, written, held, progress)
     at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
-    drawn = None if reducer.machine is None else [machine_psnr(clean, of, held, reducer.machine, progress) for of in (clean, written)]
+    drawn = None if reducer.machine is None else [machine_psnr(of, held, reducer.wanted_held, reducer.machine, progress) for of in (clean, written)]
     _show(reducer.rows, seconds)
     table = Table(show_header=False)
     table.add_column(style="bold")

@@ -173,11 +173,13 @@ struct Sim {
   uint32_t records[CORES] = {};
 #ifdef FLK_RENDERING
   static constexpr int WAITS = 9;
+  int turn = 0;  // sorting unit that delivery takes from
 #else
   static constexpr int WAITS = 11;
 #endif
+#ifndef FLK_CHIP
   int64_t waits[WAITS] = {};  // in this frame
-  int turn = 0;               // sorting unit that delivery takes from
+#endif
   std::string error;
   bool away = false;  // the memory is in reset, the design is not
 };
@@ -304,7 +306,9 @@ int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limi
     sim->cycle(false);
     sim->top->start_i = 0;
     std::fill_n(sim->waits, Sim::WAITS, 0);
+#ifdef FLK_RENDERING
     sim->turn = 0;
+#endif
     bool done = false;
     for (uint64_t n = 0; n < limit && !done; ++n) {
       sim->cycle(false);
@@ -323,6 +327,12 @@ int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limi
     return -1;
   }
 }
+
+// Cycles of the last frame in which something waited, as the harness counted them.
+int flk_half_waits(Sim* sim, int64_t* out) {
+  std::copy_n(sim->waits, Sim::WAITS, out);
+  return Sim::WAITS;
+}
 #endif
 
 // Records that a core got of each list of the last frame; at most `size` lists. How many lists there were.
@@ -330,12 +340,6 @@ int flk_half_given(Sim* sim, int core, uint32_t* out, int size) {
   const auto& lists = sim->given[core];
   std::copy_n(lists.begin(), std::min<size_t>(lists.size(), size), out);
   return static_cast<int>(lists.size());
-}
-
-// Cycles of the last frame in which something waited, as the harness counted them.
-int flk_half_waits(Sim* sim, int64_t* out) {
-  std::copy_n(sim->waits, Sim::WAITS, out);
-  return Sim::WAITS;
 }
 
 double flk_half_efficiency(Sim* sim) { return sim->memory.efficiency(); }

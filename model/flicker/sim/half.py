@@ -64,7 +64,6 @@ def _library(path: Path) -> ctypes.CDLL:
         ("fail", None, pointer, u64, u64, ctypes.c_int),
         ("mend", None, pointer),
         ("given", ctypes.c_int, pointer, ctypes.c_int, pointer, ctypes.c_int),
-        ("waits", ctypes.c_int, pointer, pointer),
         ("efficiency", ctypes.c_double, pointer),
         ("counts", None, pointer, ctypes.c_uint32, pointer),
     ):
@@ -72,6 +71,7 @@ def _library(path: Path) -> ctypes.CDLL:
         function.restype = result
         function.argtypes = arguments
     if hasattr(lib, "flk_half_frame"):  # the chip has none
+        lib.flk_half_waits.restype, lib.flk_half_waits.argtypes = ctypes.c_int, [pointer, pointer]
         lib.flk_half_frame.restype = ctypes.c_int
         lib.flk_half_frame.argtypes = [pointer, pointer, ctypes.c_int, u64, pointer, ctypes.c_int, pointer]
     return lib
