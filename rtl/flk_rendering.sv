@@ -547,9 +547,19 @@ module flk_rendering
     assign first_valid[k] = record_valid[k][0];
   end
 
+  logic running_q;  // a cycle ago, as what delivery tells
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      running_q <= 1'b0;
+    end else begin
+      running_q <= state_q == RUN && !pixels_done;
+    end
+  end
+
   assign waits[0] = list_valid & ~list_ready;
   assign waits[1] = sorted_valid & ~sorted_ready;
-  assign waits[2] = 4'(delivery_waits[0] && state_q == RUN && !pixels_done);
+  assign waits[2] = 4'(delivery_waits[0] && running_q);
   assign waits[3] = 4'(delivery_waits[1]);
   assign waits[4] = 4'(delivery_waits[2]);
   assign waits[5] = 4'(delivery_waits[3]);

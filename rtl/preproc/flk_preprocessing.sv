@@ -424,7 +424,7 @@ module flk_preprocessing
   assign full    = Quarters'(fill >> InBeatBits);
   assign partial = side.last && fill[InBeatBits-1:0] != '0;
 
-  // What a lane's survivor gets is known for each number of survivors before it; that number comes late.
+  // What a lane's survivor gets is known for each number of survivors before it; that number comes late, so a bit for each selects.
   logic [LANES-1:0][NUMBER_BITS-1:0] numbers;
   place_t [LANES-1:0]                places;
   logic [LANES-1:0][SEQ_BITS-1:0]    seqs;
@@ -448,10 +448,15 @@ module flk_preprocessing
   end
 
   always_comb begin
+    number = '0;
+    place  = '0;
+    seq    = '0;
     for (int unsigned k = 0; k < LANES; k++) begin
-      number[k] = numbers[ahead[k]];
-      place[k]  = places[ahead[k]];
-      seq[k]    = seqs[ahead[k]];
+      for (int unsigned n = 0; n <= k; n++) begin
+        number[k] |= numbers[n] & {NUMBER_BITS{ahead[k] == 2'(n)}};
+        place[k]  |= places[n] & {$bits(place_t){ahead[k] == 2'(n)}};
+        seq[k]    |= seqs[n] & {SEQ_BITS{ahead[k] == 2'(n)}};
+      end
     end
   end
 
@@ -959,19 +964,64 @@ module flk_preprocessing
   assign events[5] = faint;
   assign events[6] = unlisted;
   assign events[7] = LANES'(line_valid && line_ready);
-  // Waits: where a projected group has several reasons, the first one.
-  assign events[8]  = LANES'(kept_valid && !kept_ready);
-  assign events[9]  = LANES'(state_q == FRONT && !ended_q && front_en && !front_phase_q &&
-                             !group_valid);
-  assign events[10] = LANES'(exit_valid && !(&lane_ready));
-  assign events[11] = LANES'(exit_valid && (&lane_ready) && !record_room);
-  assign events[12] = LANES'(exit_valid && (&lane_ready) && record_room && !colour_room);
-  assign events[13] = part_valid & ~part_ready;
-  assign events[14] = record_valid & ~record_ready;
-  assign events[15] = entry_valid & ~entry_ready;
-  assign events[16] = merged_valid & ~merged_ready;
-  assign events[17] = out_valid[3:0] & ~out_ready[3:0];
-  assign events[18] = LANES'(line_valid && !line_ready);
+
+  // Waits: where a projected group has several reasons, the first one. What comes late in its cycle is looked at in the next.
+  logic             front_q, group_valid_q, exit_valid_q, places_q, colours_q;
+  logic [1:0]       kept_q, line_q;  // ready above valid
+  logic [LANES-1:0] lanes_q;
+  logic [LANES-1:0] part_q, part_ready_q, record_q, record_ready_q, entry_q, entry_ready_q;
+  logic [3:0]       merged_q, merged_ready_q, out_q, out_ready_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      front_q      <= 1'b0;
+      exit_valid_q <= 1'b0;
+      kept_q       <= '0;
+      line_q       <= '0;
+      part_q       <= '0;
+      record_q     <= '0;
+      entry_q      <= '0;
+      merged_q     <= '0;
+      out_q        <= '0;
+    end else begin
+      front_q      <= state_q == FRONT && !ended_q && !front_phase_q;
+      exit_valid_q <= exit_valid;
+      kept_q       <= {kept_ready, kept_valid};
+      line_q       <= {line_ready, line_valid};
+      part_q       <= part_valid;
+      record_q     <= record_valid;
+      entry_q      <= entry_valid;
+      merged_q     <= merged_valid;
+      out_q        <= out_valid[3:0];
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    group_valid_q  <= group_valid;
+    lanes_q        <= lane_ready;
+    places_q       <= record_room;
+    colours_q      <= colour_room;
+    part_ready_q   <= part_ready;
+    record_ready_q <= record_ready;
+    entry_ready_q  <= entry_ready;
+    merged_ready_q <= merged_ready;
+    out_ready_q    <= out_ready[3:0];
+  end
+
+  logic went;  // nothing waited at the end of the projection
+
+  assign went       = !exit_valid_q || ((&lanes_q) && places_q && colours_q);
+  assign events[8]  = LANES'(kept_q == 2'b01);
+  assign events[9]  = LANES'(front_q && went && !group_valid_q);
+  assign events[10] = LANES'(exit_valid_q && !(&lanes_q));
+  assign events[11] = LANES'(exit_valid_q && (&lanes_q) && !places_q);
+  assign events[12] = LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
+  assign events[13] = part_q & ~part_ready_q;
+  assign events[14] = record_q & ~record_ready_q;
+  assign events[15] = entry_q & ~entry_ready_q;
+  assign events[16] = merged_q & ~merged_ready_q;
+  assign events[17] = out_q & ~out_ready_q;
+  assign events[18] = LANES'(line_q == 2'b01);
 
   flk_event_counters #(
     .Counters(Events),

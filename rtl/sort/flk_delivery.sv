@@ -15,8 +15,8 @@
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
-// waits_o: in this cycle an entry could be taken and the unit in turn has none (bit 0); it has one that cannot be taken (1); the head of
-// the cache's queue waits for room in the cores' queues (2), or for its line (3).
+// waits_o: a cycle ago an entry could be taken and the unit in turn had none (bit 0); it had one that could not be taken (1); the head
+// of the cache's queue waited for room in the cores' queues (2), or for its line (3).
 // Latency 7 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
 // and out_* come from registers through a multiplexer.
 module flk_delivery #(
@@ -116,8 +116,6 @@ module flk_delivery #(
   assign e_move      = (e_valid_q & ~leaves) == '0;
   assign e_ready     = ready_q && e_move;
   assign e_take      = in_valid_i[unit_q][0] && e_ready;
-  assign waits_o     = {head_waits, in_valid_i[unit_q][0] && !e_ready,
-                        !in_valid_i[unit_q][0] && e_ready};
   assign e_end_taken = e_take && (in_valid_i[unit_q] & in_end_i[unit_q]) != '0;
 
   for (genvar k = 0; k < 2; k++) begin : gen_entry
@@ -156,6 +154,20 @@ module flk_delivery #(
       unit_q <= unit_q + 2'(e_end_taken);
     end
   end
+
+  logic offered_q, taken_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      offered_q <= 1'b0;
+      taken_q   <= 1'b0;
+    end else begin
+      offered_q <= in_valid_i[unit_q][0] && !stop;
+      taken_q   <= e_ready && !stop;
+    end
+  end
+
+  assign waits_o = {head_waits, offered_q && !taken_q, !offered_q && taken_q};
 
   // All cores are finished with the tile that a unit gives.
   logic [3:0] finish_q;

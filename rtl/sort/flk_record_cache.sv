@@ -14,7 +14,7 @@
 // Throughput: two elements a cycle, one where both are of the same bank (at the data: if both read, or both write, or
 // are of one place); a line a cycle from memory. Latency 4 without a miss in the queue. in_ready_o[1] depends on in_*; it is
 // never high without in_ready_o[0].
-// waits_o, of the head of the queue: bit 0, out_ready_i is low; bit 1, its line has not come.
+// waits_o, of the head of the queue a cycle ago: bit 0, out_ready_i was low; bit 1, its line had not come.
 // Combinational too: ar_ready_i to the requests, r_*_i to the buffer's write port, out_ready_i to the head of the queue.
 module flk_record_cache #(
   parameter  int unsigned RecordBits  = 128,
@@ -454,7 +454,6 @@ module flk_record_cache #(
   assign go_second = go_first && wait_valid[1] && apart &&
                      (!head[1].miss || (head[0].miss ? line_valid[1] : line_valid[0]));
   assign go        = {go_second, go_first};
-  assign waits_o   = {wait_valid[0] && out_ready_i && !go_first, wait_valid[0] && !out_ready_i};
   assign line_pop  = {go_second && head[1].miss && head[0].miss,
                       go_first && (head[0].miss || (go_second && head[1].miss))};
 
@@ -524,7 +523,19 @@ module flk_record_cache #(
 
   // ---- what is told -----------------------------------------------------------------------------------
 
-  logic error_q;
+  logic error_q, waiting_q, taken_q;  // of the head: it was there; it was allowed to leave
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      waiting_q <= 1'b0;
+      taken_q   <= 1'b0;
+    end else begin
+      waiting_q <= wait_valid[0] && !stop;
+      taken_q   <= out_ready_i;
+    end
+  end
+
+  assign waits_o = {waiting_q && taken_q && !d_valid_q[0], waiting_q && !taken_q};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -98,7 +98,7 @@ class Delivery:
         dut, edge = self.dut, RisingEdge(self.dut.clk_i)
         bits, number = 8 * self.bytes, len(dut.in_entry_i) // 8
         ready = 0
-        turn = 0  # of the unit that is taken from
+        turn, due = 0, 0  # unit that is taken from; waits_o of it in the next cycle
         told: list[set[int]] = [set() for _ in range(CORES)]
         while True:
             await edge
@@ -109,11 +109,12 @@ class Delivery:
             if not self.tiles:
                 told = [set() for _ in range(CORES)]
             if dut.clear_i.value == 1:
-                ready = turn = 0
+                ready = turn = due = 0
                 continue
             # Waits
             offered, taken, waits = self.units[turn].offered, int(dut.in_ready_o.value) >> turn & 1, int(dut.waits_o.value)
-            assert waits & 3 == (not offered and taken) + 2 * (offered > 0 and not taken), f"waits_o {waits:#x}, unit {turn}: {offered} offered, {taken} taken"
+            assert waits & 3 == due, f"waits_o {waits:#x}, due {due}, unit {turn}"
+            due = (not offered and taken) + 2 * (offered > 0 and not taken)
             assert waits >> 2 != 3, "the head waits for two things"
             self.waits = [n + (waits >> k & 1) for k, n in enumerate(self.waits)]
             if offered and taken and any(self.units[turn].item(k)[0] for k in range(offered)):

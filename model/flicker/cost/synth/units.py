@@ -77,13 +77,13 @@ COMPOSED: dict[str, list[str]] = {
     ],
     "flk_preprocessing": [
         "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
-        "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_line_writer", "flk_delay",
+        "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_line_writer", "flk_delay", "flk_event_counters",
     ],
     "flk_line_writer": ["flk_sram_fifo", "flk_axi_write"],
     "flk_axi_read_mux": ["flk_stream_arbiter"],
     "flk_rendering": [
         "flk_tile_walk", "flk_list_reader", "flk_sorting_unit", "flk_axi_read_mux", "flk_entry_buffer", "flk_delivery", "flk_stage",
-        "flk_frame_writer", "flk_line_writer", "flk_pipe_reg",
+        "flk_frame_writer", "flk_line_writer", "flk_pipe_reg", "flk_event_counters",
     ],
     "flk_splat_input": ["flk_record_to_splat"],
     "flk_stage": ["flk_splat_input", *(stage.module for stage in RENDERING_STAGES.values())],
@@ -325,7 +325,7 @@ def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_opacity_to_fp16"),
-        unit("flk_coefficient"), unit("flk_event_counter"),
+        unit("flk_coefficient"), unit("flk_event_counter"), unit("flk_event_counters", "19 x 4", Counters=19, Sources=4),
         unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
