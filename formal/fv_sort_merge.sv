@@ -1,6 +1,6 @@
 // flk_sort_merge: what goes into one of its two memories leaves once, unchanged and in order,
 // for lists of any lengths and any stalls; nothing leaves that is not inside, and one entry at a time.
-// Without drop_i and selection.
+// Without drop_i.
 //
 // The assertions l_* link registers and chosen element, which induction needs.
 module fv_sort_merge #(
@@ -48,12 +48,7 @@ module fv_sort_merge #(
     .out_entry_o(out_entry),
     .drop_i     (1'b0),
     .drop_o     (),
-    .empty_o    (),
-    .closed_i   (1'b0),
-    .cut_i      (1'b0),
-    .busy_o     (),
-    .limit_o    (),
-    .done_o     ()
+    .empty_o    ()
   );
 
   assign push = in_valid_i && in_ready && !in_end_i && dut.side_q == 1'(Side);
@@ -97,20 +92,20 @@ module fv_sort_merge #(
   logic [PlaceBits-1:0] head_at, fetch_at, write_at, place;
   logic                 head_valid, read_valid;
 
-  assign head_at    = dut.head_at_q[Side];
-  assign fetch_at   = dut.fetch_at_q[Side];
-  assign write_at   = dut.write_at_q[Side];
-  assign head_valid = dut.head_valid_q[Side];
-  assign read_valid = dut.read_valid_q[Side];
+  assign head_at    = dut.gen_side[Side].i_side.head_at_q;
+  assign fetch_at   = dut.gen_side[Side].i_side.fetch_at_q;
+  assign write_at   = dut.gen_side[Side].i_side.write_at_q;
+  assign head_valid = dut.gen_side[Side].i_side.head_valid_q;
+  assign read_valid = dut.gen_side[Side].i_side.read_valid_q;
   assign place      = head_at + PlaceBits'(ahead);
 
   logic [Bits-1:0] word;
   always_comb begin
-    word = dut.gen_side[Side].i_memory.storage_q[place[PlaceBits-2:0]];
+    word = dut.gen_side[Side].i_side.i_memory.storage_q[place[PlaceBits-2:0]];
     if (head_valid && ahead == '0) begin
-      word = dut.head_q[Side];
+      word = dut.gen_side[Side].i_side.head_q;
     end else if (read_valid && ahead == CountBits'(head_valid)) begin
-      word = dut.read[Side];
+      word = dut.gen_side[Side].i_side.read;
     end
   end
 

@@ -8,6 +8,7 @@
 module fv_sorting_unit #(
   parameter  int unsigned Entries = 4,
   parameter  int unsigned Steps   = 2,  // 4 << Steps / 2 entries fit
+  parameter  int unsigned Ways    = 2,
   parameter  bit          Last    = 0,  // lists of one more than fit
   localparam int unsigned Most    = Last ? (2 << Steps) + 1 : Entries,
   localparam int unsigned Bits    = 4,  // three of the key
@@ -35,6 +36,7 @@ module fv_sorting_unit #(
   flk_sorting_unit #(
     .Cells      (2),
     .Stages     (Steps),
+    .Ways       (Ways),
     .Lists      (2),
     .LineEntries(2),
     .EntryBits  (Bits),

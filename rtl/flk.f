@@ -98,8 +98,10 @@ sort/flk_delivery.sv
 sort/flk_entry_buffer.sv
 sort/flk_list_reader.sv
 sort/flk_record_cache.sv
+sort/flk_sort_memory.sv
 sort/flk_sort_merge.sv
 sort/flk_sort_runs.sv
+sort/flk_sort_select.sv
 sort/flk_sorting_unit.sv
 sort/flk_tile_walk.sv
 preproc/flk_cluster_cull.sv

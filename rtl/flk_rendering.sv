@@ -27,6 +27,7 @@ module flk_rendering
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,    // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
+  parameter  int unsigned SortWays       = 2,    // runs that its last step merges
   parameter  int unsigned Chunks         = 16,   // in a list reader's memory
   parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
   parameter  int unsigned Queue          = 64,   // records of each core
@@ -241,7 +242,8 @@ module flk_rendering
     );
 
     flk_sorting_unit #(
-      .Stages(SortStages)
+      .Stages(SortStages),
+      .Ways  (SortWays)
     ) i_sorter (
       .clk_i,
       .rst_ni,

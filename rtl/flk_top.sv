@@ -30,10 +30,12 @@ module flk_top
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
+  parameter  int unsigned SortWays       = 2,
   parameter  int unsigned Chunks         = 16,
   parameter  int unsigned Entries        = 512,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
+  parameter  int unsigned Gather         = 256,
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
   parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
@@ -411,6 +413,7 @@ module flk_top
     .Form    (Form),
     .Pointers(Pointers),
     .Lists   (Lists),
+    .Gather  (Gather),
     .Waiting (Waiting),
     .IdBits  (IdBits)
   ) i_front (
@@ -521,6 +524,7 @@ module flk_top
     .Depth         (Depth),
     .InWidth       (InWidth),
     .SortStages    (SortStages),
+    .SortWays      (SortWays),
     .Chunks        (Chunks),
     .Entries       (Entries),
     .Pairs         (Pairs),

@@ -6,24 +6,16 @@
 // list's end or in_flag_i with one of its entries says that none comes; out_flag_o says the same of
 // the output's runs. Behind the list that leaves up to Lists whole lists and the one that arrives wait.
 // Throughput: an entry a cycle. Latency: an entry is at its side's head three cycles after it was
-// taken. Handshakes: in_ready_o comes from registers; out_valid_o from registers, drop_i and closed_i;
+// taken. Handshakes: in_ready_o comes from registers; out_valid_o from registers and drop_i;
 // out_ready_i reaches the memories' read ports. clear_i (synchronous) empties it.
 // drop_i: what there is of the list that leaves is left out, its end leaves; drop_o: what arrives at
 // the input belongs to this list too. empty_o: no entry and no end inside.
-//
-// Select, for the last step: nothing of a list leaves before closed_i (its end is on the way) or its
-// end. cut_i, for a list whose end is not on the way: when both memories are full, the 2 Run entries
-// are reduced to the smallest Run: they are counted off from both heads (limit_o: out_entry_o is the
-// last of them), the heads go back to where they were, and the counted entries are merged into A,
-// where each entry read leaves room for one. They are then the list's first run; what follows is the
-// second. busy_o is high meanwhile, done_o in its last cycle: 2 Run + 4 cycles from cut_i on.
 module flk_sort_merge #(
   parameter  int unsigned Run         = 16,
   parameter  int unsigned Depth       = Run,  // entries of a memory: Run, 2 Run, 4 Run, ...
   parameter  int unsigned KeyBits     = 48,
   parameter  int unsigned PayloadBits = 4,
   parameter  int unsigned Lists       = 8,
-  parameter  bit          Select      = 1'b0,
   localparam int unsigned EntryBits   = KeyBits + PayloadBits
 ) (
   input  logic                 clk_i,
@@ -44,13 +36,7 @@ module flk_sort_merge #(
   // Control
   input  logic                 drop_i,
   output logic                 drop_o,
-  output logic                 empty_o,
-  // Selection
-  input  logic                 closed_i,
-  input  logic                 cut_i,
-  output logic                 busy_o,
-  output logic                 limit_o,
-  output logic                 done_o
+  output logic                 empty_o
 );
 
   if (Run < 2 || (Run & (Run - 1)) != 0) begin : gen_check
@@ -58,9 +44,6 @@ module flk_sort_merge #(
   end
   if (Depth < Run || (Depth & (Depth - 1)) != 0) begin : gen_check_depth
     $error("flk_sort_merge: Depth must be a power of two, at least Run");
-  end
-  if (Select && Depth != Run) begin : gen_check_select
-    $error("flk_sort_merge: with Select, Depth must be Run");
   end
 
   localparam int unsigned SlotBits = $clog2(Depth);
@@ -74,36 +57,24 @@ module flk_sort_merge #(
     place_t [1:0] place;  // behind its last entry, in both memories
   } finish_t;
 
-  typedef enum logic [1:0] {NONE, COUNT, MOVE} cut_e;
-
   // A is 0, B is 1.
-  place_t [1:0] head_at_d, head_at_q, head_passed;  // of the head, or of what becomes it
-  place_t [1:0] fetch_at_d, fetch_at_q;             // of what is read next
-  place_t [1:0] write_at_d, write_at_q;
-  place_t [1:0] limit_at_d, limit_at_q;             // behind the present run
-  logic   [1:0] head_valid_d, head_valid_q, read_valid_d, read_valid_q;
-  logic   [1:0][EntryBits-1:0] head_q, read;  // the head; behind it the memory's register
-  logic   [1:0]              at_limit, at_end, over, pop, load, fetch, write;
-  logic                      complete, finish_pop, finish_ready, finish_empty;
-  finish_t                   finish;
-  logic                      pair_done, list_done, less, prefer_b, may, can, move, drop;
-  cut_e                      cut_d, cut_q;
-  logic [RunBits-1:0]        counted_d, counted_q;
-  logic                      counted_all, begins;
+  place_t [1:0]                head_at, write_at;
+  place_t [1:0]                limit_at_d, limit_at_q;  // behind the present run
+  logic   [1:0]                head_valid, full;
+  logic   [1:0][EntryBits-1:0] head;
+  logic   [1:0]                at_limit, at_end, over, pop;
+  logic                        complete, finish_pop, finish_ready, finish_empty;
+  finish_t                     finish;
+  logic                        pair_done, list_done, less, prefer_b, can, move, drop;
 
   // ---- input --------------------------------------------------------------------------------------
 
-  logic [1:0]         full;
   logic               side_d, side_q;  // which memory's turn it is
   logic [RunBits-1:0] taken_d, taken_q;  // entries of the run
   logic               only_d, only_q;   // the list that arrives has no second run
   logic               take, take_end;
 
-  for (genvar s = 0; s < 2; s++) begin : gen_full
-    assign full[s] = write_at_q[s] == {~head_at_q[s][SlotBits], head_at_q[s][SlotBits-1:0]};
-  end
-
-  assign in_ready_o = !full[side_q] && finish_ready && (!Select || cut_q == NONE);
+  assign in_ready_o = !full[side_q] && finish_ready;
   assign take       = in_valid_i && in_ready_o && !in_end_i;
   assign take_end   = in_valid_i && in_ready_o && in_end_i;
 
@@ -120,7 +91,7 @@ module flk_sort_merge #(
     .clear_i,
     .in_valid_i (take_end),
     .in_ready_o (finish_ready),
-    .in_data_i  ({in_flag_i, write_at_q}),
+    .in_data_i  ({in_flag_i, write_at}),
     .out_valid_o(complete),
     .out_ready_i(finish_pop),
     .out_data_o (finish),
@@ -143,9 +114,6 @@ module flk_sort_merge #(
       side_d  = 1'b0;
       only_d  = 1'b0;
     end
-    if (done_o) begin
-      side_d  = 1'b1;
-    end
     if (clear_i) begin
       taken_d = '0;
       side_d  = 1'b0;
@@ -156,42 +124,29 @@ module flk_sort_merge #(
   // ---- memories -----------------------------------------------------------------------------------
 
   for (genvar s = 0; s < 2; s++) begin : gen_side
-    logic [EntryBits-1:0] write_data;
-
-    if (Select && s == 0) begin : gen_back
-      assign write_data = cut_q == MOVE ? out_entry_o : in_entry_i;
-      assign write[s]   = (take && !side_q) || (cut_q == MOVE && move);
-    end else begin : gen_in
-      assign write_data = in_entry_i;
-      assign write[s]   = take && side_q == 1'(s);
-    end
-
-    flk_sram #(
+    flk_sort_memory #(
       .Width(EntryBits),
       .Depth(Depth)
-    ) i_memory (
+    ) i_side (
       .clk_i,
-      .wr_en_i  (write[s]),
-      .wr_addr_i(write_at_q[s][SlotBits-1:0]),
-      .wr_data_i(write_data),
-      .rd_en_i  (fetch[s]),
-      .rd_addr_i(fetch_at_q[s][SlotBits-1:0]),
-      .rd_data_o(read[s])
+      .rst_ni,
+      .clear_i,
+      .write_i     (take && side_q == 1'(s)),
+      .data_i      (in_entry_i),
+      .full_o      (full[s]),
+      .write_at_o  (write_at[s]),
+      .head_valid_o(head_valid[s]),
+      .head_o      (head[s]),
+      .head_at_o   (head_at[s]),
+      .pop_i       (pop[s]),
+      .jump_i      (drop),
+      .jump_at_i   (complete ? finish.place[s] : write_at[s]),
+      .cut_i       (1'b0),
+      .cut_at_i    ('0)
     );
 
-    // A word that is written in this cycle is not there yet.
-    assign head_passed[s] = head_at_q[s] + 1'b1;
-    assign load[s]        = read_valid_q[s] && (!head_valid_q[s] || pop[s]);
-    assign fetch[s]       = write_at_q[s] != fetch_at_q[s] && (!read_valid_q[s] || load[s]);
-
-    always_ff @(posedge clk_i) begin
-      if (load[s]) begin
-        head_q[s] <= read[s];
-      end
-    end
-
-    assign at_limit[s] = head_at_q[s] == limit_at_q[s];
-    assign at_end[s]   = complete && head_at_q[s] == finish.place[s];
+    assign at_limit[s] = head_at[s] == limit_at_q[s];
+    assign at_end[s]   = complete && head_at[s] == finish.place[s];
   end
 
   // ---- choice -------------------------------------------------------------------------------------
@@ -199,23 +154,21 @@ module flk_sort_merge #(
   // Both runs have left: the next two begin in the same cycle. over: the run has left, or there is none.
   assign pair_done = at_limit == '1;
   assign list_done = at_end == '1;
-  assign less      = head_q[1][EntryBits-1:PayloadBits] < head_q[0][EntryBits-1:PayloadBits];
+  assign less      = head[1][EntryBits-1:PayloadBits] < head[0][EntryBits-1:PayloadBits];
   assign over[0]   = at_end[0] || (at_limit[0] && !pair_done);
   assign over[1]   = at_end[1] || (at_limit[1] && !pair_done) || (!complete && only_q);
-  assign may       = !Select || complete || closed_i;
-  assign drop      = drop_i && !list_done && (!Select || cut_q == NONE);
+  assign drop      = drop_i && !list_done;
 
   // What does not wait for the comparison: there is an entry to choose, and it is taken.
-  assign can       = (head_valid_q | over) == '1 && over != '1;
+  assign can       = (head_valid | over) == '1 && over != '1;
   assign prefer_b  = over[0] || (less && !over[1]);
-  assign move      = can && (Select && cut_q != NONE ? cut_q == COUNT || !pair_done
-                                                     : may && !drop && out_ready_i);
+  assign move      = can && !drop && out_ready_i;
   assign pop       = {move && prefer_b, move && !prefer_b};
 
   assign finish_pop  = list_done && out_ready_i;
-  assign out_valid_o = (!Select || cut_q == NONE) && (list_done || (can && may && !drop));
+  assign out_valid_o = list_done || (can && !drop);
   assign out_end_o   = list_done;
-  assign out_entry_o = prefer_b ? head_q[1] : head_q[0];
+  assign out_entry_o = prefer_b ? head[1] : head[0];
 
   // B had nothing of this list.
   logic second_d, second_q;
@@ -224,112 +177,37 @@ module flk_sort_merge #(
   assign out_flag_o = list_done ? finish.flag
                     : !second_q && (complete ? at_end[1] : only_q);
 
-  // ---- selection ----------------------------------------------------------------------------------
-
-  assign begins      = Select && cut_q == NONE && cut_i && !closed_i && !drop_i && !complete &&
-                       write_at_q == limit_at_q;
-  assign counted_all = Select && cut_q == COUNT && move && counted_q == '1;
-  assign busy_o      = Select && cut_q != NONE;
-  assign limit_o     = counted_all;
-  assign done_o      = Select && cut_q == MOVE && pair_done;
-
   always_comb begin
-    cut_d     = cut_q;
-    counted_d = cut_q == COUNT && move ? counted_q + 1'b1 : counted_q;
-    if (begins) begin
-      cut_d     = COUNT;
-      counted_d = '0;
-    end
-    if (counted_all) begin
-      cut_d = MOVE;
-    end
-    if (done_o || clear_i) begin
-      cut_d = NONE;
-    end
-  end
-
-  always_comb begin
+    limit_at_d = limit_at_q;
     for (int unsigned s = 0; s < 2; s++) begin
-      head_at_d[s]    = pop[s] ? head_passed[s] : head_at_q[s];
-      fetch_at_d[s]   = fetch[s] ? fetch_at_q[s] + 1'b1 : fetch_at_q[s];
-      read_valid_d[s] = fetch[s] || (read_valid_q[s] && !load[s]);
-      head_valid_d[s] = load[s] || (head_valid_q[s] && !pop[s]);
-      write_at_d[s]   = write[s] ? write_at_q[s] + 1'b1 : write_at_q[s];
-      limit_at_d[s]   = limit_at_q[s];
-      if (drop) begin
-        head_at_d[s]    = complete ? finish.place[s] : write_at_q[s];
-        fetch_at_d[s]   = head_at_d[s];
-        read_valid_d[s] = 1'b0;
-        head_valid_d[s] = 1'b0;
-      end
       if (finish_pop) begin
         limit_at_d[s] = finish.place[s] + place_t'(Run);
       end else if (pair_done && !list_done) begin
         limit_at_d[s] = limit_at_q[s] + place_t'(Run);
       end
-      if (counted_all) begin
-        // Back to the run's beginning; what was not counted is no more.
-        head_at_d[s]    = limit_at_q[s] - place_t'(Run);
-        fetch_at_d[s]   = head_at_d[s];
-        read_valid_d[s] = 1'b0;
-        head_valid_d[s] = 1'b0;
-        limit_at_d[s]   = pop[s] ? head_passed[s] : head_at_q[s];
-        write_at_d[s]   = pop[s] ? head_passed[s] : head_at_q[s];
-      end
       if (clear_i) begin
-        head_at_d[s]    = '0;
-        fetch_at_d[s]   = '0;
-        read_valid_d[s] = 1'b0;
-        head_valid_d[s] = 1'b0;
-        write_at_d[s]   = '0;
-        limit_at_d[s]   = place_t'(Run);
+        limit_at_d[s] = place_t'(Run);
       end
     end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      side_q       <= 1'b0;
-      taken_q      <= '0;
-      only_q       <= 1'b0;
-      head_at_q    <= '0;
-      fetch_at_q   <= '0;
-      read_valid_q <= '0;
-      head_valid_q <= '0;
-      write_at_q   <= '0;
-      limit_at_q   <= {2{place_t'(Run)}};
-      second_q     <= 1'b0;
-      cut_q        <= NONE;
-      counted_q    <= '0;
+      side_q     <= 1'b0;
+      taken_q    <= '0;
+      only_q     <= 1'b0;
+      limit_at_q <= {2{place_t'(Run)}};
+      second_q   <= 1'b0;
     end else begin
-      side_q       <= side_d;
-      taken_q      <= taken_d;
-      only_q       <= only_d;
-      head_at_q    <= head_at_d;
-      fetch_at_q   <= fetch_at_d;
-      read_valid_q <= read_valid_d;
-      head_valid_q <= head_valid_d;
-      write_at_q   <= write_at_d;
-      limit_at_q   <= limit_at_d;
-      second_q     <= second_d;
-      cut_q        <= cut_d;
-      counted_q    <= counted_d;
+      side_q     <= side_d;
+      taken_q    <= taken_d;
+      only_q     <= only_d;
+      limit_at_q <= limit_at_d;
+      second_q   <= second_d;
     end
   end
 
-  assign drop_o  = drop_i && finish_empty && (!Select || cut_q == NONE);
-  assign empty_o = finish_empty && write_at_q == head_at_q && (!Select || cut_q == NONE);
-
-`ifndef SYNTHESIS
-  for (genvar s = 0; s < 2; s++) begin : gen_check_side
-    place_t held;
-    assign held = write_at_q[s] - head_at_q[s];
-    assert property (@(posedge clk_i) disable iff (!rst_ni) 32'(held) <= Depth)
-    else $error("flk_sort_merge: more entries than Depth");
-    assert property (@(posedge clk_i) disable iff (!rst_ni)
-        fetch[s] && write[s] |-> write_at_q[s][SlotBits-1:0] != fetch_at_q[s][SlotBits-1:0])
-    else $error("flk_sort_merge: read where it is written");
-  end
-`endif
+  assign drop_o  = drop_i && finish_empty;
+  assign empty_o = finish_empty && write_at == head_at;
 
 endmodule

@@ -14,7 +14,8 @@
 // Structure: a line's entries one by one, dropped at or below the bound of what was delivered and above
 // the limit; runs of Cells by insertion (flk_sort_runs); Stages steps that merge them two by two
 // (flk_sort_merge), each while its runs arrive, so that an entry a cycle goes through all of them,
-// whatever the lengths of the lists. The last step holds Capacity = Cells << Stages entries. When
+// whatever the lengths of the lists. The last step (flk_sort_select) merges Ways runs and takes the place of
+// $clog2(Ways) steps; it holds Capacity = Cells << Stages entries. When
 // one more comes it keeps the nearest half, and the limit is the largest of these. At the end of a
 // reading what it has leaves; if there was a limit, it is the bound of the next reading.
 // Throughput: a list of n <= Capacity entries in n + 1 cycles, back to back. Latency: docs/sorting_unit.md.
@@ -22,6 +23,7 @@
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,
   parameter  int unsigned Stages      = 7,
+  parameter  int unsigned Ways        = 2,  // runs that the last step merges
   parameter  int unsigned Lists       = 8,  // whole lists waiting in a step, at most
   parameter  int unsigned LineEntries = 9,
   parameter  int unsigned EntryBits   = 52,
@@ -58,11 +60,16 @@ module flk_sorting_unit #(
 
   localparam int unsigned KeyBits  = EntryBits - MaskBits;
   localparam int unsigned Capacity = Cells << Stages;
+  localparam int unsigned Steps    = Stages - $clog2(Ways) + 1;  // of merging, with the last one
   localparam int unsigned GatherBits = $clog2(Capacity + 1);
-  localparam int unsigned EndsBits = $clog2((Lists + 1) * Stages + 3);
+  localparam int unsigned EndsBits = $clog2((Lists + 1) * Steps + 3);
 
   if (Stages < 1 || Cells < 2 || (Cells & (Cells - 1)) != 0) begin : gen_check
     $error("flk_sorting_unit: Cells must be a power of two, at least 2, Stages at least 1");
+  end
+
+  if (Ways < 2 || (Ways & (Ways - 1)) != 0 || Ways > 1 << Stages) begin : gen_check_ways
+    $error("flk_sorting_unit: Ways must be a power of two, 2 to 1 << Stages");
   end
 
   typedef logic [EntryBits-1:0] entry_t;
@@ -134,7 +141,7 @@ module flk_sorting_unit #(
   logic              first_ready, first_drop;  // of the first step
   logic              final_valid, final_end, final_flag, out_free, out_drop;  // of the last one
   entry_t            final_entry;
-  logic [Stages-1:0] empty;
+  logic [Steps-1:0]  empty;
   logic              closed;  // the end of the list in the last step is on its way
   logic              ends_less;
 
@@ -242,12 +249,11 @@ module flk_sorting_unit #(
     .empty_o    (runs_empty)
   );
 
-  for (genvar i = 0; i < Stages; i++) begin : gen_step
+  for (genvar i = 0; i < Steps; i++) begin : gen_step
     localparam int unsigned Run  = Cells << i;
-    localparam bit          Last = i == Stages - 1;
+    localparam bit          Last = i == Steps - 1;
 
     logic   in_valid, in_ready, in_end, in_flag, valid, ready, is_end, flag, drop_in, drop_out;
-    logic   busy, limit_now, done;
     entry_t in_entry, entry;
 
     if (i == 0) begin : gen_first
@@ -269,49 +275,68 @@ module flk_sorting_unit #(
       assign final_end   = is_end;
       assign final_flag  = flag;
       assign final_entry = entry;
-      assign cutting     = busy;
-      assign limit_set   = limit_now;
-      assign cut_done    = done;
       assign ends_less   = in_valid && in_ready && in_end;
-    end else begin : gen_earlier
-      logic unused_cut;
-      assign unused_cut = &{busy, limit_now, done, 1'b0};
-      assign ready      = gen_step[i+1].in_ready;
-      assign drop_in    = gen_step[i+1].drop_out;
-    end
 
-    // A memory of Run entries costs two cycles now and then, when the first of the next run find it
-    // full: not to be felt in long runs, and short ones have room for two.
-    flk_sort_merge #(
-      .Run        (Run),
-      .Depth      (Run <= 32 && !Last ? 2 * Run : Run),
-      .KeyBits    (KeyBits),
-      .PayloadBits(MaskBits),
-      .Lists      (Lists),
-      .Select     (Last)
-    ) i_merge (
-      .clk_i,
-      .rst_ni,
-      .clear_i,
-      .in_valid_i (in_valid),
-      .in_ready_o (in_ready),
-      .in_end_i   (in_end),
-      .in_flag_i  (in_flag),
-      .in_entry_i (in_entry),
-      .out_valid_o(valid),
-      .out_ready_i(ready),
-      .out_end_o  (is_end),
-      .out_flag_o (flag),
-      .out_entry_o(entry),
-      .drop_i     (drop_in),
-      .drop_o     (drop_out),
-      .empty_o    (empty[i]),
-      .closed_i   (closed),
-      .cut_i      (cut),
-      .busy_o     (busy),
-      .limit_o    (limit_now),
-      .done_o     (done)
-    );
+      flk_sort_select #(
+        .Run        (Run),
+        .Ways       (Ways),
+        .KeyBits    (KeyBits),
+        .PayloadBits(MaskBits),
+        .Lists      (Lists)
+      ) i_select (
+        .clk_i,
+        .rst_ni,
+        .clear_i,
+        .in_valid_i (in_valid),
+        .in_ready_o (in_ready),
+        .in_end_i   (in_end),
+        .in_flag_i  (in_flag),
+        .in_entry_i (in_entry),
+        .out_valid_o(valid),
+        .out_ready_i(ready),
+        .out_end_o  (is_end),
+        .out_flag_o (flag),
+        .out_entry_o(entry),
+        .drop_i     (drop_in),
+        .drop_o     (drop_out),
+        .empty_o    (empty[i]),
+        .closed_i   (closed),
+        .cut_i      (cut),
+        .busy_o     (cutting),
+        .limit_o    (limit_set),
+        .done_o     (cut_done)
+      );
+    end else begin : gen_earlier
+      assign ready   = gen_step[i+1].in_ready;
+      assign drop_in = gen_step[i+1].drop_out;
+
+      // A memory of Run entries costs two cycles now and then, when the first of the next run find it
+      // full: not to be felt in long runs, and short ones have room for two.
+      flk_sort_merge #(
+        .Run        (Run),
+        .Depth      (Run <= 32 ? 2 * Run : Run),
+        .KeyBits    (KeyBits),
+        .PayloadBits(MaskBits),
+        .Lists      (Lists)
+      ) i_merge (
+        .clk_i,
+        .rst_ni,
+        .clear_i,
+        .in_valid_i (in_valid),
+        .in_ready_o (in_ready),
+        .in_end_i   (in_end),
+        .in_flag_i  (in_flag),
+        .in_entry_i (in_entry),
+        .out_valid_o(valid),
+        .out_ready_i(ready),
+        .out_end_o  (is_end),
+        .out_flag_o (flag),
+        .out_entry_o(entry),
+        .drop_i     (drop_in),
+        .drop_o     (drop_out),
+        .empty_o    (empty[i])
+      );
+    end
   end
 
   assign limit     = final_entry[EntryBits-1:MaskBits];

@@ -104,7 +104,7 @@ def tables(say: Say) -> dict[str, str]:
         second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
         # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
         loose = {"records"} | ({"lists"} if len(lists_there.reading_size) > len(lists_there.lines) else set())
-        model = whole_frame(preprocessing.estimate(front, image, dram, sizes.survivors), second, dram)
+        model = whole_frame(preprocessing.estimate(front, image, dram, sizes), second, dram)
         say(f"{title}: alone")
         with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
             begin = time.process_time()

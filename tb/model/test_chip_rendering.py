@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from flicker.chip import preprocessing
 from flicker.chip import rendering as model
 from flicker.chip.dram import DramConfig
 from flicker.chip.rendering import Rendering, estimate
@@ -19,7 +20,7 @@ from flicker.golden.delivery import may_be_given
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.golden.walk import tile_walk
-from flicker.params import CatMode, ChipMemories, RenderConfig
+from flicker.params import CHIP_MEMORIES, CatMode, ChipMemories, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.chip import PORT
@@ -63,8 +64,11 @@ def test_sizes() -> None:
     for top in ("flk_rendering", "flk_top"):
         assert (sizes.sort_stages, sizes.list_chunks) == (default(top, "SortStages"), default(top, "Chunks"))
         assert (sizes.sorted_ahead, sizes.pairs) == (default(top, "Entries"), default(top, "Pairs"))
+        assert sizes.sort_ways == default(top, "SortWays")
     for top in ("flk_top", "preproc/flk_preprocessing", "preproc/flk_preprocessing_core"):
         assert sizes.survivors == default(top, "Waiting")
+    for top in ("flk_top", "preproc/flk_preprocessing"):
+        assert sizes.gathered_lines == default(top, "Gather") == preprocessing.GATHER
     assert sizes.sort_stages == default("sort/flk_sorting_unit", "Stages") and sizes.sorted_ahead == default("sort/flk_entry_buffer", "Depth")
     assert model.QUEUE == default("flk_rendering", "Queue") == default("sort/flk_delivery", "Queue")
     for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
@@ -75,16 +79,18 @@ def test_sizes() -> None:
     assert margin and model.MARGIN == int(margin[1])
 
 
-def test_small_memories() -> None:
-    """Lists of more entries than the sorting unit takes are read again."""
+def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lists of more entries than the sorting unit takes are read again; with a last step of many runs no more often."""
     tables = TileLists.of(*frame(), 64)
     with pytest.raises(ValueError, match="capacity of 64"):
         estimate(tables, RenderConfig(), None)
     assert tables.capacity == 64 and len(tables.reading_size) > len(tables.lines)
     lengths = np.diff(tables.start)
     assert (np.add.reduceat(tables.reading_size, tables.reading_start[:-1]) == lengths).all()
-    small, default = modelled(RenderConfig(memories="small")), modelled(RenderConfig())
-    assert small.bytes["lists"] > 1.5 * default.bytes["lists"] and small.cycles > default.cycles  # lists of up to 10,000 entries
+    monkeypatch.setitem(CHIP_MEMORIES, "half", ChipMemories(1024))
+    half, small, default = (modelled(RenderConfig(memories=name)) for name in ("half", "small", "default"))
+    assert half.bytes["lists"] > 1.5 * default.bytes["lists"] and half.cycles > default.cycles  # lists of up to 10,000 entries
+    assert small.bytes["lists"] == default.bytes["lists"]
 
 
 def test_cycles() -> None:

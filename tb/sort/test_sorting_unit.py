@@ -14,15 +14,16 @@ from flicker_tb.runner import build_and_test, refused
 SMALL = ["lists", "many", "long_lists", "finished", "clear_in_the_middle"]
 
 
-@pytest.mark.parametrize(("cells", "stages"), [(4, 3), (2, 1)])
-def test_small(cells: int, stages: int) -> None:
-    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": cells, "Stages": stages, "Lists": 2 if stages == 1 else 4},
-                   config={"cells": cells, "stages": stages}, tests=SMALL, opt="-O1")
+@pytest.mark.parametrize(("cells", "stages", "ways"), [(4, 3, 2), (2, 1, 2), (4, 3, 4), (2, 3, 8)])
+def test_small(cells: int, stages: int, ways: int) -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": cells, "Stages": stages, "Ways": ways, "Lists": 2 if stages == 1 else 4},
+                   config={"cells": cells, "stages": stages, "ways": ways}, tests=SMALL, opt="-O1")
 
 
+@pytest.mark.parametrize("ways", [2, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tests", [["lists", "finish_is_quick"], pytest.param([*SMALL[1:], "rate"], marks=pytest.mark.slow)], ids=["lists", "more"])
-def test_sorting_unit(tests: list[str]) -> None:
-    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", tests=tests, opt="-O1")
+def test_sorting_unit(tests: list[str], ways: int) -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Ways": ways}, config={"ways": ways}, tests=tests, opt="-O1")
 
 
 @pytest.mark.slow
@@ -33,3 +34,5 @@ def test_20000() -> None:
 def test_illegal_parameters() -> None:
     with refused("Cells must be a power of two"):
         build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": 12})
+    with refused("Ways must be a power of two"):
+        build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Stages": 1, "Ways": 4})

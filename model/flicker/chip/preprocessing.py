@@ -18,7 +18,7 @@ from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.front.setup import FrameSetup
 from ..golden.lists import ENTRY_BITS, WRITERS
-from ..params import TILE, ChipMemories
+from ..params import CHIP_MEMORIES, TILE, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
 from .dram import READ, WRITE, DramConfig, Stream, simulate
@@ -29,9 +29,10 @@ CLUSTER_CYCLES = 4  # of the cluster test; the frame begins with a pass over all
 GROUP_CYCLES = 2  # a group of four enters the front
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
-WAITING = ChipMemories().survivors  # of a lane between front and entries
+SIZES = CHIP_MEMORIES["default"]
+WAITING = SIZES.survivors  # of a lane between front and entries
 MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
-GATHER = 256  # lines that are written together
+GATHER = SIZES.gathered_lines  # lines that are written together
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,12 +330,12 @@ class Preprocessing:
         ]
 
 
-def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, waiting: int = WAITING) -> Preprocessing:
-    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. waiting: survivors of a lane between front and entries."""
+def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, sizes: ChipMemories = SIZES) -> Preprocessing:
+    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory."""
     beats = traffic(frame, image)
     used = bytes_of(beats)
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    units = unit_cycles(frame, waiting)
-    dram = dram_cycles(beats, config) if config else 0
-    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, waiting))
+    units = unit_cycles(frame, sizes.survivors)
+    dram = dram_cycles(beats, config, sizes.gathered_lines) if config else 0
+    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors))

@@ -40,7 +40,7 @@ READ = 4  # registers from a request to the port and behind it
 CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/list_reader.md)
 FIRST = 17  # a tile's first line beside two accesses
 CONTEXTS = 4  # lists under way in a list reader
-SORTED_LISTS = 8  # that a sorting unit holds, in twice its capacity
+SORTED_LISTS = 8  # that a sorting unit holds, as far as its memories reach
 OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
@@ -125,13 +125,14 @@ def _frame(
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
     elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
-    first record; memory: of `_moves`, channels 0 for one without banks. sizes: capacity of a sorting unit, chunks in a list reader, entries that wait behind a
-    sorting unit, pairs of tiles in the frame writer.
+    first record; memory: of `_moves`, channels 0 for one without banks. sizes: capacity of a sorting unit, runs of its last step, chunks in a list
+    reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
     """
     tiles = len(tile_start) - 1
     ring = 256
-    capacity, slots, buffer, held_pairs = sizes
-    cut = 3 * capacity // 2 + 38  # cycles that a reading stops for
+    capacity, runs, slots, buffer, held_pairs = sizes
+    cut = capacity + capacity // runs + 38  # cycles that a reading stops for (`perf.sorting.cut_cycles`)
+    sorted_held = capacity + 2 * capacity // runs  # entries in a sorting unit's steps
     # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
     gate_end = np.zeros(tiles, np.int64)
     out_end = np.zeros(tiles, np.int64)
@@ -300,13 +301,13 @@ def _frame(
                 gate = max(gate, came) + chunk_entries[j]
                 chunk_free[u, chunk_count[u] % slots] = gate
                 chunk_count[u] += 1
-            # What lies twice its capacity before has left.
+            # What lies as many entries before as it holds has left.
             total = n
             before = t_c - 4
-            while before >= 0 and total <= 2 * capacity:
+            while before >= 0 and total <= sorted_held:
                 total += tile_start[before + 1] - tile_start[before]
                 before -= 4
-            if before >= 0 and total > 2 * capacity:
+            if before >= 0 and total > sorted_held:
                 gate = max(gate, out_end[before + 4])
             gate += 1
             gate_end[t_c] = gate
@@ -501,7 +502,7 @@ def estimate(
     sizes = config.chip_memories
     if tables.capacity != sizes.sorted_entries:
         raise ValueError(f"lists are read for a capacity of {tables.capacity}, the configuration's is {sizes.sorted_entries}")
-    delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages) for n in np.diff(tables.start)])
+    delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages, ways=sizes.sort_ways) for n in np.diff(tables.start)])
     # Rows stay open: a line of a list finds another one than its own.
     each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
     list_latency = latency_cycles + (dram.idle_cycles(BEAT) + math.ceil(dram.trp * each) if dram else 0)
@@ -520,7 +521,8 @@ def estimate(
         tables.reading_cuts, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
         RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
         cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
-        tables.regions.records // RECORD_LINE, memory, (sizes.sorted_entries, sizes.list_chunks, sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
+        tables.regions.records // RECORD_LINE, memory,
+        (sizes.sorted_entries, sizes.sort_ways, sizes.list_chunks, sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
     )
     stride = stride or least_stride(lists.width, format_)
     moved = {

@@ -3,50 +3,73 @@
 The steps merge while their runs arrive, so lists follow each other at an entry a cycle and one cycle a list; what a list alone takes longer is latency.
 Step k waits for its first run, Cells << k entries; the step behind the last one that has two runs of the list waits for its end. A step whose first memory
 is full when the next run comes holds it up for up to three cycles, by the order of the entries: never in ascending lists, seldom in others.
+
+`ways`: runs of a list that the last step merges (`flk_sort_select`): its memories hold as much as with two, and the steps that it takes the place of are
+left out. A list of more than half of what fits then waits for the one before it.
 """
 
 from __future__ import annotations
 
 from ..golden.sorting import CELLS, STAGES, SortedList
 
-PIPELINE = 22  # registers and memories from the line to the output, one after the other
+PIPELINE = 22  # registers and memories from the line to the output, one after the other, with two ways
+STEP = 3  # of these a step's
+LEVEL = 1  # and a level's of the last step's tree
+AHEAD = 2  # cycles by which the tree's reading ahead moves a list, at most
 ORDER = 32  # of a list's entries, at most one cycle for so many is lost by their order
 
 
-def latency(n: int, cells: int = CELLS, stages: int = STAGES) -> int:
+def _saved(ways: int) -> int:
+    """Steps that the last one takes the place of, beside itself."""
+    return ways.bit_length() - 2
+
+
+def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
     """Cycles of a list of n <= cells << stages entries alone beside an entry a cycle, from its first line to its end."""
+    pipeline = PIPELINE - (STEP - LEVEL) * _saved(ways)
     if n == 0:
-        return 11
+        return 11 - _saved(ways)
     if n < cells:
-        return PIPELINE + 3 + n
+        return pipeline + 3 + n
+    capacity = cells << stages
+    if n > capacity // ways:
+        # The last step needs not wait for the end where all its runs have begun: the unit knows that it is on its way.
+        return pipeline + min(capacity // ways + n, capacity + 2)
     runs = cells
     while runs < n:
         runs *= 2
-    # The last step needs not wait for the end: the unit knows that it is on its way.
-    return PIPELINE + runs + (2 if runs == cells << stages else n)
+    return pipeline + runs + n
 
 
-def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES) -> int:
-    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly in ascending order; else n / ORDER more at most."""
-    return n + latency(n, cells, stages)
+def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
+    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly in ascending order with two ways; else n / ORDER more at most, and
+    AHEAD more or less with more ways."""
+    return n + latency(n, cells, stages, ways)
 
 
-def list_cycles(n: int) -> int:
+def list_cycles(n: int, ways: int = 2) -> int:
     """Cycles from the end of one list to that of the next, of n entries, where latency is hidden."""
-    return n + 1
+    return n + 1 + LEVEL * _saved(ways)
 
 
-def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES) -> int:
-    """Cycles from the end of the first list to that of the last, at most, for few lists: a longer latency than the lists' before shows once."""
-    delays = [latency(n, cells, stages) for n in lengths]
-    return sum(list_cycles(n) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0]
+def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
+    """Cycles from the end of the first list to that of the last, at most, for few lists: a longer latency than the lists' before shows once, and with more
+    ways than two what does not fit beside the list before."""
+    delays = [latency(n, cells, stages, ways) for n in lengths]
+    waits = sum(max(a + b - (cells << stages), 0) for a, b in zip(lengths, lengths[1:])) if ways > 2 else 0
+    return sum(list_cycles(n, ways) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0] + waits
 
 
-def long_cycles(golden: SortedList, cells: int = CELLS, stages: int = STAGES) -> int:
+def long_cycles(golden: SortedList, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
     """Estimate for a list that does not fit, within some per cent: each reading takes an entry a cycle, each cut stops it until the cut is made."""
-    return reading_cycles(len(golden.order), len(golden.readings), sum(len(r.limits) for r in golden.readings), cells << stages)
+    return reading_cycles(len(golden.order), len(golden.readings), sum(len(r.limits) for r in golden.readings), cells << stages, ways)
 
 
-def reading_cycles(n: int, readings: int, cuts: int, capacity: int) -> int:
+def cut_cycles(capacity: int, ways: int = 2) -> int:
+    """Cycles that a reading stops for when what fits has been gathered: the steps before the last one run out, half of it is counted off and moves."""
+    return capacity + capacity // ways + 38
+
+
+def reading_cycles(n: int, readings: int, cuts: int, capacity: int, ways: int = 2) -> int:
     """The same by the numbers of its readings and cuts."""
-    return readings * n + cuts * (3 * capacity // 2 + 38) + capacity
+    return readings * n + cuts * cut_cycles(capacity, ways) + min(capacity, capacity // ways + n // readings)

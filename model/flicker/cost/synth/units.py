@@ -65,7 +65,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_tile_walker": [MEMORY, "flk_sram_fifo", "flk_splat_band", "flk_fifo"],
     "flk_entry_merge": ["flk_sram_fifo"],
     "flk_sort_merge": [MEMORY],
-    "flk_sorting_unit": ["flk_sort_runs", "flk_sort_merge"],
+    "flk_sort_select": [MEMORY],
+    "flk_sorting_unit": ["flk_sort_runs", "flk_sort_merge", "flk_sort_select"],
     "flk_axi_fetch": ["flk_axi_read"],
     "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_ff_add", "flk_fifo"],
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
@@ -175,8 +176,6 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_row_mask": [f"splat_i[{bit}]" for bit in range(30)],  # colours
         "flk_lane_core": [f"in_elem_i[{153 * way + 151}]" for way in range(parameters.get("InWidth", 1))],  # record_i[127]
         "flk_lane_stage": [f"mode_i[{bit}]" for bit in range(3)],  # there is one
-        # Only the last step selects.
-        "flk_sort_merge": [] if parameters.get("Select", 0) else ["closed_i[0]", "cut_i[0]"],
         # Neither mode nor shape of a splat matters without a test.
         "flk_mask_all": [*(f"mode_i[{bit}]" for bit in range(3)), f"in_elem_i[{layout.place('splat_elem', 'splat.spiky').at}]"],
     }.get(top, [])
@@ -331,7 +330,8 @@ def _front() -> list[Unit]:
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),
-        unit("flk_sort_merge", "runs of 1024, selection", Run=1024, Lists=8, Select=1), unit("flk_sorting_unit"),
+        *(unit("flk_sort_select", f"{ways} runs of {2048 // ways}", Run=2048 // ways, Ways=ways) for ways in (2, 8)),
+        unit("flk_sorting_unit"), unit("flk_sorting_unit", "8 runs in the last step", Ways=8),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_splat_input"), unit("flk_pixel_out"), unit("flk_frame_writer"), unit("flk_frame_writer", "32 lanes", Lanes=LANE_COUNTS[0]),
         unit("flk_record_writer"), unit("flk_record_writer", "records of 32 bytes", RecordBits=177, Quarters=2),
