@@ -32,9 +32,10 @@ def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> 
     if n < cells:
         return pipeline + 3 + n
     capacity = cells << stages
-    if n > capacity // ways:
-        # The last step needs not wait for the end where all its runs have begun: the unit knows that it is on its way.
-        return pipeline + min(capacity // ways + n, capacity + 2)
+    last = capacity // ways  # runs of the last step
+    if n > last:
+        # It needs not wait for the end where all its runs have begun: the unit knows that it is on its way.
+        return pipeline + (capacity + 2 if n > capacity - last else last + n)
     runs = cells
     while runs < n:
         runs *= 2
