@@ -194,7 +194,7 @@ def test_abort_while_pointers_move() -> None:
     with session(port=port) as chip:
         view = large()
         frame = chip.frame(view, chip.place(view), background=BLUE, tag=1)
-        for _ in range(8):
+        for _ in range(4):
             before = chip.usage().live
             chip.start(frame)
             for _ in range(10_000):

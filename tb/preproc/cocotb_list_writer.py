@@ -5,7 +5,7 @@ from __future__ import annotations
 import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, config
+from flicker_tb.bench import Bench, config, rounds
 from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
 from flicker.golden.lists import entry_words, pointer_lines, write_lists
@@ -186,11 +186,11 @@ async def frames(dut, idle, stall):
     rng = test.bench.rng
     await test.bench.reset()
     evicted = 0
-    for entries in (0, 1, 300, 2000, 30, 9, 10, 1200):
-        frame = random_frame(rng, config()["lists"], entries, wide=entries in (300, 1200))
+    for entries in (0, 1, 300, rounds(1000, 2000), 30, 9, 10, rounds(600, 1200)):
+        frame = random_frame(rng, config()["lists"], entries, wide=entries in (300, 600, 1200))
         await test.run(frame)
         evicted += int(frame.image.evicted[frame.writer])
-    assert evicted > 100
+    assert evicted > rounds(50, 100)
 
 
 @cocotb.test()
@@ -200,7 +200,7 @@ async def out_of_memory(dut, idle, stall):
     test = Writer(dut, idle, stall)
     rng = test.bench.rng
     await test.bench.reset()
-    for _ in range(3):
+    for _ in range(rounds(1, 3)):
         full = random_frame(rng, config()["lists"], 800)
         need = int(full.image.taken[full.writer])
         for chunks in (need, need - 1, rng.randrange(need), 0, need + 5):

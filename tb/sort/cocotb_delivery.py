@@ -7,7 +7,7 @@ from collections import deque
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.delivery import CORES, END, LINE_BYTES, UNITS, core_records
@@ -222,7 +222,7 @@ async def tiles(dut, idle, stall, latency, pauses):
     test = Delivery(dut, idle, stall, latency, pauses)
     await test.bench.reset()
     await test.ready()
-    await test.run(make(test.rng, 40))
+    await test.run(make(test.rng, rounds(25, 40)))
     assert test.records > 500 and dut.error_o.value == 0
     assert test.width == 1 or test.together > 50
 
@@ -237,7 +237,7 @@ async def finishing(dut, idle, stall, latency, share):
     test = Delivery(dut, idle, stall, latency, finish=share)
     await test.bench.reset()
     await test.ready()
-    await test.run(make(test.rng, 60, 200) + make(test.rng, 4, 1000))
+    await test.run(make(test.rng, rounds(25, 60), 200) + make(test.rng, rounds(2, 4), 1000))
     assert test.records > 200 and (share < 0.9 or test.finish_seen)
 
 

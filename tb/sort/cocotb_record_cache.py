@@ -7,7 +7,7 @@ from collections import deque
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.delivery import LINE_BYTES, RecordCache
@@ -173,7 +173,7 @@ async def records(dut, idle, pauses, latency, stall):
     cache = Cache(dut, idle, latency, pauses, stall=stall)
     await cache.bench.reset()
     await cache.ready()
-    fill(cache, 2200)
+    fill(cache, rounds(900, 2200))
     await cache.through()
     assert cache.hits > 100
 

@@ -242,7 +242,7 @@ async def finished(dut, which):
     test = Unit(dut)
     await test.bench.reset()
     rng = test.rng
-    for _ in range(2 if CAPACITY > 256 else 8):
+    for _ in range(2 if CAPACITY > 256 else rounds(3, 8)):
         jobs = []
         for _ in range(14 if CAPACITY > 256 else 40):
             n = rng.choice((0, 1, rng.randrange(2 * CELLS), rng.randrange(CAPACITY >> 2), CAPACITY // 2 + rng.randrange(CAPACITY // 2 + 1),
@@ -282,7 +282,7 @@ async def clear_in_the_middle(dut, which):
     test = Unit(dut)
     await test.bench.reset()
     rng = test.rng
-    for _ in range(4 if CAPACITY > 256 else 30):
+    for _ in range(4 if CAPACITY > 256 else rounds(12, 30)):
         jobs = []
         for _ in range(6):
             n = rng.choice((rng.randrange(CELLS << 2), CAPACITY // 2 + 3, CAPACITY + CAPACITY // 2))

@@ -2,8 +2,9 @@
 
 State space: lists empty, of one entry, around the lengths of runs, around the capacity and beyond it; keys random, few, equal, ascending, descending, extreme;
 idle and back-pressure patterns on lines, answers and output; finish_i at every place; clear_i at random times.
-Parameter space: small units, in which lists that do not fit are many and short; the unit as it is (16 cells, 7 steps) with lists of all lengths, with
-SLOW=1 in everything, with cycles, and with a list of 20,000 entries. Not covered: counters of more than 2**16.
+Parameter space: small units, in which lists that do not fit are many and short, with last steps of two and eight runs; the unit as it is (16 cells, 7
+doublings) with lists of all lengths, with SLOW=1 with eight runs too, in everything, with cycles, and with a list of 20,000 entries. Not covered: counters of
+more than 2**16.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from flicker_tb.runner import build_and_test, refused
 SMALL = ["lists", "many", "long_lists", "finished", "clear_in_the_middle"]
 
 
-@pytest.mark.parametrize(("cells", "stages", "ways"), [(4, 3, 2), (2, 1, 2), (4, 3, 4), (2, 3, 8)])
+@pytest.mark.parametrize(("cells", "stages", "ways"), [(4, 3, 2), (2, 1, 2), pytest.param(4, 3, 4, marks=pytest.mark.slow), (2, 3, 8)])
 def test_small(cells: int, stages: int, ways: int) -> None:
     build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": cells, "Stages": stages, "Ways": ways, "Lists": 2 if stages == 1 else 4},
                    config={"cells": cells, "stages": stages, "ways": ways}, tests=SMALL, opt="-O1")
