@@ -2,15 +2,14 @@
 //
 // A list is up to Ways Run entries, in runs of Run, the last one perhaps shorter, then an element with
 // in_end_i (no entry; in_flag_i goes with it and leaves as out_flag_o). Runs go to Ways memories in turn,
-// from the first one; the smallest head leaves, by the upper KeyBits (unsigned), through a tree of
-// comparisons with registers between its levels. Nothing of a list leaves before closed_i (its end is on the
-// way) or its end. in_flag_i with an entry: the list has no other run. Behind the list that leaves up to
+// from the one behind the last list's; the smallest head leaves, by the upper KeyBits (unsigned), through
+// a tree of comparisons with registers between its levels. Nothing of a list leaves before closed_i (its
+// end is on the way) or its end. in_flag_i with an entry: the list has no other run. Behind the list that leaves up to
 // Lists whole lists and the one that arrives wait.
 // Throughput: an entry a cycle, a list of n entries in n + $clog2(Ways) cycles, where its memories have
-// room; lists fill them from the first one on, so a list of more than half of what fits waits for the
-// one before it. Latency: an entry is at the root $clog2(Ways) + 2 cycles after it was taken. Handshakes:
+// room. Latency: an entry is at the root $clog2(Ways) + 2 cycles after it was taken. Handshakes:
 // in_ready_o comes from registers; out_valid_o from registers, drop_i and closed_i; out_ready_i reaches
-// the memories' read ports. clear_i (synchronous) empties it.
+// the registers below the root, with two ways the memories' read ports. clear_i (synchronous) empties it.
 // drop_i: what there is of the list that leaves is left out, its end leaves; drop_o: what arrives at the
 // input belongs to this list too. empty_o: no entry and no end inside.
 //
@@ -19,8 +18,8 @@
 // heads go back to where they were, and the counted entries leave again and go to the lower half of the
 // memories, each to the first one with room: parts of a sorted sequence are sorted. Each entry read
 // leaves room for one, since those that were not counted are no more. They are then the list's first
-// runs; what follows are the others. busy_o is high meanwhile, done_o in its last cycle:
-// Ways Run + 2 + 2 $clog2(Ways) cycles from cut_i on.
+// runs; what follows are the others. busy_o is high meanwhile, done_o in its last cycle: Ways Run
+// cycles and a few for the pipeline from cut_i on.
 module flk_sort_select #(
   parameter  int unsigned Run         = 1024,  // entries of a memory
   parameter  int unsigned Ways        = 2,
