@@ -35,7 +35,7 @@ module flk_top
   parameter  int unsigned Entries        = 512,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
-  parameter  int unsigned Gather         = 256,
+  parameter  int unsigned Gather         = 256,   // of flk_preprocessing
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
   parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters

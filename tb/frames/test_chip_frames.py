@@ -16,6 +16,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from flicker_tb.bench import rounds
 from flicker_tb.runner import seed
 
 from flicker import params
@@ -194,7 +195,7 @@ def test_abort_while_pointers_move() -> None:
     with session(port=port) as chip:
         view = large()
         frame = chip.frame(view, chip.place(view), background=BLUE, tag=1)
-        for _ in range(4):
+        for _ in range(rounds(4, 8)):
             before = chip.usage().live
             chip.start(frame)
             for _ in range(10_000):

@@ -27,7 +27,7 @@ from ..golden.render import stream_order
 from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.render_stage import finish_events
-from ..perf.sorting import latency
+from ..perf.sorting import cut_cycles, held_entries, latency
 from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import DramConfig, Refresh, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
@@ -125,14 +125,12 @@ def _frame(
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
     elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
-    first record; memory: of `_moves`, channels 0 for one without banks. sizes: capacity of a sorting unit, runs of its last step, chunks in a list
-    reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
+    first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a sorting unit's steps, cycles of a cut there, chunks in a
+    list reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
     """
     tiles = len(tile_start) - 1
     ring = 256
-    capacity, runs, slots, buffer, held_pairs = sizes
-    cut = capacity + capacity // runs + 38  # cycles that a reading stops for (`perf.sorting.cut_cycles`)
-    sorted_held = capacity + 2 * capacity // runs  # entries in a sorting unit's steps
+    sorted_held, cut, slots, buffer, held_pairs = sizes
     # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
     gate_end = np.zeros(tiles, np.int64)
     out_end = np.zeros(tiles, np.int64)
@@ -522,7 +520,8 @@ def estimate(
         RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
         cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
         tables.regions.records // RECORD_LINE, memory,
-        (sizes.sorted_entries, sizes.sort_ways, sizes.list_chunks, sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
+        (held_entries(sizes.sorted_entries, sizes.sort_ways), cut_cycles(sizes.sorted_entries, sizes.sort_ways), sizes.list_chunks,
+         sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
     )
     stride = stride or least_stride(lists.width, format_)
     moved = {

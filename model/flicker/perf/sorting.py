@@ -66,6 +66,11 @@ def long_cycles(golden: SortedList, cells: int = CELLS, stages: int = STAGES, wa
     return reading_cycles(len(golden.order), len(golden.readings), sum(len(r.limits) for r in golden.readings), cells << stages, ways)
 
 
+def held_entries(capacity: int, ways: int = 2) -> int:
+    """Entries in all steps, those of the last one and of the smaller ones before it."""
+    return capacity + 2 * capacity // ways
+
+
 def cut_cycles(capacity: int, ways: int = 2) -> int:
     """Cycles that a reading stops for when what fits has been gathered: the steps before the last one run out, half of it is counted off and moves."""
     return capacity + capacity // ways + 38
