@@ -7,7 +7,7 @@ from collections import Counter
 import cocotb
 from cocotb.triggers import ReadWrite, RisingEdge
 from flicker_tb import splats
-from flicker_tb.bench import StreamTest, config, netlist
+from flicker_tb.bench import StreamTest, config, netlist, rounds
 from flicker_tb.models import CtuModel
 from flicker_tb.streams import Stream
 
@@ -113,7 +113,7 @@ def covering(rng) -> splats.Splat:
 async def lists(dut, mode, patterns):
     """Elements and masks in order, whatever the stalls; nothing lost, nothing twice; counters add up."""
     test = CtuTest(dut, CatMode[mode], PATTERNS[patterns])
-    await test.check(items_of(random_lists(test.bench.rng, 12)))
+    await test.check(items_of(random_lists(test.bench.rng, rounds(7, 12))))
 
 
 @cocotb.test()

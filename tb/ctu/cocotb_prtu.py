@@ -9,7 +9,7 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 from flicker_tb import splats
-from flicker_tb.bench import PERIOD_NS, config, netlist
+from flicker_tb.bench import PERIOD_NS, config, netlist, rounds
 
 from flicker.arithmetic.formats import E4M3, FP16
 from flicker.arithmetic.functions import log_opacity
@@ -26,7 +26,7 @@ from flicker.params import (
     prtu_shape_delay,
 )
 
-ITEMS = 4_000
+ITEMS = rounds(2_500, 4_000)
 RECT = ("x_i", "y_i")
 INPUTS = ("x_i", "y_i", "mean_x_i", "mean_y_i", "shape_i", "threshold_i")
 LEADERS = (*DENSE_RECTS.tolist(), *SPARSE_RECTS.tolist())

@@ -6,6 +6,7 @@ Ports are named as in docs/memory_model.md: ``<prefix>ar_valid_o``, ``<prefix>r_
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import cocotb
@@ -14,6 +15,7 @@ from cocotbext.axi import AxiRamRead, AxiRamWrite
 from cocotbext.axi.axi_channels import AxiARBus, AxiAWBus, AxiBBus, AxiRBus, AxiReadBus, AxiWBus, AxiWriteBus
 
 from flicker.sim.memory import MAX_WORDS, Memory, Port, PortConfig, Request
+from flicker_tb.pins import reader
 
 ADDRESS = ("valid", "id", "addr", "len", "size", "burst")
 
@@ -32,12 +34,17 @@ class MemoryPort:
         self.words = config.data_bits // 32
         self.off = False
         self._inputs: list[tuple[Any, str]] = []
-        self._address: list[tuple[str, Any, list[tuple[Any, str]]]] = []
+        self._address: list[tuple[str, Callable[[], int], list[tuple[Callable[[], int], str]]]] = []
         self._reads, self._writes = reads, writes
         self._pins = lambda name: getattr(dut, prefix + name)
+        self._out_of_reset = reader(dut.rst_ni)
+        self._value = {
+            name: reader(self._pins(f"{name}_o"))
+            for name in (*(("r_ready",) if reads else ()), *(("b_ready", "w_valid", "w_data", "w_strb", "w_last") if writes else ()))
+        }
         for channel, present in (("ar", reads), ("aw", writes)):
             if present:
-                self._address.append((channel, self._pins(f"{channel}_valid_o"), [(self._pins(f"{channel}_{x}_o"), x) for x in ADDRESS[1:]]))
+                self._address.append((channel, reader(self._pins(f"{channel}_valid_o")), [(reader(self._pins(f"{channel}_{x}_o")), x) for x in ADDRESS[1:]]))
         if reads:
             self._inputs += [(self._pins(f"{x}_i"), x) for x in ("ar_ready", "r_valid", "r_id", "r_resp", "r_last")]
         if writes:
@@ -54,19 +61,19 @@ class MemoryPort:
         q = self.port.request
         for channel, valid, fields in self._address:
             to = getattr(q, channel)
-            to.valid = int(valid.value)
+            to.valid = valid()
             if to.valid:
                 for pin, name in fields:
-                    setattr(to, name, int(pin.value))
+                    setattr(to, name, pin())
+        value = self._value
         if self._reads:
-            q.r_ready = int(self._pins("r_ready_o").value)
+            q.r_ready = value["r_ready"]()
         if self._writes:
-            q.b_ready = int(self._pins("b_ready_o").value)
-            q.w_valid = int(self._pins("w_valid_o").value)
+            q.b_ready, q.w_valid = value["b_ready"](), value["w_valid"]()
             if q.w_valid:
-                data = int(self._pins("w_data_o").value).to_bytes(4 * MAX_WORDS, "little")
+                data = value["w_data"]().to_bytes(4 * MAX_WORDS, "little")
                 ctypes.memmove(q.w_data, data, len(data))
-                q.w_strb, q.w_last = int(self._pins("w_strb_o").value), int(self._pins("w_last_o").value)
+                q.w_strb, q.w_last = value["w_strb"](), value["w_last"]()
 
     def _drive(self) -> None:
         p = self.port.reply
@@ -90,7 +97,7 @@ class MemoryPort:
             if self.off:
                 self.port.request = Request()
                 self.port.reset()
-            elif self.dut.rst_ni.value != 1:
+            elif not self._out_of_reset():
                 self.port.reset()
             else:
                 self.port.step()

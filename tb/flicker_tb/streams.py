@@ -17,6 +17,7 @@ import cocotb
 from cocotb.triggers import Event, RisingEdge
 
 from flicker_tb import stalls
+from flicker_tb.pins import reader
 
 Item = int | tuple[int, ...]
 
@@ -33,12 +34,14 @@ class Stream:
         self.valid = _port(dut, f"{name}_valid")
         self.ready = _port(dut, f"{name}_ready")
         self.data = [_port(dut, f"{name}_{field}") for field in fields]
+        self.is_valid, self.is_ready, self.is_out_of_reset = (reader(port) for port in (self.valid, self.ready, self.reset_n))
+        self._data = [reader(port) for port in self.data]
 
     def read(self) -> Item:
         """Item on the data ports now."""
-        if len(self.data) == 1:
-            return int(self.data[0].value)
-        return tuple(int(port.value) for port in self.data)
+        if len(self._data) == 1:
+            return self._data[0]()
+        return tuple([read() for read in self._data])
 
     def write(self, item: Item) -> None:
         """Put an item on the data ports."""
@@ -102,18 +105,18 @@ class StreamSource:
 
     async def _run(self) -> None:
         stream, queue, idle = self.stream, self._queue, self.idle
-        valid, ready, reset_n = stream.valid, stream.ready, stream.reset_n
+        valid, ready, out_of_reset = stream.valid, stream.is_ready, stream.is_out_of_reset
         edge = RisingEdge(stream.clock)
         offered = False
         while True:
             await edge
-            if reset_n.value != 1:
+            if not out_of_reset():
                 if offered:
                     valid.value = 0
                     offered = False
                 continue
             if offered:
-                if ready.value != 1:
+                if not ready():
                     continue
                 last = queue.popleft()
                 self.sent += 1
@@ -142,12 +145,12 @@ class StreamSink:
         self._task = cocotb.start_soon(self._run())
 
     async def _run(self) -> None:
-        ready, reset_n = self.stream.ready, self.stream.reset_n
+        ready, out_of_reset = self.stream.ready, self.stream.is_out_of_reset
         edge = RisingEdge(self.stream.clock)
         driven = 0
         while True:
             await edge
-            wanted = 0 if reset_n.value != 1 or next(self.stall) else 1
+            wanted = 0 if not out_of_reset() or next(self.stall) else 1
             if wanted != driven:
                 ready.value = driven = wanted
 
@@ -170,16 +173,16 @@ class Monitor:
 
     async def _run(self) -> None:
         stream = self.stream
-        valid, ready, reset_n = stream.valid, stream.ready, stream.reset_n
+        valid, ready, out_of_reset = stream.is_valid, stream.is_ready, stream.is_out_of_reset
         edge = RisingEdge(stream.clock)
         waiting: Item | None = None
         while True:
             await edge
-            if reset_n.value != 1:
+            if not out_of_reset():
                 waiting = None
                 continue
             self.cycles += 1
-            if valid.value != 1:
+            if not valid():
                 assert waiting is None, (
                     f"{stream.name}: valid fell before the transfer of {stream.show(waiting)}"
                 )
@@ -189,7 +192,7 @@ class Monitor:
                 f"{stream.name}: data changed from {stream.show(waiting)} "
                 f"to {stream.show(item)} before the transfer"
             )
-            if ready.value == 1:
+            if ready():
                 self.count += 1
                 self.last = self.cycles
                 if self.count == 1:

@@ -3,7 +3,7 @@
 State space: the middle of the demo scene (the whole with SLOW=1), both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing,
 frames one after the other, an odd number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: channels with every mode; with SLOW=1 one and four VRUs, no contribution test, and 32, 64 and 128 lanes, which
+Parameter space: channels with every mode; with SLOW=1 small memories, one and four VRUs, no contribution test, and 32, 64 and 128 lanes, which
 tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end makes. Not covered: resets within
 a frame.
 """
@@ -184,6 +184,7 @@ def test_automatic_mode() -> None:
     check((24, 16), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
 
 
+@pytest.mark.slow
 def test_small_memories() -> None:
     """Lists of more entries than the sorting unit takes in one reading, a last step of eight runs, a reader of few chunks, a frame writer of two pairs; DRAM
     behind ports that pause."""

@@ -6,7 +6,7 @@ import gzip
 import io
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import factorial, pi, sqrt
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import gsply
 import imagecodecs
 import numpy as np
 
+from flicker.scene.camera import Camera
 from flicker.scene.files import Scene, save_ply
 from flicker.scene.packed import PackedFormat
 from flicker.scene.packing import pack
@@ -33,6 +34,12 @@ def random_scene(seed: int, count: int = 300, degree: int = 3) -> Scene:
         opacities=rng.uniform(0.05, 0.99, count),
         sh=np.concatenate([rng.uniform(-1, 1, (count, 1, 3)), rng.uniform(-0.4, 0.4, (count, (degree + 1) ** 2 - 1, 3))], axis=1),
     )
+
+
+def least_scales(means: np.ndarray, cameras: Sequence[Camera], pixels: float) -> np.ndarray:
+    """(N,): the size of `pixels` in the camera that sees a Gaussian largest."""
+    distance = [np.linalg.norm(means.astype(np.float64) - camera.position, axis=1) / max(camera.fx, camera.fy) for camera in cameras]
+    return pixels * np.min(distance, axis=0)
 
 
 def as_gsply(scene: Scene) -> gsply.GSData:

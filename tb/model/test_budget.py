@@ -226,6 +226,18 @@ def test_through() -> None:
     assert np.mean(reference_psnr(scene, found.scene(), found.held)) != pytest.approx(last, abs=0.05)
 
 
+def test_least() -> None:
+    """No Gaussian of the small scene is smaller than asked for, some would be; the full scene's row is the full scene's. No least squares where none are
+    asked for."""
+    scene = small()
+    for least in (0.0, 1.0):
+        found = start(scene, keeping(0.5, least=least, refit=0))
+        found.run()
+        below = found.parameters.log_scales.min(axis=1) < np.log(samples.least_scales(found.parameters.means, found.fitted, 1.0)) - 1e-4
+        assert below.any() == (least == 0.0) and found.rows[0].decibels == float("inf") and len(found.parameters) == 200
+        assert "least squares" not in {row.step for row in found.rows}
+
+
 @pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), pytest.param(Goal(Kind.DB, 45.0), marks=pytest.mark.slow)])
 def test_interrupted(goal: Goal, tmp_path: Path) -> None:
     """Continued from any of its checkpoints, a run ends with the same bits and the same table."""

@@ -525,12 +525,6 @@ def test_squared_errors_in_the_end(nerf, tmp_path: Path) -> None:
     assert error(run(whole, 60)) < error(run(other, 60))
 
 
-def _least_scales(parameters: Parameters, cameras: list[Camera], pixels: float) -> np.ndarray:
-    """(N,): the size of `pixels` in the camera that sees a Gaussian largest."""
-    distance = np.stack([np.linalg.norm(parameters.means.astype(np.float64) - camera.position, axis=1) / max(camera.fx, camera.fy) for camera in cameras])
-    return pixels * distance.min(axis=0)
-
-
 def test_least_size(nerf) -> None:
     """No Gaussian is smaller than asked for, from the beginning, while others come, and in the end; those that are larger stay."""
     data = load_dataset(nerf)
@@ -538,14 +532,14 @@ def test_least_size(nerf) -> None:
     given = Parameters.of(scene_of_shots())
     before = given.values.copy()
     held = Trainer(data, Options(iterations=10, tune=True, least=0.8), given)
-    least = np.log(_least_scales(given, cameras, 0.8))[:, None]
+    least = np.log(samples.least_scales(given.means, cameras, 0.8))[:, None]
     assert 0 < (given.log_scales < least).mean() < 1
     np.testing.assert_allclose(held.parameters.log_scales, np.maximum(given.log_scales, least), atol=1e-5)
     np.testing.assert_array_equal(given.values, before)
     for pixels in (0.0, 3.0):
         grown = Trainer(data, Options(iterations=300, gaussians=800, degree=1, least=pixels))
         grown.run()
-        small = np.exp(grown.parameters.log_scales).min(axis=1) < _least_scales(grown.parameters, cameras, 3.0) * (1 - 1e-4)
+        small = np.exp(grown.parameters.log_scales).min(axis=1) < samples.least_scales(grown.parameters.means, cameras, 3.0) * (1 - 1e-4)
         assert len(grown.parameters) > grown.first and small.any() == (pixels == 0.0)
 
 

@@ -237,7 +237,7 @@ async def finishing(dut, idle, stall, latency, share):
     test = Delivery(dut, idle, stall, latency, finish=share)
     await test.bench.reset()
     await test.ready()
-    await test.run(make(test.rng, rounds(25, 60), 200) + make(test.rng, rounds(2, 4), 1000))
+    await test.run(make(test.rng, rounds(15, 60), 200) + make(test.rng, rounds(1, 4), 1000))
     assert test.records > 200 and (share < 0.9 or test.finish_seen)
 
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import FlickerError, one_line
 from ..fit.adam import Adam
+from ..fit.least import LeastSize
 from ..fit.parameters import SH, Parameters
 from ..fit.render import Draw, render
 from ..fit.start import extent_of
@@ -36,7 +37,7 @@ from ..scene.gaussians import Scene
 from ..scene.packed import PackedFormat
 from .degrees import cut, cuts, losses
 from .goal import FrameCost, Goal, Kind, chip_cost, price
-from .refit import refit
+from .refit import ITERATIONS, refit
 from .score import Score, scores
 from .tune import Rates, quality, tune_step
 
@@ -67,7 +68,8 @@ class Phase(str, Enum):
 class Options:
     """rounds: removals on the way to a known goal. steps: of tuning after each. last: of the tuning at the end, at most. degrees: SH coefficients go as long as
     they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted. through: name of the configuration
-    through whose contribution test the small scene is drawn; None: as the reference draws it."""
+    through whose contribution test the small scene is drawn; None: as the reference draws it. least: standard deviation in pixels that no Gaussian falls below
+    (`fit.least`), from the first removal on. refit: steps of conjugate gradients of the least squares of colours; 0: none."""
 
     goal: Goal
     by: Score = Score.CHANGE
@@ -79,6 +81,8 @@ class Options:
     frame: tuple[int, int] = (1280, 720)
     form: PackedFormat = PackedFormat.CHUNK
     through: str | None = None
+    least: float = 0.0
+    refit: int = ITERATIONS
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,7 @@ class Reducer:
         self.extent = extent_of(self.fitted)
         self.machine = None if options.through is None else through(options.through)
         self._draw: Draw = render if self.machine is None else partial(render, through=self.machine)
+        self._least = LeastSize(options.least, self.fitted)
         self.rng = np.random.default_rng(options.seed)
         self.order = np.zeros(0, np.int64)  # fitted cameras that come next
         self.phase, self.step, self.round, self.removed = Phase.REMOVE, 0, 0, 0
@@ -187,6 +192,7 @@ class Reducer:
         goal, n = self.options.goal, len(self.parameters)
         if not self.rows:
             self._told_row("full scene", float("inf") if self.machine is None else self.measure(), self.frame_cost(lanes=True))
+            self._least.hold(self.parameters.values)
         self.round += 1
         if goal.kind is Kind.KEEP:
             known = self.round / self.options.rounds
@@ -241,7 +247,7 @@ class Reducer:
         view, self.order = int(self.order[0]), self.order[1:]
         factor = min(1.0, 10 ** ((_FULL_RATE - self.level) / 20)) if self.level else 1.0
         rate = rates.at(done, self.extent, self.parameters.values.shape[1]) * np.float32(factor)
-        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._draw)
+        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._draw, self._least)
         self.level = decibels if not self.level else 0.98 * self.level + 0.02 * decibels
         self.step += 1
         if len(broken):
@@ -297,8 +303,14 @@ class Reducer:
     def _refit(self) -> None:
         """The held-out views say how far to go towards the least squares of the fitted ones."""
         self._keep_best(self.measure())
+        self.phase, self.step, self.stale = Phase.LAST, 0, 0
+        if not self.options.refit:
+            return
         assert self.best is not None
-        found, before = refit(self.parameters, self.fitted, self.wanted, self.coefficients, steps=self._steps, draw=self._draw), self.parameters.values
+        before = self.parameters.values
+        found = refit(
+            self.parameters, self.fitted, self.wanted, self.coefficients, iterations=self.options.refit, steps=self._steps, draw=self._draw,
+        )
         for share in _REFIT_SHARES:
             self.parameters = Parameters(before + np.float32(share) * (found.values - before))
             decibels = self.measure()
@@ -306,7 +318,6 @@ class Reducer:
                 self._keep_best(decibels)
         self._return_to_best()
         self._told_row("least squares", self.best[2])
-        self.phase, self.step, self.stale = Phase.LAST, 0, 0
 
     def _last(self) -> None:
         """One step of the last tuning; the held-out views say when to stop, and what is kept."""

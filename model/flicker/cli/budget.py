@@ -56,6 +56,8 @@ def budget(
     last: Annotated[int, typer.Option(help="steps of tuning at the end, at most", min=0)] = 1500,
     degrees: Annotated[float, typer.Option(help="SH coefficients go up to this share of the squared error; 0: none", min=0, max=1)] = 0.02,
     through: Annotated[str | None, typer.Option(help="configuration through whose contribution test the scene is drawn, as --through of flicker fit")] = None,
+    least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest view that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
+    refit: Annotated[int, typer.Option(help="steps of conjugate gradients of the least squares of colours; 0: none", min=0)] = 8,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
     checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
@@ -91,7 +93,7 @@ def budget(
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
     assert counted is not None
-    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through)
+    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
         full = generate() if scene == DEMO else load_scene(scene)
