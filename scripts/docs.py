@@ -49,6 +49,7 @@ from doc_parts import (
     subnormals,
     synthesis,
     system,
+    through,
     view,
 )
 from doc_parts.common import Say, scenes_missing
@@ -106,6 +107,8 @@ PARTS = (
     Part("budget", "real scenes to budgets, step by step; hours, can be interrupted", ("results", "alone", "steps"), budget.tables, scenes_missing,
          before=budget.draw),
     Part("photographs", "Table 1 against photographs: fitted, pruned, fine-tuned; an hour, can be interrupted", ("",), photographs.tables, scenes_missing),
+    Part("through", "every mode before and after fine-tuning through its contribution test; an hour, can be interrupted", ("",), through.tables,
+         scenes_missing, before=through.draw),
     Part("packing", "memory images in every format, and choices in making chunks", ("alternatives", "alone"), packing.tables, scenes_missing),
     Part("front", "bit-true front end: pictures, what becomes of Gaussians, number formats",
          ("pictures", "outcomes", "formats", "cells", "fixed", "opacity"), front.tables, scenes_missing),

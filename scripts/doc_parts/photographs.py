@@ -60,7 +60,7 @@ ROWS = (
 )
 
 
-def _kept(path: Path, make: Callable[[], Scene]) -> Path:
+def kept(path: Path, make: Callable[[], Scene]) -> Path:
     """A file that is made when it is not there."""
     if not path.exists():
         made = path.with_name(f".{path.name}")
@@ -69,7 +69,7 @@ def _kept(path: Path, make: Callable[[], Scene]) -> Path:
     return path
 
 
-def _trained(data: Dataset, options: Options, scene: Path | None) -> Scene:
+def trained(data: Dataset, options: Options, scene: Path | None) -> Scene:
     trainer = Trainer(data, options, None if scene is None else Parameters.of(load_scene(scene)))
     trainer.run()
     return trainer.scene()
@@ -98,17 +98,17 @@ def scenes_of(photographs: Photographs, say: Say) -> tuple[dict[str, Path], Path
     (folder / "cameras.json").write_text(cameras_text([shot.camera for shot in data.tests]))
     found = {}
     for name, what, make in (
-        ("base", "fitting", (lambda: load_scene(source / "scene.ply")) if photographs.fitted else partial(_trained, data, FITTED, None)),
+        ("base", "fitting", (lambda: load_scene(source / "scene.ply")) if photographs.fitted else partial(trained, data, FITTED, None)),
         ("cut", "pruning", lambda: _pruned(data, found["base"])),
-        ("pruned", "fine-tuning", lambda: _trained(data, TUNED, found["cut"])),
-        ("through", "fine-tuning through the test", lambda: _trained(data, THROUGH, found["pruned"])),
+        ("pruned", "fine-tuning", lambda: trained(data, TUNED, found["cut"])),
+        ("through", "fine-tuning through the test", lambda: trained(data, THROUGH, found["pruned"])),
     ):
         say(f"{photographs.name}: {what}")
-        found[name] = _kept(folder / f"{name}.ply", make)
+        found[name] = kept(folder / f"{name}.ply", make)
     return found, data.tests[0].path.parent
 
 
-def _row(point: Point, store: Store) -> dict:
+def row_of(point: Point, store: Store) -> dict:
     """Of the store that reports and sweeps share."""
     row = store.load(point.key)
     if row is None:
@@ -127,7 +127,7 @@ def tables(say: Say) -> dict[str, str]:
             say(f"{photographs.name}: {name}, {configuration or 'float64'}")
             scene = SceneFile(str(found[name]), photos=str(pictures))
             machine = configuration if configuration not in ("", "assumed") else "faithful"
-            rows = [_row(Point(scene.target(view), machine), store) for view in range(scene.views())]
+            rows = [row_of(Point(scene.target(view), machine), store) for view in range(scene.views())]
             if configuration == "assumed":
                 cell.append(f"({-np.mean([drop(r['psnr_db'], r['reference_photo_psnr_db']) for r in rows]):+.2f})")
                 continue

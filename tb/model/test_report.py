@@ -275,6 +275,16 @@ def test_pareto():
     assert front == set(points) - beaten
 
 
+def test_moves(tmp_path):
+    """An arrow and two circles for each machine; the numbers beside the picture."""
+    figure = figures.moves("m", "Moved", [figures.Move("a", (2e5, 31.0), (1.8e5, 33.5)), figures.Move("b", (3e5, 30.0), (3e5, 30.0))], "dB")
+    axes = figure.canvas.axes[0]
+    assert [line.get_xydata().tolist() for line in axes.lines] == [[[200.0, 31.0]], [[180.0, 33.5]], [[300.0, 30.0]], [[300.0, 30.0]]]
+    assert [(arrow.xyann, arrow.xy) for arrow in axes.texts] == [((200.0, 31.0), (180.0, 33.5)), ((300.0, 30.0), (300.0, 30.0))]
+    figure.write(tmp_path)
+    assert [row["psnr_db_after"] for row in _rows(tmp_path / "m.csv")] == ["33.5", "30"] and (tmp_path / "m.png").exists()
+
+
 def _view(title: str, **values) -> collect.ViewResult:
     view = collect.ViewResult(Target(SceneFile(f"{title}.ply"), 0, SIZE))
     view.rows = {"a": values}

@@ -544,6 +544,33 @@ def budget_curves(curves: Sequence[Curve]) -> Figure:
         )
 
 
+@dataclass(frozen=True)
+class Move:
+    """What a change of the scene does to a machine. before, after: cycles and dB."""
+
+    name: str
+    before: tuple[float, float]
+    after: tuple[float, float]
+
+
+def moves(name: str, title: str, found: Sequence[Move], gain: str) -> Figure:
+    """Cycles against dB, from the one place to the other."""
+    with plt.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 5.0, 3.2)
+        for k, move in enumerate(found):
+            colour = COLOURS[k % len(COLOURS)]
+            x, y = ([1e-3 * p[0] for p in (move.before, move.after)], [p[1] for p in (move.before, move.after)])
+            axes.annotate("", (x[1], y[1]), (x[0], y[0]), arrowprops={"arrowstyle": "->", "color": colour})
+            axes.plot(x[:1], y[:1], "o", color=colour, fillstyle="none")
+            axes.plot(x[1:], y[1:], "o", color=colour, label=move.name)
+        axes.set_xlabel("thousand cycles of a frame")
+        axes.set_ylabel(gain)
+        axes.grid(alpha=0.3)
+        axes.legend(frameon=False)
+        rows = [[move.name, *move.before, *move.after] for move in found]
+        return Figure(name, title, "", "From the open circle to the full one.", ["machine", "cycles", "psnr_db", "cycles_after", "psnr_db_after"], rows, figure)
+
+
 def paper_figures(views: Sequence[ViewResult], areas: dict[tuple[str, str], float]) -> list[Figure]:
     """Those of the paper that this run's configurations allow, in its order."""
     with plt.rc_context(STYLE):
