@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 import time
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -25,12 +23,11 @@ from flicker.report.figures import budget_curves
 from flicker.scene import Scene, load_scene
 from flicker.scene.camera import Camera
 from flicker.scene.real import REAL_VIEWS
-from flicker.toolchain import BUILD, ROOT
+from flicker.toolchain import BUILD
 
-from .common import SIZE, SIZE_TEXT, Say, folder_of_scenes
+from .common import SIZE, SIZE_TEXT, Say, folder_of_scenes, save_charts
 
 FOLDER = BUILD / "budget"
-IMAGES = ROOT / "docs" / "images"
 SHARES = (0.65, 0.5, 0.35, 0.25)  # of removal alone
 JOBS: tuple[tuple[str, Options], ...] = (
     ("guitar", Options(Goal(Kind.KEEP, 0.25), rounds=3, steps=100, last=400)),
@@ -115,10 +112,7 @@ def draw(say: Say) -> str:
     """The chart of the budgets by share."""
     curves = [Curve.of(name, result.gaussians, result.rows) for name, options, result in _results(say) if options.goal.kind is Kind.KEEP]
     figure = budget_curves(curves)
-    with tempfile.TemporaryDirectory() as folder:
-        figure.write(Path(folder))
-        shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
-    return str((IMAGES / f"{figure.name}.png").relative_to(ROOT))
+    return save_charts([figure])
 
 
 def _decibel(value: float) -> str:

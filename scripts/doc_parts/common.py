@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shutil
+import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +15,24 @@ from flicker.explore.evaluate import evaluate
 from flicker.explore.points import Point, SceneFile, Target
 from flicker.explore.store import Store
 from flicker.front.view import DEMO, View, load_view
+from flicker.report.figures import Figure
 from flicker.scene.real import REAL_VIEWS, VARIABLE, RealView, real_scenes
+from flicker.toolchain import ROOT
 
+IMAGES = ROOT / "docs" / "images"
 SIZE = (1280, 720)
 SIZE_TEXT = f"{SIZE[0]}x{SIZE[1]}"
 Say = Callable[[str], None]  # shows what is being done
 Rows = dict[str, dict[str, dict]]  # rows of `evaluate` by view and configuration
+
+
+def save_charts(figures: Sequence[Figure]) -> str:
+    """Charts of the report for the pages; the files that were written."""
+    with tempfile.TemporaryDirectory() as folder:
+        for figure in figures:
+            figure.write(Path(folder))
+            shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
+    return ", ".join(str((IMAGES / f"{figure.name}.png").relative_to(ROOT)) for figure in figures)
 
 
 def scenes_missing() -> str | None:

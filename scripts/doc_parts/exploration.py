@@ -6,10 +6,6 @@ All configurations of the report are needed, since the chart shows them: about 2
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from pathlib import Path
-
 from flicker import markdown
 from flicker.cost.area import lane_stage_parts
 from flicker.explore.configurations import EXPLORED, get_configuration, group
@@ -17,11 +13,9 @@ from flicker.perf.lane_stage import LaneStage
 from flicker.report.collect import ViewResult
 from flicker.report.figures import speed_accuracy, speed_area_accuracy
 from flicker.scene.real import REAL_VIEWS
-from flicker.toolchain import ROOT
 
-from .common import Measured, Rows, Say, measure, significant
+from .common import Measured, Rows, Say, measure, save_charts, significant
 
-IMAGES = ROOT / "docs" / "images"
 PLAIN = 58.0  # dB: what is no worse than this counts as as good as GSCore
 
 
@@ -79,11 +73,7 @@ def draw(say: Say) -> str:
     names = group("report")
     views = [ViewResult(measured.target, measured.rows(names, say)) for measured in map(Measured, REAL_VIEWS)]
     figures = [speed_accuracy(views), speed_area_accuracy(views)]
-    with tempfile.TemporaryDirectory() as folder:
-        for figure in figures:
-            figure.write(Path(folder))
-            shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
-    return ", ".join(str((IMAGES / f"{figure.name}.png").relative_to(ROOT)) for figure in figures)
+    return save_charts(figures)
 
 
 def tables(say: Say) -> dict[str, str]:

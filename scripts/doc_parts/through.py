@@ -7,11 +7,8 @@ has changed.
 from __future__ import annotations
 
 import hashlib
-import shutil
-import tempfile
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -23,12 +20,10 @@ from flicker.markdown import table
 from flicker.report.figures import Move, moves
 from flicker.scene.camera import cameras_text
 from flicker.scene.files import load_scene
-from flicker.toolchain import ROOT
 
-from .common import Say, folder_of_scenes
+from .common import Say, folder_of_scenes, save_charts
 from .photographs import FOLDER, SCENES, kept, row_of, trained
 
-IMAGES = ROOT / "docs" / "images"
 PHOTOGRAPHS = SCENES[0]  # lego
 TUNED = Options(iterations=500, tune=True, begin=0.0, squared=0.5)
 SMALL = 0.1  # dB: of what costs less no share is told
@@ -82,10 +77,7 @@ def draw(say: Say) -> str:
         "through", "Fine-tuned through the contribution test", [Move(machine, *places) for machine, places in ends.items()],
         "PSNR against test photographs, dB",
     )
-    with tempfile.TemporaryDirectory() as folder:
-        figure.write(Path(folder))
-        shutil.copy(Path(folder) / f"{figure.name}.png", IMAGES)
-    return str((IMAGES / f"{figure.name}.png").relative_to(ROOT))
+    return save_charts([figure])
 
 
 def tables(say: Say) -> dict[str, str]:

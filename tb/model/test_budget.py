@@ -236,6 +236,10 @@ def test_least() -> None:
         below = found.parameters.log_scales.min(axis=1) < np.log(samples.least_scales(found.parameters.means, found.fitted, 1.0)) - 1e-4
         assert below.any() == (least == 0.0) and found.rows[0].decibels == float("inf") and len(found.parameters) == 200
         assert "least squares" not in {row.step for row in found.rows}
+    # Sizes are held, too, where no removal reaches the goal and all Gaussians come back.
+    found = start(scene, keeping(0.5, goal=Goal(Kind.DB, 150.0), steps=2, last=2, least=1.0, refit=0))
+    found.run()
+    assert (found.parameters.log_scales.min(axis=1) > np.log(samples.least_scales(found.parameters.means, found.fitted, 1.0)) - 1e-4).all()
 
 
 @pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), pytest.param(Goal(Kind.DB, 45.0), marks=pytest.mark.slow)])

@@ -193,6 +193,7 @@ class Reducer:
         if not self.rows:
             self._told_row("full scene", float("inf") if self.machine is None else self.measure(), self.frame_cost(lanes=True))
             self._least.hold(self.parameters.values)
+            self.good = self.parameters.values.copy(), *self.good[1:]
         self.round += 1
         if goal.kind is Kind.KEEP:
             known = self.round / self.options.rounds
@@ -247,7 +248,7 @@ class Reducer:
         view, self.order = int(self.order[0]), self.order[1:]
         factor = min(1.0, 10 ** ((_FULL_RATE - self.level) / 20)) if self.level else 1.0
         rate = rates.at(done, self.extent, self.parameters.values.shape[1]) * np.float32(factor)
-        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._draw, self._least)
+        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._least, self._draw)
         self.level = decibels if not self.level else 0.98 * self.level + 0.02 * decibels
         self.step += 1
         if len(broken):

@@ -44,14 +44,14 @@ class Rates:
 
 
 def tune_step(
-    parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray, draw: Draw = render,
-    least: LeastSize | None = None,
+    parameters: Parameters, moments: Adam, camera: Camera, wanted: np.ndarray, rates: np.ndarray, coefficients: np.ndarray, least: LeastSize,
+    draw: Draw = render,
 ) -> tuple[float, np.ndarray]:
     """One view; parameters and moments change in place. PSNR of the view before, in dB, and Gaussians that have to be taken out: int64 numbers of those with
     a number or a derivative that is not finite; these have not been moved.
 
-    coefficients: int64 (N,), how many SH coefficients a channel each has; the others stay. draw: what makes the view's frame. least:
-    sizes that no Gaussian falls below.
+    coefficients: int64 (N,), how many SH coefficients a channel each has; the others stay. least: sizes that no Gaussian falls below.
+    draw: what makes the view's frame.
     """
     frame = draw(parameters, camera)
     error, slope = log_error_slope(frame.image, wanted)
@@ -59,8 +59,7 @@ def tune_step(
     gradient = found.values
     gradient[:, SH:][np.arange((gradient.shape[1] - SH) // 3).repeat(3) >= coefficients[found.index][:, None]] = 0.0
     refused = moments.step(parameters.values, found.index, gradient, rates)
-    if least is not None:
-        least.hold(parameters.values, found.index)
+    least.hold(parameters.values, found.index)
     return -10.0 * np.log10(max(error, LEAST_ERROR)), found.index[refused | frame.bad]
 
 
