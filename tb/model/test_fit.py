@@ -20,6 +20,7 @@ import pytest
 import scene_samples as samples
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
+from PIL import Image
 
 from flicker.errors import FlickerError
 from flicker.explore.configurations import run
@@ -27,7 +28,7 @@ from flicker.explore.machine import Configuration
 from flicker.fit.dataset import load_dataset
 from flicker.fit.loss import log_error_slope, loss_and_slope
 from flicker.fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH, Parameters
-from flicker.fit.render import backward, render
+from flicker.fit.render import Gradient, backward, render
 from flicker.fit.through import through
 from flicker.fit.train import Options, Trainer, affine_fit
 from flicker.front.projection import project
@@ -105,6 +106,13 @@ def difference(
     return second, abs(second - first)
 
 
+def whole(gradient: Gradient, count: int) -> np.ndarray:
+    """Derivatives in the parameters of all Gaussians: 0 of those that are not in the picture."""
+    found = np.zeros((count, gradient.values.shape[1]), np.float32)
+    found[gradient.index] = gradient.values
+    return found
+
+
 @pytest.mark.parametrize(("degree", "z", "name"), [(3, -3.0, None), (1, -1.3, None), (0, -3.0, "flicker-sparse-fixed-factored")])
 def test_derivatives(degree: int, z: float, name: str | None) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
@@ -112,17 +120,17 @@ def test_derivatives(degree: int, z: float, name: str | None) -> None:
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
     machine = None if name is None else through(name)
     frame = render(parameters, camera, BACKGROUND, machine)
-    found = backward(frame, weight)
+    found = whole(backward(frame, weight), len(parameters))
     checked = np.zeros(parameters.values.shape[1], int)
-    largest = np.abs(found.values).max(axis=0)
+    largest = np.abs(found).max(axis=0)
     clamped = 0
-    for k, i in enumerate(frame.index):
+    for i in frame.index:
         clamped += int(parameters.values[i, LOGIT] == 6.0)
         for column in range(parameters.values.shape[1]):
             wanted, doubt = difference(parameters, camera, weight, int(i), column, machine)
             scale = max(abs(wanted), 1e-3 * largest[column], 1e-6)
             if doubt < 2e-5 * scale:
-                assert abs(found.values[k, column] - wanted) < 1e-4 * scale, (i, column, found.values[k, column], wanted)
+                assert abs(found[i, column] - wanted) < 1e-4 * scale, (i, column, found[i, column], wanted)
                 checked[column] += 1
     assert clamped >= 3 and (checked >= len(frame.index) // 3).all(), checked
 
@@ -141,8 +149,7 @@ def test_rules_near() -> None:
         parameters.values[: len(o), LOGIT] = np.log(o / (1 - o))
         parameters.values[len(o) :, MEAN + 2] = -1.0  # behind the camera
         found = backward(render(parameters, camera, BACKGROUND), weight)
-        assert found.index.tolist() == list(range(len(o)))
-        return found.values[:, LOGIT] / (o * (1 - o))
+        return whole(found, len(values))[: len(o), LOGIT] / (o * (1 - o))
 
     step = 1.5 - sum(BACKGROUND)  # coefficients 0: one half a channel, in place of the background
     for o, wanted in ((0.9899, step), (0.9901, 0.0), (1.01 / 255, step), (0.99 / 255, 0.0)):
@@ -173,7 +180,17 @@ def test_gaussian_that_only_finishes() -> None:
     for x, wanted in ((16, 0.0), (17, 0.02 * 1.0609e-4)):
         weight = np.zeros((17, 18, 3))
         weight[16, x] = 1.0
-        assert backward(frame, weight).values[3, SH] / 0.28209479177387814 == pytest.approx(wanted, rel=1e-3, abs=1e-12)
+        assert whole(backward(frame, weight), 4)[3, SH] / 0.28209479177387814 == pytest.approx(wanted, rel=1e-3, abs=1e-12)
+
+
+def test_float32() -> None:
+    """Blending in float32, as fits do, is that in float64 but for rounding."""
+    parameters, camera = busy(), look()
+    weight = np.random.default_rng(seed()).normal(size=(37, 45, 3))
+    frames = [render(parameters, camera, BACKGROUND, None, kind) for kind in (np.float32, np.float64)]
+    assert frames[0].image.dtype == np.float32 and 0 < np.abs(frames[0].image - frames[1].image).max() < 1e-4
+    short, long = (whole(backward(frame, weight), len(parameters)) for frame in frames)
+    assert 0 < np.abs(short - long).max() and (np.abs(short - long).max(axis=0) < 1e-3 * np.abs(long).max(axis=0)).all()
 
 
 def test_same_bits_for_any_number_of_threads() -> None:
@@ -440,6 +457,38 @@ def test_views_that_do_not_overlap(nerf, tmp_path) -> None:
         Trainer(load_dataset(tmp_path), Options(10, 100))
 
 
+def test_start_where_nothing_is_empty(shots, tmp_path) -> None:
+    """Photographs with transparent parts: the first Gaussians are where none of them is empty, and have the colours of what they show."""
+    (tmp_path / "images").mkdir()
+    cameras = [camera for camera, _ in shots]
+    middle = np.median(scene_of_shots().means, axis=0)
+    masks = []
+    for k, camera in enumerate(cameras):  # of a ball in the middle, red; beside it green that nobody may take
+        away = np.linalg.norm(camera.position - middle)
+        radius = 0.15 * camera.fx
+        x, y = np.meshgrid(np.arange(WIDTH) + 0.5 - WIDTH / 2, np.arange(HEIGHT) + 0.5 - HEIGHT / 2)
+        at = (middle - camera.position) @ camera.rotation * (camera.fx, camera.fy, 1.0) / away
+        masks.append((x - at[0]) ** 2 + (y - at[1]) ** 2 < radius**2)
+        rgba = np.where(masks[-1][..., None], (200, 10, 10, 255), (0, 255, 0, 0)).astype(np.uint8)
+        Image.fromarray(rgba).save(tmp_path / "images" / f"r_{k}.png")
+    (tmp_path / "transforms.json").write_text(json.dumps({
+        "camera_angle_x": 2 * math.atan(WIDTH / 2 / cameras[0].fx),
+        "frames": [{"file_path": f"./images/r_{k}", "transform_matrix": pose(camera)} for k, camera in enumerate(cameras)],
+    }))
+    for size in (WIDTH, WIDTH // 2):  # a pixel that is partly transparent is not empty
+        trainer = Trainer(load_dataset(tmp_path, size), Options(10, 1000))
+        assert trainer.first == 300
+        for shot, mask in zip(trainer.dataset.fitted, [m for k, m in enumerate(masks) if k % 8]):
+            x, y, z = ((trainer.parameters.means - shot.camera.position) @ shot.camera.rotation).T
+            scale = WIDTH / size
+            column, line = ((f * v / z + 0.5 * n) * scale for f, v, n in ((shot.camera.fx, x, shot.camera.width), (shot.camera.fy, y, shot.camera.height)))
+            reach = 2 * scale
+            near = [mask[max(0, int(v - reach)) : int(v + reach) + 1, max(0, int(u - reach)) : int(u + reach) + 1].any() for u, v in zip(column, line)]
+            assert all(near)
+        colour = 0.5 + 0.28209479 * trainer.parameters.values[:, SH : SH + 3]
+        assert (colour[:, 0] > 4 * colour[:, 1]).mean() > 0.9 and colour[:, 1].max() < 0.2
+
+
 # -- training -------------------------------------------------------------------------------------------------------------------------
 
 
@@ -485,11 +534,12 @@ def test_tune_through_a_machine(nerf, tmp_path) -> None:
         Trainer(data, options, Parameters.of(tuned.scene())).restore(tmp_path / "state.npz")
 
 
-def test_rates_of_tuning(nerf) -> None:
-    """A scene that is tuned has the rates of a fit from a share on: 2/3, or as asked for."""
+def test_rates(nerf) -> None:
+    """A scene that is tuned has rates that fall as those of a fit from a share on: 2/3, or as asked for. Those of a fit from nothing are larger, the more the
+    fewer iterations it has."""
     data, given = load_dataset(nerf), Parameters.of(scene_of_shots())
-    whole = Trainer(data, Options(iterations=300), given)
-    for begin in (None, 0.0, 0.5):
+    whole = Trainer(data, Options(iterations=300, tune=True, begin=0.0), given)
+    for begin in (None, 0.5):
         options = Options(iterations=100, tune=True)
         tuned = Trainer(data, options if begin is None else replace(options, begin=begin), given)
         first = 2 / 3 if begin is None else begin
@@ -497,6 +547,14 @@ def test_rates_of_tuning(nerf) -> None:
             tuned.iteration = round(100 * share)
             whole.iteration = round(300 * (first + (1 - first) * share))
             np.testing.assert_allclose(tuned.rates(), whole.rates(), rtol=1e-5)
+    for iterations, longer in ((30_000, 1.0), (7_500, 2.0), (100, 4.0)):
+        fitted = Trainer(data, Options(iterations=iterations), given)
+        for share in (0.0, 1.0):
+            fitted.iteration, whole.iteration = round(iterations * share), round(300 * share)
+            ratio = fitted.rates() / whole.rates()
+            wanted = np.full(len(ratio), 4 * longer)
+            wanted[:SCALE], wanted[SCALE:LOGIT], wanted[LOGIT], wanted[SH : SH + 3] = longer, 2 * longer, 1.0, 2 * longer
+            np.testing.assert_allclose(ratio, wanted, rtol=1e-5)
 
 
 def test_squared_errors_in_the_end(nerf, tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ class Reducer:
         self.moments = Adam.of(self.parameters.values)
         self.extent = extent_of(self.fitted)
         self.machine = None if options.through is None else through(options.through)
-        self._draw: Draw = render if self.machine is None else partial(render, through=self.machine)
+        self._draw: Draw = partial(render, through=self.machine, precision=np.float32)
         self._least = LeastSize(options.least, self.fitted)
         self.rng = np.random.default_rng(options.seed)
         self.order = np.zeros(0, np.int64)  # fitted cameras that come next

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..fit.chain import _basis
 from ..fit.parameters import MEAN, SH, Parameters
-from ..fit.raster import BLUE, GREEN, RED, visit
+from ..fit.raster import BLUE, GREEN, LANES, RED, new_tile, spans, visit, window
 from ..fit.render import Draw, Frame, render
 from ..params import TILE
 from ..progress import Steps
@@ -31,32 +31,39 @@ MEMORY = 3 << 30  # bytes of kept weights at most: more views than that are left
 _PAIR_BYTES = 5
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _weigh_tile(t, rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill):
     """Count the pixels of each used entry into offset[e + 1], or, to fill, write their places in the tile and alpha T from offset[e] on."""
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
-    right, bottom = min(TILE, width - left) - 1.0, min(TILE, height - top) - 1.0
-    remains = np.ones((TILE, TILE))
-    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
+    columns, lines = min(TILE, width - left), min(TILE, height - top)
+    state = new_tile(0, columns, lines, rows.dtype)
+    first, last = np.empty(TILE, np.int32), np.empty(TILE, np.int32)
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
-        count, _ = visit(rows, np.uint64(entry[e]), np.uint64(mask[e]), left, top, right, bottom, remains, place, alpha, before)
+        row, at = rows[entry[e]], offset[e] if fill else 0
+        low, high = spans(row, left, top, columns - 1.0, lines - 1.0, first, last)
+        for y in range(low, high):
+            for x in range(first[y], last[y] + 1, LANES):
+                common, place = window(row, np.uint64(mask[e]), left, top, y, np.uint64(x))
+                for k in range(np.uint64(LANES)):
+                    _, alpha, before, _ = visit(k, common, state, place, rows.dtype.type)
+                    if alpha > 0.0:
+                        if fill:
+                            pixel[at] = y * np.uint64(TILE) + np.uint64(x) + k
+                            weight[at] = alpha * before
+                        at += 1
         if not fill:
-            offset[e + 1] = count
-            continue
-        for k in range(count):
-            pixel[offset[e] + k] = place[k]
-            weight[offset[e] + k] = alpha[k] * before[k]
+            offset[e + 1] = at
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _weigh(rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill):
     for t in numba.prange(len(start) - 1):
         _weigh_tile(np.int64(t), rows, start, entry, mask, tiles_x, height, width, used, offset, pixel, weight, fill)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _colour(k, gaussian, shown, values, position, x, rgb):
     i = gaussian[k]
     dx, dy, dz = values[i, MEAN] - position[0], values[i, MEAN + 1] - position[1], values[i, MEAN + 2] - position[2]
@@ -72,13 +79,13 @@ def _colour(k, gaussian, shown, values, position, x, rgb):
         rgb[k, c] = total
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _colours(gaussian, shown, values, position, x, rgb):
     for k in numba.prange(len(gaussian)):
         _colour(np.int64(k), gaussian, shown, values, position, x, rgb)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _colour_back(k, gaussian, shown, values, position, rgb, square, x):
     i = gaussian[k]
     dx, dy, dz = values[i, MEAN] - position[0], values[i, MEAN + 1] - position[1], values[i, MEAN + 2] - position[2]
@@ -92,13 +99,13 @@ def _colour_back(k, gaussian, shown, values, position, rgb, square, x):
                 x[i, n, c] += (basis[n] * basis[n] if square else basis[n]) * rgb[k, c]
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _colours_back(gaussian, shown, values, position, rgb, square, x):
     for k in numba.prange(len(gaussian)):
         _colour_back(np.int64(k), gaussian, shown, values, position, rgb, square, x)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _paint_tile(t, start, slot, offset, pixel, weight, rgb, tiles_x, mask, image):
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
@@ -117,13 +124,13 @@ def _paint_tile(t, start, slot, offset, pixel, weight, rgb, tiles_x, mask, image
                 image[top + y, left + x, c] = colour[y * TILE + x, c] if mask[top + y, left + x, c] else 0.0
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _paint(start, slot, offset, pixel, weight, rgb, tiles_x, mask, image):
     for t in numba.prange(len(start) - 1):
         _paint_tile(np.int64(t), start, slot, offset, pixel, weight, rgb, tiles_x, mask, image)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _collect_tile(t, start, offset, pixel, weight, tiles_x, mask, image, square, sums):
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
@@ -147,13 +154,13 @@ def _collect_tile(t, start, offset, pixel, weight, tiles_x, mask, image, square,
         sums[e, 2] = blue
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _collect(start, offset, pixel, weight, tiles_x, mask, image, square, sums):
     for t in numba.prange(len(start) - 1):
         _collect_tile(np.int64(t), start, offset, pixel, weight, tiles_x, mask, image, square, sums)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _gather(slot, sums, rgb):
     for e in range(len(slot)):
         for c in range(3):

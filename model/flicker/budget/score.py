@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 from ..fit.parameters import Parameters
-from ..fit.raster import BLUE, GREEN, RED, visit
+from ..fit.raster import BLUE, GREEN, LANES, PITCH, PLANE, RED, new_tile, spans, visit, window
 from ..fit.render import Draw, Frame, render
 from ..params import TILE
 from ..progress import Steps
@@ -19,6 +19,7 @@ from ..scene.camera import Camera
 # Sums of an entry: of alpha T, its largest, squared change of the picture without the Gaussian, pixels, of (alpha T)^2.
 WEIGHT, PEAK, CHANGE, PIXELS, SQUARE = range(5)
 COLUMNS = 5
+_RED, _GREEN, _BLUE = np.uint64(PLANE), np.uint64(2 * PLANE), np.uint64(3 * PLANE)  # what is yet to come of a pixel's channels
 
 
 class Score(str, Enum):
@@ -29,37 +30,41 @@ class Score(str, Enum):
     PEAK = "peak"
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _score_tile(t, rows, start, entry, mask, tiles_x, image, used, sums):
     """Walks the list as `fit.raster` does. A pixel's state: the transmittance, and what is yet to come of its three channels."""
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    remains = np.ones((TILE, TILE))
-    rest = np.zeros((TILE * TILE, 3))
-    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
+    state = new_tile(3, columns, lines, rows.dtype)
+    first, last = np.empty(TILE, np.int32), np.empty(TILE, np.int32)
     for y in range(lines):
         for x in range(columns):
             for k in range(3):
-                rest[y * TILE + x, k] = image[top + y, left + x, k]
+                state[(k + 1) * PLANE + y * PITCH + x] = image[top + y, left + x, k]
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
-        i = np.uint64(entry[e])
-        count, _ = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
-        red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-        total, peak, change, square = 0.0, 0.0, 0.0, 0.0
-        for k in range(count):
-            at, weight = np.uint64(place[k]), alpha[k] * before[k]
-            per = 1.0 / (before[k] * (1.0 - alpha[k]))
-            rest[at, 0] -= weight * red
-            rest[at, 1] -= weight * green
-            rest[at, 2] -= weight * blue
-            d_red, d_green, d_blue = red - rest[at, 0] * per, green - rest[at, 1] * per, blue - rest[at, 2] * per
-            change += weight * weight * (d_red * d_red + d_green * d_green + d_blue * d_blue)
-            total += weight
-            square += weight * weight
-            peak = max(peak, weight)
+        row = rows[entry[e]]
+        red, green, blue = row[RED], row[GREEN], row[BLUE]
+        total, peak, change, square, count = 0.0, 0.0, 0.0, 0.0, 0
+        low, high = spans(row, left, top, columns - 1.0, lines - 1.0, first, last)
+        for y in range(low, high):
+            for x in range(first[y], last[y] + 1, LANES):
+                common, place = window(row, np.uint64(mask[e]), left, top, y, np.uint64(x))
+                for k in range(np.uint64(LANES)):
+                    _, alpha, before, _ = visit(k, common, state, place, rows.dtype.type)
+                    if alpha > 0.0:
+                        weight, per, at = alpha * before, 1.0 / (before * (1.0 - alpha)), place + k
+                        state[_RED + at] -= weight * red
+                        state[_GREEN + at] -= weight * green
+                        state[_BLUE + at] -= weight * blue
+                        d_red, d_green, d_blue = red - state[_RED + at] * per, green - state[_GREEN + at] * per, blue - state[_BLUE + at] * per
+                        change += weight * weight * (d_red * d_red + d_green * d_green + d_blue * d_blue)
+                        total += weight
+                        square += weight * weight
+                        peak = max(peak, weight)
+                        count += 1
         sums[e, WEIGHT] = total
         sums[e, PEAK] = peak
         sums[e, CHANGE] = change
@@ -67,13 +72,13 @@ def _score_tile(t, rows, start, entry, mask, tiles_x, image, used, sums):
         sums[e, SQUARE] = square
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _score(rows, start, entry, mask, tiles_x, image, used, sums):
     for t in numba.prange(len(start) - 1):
         _score_tile(np.int64(t), rows, start, entry, mask, tiles_x, image, used, sums)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _gather(index, entry, used, sums, total, tiles):
     """Add the entries' sums to those of their Gaussians, the largest of the largest, in the order of the lists."""
     for e in range(len(entry)):

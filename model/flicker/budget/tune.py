@@ -60,7 +60,7 @@ def tune_step(
     gradient[:, SH:][np.arange((gradient.shape[1] - SH) // 3).repeat(3) >= coefficients[found.index][:, None]] = 0.0
     refused = moments.step(parameters.values, found.index, gradient, rates)
     least.hold(parameters.values, found.index)
-    return -10.0 * np.log10(max(error, LEAST_ERROR)), found.index[refused | frame.bad]
+    return -10.0 * np.log10(max(error, LEAST_ERROR)), np.union1d(found.index[refused], frame.index[frame.bad])
 
 
 def quality(parameters: Parameters, cameras: list[Camera], wanted: list[np.ndarray], draw: Draw = render) -> float:

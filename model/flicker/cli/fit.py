@@ -32,7 +32,9 @@ def fit(
     begin: Annotated[float | None, typer.Option(help="of --from: share of a fit whose learning rates are passed; default: 2/3", min=0.0, max=1.0)] = None,
     through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
-    squared: Annotated[float, typer.Option(help="share of the iterations, at the end, in which squared errors are minimised", min=0.0, max=1.0)] = 0.0,
+    squared: Annotated[float | None, typer.Option(
+        help="share of the iterations, at the end, in which squared errors are minimised; default: 1/2; with --from: 0", min=0.0, max=1.0,
+    )] = None,
     iterations: Annotated[int, typer.Option(help="photographs looked at, one a step", min=1)] = 4000,
     size: Annotated[int, typer.Option(help="longer side of the pictures in pixels; larger ones are averaged, none is enlarged", min=16)] = 640,
     gaussians: Annotated[int, typer.Option(help="at most so many; of --from, as many as it has", min=4)] = 100_000,

@@ -10,7 +10,7 @@ import numpy as np
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-15
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _row(k, values, first, second, index, gradient, rate, scale_1, scale_2, refused):
     i = index[k]
     total = np.float32(0.0)
@@ -28,7 +28,7 @@ def _row(k, values, first, second, index, gradient, rate, scale_1, scale_2, refu
         values[i, j] -= rate[j] * (m * scale_1) / (np.sqrt(v * scale_2) + np.float32(EPSILON))
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _step(values, first, second, index, gradient, rate, scale_1, scale_2, refused):
     for k in numba.prange(len(index)):
         _row(np.int64(k), values, first, second, index, gradient, rate, scale_1, scale_2, refused)

@@ -9,8 +9,10 @@ from ..front.projection import _C0, _C1, _C2, _C3, _CLAMP, A, B, C
 from .parameters import LOGIT, MEAN, QUAT, SCALE, SH
 from .raster import D_RED, G_X, G_XX, G_XY, G_Y, G_YY, RED, G
 
+_BLOCK = 256  # Gaussians that one call of a thread takes
 
-@numba.njit(cache=True)
+
+@numba.njit(error_model="numpy", cache=True)
 def _basis(x, y, z, count, out):
     """The first `count` real harmonics at a unit vector, as `front.projection.colours` sums them."""
     out[0] = _C0
@@ -26,7 +28,7 @@ def _basis(x, y, z, count, out):
         out[14], out[15] = _C3[5] * z * (xx - yy), _C3[6] * x * (xx - 3.0 * yy)
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _basis_slope(x, y, z, count, e):
     """Gradient in (x, y, z) of sum e_k basis_k."""
     dx = dy = dz = 0.0
@@ -49,16 +51,17 @@ def _basis_slope(x, y, z, count, e):
     return dx, dy, dz
 
 
-@numba.njit(cache=True)
-def _chain(k, values, index, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
+@numba.njit(error_model="numpy", cache=True)
+def _chain(n, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen, basis, weight):
     lim_x = _CLAMP * 0.5 * width / fx
     lim_y = _CLAMP * 0.5 * height / fy
-    i = index[k]
-    gradient[k] = 0.0
+    k = np.uint64(place[n])
+    i = np.uint64(index[k])
+    gradient[n] = 0.0
     a, b, c = table[i, A], table[i, B], table[i, C]
     g_x, g_y = sums[k, G_X], sums[k, G_Y]
     mean_x, mean_y = -(a * g_x + b * g_y), -(b * g_x + c * g_y)
-    screen[k, 0], screen[k, 1] = mean_x, mean_y
+    screen[n, 0], screen[n, 1] = mean_x, mean_y
 
     # The conic is the inverse of the covariance: dL/dcov = -conic dL/dconic conic, all symmetric.
     q0, q1, q2 = 0.5 * sums[k, G_XX], 0.5 * sums[k, G_XY], 0.5 * sums[k, G_YY]
@@ -84,14 +87,14 @@ def _chain(k, values, index, table, rows, sums, view, position, width, height, f
     w, p, q, r = w / norm, p / norm, q / norm, r / norm
     d00 = d11 = d02 = d12 = 0.0  # of the Jacobian
     dw = dp = dq = dr = 0.0
-    for n in range(3):
-        if n == 0:
+    for m in range(3):
+        if m == 0:
             r0, r1, r2 = 1.0 - 2.0 * (q * q + r * r), 2.0 * (p * q + w * r), 2.0 * (p * r - w * q)
-        elif n == 1:
+        elif m == 1:
             r0, r1, r2 = 2.0 * (p * q - w * r), 1.0 - 2.0 * (p * p + r * r), 2.0 * (q * r + w * p)
         else:
             r0, r1, r2 = 2.0 * (p * r + w * q), 2.0 * (q * r - w * p), 1.0 - 2.0 * (p * p + q * q)
-        s = np.exp(np.float64(values[i, SCALE + n]))
+        s = np.exp(np.float64(values[i, SCALE + m]))
         b0 = s * (view[0, 0] * r0 + view[0, 1] * r1 + view[0, 2] * r2)
         b1 = s * (view[1, 0] * r0 + view[1, 1] * r1 + view[1, 2] * r2)
         b2 = s * (view[2, 0] * r0 + view[2, 1] * r1 + view[2, 2] * r2)
@@ -103,16 +106,16 @@ def _chain(k, values, index, table, rows, sums, view, position, width, height, f
         d11 += dv * b1
         d12 += dv * b2
         e0, e1, e2 = j00 * du, j11 * dv, j02 * du + j12 * dv
-        gradient[k, SCALE + n] = e0 * b0 + e1 * b1 + e2 * b2
+        gradient[n, SCALE + m] = e0 * b0 + e1 * b1 + e2 * b2
         c0 = s * (view[0, 0] * e0 + view[1, 0] * e1 + view[2, 0] * e2)
         c1 = s * (view[0, 1] * e0 + view[1, 1] * e1 + view[2, 1] * e2)
         c2 = s * (view[0, 2] * e0 + view[1, 2] * e1 + view[2, 2] * e2)
-        if n == 0:
+        if m == 0:
             dw += 2.0 * (r * c1 - q * c2)
             dp += 2.0 * (q * c1 + r * c2)
             dq += 2.0 * (-2.0 * q * c0 + p * c1 - w * c2)
             dr += 2.0 * (-2.0 * r * c0 + w * c1 + p * c2)
-        elif n == 1:
+        elif m == 1:
             dw += 2.0 * (-r * c0 + p * c2)
             dp += 2.0 * (q * c0 - 2.0 * p * c1 + w * c2)
             dq += 2.0 * (p * c0 + r * c2)
@@ -123,10 +126,10 @@ def _chain(k, values, index, table, rows, sums, view, position, width, height, f
             dq += 2.0 * (w * c0 + r * c1 - 2.0 * q * c2)
             dr += 2.0 * (p * c0 + q * c1)
     along = w * dw + p * dp + q * dq + r * dr
-    gradient[k, QUAT] = (dw - along * w) / norm
-    gradient[k, QUAT + 1] = (dp - along * p) / norm
-    gradient[k, QUAT + 2] = (dq - along * q) / norm
-    gradient[k, QUAT + 3] = (dr - along * r) / norm
+    gradient[n, QUAT] = (dw - along * w) / norm
+    gradient[n, QUAT + 1] = (dp - along * p) / norm
+    gradient[n, QUAT + 2] = (dq - along * q) / norm
+    gradient[n, QUAT + 3] = (dr - along * r) / norm
 
     # Mean in the camera: by the place on the screen and by the Jacobian, whose tangents stand still where they are held.
     d_tx, d_ty = fx * mean_x, fy * mean_y
@@ -144,31 +147,39 @@ def _chain(k, values, index, table, rows, sums, view, position, width, height, f
     distance = np.sqrt(dx * dx + dy * dy + dz * dz)
     ox, oy, oz = dx / distance, dy / distance, dz / distance
     count = (values.shape[1] - SH) // 3
-    basis, weight = np.zeros(16), np.zeros(16)
+    weight[:] = 0.0
     _basis(ox, oy, oz, count, basis)
     for channel in range(3):
         if rows[k, RED + channel] > 0.0:
             slope = sums[k, D_RED + channel]
-            for n in range(count):
-                column = SH + 3 * n + channel
-                weight[n] += slope * values[i, column]
-                if n < coefficients:
-                    gradient[k, column] = slope * basis[n]
+            for m in range(count):
+                column = SH + 3 * m + channel
+                weight[m] += slope * values[i, column]
+                if m < coefficients:
+                    gradient[n, column] = slope * basis[m]
     sx, sy, sz = _basis_slope(ox, oy, oz, count, weight)
     radial = sx * ox + sy * oy + sz * oz
-    gradient[k, MEAN] = m0 + (sx - radial * ox) / distance
-    gradient[k, MEAN + 1] = m1 + (sy - radial * oy) / distance
-    gradient[k, MEAN + 2] = m2 + (sz - radial * oz) / distance
+    gradient[n, MEAN] = m0 + (sx - radial * ox) / distance
+    gradient[n, MEAN + 1] = m1 + (sy - radial * oy) / distance
+    gradient[n, MEAN + 2] = m2 + (sz - radial * oz) / distance
 
     # alpha = o exp(-E): dL/do = -G / o, and do/dlogit = o (1 - o).
-    gradient[k, LOGIT] = -sums[k, G] / (1.0 + np.exp(np.float64(values[i, LOGIT])))
+    gradient[n, LOGIT] = -sums[k, G] / (1.0 + np.exp(np.float64(values[i, LOGIT])))
 
 
-@numba.njit(parallel=True, cache=True)
-def chain(values, index, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
-    """gradient: float32 (M, P), of the Gaussians `index` in the columns of `values`; screen: float64 (M, 2), of their means in pixels.
+@numba.njit(error_model="numpy", cache=True)
+def _chain_block(block, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
+    basis, weight = np.zeros(16), np.zeros(16)
+    for n in range(block * _BLOCK, min((block + 1) * _BLOCK, len(place))):
+        _chain(n, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen, basis, weight)
 
-    sums: float64 (M, 9), of `raster`. view: world to camera (3, 3). coefficients: how many SH coefficients are trained; the others' derivatives are 0.
+
+@numba.njit(error_model="numpy", parallel=True, cache=True)
+def chain(values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
+    """gradient: float32 (S, P), of the Gaussians index[place] in the columns of `values`; screen: float64 (S, 2), of their means in pixels.
+
+    place: int64 (S,), into rows and sums. sums: float64 (M, 9), of `raster`. view: world to camera (3, 3). coefficients: how many SH coefficients are trained;
+    the others' derivatives are 0.
     """
-    for k in numba.prange(len(index)):
-        _chain(np.int64(k), values, index, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen)
+    for block in numba.prange((len(place) + _BLOCK - 1) // _BLOCK):
+        _chain_block(np.int64(block), values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen)

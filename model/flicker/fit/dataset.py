@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..scene.camera import Camera
-from ..scene.image import load_picture, picture_size
+from ..scene.image import load_coverage, load_picture, picture_size
 from ..scene.photos import BLACK, PLACES, SUFFIXES, area_average
 from .colmap import read_cameras, read_images, read_points
 
@@ -32,6 +32,11 @@ class Shot:
     def load(self, background: tuple[float, float, float] = BLACK) -> np.ndarray:
         """float32 (H, W, 3) in [0, 1], transparent parts over the background."""
         return area_average(load_picture(self.path, background), (self.camera.width, self.camera.height)).astype(np.float32)
+
+    def solid(self) -> np.ndarray | None:
+        """bool (H, W): pixels that are not wholly transparent; None for a picture without transparent parts."""
+        coverage = load_coverage(self.path)
+        return None if coverage is None else area_average(coverage[..., None], (self.camera.width, self.camera.height))[..., 0] > 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from ..scene.clusters import morton_order
 from .parameters import LOGIT, MEAN, QUAT, SCALE, Parameters
 
 EVERY = 100  # iterations
-LEAST_GRADIENT = 2e-4  # in halves of the picture's width and height
+LEAST_GRADIENT = 2e-5  # in halves of the picture's width and height
 LEAST_OPACITY = 0.005
 SMALL = 0.01  # of the scene's extent: cloned, not split
 SHRINK = 1.6  # of the standard deviations of the halves

@@ -15,7 +15,7 @@ from ..scene.camera import Camera
 from .parameters import MEAN, QUAT, SCALE
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _hold(values, index, position, per_pixel, pixels):
     for k in numba.prange(len(index)):
         i = np.int64(index[k])

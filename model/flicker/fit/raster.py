@@ -7,6 +7,8 @@ own, which halves the time to compile. `visit` is the one place where pixels are
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -23,11 +25,32 @@ G, G_X, G_Y, G_XX, G_XY, G_YY, D_RED, D_GREEN, D_BLUE = range(9)
 SUMS = 9
 MARGIN = 1e-3  # pixels and parts of LIMIT by which more is visited than alpha >= 1/255 needs: rounding never decides
 COLOUR_MAX = 1e4  # a Gaussian with more is taken for a broken one
-_NONE, _ONE, _TWO, _FOUR, _FIFTEEN = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(15)  # signed ones would make floats of unsigned indices
+LANES = 8  # pixels of a line that are visited at once
+PITCH = TILE + LANES  # of a tile's lines in its planes: what is visited beyond its end is no pixel
+PLANE = TILE * PITCH
+_ONE, _TWO, _FOUR, _TWELVE = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(12)  # signed ones would make floats of unsigned indices
+_LANES, _PITCH = np.uint64(LANES), np.uint64(PITCH)
+_OWN, _OWN_2, _OWN_3, _OWN_4 = (np.uint64(k * PLANE) for k in range(1, 5))  # planes behind the transmittance
 _FAST = {"contract", "nsz", "arcp"}  # nothing that would change what is not finite, or the order of sums
+_SUMS = _FAST | {"reassoc"}  # sums over lanes
+_FAR = 6.0  # energy from which alpha is below 1/255 whatever the opacity
+# exp(-x) = p(x)^16 with the Taylor polynomial p of exp(-x / 16): to 1e-11 up to _FAR.
+_E0, _E1, _E2, _E3, _E4, _E5, _E6, _E7, _E8, _E9, _E10 = ((-1 / 16) ** k / math.factorial(k) for k in range(11))
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", fastmath=_FAST, forceinline=True)
+def _exp(x, real):
+    """exp(-x) of x from 0 to _FAR, without a branch or a table, so that lanes are computed at once."""
+    low = real(_E8) + x * (real(_E9) + x * real(_E10))
+    low = real(_E4) + x * (real(_E5) + x * (real(_E6) + x * (real(_E7) + x * low)))
+    low = real(_E0) + x * (real(_E1) + x * (real(_E2) + x * (real(_E3) + x * low)))
+    square = low * low
+    fourth = square * square
+    eighth = fourth * fourth
+    return eighth * eighth
+
+
+@numba.njit(error_model="numpy", cache=True)
 def _make_row(k, index, table, opacity, rgb, width, height, rows, box, bad):
     tiles_x = (width + TILE - 1) // TILE
     tiles_y = (height + TILE - 1) // TILE
@@ -65,7 +88,7 @@ def _make_row(k, index, table, opacity, rgb, width, height, rows, box, bad):
     rows[k, BLUE] = rgb[k, 2]
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def make_rows(index, table, opacity, rgb, width, height, rows, box, bad):
     """Rows and boxes of the Gaussians `index`: tiles that the reference lists them in and that a pixel of alpha >= 1/255 can be in.
 
@@ -76,85 +99,120 @@ def make_rows(index, table, opacity, rgb, width, height, rows, box, bad):
         _make_row(np.int64(k), index, table, opacity, rgb, width, height, rows, box, bad)
 
 
-@numba.njit(fastmath=_FAST, cache=True)
-def visit(rows, i, visited, left, top, right, bottom, remains, place, alpha, before):
-    """Pixels of a tile that Gaussian i is blended in: how many, and how many it finishes. This is where the rules of blending stand.
+@numba.njit(error_model="numpy", fastmath=_FAST, forceinline=True)
+def spans(row, left, top, right, bottom, first, last):
+    """Lines of a tile from which to which a Gaussian is visited; from first[line], a multiple of four, to last[line] (int32 (16,)) in each of them.
 
-    visited: uint64, bit 4 row + column of the 4x4 pixels of the tile in which it may be. left, top: the tile's first pixel. right, bottom: its last column and
-    line within the picture, from there. remains: float64 (16, 16), transmittance, negative once the pixel is finished; brought up to date. The k-th blended
-    pixel is at place[k] = 16 line + column (uint8), where the Gaussian has alpha[k] behind a transmittance of before[k] (float64, 256 of each).
+    row: of the Gaussian. left, top: the tile's first pixel. right, bottom: its last column and line within the picture, from there.
     """
-    mx, my = rows[i, MX] - left, rows[i, MY] - top
-    half = rows[i, HALF_HEIGHT]
-    low, high = max(np.ceil(my - half), 0.0), min(np.floor(my + half), bottom)
-    blended, finished = _NONE, 0
-    if high < low:
-        return blended, finished
-    half_a, mixed, half_c, limit = rows[i, HALF_A], rows[i, MIXED], rows[i, HALF_C], rows[i, LIMIT]
-    opacity, per_yy, per_a, slope = rows[i, OPACITY], rows[i, PER_YY], rows[i, PER_A], rows[i, SLOPE]
-    for y in range(np.uint64(np.int64(low)), np.uint64(np.int64(high) + 1)):
-        dy = np.float64(y) - my
-        half = np.sqrt(max(limit - dy * dy * per_yy, 0.0) * per_a) + MARGIN
+    real = row.dtype.type
+    mx, my = row[MX] - real(left), row[MY] - real(top)
+    limit, per_yy, per_a, slope = row[LIMIT], row[PER_YY], row[PER_A], row[SLOPE]
+    nothing, end, margin = real(0.0), real(TILE), real(MARGIN)
+    for y in range(TILE):
+        dy = real(y) - my
+        half = np.sqrt(max(limit - dy * dy * per_yy, nothing) * per_a) + margin
         middle = mx + slope * dy
-        low_x, high_x = max(np.ceil(middle - half), 0.0), min(np.floor(middle + half), right)
-        if high_x < low_x:
-            continue
-        along, constant_part = mixed * dy, half_c * dy * dy
-        for x in range(np.uint64(np.int64(low_x)), np.uint64(np.int64(high_x) + 1)):
-            transmittance = remains[y, x]
-            if transmittance < 0.0:
-                continue
-            dx = np.float64(x) - mx
-            energy = (half_a * dx + along) * dx + constant_part
-            if energy < 0.0:
-                continue
-            opaque = min(ALPHA_MAX, opacity * np.exp(-energy))
-            if opaque < ALPHA_MIN or not (visited >> ((y >> _TWO << _TWO) + (x >> _TWO))) & _ONE:
-                continue
-            after = transmittance * (1.0 - opaque)
-            if after < TRANSMITTANCE_MIN:
-                remains[y, x] = -transmittance
-                finished += 1
-                continue
-            remains[y, x] = after
-            place[blended] = (y << _FOUR) + x
-            alpha[blended] = opaque
-            before[blended] = transmittance
-            blended += _ONE
+        first[y] = np.int32(min(max(np.ceil(middle - half), nothing), end)) & -4
+        last[y] = np.int32(max(min(np.floor(middle + half), real(right)), real(-1.0)))
+    low, high = max(np.ceil(my - row[HALF_HEIGHT]), nothing), min(np.floor(my + row[HALF_HEIGHT]), real(bottom))
+    return np.uint64(np.int64(min(low, end))), np.uint64(np.int64(max(high, real(-1.0))) + 1)
+
+
+@numba.njit(error_model="numpy", fastmath=_FAST, forceinline=True)
+def window(row, visited, left, top, y, x):
+    """What LANES pixels of a tile, from column x of line y on, have in common for `visit`: (distance of the first from the mean in x, terms of E, opacity in
+    the four nearer and the four farther pixels), and their place in a plane.
+
+    visited: uint64, bit 4 row + column of the 4x4 pixels of the tile in which the Gaussian may be; x: a multiple of four.
+    """
+    real = row.dtype.type
+    dx, dy = real(np.int64(x)) - (row[MX] - real(left)), real(np.int64(y)) - (row[MY] - real(top))
+    tiny = visited >> ((y >> _TWO << _TWO) + (x >> _TWO))
+    near = row[OPACITY] if tiny & _ONE else real(0.0)
+    far = row[OPACITY] if tiny & _TWO and x < _TWELVE else real(0.0)
+    return (dx, row[HALF_A], row[MIXED] * dy, row[HALF_C] * dy * dy, near, far), y * _PITCH + x
+
+
+@numba.njit(error_model="numpy", fastmath=_FAST, forceinline=True)
+def visit(k, common, state, at, real):
+    """Blend a Gaussian in pixel k of a window at the place `at`: its distance from the mean in x; alpha, 0 where it is not blended; the transmittance before
+    and after it, negative where the pixel was finished before or is none of the picture, and where it is finished now. The rules of blending stand here.
+
+    state: of `new_tile`; its transmittance is brought up to date. real: its format.
+    """
+    dx, half_a, along, constant_part, near, far = common
+    d = dx + real(np.int64(k))
+    energy = (half_a * d + along) * d + constant_part
+    opaque = min(real(ALPHA_MAX), (near if k < _FOUR else far) * _exp(min(energy, real(_FAR)), real))
+    opaque = opaque if (opaque >= real(ALPHA_MIN)) & (energy >= real(0.0)) else real(0.0)
+    before = state[at + k]
+    after = before - before * opaque
+    lives = after >= real(TRANSMITTANCE_MIN)
+    after = after if lives else -abs(before)
+    state[at + k] = after
+    return d, opaque if lives else real(0.0), before, after
+
+
+@numba.njit(error_model="numpy", forceinline=True)
+def new_tile(planes, columns, lines, kind):
+    """float64 (planes * PLANE,): planes of a tile's pixels, the place of column x of line y at y PITCH + x of each. The first is the transmittance: 1 in the
+    pixels of the picture, negative beyond them and in those that are finished; the others are 0."""
+    state = np.zeros((1 + planes) * PLANE, kind)
+    for y in range(TILE):
+        for x in range(PITCH):
+            state[y * PITCH + x] = 1.0 if y < lines and x < columns else -1.0
+    return state
+
+
+@numba.njit(error_model="numpy", fastmath=_SUMS, forceinline=True)
+def _paint(common, at, state, red, green, blue, real):
+    """Blend a Gaussian in a window: in how many pixels it is blended, and how many it finishes; both as float numbers, as wide as the others."""
+    blended, finished = real(0.0), real(0.0)
+    for k in range(_LANES):
+        _, opaque, before, after = visit(k, common, state, at, real)
+        weight = opaque * before
+        state[_OWN + at + k] += weight * red
+        state[_OWN_2 + at + k] += weight * green
+        state[_OWN_3 + at + k] += weight * blue
+        blended += real(1.0) if opaque > real(0.0) else real(0.0)
+        finished += real(1.0) if (before > real(0.0)) & (after < real(0.0)) else real(0.0)
     return blended, finished
 
 
-@numba.njit(fastmath=_FAST, cache=True)
+@numba.njit(error_model="numpy", fastmath=_FAST, cache=True)
 def _blend_tile(t, rows, start, entry, mask, tiles_x, background, image, transmittance, used):
     height, width = transmittance.shape
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    remains = np.ones((TILE, TILE))
-    colour = np.zeros((TILE * TILE, 3))
-    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
+    state = new_tile(3, columns, lines, rows.dtype)
+    first, last = np.empty(TILE, np.int32), np.empty(TILE, np.int32)
     live = columns * lines
+    real = rows.dtype.type
     for e in range(start[t], start[t + 1]):
         if live == 0:
             break
-        i = np.uint64(entry[e])
-        count, finished = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
-        live -= finished
-        used[e] = count or finished
-        red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
-        for k in range(count):
-            at, weight = np.uint64(place[k]), alpha[k] * before[k]
-            colour[at, 0] += weight * red
-            colour[at, 1] += weight * green
-            colour[at, 2] += weight * blue
+        row = rows[np.uint64(entry[e])]
+        red, green, blue = row[RED], row[GREEN], row[BLUE]
+        met = real(0.0)
+        low, high = spans(row, left, top, columns - 1.0, lines - 1.0, first, last)
+        for y in range(low, high):
+            for x in range(first[y], last[y] + 1, LANES):
+                common, at = window(row, np.uint64(mask[e]), left, top, y, np.uint64(x))
+                blended, finished = _paint(common, at, state, red, green, blue, real)
+                met += blended + finished
+                live -= np.int64(finished)
+        used[e] = met > 0
     for y in range(lines):
         for x in range(columns):
-            remaining = abs(remains[y, x])
+            at = y * PITCH + x
+            remaining = abs(state[at])
             transmittance[top + y, left + x] = remaining
             for k in range(3):
-                image[top + y, left + x, k] = colour[y * TILE + x, k] + remaining * background[k]
+                image[top + y, left + x, k] = state[(k + 1) * PLANE + at] + remaining * background[k]
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def blend(rows, start, entry, mask, tiles_x, background, image, transmittance, used):
     """image (H, W, 3) over the background, transmittance (H, W) left; used: bool (E,), the entry was blended in a pixel or finished one.
 
@@ -164,49 +222,68 @@ def blend(rows, start, entry, mask, tiles_x, background, image, transmittance, u
         _blend_tile(np.int64(t), rows, start, entry, mask, tiles_x, background, image, transmittance, used)
 
 
-@numba.njit(fastmath=_FAST, cache=True)
+@numba.njit(error_model="numpy", fastmath=_SUMS, forceinline=True)
+def _slopes(common, at, state, red, green, blue, real):
+    """Brings `rest` up to date in a window; sums over its pixels: of G = dL/dE, of G dx, of G dx^2; the colour's derivative."""
+    nothing = real(0.0)
+    g, g_x, g_xx, d_red, d_green, d_blue = nothing, nothing, nothing, nothing, nothing, nothing
+    for k in range(_LANES):
+        dx, opaque, before, _ = visit(k, common, state, at, real)
+        s_red, s_green, s_blue, rest = state[_OWN + at + k], state[_OWN_2 + at + k], state[_OWN_3 + at + k], state[_OWN_4 + at + k]
+        weight = opaque * before
+        own = s_red * red + s_green * green + s_blue * blue
+        rest -= weight * own
+        state[_OWN_4 + at + k] = rest
+        slope = opaque * rest / (real(1.0) - opaque) - weight * own if opaque < real(ALPHA_MAX) else nothing
+        g += slope
+        g_x += slope * dx
+        g_xx += slope * dx * dx
+        d_red += weight * s_red
+        d_green += weight * s_green
+        d_blue += weight * s_blue
+    return g, g_x, g_xx, d_red, d_green, d_blue
+
+
+@numba.njit(error_model="numpy", fastmath=_FAST, cache=True)
 def _blend_back_tile(t, rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums):
-    """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, and `rest`, what is yet to come of the picture's product with its slope."""
+    """Walks the list as `_blend_tile` does. A pixel's state: the transmittance, the slope of its three channels, and `rest`, what is yet to come of the
+    picture's product with its slope."""
     height, width = image.shape[:2]
     left, top = t % tiles_x * TILE, t // tiles_x * TILE
     columns, lines = min(TILE, width - left), min(TILE, height - top)
-    remains = np.ones((TILE, TILE))
-    pixel = np.zeros((TILE * TILE, 4))  # slope of the three channels, rest
-    place, alpha, before = np.empty(TILE * TILE, np.uint8), np.empty(TILE * TILE), np.empty(TILE * TILE)
+    state = new_tile(4, columns, lines, rows.dtype)
+    first, last = np.empty(TILE, np.int32), np.empty(TILE, np.int32)
     for y in range(lines):
         for x in range(columns):
-            at = y * TILE + x
+            at = y * PITCH + x
             for k in range(3):
-                pixel[at, k] = slope_of_image[top + y, left + x, k]
-                pixel[at, 3] += slope_of_image[top + y, left + x, k] * image[top + y, left + x, k]
+                slope = slope_of_image[top + y, left + x, k]
+                state[(k + 1) * PLANE + at] = slope
+                state[4 * PLANE + at] += slope * image[top + y, left + x, k]
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
-        i = np.uint64(entry[e])
-        count, _ = visit(rows, i, np.uint64(mask[e]), left, top, columns - 1.0, lines - 1.0, remains, place, alpha, before)
-        mx, my = rows[i, MX] - left, rows[i, MY] - top
-        red, green, blue = rows[i, RED], rows[i, GREEN], rows[i, BLUE]
+        real = rows.dtype.type
+        row = rows[np.uint64(entry[e])]
+        my = np.float64(row[MY]) - top
+        red, green, blue = row[RED], row[GREEN], row[BLUE]
         g, g_x, g_y, g_xx, g_xy, g_yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         d_red, d_green, d_blue = 0.0, 0.0, 0.0
-        for k in range(count):
-            at = np.uint64(place[k])
-            s_red, s_green, s_blue = pixel[at, 0], pixel[at, 1], pixel[at, 2]
-            weight = alpha[k] * before[k]
-            d_red += weight * s_red
-            d_green += weight * s_green
-            d_blue += weight * s_blue
-            own = s_red * red + s_green * green + s_blue * blue
-            rest = pixel[at, 3] - weight * own
-            pixel[at, 3] = rest
-            if alpha[k] < ALPHA_MAX:
-                dx, dy = np.float64(at & _FIFTEEN) - mx, np.float64(at >> _FOUR) - my
-                slope = alpha[k] * (rest / (1.0 - alpha[k]) - before[k] * own)
-                g += slope
-                g_x += slope * dx
-                g_y += slope * dy
-                g_xx += slope * dx * dx
-                g_xy += slope * dx * dy
-                g_yy += slope * dy * dy
+        low, high = spans(row, left, top, columns - 1.0, lines - 1.0, first, last)
+        for y in range(low, high):
+            dy = np.float64(np.int64(y)) - my
+            for x in range(first[y], last[y] + 1, LANES):
+                common, at = window(row, np.uint64(mask[e]), left, top, y, np.uint64(x))
+                some, some_x, some_xx, some_red, some_green, some_blue = _slopes(common, at, state, red, green, blue, real)
+                g += some
+                g_x += some_x
+                g_y += some * dy
+                g_xx += some_xx
+                g_xy += some_x * dy
+                g_yy += some * dy * dy
+                d_red += some_red
+                d_green += some_green
+                d_blue += some_blue
         sums[e, G] = g
         sums[e, G_X] = g_x
         sums[e, G_Y] = g_y
@@ -218,18 +295,19 @@ def _blend_back_tile(t, rows, start, entry, mask, tiles_x, image, used, slope_of
         sums[e, D_BLUE] = d_blue
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def blend_back(rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums):
     """sums (E, 9) of every used entry; the others' are not written. slope_of_image: (H, W, 3), dL/d image."""
     for t in numba.prange(len(start) - 1):
         _blend_back_tile(np.int64(t), rows, start, entry, mask, tiles_x, image, used, slope_of_image, sums)
 
 
-@numba.njit(cache=True)
-def gather(entry, used, sums, total):
-    """Add the sums of the entries to those of their Gaussians, float64 (M, 9), in the order of the lists."""
+@numba.njit(error_model="numpy", cache=True)
+def gather(entry, used, sums, total, seen):
+    """Add the sums of the entries to those of their Gaussians, float64 (M, 9), in the order of the lists; seen: bool (M,), those with any."""
     for e in range(len(entry)):
         if used[e]:
             i = np.uint64(entry[e])
+            seen[i] = True
             for k in range(SUMS):
                 total[i, k] += sums[e, k]

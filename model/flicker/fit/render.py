@@ -29,9 +29,9 @@ from .through import ALL, tile_masks
 class Frame:
     """A view of parameters and what its way back needs. M Gaussians are in front of the camera, E entries in the lists of 16x16 tiles.
 
-    image: float64 (H, W, 3), neither clamped nor quantised. transmittance: float64 (H, W). index: int64 (M,), Gaussians near to far.
-    rows: float64 (M, COLUMNS), `raster`. start: int64 (tiles + 1,), entry: int32 (E,), into index; used: bool (E,), blended in a pixel or finishing one. mask:
-    uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
+    image: (H, W, 3), neither clamped nor quantised. transmittance: (H, W). index: int64 (M,), those Gaussians, ascending.
+    rows: (M, COLUMNS), `raster`, of the precision in which pictures are blended. start: int64 (tiles + 1,), entry: int32 (E,), into index, near to far; used:
+    bool (E,), blended in a pixel or finishing one. mask: uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
     bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
     """
 
@@ -51,7 +51,8 @@ class Frame:
 
 @dataclass(eq=False)
 class Gradient:
-    """values: float32 (M, P), dL/d parameters.values[index]. screen: float64 (M, 2), dL/d mean in pixels. index: of the frame."""
+    """values: float32 (S, P), dL/d parameters.values[index]. screen: float64 (S, 2), dL/d mean in pixels. index: int64 (S,), those of the frame that are in its
+    picture, ascending; the others' derivatives are 0."""
 
     values: np.ndarray
     screen: np.ndarray
@@ -61,18 +62,21 @@ class Gradient:
 def _masks(
     through: Configuration, frame: tuple[np.ndarray, ...], opacity: np.ndarray, depth: np.ndarray, camera: Camera, start: np.ndarray, entry: np.ndarray,
 ) -> np.ndarray:
-    """Masks of the entries. frame: index, table, rgb, bad, of `Frame`."""
-    index, table, rgb, bad = frame
-    good = np.flatnonzero(~bad)
-    number = np.cumsum(~bad) - 1
+    """Masks of the entries. frame: order, index, table, rgb, bad; order: int64 (M,), places in index, near to far; the rest of `Frame`."""
+    order, index, table, rgb, bad = frame
+    good = order[~bad[order]]
+    number = np.empty(len(index), np.int32)
+    number[good] = np.arange(len(good))
     projected = Projected.of(table, depth, opacity, rgb[good], index[good])
-    return tile_masks(through, projected, camera, start, number[entry].astype(np.int32))
+    return tile_masks(through, projected, camera, start, number[entry])
 
 
 def render(
     parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0), through: Configuration | None = None,
+    precision: type[np.floating] = np.float64,
 ) -> Frame:
-    """The picture over an RGB background; through: only where the masks of that machine let a Gaussian through (`through.through`)."""
+    """The picture over an RGB background; through: only where the masks of that machine let a Gaussian through (`through.through`). precision: of blending, and
+    of its derivatives."""
     count, (width, height) = len(parameters), (camera.width, camera.height)
     with np.errstate(all="ignore"):  # what is not finite is found below
         scales = np.exp(parameters.log_scales.astype(np.float64))
@@ -80,22 +84,26 @@ def render(
     table, depth = np.empty((count, 10)), np.empty(count, np.float32)
     view = np.ascontiguousarray(camera.rotation.T)
     geometry(parameters.means, scales, parameters.quats, view, camera.position, width, height, camera.fx, camera.fy, table, depth)
-    # Sorted by depth, then number: both in one key.
+    # By depth, then number: both in one key.
     index = np.flatnonzero(depth)
-    key = np.sort(depth[index].view(np.uint32).astype(np.uint64) << np.uint64(32) | index.astype(np.uint64))
-    index = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    key = np.sort(depth[index].view(np.uint32).astype(np.uint64) << np.uint64(32) | np.arange(len(index), dtype=np.uint64))
+    order = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
     rgb = np.empty((len(index), 3))
     colours(parameters.means, parameters.sh, index, camera.position, rgb)
-    rows, box, bad = np.empty((len(index), raster.COLUMNS)), np.empty((len(index), 4), np.int32), np.empty(len(index), np.bool_)
+    rows: np.ndarray = np.empty((len(index), raster.COLUMNS), precision)
+    box, bad = np.empty((len(index), 4), np.int32), np.empty(len(index), np.bool_)
     raster.make_rows(index, table, opacity, rgb, width, height, rows, box, bad)
     tiles_x, tiles_y = -(-width // TILE), -(-height // TILE)
-    start, entry = bin_boxes(box, tiles_x, tiles_y)
-    image, transmittance, used = np.empty((height, width, 3)), np.empty((height, width)), np.zeros(len(entry), np.bool_)
+    start, entry = bin_boxes(box[order], tiles_x, tiles_y)
+    entry = order.astype(np.int32)[entry]
+    image: np.ndarray = np.empty((height, width, 3), precision)
+    transmittance: np.ndarray = np.empty((height, width), precision)
+    used = np.zeros(len(entry), np.bool_)
     if through is None:
         mask = np.full(len(entry), ALL, np.uint16)
     else:
-        mask = _masks(through, (index, table, rgb, bad), opacity, depth, camera, start, entry)
-    raster.blend(rows, start, entry, mask, tiles_x, np.asarray(background, np.float64), image, transmittance, used)
+        mask = _masks(through, (order, index, table, rgb, bad), opacity, depth, camera, start, entry)
+    raster.blend(rows, start, entry, mask, tiles_x, np.asarray(background, precision), image, transmittance, used)
     return Frame(parameters, camera, image, transmittance, index, rows, start, entry, mask, used, bad, table)
 
 
@@ -109,13 +117,14 @@ def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -
     """
     camera, values = frame.camera, frame.parameters.values
     sums = np.empty((len(frame.entry), raster.SUMS))
-    slope = np.ascontiguousarray(slope_of_image, np.float64)
+    slope = np.ascontiguousarray(slope_of_image, frame.rows.dtype)
     raster.blend_back(frame.rows, frame.start, frame.entry, frame.mask, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
-    total = np.zeros((len(frame.index), raster.SUMS))
-    raster.gather(frame.entry, frame.used, sums, total)
-    gradient, screen = np.empty((len(frame.index), values.shape[1]), np.float32), np.empty((len(frame.index), 2))
+    total, seen = np.zeros((len(frame.index), raster.SUMS)), np.zeros(len(frame.index), np.bool_)
+    raster.gather(frame.entry, frame.used, sums, total, seen)
+    place = np.flatnonzero(seen)
+    gradient, screen = np.empty((len(place), values.shape[1]), np.float32), np.empty((len(place), 2))
     chain(
-        values, frame.index, frame.table, frame.rows, total, np.ascontiguousarray(camera.rotation.T), camera.position, camera.width, camera.height,
+        values, frame.index, place, frame.table, frame.rows, total, np.ascontiguousarray(camera.rotation.T), camera.position, camera.width, camera.height,
         camera.fx, camera.fy, coefficients, gradient, screen,
     )
-    return Gradient(gradient, screen, frame.index)
+    return Gradient(gradient, screen, frame.index[place])

@@ -30,7 +30,7 @@ def through(name: str) -> Configuration:
     return configuration
 
 
-@numba.njit(cache=True)
+@numba.njit(error_model="numpy", cache=True)
 def _join_tile(t, start, entry, tiles_x, sub_start, sub_entry, sub_mask, cols, rows, mask):
     left, top = t % tiles_x * _SIDE, t // tiles_x * _SIDE
     for k in range(_SIDE * _SIDE):
@@ -50,7 +50,7 @@ def _join_tile(t, start, entry, tiles_x, sub_start, sub_entry, sub_mask, cols, r
                         mask[e] |= np.uint16(1) << np.uint16((2 * y + m // 2) * 4 + 2 * x + m % 2)
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(error_model="numpy", parallel=True, cache=True)
 def _join(start, entry, tiles_x, sub_start, sub_entry, sub_mask, cols, rows, mask):
     for t in numba.prange(len(start) - 1):
         _join_tile(np.int64(t), start, entry, tiles_x, sub_start, sub_entry, sub_mask, cols, rows, mask)

@@ -39,9 +39,12 @@ from .through import through
 
 MEASURE_EVERY = 500  # iterations
 SAVE_EVERY = 500
-# Learning rates of the INRIA code: of means in extents of the scene, first and last.
+# Learning rates of the INRIA code, which makes 30,000 iterations: of means in extents of the scene, first and last.
 _MEAN_RATES = (1.6e-4, 1.6e-6)
 _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5e-3, 1 / 20
+# A fit from nothing makes fewer and takes longer steps, but in opacity: of means by the square root of how many fewer, at most _LONGEST; of the others by
+# twice as much.
+_ITERATIONS, _LONGEST = 30_000, 4.0
 _EXPOSURE_RATES = (1e-2, 1e-3)
 _LAST_RATE = 0.1  # of all rates but the means', which fall evenly over the last third
 _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
@@ -54,7 +57,7 @@ class Options:
     tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on.
     through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
     Gaussian falls below (`LeastSize`). squared: share of the iterations, the last ones, in which the squared error is minimised (`log_error_slope`), with
-    moments that begin anew.
+    moments that begin anew; None: half of a fit from nothing, none of one that tunes.
     """
 
     iterations: int = 4000
@@ -67,7 +70,13 @@ class Options:
     through: str | None = None
     least: float = 0.0
     begin: float = 2 / 3
-    squared: float = 0.0
+    squared: float | None = None
+
+    @property
+    def first_squared(self) -> int:
+        """The first iteration that minimises the squared error."""
+        share = self.squared if self.squared is not None else 0.0 if self.tune else 0.5
+        return round((1.0 - share) * self.iterations)
 
 
 @dataclass(frozen=True)
@@ -99,7 +108,10 @@ class Trainer:
         self.dataset, self.options = dataset, options
         self.machine = None if options.through is None else through(options.through)
         self.rng = np.random.default_rng(options.seed)
-        self.parameters = start(dataset, options.gaussians, options.degree, self.rng) if parameters is None else Parameters(parameters.values.copy())
+        self._photos = [shot.load(options.background) for shot in dataset.fitted]
+        self._test_photos = [shot.load(options.background) for shot in dataset.tests]
+        begun = start(dataset, self._photos, options.gaussians, options.degree, self.rng) if parameters is None else Parameters(parameters.values.copy())
+        self.parameters = begun
         self.first = len(self.parameters)
         self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes()).hexdigest()
         self.moments = Adam.of(self.parameters.values)
@@ -111,23 +123,24 @@ class Trainer:
         self.extent = extent_of([shot.camera for shot in dataset.fitted])
         self._least = LeastSize(options.least, [shot.camera for shot in dataset.fitted])
         self._least.hold(self.parameters.values)
-        self._photos = [shot.load(options.background) for shot in dataset.fitted]
-        self._test_photos = [shot.load(options.background) for shot in dataset.tests]
 
     # -- one step ---------------------------------------------------------------------------------------------------------------------
 
     def rates(self) -> np.ndarray:
         """float32 (P,): learning rates of this iteration."""
         done = self.iteration / self.options.iterations
+        longer, rest = min(_LONGEST, max(1.0, (_ITERATIONS / self.options.iterations) ** 0.5)), 2.0 * _SH_REST
+        others = 2.0 * longer
         if self.options.tune:
             done = self.options.begin + (1.0 - self.options.begin) * done
+            longer, others, rest = 1.0, 1.0, _SH_REST
         falling = _LAST_RATE ** max(0.0, 3.0 * done - 2.0)
         rates = np.empty(self.parameters.values.shape[1])
         first, last = _MEAN_RATES
-        rates[:SCALE] = self.extent * first * (last / first) ** done
-        rates[SCALE:QUAT], rates[QUAT:LOGIT], rates[LOGIT] = _SCALE_RATE * falling, _QUAT_RATE * falling, _LOGIT_RATE * falling
-        rates[SH:] = _SH_RATE * _SH_REST * falling
-        rates[SH : SH + 3] = _SH_RATE * falling
+        rates[:SCALE] = self.extent * longer * first * (last / first) ** done
+        rates[SCALE:QUAT], rates[QUAT:LOGIT], rates[LOGIT] = _SCALE_RATE * others * falling, _QUAT_RATE * others * falling, _LOGIT_RATE * falling
+        rates[SH:] = _SH_RATE * others * rest * falling
+        rates[SH : SH + 3] = _SH_RATE * others * falling
         return rates.astype(np.float32)
 
     @property
@@ -143,11 +156,10 @@ class Trainer:
             self.order = self.rng.permutation(len(self._photos))
         view, self.order = int(self.order[0]), self.order[1:]
         camera, photo = self.dataset.fitted[view].camera, self._photos[view]
-        frame = render(self.parameters, camera, self.options.background, self.machine)
-        first = round((1.0 - self.options.squared) * self.options.iterations)  # that minimises the squared error
-        if self.iteration == first:
+        frame = render(self.parameters, camera, self.options.background, self.machine, np.float32)
+        if self.iteration == self.options.first_squared:
             self.moments = Adam.of(self.parameters.values)
-        measure = loss_and_slope if self.iteration < first else log_error_slope
+        measure = loss_and_slope if self.iteration < self.options.first_squared else log_error_slope
         if self.options.exposure:
             change = self.exposures[view].reshape(3, 4)
             loss, slope = measure(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
@@ -165,10 +177,10 @@ class Trainer:
         self.score[found.index] += np.hypot(found.screen[:, 0] * camera.width / 2, found.screen[:, 1] * camera.height / 2)
         self.seen[found.index] += 1
         self.iteration += 1
-        broken = refused | frame.bad
-        if broken.any():
-            self.removed += int(broken.sum())
-            self._select(np.setdiff1d(np.arange(len(self.parameters)), found.index[broken]))
+        broken = np.union1d(found.index[refused], frame.index[frame.bad])
+        if len(broken):
+            self.removed += len(broken)
+            self._select(np.setdiff1d(np.arange(len(self.parameters)), broken))
         self._grow()
         return loss
 

@@ -43,3 +43,12 @@ def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0)
             raise FlickerError(f"{path}: pixels of more than 8 bits (mode {picture.mode}) are not read")
         rgba = np.asarray(picture.convert("RGBA"), np.float64) / 255.0
         return rgba[..., :3] * rgba[..., 3:] + np.asarray(background, np.float64) * (1.0 - rgba[..., 3:])
+
+
+def load_coverage(path: str | Path) -> np.ndarray | None:
+    """float64 (H, W) in [0, 1], alpha of a picture; None where it is 1 everywhere."""
+    with _opened(path) as picture:
+        if not picture.has_transparency_data:
+            return None
+        alpha = np.asarray(picture.convert("RGBA").getchannel("A"), np.float64) / 255.0
+    return alpha if alpha.min() < 1.0 else None
