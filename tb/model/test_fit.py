@@ -547,8 +547,8 @@ def test_rates(nerf) -> None:
             tuned.iteration = round(100 * share)
             whole.iteration = round(300 * (first + (1 - first) * share))
             np.testing.assert_allclose(tuned.rates(), whole.rates(), rtol=1e-5)
-    for iterations, longer in ((30_000, 1.0), (7_500, 2.0), (100, 4.0)):
-        fitted = Trainer(data, Options(iterations=iterations), given)
+    for iterations, longer, options in ((30_000, 1.0, {}), (7_500, 2.0, {}), (100, 4.0, {}), (100, 1.5, {"longer": 1.5, "tune": True, "begin": 0.0})):
+        fitted = Trainer(data, Options(iterations=iterations, **options), given)
         for share in (0.0, 1.0):
             fitted.iteration, whole.iteration = round(iterations * share), round(300 * share)
             ratio = fitted.rates() / whole.rates()

@@ -30,6 +30,10 @@ def fit(
     out: Annotated[Path, typer.Option("--out", "-o", help="scene, .ply; cameras.json of the test photographs goes beside it")],
     scene: Annotated[Path | None, typer.Option("--from", help="scene of these photographs to fine-tune, as in the last third of a fit")] = None,
     begin: Annotated[float | None, typer.Option(help="of --from: share of a fit whose learning rates are passed; default: 2/3", min=0.0, max=1.0)] = None,
+    longer: Annotated[float | None, typer.Option(
+        help="steps longer than the INRIA code's by this factor, twice as much those of sizes and colours; default: by --iterations; with --from: its own",
+        min=0.01, max=100.0,
+    )] = None,
     through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     squared: Annotated[float | None, typer.Option(
@@ -63,7 +67,7 @@ def fit(
     if begin is not None and scene is None:
         raise FlickerError("--begin: of which scene, --from?")
     options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through, least,
-                      Options.begin if begin is None else begin, squared)
+                      Options.begin if begin is None else begin, squared, longer)
     data = load_dataset(dataset, size)
     text = cameras_text([shot.camera for shot in data.tests])
     cameras = _cameras_beside(out, text)

@@ -43,8 +43,8 @@ SAVE_EVERY = 500
 _MEAN_RATES = (1.6e-4, 1.6e-6)
 _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5e-3, 1 / 20
 # A fit from nothing makes fewer and takes longer steps, but in opacity: of means by the square root of how many fewer, at most _LONGEST; of the others by
-# twice as much.
-_ITERATIONS, _LONGEST = 30_000, 4.0
+# _OTHERS as much, of higher harmonics by _OTHERS as much again.
+_ITERATIONS, _LONGEST, _OTHERS = 30_000, 4.0, 2.0
 _EXPOSURE_RATES = (1e-2, 1e-3)
 _LAST_RATE = 0.1  # of all rates but the means', which fall evenly over the last third
 _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
@@ -57,7 +57,8 @@ class Options:
     tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on.
     through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
     Gaussian falls below (`LeastSize`). squared: share of the iterations, the last ones, in which the squared error is minimised (`log_error_slope`), with
-    moments that begin anew; None: half of a fit from nothing, none of one that tunes.
+    moments that begin anew; None: half of a fit from nothing, none of one that tunes. longer: factor of the steps of means, others follow (docs/fit.md); None: by
+    the number of iterations, or the INRIA code's own steps where a scene is tuned.
     """
 
     iterations: int = 4000
@@ -71,6 +72,7 @@ class Options:
     least: float = 0.0
     begin: float = 2 / 3
     squared: float | None = None
+    longer: float | None = None
 
     @property
     def first_squared(self) -> int:
@@ -129,11 +131,12 @@ class Trainer:
     def rates(self) -> np.ndarray:
         """float32 (P,): learning rates of this iteration."""
         done = self.iteration / self.options.iterations
-        longer, rest = min(_LONGEST, max(1.0, (_ITERATIONS / self.options.iterations) ** 0.5)), 2.0 * _SH_REST
-        others = 2.0 * longer
+        longer, others, rest = 1.0, 1.0, _SH_REST
+        if self.options.longer is not None or not self.options.tune:
+            longer = self.options.longer or min(_LONGEST, max(1.0, (_ITERATIONS / self.options.iterations) ** 0.5))
+            others, rest = _OTHERS * longer, _OTHERS * rest
         if self.options.tune:
             done = self.options.begin + (1.0 - self.options.begin) * done
-            longer, others, rest = 1.0, 1.0, _SH_REST
         falling = _LAST_RATE ** max(0.0, 3.0 * done - 2.0)
         rates = np.empty(self.parameters.values.shape[1])
         first, last = _MEAN_RATES
