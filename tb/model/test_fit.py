@@ -479,8 +479,9 @@ def test_start_where_nothing_is_empty(shots, tmp_path) -> None:
         trainer = Trainer(load_dataset(tmp_path, size), Options(10, 1000))
         assert trainer.first == 300
         for shot, mask in zip(trainer.dataset.fitted, [m for k, m in enumerate(masks) if k % 8]):
+            scale = WIDTH // size
+            assert np.array_equal(shot.solid(), mask.reshape(HEIGHT // scale, scale, WIDTH // scale, scale).any(axis=(1, 3)))
             x, y, z = ((trainer.parameters.means - shot.camera.position) @ shot.camera.rotation).T
-            scale = WIDTH / size
             column, line = ((f * v / z + 0.5 * n) * scale for f, v, n in ((shot.camera.fx, x, shot.camera.width), (shot.camera.fy, y, shot.camera.height)))
             reach = 2 * scale
             near = [mask[max(0, int(v - reach)) : int(v + reach) + 1, max(0, int(u - reach)) : int(u + reach) + 1].any() for u, v in zip(column, line)]

@@ -17,6 +17,7 @@ from .parameters import LOGIT, MEAN, QUAT, SCALE, SH, Parameters
 OPACITY = 0.1
 RANDOM = 0.3  # share of the largest number of Gaussians that random starts have
 _TRIES = 16  # random places tried for each that is kept
+_BLOCK = 4096  # places whose colours are held at once
 
 
 def extent_of(cameras: Sequence[Camera]) -> float:
@@ -72,19 +73,21 @@ def _random_places(cameras: Sequence[Camera], solid: Sequence[np.ndarray | None]
             return _candidates(cameras, everywhere, low, high, _TRIES * count, rng)[:count]
         margin = 0.5 * (found.max(axis=0) - found.min(axis=0)) / len(found) ** (1 / 3)
         low, high = np.maximum(low, found.min(axis=0) - margin), np.minimum(high, found.max(axis=0) + margin)
-        found = _candidates(cameras, solid, low, high, _TRIES * count, rng)
+        found = max(found, _candidates(cameras, solid, low, high, _TRIES * count, rng), key=len)
     return found[:count]
 
 
 def _colours_of(places: np.ndarray, cameras: Sequence[Camera], photos: Sequence[np.ndarray]) -> np.ndarray:
     """float64 (N, 3): median of what the photographs show at each place, grey where none does."""
-    shown = np.full((len(cameras), len(places), 3), np.nan, np.float32)
-    for row, camera, photo in zip(shown, cameras, photos):
-        seen, line, column = _seen(places, camera)
-        row[seen] = photo[line, column]
     middle = np.full(places.shape, 0.5)
-    any_ = ~np.isnan(shown[..., 0]).all(axis=0)
-    middle[any_] = np.nanmedian(shown[:, any_], axis=0)
+    for first in range(0, len(places), _BLOCK):
+        block = places[first : first + _BLOCK]
+        shown = np.full((len(cameras), len(block), 3), np.nan, np.float32)
+        for row, camera, photo in zip(shown, cameras, photos):
+            seen, line, column = _seen(block, camera)
+            row[seen] = photo[line, column]
+        some = ~np.isnan(shown[..., 0]).all(axis=0)
+        middle[first : first + _BLOCK][some] = np.nanmedian(shown[:, some], axis=0)
     return middle
 
 
