@@ -2,7 +2,9 @@
 
 A tile is drawn by one thread, entries in the order of its list, and writes nothing that another tile writes: the results have the same bits whatever the
 number of threads. Indices are unsigned: signed ones may count from the end, which costs a test at every access. What a thread does stands in a function of its
-own, which halves the time to compile. `visit` is the one place where pixels are chosen and transmittance is counted down: whoever walks a list calls it.
+own, which halves the time to compile. `visit` is the one place where pixels are chosen and transmittance is counted down: whoever walks a list calls it, over
+windows of LANES pixels of a line, and does all it has to do with a pixel in the same loop, without branches, which the compiler then vectorises. The format of
+the rows, float32 or float64, is that of everything.
 """
 
 from __future__ import annotations
@@ -156,8 +158,9 @@ def visit(k, common, state, at, real):
 
 @numba.njit(error_model="numpy", forceinline=True)
 def new_tile(planes, columns, lines, kind):
-    """float64 (planes * PLANE,): planes of a tile's pixels, the place of column x of line y at y PITCH + x of each. The first is the transmittance: 1 in the
-    pixels of the picture, negative beyond them and in those that are finished; the others are 0."""
+    """((1 + planes) PLANE,), of format `kind`: planes of a tile's pixels, the place of column x of line y at y PITCH + x of each. The first is the
+    transmittance: 1 in the pixels of the picture, negative beyond them and in those that are finished; the others are 0. All in one array, so that the compiler
+    sees that they do not overlap."""
     state = np.zeros((1 + planes) * PLANE, kind)
     for y in range(TILE):
         for x in range(PITCH):
@@ -260,10 +263,10 @@ def _blend_back_tile(t, rows, start, entry, mask, tiles_x, image, used, slope_of
                 slope = slope_of_image[top + y, left + x, k]
                 state[(k + 1) * PLANE + at] = slope
                 state[4 * PLANE + at] += slope * image[top + y, left + x, k]
+    real = rows.dtype.type
     for e in range(start[t], start[t + 1]):
         if not used[e]:
             continue
-        real = rows.dtype.type
         row = rows[np.uint64(entry[e])]
         my = np.float64(row[MY]) - top
         red, green, blue = row[RED], row[GREEN], row[BLUE]
