@@ -25,7 +25,9 @@ COLUMNS = 14
 # Sums over pixels, of an entry: G = dL/dE, then G times dx, dy, dx^2, dx dy, dy^2; the colour's derivative.
 G, G_X, G_Y, G_XX, G_XY, G_YY, D_RED, D_GREEN, D_BLUE = range(9)
 SUMS = 9
-MARGIN = 1e-3  # pixels and parts of LIMIT by which more is visited than alpha >= 1/255 needs: rounding never decides
+# Pixels and parts of LIMIT by which more is visited than alpha >= 1/255 needs, so that rounding never decides; in float32 as long as a splat's mean is within
+# some 10,000 pixels of the tile.
+MARGIN = 1e-3
 COLOUR_MAX = 1e4  # a Gaussian with more is taken for a broken one
 LANES = 8  # pixels of a line that are visited at once
 PITCH = TILE + LANES  # of a tile's lines in its planes: what is visited beyond its end is no pixel

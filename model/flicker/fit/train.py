@@ -42,8 +42,8 @@ SAVE_EVERY = 500
 # Learning rates of the INRIA code, which makes 30,000 iterations: of means in extents of the scene, first and last.
 _MEAN_RATES = (1.6e-4, 1.6e-6)
 _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5e-3, 1 / 20
-# A fit from nothing makes fewer and takes longer steps, but in opacity: of means by the square root of how many fewer, at most _LONGEST; of the others by
-# _OTHERS as much, of higher harmonics by _OTHERS as much again.
+# A fit from nothing makes fewer and takes longer steps, but in opacity: of means by the square root of how many fewer, at most _LONGEST; of the others _OTHERS
+# times as much longer, of higher harmonics _OTHERS times again.
 _ITERATIONS, _LONGEST, _OTHERS = 30_000, 4.0, 2.0
 _EXPOSURE_RATES = (1e-2, 1e-3)
 _LAST_RATE = 0.1  # of all rates but the means', which fall evenly over the last third
@@ -131,9 +131,12 @@ class Trainer:
     def rates(self) -> np.ndarray:
         """float32 (P,): learning rates of this iteration."""
         done = self.iteration / self.options.iterations
-        longer, others, rest = 1.0, 1.0, _SH_REST
-        if self.options.longer is not None or not self.options.tune:
-            longer = self.options.longer or min(_LONGEST, max(1.0, (_ITERATIONS / self.options.iterations) ** 0.5))
+        longer, others, rest = self.options.longer, 1.0, _SH_REST
+        if longer is None and not self.options.tune:
+            longer = min(_LONGEST, max(1.0, (_ITERATIONS / self.options.iterations) ** 0.5))
+        if longer is None:
+            longer = 1.0
+        else:
             others, rest = _OTHERS * longer, _OTHERS * rest
         if self.options.tune:
             done = self.options.begin + (1.0 - self.options.begin) * done
