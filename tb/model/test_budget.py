@@ -16,21 +16,24 @@ import pytest
 import scene_samples as samples
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
+from scipy.spatial.transform import Rotation
 
 from flicker.budget.curve import Curve
 from flicker.budget.degrees import cut, cuts, losses
 from flicker.budget.goal import Goal, Kind, chip_cost, price
+from flicker.budget.merge import COLOUR, loss, merge, united
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.refit import ViewMatrix, refit
 from flicker.budget.score import Score, scores
-from flicker.budget.tune import quality
+from flicker.budget.tune import Rates, quality
 from flicker.budget.views import HOLD_EVERY, cameras_of, machine_psnr, reference_psnr
 from flicker.budget.write import save
 from flicker.chip.scene_cost import scene_cost
 from flicker.errors import FlickerError
 from flicker.fit.loss import log_error_slope
-from flicker.fit.parameters import LOGIT, SH, Parameters
+from flicker.fit.parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from flicker.fit.render import render
+from flicker.front.projection import colours
 from flicker.scene.camera import Camera, cameras_text, orbit_camera
 from flicker.scene.files import Scene, load_scene, save_ply
 from flicker.scene.packed import PackedFormat, load_packed
@@ -94,6 +97,79 @@ def test_price() -> None:
     assert np.corrcoef(of, cost.moved)[0, 1] > 0.9 and of.sum() == pytest.approx(cost.moved.sum(), rel=0.15)
     assert (price(found, Kind.KEEP, 1.0, np.full(len(scene), 4)) == 1).all()
     assert (price(found, Kind.CYCLES, 4.0, np.full(len(scene), 4)) > price(found, Kind.CYCLES, 1.0, np.full(len(scene), 4)))[found.pixels > 0].all()
+
+
+# -- merging --------------------------------------------------------------------------------------------------------------------------
+
+
+def moments(row: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Opacity times the area of the broadest side, mean and covariance of a row of parameters."""
+    scales = np.exp(row[SCALE:QUAT].astype(np.float64))
+    axes = Rotation.from_quat(row[QUAT:LOGIT], scalar_first=True).as_matrix() * scales
+    return np.prod(np.sort(scales)[1:]) / (1 + np.exp(-float(row[LOGIT]))), row[:SCALE].astype(np.float64), axes @ axes.T
+
+
+def test_loss_of_a_merger() -> None:
+    """The mixture's moments, one pair at a time; Runnalls' bound of them; colours differ as they do over all directions."""
+    values = Parameters.of(small(40, 2)).values
+    a, b = values[:20], values[20:]
+    grey = b.copy()
+    grey[:, SH:] = a[:, SH:]
+    both, lost, apart = united(a, b), loss(a, b), loss(a, grey)
+    for k in range(len(a)):
+        (wa, ma, ca), (wb, mb, cb), (_, m, c) = moments(a[k]), moments(b[k]), moments(both[k])
+        wa, wb = wa / (wa + wb), wb / (wa + wb)
+        mean = wa * ma + wb * mb
+        wide = wa * (ca + np.outer(ma - mean, ma - mean)) + wb * (cb + np.outer(mb - mean, mb - mean))
+        assert np.allclose(m, mean, rtol=1e-5, atol=1e-5) and np.allclose(c, wide, rtol=1e-4, atol=1e-5 * wide.max())
+        bound = 0.5 * (np.log(np.linalg.det(wide)) - wa * np.log(np.linalg.det(ca)) - wb * np.log(np.linalg.det(cb)))
+        assert apart[k] == pytest.approx(bound, rel=1e-4, abs=1e-4) and bound > 0
+    rays = np.random.default_rng(seed()).normal(size=(20_000, 3)).astype(np.float32)
+    flat = np.zeros((len(rays), *a[:1, SH:].reshape(1, -1, 3).shape[1:]), np.float32)
+    flat[:] = (a[0, SH:] - b[0, SH:]).reshape(-1, 3)
+    seen = np.empty((len(rays), 3))
+    flat[:, 0] += np.float32(100)  # no channel at its clamp
+    colours(rays, flat, np.arange(len(rays)), np.zeros(3), seen)
+    square = ((seen - 0.5 - 100 * 0.28209479177387814) ** 2).mean()
+    assert lost[0] - apart[0] == pytest.approx(square / COLOUR**2, rel=0.05)
+
+
+def test_merge() -> None:
+    """Gaussians that lie twice at one place, each half as dense, become the one whose picture they have; others stay, bit for bit; what loses more than the
+    limit stays."""
+    scene = small(200)
+    scene.opacities = np.minimum(scene.opacities, np.float32(0.9))
+    values, cameras = Parameters.of(scene).values, look(scene, 3)
+    halves = values.copy()
+    opacity = 1 / (1 + np.exp(-values[:, LOGIT].astype(np.float64)))
+    half = 1 - np.sqrt(1 - opacity)
+    halves[:, LOGIT] = np.log(half / (1 - half))
+    twins = np.concatenate([values[:50], np.repeat(halves[50:], 2, axis=0)])
+    found = merge(twins, 1e-4)
+    assert len(found) == 200 and found[:50].tobytes() == values[:50].tobytes()
+    wanted = [render(Parameters(values), camera).image for camera in cameras]
+    assert quality(Parameters(found), cameras, wanted) > 80
+    other = twins.copy()
+    other[51::2, SH] += np.float32(1.0)  # of one twin each, from 51 on
+    assert len(merge(other, 1e-4)) == len(other)
+    few = values[:9]  # all are neighbours
+    least = min(loss(few[i : i + 1], few[k : k + 1])[0] for i in range(9) for k in range(i))
+    assert merge(few, 0.999 * least).tobytes() == few.tobytes() and len(merge(few, 1.001 * least)) == 8
+    assert len(merge(few[:1], 1.0)) == 1
+
+
+def test_merging_in_a_reduction() -> None:
+    """A row says what merging cost; the share that is kept is of the full scene; in a search for dB it stays only where the held-out views allow it."""
+    scene = small(300)
+    found = start(scene, keeping(0.3, merge=5.0, steps=0, last=0, degrees=0, refit=0), 7)
+    found.run()
+    full, merged, *_ = found.rows
+    assert merged.step == "merging" and 90 < merged.gaussians < full.gaussians and merged.decibels < 60 and merged.cost is not None
+    assert full.cost is not None and merged.cost.bytes < full.cost.bytes and len(found.parameters) == 90
+    for wanted in (merged.decibels - 1e-9, merged.decibels + 1e-9):
+        found = start(scene, keeping(0.5, goal=Goal(Kind.DB, wanted), merge=5.0, steps=0, last=0, degrees=0, refit=0, frame=(32, 32)), 7)
+        found.advance()
+        assert len(found.good[0]) == (merged.gaussians if wanted < merged.decibels else full.gaussians)
 
 
 # -- least squares --------------------------------------------------------------------------------------------------------------------
@@ -212,6 +288,20 @@ def test_keep() -> None:
     assert first and last and last.bytes < first.bytes and last.image_bytes < first.image_bytes and (last.lane_cycles or 0) > 0
 
 
+def test_rates_of_a_reduction(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps are the longest at the beginning of every tuning, after a removal and at the end, and fall evenly, in logarithms, to a twentieth."""
+    asked: list[float] = []
+
+    def step(parameters, moments, camera, wanted, rates, *rest):
+        asked.append(float(rates[SCALE]))
+        return 20.0, np.zeros(0, np.int64)
+
+    monkeypatch.setattr("flicker.budget.reduce.tune_step", step)
+    start(small(100), keeping(0.3, rounds=2, steps=3, last=5, degrees=0, refit=0, frame=(32, 32)), 7).run()
+    wanted = [Rates().scale * 20 ** -(k / steps) for steps in (3, 3, 5) for k in range(steps)]
+    assert asked == pytest.approx(wanted, rel=1e-6)
+
+
 def test_through() -> None:
     """All Gaussians, drawn through a contribution test: measured and tuned as the machine draws them, which wins back a part of what it loses."""
     scene = small(600)
@@ -245,7 +335,7 @@ def test_least() -> None:
 @pytest.mark.parametrize("goal", [Goal(Kind.KEEP, 0.5), pytest.param(Goal(Kind.DB, 45.0), marks=pytest.mark.slow)])
 def test_interrupted(goal: Goal, tmp_path: Path) -> None:
     """Continued from any of its checkpoints, a run ends with the same bits and the same table."""
-    scene, options = small(150), keeping(0.5, goal=goal, steps=4, last=8, degrees=0.1, frame=(32, 32))
+    scene, options = small(150), keeping(0.5, goal=goal, steps=4, last=8, degrees=0.1, frame=(32, 32), merge=0.5)
     whole = start(scene, options, 7)
     states: list[Path] = []
 
@@ -260,7 +350,7 @@ def test_interrupted(goal: Goal, tmp_path: Path) -> None:
         if whole.phase not in (before, Phase.DONE) and (before, whole.phase) not in seen or whole.step == 3:
             seen.add((before, whole.phase))
             kept()
-    assert {phase for pair in seen for phase in pair} >= {Phase.REMOVE, Phase.TUNE, Phase.DEGREES, Phase.REFIT, Phase.LAST}
+    assert {phase for pair in seen for phase in pair} >= {Phase.MERGE, Phase.REMOVE, Phase.TUNE, Phase.DEGREES, Phase.REFIT, Phase.LAST}
     for state in states[:: 2 if goal.kind is Kind.KEEP else 5]:
         other = start(scene, options, 7)
         other.restore(state)
@@ -331,7 +421,7 @@ def test_views(tmp_path: Path) -> None:
     """Every sixth is held out; orbits have several distances and heights; files are resized, and say what is wrong with them."""
     scene = small()
     fitted, held = cameras_of(scene)
-    assert (len(fitted), len(held)) == (40, 8) and HOLD_EVERY == 6
+    assert (len(fitted), len(held)) == (120, 24) and HOLD_EVERY == 6
     middle = np.mean([c.position for c in [*fitted, *held]], axis=0)
     distances = [np.linalg.norm(c.position - middle) for c in held]
     assert max(distances) > 1.3 * min(distances) and np.ptp([c.position[1] for c in held]) > 0.3

@@ -5,9 +5,9 @@
     reducer.run()
     small = reducer.scene()
 
-Rounds of scores, removal and tuning come nearer to the goal; then SH coefficients that say little go, colours are refitted by least squares and everything
-is tuned until the held-out views gain no more. A reducer's state is its arrays, a random generator and a few numbers: `save` writes them, `restore` continues
-to the same bits.
+Near-equal neighbours may become one. Rounds of scores, removal and tuning come nearer to the goal; then SH coefficients that say little go, colours are
+refitted by least squares and everything is tuned until the held-out views gain no more. A reducer's state is its arrays, a random generator and a few numbers:
+`save` writes them, `restore` continues to the same bits.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from ..scene.gaussians import Scene
 from ..scene.packed import PackedFormat
 from .degrees import cut, cuts, losses
 from .goal import FrameCost, Goal, Kind, chip_cost, price
+from .merge import merge
 from .refit import ITERATIONS, refit
 from .score import Score, scores
 from .tune import Rates, quality, tune_step
@@ -56,6 +57,7 @@ _FULL_RATE = 38.0  # dB at which rates are those of `Rates`; nearer pictures nee
 
 
 class Phase(str, Enum):
+    MERGE = "merge"
     REMOVE = "remove"
     TUNE = "tune"
     DEGREES = "degrees"
@@ -69,7 +71,8 @@ class Options:
     """rounds: removals on the way to a known goal. steps: of tuning after each. last: of the tuning at the end, at most. degrees: SH coefficients go as long as
     they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted. through: name of the configuration
     through whose contribution test the small scene is drawn; None: as the reference draws it. least: standard deviation in pixels that no Gaussian falls below
-    (`fit.least`), from the first removal on. refit: steps of conjugate gradients of the least squares of colours; 0: none."""
+    (`fit.least`), from the first removal on. refit: steps of conjugate gradients of the least squares of colours; 0: none. merge: what pairs of near-equal
+    neighbours may lose as one Gaussian (`merge`), before the first removal; 0: none is merged."""
 
     goal: Goal
     by: Score = Score.CHANGE
@@ -83,6 +86,7 @@ class Options:
     through: str | None = None
     least: float = 0.0
     refit: int = ITERATIONS
+    merge: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ class Reducer:
         self._least = LeastSize(options.least, self.fitted)
         self.rng = np.random.default_rng(options.seed)
         self.order = np.zeros(0, np.int64)  # fitted cameras that come next
-        self.phase, self.step, self.round, self.removed = Phase.REMOVE, 0, 0, 0
+        self.phase, self.step, self.round, self.removed = Phase.MERGE, 0, 0, 0
         self.ratio = _SHRINK
         self.level = 0.0  # dB of the picture that steps are sized for
         self.rows: list[Row] = []
@@ -187,13 +191,23 @@ class Reducer:
         self.parameters, self.coefficients = Parameters(values.copy()), coefficients.copy()
         self.moments = Adam.of(values)
 
+    def _merge(self) -> None:
+        """What the full scene is and costs; sizes are held, near-equal neighbours become one."""
+        self._told_row("full scene", float("inf") if self.machine is None else self.measure(), self.frame_cost(lanes=True))
+        self._least.hold(self.parameters.values)
+        self.good = self.parameters.values.copy(), *self.good[1:]
+        self.phase = Phase.REMOVE
+        if self.options.merge:
+            values = merge(self.parameters.values, self.options.merge)
+            self.parameters, self.coefficients, self.moments = Parameters(values), self.coefficients[: len(values)], Adam.of(values)
+            decibels = self.measure()
+            if self.options.goal.kind is Kind.DB and decibels >= self.options.goal.value:
+                self.good = values.copy(), self.coefficients.copy(), decibels
+            self._told_row("merging", decibels, self.frame_cost(lanes=True))
+
     def _remove(self) -> None:
         """A round: those of the lowest score go, as many as bring the scene nearer to the goal."""
         goal, n = self.options.goal, len(self.parameters)
-        if not self.rows:
-            self._told_row("full scene", float("inf") if self.machine is None else self.measure(), self.frame_cost(lanes=True))
-            self._least.hold(self.parameters.values)
-            self.good = self.parameters.values.copy(), *self.good[1:]
         self.round += 1
         if goal.kind is Kind.KEEP:
             known = self.round / self.options.rounds
@@ -340,11 +354,13 @@ class Reducer:
 
     def advance(self) -> None:
         """One step."""
-        if self.phase is Phase.REMOVE:
+        if self.phase is Phase.MERGE:
+            self._merge()
+        elif self.phase is Phase.REMOVE:
             self._remove()
         elif self.phase is Phase.TUNE:
             if self.step < self.options.steps:
-                self._tune(Rates(), 0.0)
+                self._tune(Rates(), self.step / self.options.steps)
             if self.step >= self.options.steps:
                 self._end_round()
         elif self.phase is Phase.DEGREES:

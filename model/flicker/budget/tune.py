@@ -18,8 +18,8 @@ from ..fit.render import Draw, backward, render
 from ..scene.camera import Camera
 from ..scene.metrics import psnr
 
-_MEAN_RATE = 2e-5  # of the scene's extent
-_SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 3e-3, 1e-3, 2e-2, 2.5e-3, 1 / 20
+_MEAN_RATE = 8e-5  # of the scene's extent
+_SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 2.4e-2, 8e-3, 8e-2, 2e-2, 1 / 10
 _LAST_RATE = 0.05
 
 

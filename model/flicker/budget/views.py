@@ -17,7 +17,7 @@ from ..scene.camera import DEFAULT_UP, Camera, load_cameras, orbit_camera
 from ..scene.gaussians import Scene
 from ..scene.metrics import psnr
 
-VIEWS = 48  # of an orbit: 40 to fit, 8 held out
+VIEWS = 144  # of an orbit: 120 to fit, 24 held out
 HOLD_EVERY = 6  # cameras 0, 6, 12, ... are held out
 LEAST_VIEWS = 3
 SIZE = (480, 270)  # of an orbit's pictures

@@ -46,7 +46,7 @@ def budget(
     cycles: Annotated[float | None, typer.Option(help="of a frame, at most, as flicker cost counts them")] = None,
     mbytes: Annotated[float | None, typer.Option(help="10^6 bytes of a frame, at most, as flicker cost counts them")] = None,
     views: Annotated[Path | None, typer.Option(help="INRIA cameras.json, every sixth held out (default: orbits at several distances and heights)")] = None,
-    count: Annotated[int | None, typer.Option(help="cameras of the orbits, every sixth held out [default: 48]", min=3)] = None,
+    count: Annotated[int | None, typer.Option(help="cameras of the orbits, every sixth held out [default: 144]", min=3)] = None,
     size: Annotated[str | None, typer.Option(help="WxH of the pictures that are fitted to [default: the cameras', 480x270 of orbits]")] = None,
     frame: Annotated[str, typer.Option(help="WxH of the frames whose cycles and bytes are counted")] = "1280x720",
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbits: x, y, z, -x, -y, -z [default: -y]")] = None,
@@ -58,6 +58,7 @@ def budget(
     through: Annotated[str | None, typer.Option(help="configuration through whose contribution test the scene is drawn, as --through of flicker fit")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest view that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     refit: Annotated[int, typer.Option(help="steps of conjugate gradients of the least squares of colours; 0: none", min=0)] = 8,
+    merge: Annotated[float, typer.Option(help="near-equal neighbours that lose at most this become one, such as 0.1; 0: none", min=0.0, max=100.0)] = 0.0,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
     checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
@@ -93,7 +94,7 @@ def budget(
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
     assert counted is not None
-    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit)
+    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit, merge)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
         full = generate() if scene == DEMO else load_scene(scene)
