@@ -11,8 +11,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
+from scipy.special import expit, log_expit
 
 from ..fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH
+from ..progress import Steps
 
 NEIGHBOURS = 8  # nearest by mean, of which each Gaussian's partner is one
 COLOUR = 0.1  # difference of colours that is as much as a nat
@@ -32,13 +34,14 @@ def _areas(log_scales: np.ndarray) -> np.ndarray:
     return np.sort(log_scales.astype(np.float64), axis=1)[:, 1:].sum(axis=1)
 
 
-def _log_opacity(logits: np.ndarray) -> np.ndarray:
-    return -np.logaddexp(0.0, -logits.astype(np.float64))
+def _weights(rows: np.ndarray) -> np.ndarray:
+    """Logarithms, float64 (N,): opacity times area."""
+    return log_expit(rows[:, LOGIT].astype(np.float64)) + _areas(rows[:, SCALE:QUAT])
 
 
 def _moments(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Share of the first in the weight (M,), mean (M, 3) and covariance (M, 3, 3) of pairs of rows of parameters."""
-    share = 1.0 / (1.0 + np.exp(_areas(b[:, SCALE:QUAT]) + _log_opacity(b[:, LOGIT]) - _areas(a[:, SCALE:QUAT]) - _log_opacity(a[:, LOGIT])))
+    share = expit(_weights(a) - _weights(b))
     apart = b[:, MEAN:SCALE].astype(np.float64) - a[:, MEAN:SCALE]
     mean = a[:, MEAN:SCALE] + (1.0 - share)[:, None] * apart
     s = share[:, None, None]
@@ -64,31 +67,33 @@ def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     out[:, MEAN:SCALE], out[:, SCALE:QUAT] = mean, 0.5 * np.log(np.maximum(squares, np.finfo(np.float32).tiny))
     out[:, QUAT:LOGIT] = Rotation.from_matrix(axes).as_quat(scalar_first=True)
     area = _areas(out[:, SCALE:QUAT])
-    left = [1.0 - np.exp(np.minimum(_log_opacity(of[:, LOGIT]) + _areas(of[:, SCALE:QUAT]) - area, 0.0)) for of in (a, b)]
+    left = [1.0 - np.exp(np.minimum(_weights(of) - area, 0.0)) for of in (a, b)]
     opacity = np.clip(1.0 - left[0] * left[1], 1.0 - _MOST_OPACITY, _MOST_OPACITY)
     out[:, LOGIT] = np.log(opacity / (1.0 - opacity))
     return out
 
 
-def merge(values: np.ndarray, limit: float) -> np.ndarray:
+def merge(values: np.ndarray, limit: float, steps: Steps | None = None) -> np.ndarray:
     """float32 (n, P), n <= N: parameters (N, P) in which pairs that lose at most `limit` are one, again and again until hardly any is left. A Gaussian merges
     with the one of its nearest neighbours with which it loses least, if that one's choice is the same."""
-    for _ in range(_MOST_ROUNDS):
-        n = len(values)
-        if n < 2:
-            break
-        _, near = KDTree(values[:, MEAN:SCALE]).query(values[:, MEAN:SCALE], k=min(NEIGHBOURS + 1, n))
-        best, partner = np.full(n, np.inf), np.full(n, -1)
-        for other in near.T:
-            lost = loss(values, values[other])
-            lost[other == np.arange(n)] = np.inf
-            better = lost < best
-            best[better], partner[better] = lost[better], other[better]
-        first = np.flatnonzero((best <= limit) & (partner > np.arange(n)))
-        first = first[partner[partner[first]] == first]
-        values = values.copy()
-        values[first] = united(values[first], values[partner[first]])
-        values = np.delete(values, partner[first], axis=0)
-        if len(first) < max(1, _FEWEST * n):
-            break
+    with (steps or Steps()).bar("merging") as report:
+        for turn in range(_MOST_ROUNDS):
+            n = len(values)
+            if n < 2:
+                break
+            _, near = KDTree(values[:, MEAN:SCALE]).query(values[:, MEAN:SCALE], k=min(NEIGHBOURS + 1, n))
+            best, partner = np.full(n, np.inf), np.full(n, -1)
+            for k, other in enumerate(near.T):
+                report(turn * len(near.T) + k, _MOST_ROUNDS * len(near.T))
+                lost = loss(values, values[other])
+                lost[other == np.arange(n)] = np.inf
+                better = lost < best
+                best[better], partner[better] = lost[better], other[better]
+            first = np.flatnonzero((best <= limit) & (partner > np.arange(n)))
+            first = first[partner[partner[first]] == first]
+            values = values.copy()
+            values[first] = united(values[first], values[partner[first]])
+            values = np.delete(values, partner[first], axis=0)
+            if len(first) < max(1, _FEWEST * n):
+                break
     return values

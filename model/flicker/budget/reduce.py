@@ -198,7 +198,7 @@ class Reducer:
         self.good = self.parameters.values.copy(), *self.good[1:]
         self.phase = Phase.REMOVE
         if self.options.merge:
-            values = merge(self.parameters.values, self.options.merge)
+            values = merge(self.parameters.values, self.options.merge, self._steps)
             self.parameters, self.coefficients, self.moments = Parameters(values), self.coefficients[: len(values)], Adam.of(values)
             decibels = self.measure()
             if self.options.goal.kind is Kind.DB and decibels >= self.options.goal.value:
