@@ -480,7 +480,8 @@ def test_command(tmp_path: Path) -> None:
     told = run("--keep", 0.4, *few, "--checkpoint", tmp_path / "state.npz", "--resume")
     assert "continues after 8 steps" in told and (tmp_path / "out.ply").read_bytes() == written
     assert Row(**kept["steps"][1]).step == "1: removal"
-    told = run("--keep", 0.9, *few, "--through", "faithful", "--json", tmp_path / "c.json")
+    told = run("--keep", 0.9, *few, "--through", "faithful", "--merge", 0.5, "--json", tmp_path / "c.json")
+    assert "merging" in told
     drawn = json.loads((tmp_path / "c.json").read_text())["drawn_db"]
     assert f"{np.mean(drawn['scene']):.2f} dB, the full scene {np.mean(drawn['full']):.2f} dB" in told
     before = sorted(tmp_path.iterdir())
