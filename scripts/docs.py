@@ -104,7 +104,7 @@ PARTS = (
     Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),
     Part("chip", "whole frames: culling, memory, lists, sorting",
          ("counts", "culling", "frames", "traffic", "schemes", "variations", "broadcast", "formats", "keys"), chip.tables, scenes_missing),
-    Part("budget", "real scenes to budgets, step by step; hours, can be interrupted", ("results", "alone", "steps"), budget.tables, scenes_missing,
+    Part("budget", "real scenes to budgets, step by step; half an hour, can be interrupted", ("results", "alone", "steps"), budget.tables, scenes_missing,
          before=budget.draw),
     Part("photographs", "Table 1 against photographs: fitted, pruned, fine-tuned; an hour, can be interrupted", ("",), photographs.tables, scenes_missing),
     Part("through", "every mode before and after fine-tuning through its contribution test; an hour, can be interrupted", ("",), through.tables,

@@ -36,6 +36,7 @@ from flicker.fit.render import render
 from flicker.front.projection import colours
 from flicker.scene.camera import Camera, cameras_text, orbit_camera
 from flicker.scene.files import Scene, load_scene, save_ply
+from flicker.scene.gaussians import SH_C0
 from flicker.scene.packed import PackedFormat, load_packed
 from flicker.scene.packing import pack
 
@@ -130,7 +131,7 @@ def test_loss_of_a_merger() -> None:
     seen = np.empty((len(rays), 3))
     flat[:, 0] += np.float32(100)  # no channel at its clamp
     colours(rays, flat, np.arange(len(rays)), np.zeros(3), seen)
-    square = ((seen - 0.5 - 100 * 0.28209479177387814) ** 2).mean()
+    square = ((seen - 0.5 - 100 * SH_C0) ** 2).mean()
     assert lost[0] - apart[0] == pytest.approx(square / COLOUR**2, rel=0.05)
 
 
@@ -166,6 +167,9 @@ def test_merging_in_a_reduction() -> None:
     full, merged, *_ = found.rows
     assert merged.step == "merging" and 90 < merged.gaussians < full.gaussians and merged.decibels < 60 and merged.cost is not None
     assert full.cost is not None and merged.cost.bytes < full.cost.bytes and len(found.parameters) == 90
+    found = start(scene, keeping(1.0, merge=5.0, rounds=1, steps=2, last=0, degrees=0, refit=0), 7)  # nothing is removed
+    found.run()
+    assert len(found.parameters) == merged.gaussians and found.rows[2].decibels == merged.decibels < found.rows[-1].decibels
     for wanted in (merged.decibels - 1e-9, merged.decibels + 1e-9):
         found = start(scene, keeping(0.5, goal=Goal(Kind.DB, wanted), merge=5.0, steps=0, last=0, degrees=0, refit=0, frame=(32, 32)), 7)
         found.advance()
@@ -446,6 +450,7 @@ def test_files(name: str, least: float, tmp_path: Path) -> None:
     scene = small(600, 2)
     scene.scales *= np.float32(0.5)
     scene.sh[scene.means[:, 0] < 0, 1:] = 0
+    scene.opacities[:5] = 1.0  # has no logit
     save(scene, tmp_path / name, tmp_path / f"temporary.{name}")
     (tmp_path / f"temporary.{name}").rename(tmp_path / name)
     found = load_scene(tmp_path / name)

@@ -2,8 +2,8 @@
 reduction").
 
 A Gaussian counts by opacity times the area of its broadest side, product of its two largest standard deviations. What a pair loses is Runnalls' bound, half the
-difference of the logarithms of the determinants, in nats of the pair's weight, plus the squared difference of colours over `COLOUR`, root mean square over all
-directions. Two at one place add up as they are blended, 1 - (1 - a)(1 - b); the opacity of one that is wider than its parts falls as its area grows.
+difference of the logarithms of the determinants, in nats of the pair's weight, plus the square of how many `COLOUR` their colours differ by, root mean square
+over all directions. Two at one place add up as they are blended, 1 - (1 - a)(1 - b); the opacity of one that is wider than its parts falls as its area grows.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from scipy.special import expit, log_expit
 
 from ..fit.parameters import LOGIT, MEAN, QUAT, SCALE, SH
 from ..progress import Steps
+from ..scene.gaussians import logits
 
 NEIGHBOURS = 8  # nearest by mean, of which each Gaussian's partner is one
 COLOUR = 0.1  # difference of colours that is as much as a nat
 _MOST_ROUNDS = 10
 _FEWEST = 0.001  # of the Gaussians, merged in a round: fewer end it
-_MOST_OPACITY = 1.0 - 2.0**-25
+_LEAST_OPACITY = 2.0**-40  # has a finite logit
 
 
 def _matrices(values: np.ndarray) -> np.ndarray:
@@ -68,8 +69,7 @@ def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     out[:, QUAT:LOGIT] = Rotation.from_matrix(axes).as_quat(scalar_first=True)
     area = _areas(out[:, SCALE:QUAT])
     left = [1.0 - np.exp(np.minimum(_weights(of) - area, 0.0)) for of in (a, b)]
-    opacity = np.clip(1.0 - left[0] * left[1], 1.0 - _MOST_OPACITY, _MOST_OPACITY)
-    out[:, LOGIT] = np.log(opacity / (1.0 - opacity))
+    out[:, LOGIT] = logits(np.maximum(1.0 - left[0] * left[1], _LEAST_OPACITY))
     return out
 
 

@@ -71,7 +71,7 @@ class Options:
     """rounds: removals on the way to a known goal. steps: of tuning after each. last: of the tuning at the end, at most. degrees: SH coefficients go as long as
     they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted. through: name of the configuration
     through whose contribution test the small scene is drawn; None: as the reference draws it. least: standard deviation in pixels that no Gaussian falls below
-    (`fit.least`), from the first removal on. refit: steps of conjugate gradients of the least squares of colours; 0: none. merge: what pairs of near-equal
+    (`fit.least`), before the first removal. refit: steps of conjugate gradients of the least squares of colours; 0: none. merge: what pairs of near-equal
     neighbours may lose as one Gaussian (`merge`), before the first removal; 0: none is merged."""
 
     goal: Goal
@@ -199,7 +199,7 @@ class Reducer:
         self.phase = Phase.REMOVE
         if self.options.merge:
             values = merge(self.parameters.values, self.options.merge, self._steps)
-            self.parameters, self.coefficients, self.moments = Parameters(values), self.coefficients[: len(values)], Adam.of(values)
+            self.parameters, self.coefficients, self.moments = Parameters(values), self.coefficients[: len(values)], Adam.of(values)  # all have as many
             decibels = self.measure()
             if self.options.goal.kind is Kind.DB and decibels >= self.options.goal.value:
                 self.good = values.copy(), self.coefficients.copy(), decibels

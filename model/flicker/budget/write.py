@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import FlickerError
 from ..progress import Steps
 from ..scene.files import half_turn, save_ply
-from ..scene.gaussians import Scene
+from ..scene.gaussians import Scene, logits
 from ..scene.packed import PackedFormat
 from ..scene.packing import pack
 
@@ -31,10 +31,10 @@ def check_suffix(path: Path) -> None:
 
 def _data(scene: Scene) -> gsply.GSData:
     """Log scales and logit opacities."""
-    opacities = np.clip(scene.opacities.astype(np.float64), 2.0**-40, 1.0 - 2.0**-25)
+    opacities = np.maximum(scene.opacities, np.float32(2.0**-40))
     rest = np.ascontiguousarray(scene.sh[:, 1:]) if scene.sh.shape[1] > 1 else None
     return gsply.GSData.from_arrays(
-        means=scene.means, scales=np.log(scene.scales), quats=scene.quats, opacities=np.log(opacities / (1.0 - opacities)).astype(np.float32),
+        means=scene.means, scales=np.log(scene.scales), quats=scene.quats, opacities=logits(opacities).astype(np.float32),
         sh0=np.ascontiguousarray(scene.sh[:, 0]), shN=rest, format="ply",
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.gaussians import SH_DEGREES, Scene
+from ..scene.gaussians import SH_DEGREES, Scene, logits
 
 # Columns of the matrix; the coefficients, three channels each, follow up to its end.
 MEAN, SCALE, QUAT, LOGIT, SH = 0, 3, 6, 10, 11
@@ -53,9 +53,7 @@ class Parameters:
 
     @classmethod
     def of(cls, scene: Scene) -> Parameters:
-        opacities = np.minimum(scene.opacities.astype(np.float64), 1.0 - 2.0**-25)
-        logits = np.log(opacities / (1.0 - opacities))
-        columns = (scene.means, np.log(scene.scales), scene.quats, logits[:, None], scene.sh.reshape(len(scene), -1))
+        columns = (scene.means, np.log(scene.scales), scene.quats, logits(scene.opacities)[:, None], scene.sh.reshape(len(scene), -1))
         return cls(np.concatenate(columns, axis=1, dtype=np.float32))
 
     def scene(self) -> Scene:

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..errors import FlickerError, FlickerWarning, one_line
 from . import sog
-from .gaussians import SH_C0, SH_DEGREES, Scene
+from .gaussians import SH_C0, SH_DEGREES, Scene, logits
 from .packed import decode, is_image, load_packed
 
 _REST_COUNTS = (0, 9, 24, 45)
@@ -407,9 +407,8 @@ def scene_digest(path: str | Path) -> str:
 
 def save_ply(scene: Scene, path: str | Path) -> None:
     """Write a scene as an INRIA PLY file (log scales, logit opacities). Raises OSError."""
-    opacities = np.minimum(scene.opacities.astype(np.float64), 1.0 - 2.0**-25)
     gsply.plywrite(path, gsply.GSData.from_arrays(
         means=scene.means, scales=np.log(scene.scales), quats=scene.quats,
-        opacities=np.log(opacities / (1.0 - opacities)).astype(np.float32), sh0=np.ascontiguousarray(scene.sh[:, 0]),
+        opacities=logits(scene.opacities).astype(np.float32), sh0=np.ascontiguousarray(scene.sh[:, 0]),
         shN=np.ascontiguousarray(scene.sh[:, 1:]) if scene.sh.shape[1] > 1 else None, format="ply",
     ))

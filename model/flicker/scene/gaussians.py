@@ -11,6 +11,12 @@ SH_C0 = 0.28209479177387814  # of the constant harmonic: 1 / (2 sqrt(pi))
 SH_DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # coefficients a channel: degree
 
 
+def logits(opacities: np.ndarray) -> np.ndarray:
+    """float64, as files and fits hold opacities: log(o / (1 - o)). Those above 1 - 2^-25, which none is the logit of, as that."""
+    o = np.minimum(opacities.astype(np.float64), 1.0 - 2.0**-25)
+    return np.log(o / (1.0 - o))
+
+
 @dataclass(eq=False)
 class Scene:
     """N Gaussians, values activated; contiguous float32 arrays.
