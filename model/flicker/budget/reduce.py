@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import FlickerError, one_line
 from ..fit.adam import Adam
+from ..fit.engines import engine
 from ..fit.least import LeastSize
 from ..fit.parameters import SH, Parameters
 from ..fit.render import Draw, render
@@ -72,7 +73,8 @@ class Options:
     they are estimated to add at most this share to the squared error. form: of the packed scene whose frames are counted. through: name of the configuration
     through whose contribution test the small scene is drawn; None: as the reference draws it. least: standard deviation in pixels that no Gaussian falls below
     (`fit.least`), before the first removal. refit: steps of conjugate gradients of the least squares of colours; 0: none. merge: what pairs of near-equal
-    neighbours may lose as one Gaussian (`merge`), before the first removal; 0: none is merged."""
+    neighbours may lose as one Gaussian (`merge`), before the first removal; 0: none is merged. engine: of `fit.engines`, what draws the views that are tuned;
+    all else is numba's."""
 
     goal: Goal
     by: Score = Score.CHANGE
@@ -87,6 +89,7 @@ class Options:
     least: float = 0.0
     refit: int = ITERATIONS
     merge: float = 0.0
+    engine: str = "numba"
 
 
 @dataclass(frozen=True)
@@ -140,6 +143,7 @@ class Reducer:
         self.extent = extent_of(self.fitted)
         self.machine = None if options.through is None else through(options.through)
         self._draw: Draw = partial(render, through=self.machine, precision=np.float32)
+        self._tuned: Draw = partial(self._draw, engine=engine(options.engine, self.machine is not None))
         self._least = LeastSize(options.least, self.fitted)
         self.rng = np.random.default_rng(options.seed)
         self.order = np.zeros(0, np.int64)  # fitted cameras that come next
@@ -262,7 +266,7 @@ class Reducer:
         view, self.order = int(self.order[0]), self.order[1:]
         factor = min(1.0, 10 ** ((_FULL_RATE - self.level) / 20)) if self.level else 1.0
         rate = rates.at(done, self.extent, self.parameters.values.shape[1]) * np.float32(factor)
-        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._least, self._draw)
+        decibels, broken = tune_step(self.parameters, self.moments, self.fitted[view], self.wanted[view], rate, self.coefficients, self._least, self._tuned)
         self.level = decibels if not self.level else 0.98 * self.level + 0.02 * decibels
         self.step += 1
         if len(broken):

@@ -59,6 +59,7 @@ def budget(
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest view that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     refit: Annotated[int, typer.Option(help="steps of conjugate gradients of the least squares of colours; 0: none", min=0)] = 8,
     merge: Annotated[float, typer.Option(help="near-equal neighbours that lose at most this become one, such as 0.1; 0: none", min=0.0, max=100.0)] = 0.0,
+    engine: Annotated[str, typer.Option(help="what draws the views that are tuned: numba, or gsplat on a GPU, as --engine of flicker fit")] = "numba",
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
     checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
@@ -75,6 +76,7 @@ def budget(
         from ..budget.score import Score
         from ..budget.views import VIEWS, cameras_of, machine_psnr, reference_psnr
         from ..budget.write import check_suffix, save
+        from ..fit.engines import engine as engine_of
         from ..fit.through import through as machine_of
         from ..front.view import DEMO
         from ..scene.demo import generate
@@ -86,6 +88,7 @@ def budget(
     check_suffix(out)
     if through is not None:
         machine_of(through)
+    engine_of(engine, through is not None)
     for path, option in ((out, "--out"), (checkpoint, "--checkpoint"), (json_, "--json")):
         writable(path, option)
     if resume and checkpoint is None:
@@ -94,7 +97,7 @@ def budget(
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
     assert counted is not None
-    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit, merge)
+    options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit, merge, engine)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
         full = generate() if scene == DEMO else load_scene(scene)

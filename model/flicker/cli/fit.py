@@ -45,6 +45,7 @@ def fit(
     degree: Annotated[int, typer.Option(help="of the spherical harmonics; of --from, its own", min=0, max=3)] = 2,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     background: Annotated[str, typer.Option(help="black, white or r,g,b: behind the scene, and behind what is transparent in the pictures")] = "black",
+    engine: Annotated[str, typer.Option(help="what draws the pictures: numba, or gsplat on a GPU (docs/fit.md), whose bits differ from run to run")] = "numba",
     exposure: Annotated[bool, typer.Option("--exposure", help="an affine colour for each photograph")] = False,
     checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to every 500 iterations, .npz")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="continue from the checkpoint, if it is there")] = False,
@@ -67,7 +68,7 @@ def fit(
     if begin is not None and scene is None:
         raise FlickerError("--begin: of which scene, --from?")
     options = Options(iterations, gaussians, degree, seed, parse_background(background), exposure, scene is not None, through, least,
-                      Options.begin if begin is None else begin, squared, longer)
+                      Options.begin if begin is None else begin, squared, longer, engine)
     data = load_dataset(dataset, size)
     text = cameras_text([shot.camera for shot in data.tests])
     cameras = _cameras_beside(out, text)

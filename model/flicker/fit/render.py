@@ -21,6 +21,7 @@ from ..params import TILE
 from ..scene.camera import Camera
 from . import raster
 from .chain import chain
+from .engines import Back, Engine, processor
 from .parameters import Parameters
 from .through import ALL, tile_masks
 
@@ -31,8 +32,9 @@ class Frame:
 
     image: (H, W, 3), neither clamped nor quantised. transmittance: (H, W). index: int64 (M,), those Gaussians, ascending.
     rows: (M, COLUMNS), `raster`, of the precision in which pictures are blended. start: int64 (tiles + 1,), entry: int32 (E,), into index, near to far; used:
-    bool (E,), blended in a pixel or finishing one. mask: uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
+    bool (E,), blended in a pixel or finishing one, as far as the engine tells. mask: uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
     bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
+    back: the engine's way back.
     """
 
     parameters: Parameters
@@ -47,6 +49,7 @@ class Frame:
     used: np.ndarray
     bad: np.ndarray
     table: np.ndarray
+    back: Back
 
 
 @dataclass(eq=False)
@@ -73,10 +76,10 @@ def _masks(
 
 def render(
     parameters: Parameters, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0), through: Configuration | None = None,
-    precision: type[np.floating] = np.float64,
+    precision: type[np.floating] = np.float64, engine: Engine = processor,
 ) -> Frame:
     """The picture over an RGB background; through: only where the masks of that machine let a Gaussian through (`through.through`). precision: of blending, and
-    of its derivatives."""
+    of its derivatives. engine: what does both (`engines`)."""
     count, (width, height) = len(parameters), (camera.width, camera.height)
     with np.errstate(all="ignore"):  # what is not finite is found below
         scales = np.exp(parameters.log_scales.astype(np.float64))
@@ -103,8 +106,8 @@ def render(
         mask = np.full(len(entry), ALL, np.uint16)
     else:
         mask = _masks(through, (order, index, table, rgb, bad), opacity, depth, camera, start, entry)
-    raster.blend(rows, start, entry, mask, tiles_x, np.asarray(background, precision), image, transmittance, used)
-    return Frame(parameters, camera, image, transmittance, index, rows, start, entry, mask, used, bad, table)
+    back = engine(rows, start, entry, mask, np.asarray(background, precision), image, transmittance, used)
+    return Frame(parameters, camera, image, transmittance, index, rows, start, entry, mask, used, bad, table, back)
 
 
 Draw = Callable[[Parameters, Camera], Frame]  # `render` over black, or through a machine's masks
@@ -116,11 +119,7 @@ def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -
     coefficients: how many SH coefficients a channel are trained; the others' derivatives are 0.
     """
     camera, values = frame.camera, frame.parameters.values
-    sums = np.empty((len(frame.entry), raster.SUMS))
-    slope = np.ascontiguousarray(slope_of_image, frame.rows.dtype)
-    raster.blend_back(frame.rows, frame.start, frame.entry, frame.mask, -(-camera.width // TILE), frame.image, frame.used, slope, sums)
-    total, seen = np.zeros((len(frame.index), raster.SUMS)), np.zeros(len(frame.index), np.bool_)
-    raster.gather(frame.entry, frame.used, sums, total, seen)
+    total, seen = frame.back(slope_of_image)
     place = np.flatnonzero(seen)
     gradient, screen = np.empty((len(place), values.shape[1]), np.float32), np.empty((len(place), 2))
     chain(

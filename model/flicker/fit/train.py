@@ -30,6 +30,7 @@ from ..scene.photos import BLACK
 from . import density
 from .adam import Adam
 from .dataset import Dataset
+from .engines import engine
 from .least import LeastSize
 from .loss import log_error_slope, loss_and_slope
 from .parameters import LOGIT, QUAT, SCALE, SH, Parameters
@@ -58,7 +59,7 @@ class Options:
     through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
     Gaussian falls below (`LeastSize`). squared: share of the iterations, the last ones, in which the squared error is minimised (`log_error_slope`), with
     moments that begin anew; None: half of a fit from nothing, none of one that tunes. longer: factor of the steps of means, others follow (docs/fit.md); None:
-    by the number of iterations, or the INRIA code's own steps where a scene is tuned.
+    by the number of iterations, or the INRIA code's own steps where a scene is tuned. engine: of `engines`, what draws the photographs' views; PSNR is numba's.
     """
 
     iterations: int = 4000
@@ -73,6 +74,7 @@ class Options:
     begin: float = 2 / 3
     squared: float | None = None
     longer: float | None = None
+    engine: str = "numba"
 
     @property
     def first_squared(self) -> int:
@@ -109,6 +111,7 @@ class Trainer:
         """parameters: to begin with; None: `start` makes them."""
         self.dataset, self.options = dataset, options
         self.machine = None if options.through is None else through(options.through)
+        self._engine = engine(options.engine, self.machine is not None)
         self.rng = np.random.default_rng(options.seed)
         self._photos = [shot.load(options.background) for shot in dataset.fitted]
         self._test_photos = [shot.load(options.background) for shot in dataset.tests]
@@ -162,7 +165,7 @@ class Trainer:
             self.order = self.rng.permutation(len(self._photos))
         view, self.order = int(self.order[0]), self.order[1:]
         camera, photo = self.dataset.fitted[view].camera, self._photos[view]
-        frame = render(self.parameters, camera, self.options.background, self.machine, np.float32)
+        frame = render(self.parameters, camera, self.options.background, self.machine, np.float32, self._engine)
         if self.iteration == self.options.first_squared:
             self.moments = Adam.of(self.parameters.values)
         measure = loss_and_slope if self.iteration < self.options.first_squared else log_error_slope
