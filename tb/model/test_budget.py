@@ -306,6 +306,30 @@ def test_rates_of_a_reduction(monkeypatch: pytest.MonkeyPatch) -> None:
     assert asked == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.parametrize(("gains", "ends"), [([2, 7], 1300), ([2, 7, 12], 1600), ([2, 7, 12, 15, 18], 1999)])
+def test_end_of_the_last_tuning(gains: list[int], ends: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four measurements without gain end it, but only in its second half: long steps lose what the shorter ones then win back. gains: measurements that are
+    better than all before."""
+    found = start(small(), keeping(0.5, last=1999))
+    found._keep_best(20.0)
+    found.phase, measured = Phase.LAST, 0
+
+    def tune(rates: Rates, done: float) -> None:
+        found.step += 1
+
+    def measure() -> float:
+        nonlocal measured
+        measured += 1
+        return 20.0 + 0.1 * measured if measured in gains else 20.0 if measured > 1 else 10.0
+
+    monkeypatch.setattr(found, "_tune", tune)
+    monkeypatch.setattr(found, "measure", measure)
+    while found.phase is Phase.LAST:
+        found.advance()
+    assert found.phase is Phase.DONE and found.rows[-1].step == f"tuning, {ends} steps"
+    assert found.best is not None and found.best[2] == 20.0 + 0.1 * gains[-1]
+
+
 def test_through() -> None:
     """All Gaussians, drawn through a contribution test: measured and tuned as the machine draws them, which wins back a part of what it loses."""
     scene = small(600)

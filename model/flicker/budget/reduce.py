@@ -44,7 +44,7 @@ from .score import Score, scores
 from .tune import Rates, quality, tune_step
 
 MEASURE_EVERY = 100  # steps of the last tuning
-PATIENCE = 4  # measurements without gain that end it
+PATIENCE = 4  # measurements without gain in its second half that end it
 LEAST_GAIN = 0.01  # dB
 SAVE_EVERY = 100
 CHIP_VIEWS = 2  # held-out views that a frame's cost is the mean of
@@ -347,7 +347,8 @@ class Reducer:
             decibels = self.measure()
             assert self.best is not None
             gained = decibels - self.best[2]
-            self.stale = 0 if gained > LEAST_GAIN else self.stale + 1
+            long = self.step < self.options.last / 2  # steps that may lose what shorter ones then win
+            self.stale = 0 if gained > LEAST_GAIN or long else self.stale + 1
             if gained > 0:
                 self._keep_best(decibels)
             if over or self.stale >= PATIENCE:
