@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -111,13 +111,20 @@ def splat_sums(rows: np.ndarray, means: np.ndarray, conics: np.ndarray, colours:
     return total, seen
 
 
-ENGINES: dict[str, Callable[[], Engine]] = {"numba": lambda: processor, "gsplat": Gsplat}
+class Choice(NamedTuple):
+    """make: the engine; FlickerError where it is not there. masks: it draws those of a contribution test."""
+
+    make: Callable[[], Engine]
+    masks: bool
+
+
+ENGINES = {"numba": Choice(lambda: processor, True), "gsplat": Choice(Gsplat, False)}
 
 
 def engine(name: str, masks: bool) -> Engine:
     """masks: of a contribution test are drawn. FlickerError for a name that is none, and an engine that is not there or draws no masks."""
     if name not in ENGINES:
         raise FlickerError(f"--engine: {name}: none of {', '.join(ENGINES)}")
-    if masks and name != "numba":
+    if masks and not ENGINES[name].masks:
         raise FlickerError(f"--engine: {name}: draws through no contribution test: leave out --through, or take numba")
-    return ENGINES[name]()
+    return ENGINES[name].make()
