@@ -100,10 +100,16 @@ def test_file_that_is_none(tmp_path: Path) -> None:
 
 
 def test_resized() -> None:
-    camera = Camera(640, 360, 500.0, 510.0, np.zeros(3), np.eye(3), "a")
+    """The vertical field of view and the pixels' shape stay; `scaled` takes each axis by its own factor."""
+    camera = Camera(640, 360, 500.0, 510.0, np.zeros(3), np.eye(3), "a", cx=329.5, cy=169.5)
     small = camera.resized(320, 90)
-    assert (small.width, small.height, small.fx, small.fy, small.name) == (320, 90, 250.0, 127.5, "a")
+    assert (small.width, small.height, small.fx, small.fy, small.name) == (320, 90, 125.0, 127.5, "a")
+    assert (small.cx, small.cy) == (159.5 + 2.5, 44.5 - 2.5)
+    other = camera.scaled(320, 90)
+    assert (other.width, other.height, other.fx, other.fy, other.cx, other.cy) == (320, 90, 250.0, 127.5, 159.5 + 5.0, 44.5 - 2.5)
     assert camera.width == 640
+    middle = Camera(640, 360, 500.0, 510.0, np.zeros(3), np.eye(3))
+    assert (middle.cx, middle.cy, middle.resized(31, 17).cx, middle.resized(31, 17).cy) == (319.5, 179.5, 15.0, 8.0)
     for width, height, field in ((0, 10, "width"), (10, -1, "height"), (16385, 10, "width"), (10, 10**12, "height")):
         with pytest.raises(FlickerError, match=field):
             camera.resized(width, height)

@@ -94,7 +94,7 @@ def _shot(where: str, picture: Path, root: Path, size: int | None, width: float 
     fx, fy = focal(w, h)
     try:
         camera = Camera(round(w), round(h), fx, fy, position, rotation, name=picture.stem, img_name=_name(picture, root))
-        return Shot(camera.resized(*used), picture)
+        return Shot(camera.scaled(*used), picture)
     except FlickerError as error:
         raise FlickerError(f"{where}: {error}") from None
 

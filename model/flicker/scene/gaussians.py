@@ -23,6 +23,8 @@ class Scene:
 
     means: (N, 3). scales: (N, 3), standard deviations, > 0. quats: (N, 4), unit, w first. opacities: (N,), in (0, 1].
     sh: (N, K, 3), K = (degree + 1)^2 coefficients a colour, constant term first, order and signs of the INRIA code.
+    antialiased: trained for the antialiased rendering of Mip-Splatting: a splat's opacity is multiplied by the square root of the ratio of the determinants
+    of its covariance on the screen before and after dilation.
     path: the file or folder. rejected: Gaussians of the file that were left out, by reason.
     """
 
@@ -33,6 +35,7 @@ class Scene:
     sh: np.ndarray
     path: Path | None = None
     rejected: dict[str, int] = field(default_factory=dict)
+    antialiased: bool = False
 
     def __post_init__(self) -> None:
         for name in ("means", "scales", "quats", "opacities", "sh"):

@@ -149,7 +149,7 @@ class Renderer:
                 return Frame(camera, choice, 1, np.zeros((camera.height, camera.width, 3)), None, {"missing": SIMULATED[choice.engine]})
             camera, coarse = shot.camera, 1
         if coarse > 1:
-            camera = camera.resized(max(camera.width // coarse, 1), max(camera.height // coarse, 1))
+            camera = camera.scaled(max(camera.width // coarse, 1), max(camera.height // coarse, 1))
         view, config = self.view(camera, coarse), shot.config if shot else choice.config
         stats: dict[str, Any]
         if shot is not None:
