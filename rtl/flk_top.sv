@@ -150,7 +150,7 @@ module flk_top
 
   state_e                           state_q;
   logic [$clog2(ResetCycles+1)-1:0] reset_q;
-  logic                             units_rst_nq, aborted_q, abort_q;
+  logic                             units_rst_nq, aborted_q, abort_q, dead_q;
   logic                             drained, stuck, forget, hold;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -160,8 +160,10 @@ module flk_top
       units_rst_nq <= 1'b0;
       aborted_q    <= 1'b0;
       abort_q      <= 1'b0;
+      dead_q       <= 1'b0;
     end else begin
       aborted_q    <= 1'b0;
+      dead_q       <= state_q == DEAD;
       units_rst_nq <= state_q != RESET;
       reset_q      <= state_q == RESET ? reset_q + 1'b1 : '0;
       if (from_host.control.reset.value) begin
@@ -215,7 +217,7 @@ module flk_top
   rendering_registers_t rendering;
   logic                 copy_front, copy_front_bank, copy_front_none, copy_front_done;
   logic                 copy_rendering, copy_rendering_bank, copy_rendering_none;
-  logic                 copy_rendering_done, told_q;
+  logic                 copy_rendering_done, told_q, timed_out_q;
   logic [3:0][31:0]     stamps;
   logic [31:0]          now_q;
 
@@ -224,11 +226,13 @@ module flk_top
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      told_q <= 1'b0;
-      now_q  <= '0;
+      told_q      <= 1'b0;
+      timed_out_q <= 1'b0;
+      now_q       <= '0;
     end else begin
-      told_q <= from_host.interrupt.frame_done.value;
-      now_q  <= now_q + 1'b1;
+      told_q      <= from_host.interrupt.frame_done.value;
+      timed_out_q <= frame_error.timed_out;
+      now_q       <= now_q + 1'b1;
     end
   end
 
@@ -683,8 +687,11 @@ module flk_top
   assign to_host.status.dead.next            = state_q == DEAD;
   assign to_host.interrupt.front_done.next   = front_done;
   assign to_host.interrupt.frame_done.next   = post;
+  assign to_host.interrupt.frame_done.hwclr  = from_host.control.reset.value;
+  // A time-out is told at once; and when result shows it, which may be later, when a frame has been released.
   assign to_host.interrupt.error.next        = (post && frame_error != '0) ||
-                                               (stuck && state_q != DEAD);
+                                               (state_q == DEAD && !dead_q) ||
+                                               (frame_error.timed_out && !timed_out_q);
   assign to_host.interrupt.aborted.next      = aborted_q;
   assign to_host.interrupt.refused.next      = refused || (from_host.control.start.value && !start);
   assign to_host.result.tag.next             = tag;

@@ -520,7 +520,7 @@ flk_result_t flk_result(flk_device_t *device)
 
 void flk_release(flk_device_t *device)
 {
-  put(device, FLK_INTERRUPT_OFFSET, FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK);
+  put(device, FLK_INTERRUPT_OFFSET, FLK_INTERRUPT_FRAME_DONE_MASK);
 }
 
 const char *flk_error_text(unsigned error)

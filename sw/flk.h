@@ -192,14 +192,15 @@ flk_status_t flk_ready(flk_device_t *device);
 /* Poll until a frame has ended; those before it must have been released. polls: at most so many, 0: without bound. pause: may be NULL. FLK_WAITED when either has ended the wait. */
 flk_status_t flk_wait(flk_device_t *device, uint16_t number, uint32_t polls, flk_pause_t pause, void *user);
 
-/* Of the frame that ended last; it stays, with its counters, until flk_release. */
+/* Of the frame that ended last; it stays, with its counters, until flk_release, whatever happens meanwhile but flk_reset. Before the first frame: 0. After an
+ * abort or a time-out it tells of that, as soon as no frame waits for its release. */
 flk_result_t flk_result(flk_device_t *device);
-/* The result has been read: the next frame may end. Once for each frame, or the one after it never ends. */
+/* The result has been read: the next frame may end. Once for each frame, or the one after it never ends. Clears interrupt.frame_done and no other interrupt. */
 void flk_release(flk_device_t *device);
 /* Text of bit `error` of a result; never NULL. */
 const char *flk_error_text(unsigned error);
 
-void flk_abort(flk_device_t *device); /* all frames under way end, with the error aborted */
+void flk_abort(flk_device_t *device); /* all frames under way are forgotten; one that has ended still waits for flk_release */
 /* Of all but the registers; frames count from 0. The chip's side of memory must be in reset from before the call until flk_ready says FLK_OK. */
 void flk_reset(flk_device_t *device);
 void flk_set_timeout(flk_device_t *device, uint32_t cycles); /* without progress; 0: never */

@@ -1083,6 +1083,9 @@ module flk_registers (
         if(hwif_in.interrupt.frame_done.next) begin // stickybit
             next_c = '1;
             load_next_c = '1;
+        end else if(hwif_in.interrupt.frame_done.hwclr) begin // HW Clear
+            next_c = '0;
+            load_next_c = '1;
         end else if(decoded_reg_strb.interrupt && decoded_req_is_wr) begin // SW write 1 clear
             next_c = field_storage.interrupt.frame_done.value & ~(decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
             load_next_c = '1;

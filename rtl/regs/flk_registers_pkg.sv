@@ -87,6 +87,7 @@ package flk_registers_pkg;
 
     typedef struct packed {
         logic next;
+        logic hwclr;
     } flk_registers__interrupt__frame_done__in_t;
 
     typedef struct packed {

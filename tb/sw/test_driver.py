@@ -686,7 +686,7 @@ def test_the_rest(lib: ctypes.CDLL, chip: Chip) -> None:
     lib.flk_release(device)
     lib.flk_abort(device)
     lib.flk_set_timeout(device, u32(12345))
-    released = sum(1 << REGISTERS["interrupt"].fields[name][0] for name in ("frame_done", "error"))
+    released = 1 << REGISTERS["interrupt"].fields["frame_done"][0]  # an error may have come since: it stays
     assert chip.writes == [(REGISTERS[name].offset, value) for name, value in (
         ("counter_select", 777), ("interrupt_enable", 0b10110), ("interrupt", 0b00100), ("interrupt", released), ("control", 2), ("timeout", 12345),
     )]
