@@ -10,6 +10,7 @@
 // control.reset: the same at once; the memory's side of the port must be in reset from before the write until
 // status.aborting is 0.
 // The clock of a half stands still while it is idle and no frame is in its place (flk_clock_gate).
+// test_en_i (scan test, 0 in use): both clocks run, both halves are reset by rst_ni alone.
 // irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone, but for reg_*_ready_o, which follow the ready of
 // the register port's answers; w_ready_i and b_* reach the writers combinationally.
 module flk_top
@@ -46,6 +47,7 @@ module flk_top
 ) (
   input  logic                    clk_i,
   input  logic                    rst_ni,
+  input  logic                    test_en_i,  // scan test: clock gates open, resets are rst_ni
   output logic                    irq_o,
   // Registers: AXI4-Lite
   input  logic                    reg_aw_valid_i,
@@ -150,7 +152,7 @@ module flk_top
 
   state_e                           state_q;
   logic [$clog2(ResetCycles+1)-1:0] reset_q;
-  logic                             units_rst_nq, aborted_q, abort_q, dead_q;
+  logic                             units_rst_nq, units_rst_n, aborted_q, abort_q, dead_q;
   logic                             drained, stuck, forget, hold;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -199,6 +201,8 @@ module flk_top
       end
     end
   end
+
+  assign units_rst_n = test_en_i ? rst_ni : units_rst_nq;
 
   assign hold   = state_q != RUN;
   assign forget = state_q == RESET;
@@ -384,7 +388,7 @@ module flk_top
     .AddrBits(AddrBits)
   ) i_records (
     .clk_i,
-    .rst_ni   (units_rst_nq),
+    .rst_ni   (units_rst_n),
     .ar_move_i(ar_valid[READ_RECORDS] && ar_ready[READ_RECORDS]),
     .ar_addr_i(ar_addr[READ_RECORDS]),
     .r_valid_i(r_valid[READ_RECORDS]),
@@ -398,14 +402,16 @@ module flk_top
 
   flk_clock_gate i_front_clock (
     .clk_i,
-    .en_i (front_busy || !front_idle || !units_rst_nq),
-    .clk_o(front_clk)
+    .en_i     (front_busy || !front_idle || !units_rst_nq),
+    .test_en_i,
+    .clk_o    (front_clk)
   );
 
   flk_clock_gate i_rendering_clock (
     .clk_i,
-    .en_i (rendering_busy || !rendering_idle || !units_rst_nq),
-    .clk_o(rendering_clk)
+    .en_i     (rendering_busy || !rendering_idle || !units_rst_nq),
+    .test_en_i,
+    .clk_o    (rendering_clk)
   );
 
   front_counters_t     front_counters;
@@ -422,7 +428,7 @@ module flk_top
     .IdBits  (IdBits)
   ) i_front (
     .clk_i               (front_clk),
-    .rst_ni              (units_rst_nq),
+    .rst_ni              (units_rst_n),
     .start_i             (front_start),
     .idle_o              (front_idle),
     .done_o              (front_end),
@@ -535,7 +541,7 @@ module flk_top
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),
-    .rst_ni             (units_rst_nq),
+    .rst_ni             (units_rst_n),
     .start_i            (rendering_start),
     .idle_o             (rendering_idle),
     .registers_i        (rendering),
