@@ -138,6 +138,7 @@ module flk_preprocessing_core
   if (Form == FORM_FACTORED) begin : gen_projection
     flk_projection i_projection (
       .clk_i,
+      .rst_ni,
       .en_i         (front_en_i),
       .phase_i      (front_phase_i),
       .low_0_i      (low_i[0]),
@@ -207,6 +208,7 @@ module flk_preprocessing_core
   end else begin : gen_projection_conic
     flk_projection_conic i_projection (
       .clk_i,
+      .rst_ni,
       .en_i         (front_en_i),
       .phase_i      (front_phase_i),
       .low_0_i      (low_i[0]),
