@@ -31,7 +31,7 @@ from ..fit.parameters import SH, Parameters
 from ..fit.render import Draw, render
 from ..fit.start import extent_of
 from ..fit.through import through
-from ..progress import Steps
+from ..progress import Steps, undivided
 from ..scene.camera import Camera, cameras_text
 from ..scene.clusters import reorder
 from ..scene.gaussians import Scene
@@ -376,23 +376,34 @@ class Reducer:
             self._last()
 
     def run(self, steps: Steps | None = None, told: Callable[[Row], None] | None = None, keep: Callable[[], None] | None = None) -> None:
-        """All that is left. told(row): after each step of the table; keep(): every so many steps."""
+        """All that is left. told(row): after each step of the table; keep(): every so many steps, and at Ctrl-C between two steps of tuning."""
         self._steps, self._told = steps or Steps(), told or (lambda row: None)
+        keep = keep or (lambda: None)
         while self.phase is not Phase.DONE:
             if self.phase in (Phase.TUNE, Phase.LAST):
-                phase, most = self.phase, self.options.steps if self.phase is Phase.TUNE else self.options.last
-                with self._steps.bar("tuning") as report:
-                    while self.phase is phase:
-                        self.advance()
-                        report(self.step, most)
-                        if keep and self.step % SAVE_EVERY == 0:
-                            keep()
+                self._run_tuning(keep)
             else:
                 self.advance()
-                if keep:
-                    keep()
-        if keep:
-            keep()
+                keep()
+        keep()
+
+    def _run_tuning(self, keep: Callable[[], None]) -> None:
+        phase, most = self.phase, self.options.steps if self.phase is Phase.TUNE else self.options.last
+        whole = True
+        try:
+            with self._steps.bar("tuning") as report:
+                while self.phase is phase:
+                    with undivided():
+                        whole = False
+                        self.advance()
+                        whole = True
+                    report(self.step, most)
+                    if self.step % SAVE_EVERY == 0:
+                        keep()
+        except KeyboardInterrupt:
+            if whole:
+                keep()
+            raise
 
     # -- state ------------------------------------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
+from .kept import Checkpoint, checkpoint_path
 from .options import RichSteps, console, parse_size, writable, write_atomically
 from .render import FormatChoice
 
@@ -62,7 +63,7 @@ def budget(
     engine: Annotated[str, typer.Option(help="what draws the views that are tuned: numba, or gsplat on a GPU, as --engine of flicker fit")] = "numba",
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
-    checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
+    checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to; default: OUT.checkpoint.npz, which goes when all is done")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="continue from the checkpoint, if it is there")] = False,
     json_: Annotated[Path | None, typer.Option("--json", help="what each step gave, as JSON")] = None,
 ) -> None:
@@ -89,10 +90,9 @@ def budget(
     if through is not None:
         machine_of(through)
     engine_of(engine, through is not None)
-    for path, option in ((out, "--out"), (checkpoint, "--checkpoint"), (json_, "--json")):
+    for path, option in ((out, "--out"), (json_, "--json")):
         writable(path, option)
-    if resume and checkpoint is None:
-        raise FlickerError("--resume: from which --checkpoint?")
+    place = checkpoint_path(checkpoint, out)
     if views is not None and count is not None:
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
@@ -109,8 +109,8 @@ def budget(
     if bad:
         console.print(f"{bad:,} Gaussians were left out: numbers that are not finite, or make no sense")
     reducer = Reducer(clean, fitted, held, pictures, options)
-    if checkpoint is not None and resume and checkpoint.exists():
-        reducer.restore(checkpoint)
+    kept = Checkpoint(place, checkpoint is None, reducer.save, lambda: f"the state after {len(reducer.rows)} steps of the table, {reducer.phase.value} next")
+    if kept.begin(resume, reducer.restore):
         console.print(f"continues after {len(reducer.rows)} steps of the table")
     began = time.monotonic()
     seconds: list[float | None] = [None] * len(reducer.rows)
@@ -119,11 +119,13 @@ def budget(
         seconds.append(time.monotonic() - began)
         console.print(f"{row.step:20} {row.gaussians:9,} Gaussians {min(row.decibels, 999):6.2f} dB on the held-out views {seconds[-1]:6.0f} s")
 
-    reducer.run(progress, told, None if checkpoint is None else lambda: write_atomically(checkpoint, reducer.save))
+    with kept.interruptible():
+        reducer.run(progress, told, kept.keep)
     found = reducer.scene()
     if not len(found):
         raise FlickerError("budget: no Gaussian is left")
     write_atomically(out, lambda path: save(found, out, path, options.form, progress))
+    kept.finish()
     written = load_scene(out)
     decibels = reference_psnr(clean, written, held, progress)
     at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)

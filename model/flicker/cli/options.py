@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from ..errors import FlickerError
+from ..errors import FlickerError, one_line
 from ..progress import Steps
 
 console = Console()
@@ -63,6 +63,6 @@ def write_atomically(path: Path, write) -> None:
         write(temporary)
         temporary.replace(path)
     except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+        raise FlickerError(f"{path}: cannot be written ({error.strerror or one_line(error)})") from None
     finally:
         temporary.unlink(missing_ok=True)
