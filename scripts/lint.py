@@ -9,6 +9,8 @@ or with those of VARIANTS. All shapes are instances of one generated top, in whi
 2. flattening (`--lint-only`), as synthesised. Gives the rest: latches, loops, several drivers, incomplete cases, resets of two kinds. Only the shapes
    that elaboration has found in no other module are instances here, in groups; all others are inside them.
 
+Step 1 also gives the registers without reset and what they feed (scripts/registers.py): each must be on the list lint/registers.toml with its reason.
+
 Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules; rules of ruff and mypy: pyproject.toml.
 """
 
@@ -26,6 +28,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import registers
+
 from flicker import toolchain
 from flicker.errors import FlickerError
 
@@ -33,7 +37,8 @@ ROOT = toolchain.ROOT
 RTL = ROOT / "rtl"
 REGISTERS = RTL / "regs"  # written by PeakRDL-regblock, in a style of its own: not for Verible
 FOLDER = toolchain.BUILD / "lint"
-VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text()
+REGISTER_LIST = ROOT / "lint" / "registers.toml"  # those that have no reset
+VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text() + Path(registers.__file__).read_text()
 
 # Parameters in place of the defaults, where these only make more of a part that is linted by itself: the stage hands the number of VRUs to its cores.
 SMALLER: dict[str, dict[str, int]] = {"flk_render_stage": {"VrusPerChannel": 1}}
@@ -179,14 +184,24 @@ def verilator(shapes: Sequence[Shape], *options: str) -> list[object]:
 
 def elaborate(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, int]]:
     """Findings of step 1, and the shapes that no other one holds with their number of instances at all depths (empty after findings)."""
+    out, seen = look(shapes, *defines)
+    return out, seen.get("outermost", {})
+
+
+def look(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, dict]]:
+    """Findings of step 1; with defines, unless something was found, `outermost` and the registers without reset (`registers.registers_of`)."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree.json"
         out, kept = run(
             verilator(shapes, "--json-only", *defines),
             "--json-only-output", tree, "--json-only-meta-output", Path(folder) / "meta.json", "-Mdir", folder,
-            keep=lambda: json.dumps(outermost(json.loads(tree.read_text())["modulesp"])) if defines else "{}",
+            keep=lambda: json.dumps(_facts(json.loads(tree.read_text())["modulesp"])) if defines else "{}",
         )
     return out, json.loads(kept or "{}")
+
+
+def _facts(modules: list[dict]) -> dict[str, dict]:
+    return {"outermost": outermost(modules), "registers": registers.registers_of(modules)}
 
 
 def outermost(modules: list[dict]) -> dict[str, int]:
@@ -270,20 +285,21 @@ def main() -> int:
     ]
     with ThreadPoolExecutor(2) as pool:
         jobs: list[Future[tuple[str, object]]] = [pool.submit(run, CHECKS[0])]
-        jobs.append(pool.submit(elaborate, shapes, "-DSYNTHESIS"))
-        out, sizes = jobs[-1].result()
+        synthesised = pool.submit(look, shapes, "-DSYNTHESIS")
+        out, seen = synthesised.result()
         # Shapes that do not elaborate are not flattened either: the findings would be the same.
-        groups = [] if out else groups_of(shapes, sizes)
+        groups = [] if out else groups_of(shapes, seen["outermost"])
         jobs += [pool.submit(run, verilator(group, "--lint-only", "-DSYNTHESIS")) for group in groups]
         jobs.append(pool.submit(elaborate, shapes))
         jobs += [pool.submit(run, command) for command in [*CHECKS[1:], verible]]
-        outputs = [job.result()[0] for job in jobs]
+        outputs = [out, *(job.result()[0] for job in jobs)]
+    findings += [] if out else registers.check(seen["registers"], REGISTER_LIST)
     findings += unseen([output for output in outputs if output])
 
     for finding in findings:
         print(finding.rstrip())
     modules = len({shape.module for shape in shapes})
-    print(f"lint: {modules} modules in {len(shapes)} shapes, {len(jobs)} checks, {len(findings)} findings")
+    print(f"lint: {modules} modules in {len(shapes)} shapes, {len(jobs) + 2} checks, {len(findings)} findings")
     return 1 if findings else 0
 
 

@@ -5,6 +5,7 @@ Not covered: GTKWave itself, Bender itself (its manifest is read as YAML and com
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import lint
 import pytest
+import registers
 import yaml
 from flicker_tb import runner, signal_view
 
@@ -284,6 +286,50 @@ def test_lint_flattens_every_shape_once() -> None:
     assert sizes == {inner.name: 1, default.name: 1}
     groups = lint.groups_of([inner, outer, default], {"inner": lint.GROUP, outer.name: 2 * lint.GROUP, default.name: 1})
     assert groups == [[outer], [inner], [default]]
+
+
+# What a register without reset is: the next value of each in turn, with `held` around it or not.
+BARE = {
+    "load": ("if (go_i) q <= d_i;", "data"),
+    "row": ("if (go_i) q <= {q[2:0], d_i[0]};", "data"),
+    "hold": ("q <= go_i ? d_i : q;", "data"),
+    "count": ("if (go_i) q <= q + 4'd1;", "feeds itself"),
+    "ring": ("if (go_i) q <= {q[2:0], q[3]};", "feeds itself"),
+    "wrap": ("if (go_i) q <= next; ", "feeds itself"),
+    "by itself": ("if (q[3]) q <= d_i;", "feeds itself"),
+    "by another": ("if (go_i) q <= other + 4'd1; other <= q;", "feeds itself"),
+    "decides": ("q <= d_i; state <= q[0];", "drives control"),
+}
+
+
+@pytest.mark.parametrize("name", BARE)
+def test_registers_without_reset(name: str, tmp_path: Path) -> None:
+    """What each is, through Verilator's tree; also below another module, whose register it decides. The list must name it as that."""
+    text, kind = BARE[name]
+    bare, reset = (part.strip() for part in text.split("state <=")) if "state" in text else (text, "")
+    source = tmp_path / "inner.sv"
+    source.write_text(
+        "module inner (input logic clk_i, rst_ni, go_i, input logic [3:0] d_i, output logic [3:0] q_o, output logic state_o);\n"
+        "  logic [3:0] q, other, next;\n  logic state;\n  assign next = q >= 4'd9 ? 4'd0 : q + 4'd1;\n"
+        f"  always_ff @(posedge clk_i) begin {bare} end\n"
+        f"  always_ff @(posedge clk_i or negedge rst_ni) if (!rst_ni) state <= 1'b0; else state <= {reset or 'go_i;'}\n"
+        "  assign q_o = q;\n  assign state_o = state;\nendmodule\n"
+    )
+    tree = tmp_path / "tree.json"
+    done = command(
+        "verilator", "--json-only", "--json-only-output", tree, "--json-only-meta-output", tmp_path / "meta", "-Mdir", tmp_path, "-Wno-fatal", source,
+        **toolchain.environment(),
+    )
+    assert done.returncode == 0, done.stdout
+    found = registers.registers_of(json.loads(tree.read_text())["modulesp"])
+    assert found["inner"]["q"] == kind
+    allowed = tmp_path / "list.toml"
+    names = json.dumps([*found["inner"], "another"])
+    allowed.write_text(f'[[register]]\nmodules = ["inner"]\nkind = "{kind}"\nnames = {names}\nreason = "a test"\n')
+    assert [line for line in registers.check(found, allowed) if "inner: other" not in line] == ["%s: entry 1: nothing is like another" % "/".join(allowed.parts[-2:])]
+    wrong = "data" if kind != "data" else "feeds itself"
+    allowed.write_text(allowed.read_text().replace(kind, wrong))
+    assert any("inner: q has no reset" in line for line in registers.check(found, allowed))
 
 
 # ---- manifests for other tools ------------------------------------------------------------------

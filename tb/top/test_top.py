@@ -1,8 +1,8 @@
 """The chip's top, flk_top, with stand-ins for its halves: the sequence of frames as a host sees it.
 
 State space: frames back to back, released early and late; a write right behind each start; aborts, time-outs and resets with and without a frame that waits
-for its release, in a drain too; interrupts, enables, counters that run on. Not covered: the halves (tb/frames/test_chip_frames.py has the whole chip), addresses and
-orders at the memory port (tb/common/test_axi_arbiter.py).
+for its release, in a drain too; interrupts, enables, counters that run on. Not covered: the halves (tb/frames/test_chip_frames.py has the whole chip),
+addresses and orders at the memory port (tb/common/test_axi_arbiter.py).
 """
 
 from __future__ import annotations
