@@ -16,6 +16,7 @@ turn; the other formats keep the coordinates of the training.
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import re
 from collections.abc import Callable
@@ -218,8 +219,9 @@ def _text(head: bytes) -> str:
     if head.startswith(b"version https://git-lfs"):
         return "a pointer of Git LFS (get the file with git lfs pull)"
     plain = sum(32 <= byte < 127 or byte in b"\t\n\f\r" for byte in head)
+    decoder = codecs.getincrementaldecoder("utf-8")("ignore" if plain > 0.9 * len(head) else "strict")
     try:
-        words = head[:-3].decode("utf-8", "ignore" if plain > 0.9 * len(head) else "strict")  # a character may be cut at the end
+        words = decoder.decode(head)  # a character may be cut at the end
     except UnicodeDecodeError:
         return ""
     if b"\0" in head or not all(c.isprintable() or c.isspace() for c in words):
