@@ -182,7 +182,7 @@ def write_gltf(path: Path, document: dict, buffer: bytes, form: str) -> Path:
 
 
 def ksplat(scenes: list[Scene], level: int, room: int = 0, bucket: int = 16, block: float = 5.0) -> bytes:
-    """A section for each scene. room: places for further Gaussians at the end of each. Gaussians of levels 1 and 2 must lie within half a block of the origin."""
+    """A section for each scene. room: places for further Gaussians at the end of each. In levels 1 and 2, Gaussians lie within half a block of the origin."""
     total = sum(map(len, scenes))
     head = struct.pack("<BBxxIIII", 0, 1, len(scenes), len(scenes), total, total) + struct.pack("<Hxxfffff", level, 0, 0, 0, -1.5, 1.5)
     headers, sections = [], []
