@@ -84,8 +84,8 @@ module flk_splat_band (
   logic [23:0] v49;  // cycle 23
   logic [23:0] v50;  // cycle 24
   logic signed [24:0] v51;  // cycle 21
-  logic signed [23:0] v52;  // cycle 21
-  logic signed [23:0] v53;  // cycle 22
+  logic signed [24:0] v52;  // cycle 21
+  logic signed [24:0] v53;  // cycle 22
   logic empty;  // cycle 25
   logic [8:0] first;  // cycle 25
   logic [8:0] last;  // cycle 25
@@ -120,8 +120,8 @@ module flk_splat_band (
   logic [0:0][31:0] v47_q;
   logic [0:0][23:0] v49_q;
   logic [0:0][23:0] v50_q;
-  logic [0:0][23:0] v52_q;
-  logic [2:0][23:0] v53_q;
+  logic [0:0][24:0] v52_q;
+  logic [2:0][24:0] v53_q;
   logic [0:0][0:0] empty_q;
   logic [0:0][8:0] first_q;
   logic [0:0][8:0] last_q;
@@ -233,9 +233,9 @@ module flk_splat_band (
   assign v49 = 24'(v48 < $signed(25'(x0_i_q[22])) ? $signed(25'(x0_i_q[22])) : v48);
   assign v50 = box_i ? 24'(x0_i_q[23]) : v49_q[0];
   assign v51 = 25'($signed(v32_q[0]) >>> 7);
-  assign v52 = 24'($signed(25'(x1_i_q[20])) < v51 ? $signed(25'(x1_i_q[20])) : v51);
-  assign v53 = box_i ? $signed(24'(x1_i_q[21])) : $signed(v52_q[0]);
-  assign empty = $signed(25'(v50_q[0])) > 25'($signed(v53_q[2]));
+  assign v52 = 25'($signed(25'(x1_i_q[20])) < v51 ? $signed(25'(x1_i_q[20])) : v51);
+  assign v53 = box_i ? $signed(25'(x1_i_q[21])) : $signed(v52_q[0]);
+  assign empty = $signed(25'(v50_q[0])) > $signed(v53_q[2]);
   assign first = 9'(9'(v50_q[0] >>> 3));
   assign last = 9'(9'($signed(v53_q[2]) >>> 3));
 

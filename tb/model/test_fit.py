@@ -63,12 +63,15 @@ def busy(count: int = 60, degree: int = 3) -> Parameters:
 # -- pictures and derivatives ---------------------------------------------------------------------------------------------------------
 
 
-def test_picture_is_the_reference() -> None:
+@pytest.mark.parametrize("antialiased", [False, True])
+def test_picture_is_the_reference(antialiased: bool) -> None:
     """Picture and transmittance, but for the rounding of scales and opacities to the scene's float32."""
-    found, camera = busy(), look()
+    found, camera = busy(), replace(look(), cx=19.0, cy=20.5) if antialiased else look()
+    found.antialiased = antialiased
+    found.values[30:, SCALE:QUAT] -= 2.0 * antialiased  # small ones, which it shows on
     frame = render(found, camera, BACKGROUND)
     image, left = render_with_transmittance(project(found.scene(), camera), camera, BACKGROUND)
-    assert left.min() < 1e-3 and left.max() > 0.5
+    assert left.min() < (0.01 if antialiased else 1e-3) and left.max() > 0.5
     assert np.abs(frame.image - image).max() < 2e-5 and np.abs(frame.transmittance - left).max() < 2e-5
     assert not frame.bad.any() and frame.used.sum() > 50
 
@@ -94,7 +97,7 @@ def difference(
     def slope(step: float) -> float:
         results, places = [], []
         for sign in (1, -1):
-            moved = Parameters(parameters.values.copy())
+            moved = parameters.like(parameters.values.copy())
             moved.values[i, column] += np.float32(sign * step)
             places.append(float(moved.values[i, column]))
             results.append(float((weight * render(moved, camera, BACKGROUND, machine).image).sum()))
@@ -112,10 +115,15 @@ def whole(gradient: Gradient, count: int) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize(("degree", "z", "name"), [(3, -3.0, None), (1, -1.3, None), (0, -3.0, "flicker-sparse-fixed-factored")])
-def test_derivatives(degree: int, z: float, name: str | None) -> None:
+@pytest.mark.parametrize(("degree", "z", "name", "antialiased"), [
+    (3, -3.0, None, False), (1, -1.3, None, False), (0, -3.0, "flicker-sparse-fixed-factored", False), (0, -3.0, None, True),
+])
+def test_derivatives(degree: int, z: float, name: str | None, antialiased: bool) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
     parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
+    if antialiased:
+        parameters.antialiased, camera = True, replace(camera, cx=11.25, cy=14.0)
+        parameters.values[:, SCALE:QUAT] -= 1.5
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
     machine = None if name is None else through(name)
     frame = render(parameters, camera, BACKGROUND, machine)

@@ -13,6 +13,7 @@ import math
 import socket
 import threading
 import time
+from dataclasses import replace
 
 import browser
 import numpy as np
@@ -181,14 +182,16 @@ def test_camera_there_and_back() -> None:
     rng = np.random.default_rng(3)
     for _ in range(50):
         rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        camera = Camera(320, 180, rng.uniform(100, 900), rng.uniform(100, 900), rng.normal(size=3) * 10, rotation * np.sign(np.linalg.det(rotation)))
+        camera = Camera(320, 180, rng.uniform(100, 900), rng.uniform(100, 900), rng.normal(size=3) * 10, rotation * np.sign(np.linalg.det(rotation)),
+                        cx=rng.uniform(100, 200), cy=rng.uniform(-50, 200))
         pose = Pose.of(camera)
         assert math.isclose(np.linalg.norm(pose.wxyz), 1.0)
         back = pose.camera(camera)
+        assert (back.cx, back.cy) == (camera.cx, camera.cy)
         assert close(camera, back) and back.fx == pytest.approx(camera.fx) and np.allclose(back.rotation, camera.rotation)
         assert Pose(tuple(-w for w in pose.wxyz), pose.position, pose.fov).camera(camera).rotation == pytest.approx(back.rotation)
         moved = Pose(pose.wxyz, (pose.position[0] + 0.1, *pose.position[1:]), pose.fov).camera(camera)
-        assert not close(camera, moved)
+        assert not close(camera, moved) and not close(camera, replace(back, cx=camera.cx + 1))
         # The browser makes its rotation of position, target and up.
         up = upright(camera, rng.normal(size=3))
         ahead = camera.rotation[:, 2]

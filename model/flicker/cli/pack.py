@@ -46,6 +46,8 @@ def _contents(packed: PackedScene, title: str) -> Table:
     for name, corner in (("lowest mean", packed.table["low"].min(axis=0)), ("highest mean", packed.table["high"].max(axis=0))):
         table.add_row(name, " ".join(f"{x:.4g}" for x in corner))
     table.add_row("largest deviation", f"{packed.sigma.max():.4g}")
+    if packed.antialiased:
+        table.add_row("antialiased", "yes")
     return table
 
 

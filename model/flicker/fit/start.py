@@ -34,7 +34,7 @@ def _seen(places: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray, n
     """bool (N,): places in the picture of a camera; lines and columns of those, int64."""
     x, y, z = ((places - camera.position) @ camera.rotation).T
     with np.errstate(all="ignore"):
-        column, line = camera.fx * x / z + 0.5 * camera.width, camera.fy * y / z + 0.5 * camera.height
+        column, line = camera.fx * x / z + camera.cx + 0.5, camera.fy * y / z + camera.cy + 0.5
     seen = (z > NEAR) & (column >= 0) & (column < camera.width) & (line >= 0) & (line < camera.height)
     return seen, line[seen].astype(np.int64), column[seen].astype(np.int64)
 

@@ -128,10 +128,10 @@ class Trainer:
         if parameters is None:
             begun = start(dataset, self._photos, options.gaussians, options.degree, self.rng, self._counted)
         else:
-            begun = Parameters(parameters.values.copy())
+            begun = parameters.like(parameters.values.copy())
         self.parameters = begun
         self.first = len(self.parameters)
-        self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes()).hexdigest()
+        self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes() + b"antialiased" * parameters.antialiased).hexdigest()
         self.moments = Adam.of(self.parameters.values)
         self.exposures = np.tile(np.eye(3, 4, dtype=np.float32).ravel(), (len(dataset.fitted), 1))
         self.exposure_moments = Adam.of(self.exposures)
@@ -216,7 +216,7 @@ class Trainer:
         new = values[:0] if new is None else new
         if not len(keep) + len(new):
             raise FlickerError(f"fit: no Gaussian is left after {self.iteration} iterations")
-        self.parameters = Parameters(np.concatenate([values[keep], new]))
+        self.parameters = self.parameters.like(np.concatenate([values[keep], new]))
         self.moments.select(keep, len(new))
         self.score, self.seen = (np.concatenate([old[keep], np.zeros(len(new))]) for old in (self.score, self.seen))
 
@@ -329,7 +329,7 @@ class Trainer:
                 if theirs[key] != ours[key]:
                     said = f"another {key}" if key == "scene" else f"other {key}" if key == "photographs" else f"{key} {theirs[key]}, not {ours[key]}"
                     raise FlickerError(f"{path}: is of a fit with {said}")
-            self.parameters = Parameters(arrays["values"])
+            self.parameters = self.parameters.like(arrays["values"])
             self.moments = Adam(arrays["m"], arrays["v"], numbers["steps"][0])
             self.exposures = arrays["exposures"]
             self.exposure_moments = Adam(arrays["exposure_m"], arrays["exposure_v"], numbers["steps"][1])

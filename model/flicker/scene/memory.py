@@ -17,7 +17,7 @@ The chunk format is that of PlayCanvas' splat-transform: values are rounded to t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -315,5 +315,7 @@ def load_chunks(path: str | Path) -> ChunkScene:
 def through_memory(scene: Scene, form: MemoryFormat, size: int = CHUNK) -> Scene:
     """The scene as it comes back out of memory in a format. It must be in the order of its clusters (`build_clusters`)."""
     if form.chunked:
-        return decode_chunks(encode_chunks(scene, scaled_sh=form is MemoryFormat.CHUNK_SH), scene.path)
-    return decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)
+        decoded = decode_chunks(encode_chunks(scene, scaled_sh=form is MemoryFormat.CHUNK_SH), scene.path)
+    else:
+        decoded = decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)
+    return replace(decoded, antialiased=scene.antialiased)

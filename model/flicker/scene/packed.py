@@ -93,7 +93,8 @@ IMAGE_HEADER = _record(
     ("low", "<f4", 3),  # box of the cluster boxes
     ("high", "<f4", 3),
     ("sigma", "<f4"),  # the largest of a cluster
-    ("reserved", "V144"),
+    ("flags", "<u4"),  # bit 0: antialiased
+    ("reserved", "V140"),
     ("crc", "<u4"),  # of the bytes before
 )
 TABLE_ENTRY = _record(
@@ -138,7 +139,7 @@ class PackedScene:
     """A scene as it lies in memory: C clusters, S slots (a multiple of 16), N Gaussians in the order of their slots.
 
     table: TABLE_ENTRY (C,). headers: CHUNK_HEADER or FP16_HEADER (C,). geometry: chunk: uint32 (S, 3), words of position, rotation, log2 scale; FP16:
-    uint16 (S, 10), bits of mean, scale, quaternion (w first). colour: uint8 (B,), B a multiple of 64.
+    uint16 (S, 10), bits of mean, scale, quaternion (w first). colour: uint8 (B,), B a multiple of 64. antialiased: as in `Scene`.
     """
 
     format: PackedFormat
@@ -147,6 +148,7 @@ class PackedScene:
     geometry: np.ndarray
     colour: np.ndarray
     path: Path | None = None
+    antialiased: bool = False
 
     def __len__(self) -> int:
         """Gaussians."""
@@ -219,6 +221,7 @@ class PackedScene:
         header["gaussians"], header["clusters"], header["slots"] = len(self), len(self.table), len(self.geometry)
         header["low"], header["high"] = self.table["low"].min(axis=0), self.table["high"].max(axis=0)
         header["sigma"] = self.sigma.max()
+        header["flags"] = self.antialiased
         parts = self.sections()
         offset = HEADER_BYTES // BEAT
         for name, part in parts.items():
@@ -337,7 +340,7 @@ def decode(packed: PackedScene) -> Scene:
     """The scene that the image holds, in float32, Gaussian i being that of `packed.slot[i]`. Rotations are normalised; an opacity of 0 becomes 2^-24."""
     v = values(packed)
     quats = v.quats / np.linalg.norm(v.quats, axis=1, keepdims=True)
-    return Scene(v.means, v.scales, quats, np.maximum(v.opacities, _TINY), v.sh, packed.path)
+    return Scene(v.means, v.scales, quats, np.maximum(v.opacities, _TINY), v.sh, packed.path, antialiased=packed.antialiased)
 
 
 # ---- bounds of the clusters ----------------------------------------------------------------------------------------------------------
@@ -394,6 +397,7 @@ def parse(data: bytes, path: Path) -> PackedScene:
     packed = PackedScene(
         form, np.frombuffer(parts["table"], TABLE_ENTRY, clusters), np.frombuffer(parts["headers"], form.header, clusters),
         np.frombuffer(parts["geometry"], kind, slots * words).reshape(slots, words), np.frombuffer(parts["colour"], np.uint8), path,
+        bool(header["flags"] & 1),
     )
     _check_table(packed, header, path)
     _check_headers(packed, path)
@@ -435,6 +439,8 @@ def _image_header(data: bytes, path: Path) -> tuple[np.ndarray, PackedFormat]:
         end += size
     if end != beats:
         raise FlickerError(f"{path}: colour_beats: ends at beat {end}, the image has {beats}")
+    if header["flags"] > 1:
+        raise FlickerError(f"{path}: flags: {header['flags']}: reserved bits are not zero")
     if any(header["reserved"].tobytes()):
         raise FlickerError(f"{path}: reserved: not zero")
     return header, form

@@ -199,6 +199,7 @@ def pack(scene: Scene, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe =
             packed, clamped = _chunks(scene, start, counts, recipe)
         else:
             packed, clamped = _fp16(scene, form, start, counts)
+    packed.antialiased = scene.antialiased
     return Packing(packed, order, clamped, left_out)
 
 

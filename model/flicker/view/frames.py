@@ -85,7 +85,7 @@ class Frame:
 
 def camera_key(camera: Camera) -> tuple:
     """Equal for cameras that see the same."""
-    return camera.width, camera.height, camera.fx, camera.fy, camera.position.tobytes(), camera.rotation.tobytes()
+    return camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.position.tobytes(), camera.rotation.tobytes()
 
 
 def largest(scene: Scene, share: int) -> Scene:
@@ -96,7 +96,7 @@ def largest(scene: Scene, share: int) -> Scene:
     count = -(-len(scene) // share)
     size = scene.opacities * axes[:, 1] * axes[:, 2]
     keep = np.sort(np.argpartition(size, len(scene) - count)[len(scene) - count :]) if len(scene) else np.zeros(0, np.int64)
-    return Scene(scene.means[keep], scene.scales[keep], scene.quats[keep], scene.opacities[keep], scene.sh[keep])
+    return Scene(scene.means[keep], scene.scales[keep], scene.quats[keep], scene.opacities[keep], scene.sh[keep], antialiased=scene.antialiased)
 
 
 class Renderer:

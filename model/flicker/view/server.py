@@ -182,7 +182,7 @@ class Session:
     def moved(self) -> None:
         """The browser's camera has moved, or its window has another shape."""
         at = self.client.camera
-        camera = Pose(tuple(at.wxyz), tuple(at.position), float(at.fov)).camera(self.viewer.start)
+        camera = Pose(tuple(at.wxyz), tuple(at.position), float(at.fov)).camera(self.goal)
         if close(camera, self.goal):
             camera = self.goal
         if self._aspect() != self.whole[0] / self.whole[1]:

@@ -153,7 +153,7 @@ def crop(projected: Projected, camera: Camera, x0: int, y0: int, size: int = SIZ
     mean = projected.mean - (x0, y0)
     near = (np.abs(mean - (size - 1) / 2) <= (size - 1) / 2 + projected.circle[:, None] + 16).all(axis=1)
     fields = {k: v[near] for k, v in vars(projected).items()} | {"mean": mean[near]}
-    return Projected(**fields), replace(camera, width=size, height=size)
+    return Projected(**fields), replace(camera, width=size, height=size, cx=camera.cx - x0, cy=camera.cy - y0)
 
 
 def _screen(x0: float, rng: np.random.Generator) -> Case:
