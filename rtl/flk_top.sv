@@ -11,8 +11,8 @@
 // status.aborting is 0.
 // The clock of a half stands still while it is idle and no frame is in its place (flk_clock_gate).
 // test_en_i (scan test, 0 in use): both clocks run, both halves are reset by rst_ni alone.
-// irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone, but for reg_*_ready_o, which follow the ready of
-// the register port's answers; w_ready_i and b_* reach the writers combinationally.
+// irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone; w_ready_i and b_* reach
+// the writers combinationally.
 module flk_top
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;

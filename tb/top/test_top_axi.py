@@ -1,21 +1,38 @@
 """The chip with the pins of AMBA: what of it is wrapper, with nothing but a header in the chip's place, and, with SLOW=1, frames.
 
-State space: every pin of both sides with random values, one edge of a reset with and without the synchroniser, test enable; what is refused. With SLOW=1
-the whole chip behind cocotbext-axi's AXI4-Lite manager, with its AXI4 memory, which knows narrow reads: registers, accesses of bytes, a refused descriptor, a
-frame byte for byte as the golden model has it, and every access of that frame against the table of docs/integration.md.
-Parameter space: identifiers as wide as the chip's and wider; with SLOW=1 a chip of 32 lanes with small memories. Frames of flk_top: tb/frames/test_chip_frames.py.
+State space: every pin of both sides with random values, resets with and without the synchroniser, test enable; what is refused. With SLOW=1 the whole chip
+between cocotbext-axi's AXI4-Lite manager and its AXI4 memory, which knows narrow reads: a frame byte for byte as the golden model has it, and every access
+of that frame against the table of docs/integration.md.
+Parameter space: identifiers as wide as the chip's and wider; with SLOW=1 a chip of 32 lanes with small memories. Frames of flk_top: tb/frames.
 """
 
 from __future__ import annotations
 
+import ctypes
+import json
 import re
+from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
+from doc_parts.instance import OWN_ID_BITS, managers
 from flicker_tb.bench import netlist
-from flicker_tb.runner import build, build_and_test, refused
+from flicker_tb.runner import build, build_and_test, refused, seed
 
-from flicker.toolchain import BUILD, ROOT, sources_of
+from flicker.chip_registers import REGISTERS, ResultError
+from flicker.golden.chip import render_chip
+from flicker.golden.front.frame import ListKind, run_front
+from flicker.golden.front.record import RecordKind
+from flicker.golden.lanes.lists import front_lists
+from flicker.params import RenderConfig
+from flicker.scene.camera import Camera
+from flicker.scene.files import Scene
+from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packing import pack
+from flicker.sim import driver
+from flicker.sim.chip import IMAGE, ChipSession
+from flicker.toolchain import BUILD, ROOT, filelist, sources_of
 
 TOP = ROOT / "rtl" / "flk_top.sv"
 WRAPPER = ROOT / "rtl" / "flk_top_axi.sv"
@@ -78,3 +95,135 @@ def test_parameters_are_those_of_the_chip() -> None:
     assert len(chip) > 15 and chip.items() <= wrapper.items()
     instance = re.search(r"flk_top #\((.*?)\) i_top", WRAPPER.read_text(), re.S)
     assert instance and dict(re.findall(r"\.(\w+)\s*\((\w+)\)", instance[1])) == {name: name for name in chip}
+
+
+# ---- the whole chip -----------------------------------------------------------------------------
+
+CONFIG = RenderConfig(stage="lanes", memories="small")
+PARAMETERS = {**CONFIG.chip_parameters(), **CONFIG.chip_memories.front_parameters(), "IdWidth": 9}
+SIZE = 1 << 29  # of the memory; only what is written takes place
+
+
+class Recorded(ChipSession):
+    """The session of a chip that is not there: what the driver writes into registers, what lies in memory."""
+
+    def __init__(self, packed: PackedScene, capability: int) -> None:
+        self.name, self.seed, self.config, self.packed = "recorded", seed(), CONFIG, packed
+        self.driver, self._error = driver.library(), None
+        reset = {name: int(value, 16) for name, value in re.findall(r"#define FLK_(\w+)_RESET 0x(\w+)u", (driver.SW / "flk_registers.h").read_text())}
+        version = reset["VERSION_MAJOR"] | reset["VERSION_MINOR"] << 8
+        self.answers = {REGISTERS[name].offset: value for name, value in (
+            ("id", reset["ID_VALUE"]), ("version", version), ("capability", capability), ("status", 1),
+        )}
+        self.written: list[tuple[int, int]] = []
+        self._calls = driver.READ(self._read), driver.WRITE(self._write)
+        self.device, self.scene = driver.CDevice(), driver.CScene()
+        data = packed.image()
+        self._check(self.call("flk_scene_open", ctypes.byref(self.scene), data, len(data), IMAGE, 0))
+        self._check(self.call("flk_probe", ctypes.byref(self.device), ctypes.byref(driver.CBus(*self._calls, None))))
+        self._next = IMAGE + -(-len(data) // 4096) * 4096
+        assert not self.written
+
+    def _access(self, offset: int, write: bool, value: int = 0) -> int:
+        if write:
+            self.written.append((offset, value))
+        return value if write else self.answers.get(offset, 0)
+
+    def load(self, base: int, allocated: int, data: bytes, purpose: int) -> None:
+        assert base + allocated <= SIZE
+
+
+def scene() -> PackedScene:
+    rng = np.random.default_rng(seed())
+    return pack(Scene(
+        means=np.stack([*rng.uniform(-1.5, 1.5, (2, 300)), rng.uniform(1.0, 6.0, 300)], axis=1), scales=rng.uniform(0.01, 0.1, (300, 3)),
+        quats=rng.normal(size=(300, 4)), opacities=rng.uniform(0.01, 1.0, 300), sh=rng.normal(scale=0.3, size=(300, 4, 3)),
+    ), PackedFormat.CHUNK).packed
+
+
+@pytest.mark.slow
+def test_frame(tmp_path: Path) -> None:
+    """Written by the C driver, rendered by the RTL, equal to the golden model; every access is one of the page's table."""
+    packed, view = scene(), Camera(96, 54, 80.0, 80.0, np.zeros(3), np.eye(3))
+    fields = REGISTERS["capability"].fields
+    built = {"stage": 1, "form": int(CONFIG.form), "precision": int(CONFIG.precision), "vrus": CONFIG.vrus_per_channel, "mask_generator": 0,
+             "log2_lists": 14, "log2_beat": 6, "log2_lanes": 5}
+    session = Recorded(packed, sum(value << fields[name][0] for name, value in built.items()))
+    frame = session.frame(view, session.place(view), background=(10, 20, 200), tag=77)
+    session.start(frame)
+    want = render_chip(front_lists(run_front(packed, view, ListKind.ELLIPSE, RecordKind.of(CONFIG.form))), CONFIG, background=(10, 20, 200)).buffer
+    files = {"image": packed.image(), "want": want.tobytes(), "table": json.dumps([asdict(m) | {"qos": m.qos} for m in managers(PARAMETERS)]).encode()}
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+    build_and_test(
+        "flk_top_axi", "cocotb_top_axi", parameters=PARAMETERS,
+        config={
+            "files": str(tmp_path), "size": SIZE, "image": IMAGE, "written": session.written, "frame_buffer": frame.frame_buffer, "tag": 77,
+            "registers": {name: register.offset for name, register in REGISTERS.items()}, "capability": session.answers[REGISTERS["capability"].offset],
+            "built": sum(((1 << fields[name][1]) - 1) << fields[name][0] for name in ("stage", "form", "log2_lists", "log2_beat", "log2_lanes")),
+            "descriptor_error": 1 << ResultError.DESCRIPTOR,
+        },
+    )
+
+
+# ---- what docs/integration.md says of the sources -----------------------------------------------
+
+
+def code(path: Path) -> str:
+    """A source without its comments."""
+    return re.sub(r"//.*", "", path.read_text())
+
+
+def test_clocks_and_resets() -> None:
+    """One clock and its rising edge; resets that in a scan test are the pin; gates in flk_top alone, each with its test enable."""
+    gates = 0
+    for path in filelist():
+        text, wrapper = code(path), path.stem == "flk_top_axi"
+        events = {re.sub(r"\s+", " ", event) for event in re.findall(r"\balways\w*\s*@\s*\((.*?)\)", text)}
+        clock, reset = ("aclk", "rst_n") if wrapper else ("clk_i", "rst_ni")
+        assert events <= {f"posedge {clock}", f"posedge {clock} or negedge {reset}"}, path.name
+        assert ("always_latch" in text) == (path.stem == "flk_clock_gate"), path.name
+        connected = set(re.findall(r"\.rst_ni\s*\(\s*(.*?)\s*\)", text)) - {"rst_ni"}
+        assert connected <= {"flk_top": {"units_rst_n"}, "flk_top_axi": {"rst_n", "aresetn"}}.get(path.stem, set()), path.name
+        clocks = set(re.findall(r"\.clk_i\s*\(\s*(.*?)\s*\)", text)) - {"clk_i", "1'b0"}
+        assert clocks <= {"flk_top": {"front_clk", "rendering_clk"}, "flk_top_axi": {"aclk"}}.get(path.stem, set()), path.name
+        inside = re.findall(r"flk_clock_gate (\w+) \((.*?)\);", text, re.S)
+        assert not inside or path.stem == "flk_top"
+        assert all(re.search(r"\.test_en_i,", pins) for _, pins in inside)
+        gates += len(inside)
+    assert gates == 2
+    assert re.search(r"assign units_rst_n\s*= test_en_i \? rst_ni : units_rst_nq;", code(TOP))
+    assert re.search(r"assign rst_no\s*= test_en_i \? rst_ni : ", code(ROOT / "rtl" / "common" / "flk_reset_sync.sv"))
+
+
+def test_cells_to_replace() -> None:
+    """Those of the page are all that hold memories, gate a clock or synchronise; the stages alone have none of them."""
+    page = (ROOT / "docs" / "integration.md").read_text()
+    listed = re.findall(r"^\| `(\w+)` \| `(rtl/[\w/]+\.sv)` \|", page, re.M)
+    assert len(listed) == 4 and all((ROOT / file).stem == name for name, file in listed)
+    cells = {name for name, _ in listed}
+    arrays = {path.stem for path in filelist() if re.search(r"\blogic\b[^;=]*\]\s*\w+_q\s*\[\w+\]\s*;", code(path))}
+    assert arrays == {"flk_sram", "flk_sram_single", "flk_fifo"}, arrays
+    for stage in ("flk_render_stage", "flk_lane_stage"):
+        assert not cells & {path.stem for path in sources_of(stage)}
+
+
+def test_figures_of_the_page() -> None:
+    """Widths, sizes and constants in the prose."""
+    page = (ROOT / "docs" / "integration.md").read_text()
+    said = {"narrow": 5, "whole": 6}
+    table = managers()
+    assert all(m.size == (said["narrow"] if m.note.startswith("always") else said["whole"]) for m in table)
+    assert all(m.beats == 1 and not m.note for m in table if m.write) and "Writes are single beats of the whole width" in page
+    assert f"(AxSIZE {said['narrow']})" in page and f"(AxSIZE {said['whole']})" in page and "single beats of 32 bytes" in page
+    ports = header(WRAPPER)
+    for text, bits in (
+        ("512 bits of data, byte addresses of 40 bits", r"\[39:0\]\s+m_axi_araddr"), ("32 bits of data and 10 of address, 1 KB", r"\[9:0\]\s+s_axil_araddr"),
+    ):
+        assert text in page and re.search(bits, ports)
+    assert re.search(r"\[511:0\]\s+m_axi_rdata", ports) and re.search(r"\[31:0\]\s+s_axil_rdata", ports)
+    for name, value, text in (
+        ("Cache", 3, "CACHE is 3 ("), ("ResetStages", 2, "with `ResetStages` of 2 (default)"), ("IdWidth", 7, "fewer than 7 bits of identifiers are refused"),
+    ):
+        assert re.search(rf"{name}\s+= {value}\b", ports) and text in page
+    assert OWN_ID_BITS == 4 and "above its own four bits" in page and all(m.ids[0] >> OWN_ID_BITS == m.index for m in table)
