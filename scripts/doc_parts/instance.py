@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import pyslang
@@ -57,6 +57,7 @@ MANAGERS = (
     ("pointers that make room", "WRITE_POINTERS", "i_front.i_pointers", ""),
     ("records, lists, pointers", "WRITE_FRONT", "i_front.i_write", ""),
 )
+AXI_SIZES = ("MaxBeats", "Bursts", "Width", "Id")  # parameters of the units of AXI
 OWN_ID_BITS = 4  # of a manager's identifier, below its number
 BEAT = 64
 
@@ -142,6 +143,16 @@ def duties() -> str:
     return table(["`flk_top`", "`flk_top_axi`", "duty"], rows)
 
 
+def _instances(scope: object) -> Iterator[pyslang.ast.InstanceSymbol]:
+    """All below a scope, blocks that are generated included."""
+    for member in scope:  # type: ignore[attr-defined]
+        if isinstance(member, pyslang.ast.InstanceSymbol):
+            yield member
+            yield from _instances(member.body)
+        elif isinstance(member, pyslang.ast.GenerateBlockArraySymbol) or (isinstance(member, pyslang.ast.GenerateBlockSymbol) and not member.isUninstantiated):
+            yield from _instances(member)
+
+
 @dataclass(frozen=True)
 class Manager:
     """What the memory port sees of one of its managers. index: its number among readers or writers, which the identifier begins with. ids: of the port.
@@ -169,16 +180,13 @@ def managers(parameters: Mapping[str, int] | None = None) -> list[Manager]:
     errors, tops = elaborate(text, {"flk_sized"} if text else {CHIP})
     if errors:
         raise FlickerError(f"rtl/flk.f: slang finds {errors[0]}")
-    units: list[tuple[str, str, dict[str, int]]] = []
-
-    def visit(symbol: object) -> pyslang.ast.VisitAction:
-        if isinstance(symbol, pyslang.ast.InstanceSymbol) and symbol.definition.name in ("flk_axi_read", "flk_axi_write"):
-            values = {p.name: int(str(p.value).split("'d")[-1]) for p in symbol.body.parameters if p.name in ("MaxBeats", "Bursts", "Width", "Id")}
-            units.append((symbol.hierarchicalPath, symbol.definition.name, values))
-        return pyslang.ast.VisitAction.Advance
-
-    top = next(iter(tops.values()))
-    top.visit(visit)
+    units = [
+        (
+            instance.hierarchicalPath, instance.definition.name,
+            {p.name: int(str(p.value).split("'d")[-1]) for p in instance.body.parameters if p.name in AXI_SIZES},
+        )
+        for instance in _instances(next(iter(tops.values())).body) if instance.definition.name in ("flk_axi_read", "flk_axi_write")
+    ]
     package = (ROOT / "rtl" / "top" / "flk_top_pkg.sv").read_text()
     found, taken = [], 0
     for name, constant, place, note in MANAGERS:
