@@ -97,6 +97,7 @@ def shuffled(properties: list) -> list:
     return [properties[k] for k in np.random.default_rng(SEED).permutation(len(properties))]
 
 
+COMMENTS = ["comment von Jörg, élément vertex 3", "obj_info is_cyberware_data 1", "comment", ""]
 PLY = {  # elements, layout and further arguments of `ply`
     "ascii": lambda v: ([("vertex", v)], "ascii"),
     "ascii, lines of Windows": lambda v: ([("vertex", v)], "ascii", b"\r\n"),
@@ -105,7 +106,7 @@ PLY = {  # elements, layout and further arguments of `ply`
     "big endian": lambda v: ([FACES, ("vertex", v), *SHARP, ("more", FACES[1])], "binary_big_endian"),
     "header of Windows": lambda v: ([("vertex", v)], "binary_little_endian", b"\r\n"),
     "header of an old Macintosh": lambda v: ([("vertex", v)], "binary_little_endian", b"\r"),
-    "comments": lambda v: ([("vertex", v)], "binary_little_endian", b"\n", ["comment von Jörg, élément vertex 3", "obj_info is_cyberware_data 1", "comment"]),
+    "comments": lambda v: ([("vertex", v)], "binary_little_endian", b"\n", COMMENTS),
     "elements behind": lambda v: ([("vertex", v), *SHARP], "binary_little_endian"),
     "elements before": lambda v: ([*SHARP, EMPTY, ("vertex", v)], "binary_little_endian"),
     "faces before": lambda v: ([FACES, ("vertex", v)], "binary_little_endian"),
@@ -208,6 +209,8 @@ def test_ply_of_surfels(tmp_path: Path) -> None:
     equal(got, scene, of=("means", "quats", "opacities", "sh"))
     assert np.allclose(got.scales[:, :2], scene.scales[:, :2]) and np.array_equal(got.scales[:, 2], got.scales[:, :2].max(axis=1) * np.float32(FLAT))
     assert len(notes) == 1 and "2DGS" in notes[0] and "flat" in notes[0]
+    _, notes = told(written(tmp_path / "a.ply", formats.ply([("vertex", formats.vertex(scene))], comments=["comment SplatRenderMode: 2dgs"])))
+    assert len(notes) == 1 and "2DGS" in notes[0]
 
 
 def test_ply_says_what_it_does_not_use(tmp_path: Path) -> None:
@@ -332,12 +335,13 @@ def test_opaque_and_flat_gaussians_are_drawn(form: str, tmp_path: Path) -> None:
         data = {"ply": lambda: formats.ply([("vertex", formats.vertex(scene))]), "glb": lambda: formats.glb(*formats.gltf(formats.gltf_attributes(scene))),
                 "ksplat": lambda: formats.ksplat([scene], 1)}[form]()
         path.write_bytes(data)
-    got = quiet(path)
+    got, notes = told(path)
+    assert notes == ["20 Gaussians have a scale of 0: drawn as flat, 2^-16 as thick as wide"]
     assert got.rejected == {} and len(got) == 40 and (got.opacities[::2] == 1).all()
     assert (got.scales[20:].min(axis=1) == got.scales[20:].max(axis=1) * np.float32(FLAT)).all() and (got.scales[:20].min() > 0.04)
     if form == "ply":
         scene.scales[3] = 0  # a point: as thin as can be, and no more
-        got = quiet(written(path, formats.ply([("vertex", formats.vertex(scene))])))
+        got, _ = told(written(path, formats.ply([("vertex", formats.vertex(scene))])))
         assert len(got) == 40 and (got.scales[3] == np.float32(2.0**-30)).all()
 
 
@@ -622,6 +626,11 @@ def test_gltf_of_several_parts(tmp_path: Path) -> None:
         got = quiet(written(tmp_path / "a.glb", formats.glb(document, data)))
         equal(got, base(1), 1e-3, ("means",))
         assert got.antialiased and got.sh_degree == 1
+    primitive = document["meshes"][0]["primitives"][0]
+    for name in ("KHR_spz_gaussian_splats_compression", "KHR_spz_compression"):  # drafts of it
+        primitive["extensions"] = {name: {"bufferView": 1}}
+        document["extensionsRequired"] = [name]
+        assert samples_same(quiet(written(tmp_path / "a.glb", formats.glb(document, data))), got)
 
 
 def test_gltf_that_is_refused(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import codecs
 import hashlib
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,13 +27,14 @@ import numpy as np
 
 from ..errors import FlickerError, one_line, say
 from . import sog
+from .folders import trained_scene
 from .gaussians import Scene, logits
 from .gltf import gltf_files, is_gltf, read_gltf
 from .ksplat import is_ksplat, read_ksplat
 from .packed import decode, is_image, load_packed
 from .ply import is_ply
 from .ply_scene import check_ply, read_ply
-from .raw import Raw
+from .raw import FLAT_NOTE, Raw
 from .splat import read_splat
 from .spz import is_spz, read_spz
 from .turns import ABOUT_X
@@ -104,6 +104,8 @@ def _checked(path: Path, raw: Raw) -> Scene:
     if flat.any():
         thin = np.maximum(np.float32(FLAT) * scales[flat].max(axis=1, keepdims=True), np.float32(_LEAST))
         scales[flat] = np.where(scales[flat] == 0, thin, scales[flat])
+        if FLAT_NOTE not in raw.notes:
+            say(path, f"{int(flat.sum())} Gaussians have a scale of 0: drawn as flat, 2^-16 as thick as wide")
     kept = slice(None) if good.all() else good
     quats = np.asarray(raw.quats, np.float64)[kept] / norm[kept, None]
     return Scene(raw.means[kept], scales[kept], quats, raw.opacities[kept], raw.sh[kept], path, rejected, raw.antialiased)
@@ -243,10 +245,9 @@ _POINTS = ("input.ply", "points3d.ply", "sparse_pc.ply")  # what trainers start 
 
 
 def _inside(folder: Path) -> str:
-    """A scene in a folder, for hints: what a trainer left last below it, else the first file that may be one; empty for none."""
-    found = [(int(steps[1]), path) for path in folder.glob("**/iteration_*/point_cloud.ply") if (steps := re.fullmatch(r"iteration_(\d+)", path.parent.name))]
-    if found:
-        return one_line(max(found)[1].relative_to(folder))
+    """A scene in a folder, for hints: what a trainer ended with, else the first file that may be one; empty for none."""
+    if (trained := trained_scene(folder)) is not None:
+        return one_line(trained.relative_to(folder))
     names = sorted(p.name for p in folder.glob("*") if _said_kind(p) not in (None, "SOG") and p.name.lower() not in _POINTS)
     return one_line(names[0]) if names else ""
 

@@ -25,7 +25,8 @@ from .turns import ABOUT_Z, half_turn, matrices, moved
 MAGIC = b"glTF"
 SPLATS = "KHR_gaussian_splatting"
 _SPZ = ("KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz")
-_HARMLESS = {SPLATS, *_SPZ, "KHR_materials_unlit", "KHR_mesh_quantization"}  # extensions that a file may require
+_DRAFTS = ("KHR_spz_gaussian_splats_compression", "KHR_spz_compression")  # on the primitive itself
+_HARMLESS = {SPLATS, *_SPZ, *_DRAFTS, "KHR_materials_unlit", "KHR_mesh_quantization"}  # extensions that a file may require
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
@@ -52,7 +53,7 @@ def read_gltf(path: Path) -> Raw:
     parts, notes, others = [], [], 0
     for mesh, matrix in file.placed():
         for k, primitive in enumerate(file.entry("meshes", mesh, "a node").get("primitives", [])):
-            if SPLATS not in primitive.get("extensions", {}):
+            if not primitive.get("extensions", {}).keys() & {SPLATS, *_DRAFTS}:
                 others += 1
                 continue
             where = f"meshes[{mesh}].primitives[{k}]"
@@ -209,6 +210,9 @@ class _File:
 
     def gaussians(self, primitive: dict[str, Any], where: str) -> Raw:
         """Of a primitive, in the axes of the mesh."""
+        for name in _DRAFTS:
+            if name in primitive["extensions"]:
+                return self._spz(primitive["extensions"][name], where)
         extension, attributes = primitive["extensions"][SPLATS], primitive.get("attributes", {})
         if not isinstance(extension, dict) or not isinstance(attributes, dict):
             raise FlickerError(f"{self.path}: {where}: {SPLATS}, attributes: not objects")
@@ -222,8 +226,7 @@ class _File:
         for name, more in extension.get("extensions", {}).items():
             if name not in _SPZ:
                 raise FlickerError(f"{self.path}: {where}: {one_line(name)}, which is not read; export without it")
-            data, _ = self._view(more.get("bufferView"), where)
-            raw, _ = decode_spz(bytes(data), f"{self.path}: {where}")
+            raw = self._spz(more, where)
             raw.notes += notes
             return raw
 
@@ -243,6 +246,10 @@ class _File:
         if beyond := int((opacities > 1).sum()):
             notes += (f"{beyond} opacities above 1 are taken for 1",)
         return Raw(means, scales, np.roll(quats, 1, axis=1), np.minimum(opacities, 1), np.stack(coefficients, axis=1), notes=notes)
+
+    def _spz(self, extension: dict[str, Any], where: str) -> Raw:
+        data, _ = self._view(extension.get("bufferView"), where)
+        return decode_spz(bytes(data), f"{self.path}: {where}")[0]
 
     def placed(self) -> Iterator[tuple[int, np.ndarray]]:
         """Meshes and where nodes put them, (4, 4); each mesh once, where it is, in a file without nodes."""

@@ -22,6 +22,7 @@ TYPES = {
     "half": "f2", "float16": "f2", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }
 LAYOUTS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+ANTIALIASED = "mip"
 _MOST = 1 << 20  # bytes of a header
 _BLOCK = 4096  # records
 
@@ -61,16 +62,16 @@ class Header:
         return next((e for e in self.elements if e.name == name), None)
 
     @property
-    def antialiased(self) -> bool:
-        """Whether the comments say that the scene was trained for antialiased rendering, as brush, gsplat and Postshot write it; the last one holds."""
-        found = False
+    def mode(self) -> str:
+        """How the comments say that the scene is rendered, as brush, gsplat and Postshot write it: default, mip (antialiased) or 2dgs; the last one holds."""
+        found = "default"
         for comment in self.comments:
             key, _, value = comment.lower().replace(":", " ").partition(" ")
             value = value.strip()
-            if key == "splatrendermode" and value in ("default", "mip", "antialiased", "2dgs"):
-                found = value in ("mip", "antialiased")
-            elif key == "antialiased" and value in ("0", "1", "false", "true"):
-                found = value in ("1", "true")
+            if key == "splatrendermode" and value in ("default", ANTIALIASED, "2dgs"):
+                found = value
+            elif key == "antialiased" and value in ("0", "1"):
+                found = ANTIALIASED if value == "1" else "default"
         return found
 
 
@@ -139,7 +140,7 @@ def _parse(path: Path, head: bytes) -> Header:
         try:
             words = text.decode("ascii", "replace").split()
             if not words:
-                raise ValueError
+                continue
             if words[0] in ("comment", "obj_info"):
                 comments.append(text.decode("utf-8", "replace").strip()[len(words[0]) :].strip())
                 continue

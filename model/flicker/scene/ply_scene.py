@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import FlickerError, one_line
 from .memory import chunk_bytes, chunks_of, is_chunked
-from .ply import Ply, open_ply
+from .ply import ANTIALIASED, Ply, open_ply
 from .raw import FLAT_NOTE, KEPT, Raw, cut_note, degree_of, of_gsply, sh_of_colours, sigmoid
 
 TRAINED = "point_cloud/iteration_N/point_cloud.ply"  # the scene in an output folder of the INRIA code
@@ -102,15 +102,15 @@ def _gaussians(file: Ply) -> Raw:
     if names:
         sh[:, 1:] = file.numbers("vertex", names).reshape(len(means), 3, -1).transpose(0, 2, 1)
     notes += cut_note(count)
-    return Raw(means, scales, quats, sigmoid(logits[:, 0]), sh, file.header.antialiased, notes)
+    return Raw(means, scales, quats, sigmoid(logits[:, 0]), sh, file.header.mode == ANTIALIASED, notes)
 
 
 def _notes(file: Ply, scales: int) -> tuple[str, ...]:
     vertex = file.header.element("vertex")
     properties = [] if vertex is None else vertex.properties
     notes = []
-    if scales == 2:
-        notes.append(f"two scales a Gaussian, {FLAT_NOTE}")
+    if scales == 2 or file.header.mode == "2dgs":
+        notes.append(FLAT_NOTE)
     if any(p.kind == "u2" and not p.length and p.name not in _COLOURS and _KNOWN.fullmatch(p.name) for p in properties):
         notes.append("values of type ushort are taken for half floats")
     if others := [one_line(p.name) for p in properties if not _KNOWN.fullmatch(p.name)]:

@@ -11,7 +11,7 @@ from .gaussians import SH_C0, SH_DEGREES
 
 MAX_DEGREE = 3
 KEPT = (MAX_DEGREE + 1) ** 2  # SH coefficients a colour
-FLAT_NOTE = "2DGS: drawn as flat 3D Gaussians, not by where rays meet a surfel"
+FLAT_NOTE = "2DGS (surfels of two scales): drawn as flat 3D Gaussians, not by where rays meet a surfel"
 
 
 @dataclass(eq=False)
