@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from . import params
 from .errors import FlickerError
 from .front.records import SubtileLists, bin_splats, build_lists
+from .front.reference import render_with_transmittance
 from .front.view import View
 from .golden.front.blend import blend_records
 from .golden.front.frame import FrontFrame, ListKind, run_front
@@ -19,7 +21,7 @@ from .golden.lanes.formats import FORMATS as LANE_FORMATS
 from .golden.lanes.lists import RecordLists, float_lists, front_lists
 from .golden.lanes.render import COUNTS as LANE_COUNTS
 from .golden.lanes.render import LaneFrame, render_lanes
-from .golden.render import render_golden
+from .golden.render import coverage, render_golden
 from .params import CHANNELS, CORES, Coords, RenderConfig
 from .progress import Steps
 from .scene.files import scene_kind
@@ -68,10 +70,12 @@ class FrontOptions:
 
 @dataclass
 class Rendered:
-    """A picture (float (H, W, 3), unquantised) and its statistics (what stats.json holds)."""
+    """A picture (float (H, W, 3), unquantised) and its statistics (what stats.json holds). alpha: float (H, W), what the Gaussians cover of each pixel, by the
+    same engine; None: was not asked for."""
 
     image: np.ndarray
     stats: dict[str, Any]
+    alpha: np.ndarray | None = None
 
 
 def rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
@@ -126,9 +130,16 @@ def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = No
     return pack_file(path, form or PackedFormat.CHUNK, steps=steps)
 
 
+# The last image of each scene that is still in use.
+_PACKED: WeakKeyDictionary[Scene, tuple[PackedFormat | None, PackedScene]] = WeakKeyDictionary()
+
+
 def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
-    """`packing_of` a view's scene."""
-    return packing_of(view.scene, form).packed
+    """`packing_of` a view's scene, kept for the next view of the same scene."""
+    kept = _PACKED.get(view.scene)
+    if kept is None or kept[0] is not form:
+        kept = _PACKED[view.scene] = (form, packing_of(view.scene, form).packed)
+    return kept[1]
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
@@ -183,8 +194,9 @@ def front_stats(front: FrontFrame) -> dict[str, Any]:
 def basic_stats(view: View, engine: Engine, front: Front, config: RenderConfig) -> dict[str, Any]:
     """What was rendered, and how."""
     return {
-        "scene": str(view.scene.path),
+        "scene": view.name if view.scene.path is None else str(view.scene.path),
         "view": view.number,
+        "cameras": view.cameras_from,
         "width": view.camera.width,
         "height": view.camera.height,
         "engine": engine.value,
@@ -224,18 +236,19 @@ def render_view(
     front: Front = Front.FLOAT,
     options: FrontOptions = FrontOptions(),
     compare: bool = False,
+    alpha: bool = False,
     steps: Steps | None = None,
 ) -> Rendered:
     """Render a view of a scene.
 
     front, options: who preprocesses, and how. With a bit-true front end the engine `reference` blends its records in float64. Engines of the whole chip:
     `chip.run.render_on_chip`.
-    compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
+    compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal). alpha: also give what covers the pixels.
     """
     steps = steps or Steps()
     camera = view.camera
     if config.by_lanes:
-        return _by_lanes(view, engine, config, front, options, compare, steps)
+        return _by_lanes(view, engine, config, front, options, compare, alpha, steps)
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = golden_lists(frame_in, steps)
@@ -243,18 +256,21 @@ def render_view(
     else:
         lists, more = _float_lists(view, config, steps)
     stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
+    covered = None
     if engine is Engine.RTL:
         with steps.step("building the simulator (once per configuration)"):
             build(config)
         with steps.bar("simulating the RTL") as report:
             rtl = render_rtl(lists, config, progress=report)
         image = rtl.image(view.background)
+        covered = coverage(lists, rtl.pixels)
         sent = int(rtl.channel_counter("minitiles_sent").sum())
         stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent} | rtl_stats(rtl, config)
     elif engine is Engine.GOLDEN:
         with steps.step("rendering with the golden model"):
             frame = render_golden(lists, config)
         image = frame.image(view.background)
+        covered = coverage(lists, frame.pixels)
         sent = frame.total("minitiles_sent")
         stats |= {
             "minitiles_sent": sent,
@@ -269,17 +285,22 @@ def render_view(
     if engine is Engine.REFERENCE:
         if front is not Front.FLOAT:
             with steps.step("blending the records in float64"):
-                image = blend_records(frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height, view.background)
+                records = (frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height)
+                image = blend_records(*records, view.background)
+                if alpha:
+                    covered = 1.0 - (blend_records(*records, (1.0, 1.0, 1.0)) - blend_records(*records))[..., 0]
         else:
             with steps.step("rendering the float64 reference"):
                 image = view.reference
+                if alpha:
+                    covered = 1.0 - render_with_transmittance(view.projected, camera)[1]
         stats |= {"minitiles_sent": None, "pixel_pairs": None}
     if compare:
         stats |= compared(view, image, steps)
-    return Rendered(image, stats)
+    return Rendered(image, stats, covered if alpha else None)
 
 
-def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, steps: Steps) -> Rendered:
+def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, alpha: bool, steps: Steps) -> Rendered:
     """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once. The RTL
     is fed as a chip feeds a stage that says when a sub-tile is finished: it leaves its list then, and one with an empty list is not streamed."""
     if engine is Engine.REFERENCE:
@@ -310,4 +331,4 @@ def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, op
     image = frame.image(view.background)
     if compare:
         stats |= compared(view, image, steps)
-    return Rendered(image, stats)
+    return Rendered(image, stats, coverage(lists, frame.pixels) if alpha else None)

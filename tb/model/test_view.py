@@ -295,7 +295,7 @@ def test_refusals(view, tmp_path, monkeypatch) -> None:
             ((scene, "--size", "0x10", "--port", 0), "width"), ((scene, "--size", "90000x1", "--port", 0), "width"), (("demo", "--size", "big"), "--size"),
             (("demo", "--size", "9000x9000"), "--size"), ((scene, "--view", 99, "--port", 0), "view 99"), (("demo", "--dir", tmp_path / "file"), "--dir"),
             ((tmp_path / "none.ply", "--port", 0), "none.ply"), ((tmp_path / "bad.ply", "--port", 0), "bad.ply"),
-            (("demo", "--cameras", tmp_path / "none.json"), "--cameras"), (("demo", "--up", "z"), "--up"),
+            (("demo", "--port", 0, "--cameras", tmp_path / "none.json"), "none.json"), (("demo", "--port", 0, "--up", "z"), "up: z"),
             (("demo", "--port", 0, "--host", "nowhere.invalid"), "--host"),
         ):
             run = flicker("view", *arguments)
@@ -460,9 +460,9 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     assert session.camera is session.goal and close(session.goal, view.camera)
 
     class Simulated:
-        def __init__(self, scene, camera, engine, config, told, done) -> None:
+        def __init__(self, view, engine, config, told, done) -> None:
             told("simulating")
-            shot = Shot(engine, camera, config, np.full((SIZE[1], SIZE[0], 3), [1.0, 0.0, 1.0]), {"visible": 1, "pixel_pairs": 2, "cycles": 1234})
+            shot = Shot(engine, view.camera, config, np.full((SIZE[1], SIZE[0], 3), [1.0, 0.0, 1.0]), {"visible": 1, "pixel_pairs": 2, "cycles": 1234})
             threading.Thread(target=done, args=(shot,)).start()
 
     monkeypatch.setattr(server, "Simulation", Simulated)

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from .kept import Checkpoint, checkpoint_path
-from .options import RichSteps, console, parse_size, writable, write_atomically
+from .options import RichSteps, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 
 ScoreChoice = Enum("ScoreChoice", {"CHANGE": "change", "WEIGHT": "weight", "PEAK": "peak"}, type=str)
@@ -40,16 +40,20 @@ def _show(rows, seconds: list[float | None]) -> None:
 
 
 def budget(
-    scene: Annotated[str, typer.Argument(help="scene file, or demo")],
+    scene: Annotated[str, typer.Argument(help="scene as for flicker render, or demo")],
     out: Annotated[Path, typer.Option("--out", "-o", help="scene: .ply, .compressed.ply, .spz or .flk")],
     keep: Annotated[float | None, typer.Option(help="share of the Gaussians that may stay, such as 0.4")] = None,
     db: Annotated[float | None, typer.Option(help="least mean PSNR against the full scene on held-out views; as few Gaussians as reach it")] = None,
     cycles: Annotated[float | None, typer.Option(help="of a frame, at most, as flicker cost counts them")] = None,
     mbytes: Annotated[float | None, typer.Option(help="10^6 bytes of a frame, at most, as flicker cost counts them")] = None,
-    views: Annotated[Path | None, typer.Option(help="INRIA cameras.json, every sixth held out (default: orbits at several distances and heights)")] = None,
+    views: Annotated[Path | None, typer.Option(
+        help="as --cameras of flicker render, every sixth held out (default: orbits at several distances and heights)",
+    )] = None,
     count: Annotated[int | None, typer.Option(help="cameras of the orbits, every sixth held out [default: 144]", min=3)] = None,
-    size: Annotated[str | None, typer.Option(help="WxH of the pictures that are fitted to [default: the cameras', 480x270 of orbits]")] = None,
-    frame: Annotated[str, typer.Option(help="WxH of the frames whose cycles and bytes are counted")] = "1280x720",
+    size: Annotated[str | None, typer.Option(
+        help="WxH of the pictures that are fitted to, as --size of flicker render [default: the cameras', 480x270 of orbits]",
+    )] = None,
+    frame: Annotated[str, typer.Option(help="WxH of the frames whose cycles and bytes are counted, as --size of flicker render")] = "1280x720",
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbits: x, y, z, -x, -y, -z [default: -y]")] = None,
     by: Annotated[ScoreChoice, typer.Option(help="of Gaussians: change of the pictures without it, or sum or largest of alpha T")] = ScoreChoice.CHANGE,
     rounds: Annotated[int, typer.Option(help="of removal, on the way to a share, cycles or bytes", min=1, max=40)] = 4,
@@ -79,10 +83,10 @@ def budget(
         from ..budget.write import check_suffix, save
         from ..fit.engines import engine as engine_of
         from ..fit.through import through as machine_of
-        from ..front.view import DEMO
-        from ..scene.demo import generate
+        from ..scene.camera import DEFAULT_UP, camera_files
         from ..scene.files import load_scene
         from ..scene.packed import PackedFormat
+        from ..scene.sources import read_scene
 
     (name, value), = given.items()
     goal = Goal(Kind(name), value)
@@ -100,11 +104,13 @@ def budget(
     options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit, merge, engine)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
-        full = generate() if scene == DEMO else load_scene(scene)
+        full = read_scene(scene)
     fitted, held = cameras_of(full, views, VIEWS if count is None else count, parse_size(size), up, seed)
     held[0].resized(*counted)
     clean, pictures, broken = sound(full, [*fitted, *held], progress)
     console.print(f"{scene}: {len(clean):,} Gaussians; {len(fitted)} views to fit, {len(held)} held out, {fitted[0].width}x{fitted[0].height}")
+    cameras_from = f"orbits, up {up or DEFAULT_UP}" if views is None else str(camera_files(views)[0])
+    say_source(full.path or scene, cameras_from)
     bad = sum(full.rejected.values()) + broken
     if bad:
         console.print(f"{bad:,} Gaussians were left out: numbers that are not finite, or make no sense")
@@ -147,7 +153,8 @@ def budget(
     console.print(table)
     if json_ is not None:
         text = json.dumps({
-            "scene": scene, "goal": {goal.kind.value: goal.value}, "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
+            "scene": scene, "cameras": cameras_from, "goal": {goal.kind.value: goal.value},
+            "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
             "held_out_db": decibels, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
             "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
         }, indent=2)

@@ -80,10 +80,10 @@ def fit(
     from ..fit.dataset import load_dataset, photo_folder
     from ..fit.parameters import Parameters
     from ..fit.train import Options, Trainer
-    from ..scene import load_scene
     from ..scene.camera import cameras_text
     from ..scene.files import save_ply
     from ..scene.photos import parse_background
+    from ..scene.sources import read_scene
 
     if out.suffix.lower() != ".ply":
         raise FlickerError(f"--out: {out}: not a .ply")
@@ -98,7 +98,7 @@ def fit(
     cameras = _cameras_beside(out, text)
     steps = RichSteps()
     with steps.step("reading photographs"):
-        given = None if scene is None else Parameters.of(load_scene(scene))
+        given = None if scene is None else Parameters.of(read_scene(scene))
         trainer = Trainer(data, options, given)
     kept = Checkpoint(place, checkpoint is None, trainer.save, lambda: f"the state after {trainer.iteration:,} of {iterations:,} iterations")
     continued = kept.begin(resume, trainer.restore)

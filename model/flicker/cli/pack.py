@@ -84,18 +84,19 @@ def pack(
         raise FlickerError(f"--out: {out}: only .flk is written")
     writable(out, "--out")
     with steps.step("starting"):
-        from ..scene.demo import generate
         from ..scene.files import scene_title
         from ..scene.packed import PackedFormat
         from ..scene.packing import pack as pack_scene
         from ..scene.packing import pack_file
+        from ..scene.sources import DEMO, read_scene, scene_path
     chosen = PackedFormat(form.value if form else "chunk")
-    if str(scene) == "demo":
+    if str(scene) == DEMO:
         with steps.step("making the demo scene"):
-            made = generate()
-        packing, title = pack_scene(made, chosen, steps=steps), "demo"
+            made = read_scene(scene)
+        packing, title = pack_scene(made, chosen, steps=steps), DEMO
     else:
-        packing, title = pack_file(scene, chosen, steps=steps), scene_title(scene)
+        file = scene_path(scene)
+        packing, title = pack_file(file, chosen, steps=steps), str(file) if file is not scene else scene_title(scene)
     with steps.step(f"writing {out.name}"):
         image = packing.packed.image()
         write_atomically(out, lambda path: path.write_bytes(image))

@@ -19,7 +19,7 @@ def sweep(
     config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/sweep.md)")],
     cluster: Annotated[str | None, typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
-    out: Annotated[Path | None, typer.Option(help="folder for results [default: build/sweep]")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for results [default: build/sweep]")] = None,
 ) -> None:
     """Run scenes x views x configurations on Dask; results in Parquet, resumed where an earlier run has stopped."""
     from ..errors import FlickerError
@@ -36,6 +36,8 @@ def sweep(
     if out is not None:
         wanted = replace(wanted, out=out)
     console = Console(width=None if sys.stdout.isatty() else 140)
+    for line in dict.fromkeys(f"{target.scene.path}: cameras: {target.scene.cameras_from}" for target in wanted.targets):
+        console.print(line, highlight=False, soft_wrap=True)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, transient=True, disable=not console.is_terminal,

@@ -25,6 +25,7 @@ from ..front.view import DEMO
 from ..scene.camera import Camera
 from ..scene.files import scene_kind
 from ..scene.photos import BLACK
+from ..scene.sources import scene_path
 from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import budget_curves, own_figures, paper_figures, stability_table
@@ -64,16 +65,18 @@ def _views(text: str, count: int) -> list[int] | None:
 
 
 def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = None, background: tuple[float, float, float] = BLACK) -> list[Target]:
-    """`FILE` (its view 0), `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
+    """`FILE` (its view 0), or `demo`, `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
     path, views = Path(text), "0"
     head, colon, tail = text.rpartition(":")
     if colon and not path.exists() and _views(tail, 0) is not None:
         path, views = Path(head), tail
-    if not path.exists():
-        raise FlickerError(f"{path}: no such scene")
-    if not os.access(path, os.R_OK):
-        raise FlickerError(f"{path}: not readable")
-    scene_kind(path)
+    if str(path) != DEMO:
+        if not path.exists():
+            raise FlickerError(f"{path}: no such scene")
+        if not os.access(path, os.R_OK):
+            raise FlickerError(f"{path}: not readable")
+        path = Path(scene_path(path))
+        scene_kind(path)
     scene = SceneFile(str(path), photos=photos, background=background)
     numbers = _views(views, scene.views())
     if not numbers:
@@ -142,6 +145,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     about = {
         "views": ", ".join(v.target.title for v in views), "size": ", ".join(dict.fromkeys(f"{w}x{h}" for w, h in (t.size for t in job.targets))),
         "photographs": f"of {sum(t.photo is not None for t in job.targets)} of {len(views)} views, averaged to the picture's size",
+        "cameras": "; ".join(dict.fromkeys(f"{t.scene.name}: {t.scene.cameras_from}" for t in job.targets)),
         "background": ", ".join(dict.fromkeys(" ".join(f"{c:g}" for c in t.scene.background) for t in job.targets)), "configurations": str(len(job.configurations)),
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",

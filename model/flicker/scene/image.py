@@ -24,6 +24,12 @@ def save_png(path: str | Path, image: np.ndarray) -> None:
     Image.fromarray(pixels).save(path, format="PNG")
 
 
+def save_grey16(path: str | Path, values: np.ndarray) -> None:
+    """Write numbers (H, W), clamped to [0, 1] and rounded to 16 bits, as a grey PNG. Raises OSError."""
+    pixels = np.rint(np.clip(np.nan_to_num(values), 0.0, 1.0) * 65535.0).astype(np.uint16)
+    Image.fromarray(pixels).save(path, format="PNG")
+
+
 @contextmanager
 def _opened(path: str | Path) -> Iterator[Image.Image]:
     """A picture of a file; FlickerError, naming it, for whatever goes wrong in reading it."""

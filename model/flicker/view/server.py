@@ -376,7 +376,7 @@ class Viewer:
         with self.changed:
             if self._simulation is None:
                 self._tell("starting")
-                self._simulation = Simulation(self.renderer.scene, camera, engine, config, self._tell, self._done)
+                self._simulation = Simulation(self.renderer.fresh(camera), engine, config, self._tell, self._done)
 
     def stop_simulation(self) -> None:
         with self.changed:
