@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -60,17 +61,21 @@ def write_transforms(folder: Path, shots: Views, name: str = "transforms.json", 
     return data
 
 
-def write_colmap(folder: Path, shots: Views, model: int = 1, points: np.ndarray | None = None) -> Path:
-    """sparse/0 and images/, at twice the pictures' size."""
+def write_colmap(
+    folder: Path, shots: Views, model: int = 1, points: np.ndarray | None = None, lens: Sequence[float] | None = None,
+    size: tuple[int, int] = (2 * WIDTH, 2 * HEIGHT), pictures: Sequence[np.ndarray] | None = None,
+) -> Path:
+    """sparse/0 and images/. model: COLMAP's number of a model; lens: its parameters, those of a pinhole by default; size: the camera's, twice the pictures'.
+    pictures: in place of those of the shots."""
     sparse = folder / "sparse" / "0"
     sparse.mkdir(parents=True, exist_ok=True)
     (folder / "images").mkdir(exist_ok=True)
     c = shots[0][0]
-    lens = struct.pack("<4d", 2 * c.fx, 2 * c.fy, WIDTH, HEIGHT)
-    (sparse / "cameras.bin").write_bytes(struct.pack("<QiiQQ", 1, 7, model, 2 * WIDTH, 2 * HEIGHT) + lens)
+    numbers = (2 * c.fx, 2 * c.fy, WIDTH, HEIGHT) if lens is None else lens
+    (sparse / "cameras.bin").write_bytes(struct.pack("<QiiQQ", 1, 7, model, *size) + struct.pack(f"<{len(numbers)}d", *numbers))
     data = struct.pack("<Q", len(shots))
     for k, (camera, picture) in enumerate(shots):
-        save_png(folder / "images" / f"shot.{k:02}.png", picture)
+        save_png(folder / "images" / f"shot.{k:02}.png", picture if pictures is None else pictures[k])
         m = camera.rotation.T
         w = math.sqrt(max(0.0, 1 + np.trace(m))) / 2
         if w > 1e-3:

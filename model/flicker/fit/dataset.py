@@ -184,8 +184,8 @@ def transforms_shot(frame: Frame, size: int | None, folder: Path | None = None, 
     except FlickerError as error:
         raise FlickerError(f"{frame.where}: {error}") from None
     return shot_of(
-        frame.where, picture, _name(picture, frame.folder) if folder is None else photo_name(frame.name), size, (number["w"], number["h"]), frame.focal,
-        (number["cx"], number["cy"]), _model(frame), {key: number[key] for key in COEFFICIENTS}, pose, mask, exact,
+        frame.where, picture, _name(picture, frame.folder) if folder is None else picture.relative_to(folder).as_posix(), size, (number["w"], number["h"]),
+        frame.focal, (number["cx"], number["cy"]), _model(frame), {key: number[key] for key in COEFFICIENTS}, pose, mask, exact,
     )
 
 
