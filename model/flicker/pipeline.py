@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -10,11 +11,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from . import params
-from .errors import FlickerError
+from .errors import FlickerError, FlickerWarning
 from .front.records import SubtileLists, bin_splats, build_lists
 from .front.reference import render_with_transmittance
 from .front.view import View
 from .golden.front.blend import blend_records
+from .golden.front.depths import DepthSteps
 from .golden.front.frame import FrontFrame, ListKind, run_front
 from .golden.front.record import RecordKind
 from .golden.lanes.formats import FORMATS as LANE_FORMATS
@@ -29,6 +31,7 @@ from .scene.gaussians import Scene
 from .scene.metrics import psnr
 from .scene.packed import PackedFormat, PackedScene, load_packed
 from .scene.packing import Packing, pack, pack_file
+from .scene.steps import measure_steps
 from .sim.preprocessing import build as build_front
 from .sim.preprocessing import front_frame
 from .sim.render_stage import RtlFrame, build, render_rtl
@@ -61,11 +64,13 @@ class Front(str, Enum):
 class FrontOptions:
     """What the front end reads and writes; not for `Front.FLOAT`.
 
-    format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile.
+    format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile. rechunk: make clusters anew of a file that
+    brings its own.
     """
 
     format: PackedFormat | None = None
     lists: ListKind = ListKind.ELLIPSE
+    rechunk: bool = False
 
 
 @dataclass
@@ -116,48 +121,66 @@ def lane_rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
     }
 
 
-def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = None) -> Packing:
+def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = None, rechunk: bool = False) -> Packing:
     """The memory image of a scene: the file itself if it is one, else made now; a file that comes in chunks keeps them. What is kept has every Gaussian of the
-    file, those too that `load_scene` leaves out."""
+    file, those too that `load_scene` leaves out. rechunk: keep nothing, make clusters anew."""
     path = scene.path
-    if path is None:
+    if path is None or rechunk:
         return pack(scene, form or PackedFormat.CHUNK, steps=steps)
     if scene_kind(path) == "image":
         packed = load_packed(path)
         if form not in (None, packed.format):
             raise FlickerError(f"{path}: is packed as {packed.format.value}, not {form.value if form else ''}")
-        return Packing(packed, np.arange(len(packed)))
+        return Packing(packed, np.arange(len(packed)), brought=True)
     return pack_file(path, form or PackedFormat.CHUNK, steps=steps)
 
 
 # The last image of each scene that is still in use.
-_PACKED: WeakKeyDictionary[Scene, tuple[PackedFormat | None, PackedScene]] = WeakKeyDictionary()
+_PACKED: WeakKeyDictionary[Scene, tuple[tuple[PackedFormat | None, bool], Packing]] = WeakKeyDictionary()
 
 
-def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
-    """`packing_of` a view's scene, kept for the next view of the same scene."""
-    kept = _PACKED.get(view.scene)
-    if kept is None or kept[0] is not form:
-        kept = _PACKED[view.scene] = (form, packing_of(view.scene, form).packed)
+def _kept_packing(scene: Scene, form: PackedFormat | None, rechunk: bool) -> Packing:
+    """`packing_of`, kept for the next view of the same scene."""
+    kept = _PACKED.get(scene)
+    if kept is None or kept[0] != (form, rechunk):
+        kept = _PACKED[scene] = ((form, rechunk), packing_of(scene, form, rechunk=rechunk))
     return kept[1]
 
 
+def packed_scene(view: View, form: PackedFormat | None, rechunk: bool = False) -> PackedScene:
+    """`packing_of` a view's scene, kept for the next view of the same scene."""
+    return _kept_packing(view.scene, form, rechunk).packed
+
+
+def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, dict[str, Any]]:
+    """`packed_scene` of a view that is to be drawn, and statistics of what its number formats cost there. FlickerWarning where that is a loss to be seen: steps
+    of positions that are `coarse`, or depths of which the keys tell too few apart (`DepthSteps`)."""
+    packing = _kept_packing(view.scene, options.format, options.rechunk)
+    packed, where = packing.packed, view.scene.path or view.name or "scene"
+    found, depths = measure_steps(packed, [view.camera]), DepthSteps.of(packed, view.camera)
+    if found.coarse:
+        warnings.warn(FlickerWarning(f"{where}: {found.warning(packing.brought)}"), stacklevel=2)
+    if depths.coarse:
+        warnings.warn(FlickerWarning(f"{where}: {depths.warning}"), stacklevel=2)
+    return packed, {"position_steps": found.as_dict(), "depth_keys": depths.as_dict()}
+
+
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
-    """Records and lists of a view by the golden model of the front end or by its RTL, and the RTL's statistics; 16-byte records for the factored form,
-    32-byte ones for the conic."""
+    """Records and lists of a view by the golden model of the front end or by its RTL, and statistics of packing and of the RTL; 16-byte records for the
+    factored form, 32-byte ones for the conic."""
     if config.coords is Coords.ABSOLUTE:
         raise FlickerError("coords absolute: for --front float only; records hold means in 1/128 pixel")
     kind = RecordKind.of(config.form)
     with steps.step("packing the scene"):
-        packed = packed_scene(view, options.format)
+        packed, stats = packed_for_picture(view, options)
     if front is Front.GOLDEN:
         with steps.step("preprocessing with the golden model"):
-            return run_front(packed, view.camera, options.lists, kind), {}
+            return run_front(packed, view.camera, options.lists, kind), stats
     with steps.step("building the front end's simulator (once for each form)"):
         build_front(kind=kind)
     with steps.step("preprocessing with the RTL"):
         frame, rtl = front_frame(packed, view.camera, options.lists, kind)
-    return frame, {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
+    return frame, stats | {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 
 def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:

@@ -243,7 +243,7 @@ def test_one_gaussian() -> None:
 def test_cuts_make_steps_finer_and_stay_within_their_bytes() -> None:
     """Two blobs far apart: the cluster across the gap is cut there."""
     scene = random_scene(seed(), 1000, 0)
-    scene.means[:700] += 100
+    scene.means[:700] += 30
     sizes, steps = [], []
     for cuts in (0.0, 0.03, 0.2):
         packed = pack(scene, recipe=Recipe(cuts=cuts)).packed

@@ -158,6 +158,7 @@ def render(
         help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
     )] = None,
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
+    rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own, not for --front float")] = False,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
     stage: Annotated[StageChoice | None, typer.Option(
         help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
@@ -184,7 +185,7 @@ def render(
 ) -> None:
     """Render one view of a scene, or all."""
     given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
-    chosen: dict[str, object] = {"format": memory, "lists": lists}
+    chosen: dict[str, object] = {"format": memory, "lists": lists, "rechunk": rechunk or None}
     whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
@@ -196,7 +197,7 @@ def render(
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
             raise FlickerError(f"{names}: for --front golden and rtl only")
     else:
-        given |= chosen
+        given |= {k: v for k, v in chosen.items() if k != "rechunk"}
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
@@ -231,8 +232,8 @@ def render(
         from ..scene.files import scene_title
         from ..scene.packed import PackedFormat
         from ..scene.sources import open_scene
-    options = FrontOptions(PackedFormat.FP16, ListKind.BOX) if faithful else FrontOptions(
-        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value),
+    options = FrontOptions(PackedFormat.FP16, ListKind.BOX, rechunk) if faithful else FrontOptions(
+        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value), rechunk,
     )
     with steps.step(f"loading {scene_title(scene)}"):
         source = open_scene(scene, cameras, up)

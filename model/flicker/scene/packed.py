@@ -306,7 +306,8 @@ class Values:
     sh: np.ndarray
 
 
-def _means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
+def means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
+    """Those of `values`, without the rest."""
     words, cluster, headers = packed.geometry[packed.slot], packed.cluster, packed.headers
     if packed.format is not PackedFormat.CHUNK:
         numbers = words[:, :6].view(np.float16).astype(np.float64)
@@ -321,7 +322,7 @@ def _means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
 
 def values(packed: PackedScene) -> Values:
     """The numbers in the image, exact but for float64's own rounding: colours are turned back into coefficients, log2 scales into scales."""
-    means, scales = _means_and_scales(packed)
+    means, scales = means_and_scales(packed)
     if packed.format is not PackedFormat.CHUNK:
         bits = fp16_bits(packed)
         quats, opacities, sh = (x.view(np.float16).astype(np.float64) for x in (bits.quat, bits.opacity, np.ascontiguousarray(bits.sh)))
@@ -360,7 +361,7 @@ def upper_half(values: np.ndarray) -> np.ndarray:
 
 def bounds(packed: PackedScene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """low, high: float32 (C, 3), box of the decoded means, rounded outward; sigma: uint16 (C,), upper half of float32, largest decoded scale, rounded up."""
-    means, scales = _means_and_scales(packed)
+    means, scales = means_and_scales(packed)
     start = packed.start[:-1]
     low, high = np.minimum.reduceat(means, start), np.maximum.reduceat(means, start)
     with np.errstate(over="ignore"):
@@ -502,7 +503,7 @@ def _check_gaussians(packed: PackedScene, path: Path) -> None:
     _check_numbers(packed, path)
     with np.errstate(over="ignore"):
         low, high, sigma = bounds(packed)
-        _, scales = _means_and_scales(packed)
+        _, scales = means_and_scales(packed)
     _refuse(path, ~((low >= packed.table["low"]) & (high <= packed.table["high"])), "low, high", "a mean lies outside")
     _refuse(path, sigma > packed.table["sigma"], "sigma", "below a standard deviation")
     if packed.format is PackedFormat.CHUNK and (small := (scales < 2.0**-126).any(axis=1)).any():
