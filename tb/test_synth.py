@@ -225,6 +225,24 @@ def test_composed_unit_is_the_sum_of_its_parts(library: Library) -> None:
 E4M3 = dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1)
 
 
+FPGAS = {
+    "synth_ecp5": {"DP16KD": 8}, "synth_ice40": {"SB_RAM40_4K": 16, "SB_LUT4": 1}, "synth_gowin": {"SDPX9B": 8},
+    "synth_xilinx -family xcup": {"RAMB36E2": 4},
+}
+
+
+@pytest.mark.parametrize("flow", [pytest.param(flow, marks=[pytest.mark.slow] * (flow != "synth_ecp5")) for flow in FPGAS])
+def test_memory_on_an_fpga(flow: str, tmp_path: Path) -> None:
+    """A memory of 256 words of 256 bits is blocks alone: no flip-flop and no logic for a read and a write of the same place."""
+    stat = tmp_path / "stat"
+    source = ROOT / "rtl/common/flk_sram.sv"
+    commands = [f"read_slang --std 1800-2023 {source} --top flk_sram -G Width=256 -G Depth=256", f"{flow} -top flk_sram", f"tee -o {stat} stat"]
+    code = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in sys.argv[1:]]"
+    subprocess.run([sys.executable, "-c", code, *commands], check=True, capture_output=True)
+    cells = {name: int(count) for count, name in re.findall(r"^ +(\d+) +([A-Z]\w+)$", stat.read_text(), re.M)}
+    assert {name: count for name, count in cells.items() if name not in ("BUFG", "IBUF", "OBUF", "GND", "VCC")} == FPGAS[flow]
+
+
 @pytest.mark.parametrize("top", ["flk_fp_add", "flk_fp_mul"])
 def test_netlist_equals_rtl(top: str, library: Library, tmp_path: Path) -> None:
     """Proved for all inputs: the mapped netlist with the generated cell models, and the RTL, E4M3."""

@@ -2,7 +2,8 @@
 //
 // Latency 1: rd_data_o is the word of the cycle with rd_en_i, and stays until the next such cycle. What a read and a write of
 // the same address give in the same cycle is not defined: rd_data_o is then a value that no one may use (in simulation: all
-// bits of the word inverted). Contents are not reset. Behaviour in flip-flops; a technology replaces the module by its macro.
+// bits of the word inverted; in synthesis: told by attributes, so that an FPGA's tool adds no logic to a block of memory). Contents are
+// not reset. Behaviour in flip-flops; a technology replaces the module by its macro.
 module flk_sram #(
   parameter  int unsigned Width    = 8,
   parameter  int unsigned Depth    = 16,
@@ -21,6 +22,8 @@ module flk_sram #(
     $error("flk_sram: Width and Depth must be at least 1");
   end
 
+  // No check for a read and a write of the same address: Yosys, Quartus, Vivado.
+  (* no_rw_check, ramstyle = "no_rw_check", rw_addr_collision = "no" *)
   logic [Width-1:0] storage_q[Depth];
   logic [Width-1:0] rd_data_q;
 

@@ -24,6 +24,11 @@ def config() -> dict[str, Any]:
     return json.loads(os.environ.get("FLICKER_TB_CONFIG", "{}"))
 
 
+def four_state() -> bool:
+    """Whether the design runs in Icarus Verilog, with X and Z (FOUR_STATE=1): it has the RTL's ports and parameters, but not its inner names."""
+    return os.environ.get("FOUR_STATE", "") not in ("", "0")
+
+
 def netlist() -> bool:
     """Whether the design is its synthesised netlist (NETLIST=1): it has the RTL's ports, but not its inner names."""
     return os.environ.get("NETLIST", "") not in ("", "0")

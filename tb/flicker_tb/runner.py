@@ -24,7 +24,7 @@ from cocotb_tools.runner import get_runner
 
 from flicker import toolchain
 from flicker.errors import FlickerError
-from flicker_tb import signal_view
+from flicker_tb import bench, four_state, signal_view
 from flicker_tb.bench import netlist
 
 TB = toolchain.ROOT / "tb"
@@ -63,9 +63,12 @@ def build(
 
     cocotb sees the ports only, or with ``inner`` all signals, which for large designs is several times more C++; registers get random values at the start
     of a run. Compilation is quick instead of thorough (one piece of C++, ``opt``): most of a simulation's time is Python's. With NETLIST=1 in the environment
-    the design is its synthesised netlist instead of the RTL, of which only ports are visible and registers with a reset begin reset.
+    the design is its synthesised netlist instead of the RTL, of which only ports are visible and registers with a reset begin reset. With FOUR_STATE=1 it
+    runs in Icarus Verilog (`four_state`).
     Args as of ``flicker.toolchain.verilate``.
     """
+    if bench.four_state():
+        return four_state.build(top, parameters or {}, list(sources or toolchain.sources_of(top, extra)))
     visible = ["--public-flat-rw"] if inner or waves() else ["--public-depth", "1"]
     if netlist():
         if sources is not None or extra:
@@ -143,7 +146,8 @@ def build_and_test(
         print(f"{top} {dict(parameters or {})} FLICKER_SEED={number}", file=sys.stderr, flush=True)
         results = folder / "results.xml"
         try:
-            get_runner("verilator").test(
+            simulator = "icarus" if bench.four_state() else "verilator"
+            get_runner(simulator).test(
                 test_module=module,
                 hdl_toplevel=top,
                 hdl_toplevel_lang="verilog",
@@ -154,7 +158,7 @@ def build_and_test(
                 test_filter=rf"\.({'|'.join(tests)})(/.*)?$" if tests else None,
                 waves=bool(waves()),
                 test_args=["--trace-file", str(trace)] if waves() else [],
-                plusargs=["+verilator+rand+reset+2", f"+verilator+seed+{_verilator_seed(number)}"],
+                plusargs=[] if bench.four_state() else ["+verilator+rand+reset+2", f"+verilator+seed+{_verilator_seed(number)}"],
                 extra_env={
                     "FLICKER_TB_CONFIG": json.dumps(dict(config or {})),
                     "COCOTB_ANSI_OUTPUT": "0",

@@ -26,7 +26,7 @@ from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
-from flicker.golden.chip import render_chip
+from flicker.golden.chip import chip_walk, render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
@@ -107,15 +107,16 @@ def compare(
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
-    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i is of sorting
-    # unit i mod 4, which delivers what the core that needs most of the tile's list needs.
+    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i of the walk is of
+    # sorting unit i mod 4, which delivers what the core that needs most of the tile's list needs.
     counters = params.STAGES[config.stage].counters
     taken, of_frame = done.stage[:, counters.index("gaussians_in")], want.frame.lists
     lengths, needed = (of_cores(values, of_frame.cols) for values in (np.diff(of_frame.start), want.frame.needed))
     whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu" and not config.by_lanes
     assert may_be_given(taken, lengths, needed, whole).all(), (taken, needed, lengths)
     delivered = np.asarray(done.rendering["entries"])
-    least = want.frame.needed.reshape(of_frame.rows // 2, 2, of_frame.cols // 2, 2).max(axis=(1, 3)).ravel()
+    x, y = chip_walk(of_frame)
+    least = want.frame.needed.reshape(of_frame.rows // 2, 2, of_frame.cols // 2, 2).max(axis=(1, 3))[y, x]
     assert all(delivered[k] >= least[k::4].sum() for k in range(4)), (delivered, least)
     assert taken.sum() <= CORES * delivered.sum() and delivered.sum() <= counts["entries"]
     for name in ("blended", "pixels_finished") if config.by_lanes else ("minitiles_sent", "pixels_finished"):
@@ -332,6 +333,13 @@ def test_registers_in_mid_frame() -> None:
             chip.set_register("chunks", rng.getrandbits(25))
             assert 0 <= chip.register("status") < 32
         compare(chip, view, chip.finish(frames[1], LIMIT))
+
+
+@pytest.mark.parametrize("size", [(1, 600), (600, 1), (1, 1)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_narrow_pictures(size: tuple[int, int]) -> None:
+    """One pixel wide or high: bands of the walk that go left, and pairs with one tile."""
+    with session() as chip:
+        check(chip, camera(*size))
 
 
 def test_nothing_to_see() -> None:

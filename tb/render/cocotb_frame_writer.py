@@ -40,17 +40,19 @@ class Writer:
         return out
 
     async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0,
-                    order: str = "any") -> int:
+                    order: str = "any", at: tuple[int, int] = (0, 0), stride: int = 0, top: bool = False) -> int:
         """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle.
+        at: pair of tiles where it begins in a larger picture with that stride, in bytes. top: its last row is the last of the address space.
         order: of a core's groups of pixels, any, ahead (as far apart as they may be) or pairs (one pair after the other)."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         across, down = -(-cols * 8 // PAIR), -(-rows * 8 // TILE)
         cols, rows = 4 * across, 2 * down
         pixels = self.pixels(cols, rows)
         width, height = 8 * cols, 8 * rows
-        stride = least_stride(width, form) + 32 * gap
+        stride = stride or least_stride(width, form) + 32 * gap
         background = [rng.choice((0, 255, rng.randrange(256))) for _ in range(3)]
-        base = rng.randrange(1 << 20)
+        begin = TILE * at[1] * stride + at[0] * least_stride(PAIR, form)  # byte of its first pixel
+        base = (1 << len(dut.base_i)) - -(-(begin + height * stride) // 64) if top else rng.randrange(1 << 20)
         pairs = [(x, y) for y in range(down) for x in range(across)]
         if walk == "any":
             rng.shuffle(pairs)
@@ -66,7 +68,7 @@ class Writer:
                         rng.shuffle(places)
                         for i in places:
                             t, r, g, b = (int(v) for v in pixels[row * cols + col, i])
-                            position = row << SUBTILE_COORD_BITS | col
+                            position = row + 2 * at[1] << SUBTILE_COORD_BITS | col + 4 * at[0]
                             work[k][m].append((number, position << 70 | i << 64 | t << 48 | r << 32 | g << 16 | b))
         expected = frame_buffer(pixels, cols, rows, width, height, form, stride, background)
         memory = np.zeros(expected.size + 64, np.uint8)
@@ -102,7 +104,7 @@ class Writer:
                 assert held in (None, got), "line changed before its transfer"
                 held = None if ready else got
                 if ready:
-                    where = (got[0] - base) * 64
+                    where = (got[0] - base) * 64 - begin
                     assert got[1] in (3, 12, 15), "not whole bursts"
                     for q in range(4):
                         if got[1] >> q & 1:
@@ -144,6 +146,18 @@ async def bytes_of_frames(dut, form, kind):
         idle, stall = ([pick() for _ in range(CORES)], pick()) if kind == "mixed" else ([kind.split()[0]] * CORES, kind.split()[1])
         walk, order = test.rng.choice(("rows", "any")), test.rng.choice(("any", "ahead", "pairs"))
         await test.frame(cols, rows, form, idle, stall, gap=test.rng.randrange(3), walk=walk, order=order)
+
+
+@cocotb.test()
+@cocotb.parametrize(("form", list(PixelFormat)))
+async def largest_picture(dut, form):
+    """First and last pair of tiles of 4096x4096 pixels, in rows as short and as long as there are, at the end of the address space."""
+    test = Writer(dut)
+    await test.bench.reset()
+    last = 4096 // PAIR - 1, 4096 // TILE - 1
+    for stride in (least_stride(4096, form), (1 << 17) - 32):
+        for at in (last, (0, last[1]), (last[0], 0)):
+            await test.frame(4, 2, form, ["never"] * CORES, "never", at=at, stride=stride, top=at == last)
 
 
 @cocotb.test()

@@ -1,7 +1,8 @@
 """Frame writer: every byte of the frame buffer as in the golden model, nothing else written; lines, rates, frames one after the other, abort.
 
 State space: pixels of every sub-tile in any order, cores apart by up to two pairs, special FP16 values, idle and back-pressure patterns, both pixel formats,
-strides with a gap, odd and even bursts at the start of a row, tiles in any order of pairs. Parameter space: four pairs held and the
+strides with a gap, odd and even bursts at the start of a row, tiles in any order of pairs, the corners of the largest picture with the least and the longest
+stride at the end of the address space. Parameter space: four pairs held and the
 order of mini-tiles; two and the order of 32 lanes, with SLOW=1 two and eight, 64 and 128 lanes, for the bytes of frames and one late core only.
 """
 
