@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from .kept import Checkpoint, checkpoint_path
+from .kept import Checkpoint, checkpoint_path, measuring
 from .options import RichSteps, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 
@@ -133,9 +133,10 @@ def budget(
     write_atomically(out, lambda path: save(found, out, path, options.form, progress))
     kept.finish()
     written = load_scene(out)
-    decibels = reference_psnr(clean, written, held, progress)
-    at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
-    drawn = None if reducer.machine is None else [machine_psnr(of, held, reducer.wanted_held, reducer.machine, progress) for of in (clean, written)]
+    with measuring(out):
+        decibels = reference_psnr(clean, written, held, progress)
+        at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
+        drawn = None if reducer.machine is None else [machine_psnr(of, held, reducer.wanted_held, reducer.machine, progress) for of in (clean, written)]
     _show(reducer.rows, seconds)
     table = Table(show_header=False)
     table.add_column(style="bold")

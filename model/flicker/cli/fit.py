@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from .kept import Checkpoint, checkpoint_path, printed
+from .kept import Checkpoint, checkpoint_path, measuring, printed
 from .options import RichSteps, console, writable, write_atomically
 
 if TYPE_CHECKING:
@@ -129,7 +129,8 @@ def fit(
     write_atomically(out, lambda path: save_ply(fitted, path))
     write_atomically(cameras, lambda path: path.write_text(text))
     kept.finish()
-    after = trainer.quality(fitted)
+    with measuring(out):
+        after = trainer.quality(fitted)
     table = Table(show_header=before is not None)
     table.add_column(style="bold")
     if before is not None:

@@ -73,6 +73,15 @@ class Checkpoint:
             self.path.unlink(missing_ok=True)
 
 
+@contextmanager
+def measuring(out: Path) -> Iterator[None]:
+    """Ctrl-C within says that the result is there."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted(f"{out} is written; its PSNR was not measured") from None
+
+
 def checkpoint_path(given: Path | None, out: Path) -> Path:
     """Where a state goes: as the user says, else beside the result. FlickerError where it cannot be written."""
     path = out.with_name(out.name + ".checkpoint.npz") if given is None else given

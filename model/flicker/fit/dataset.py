@@ -126,6 +126,8 @@ def _told(root: Path, shots: Sequence[Shot]) -> list[str]:
             notes.append(f"{count} of {total} photographs {text}")
     if masked := sum(shot.mask is not None for shot in shots):
         notes.append(f"{masked} of {total} photographs have a mask: black pixels do not count")
+    elif dynamic := sum(shot.path.with_name(f"dynamic_mask_{shot.path.stem}.png").is_file() for shot in shots):
+        notes.append(f"{dynamic} of {total} photographs have a dynamic_mask_ beside them: not used; a mask_path names a mask that is white where pixels count")
     elif (root / MASKS).is_dir():
         notes.append(f"{root / MASKS}: not used: no photograph has a mask of its name there, nor does a mask_path name one")
     return notes

@@ -100,6 +100,16 @@ def _where(counted: np.ndarray | None, image: np.ndarray, photo: np.ndarray) -> 
     return (image, photo) if counted is None else (image[counted], photo[counted])
 
 
+def _masked(
+    measure: Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray]], image: np.ndarray, photo: np.ndarray, counted: np.ndarray | None,
+) -> tuple[float, np.ndarray]:
+    """A loss and its slope, of pictures that are black where pixels do not count; the photograph is so already."""
+    if counted is None:
+        return measure(image, photo)
+    loss, slope = measure(image * counted[..., None], photo)
+    return loss, slope * counted[..., None]
+
+
 def affine_fit(image: np.ndarray, photo: np.ndarray) -> np.ndarray:
     """The picture (..., 3) with the affine change of colour that brings it nearest to the photograph, least squares."""
     columns = np.concatenate([image, np.ones((*image.shape[:-1], 1))], axis=-1).reshape(-1, 4).astype(np.float64)
@@ -183,11 +193,9 @@ class Trainer:
             self.moments = Adam.of(self.parameters.values)
         measure = loss_and_slope if self.iteration < self.options.first_squared else log_error_slope
         counted = self._counted[view]
-        counts = np.float32(1.0) if counted is None else counted[..., None].astype(np.float32)
         if self.options.exposure:
             change = self.exposures[view].reshape(3, 4)
-            loss, slope = measure(np.ascontiguousarray((frame.image @ change[:, :3].T + change[:, 3]) * counts), photo)
-            slope = slope * counts
+            loss, slope = _masked(measure, np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo, counted)
             by_colour = np.einsum("hwi,hwj->ij", slope, frame.image, dtype=np.float64)
             gradient = np.concatenate([by_colour, slope.sum(axis=(0, 1), dtype=np.float64)[:, None]], axis=1).astype(np.float32)
             slope = slope @ change[:, :3]
@@ -195,8 +203,7 @@ class Trainer:
             rate = np.full(12, fast * (slow / fast) ** (self.iteration / self.options.iterations), np.float32)
             self.exposure_moments.step(self.exposures, np.array([view]), gradient.reshape(1, 12), rate)
         else:
-            loss, slope = measure(frame.image * counts, photo)
-            slope = slope * counts
+            loss, slope = _masked(measure, frame.image, photo, counted)
         found = backward(frame, slope, (self.degree + 1) ** 2)
         refused = self.moments.step(self.parameters.values, found.index, found.values, self.rates())
         self._least.hold(self.parameters.values, found.index)
