@@ -243,14 +243,14 @@ def test_one_gaussian() -> None:
 def test_cuts_make_steps_finer_and_stay_within_their_bytes() -> None:
     """Two blobs far apart: the cluster across the gap is cut there."""
     scene = random_scene(seed(), 1000, 0)
-    scene.means[:700] += 30
+    scene.means[:700] += 10
     sizes, steps = [], []
     for cuts in (0.0, 0.03, 0.2):
         packed = pack(scene, recipe=Recipe(cuts=cuts)).packed
         sizes.append(len(packed.image()))
         steps.append(packed.headers["position_step"].max(axis=1)[packed.cluster])
         assert packed.counts.max() <= 256 and packed.counts.min() >= 1
-    coarse = [(step > 0.04).sum() for step in steps]
+    coarse = [(step > 0.004).sum() for step in steps]
     assert coarse[0] == 256 and coarse[1] < 64 and coarse[2] == 0 and steps[2].max() < 0.002
     assert sizes[0] < sizes[1] <= sizes[0] + 0.03 * 16 * 1000 + 64 * 4 and sizes[2] <= sizes[0] + 0.2 * 16 * 1000 + 64 * 4
 

@@ -11,6 +11,7 @@ import typer
 from ..errors import FlickerError, FlickerWarning
 from .budget import budget
 from .chip import chip
+from .convert import convert
 from .cost import cost
 from .fit import fit
 from .pack import pack
@@ -23,7 +24,7 @@ from .view import view
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
-for command in (render, demo, view, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
+for command in (render, demo, view, convert, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
     app.command()(command)
 
 

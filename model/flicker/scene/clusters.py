@@ -103,6 +103,14 @@ def _middle(means: np.ndarray) -> tuple[np.ndarray, float]:
     return np.array([(ordered[k, axis] + ordered[k + inside, axis]) / 2 for axis, k in enumerate(first)]), width
 
 
+def flyaways(means: np.ndarray) -> np.ndarray:
+    """bool (N,): Gaussians whose distance along an axis from the middle of the scene is beyond `FAR` times the width of its densest quarter: the span on an
+    axis that holds a quarter of the Gaussians, the largest of three axes."""
+    means = np.asarray(means, np.float64)
+    centre, width = _middle(means)
+    return (np.abs(means - centre) > FAR * width).any(axis=1)
+
+
 def morton_order(means: np.ndarray) -> np.ndarray:
     """int64 (N,): order of the Gaussians along a Morton curve, those far away from most (`cluster_order`) last."""
     return cluster_order(means)[0]

@@ -308,9 +308,12 @@ def scene_digest(path: str | Path) -> str:
 
 
 def save_ply(scene: Scene, path: str | Path) -> None:
-    """Write a scene as an INRIA PLY file (log scales, logit opacities). Raises OSError."""
+    """Write a scene as an INRIA PLY file (log scales, logit opacities), with the comment `SplatRenderMode: mip` where it is antialiased. Raises OSError."""
     gsply.plywrite(path, gsply.GSData.from_arrays(
         means=scene.means, scales=np.log(scene.scales), quats=scene.quats,
         opacities=logits(scene.opacities).astype(np.float32), sh0=np.ascontiguousarray(scene.sh[:, 0]),
         shN=np.ascontiguousarray(scene.sh[:, 1:]) if scene.sh.shape[1] > 1 else None, format="ply",
     ))
+    if scene.antialiased:
+        first, end, rest = Path(path).read_bytes().partition(b" 1.0\n")  # behind the line of the format
+        Path(path).write_bytes(first + end + b"comment SplatRenderMode: mip\n" + rest)
