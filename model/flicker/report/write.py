@@ -148,7 +148,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     }
     text = page(views, verdicts, paper, charts, heats, budgets, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]
-    columns = [*SUMMARY, *(key for key in rows[0] if key not in SUMMARY)]
+    columns = list(dict.fromkeys([*SUMMARY, *(key for row in rows for key in row)]))  # stages differ in the parts that their energy has
     index, summary = job.folder / "index.html", job.folder / "summary.csv"
     try:
         with summary.open("w", newline="") as file:
