@@ -9,6 +9,10 @@ class FlickerError(Exception):
     """
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C where something is kept: the message says what, and how to go on."""
+
+
 class FlickerWarning(UserWarning):
     """Input that is used, though not as its name says. The message is one line that names the file."""
 

@@ -402,7 +402,7 @@ def test_bad_input(scene, tmp_path, monkeypatch, arguments, message):
 
 def test_unwritable_folder(tmp_path, monkeypatch):
     """A folder that cannot be written is found before any work, also one in the way of a file."""
-    monkeypatch.setattr("flicker.explore.stability.write.os.access", lambda *a: False)
+    monkeypatch.setattr("flicker.output.os.access", lambda *a: False)
     with pytest.raises(FlickerError, match="not writable"):
         check([], tmp_path / "out", SIZE, NAMES)
     monkeypatch.undo()

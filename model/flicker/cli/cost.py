@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from .options import RichSteps, console, parse_size, writable, write_atomically
+from .options import RichSteps, check_scene, check_there, console, parse_size, writable, write_atomically
 from .render import FormatChoice
 
 
@@ -74,15 +74,17 @@ def cost(
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
 ) -> None:
     """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
+    writable(out, "--out")
+    writable(json_, "--json")
+    wanted = parse_size(size)
+    check_scene(scene)
+    check_there(cameras)
     from ..chip.scene_cost import scene_cost
     from ..front.view import DEMO, load_view
     from ..scene.camera import find_cameras
     from ..scene.demo import demo_cameras
     from ..scene.packed import PackedFormat
 
-    writable(out, "--out")
-    writable(json_, "--json")
-    wanted = parse_size(size)
     loaded = load_view(scene, view or 0, wanted, cameras, up)
     found = demo_cameras() if scene == DEMO else find_cameras(loaded.scene, cameras, up)
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]

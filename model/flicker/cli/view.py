@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import FlickerError
-from .options import RichSteps, console, parse_size
+from .options import RichSteps, check_scene, check_there, console, parse_size
 
 MAX_PIXELS = 3840 * 2160
 
@@ -30,6 +30,8 @@ def view(
         raise FlickerError(f"--size: {size} is more than {MAX_PIXELS:,} pixels")
     if folder.exists() and not folder.is_dir():
         raise FlickerError(f"--dir: {folder}: not a folder")
+    check_scene(scene)
+    check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import DEMO, load_view

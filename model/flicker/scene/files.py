@@ -20,15 +20,17 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import gsply
 import numpy as np
 
 from ..errors import FlickerError, FlickerWarning, one_line
 from . import sog
 from .gaussians import SH_C0, SH_DEGREES, Scene, logits
 from .packed import decode, is_image, load_packed
+
+if TYPE_CHECKING:
+    import gsply  # loads numba: in the functions that decode
 
 _REST_COUNTS = (0, 9, 24, 45)
 _CHUNK = 256
@@ -195,6 +197,8 @@ def check_ply(path: Path) -> bool:
 
 def _read_ply(path: Path) -> tuple[np.ndarray, ...]:
     check_ply(path)
+    import gsply
+
     return _activated(gsply.plyread(path))
 
 
@@ -204,6 +208,8 @@ def _read_image(path: Path) -> tuple[np.ndarray, ...]:
 
 
 def _read_spz(path: Path) -> tuple[np.ndarray, ...]:
+    import gsply
+
     means, scales, quats, opacities, sh = _activated(gsply.read_spz(path))
     if len(means) == 0:
         raise FlickerError(f"{path}: no Gaussians")
@@ -407,6 +413,8 @@ def scene_digest(path: str | Path) -> str:
 
 def save_ply(scene: Scene, path: str | Path) -> None:
     """Write a scene as an INRIA PLY file (log scales, logit opacities). Raises OSError."""
+    import gsply
+
     gsply.plywrite(path, gsply.GSData.from_arrays(
         means=scene.means, scales=np.log(scene.scales), quats=scene.quats,
         opacities=logits(scene.opacities).astype(np.float32), sh0=np.ascontiguousarray(scene.sh[:, 0]),

@@ -13,13 +13,14 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import gsply
-import imagecodecs
 import numpy as np
 
 from ..errors import FlickerError, one_line
+
+if TYPE_CHECKING:
+    import gsply  # loads numba: in the function that decodes
 
 T = TypeVar("T")
 META = "meta.json"
@@ -129,6 +130,8 @@ def _check(where: str, meta: dict[str, Any]) -> None:
 
 def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) -> gsply.GSData:
     """text: `meta.json`, called `where` in messages. read: a member's content; raises FlickerError."""
+    import gsply
+
     meta = parse_meta(where, text)
     names = member_names(where, meta)
     _check(where, meta)
@@ -140,6 +143,8 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
     try:
         return gsply.sogread(packed.getvalue())
     except Exception:  # of several libraries; the culprit is looked for now, so that good files are decoded once
+        import imagecodecs
+
         for name, data in members.items():
             try:
                 imagecodecs.webp_decode(data)
