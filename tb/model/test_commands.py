@@ -18,14 +18,17 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import scene_samples as samples
 from flicker_tb.command import flicker
 from flicker_tb.doc_commands import all_commands, commands_of, words_of
+from flicker_tb.screen import figures, on_screen
 
 from flicker.budget.write import save
+from flicker.cli.tables import Terminal
 from flicker.explore.sweep import load_sweep
 from flicker.explore.sweep.run import connect
 from flicker.front.view import View
@@ -54,7 +57,8 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make test SLOW=1", "is what runs this"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),
-    (r"scripts/gen_\w+.py --check|scripts/docs.py --list", "script"),
+    (r"scripts/gen_\w+.py --check", "make lint runs it"),
+    (r"scripts/docs.py --list", "list"),
     (r"scripts/(?:make_demo_scene|formal|synth).py .*", "slow script"),
     (r"cc .*flk.c -lm", "cc"),
     (r".*pytest .*", "pytest"),
@@ -142,7 +146,9 @@ def sandbox(tmp_path_factory) -> Path:
         save(scene, here / name, here / name, PackedFormat.CHUNK, Steps())
     for name in ("scene.sog", "playbot.sog", "st-peter.sog", "b.sog"):
         (here / name).write_bytes(samples.sog_bundle(samples.sog_files(scene)))
-    (here / "cameras.json").write_text(cameras_text(small_cameras()))
+    (here / "build" / "view").mkdir(parents=True)
+    for folder in (here, here / "build" / "view"):
+        (folder / "cameras.json").write_text(cameras_text(small_cameras()))
     for name in ("Makefile", "pyproject.toml", "requirements.lock", "scripts"):
         (here / name).symlink_to(ROOT / name)
     (here / ".venv").mkdir()
@@ -155,19 +161,29 @@ def run_in(sandbox: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> subp
     """A `flicker` command in the sandbox, in this process; the demo scene is a small one."""
     monkeypatch.chdir(sandbox)
     monkeypatch.setattr("flicker.scene.demo.generate", lambda seed=1: small_scene())
-    done = flicker(*(OWN.get(word, word) for word in words_of(command)[1:]))
+    printed: list[object] = []
+    usual = Terminal.print
+
+    def noted(console: Terminal, *objects: object, **options: Any) -> None:
+        printed.extend(objects)
+        usual(console, *objects, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Terminal, "print", noted)
+        done = flicker(*(OWN.get(word, word) for word in words_of(command)[1:]))
     assert done.returncode == 0, f"{command}: {done.stderr or done.stdout}"
-    assert "Traceback" not in done.stderr
+    assert done.stderr == "" and "…" not in done.stdout
+    for thing in printed:  # on a terminal of 80 columns, with every figure that a pipe gets
+        whole, shown = on_screen(thing, None), on_screen(thing, 80)
+        assert "…" not in shown and not set(figures(whole)) - set(figures(shown)), shown
+        assert max(map(len, shown.splitlines()), default=0) <= 80, shown
     return done
-
-
-FIGURES = re.compile(r"\d[\d,]*\.?\d*")
 
 
 @pytest.mark.parametrize("command", [c for c in of("run") if "flicker" in c])
 def test_command(command: str, sandbox: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done = run_in(sandbox, monkeypatch, command)
-    assert "…" not in done.stdout and FIGURES.search(done.stdout), done.stdout
+    assert figures(done.stdout), done.stdout
     for option, name in re.findall(r"(--out|-o|--stats|--json) (\S+)", command):
         assert (sandbox / name).stat().st_size > 0, (option, name)
 
@@ -190,10 +206,20 @@ def test_make_clean(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.rglob("*")} == {"Makefile", "model", "flicker", "a.py", "tb", "scripts", ".venv"}
 
 
-@pytest.mark.parametrize("command", of("script"))
-def test_script(command: str) -> None:
-    done = subprocess.run([sys.executable, *words_of(command)], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_list_of_parts(capsys: pytest.CaptureFixture[str]) -> None:
+    """`scripts/docs.py --list` has a line for each part of `make docs`."""
+    import docs
+
+    (command,) = of("list")
+    assert docs.main(words_of(command)[1:]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [part.name for part in docs.PARTS]
+
+
+def test_lint_checks_what_is_generated() -> None:
+    """As ACCOUNTS says of `--check`."""
+    text = (ROOT / "scripts" / "lint.py").read_text()
+    for command in of("make lint runs it"):
+        assert words_of(command)[0].removeprefix("scripts/") in text, command
 
 
 def test_scripts_can_be_started() -> None:
@@ -289,8 +315,6 @@ def studio(sandbox: Path) -> Path:
             assert flicker("budget", "scene.ply", "-o", "cut.ply", *options).returncode == 0
     (sandbox / "train.json").write_text(cameras_text(cameras))
     (sandbox / "sweep.yaml").write_text("scenes: [scene.ply]\nsize: 48x32\nconfigurations: [flicker, log-lanes]\nout: results\n")
-    (sandbox / "build" / "view").mkdir(parents=True, exist_ok=True)
-    shutil.copy(sandbox / "cameras.json", sandbox / "build" / "view")
     return sandbox
 
 

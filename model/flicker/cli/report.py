@@ -10,7 +10,6 @@ from rich.text import Text
 
 from ..errors import FlickerError, Interrupted
 from ..output import check_folder
-from ..report.named import named
 from .options import check_there, console, parse_size
 
 
@@ -28,6 +27,8 @@ def report(
 ) -> None:
     """Measure configurations on every view; write tables and figures as one page."""
     if not show:
+        from ..report.named import named
+
         check_folder(out)
         for text in scenes or ():
             named(text)

@@ -12,7 +12,7 @@ from rich.text import Text
 
 PIPE = 1_000_000  # columns of what is no terminal: nothing is wrapped there
 _FIGURE = re.compile(r"[-+(]*\d[\d.,:x%)^-]*$")
-_FOLDED = 24  # characters of a word, such as a path, that a narrow column may break; figures are never broken
+_FOLDED = 20  # characters of a word, such as a path, that a narrow column may break; figures are never broken
 
 
 def decibels(value: float | None, digits: int = 2, unit: str = " dB") -> str:
