@@ -291,6 +291,12 @@ def test_whole_folder_or_none(tmp_path: Path) -> None:
         pass
 
 
+def test_records_of_several_kinds(tmp_path: Path) -> None:
+    """Columns in order of appearance over all records, not those of the first."""
+    output.write_records(tmp_path / "x.csv", ["b", "a"], [{"a": 1, "b": 2}, {"a": 3, "c": "x,y"}])
+    assert (tmp_path / "x.csv").read_text() == 'b,a,c\n2,1,\n,3,"x,y"\n'
+
+
 def test_interrupted_is_ctrl_c() -> None:
     """So that what expects KeyboardInterrupt stops for it, too."""
     assert issubclass(Interrupted, KeyboardInterrupt) and isinstance(Terminal(file=io.StringIO()), Terminal)

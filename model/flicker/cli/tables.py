@@ -26,8 +26,8 @@ class Terminal(Console):
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, **options)
 
-    @property
-    def size(self) -> ConsoleDimensions:  # type: ignore[override]  # never set
+    @property  # type: ignore[misc]  # never set
+    def size(self) -> ConsoleDimensions:
         """Columns and lines; a pipe has no width that would wrap or cut a line."""
         if not self.file.isatty():
             return ConsoleDimensions(PIPE, 25)
@@ -108,7 +108,7 @@ def fitted(table: Table, console: Console) -> list[Table]:
             column: Column = table.columns[k]
             part.add_column(_wrapped(heads[k], width, console), style=column.style, justify=column.justify, width=width, no_wrap=True)
         for number, row in enumerate(table.rows):
-            part.add_row(*(_wrapped(cells[k][number], width, console) for k, width in zip(chosen, widths)), end_section=row.end_section)
+            part.add_row(*(_wrapped(cells[k][number], width, console) for k, width in zip(chosen, widths)), style=row.style, end_section=row.end_section)
         return part
 
     every = list(range(len(cells)))
