@@ -16,6 +16,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -241,16 +242,14 @@ def test_driver_is_compiled_as_the_page_says(tmp_path: Path) -> None:
 
 def names_of(target: str) -> set[str]:
     """What UNIT or PART of a target may be."""
-    import docs
-    import formal
-    import mutants
-
     from flicker.cost.synth.units import all_units
 
     tests = {path.stem.removeprefix("test_") for path in (ROOT / "tb").rglob("test_*.py")}
     known: dict[str, Callable[[], set[str]]] = {
-        "sim": lambda: tests, "waves": lambda: tests, "synth": lambda: {unit.name for unit in all_units()}, "docs": lambda: {part.name for part in docs.PARTS},
-        "formal": lambda: {proof.name for proof in formal.read_proofs()}, "mutants": lambda: {path.stem for path in mutants.LISTS.glob("*.toml")},
+        "sim": lambda: tests, "waves": lambda: tests, "synth": lambda: {unit.name for unit in all_units()},
+        "docs": lambda: set(re.findall(r'^    Part\("(\w+)"', (ROOT / "scripts" / "docs.py").read_text(), re.M)),
+        "formal": lambda: {proof["name"] for proof in tomllib.loads((ROOT / "formal" / "proofs.toml").read_text())["proof"]},
+        "mutants": lambda: {path.stem for path in (ROOT / "tb" / "mutants").glob("*.toml")},
     }
     return known[target]()
 
