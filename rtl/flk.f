@@ -58,6 +58,7 @@ common/flk_pair_fifo.sv
 common/flk_phase_mux.sv
 common/flk_pipe_reg.sv
 common/flk_priority_arbiter.sv
+common/flk_reset_sync.sv
 common/flk_skid_buffer.sv
 common/flk_sram.sv
 common/flk_sram_fifo.sv
@@ -136,3 +137,4 @@ flk_lane_stage.sv
 flk_render_stage.sv
 flk_rendering.sv
 flk_top.sv
+flk_top_axi.sv

@@ -10,8 +10,9 @@
 // control.reset: the same at once; the memory's side of the port must be in reset from before the write until
 // status.aborting is 0.
 // The clock of a half stands still while it is idle and no frame is in its place (flk_clock_gate).
-// irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone, but for reg_*_ready_o, which follow the ready of
-// the register port's answers; w_ready_i and b_* reach the writers combinationally.
+// test_en_i (scan test, 0 in use): both clocks run, both halves are reset by rst_ni alone.
+// irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone; w_ready_i and b_* reach
+// the writers combinationally.
 module flk_top
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;
@@ -46,6 +47,7 @@ module flk_top
 ) (
   input  logic                    clk_i,
   input  logic                    rst_ni,
+  input  logic                    test_en_i,  // scan test: clock gates open, resets are rst_ni
   output logic                    irq_o,
   // Registers: AXI4-Lite
   input  logic                    reg_aw_valid_i,
@@ -150,7 +152,7 @@ module flk_top
 
   state_e                           state_q;
   logic [$clog2(ResetCycles+1)-1:0] reset_q;
-  logic                             units_rst_nq, aborted_q, abort_q;
+  logic                             units_rst_nq, units_rst_n, aborted_q, abort_q, dead_q;
   logic                             drained, stuck, forget, hold;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -160,8 +162,10 @@ module flk_top
       units_rst_nq <= 1'b0;
       aborted_q    <= 1'b0;
       abort_q      <= 1'b0;
+      dead_q       <= 1'b0;
     end else begin
       aborted_q    <= 1'b0;
+      dead_q       <= state_q == DEAD;
       units_rst_nq <= state_q != RESET;
       reset_q      <= state_q == RESET ? reset_q + 1'b1 : '0;
       if (from_host.control.reset.value) begin
@@ -198,6 +202,8 @@ module flk_top
     end
   end
 
+  assign units_rst_n = test_en_i ? rst_ni : units_rst_nq;
+
   assign hold   = state_q != RUN;
   assign forget = state_q == RESET;
 
@@ -215,7 +221,7 @@ module flk_top
   rendering_registers_t rendering;
   logic                 copy_front, copy_front_bank, copy_front_none, copy_front_done;
   logic                 copy_rendering, copy_rendering_bank, copy_rendering_none;
-  logic                 copy_rendering_done, told_q;
+  logic                 copy_rendering_done, told_q, timed_out_q;
   logic [3:0][31:0]     stamps;
   logic [31:0]          now_q;
 
@@ -224,11 +230,13 @@ module flk_top
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      told_q <= 1'b0;
-      now_q  <= '0;
+      told_q      <= 1'b0;
+      timed_out_q <= 1'b0;
+      now_q       <= '0;
     end else begin
-      told_q <= from_host.interrupt.frame_done.value;
-      now_q  <= now_q + 1'b1;
+      told_q      <= from_host.interrupt.frame_done.value;
+      timed_out_q <= frame_error.timed_out;
+      now_q       <= now_q + 1'b1;
     end
   end
 
@@ -380,7 +388,7 @@ module flk_top
     .AddrBits(AddrBits)
   ) i_records (
     .clk_i,
-    .rst_ni   (units_rst_nq),
+    .rst_ni   (units_rst_n),
     .ar_move_i(ar_valid[READ_RECORDS] && ar_ready[READ_RECORDS]),
     .ar_addr_i(ar_addr[READ_RECORDS]),
     .r_valid_i(r_valid[READ_RECORDS]),
@@ -394,14 +402,16 @@ module flk_top
 
   flk_clock_gate i_front_clock (
     .clk_i,
-    .en_i (front_busy || !front_idle || !units_rst_nq),
-    .clk_o(front_clk)
+    .en_i     (front_busy || !front_idle || !units_rst_nq),
+    .test_en_i,
+    .clk_o    (front_clk)
   );
 
   flk_clock_gate i_rendering_clock (
     .clk_i,
-    .en_i (rendering_busy || !rendering_idle || !units_rst_nq),
-    .clk_o(rendering_clk)
+    .en_i     (rendering_busy || !rendering_idle || !units_rst_nq),
+    .test_en_i,
+    .clk_o    (rendering_clk)
   );
 
   front_counters_t     front_counters;
@@ -418,7 +428,7 @@ module flk_top
     .IdBits  (IdBits)
   ) i_front (
     .clk_i               (front_clk),
-    .rst_ni              (units_rst_nq),
+    .rst_ni              (units_rst_n),
     .start_i             (front_start),
     .idle_o              (front_idle),
     .done_o              (front_end),
@@ -531,7 +541,7 @@ module flk_top
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),
-    .rst_ni             (units_rst_nq),
+    .rst_ni             (units_rst_n),
     .start_i            (rendering_start),
     .idle_o             (rendering_idle),
     .registers_i        (rendering),
@@ -683,8 +693,11 @@ module flk_top
   assign to_host.status.dead.next            = state_q == DEAD;
   assign to_host.interrupt.front_done.next   = front_done;
   assign to_host.interrupt.frame_done.next   = post;
+  assign to_host.interrupt.frame_done.hwclr  = from_host.control.reset.value;
+  // A time-out is told at once; and when result shows it, which may be later, when a frame has been released.
   assign to_host.interrupt.error.next        = (post && frame_error != '0) ||
-                                               (stuck && state_q != DEAD);
+                                               (state_q == DEAD && !dead_q) ||
+                                               (frame_error.timed_out && !timed_out_q);
   assign to_host.interrupt.aborted.next      = aborted_q;
   assign to_host.interrupt.refused.next      = refused || (from_host.control.start.value && !start);
   assign to_host.result.tag.next             = tag;

@@ -86,7 +86,7 @@ PARTS = (
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
     Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
          areas.missing, before=areas.save, cheap=True),
-    Part("instance", "instantiation template of the rendering stage", ("",), instance.tables, cheap=True),
+    Part("instance", "instantiation templates, port duties, accesses of memory", ("", "chip", "axi", "duties", "managers"), instance.tables, cheap=True),
     Part("constants", "constants of the chip model", ("",), chip.constant_tables, cheap=True),
     Part("dram", "access patterns on the DRAM model", ("",), chip.dram_tables),
     Part("synthesis", "tables of make synth", ("units", "summary"), synthesis.tables, synthesis.missing),

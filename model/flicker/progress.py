@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 
 class Steps:
@@ -16,3 +18,26 @@ class Steps:
     def bar(self, text: str) -> AbstractContextManager[Callable[[int, int], None]]:
         """Around a step that reports (done, total)."""
         return nullcontext(lambda done, total: None)
+
+
+@contextmanager
+def undivided() -> Iterator[None]:
+    """Ctrl-C within takes effect at the end of the block, whose state is then whole; a second one takes effect at once."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    came = False
+
+    def wait(*_: object) -> None:
+        nonlocal came
+        if came:
+            raise KeyboardInterrupt
+        came = True
+
+    signal.signal(signal.SIGINT, wait)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if came:
+        raise KeyboardInterrupt

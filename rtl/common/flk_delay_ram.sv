@@ -1,4 +1,4 @@
-// Delay line in a memory: q_o is d_i Depth enabled cycles ago, as flk_delay gives it. Not reset.
+// Delay line in a memory: q_o is d_i Depth enabled cycles ago, as flk_delay gives it. The place in the memory is reset, the words are not.
 //
 // A ring of Depth words in flk_sram, whose read register is the last stage; for lines that are too
 // long for flip-flops.
@@ -7,6 +7,7 @@ module flk_delay_ram #(
   parameter int unsigned Depth = 8
 ) (
   input  logic             clk_i,
+  input  logic             rst_ni,
   input  logic             en_i,
   input  logic [Width-1:0] d_i,
   output logic [Width-1:0] q_o
@@ -19,20 +20,14 @@ module flk_delay_ram #(
   localparam int unsigned AddrBits = $clog2(Depth);
   localparam logic [AddrBits-1:0] LAST = AddrBits'(Depth - 1);
 
-  // Wherever it begins, after one step it is a place of the ring.
   logic [AddrBits-1:0] at_q, next;
-  logic                known;
 
-  if (Depth == 1 << AddrBits) begin : gen_all
-    assign known = 1'b1;
-  end else begin : gen_some
-    assign known = at_q <= LAST;
-  end
+  assign next = at_q == LAST ? '0 : at_q + 1'b1;
 
-  assign next = at_q >= LAST ? '0 : at_q + 1'b1;
-
-  always_ff @(posedge clk_i) begin
-    if (en_i) begin
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      at_q <= '0;
+    end else if (en_i) begin
       at_q <= next;
     end
   end
@@ -42,7 +37,7 @@ module flk_delay_ram #(
     .Depth(Depth)
   ) i_ring (
     .clk_i,
-    .wr_en_i  (en_i && known),
+    .wr_en_i  (en_i),
     .wr_addr_i(at_q),
     .wr_data_i(d_i),
     .rd_en_i  (en_i),

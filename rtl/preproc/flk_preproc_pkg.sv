@@ -20,6 +20,7 @@ package flk_preproc_pkg;
   typedef struct packed {
     logic                      chunked;  // the image's format
     logic                      box;      // lists by boxes of 3 standard deviations
+    logic                      antialiased;  // opacities have their factor
     logic [12:0]               width;    // pixels
     logic [12:0]               height;
     position_t [2:0][2:0]      view;
@@ -28,7 +29,9 @@ package flk_preproc_pkg;
     shape_t [2:0]              row_x_z;
     shape_t [2:0]              row_y;
     shape_t [2:0]              row_y_z;
+    shape_t [1:0]              least;    // of the slopes in the projection's derivative
     shape_t [1:0]              limit;
+    logic signed [1:0][22:0]   middle;   // principal point, 1/128 pixel
   } lane_setup_t;
 
   // A cluster that is kept.

@@ -98,6 +98,7 @@ module flk_preprocessing_core
     shape_t                 i0;
     shape_t                 kappa;
     shape_t                 lean;
+    shape_t                 scale;
   } survivor_t;
 
   position_t [2:0] q;
@@ -138,6 +139,7 @@ module flk_preprocessing_core
   if (Form == FORM_FACTORED) begin : gen_projection
     flk_projection i_projection (
       .clk_i,
+      .rst_ni,
       .en_i         (front_en_i),
       .phase_i      (front_phase_i),
       .low_0_i      (low_i[0]),
@@ -179,10 +181,16 @@ module flk_preprocessing_core
       .row_y_z_0_i  (setup_i.row_y_z[0]),
       .row_y_z_1_i  (setup_i.row_y_z[1]),
       .row_y_z_2_i  (setup_i.row_y_z[2]),
+      .least_0_i    (setup_i.least[0]),
+      .least_1_i    (setup_i.least[1]),
       .limit_0_i    (setup_i.limit[0]),
       .limit_1_i    (setup_i.limit[1]),
+      .middle_0_i   ($signed(setup_i.middle[0])),
+      .middle_1_i   ($signed(setup_i.middle[1])),
       .width_i      (setup_i.width),
       .height_i     (setup_i.height),
+      .chunked_i    (setup_i.chunked),
+      .antialiased_i(setup_i.antialiased),
       .key_shift_i,
       .key_low_i,
       .near_o,
@@ -196,6 +204,7 @@ module flk_preprocessing_core
       .l1_o         (survivor_in.shape[1]),
       .l2_o         (survivor_in.l2),
       .spiky_o      (survivor_in.spiky),
+      .scale_o      (survivor_in.scale),
       .i0_o         (survivor_in.i0),
       .kappa_o      (survivor_in.kappa),
       .lean_o       (survivor_in.lean),
@@ -207,6 +216,7 @@ module flk_preprocessing_core
   end else begin : gen_projection_conic
     flk_projection_conic i_projection (
       .clk_i,
+      .rst_ni,
       .en_i         (front_en_i),
       .phase_i      (front_phase_i),
       .low_0_i      (low_i[0]),
@@ -248,10 +258,16 @@ module flk_preprocessing_core
       .row_y_z_0_i  (setup_i.row_y_z[0]),
       .row_y_z_1_i  (setup_i.row_y_z[1]),
       .row_y_z_2_i  (setup_i.row_y_z[2]),
+      .least_0_i    (setup_i.least[0]),
+      .least_1_i    (setup_i.least[1]),
       .limit_0_i    (setup_i.limit[0]),
       .limit_1_i    (setup_i.limit[1]),
+      .middle_0_i   ($signed(setup_i.middle[0])),
+      .middle_1_i   ($signed(setup_i.middle[1])),
       .width_i      (setup_i.width),
       .height_i     (setup_i.height),
+      .chunked_i    (setup_i.chunked),
+      .antialiased_i(setup_i.antialiased),
       .key_shift_i,
       .key_low_i,
       .near_o,
@@ -266,6 +282,7 @@ module flk_preprocessing_core
       .conic_1_o    (survivor_in.shape[1]),
       .conic_2_o    (survivor_in.shape[2]),
       .spiky_o      (survivor_in.spiky),
+      .scale_o      (survivor_in.scale),
       .i0_o         (survivor_in.i0),
       .kappa_o      (survivor_in.kappa),
       .lean_o       (survivor_in.lean),
@@ -663,7 +680,7 @@ module flk_preprocessing_core
     assign clipped[c] = clipped_q;
   end
 
-  // Opacity codes of a factored record come through the bounds' pipeline, which is longer: colours wait
+  // Opacity codes of a record come through the bounds' pipeline, which is longer: colours wait
   // for them here, not in their pipeline, which would stand.
   logic            rgb_room, colour_clipped;
   logic [2:0][ColourBits-1:0] colour;
@@ -698,6 +715,7 @@ module flk_preprocessing_core
     shape_t             sx;
     shape_t             sy;
     shape_t             lean;
+    shape_t             scale;
     logic [15:0]        opacity;
   } bounded_t;
 
@@ -733,7 +751,8 @@ module flk_preprocessing_core
     .clear_i    (1'b0),
     .in_valid_i (survivor_ready),
     .in_ready_o (bounds_room),
-    .in_data_i  ({survivor.x, survivor.y, survivor.sx, survivor.sy, survivor.lean, part_q.opacity}),
+    .in_data_i  ({survivor.x, survivor.y, survivor.sx, survivor.sy, survivor.lean, survivor.scale,
+                  part_q.opacity}),
     .out_valid_o(bounded_valid),
     .out_ready_i(bounds_take),
     .out_data_o (bounded),
@@ -768,7 +787,7 @@ module flk_preprocessing_core
     .sx_i     (bounded.sx),
     .sy_i     (bounded.sy),
     .lean_i   (bounded.lean),
-    .chunked_i(setup_i.chunked),
+    .scale_i  (bounded.scale),
     .box_i    (setup_i.box),
     .opacity_i(bounded.opacity),
     .width_i  (setup_i.width),
@@ -962,11 +981,35 @@ module flk_preprocessing_core
     .empty_o    (fields_empty)
   );
 
-  if (Form == FORM_FACTORED) begin : gen_factored
-    logic [7:0] record_code;
-    logic       unused_full_code;
-    logic [4:0] unused_usage_code;
+  // Codes of opacities, out of the bounds' pipeline: of factored records, and in antialiased scenes of all.
+  logic       with_code, code_space, code_there, unused_full_code;
+  logic [7:0] record_code;
+  logic [4:0] unused_usage_code;
 
+  assign with_code = Form == FORM_FACTORED || setup_i.antialiased;
+
+  flk_fifo #(
+    .Width(8),
+    .Depth(16)
+  ) i_codes (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (with_code && bounds_out && side_valid && walk_room),
+    .in_ready_o (code_space),
+    .in_data_i  (code),
+    .out_valid_o(code_there),
+    .out_ready_i(with_code && record_valid_o && record_ready_i),
+    .out_data_o (record_code),
+    .usage_o    (unused_usage_code),
+    .full_o     (unused_full_code),
+    .empty_o    (code_empty)
+  );
+
+  assign code_room  = code_space || !with_code;
+  assign code_valid = code_there || !with_code;
+
+  if (Form == FORM_FACTORED) begin : gen_factored
     assign recorded_shape       = {survivor.l2, survivor.shape};
     assign fields_in.shape[28]  = recorded_q.shape[1][SHAPE_MAN_BITS+8];  // sign of l1
 
@@ -985,33 +1028,13 @@ module flk_preprocessing_core
       .field_o(fields_in.shape[42:29])
     );
 
-    flk_fifo #(
-      .Width(8),
-      .Depth(16)
-    ) i_codes (
-      .clk_i,
-      .rst_ni,
-      .clear_i    (1'b0),
-      .in_valid_i (bounds_out && side_valid && walk_room),
-      .in_ready_o (code_room),
-      .in_data_i  (code),
-      .out_valid_o(code_valid),
-      .out_ready_i(record_valid_o && record_ready_i),
-      .out_data_o (record_code),
-      .usage_o    (unused_usage_code),
-      .full_o     (unused_full_code),
-      .empty_o    (code_empty)
-    );
-
     assign record_o = {fields.spiky, colour, record_code, fields.shape, fields.y, fields.x};
   end else begin : gen_conic
-    // The opacity is in the record as it is in the image, in FP16: it waits for nothing.
-    logic [15:0] opacity_q, opacity;
+    // The opacity is in the record as it is in the image, in FP16: it waits for nothing. In antialiased scenes it is that
+    // of the code that lists are made by.
+    logic [15:0] opacity_q, opacity, coded;
 
     assign recorded_shape = survivor.shape;
-    assign code_room      = 1'b1;
-    assign code_valid     = 1'b1;
-    assign code_empty     = 1'b1;
 
     always_ff @(posedge clk_i) begin
       if (survivor_ready) begin
@@ -1022,6 +1045,11 @@ module flk_preprocessing_core
     flk_opacity_to_fp16 i_opacity (
       .code_i   (opacity_q[7:0]),
       .opacity_o(opacity)
+    );
+
+    flk_opacity_to_fp16 i_coded (
+      .code_i   (record_code),
+      .opacity_o(coded)
     );
 
     for (genvar k = 0; k < 3; k++) begin : gen_shape
@@ -1037,8 +1065,9 @@ module flk_preprocessing_core
     assign fields_in.x            = recorded_q.x;
     assign fields_in.y            = recorded_q.y;
 
-    assign record_o = {fields.spiky, colour, fields.shape, 32'($signed(fields.y)),
-                       32'($signed(fields.x))};
+    assign record_o = {fields.spiky, colour,
+                       setup_i.antialiased ? coded : fields.shape[63:48], fields.shape[47:0],
+                       32'($signed(fields.y)), 32'($signed(fields.x))};
   end
 
   assign record_valid_o = rgb_valid && fields_valid && code_valid;

@@ -13,7 +13,7 @@ module flk_splat_bounds (
   input  logic [19:0]        sx_i,
   input  logic [19:0]        sy_i,
   input  logic [19:0]        lean_i,
-  input  logic               chunked_i,
+  input  logic [19:0]        scale_i,
   input  logic               box_i,
   input  logic [15:0]        opacity_i,
   input  logic [12:0]        width_i,
@@ -134,203 +134,204 @@ module flk_splat_bounds (
   };
 
   logic next_odd;  // the phase of the next cycle
-  logic [15:0] v10;  // cycle 0
-  logic [7:0] v11;  // cycle 0
-  logic [19:0] v12;  // cycle 0
-  logic [19:0] v13;  // cycle 3
-  logic [19:0] u_v41;
-  logic [19:0] u_v41_a, u_v41_a_even, u_v41_a_odd;
-  logic [19:0] u_v41_b, u_v41_b_even, u_v41_b_odd;
-  logic signed [15:0] v14;  // cycle 5
-  logic signed [15:0] u_v14;
-  logic signed [15:0] v15;  // cycle 5
-  logic signed [15:0] v16;  // cycle 6
+  logic [15:0] v10;  // cycle 1
+  logic [19:0] v11;  // cycle 1
+  logic [19:0] v12;  // cycle 4
+  logic [19:0] u_v12;
+  logic [19:0] u_v12_a, u_v12_a_even, u_v12_a_odd;
+  logic [19:0] u_v12_b, u_v12_b_even, u_v12_b_odd;
+  logic signed [15:0] v13;  // cycle 6
+  logic signed [15:0] u_v13;
+  logic signed [15:0] v14;  // cycle 6
   logic [7:0] code;  // cycle 7
-  logic [19:0] v18;  // cycle 7
-  logic [19:0] v19;  // cycle 8
-  logic [19:0] v20;  // cycle 11
-  logic [19:0] u_v30;
-  logic [19:0] u_v30_b, u_v30_b_even, u_v30_b_odd;
-  logic signed [29:0] v21;  // cycle 13
-  logic signed [29:0] u_v31;
-  logic signed [31:0] v22;  // cycle 14
-  logic signed [24:0] v23;  // cycle 15
-  logic signed [24:0] v24;  // cycle 15
-  logic signed [31:0] v25;  // cycle 14
-  logic signed [24:0] v26;  // cycle 15
-  logic [23:0] v27;  // cycle 16
-  logic [11:0] v28;
-  logic signed [23:0] v29;  // cycle 15
-  logic [19:0] v30;  // cycle 12
-  logic signed [29:0] v31;  // cycle 14
-  logic signed [31:0] v32;  // cycle 15
-  logic signed [24:0] v33;  // cycle 16
-  logic signed [24:0] v34;  // cycle 16
-  logic signed [31:0] v35;  // cycle 15
-  logic signed [24:0] v36;  // cycle 16
-  logic [23:0] v37;  // cycle 17
-  logic [11:0] v38;
-  logic signed [23:0] v39;  // cycle 16
-  logic [19:0] v40;  // cycle 7
-  logic [19:0] v41;  // cycle 10
-  logic signed [29:0] right;  // cycle 18
+  logic [19:0] v16;  // cycle 7
+  logic [19:0] v17;  // cycle 8
+  logic [19:0] v18;  // cycle 11
+  logic signed [29:0] v19;  // cycle 13
   logic signed [29:0] u_right;
+  logic signed [31:0] v20;  // cycle 14
+  logic signed [24:0] v21;  // cycle 15
+  logic signed [24:0] v22;  // cycle 15
+  logic signed [31:0] v23;  // cycle 14
+  logic signed [24:0] v24;  // cycle 15
+  logic [23:0] v25;  // cycle 16
+  logic [11:0] v26;
+  logic signed [24:0] v27;  // cycle 15
+  logic [19:0] v28;  // cycle 11
+  logic [19:0] u_v39;
+  logic [19:0] u_v39_a, u_v39_a_even, u_v39_a_odd;
+  logic [19:0] u_v39_b, u_v39_b_even, u_v39_b_odd;
+  logic signed [29:0] v29;  // cycle 13
+  logic signed [29:0] u_v29;
+  logic signed [31:0] v30;  // cycle 14
+  logic signed [24:0] v31;  // cycle 15
+  logic signed [24:0] v32;  // cycle 15
+  logic signed [31:0] v33;  // cycle 14
+  logic signed [24:0] v34;  // cycle 15
+  logic [23:0] v35;  // cycle 16
+  logic [11:0] v36;
+  logic signed [24:0] v37;  // cycle 15
+  logic [19:0] v38;  // cycle 7
+  logic [19:0] v39;  // cycle 10
+  logic signed [29:0] right;  // cycle 18
   logic [19:0] limit;  // cycle 18
-  logic v44;  // cycle 17
-  logic v45;  // cycle 18
-  logic empty;  // cycle 19
+  logic v42;  // cycle 17
+  logic v43;  // cycle 17
+  logic empty;  // cycle 18
   logic [11:0] x0;  // cycle 18
   logic [11:0] x1;  // cycle 16
   logic [11:0] y0;  // cycle 18
-  logic [11:0] y1;  // cycle 18
+  logic [11:0] y1;  // cycle 16
   logic unused_wrapped;
   logic [6:0][30:0] x_i_q;
-  logic [7:0][30:0] y_i_q;
+  logic [6:0][30:0] y_i_q;
   logic [4:0][19:0] sx_i_q;
   logic [4:0][19:0] sy_i_q;
   logic [3:0][19:0] lean_i_q;
-  logic [2:0][7:0] v11_q;
-  logic [0:0][19:0] v12_q;
-  logic [0:0][15:0] v15_q;
-  logic [0:0][15:0] v16_q;
+  logic [0:0][19:0] scale_i_q;
+  logic [0:0][15:0] opacity_i_q;
+  logic [0:0][19:0] v11_q;
+  logic [0:0][15:0] v14_q;
   logic [6:0][7:0] code_q;
-  logic [0:0][19:0] v18_q;
-  logic [0:0][19:0] v19_q;
-  logic [0:0][29:0] v21_q;
-  logic [0:0][31:0] v22_q;
-  logic [0:0][24:0] v24_q;
-  logic [0:0][31:0] v25_q;
-  logic [0:0][23:0] v27_q;
-  logic [0:0][23:0] v29_q;
-  logic [0:0][29:0] v31_q;
-  logic [0:0][31:0] v32_q;
-  logic [0:0][24:0] v34_q;
-  logic [0:0][31:0] v35_q;
-  logic [0:0][23:0] v37_q;
-  logic [0:0][23:0] v39_q;
-  logic [0:0][19:0] v40_q;
-  logic [2:0][19:0] v41_q;
+  logic [0:0][19:0] v16_q;
+  logic [0:0][19:0] v17_q;
+  logic [0:0][29:0] v19_q;
+  logic [0:0][31:0] v20_q;
+  logic [0:0][24:0] v22_q;
+  logic [0:0][31:0] v23_q;
+  logic [0:0][23:0] v25_q;
+  logic [0:0][24:0] v27_q;
+  logic [0:0][29:0] v29_q;
+  logic [0:0][31:0] v30_q;
+  logic [0:0][24:0] v32_q;
+  logic [0:0][31:0] v33_q;
+  logic [0:0][23:0] v35_q;
+  logic [0:0][24:0] v37_q;
+  logic [0:0][19:0] v38_q;
+  logic [2:0][19:0] v39_q;
   logic [0:0][29:0] right_q;
   logic [0:0][19:0] limit_q;
-  logic [0:0][0:0] v44_q;
-  logic [0:0][0:0] v45_q;
+  logic [0:0][0:0] v42_q;
+  logic [0:0][0:0] v43_q;
   logic [0:0][0:0] empty_q;
   logic [0:0][11:0] x0_q;
   logic [1:0][11:0] x1_q;
   logic [0:0][11:0] y0_q;
-  logic [0:0][11:0] y1_q;
+  logic [1:0][11:0] y1_q;
 
   always_ff @(posedge clk_i) begin
     if (en_i && phase_i == 1'd0) begin
       x_i_q <= {x_i_q[5:0], x_i};
-      y_i_q <= {y_i_q[6:0], y_i};
+      y_i_q <= {y_i_q[5:0], y_i};
       sx_i_q <= {sx_i_q[3:0], sx_i};
       sy_i_q <= {sy_i_q[3:0], sy_i};
       lean_i_q <= {lean_i_q[2:0], lean_i};
-      v11_q <= {v11_q[1:0], v11};
-      v12_q <= v12;
-      v16_q <= v16;
-      v19_q <= v19;
-      v22_q <= v22;
+      scale_i_q <= scale_i;
+      opacity_i_q <= opacity_i;
+      v14_q <= v14;
+      v17_q <= v17;
+      v20_q <= v20;
+      v23_q <= v23;
       v25_q <= v25;
-      v27_q <= v27;
-      v31_q <= v31;
-      v34_q <= v34;
-      v39_q <= v39;
-      v41_q <= {v41_q[1:0], v41};
+      v30_q <= v30;
+      v33_q <= v33;
+      v35_q <= v35;
+      v39_q <= {v39_q[1:0], v39};
       right_q <= right;
       limit_q <= limit;
-      v45_q <= v45;
+      empty_q <= empty;
       x0_q <= x0;
       x1_q <= {x1_q[0:0], x1};
       y0_q <= y0;
-      y1_q <= y1;
+      y1_q <= {y1_q[0:0], y1};
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (en_i && phase_i == 1'd1) begin
-      v15_q <= v15;
+      v11_q <= v11;
       code_q <= {code_q[5:0], code};
-      v18_q <= v18;
-      v21_q <= v21;
-      v24_q <= v24;
+      v16_q <= v16;
+      v19_q <= v19;
+      v22_q <= v22;
+      v27_q <= v27;
       v29_q <= v29;
       v32_q <= v32;
-      v35_q <= v35;
       v37_q <= v37;
-      v40_q <= v40;
-      v44_q <= v44;
-      empty_q <= empty;
+      v38_q <= v38;
+      v42_q <= v42;
+      v43_q <= v43;
     end
   end
 
   assign next_odd = phase_i ^ en_i;
-  assign v10 = opacity_i & 16'h7fff;
-  assign v11 = opacity_i[7:0];
-  flk_ff_from_fp16 #(.ManBits(11)) i_v12 (.x_i(v10), .y_o(v12));
-  assign u_v41_a_even = v40_q[0];
-  assign u_v41_a_odd = 20'h437f0;
-  flk_phase_mux #(.Width(10)) i_u_v41_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v41_a_even[9:0]), .b_i(u_v41_a_odd[9:0]), .y_o(u_v41_a[9:0]));
-  flk_phase_mux #(.Width(10)) i_u_v41_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v41_a_even[19:10]), .b_i(u_v41_a_odd[19:10]), .y_o(u_v41_a[19:10]));
-  assign u_v41_b_even = lean_i_q[3];
-  assign u_v41_b_odd = v12_q[0];
-  flk_phase_mux #(.Width(10)) i_u_v41_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v41_b_even[9:0]), .b_i(u_v41_b_odd[9:0]), .y_o(u_v41_b[9:0]));
-  flk_phase_mux #(.Width(10)) i_u_v41_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v41_b_even[19:10]), .b_i(u_v41_b_odd[19:10]), .y_o(u_v41_b[19:10]));
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v41 (.clk_i, .en_i, .a_i(u_v41_a), .b_i(u_v41_b), .prod_o(u_v41));
-  assign v41 = u_v41;
-  assign v13 = u_v41;
-  flk_ff_to_fixed #(.Bits(16), .FracBits(0), .Round(1), .ManBits(11), .Stages(2)) i_u_v14 (.clk_i, .en_i, .x_i(v13), .y_o(u_v14));
-  assign v14 = u_v14;
-  assign v15 = 16'(16'sd255 < v14 ? 16'sd255 : v14);
-  assign v16 = chunked_i ? $signed(16'(v11_q[2])) : $signed(v15_q[0]);
-  assign code = 8'($signed(v16_q[0]));
-  assign v18 = CUT[code];
-  assign v19 = box_i ? 20'h40400 : v18_q[0];
-  assign u_v30_b_even = sy_i_q[4];
-  assign u_v30_b_odd = sx_i_q[4];
-  flk_phase_mux #(.Width(10)) i_u_v30_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v30_b_even[9:0]), .b_i(u_v30_b_odd[9:0]), .y_o(u_v30_b[9:0]));
-  flk_phase_mux #(.Width(10)) i_u_v30_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v30_b_even[19:10]), .b_i(u_v30_b_odd[19:10]), .y_o(u_v30_b[19:10]));
-  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v30 (.clk_i, .en_i, .a_i(v19_q[0]), .b_i(u_v30_b), .prod_o(u_v30));
-  assign v30 = u_v30;
-  assign v20 = u_v30;
-  flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v31 (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v30 : v20), .y_o(u_v31));
-  assign v31 = u_v31;
-  assign v21 = u_v31;
-  assign v22 = 32'(32'($signed(v21_q[0])) - 32'($signed(x_i_q[6])));
-  assign v23 = 25'($signed(v22_q[0]) >>> 7);
-  assign v24 = 25'(25'sd0 - v23);
-  assign v25 = 32'(32'($signed(x_i_q[6])) + 32'($signed(v21_q[0])));
-  assign v26 = 25'($signed(v25_q[0]) >>> 7);
-  assign v27 = 24'($signed(v24_q[0]) < 25'sd0 ? 25'sd0 : $signed(v24_q[0]));
-  assign v28 = 12'(width_i - 13'd1);
-  assign v29 = 24'($signed(25'(v28)) < v26 ? $signed(25'(v28)) : v26);
-  assign v32 = 32'(32'($signed(v31_q[0])) - 32'($signed(y_i_q[7])));
-  assign v33 = 25'($signed(v32_q[0]) >>> 7);
-  assign v34 = 25'(25'sd0 - v33);
-  assign v35 = 32'(32'($signed(y_i_q[7])) + 32'($signed(v31_q[0])));
-  assign v36 = 25'($signed(v35_q[0]) >>> 7);
-  assign v37 = 24'($signed(v34_q[0]) < 25'sd0 ? 25'sd0 : $signed(v34_q[0]));
-  assign v38 = 12'(height_i - 13'd1);
-  assign v39 = 24'($signed(25'(v38)) < v36 ? $signed(25'(v38)) : v36);
-  assign v40 = SIGMAS[code];
-  flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(v41_q[2]), .y_o(u_right));
+  assign v10 = opacity_i_q[0] & 16'h7fff;
+  flk_ff_from_fp16 #(.ManBits(11)) i_v11 (.x_i(v10), .y_o(v11));
+  assign u_v12_a_even = scale_i_q[0];
+  assign u_v12_a_odd = v17_q[0];
+  flk_phase_mux #(.Width(10)) i_u_v12_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v12_a_even[9:0]), .b_i(u_v12_a_odd[9:0]), .y_o(u_v12_a[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v12_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v12_a_even[19:10]), .b_i(u_v12_a_odd[19:10]), .y_o(u_v12_a[19:10]));
+  assign u_v12_b_even = v11_q[0];
+  assign u_v12_b_odd = sx_i_q[4];
+  flk_phase_mux #(.Width(10)) i_u_v12_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v12_b_even[9:0]), .b_i(u_v12_b_odd[9:0]), .y_o(u_v12_b[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v12_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v12_b_even[19:10]), .b_i(u_v12_b_odd[19:10]), .y_o(u_v12_b[19:10]));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v12 (.clk_i, .en_i, .a_i(u_v12_a), .b_i(u_v12_b), .prod_o(u_v12));
+  assign v12 = u_v12;
+  assign v18 = u_v12;
+  flk_ff_to_fixed #(.Bits(16), .FracBits(0), .Round(1), .ManBits(11), .Stages(2)) i_u_v13 (.clk_i, .en_i, .x_i(v12), .y_o(u_v13));
+  assign v13 = u_v13;
+  assign v14 = 16'(16'sd255 < v13 ? 16'sd255 : v13);
+  assign code = 8'($signed(v14_q[0]));
+  assign v16 = CUT[code];
+  assign v17 = box_i ? 20'h40400 : v16_q[0];
+  flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v39_q[2] : v18), .y_o(u_right));
   assign right = u_right;
+  assign v19 = u_right;
+  assign v20 = 32'(32'($signed(v19_q[0])) - 32'($signed(x_i_q[6])));
+  assign v21 = 25'($signed(v20_q[0]) >>> 7);
+  assign v22 = 25'(25'sd0 - v21);
+  assign v23 = 32'(32'($signed(x_i_q[6])) + 32'($signed(v19_q[0])));
+  assign v24 = 25'($signed(v23_q[0]) >>> 7);
+  assign v25 = 24'($signed(v22_q[0]) < 25'sd0 ? 25'sd0 : $signed(v22_q[0]));
+  assign v26 = 12'(width_i - 13'd1);
+  assign v27 = 25'($signed(25'(v26)) < v24 ? $signed(25'(v26)) : v24);
+  assign u_v39_a_even = v38_q[0];
+  assign u_v39_a_odd = v17_q[0];
+  flk_phase_mux #(.Width(10)) i_u_v39_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v39_a_even[9:0]), .b_i(u_v39_a_odd[9:0]), .y_o(u_v39_a[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v39_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v39_a_even[19:10]), .b_i(u_v39_a_odd[19:10]), .y_o(u_v39_a[19:10]));
+  assign u_v39_b_even = lean_i_q[3];
+  assign u_v39_b_odd = sy_i_q[4];
+  flk_phase_mux #(.Width(10)) i_u_v39_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v39_b_even[9:0]), .b_i(u_v39_b_odd[9:0]), .y_o(u_v39_b[9:0]));
+  flk_phase_mux #(.Width(10)) i_u_v39_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v39_b_even[19:10]), .b_i(u_v39_b_odd[19:10]), .y_o(u_v39_b[19:10]));
+  flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v39 (.clk_i, .en_i, .a_i(u_v39_a), .b_i(u_v39_b), .prod_o(u_v39));
+  assign v39 = u_v39;
+  assign v28 = u_v39;
+  flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v29 (.clk_i, .en_i, .x_i(v28), .y_o(u_v29));
+  assign v29 = u_v29;
+  assign v30 = 32'(32'($signed(v29_q[0])) - 32'($signed(y_i_q[6])));
+  assign v31 = 25'($signed(v30_q[0]) >>> 7);
+  assign v32 = 25'(25'sd0 - v31);
+  assign v33 = 32'(32'($signed(y_i_q[6])) + 32'($signed(v29_q[0])));
+  assign v34 = 25'($signed(v33_q[0]) >>> 7);
+  assign v35 = 24'($signed(v32_q[0]) < 25'sd0 ? 25'sd0 : $signed(v32_q[0]));
+  assign v36 = 12'(height_i - 13'd1);
+  assign v37 = 25'($signed(25'(v36)) < v34 ? $signed(25'(v36)) : v34);
+  assign v38 = SIGMAS[code];
   assign limit = LOG[code_q[5]];
-  assign v44 = $signed(25'(v27_q[0])) > 25'($signed(v29_q[0]));
-  assign v45 = $signed(25'(v37_q[0])) > 25'($signed(v39_q[0]));
-  assign empty = v44_q[0] | v45_q[0];
-  assign x0 = 12'(v27_q[0]);
-  assign x1 = 12'($signed(v29_q[0]));
-  assign y0 = 12'(v37_q[0]);
-  assign y1 = 12'($signed(v39_q[0]));
-  assign unused_wrapped = ^{v16};
+  assign v42 = $signed(25'(v25_q[0])) > $signed(v27_q[0]);
+  assign v43 = $signed(25'(v35_q[0])) > $signed(v37_q[0]);
+  assign empty = v42_q[0] | v43_q[0];
+  assign x0 = 12'(v25_q[0]);
+  assign x1 = 12'($signed(v27_q[0]));
+  assign y0 = 12'(v35_q[0]);
+  assign y1 = 12'($signed(v37_q[0]));
+  assign unused_wrapped = ^{v14};
 
   assign empty_o = empty_q[0];
   assign x0_o = x0_q[0];
   assign x1_o = x1_q[1];
   assign y0_o = y0_q[0];
-  assign y1_o = y1_q[0];
+  assign y1_o = y1_q[1];
   assign limit_o = limit_q[0];
   assign right_o = $signed(right_q[0]);
   assign code_o = code_q[6];

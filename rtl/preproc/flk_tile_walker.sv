@@ -122,6 +122,7 @@ module flk_tile_walker
 
   flk_splat_band i_band (
     .clk_i,
+    .rst_ni,
     .en_i   (en),
     .band_i (band),
     .box_i,

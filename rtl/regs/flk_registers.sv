@@ -274,6 +274,8 @@ module flk_registers (
         logic row_y[3];
         logic row_y_z[3];
         logic limit[2];
+        logic middle[2];
+        logic least[2];
     } decoded_reg_strb_t;
     decoded_reg_strb_t decoded_reg_strb;
     logic decoded_err;
@@ -402,6 +404,14 @@ module flk_registers (
             decoded_reg_strb.limit[i0] = cpuif_req_masked & (cpuif_addr == 10'h290 + (10)'(i0) * 10'h4);
             is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h290 + (10)'(i0) * 10'h4);
         end
+        for(int i0=0; i0<2; i0++) begin
+            decoded_reg_strb.middle[i0] = cpuif_req_masked & (cpuif_addr == 10'h298 + (10)'(i0) * 10'h4);
+            is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h298 + (10)'(i0) * 10'h4);
+        end
+        for(int i0=0; i0<2; i0++) begin
+            decoded_reg_strb.least[i0] = cpuif_req_masked & (cpuif_addr == 10'h2a0 + (10)'(i0) * 10'h4);
+            is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h2a0 + (10)'(i0) * 10'h4);
+        end
         decoded_err = ~is_valid_addr & decoded_req;
     end
 
@@ -507,6 +517,14 @@ module flk_registers (
                 logic next;
                 logic load_next;
             } chunked;
+            struct {
+                logic next;
+                logic load_next;
+            } antialiased;
+            struct {
+                logic next;
+                logic load_next;
+            } off_centre;
         } frame;
         struct {
             struct {
@@ -718,6 +736,18 @@ module flk_registers (
                 logic load_next;
             } value;
         } limit[2];
+        struct {
+            struct {
+                logic [22:0] next;
+                logic load_next;
+            } value;
+        } middle[2];
+        struct {
+            struct {
+                logic [19:0] next;
+                logic load_next;
+            } value;
+        } least[2];
     } field_combo_t;
     field_combo_t field_combo;
 
@@ -793,6 +823,12 @@ module flk_registers (
             struct {
                 logic value;
             } chunked;
+            struct {
+                logic value;
+            } antialiased;
+            struct {
+                logic value;
+            } off_centre;
         } frame;
         struct {
             struct {
@@ -968,6 +1004,16 @@ module flk_registers (
                 logic [19:0] value;
             } value;
         } limit[2];
+        struct {
+            struct {
+                logic [22:0] value;
+            } value;
+        } middle[2];
+        struct {
+            struct {
+                logic [19:0] value;
+            } value;
+        } least[2];
     } field_storage_t;
     field_storage_t field_storage;
 
@@ -1082,6 +1128,9 @@ module flk_registers (
         load_next_c = '0;
         if(hwif_in.interrupt.frame_done.next) begin // stickybit
             next_c = '1;
+            load_next_c = '1;
+        end else if(hwif_in.interrupt.frame_done.hwclr) begin // HW Clear
+            next_c = '0;
             load_next_c = '1;
         end else if(decoded_reg_strb.interrupt && decoded_req_is_wr) begin // SW write 1 clear
             next_c = field_storage.interrupt.frame_done.value & ~(decoded_wr_data[1:1] & decoded_wr_biten[1:1]);
@@ -1452,6 +1501,52 @@ module flk_registers (
         end
     end
     assign hwif_out.frame.chunked.value = field_storage.frame.chunked.value;
+    // Field: flk_registers.frame.antialiased
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.frame.antialiased.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.frame && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.frame.antialiased.value & ~decoded_wr_biten[23:23]) | (decoded_wr_data[23:23] & decoded_wr_biten[23:23]);
+            load_next_c = '1;
+        end
+        field_combo.frame.antialiased.next = next_c;
+        field_combo.frame.antialiased.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.frame.antialiased.value <= 1'h0;
+        end else begin
+            if(field_combo.frame.antialiased.load_next) begin
+                field_storage.frame.antialiased.value <= field_combo.frame.antialiased.next;
+            end
+        end
+    end
+    assign hwif_out.frame.antialiased.value = field_storage.frame.antialiased.value;
+    // Field: flk_registers.frame.off_centre
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.frame.off_centre.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.frame && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.frame.off_centre.value & ~decoded_wr_biten[24:24]) | (decoded_wr_data[24:24] & decoded_wr_biten[24:24]);
+            load_next_c = '1;
+        end
+        field_combo.frame.off_centre.next = next_c;
+        field_combo.frame.off_centre.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.frame.off_centre.value <= 1'h0;
+        end else begin
+            if(field_combo.frame.off_centre.load_next) begin
+                field_storage.frame.off_centre.value <= field_combo.frame.off_centre.next;
+            end
+        end
+    end
+    assign hwif_out.frame.off_centre.value = field_storage.frame.off_centre.value;
     // Field: flk_registers.background.red
     always_comb begin
         automatic logic [7:0] next_c;
@@ -2302,6 +2397,56 @@ module flk_registers (
         end
         assign hwif_out.limit[i0].value.value = field_storage.limit[i0].value.value;
     end
+    for(genvar i0=0; i0<2; i0++) begin : gen_array_11
+        // Field: flk_registers.middle[].value
+        always_comb begin
+            automatic logic [22:0] next_c;
+            automatic logic load_next_c;
+            next_c = field_storage.middle[i0].value.value;
+            load_next_c = '0;
+            if(decoded_reg_strb.middle[i0] && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+                next_c = (field_storage.middle[i0].value.value & ~decoded_wr_biten[22:0]) | (decoded_wr_data[22:0] & decoded_wr_biten[22:0]);
+                load_next_c = '1;
+            end
+            field_combo.middle[i0].value.next = next_c;
+            field_combo.middle[i0].value.load_next = load_next_c;
+        end
+        always_ff @(posedge clk_i or negedge rst_ni) begin
+            if(~rst_ni) begin
+                field_storage.middle[i0].value.value <= 23'h0;
+            end else begin
+                if(field_combo.middle[i0].value.load_next) begin
+                    field_storage.middle[i0].value.value <= field_combo.middle[i0].value.next;
+                end
+            end
+        end
+        assign hwif_out.middle[i0].value.value = field_storage.middle[i0].value.value;
+    end
+    for(genvar i0=0; i0<2; i0++) begin : gen_array_12
+        // Field: flk_registers.least[].value
+        always_comb begin
+            automatic logic [19:0] next_c;
+            automatic logic load_next_c;
+            next_c = field_storage.least[i0].value.value;
+            load_next_c = '0;
+            if(decoded_reg_strb.least[i0] && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+                next_c = (field_storage.least[i0].value.value & ~decoded_wr_biten[19:0]) | (decoded_wr_data[19:0] & decoded_wr_biten[19:0]);
+                load_next_c = '1;
+            end
+            field_combo.least[i0].value.next = next_c;
+            field_combo.least[i0].value.load_next = load_next_c;
+        end
+        always_ff @(posedge clk_i or negedge rst_ni) begin
+            if(~rst_ni) begin
+                field_storage.least[i0].value.value <= 20'h0;
+            end else begin
+                if(field_combo.least[i0].value.load_next) begin
+                    field_storage.least[i0].value.value <= field_combo.least[i0].value.next;
+                end
+            end
+        end
+        assign hwif_out.least[i0].value.value = field_storage.least[i0].value.value;
+    end
 
     //--------------------------------------------------------------------------
     // Write response
@@ -2328,7 +2473,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h2;
-            readback_data_var[15:8] = 8'h2;
+            readback_data_var[15:8] = 8'h3;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2384,6 +2529,8 @@ module flk_registers (
             readback_data_var[20] = field_storage.frame.rgba.value;
             readback_data_var[21] = field_storage.frame.box.value;
             readback_data_var[22] = field_storage.frame.chunked.value;
+            readback_data_var[23] = field_storage.frame.antialiased.value;
+            readback_data_var[24] = field_storage.frame.off_centre.value;
         end
         if(rd_mux_addr == 10'h104) begin
             readback_data_var[7:0] = field_storage.background.red.value;
@@ -2507,6 +2654,16 @@ module flk_registers (
         for(int i0=0; i0<2; i0++) begin
             if(rd_mux_addr == 10'h290 + (10)'(i0) * 10'h4) begin
                 readback_data_var[19:0] = field_storage.limit[i0].value.value;
+            end
+        end
+        for(int i0=0; i0<2; i0++) begin
+            if(rd_mux_addr == 10'h298 + (10)'(i0) * 10'h4) begin
+                readback_data_var[22:0] = field_storage.middle[i0].value.value;
+            end
+        end
+        for(int i0=0; i0<2; i0++) begin
+            if(rd_mux_addr == 10'h2a0 + (10)'(i0) * 10'h4) begin
+                readback_data_var[19:0] = field_storage.least[i0].value.value;
             end
         end
         readback_data = readback_data_var;

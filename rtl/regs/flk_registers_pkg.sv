@@ -8,7 +8,7 @@ package flk_registers_pkg;
 
     localparam FLK_REGISTERS_DATA_WIDTH = 32;
     localparam FLK_REGISTERS_MIN_ADDR_WIDTH = 10;
-    localparam FLK_REGISTERS_SIZE = 'h298;
+    localparam FLK_REGISTERS_SIZE = 'h2a8;
 
     typedef struct packed {
         logic [3:0] next;
@@ -87,6 +87,7 @@ package flk_registers_pkg;
 
     typedef struct packed {
         logic next;
+        logic hwclr;
     } flk_registers__interrupt__frame_done__in_t;
 
     typedef struct packed {
@@ -217,11 +218,21 @@ package flk_registers_pkg;
     } flk_registers__frame__chunked__out_t;
 
     typedef struct packed {
+        logic value;
+    } flk_registers__frame__antialiased__out_t;
+
+    typedef struct packed {
+        logic value;
+    } flk_registers__frame__off_centre__out_t;
+
+    typedef struct packed {
         flk_registers__frame__tag__out_t tag;
         flk_registers__frame__mode__out_t mode;
         flk_registers__frame__rgba__out_t rgba;
         flk_registers__frame__box__out_t box;
         flk_registers__frame__chunked__out_t chunked;
+        flk_registers__frame__antialiased__out_t antialiased;
+        flk_registers__frame__off_centre__out_t off_centre;
     } flk_registers__frame__out_t;
 
     typedef struct packed {
@@ -504,6 +515,22 @@ package flk_registers_pkg;
     } flk_registers__limitx__out_t;
 
     typedef struct packed {
+        logic [22:0] value;
+    } flk_registers__middlex__value__out_t;
+
+    typedef struct packed {
+        flk_registers__middlex__value__out_t value;
+    } flk_registers__middlex__out_t;
+
+    typedef struct packed {
+        logic [19:0] value;
+    } flk_registers__leastx__value__out_t;
+
+    typedef struct packed {
+        flk_registers__leastx__value__out_t value;
+    } flk_registers__leastx__out_t;
+
+    typedef struct packed {
         flk_registers__control__out_t control;
         flk_registers__interrupt__out_t interrupt;
         flk_registers__timeout__out_t timeout;
@@ -542,6 +569,8 @@ package flk_registers_pkg;
         flk_registers__row_yx__out_t [2:0] row_y;
         flk_registers__row_y_zx__out_t [2:0] row_y_z;
         flk_registers__limitx__out_t [1:0] limit;
+        flk_registers__middlex__out_t [1:0] middle;
+        flk_registers__leastx__out_t [1:0] least;
     } flk_registers__out_t;
 endpackage
 // verilator lint_on SYMRSVDWORD

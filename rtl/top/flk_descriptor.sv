@@ -1,7 +1,8 @@
 // The descriptor of a frame as the registers hold it: names of the register map to those of the halves.
 //
-// Combinational, no gates.
+// Combinational, no gates but those that put the principal point in the middle of the picture where no other is given.
 module flk_descriptor
+  import flk_front_pkg::*;
   import flk_preproc_pkg::*;
   import flk_top_pkg::*;
 (
@@ -39,6 +40,7 @@ module flk_descriptor
 
   assign descriptor_o.lane.chunked = registers_i.frame.chunked.value;
   assign descriptor_o.lane.box     = registers_i.frame.box.value;
+  assign descriptor_o.lane.antialiased = registers_i.frame.antialiased.value;
   assign descriptor_o.lane.width   = registers_i.size.width.value;
   assign descriptor_o.lane.height  = registers_i.size.height.value;
 
@@ -59,9 +61,22 @@ module flk_descriptor
       assign descriptor_o.cull.normal[k][i] = registers_i.normal[3*k+i].value.value;
     end
   end
+  logic [1:0][12:0] size;
+
+  assign size = {registers_i.size.height.value, registers_i.size.width.value};
+
   for (genvar k = 0; k < 2; k++) begin : gen_axis
-    assign descriptor_o.lane.focal[k] = registers_i.focal[k].value.value;
-    assign descriptor_o.lane.limit[k] = registers_i.limit[k].value.value;
+    shape_t opposite;  // of the limit
+
+    assign opposite = {|registers_i.limit[k].value.value[SHAPE_MAN_BITS+7:SHAPE_MAN_BITS],
+                       registers_i.limit[k].value.value[SHAPE_MAN_BITS+7:0]};
+    assign descriptor_o.lane.focal[k]  = registers_i.focal[k].value.value;
+    assign descriptor_o.lane.limit[k]  = registers_i.limit[k].value.value;
+    assign descriptor_o.lane.least[k]  = registers_i.frame.off_centre.value
+                                         ? registers_i.least[k].value.value : opposite;
+    assign descriptor_o.lane.middle[k] = registers_i.frame.off_centre.value
+                                         ? registers_i.middle[k].value.value
+                                         : 23'({size[k], 6'b0}) - 23'd64;
   end
 
   logic unused_registers;

@@ -1,23 +1,26 @@
 // Frames of the chip: two are under way, one in the front end and one in the rendering half.
 //
-// start_i takes nothing by itself: the descriptor is taken when the front end's place is free, until then descriptor_i
-// must stay (locked_o). It is checked; then the front end works, its counters are kept, and the frame goes to the
+// start_i takes nothing by itself: the descriptor is taken when the front end's place is free; from the cycle of start_i until
+// then descriptor_i must stay (locked_o). It is checked; then the front end works, its counters are kept, and the frame goes to the
 // rendering half's place, as soon as that is free, with all that it needs. Frames are posted in the order of their starts:
 // a frame whose descriptor was refused, or whose front end met an error, passes the rendering half by, and its
 // frame buffer is not touched.
 // post_o is high for a cycle when a frame has ended; tag_o, error_o and bank_o are its until the next one, which is posted only
-// after acknowledged_i, a pulse.
+// after acknowledged_i, a pulse behind that cycle: what comes before or with post_o is of an earlier frame. Before the first
+// post, and after reset_i, all three are 0.
 // copy_front_o and copy_rendering_o are high until their done: the frame's counters are to be kept in bank *_bank_o, of
 // which there are two; a bank is not written again before its frame was posted and acknowledged. copy_*_none_o: that half
 // has not run, its counters are 0.
 // stamps_o: now_i when the frame that ends was taken, left the front end, entered the rendering half and left it.
 // started_o, finished_o: frames started and posted since reset_i, modulo 2^16.
-// clear_i: all frames are forgotten and count as finished; the halves must be reset with it. aborted_i, timed_out_i: error_o
-// says so until the next post. reset_i, with clear_i or in the cycle before it: frames count from 0.
+// clear_i: all frames under way are forgotten and count as finished; the halves must be reset with it. A posted frame is not under
+// way: it stays, with its bank, until it is acknowledged; aborted_i adds its bit to error_o. aborted_i, timed_out_i, with clear_i:
+// once no posted frame waits, error_o is that bit alone until the next post. reset_i, with clear_i or in the cycle before it: the posted frame is forgotten too, frames count from 0.
 // A descriptor is refused where an address is no multiple of 64, the stride no multiple of 32 or less than a row of whole
 // pairs of tiles, a side 0 or beyond 4096, the mode not one of CAT_*, there is no cluster, or a list writer would have
 // more lists than Lists.
-// Combinational: start_i to refused_o, *_idle_i to *_start_o, copy_front_done_i to front_done_o; all else depends on registers alone.
+// Combinational: start_i to locked_o and refused_o, *_idle_i to *_start_o, copy_front_done_i to front_done_o, reset_i to post_o;
+// all else depends on registers alone.
 module flk_frame_control
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;
@@ -108,7 +111,7 @@ module flk_frame_control
   assign take         = pending_q && front_q == FREE;
   assign hand_over    = front_q == POST && render_q == FREE;
   assign refused_o    = start_i && pending_q;
-  assign locked_o     = pending_q;
+  assign locked_o     = pending_q || start_i;
   // The frame before last has been acknowledged: the last one waits for its turn, or has been posted.
   assign may_copy     = render_q == FREE || !unacknowledged_q;
   assign copy_front_o = front_q == COPY && may_copy;
@@ -209,7 +212,7 @@ module flk_frame_control
 
   // ---- rendering half ---------------------------------------------------------------------------------
 
-  logic                 post, rendered_q;
+  logic                 post, post_q, rendered_q;
   logic [15:0]          tag_q;
   logic [3:0][31:0]     stamps_q;
   logic [1:0][31:0]     front_stamps_q;
@@ -217,13 +220,20 @@ module flk_frame_control
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      render_q         <= FREE;
       unacknowledged_q <= 1'b0;
-    end else if (clear_i) begin
-      render_q         <= FREE;
+    end else if (reset_i) begin
       unacknowledged_q <= 1'b0;
     end else begin
-      unacknowledged_q <= post || (unacknowledged_q && !acknowledged_i);
+      unacknowledged_q <= post || (unacknowledged_q && !(acknowledged_i && !post_q));
+    end
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      render_q <= FREE;
+    end else if (clear_i) begin
+      render_q <= FREE;
+    end else begin
       unique case (render_q)
         FREE: begin
           if (front_q == POST) begin
@@ -287,7 +297,8 @@ module flk_frame_control
 
   logic [15:0]  started_q, finished_q, posted_tag_q;
   frame_error_t posted_error_q;
-  logic         posted_bank_q, post_q;
+  logic         posted_bank_q;
+  logic         aborted, timed_out, aborted_q, timed_out_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -298,7 +309,9 @@ module flk_frame_control
       post_q        <= 1'b0;
     end else begin
       post_q <= post;
-      if (take) begin
+      if (clear_i) begin
+        front_bank_q <= posted_bank_q;  // the next frame takes the other one
+      end else if (take) begin
         front_bank_q <= !front_bank_q;
       end
       if (hand_over) begin
@@ -316,16 +329,41 @@ module flk_frame_control
     end
   end
 
-  always_ff @(posedge clk_i) begin
-    if (aborted_i || timed_out_i || reset_i) begin
-      posted_error_q           <= '0;
-      posted_error_q.aborted   <= aborted_i && !reset_i;
-      posted_error_q.timed_out <= timed_out_i && !reset_i;
-    end else if (post) begin
-      posted_tag_q   <= tag_q;
-      posted_error_q <= render_error_q;
-      posted_bank_q  <= render_bank_q;
+  // What a posted frame has left is shown until it is acknowledged, with an abort added to it; an abort or a time-out alone after that.
+  assign timed_out = timed_out_i || timed_out_q;
+  assign aborted   = (aborted_i || aborted_q) && !timed_out;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      posted_tag_q   <= '0;
+      posted_error_q <= '0;
+      posted_bank_q  <= 1'b0;
+      aborted_q      <= 1'b0;
+      timed_out_q    <= 1'b0;
+    end else if (reset_i) begin
+      posted_tag_q   <= '0;
+      posted_error_q <= '0;
+      posted_bank_q  <= 1'b0;
+      aborted_q      <= 1'b0;
+      timed_out_q    <= 1'b0;
+    end else begin
+      aborted_q   <= aborted && unacknowledged_q;
+      timed_out_q <= timed_out && unacknowledged_q;
+      if (post) begin
+        posted_tag_q   <= tag_q;
+        posted_error_q <= render_error_q;
+        posted_bank_q  <= render_bank_q;
+      end else if ((aborted || timed_out) && !unacknowledged_q) begin
+        posted_error_q           <= '0;
+        posted_error_q.aborted   <= aborted;
+        posted_error_q.timed_out <= timed_out;
+      end else if (aborted_i) begin
+        posted_error_q.aborted <= 1'b1;
+      end
     end
+  end
+
+  always_ff @(posedge clk_i) begin
     if (take) begin
       front_stamps_q[0] <= now_i;
     end
@@ -343,7 +381,7 @@ module flk_frame_control
     end
   end
 
-  assign post_o                = post_q;
+  assign post_o                = post_q && !reset_i;
   assign tag_o                 = posted_tag_q;
   assign error_o               = posted_error_q;
   assign bank_o                = posted_bank_q;

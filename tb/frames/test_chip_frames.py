@@ -228,10 +228,12 @@ def any_port(rng: random.Random, number: int) -> PortConfig:
 
 @pytest.mark.parametrize("number", range(5))
 def test_memories(number: int) -> None:
-    """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one."""
-    port = any_port(random.Random(f"{seed()} {number}"), number)
-    with session(port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:
-        check(chip, camera(), list(PixelFormat)[number % 2])
+    """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one. In two of an antialiased scene, where the first frame's
+    principal point is off the middle."""
+    port, features = any_port(random.Random(f"{seed()} {number}"), number), number in (1, 2)
+    packed, first = replace(small(), antialiased=features), replace(camera(), cx=20.3, cy=31.0 + number) if features else camera()
+    with session(packed, port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:
+        check(chip, first, list(PixelFormat)[number % 2])
         check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2])
 
 
@@ -550,12 +552,44 @@ def test_silent_memory(channel: str) -> None:
         chip.set_register("control", 1)
         chip.step(500)
         assert chip.field("status", "dead")
+        chip.driver.flk_interrupt_acknowledge(ctypes.byref(chip.device), chip.driver.flk_interrupt_pending(ctypes.byref(chip.device)))
+        assert chip.register("interrupt") == 0
         chip.mend()
+        revive(chip)
+        assert chip.register("interrupt") == chip.register("result") == 0
+        check(chip, view)
+
+
+def revive(chip: ChipSession) -> None:
+    """A reset of the chip and of the memory's side of the port."""
+    chip.hold_memory(True)
+    chip.driver.flk_reset(ctypes.byref(chip.device))
+    chip.step(20)
+    chip.hold_memory(False)
+
+
+def test_time_out_before_a_release() -> None:
+    """Between a handler's look at a frame and its release: what the frame left stays until then, and the time-out is told after it."""
+    with session() as chip:
+        view, device = camera(), ctypes.byref(chip.device)
+        frames = [chip.frame(view, chip.place(view), background=BLUE, tag=k) for k in (21, 22)]
+        chip.driver.flk_set_timeout(device, ctypes.c_uint32(3000))
+        chip.start(frames[0])
+        while not chip.field("interrupt", "frame_done"):
+            chip.step(100)
+        survivors = chip.counter(ChipCounter.SURVIVORS)
+        chip.start(frames[1])
+        chip.step(500)
         chip.hold_memory(True)
-        chip.driver.flk_reset(ctypes.byref(chip.device))
-        chip.step(20)
-        chip.hold_memory(False)
+        chip.step(4000)
+        assert chip.field("status", "dead") and chip.field("interrupt", "error")
+        result = chip.driver.flk_result(device)
+        assert (result.tag, result.error) == (21, 0) and chip.counter(ChipCounter.SURVIVORS) == survivors
+        chip.driver.flk_release(device)
+        assert chip.field("interrupt", "error") and chip.driver.flk_result(device).error == 1 << ResultError.TIMED_OUT
         chip.set_register("interrupt", 31)
+        revive(chip)
+        assert chip.register("interrupt") == 0
         check(chip, view)
 
 

@@ -50,7 +50,7 @@ def view_of(width: int, height: int, scene: str = "some") -> tuple[FrontFrame, F
     `layers` that cover the picture."""
     if scene in ("demo", "middle"):
         view = load_view(DEMO, 0, (width, height) if scene == "demo" else (96, 54))
-        front = run_front(packed_scene(view, PackedFormat.CHUNK), replace(view.camera, width=width, height=height))
+        front = run_front(packed_scene(view, PackedFormat.CHUNK), replace(view.camera, width=width, height=height, cx=None, cy=None))
     else:
         layers, haze = scene == "layers", scene == "haze"
         rng, n = np.random.default_rng(seed()), LAYERS if layers else 2300 if haze else 500

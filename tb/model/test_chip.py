@@ -65,6 +65,8 @@ def test_cull_loses_no_visible_gaussian(size):
         scene = random_scene(seed() + k, 400, 0)
         scene.scales *= np.exp(rng.uniform(-1, 4, (400, 1))).astype(np.float32) if k % 2 else 1
         view = turned_camera(rng, int(rng.integers(1, 130)), int(rng.integers(1, 130)))
+        if k % 4 == 0:  # the principal point off the middle
+            view = replace(view, cx=rng.uniform(-300, 300), cy=rng.uniform(-300, 300))
         scene, clusters = build_clusters(scene, size)
         visible = project(scene, view).index
         for shape in ("box", "sphere"):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numba
 import numpy as np
 import pytest
 import scene_samples as samples
+from dataset_samples import HEIGHT, WIDTH, Views, pose, scene_of_shots, views_around, write_colmap, write_transforms
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 from PIL import Image
@@ -34,9 +34,8 @@ from flicker.fit.train import Options, Trainer, affine_fit
 from flicker.front.projection import project
 from flicker.front.reference import render_with_transmittance
 from flicker.front.view import View
-from flicker.scene.camera import Camera, load_cameras, orbit_camera
+from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.files import load_scene
-from flicker.scene.gaussians import Scene
 from flicker.scene.image import save_png
 from flicker.scene.metrics import psnr, ssim
 
@@ -64,12 +63,15 @@ def busy(count: int = 60, degree: int = 3) -> Parameters:
 # -- pictures and derivatives ---------------------------------------------------------------------------------------------------------
 
 
-def test_picture_is_the_reference() -> None:
+@pytest.mark.parametrize("antialiased", [False, True])
+def test_picture_is_the_reference(antialiased: bool) -> None:
     """Picture and transmittance, but for the rounding of scales and opacities to the scene's float32."""
-    found, camera = busy(), look()
+    found, camera = busy(), replace(look(), cx=19.0, cy=20.5) if antialiased else look()
+    found.antialiased = antialiased
+    found.values[30:, SCALE:QUAT] -= 2.0 * antialiased  # small ones, which it shows on
     frame = render(found, camera, BACKGROUND)
     image, left = render_with_transmittance(project(found.scene(), camera), camera, BACKGROUND)
-    assert left.min() < 1e-3 and left.max() > 0.5
+    assert left.min() < (0.01 if antialiased else 1e-3) and left.max() > 0.5
     assert np.abs(frame.image - image).max() < 2e-5 and np.abs(frame.transmittance - left).max() < 2e-5
     assert not frame.bad.any() and frame.used.sum() > 50
 
@@ -95,7 +97,7 @@ def difference(
     def slope(step: float) -> float:
         results, places = [], []
         for sign in (1, -1):
-            moved = Parameters(parameters.values.copy())
+            moved = parameters.like(parameters.values.copy())
             moved.values[i, column] += np.float32(sign * step)
             places.append(float(moved.values[i, column]))
             results.append(float((weight * render(moved, camera, BACKGROUND, machine).image).sum()))
@@ -113,10 +115,15 @@ def whole(gradient: Gradient, count: int) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize(("degree", "z", "name"), [(3, -3.0, None), (1, -1.3, None), (0, -3.0, "flicker-sparse-fixed-factored")])
-def test_derivatives(degree: int, z: float, name: str | None) -> None:
+@pytest.mark.parametrize(("degree", "z", "name", "antialiased"), [
+    (3, -3.0, None, False), (1, -1.3, None, False), (0, -3.0, "flicker-sparse-fixed-factored", False), (0, -3.0, None, True),
+])
+def test_derivatives(degree: int, z: float, name: str | None, antialiased: bool) -> None:
     """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
     parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
+    if antialiased:
+        parameters.antialiased, camera = True, replace(camera, cx=11.25, cy=14.0)
+        parameters.values[:, SCALE:QUAT] -= 1.5
     weight = np.random.default_rng(seed()).normal(size=(23, 31, 3))
     machine = None if name is None else through(name)
     frame = render(parameters, camera, BACKGROUND, machine)
@@ -235,67 +242,17 @@ def test_loss() -> None:
 
 # -- data sets ------------------------------------------------------------------------------------------------------------------------
 
-WIDTH, HEIGHT, SHOTS = 48, 40, 17
-
-
-def pose(camera: Camera) -> list:
-    matrix = np.eye(4)
-    matrix[:3, :3] = camera.rotation * np.array([1, -1, -1])
-    matrix[:3, 3] = camera.position
-    return matrix.tolist()
-
-
-def scene_of_shots() -> Scene:
-    scene = samples.random_scene(seed(), 120, 1)
-    scene.scales *= np.float32(3.0)
-    return scene
-
-
 @pytest.fixture(scope="module")
-def shots() -> list[tuple[Camera, np.ndarray]]:
+def shots() -> Views:
     """Views all around a small scene."""
-    scene = scene_of_shots()
-    cameras = [orbit_camera(scene, k, SHOTS, WIDTH, HEIGHT) for k in range(SHOTS)]
-    return [(camera, render_with_transmittance(project(scene, camera), camera, (0, 0, 0))[0]) for camera in cameras]
+    return views_around()
 
 
 @pytest.fixture(scope="module")
 def nerf(shots, tmp_path_factory) -> Path:
     """A data set with transforms.json."""
     folder = tmp_path_factory.mktemp("nerf")
-    (folder / "images").mkdir()
-    for k, (_, picture) in enumerate(shots):
-        save_png(folder / "images" / f"r_{k}.png", picture)
-    (folder / "transforms.json").write_text(json.dumps({
-        "camera_angle_x": 2 * math.atan(WIDTH / 2 / shots[0][0].fx),
-        "frames": [{"file_path": f"./images/r_{k}", "transform_matrix": pose(camera)} for k, (camera, _) in enumerate(shots)],
-    }))
-    return folder
-
-
-def write_colmap(folder: Path, shots: list[tuple[Camera, np.ndarray]], model: int = 1, points: np.ndarray | None = None) -> Path:
-    """sparse/0 and images/, at twice the pictures' size."""
-    sparse = folder / "sparse" / "0"
-    sparse.mkdir(parents=True, exist_ok=True)
-    (folder / "images").mkdir(exist_ok=True)
-    c = shots[0][0]
-    lens = struct.pack("<4d", 2 * c.fx, 2 * c.fy, WIDTH, HEIGHT)
-    (sparse / "cameras.bin").write_bytes(struct.pack("<QiiQQ", 1, 7, model, 2 * WIDTH, 2 * HEIGHT) + lens)
-    data = struct.pack("<Q", len(shots))
-    for k, (camera, picture) in enumerate(shots):
-        save_png(folder / "images" / f"shot.{k:02}.png", picture)
-        m = camera.rotation.T
-        w = math.sqrt(max(0.0, 1 + np.trace(m))) / 2
-        if w > 1e-3:
-            quat = [w, *(np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]) / (4 * w))]
-        else:  # half a turn: its axis is an eigenvector
-            values, vectors = np.linalg.eigh((m + m.T) / 2)
-            quat = [0.0, *vectors[:, np.argmax(values)]]
-        data += struct.pack("<I7dI", k, *quat, *(-m @ camera.position), 7) + f"shot.{k:02}.png".encode() + b"\0" + struct.pack("<Q", 1) + bytes(24)
-    (sparse / "images.bin").write_bytes(data)
-    points = np.random.default_rng(seed()).uniform(-1, 1, (50, 3)) if points is None else points
-    (sparse / "points3D.bin").write_bytes(struct.pack("<Q", len(points)) + b"".join(
-        struct.pack("<Q3d3BdQ", k, *p, 255, 0, 51, 0.5, 1) + bytes(8) for k, p in enumerate(points)))
+    write_transforms(folder, shots)
     return folder
 
 
@@ -345,8 +302,6 @@ def test_undistort(nerf, shots, tmp_path) -> None:
         save_png(bent / f"{k}.png", seen_by(LENS, width, height))
     frames = [{"file_path": f"{k}.png", "transform_matrix": pose(shots[k][0])} for k in range(4)]
     (bent / "transforms.json").write_text(json.dumps(LENS | {"w": width, "h": height, "aabb_scale": 4, "frames": frames}))
-    with pytest.raises(FlickerError, match=r"cx: 66 is 2.0 pixels off the middle, 64: .* flicker undistort"):
-        load_dataset(bent)
     done = flicker("undistort", bent, "-o", tmp_path / "flat")
     assert done.returncode == 0 and "4 photographs" in done.stdout, done.stderr
     data = load_dataset(tmp_path / "flat")
@@ -403,12 +358,11 @@ def test_bad_transforms(nerf, tmp_path) -> None:
     refused(r"frames\[5\]: file_path: no picture .*r_99", {"file_path": "images/r_99"})
     refused(r"frames\[5\]: file_path: not a text", {"file_path": 5})
     refused(r"frames\[5\]: rotation: not a rotation matrix", {"transform_matrix": np.zeros((4, 4)).tolist()})
-    refused(r"frames\[5\]: position: not finite", {"transform_matrix": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})
+    refused(r"frames\[5\]: transform_matrix: not finite", {"transform_matrix": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})
     refused(r"frames\[5\]: transform_matrix: not 4x4 numbers", {"transform_matrix": [[1, 2], [3]]})
     refused(r"frames\[5\]: fl_x: not a number", {"fl_x": "wide"})
     refused(r"frames\[5\]: .*r_5.png is 48x40, not of the shape of the camera's 48x48", {"w": 48, "h": 48})
-    refused(r"frames\[0\]: cx: 30 is 6.0 pixels off the middle", cx=30.0)
-    refused(r"frames\[0\]: k1: the lens distorts by up to .* pixels", k1=0.2)
+    refused(r"frames\[0\]: its lens leaves less than 50%", cx=40.0)
     refused(r"frames\[0\]: camera_angle_x: 4 is not between 0 and pi", camera_angle_x=4.0)
     file.write_text(json.dumps(good | {"frames": good["frames"][:1]}))
     with pytest.raises(FlickerError, match="1 photograph, at least 3 are needed"):
@@ -420,7 +374,7 @@ def test_bad_transforms(nerf, tmp_path) -> None:
     with pytest.raises(FlickerError, match=r"transforms.json: not JSON"):
         load_dataset(tmp_path)
     file.unlink()
-    with pytest.raises(FlickerError, match=r"neither transforms.json nor sparse/0"):
+    with pytest.raises(FlickerError, match=r"neither transforms.json, transforms_train.json nor a COLMAP model"):
         load_dataset(tmp_path)
     with pytest.raises(FlickerError, match=r"no such folder"):
         load_dataset(tmp_path / "none")
@@ -429,9 +383,6 @@ def test_bad_transforms(nerf, tmp_path) -> None:
 def test_bad_colmap(shots, tmp_path) -> None:
     sparse = write_colmap(tmp_path, shots, model=4) / "sparse" / "0"
     with pytest.raises(FlickerError, match=r"cameras.bin: truncated"):
-        load_dataset(tmp_path)
-    (sparse / "cameras.bin").write_bytes((sparse / "cameras.bin").read_bytes() + bytes(32))
-    with pytest.raises(FlickerError, match=r"cameras.bin: camera 7: model OPENCV, not PINHOLE"):
         load_dataset(tmp_path)
     write_colmap(tmp_path, shots)
     whole = (sparse / "images.bin").read_bytes()
@@ -444,8 +395,7 @@ def test_bad_colmap(shots, tmp_path) -> None:
         load_dataset(tmp_path)
     (sparse / "points3D.bin").unlink()
     (tmp_path / "images" / "shot.03.png").write_bytes((tmp_path / "images" / "shot.04.png").read_bytes())
-    with pytest.raises(FlickerError, match=r"points3D.bin: cannot be read"):
-        load_dataset(tmp_path)
+    assert load_dataset(tmp_path).points is None  # a model of cameras alone
 
 
 def test_views_that_do_not_overlap(nerf, tmp_path) -> None:
@@ -453,8 +403,9 @@ def test_views_that_do_not_overlap(nerf, tmp_path) -> None:
     data = json.loads((nerf / "transforms.json").read_text())
     (tmp_path / "images").symlink_to(nerf / "images")
     data["camera_angle_x"] = 0.01
-    for k, frame in enumerate(data["frames"][:4]):
-        frame["transform_matrix"] = [[1, 0, 0, 100.0 * k], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    for k, frame in enumerate(data["frames"][:4]):  # that look outwards
+        c, s = round(math.cos(k * math.pi / 2)), round(math.sin(k * math.pi / 2))
+        frame["transform_matrix"] = [[c, 0, s, -s], [0, 1, 0, 0], [-s, 0, c, -c], [0, 0, 0, 1]]
     (tmp_path / "transforms.json").write_text(json.dumps(data | {"frames": data["frames"][:4]}))
     with pytest.raises(FlickerError, match="do not overlap"):
         Trainer(load_dataset(tmp_path), Options(10, 100))
@@ -666,7 +617,7 @@ def test_command(nerf, tmp_path) -> None:
     assert "as faithful draws" in told and len(load_scene(tmp_path / "a.ply")) == len(scene)
     assert "its masks are not of 4x4 mini-tiles" in fit("--through", "log-lanes", code=2)
     assert "configuration 'fiathful' is unknown; close names: faithful" in fit("--through", "fiathful", code=2)
-    assert "--resume: from which --checkpoint?" in fit("--resume", code=2)
+    assert "a.ply.checkpoint.npz: no checkpoint there: begins anew" in fit("--iterations", 1, "--resume")
     assert "--begin: of which scene, --from?" in fit("--begin", 0.5, code=2)
     assert "holds other cameras" in fit("--size", 30, code=2)
     assert "background: expected black" in fit("--background", "blue", code=2)

@@ -21,15 +21,17 @@ from flicker_tb.runner import seed
 from scene_samples import random_scene
 
 from flicker.errors import FlickerError
+from flicker.fit.parameters import Parameters
 from flicker.front.view import View, load_view
 from flicker.scene import packing
-from flicker.scene.clusters import cut_clusters, morton_order, reorder
-from flicker.scene.files import Scene, load_scene, save_ply
-from flicker.scene.memory import decode_chunks, encode_chunks, load_chunks, rotation_of, save_chunks
+from flicker.scene.clusters import build_clusters, cut_clusters, morton_order, reorder
+from flicker.scene.files import Scene, half_turn, load_scene, save_ply
+from flicker.scene.memory import MemoryFormat, decode_chunks, encode_chunks, load_chunks, rotation_of, save_chunks, through_memory
 from flicker.scene.metrics import psnr
 from flicker.scene.packed import PackedFormat, PackedScene, bounds, chunk_codes, decode, fp16_bits, load_packed, parse, too_long, upper_half, values
 from flicker.scene.packing import Packing, Recipe, ShSteps, pack, pack_chunks, pack_file
 from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.view.frames import largest
 
 FORMATS = list(PackedFormat)
 
@@ -241,7 +243,7 @@ def test_one_gaussian() -> None:
 def test_cuts_make_steps_finer_and_stay_within_their_bytes() -> None:
     """Two blobs far apart: the cluster across the gap is cut there."""
     scene = random_scene(seed(), 1000, 0)
-    scene.means[:700] += 100
+    scene.means[:700] += 30
     sizes, steps = [], []
     for cuts in (0.0, 0.03, 0.2):
         packed = pack(scene, recipe=Recipe(cuts=cuts)).packed
@@ -357,6 +359,22 @@ def test_damaged_chunks(tmp_path: Path) -> None:
 # ---- images as scenes ----------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("form", PackedFormat)
+def test_antialiased_travels(form: PackedFormat, tmp_path: Path) -> None:
+    """Through the image, where it is a bit that others have not, and through all that copies a scene."""
+    scene, path = random_scene(seed(), 300, 1), tmp_path / "scene.flk"
+    plain, flagged = (pack(replace(scene, antialiased=on), form).packed.image() for on in (False, True))
+    assert {i for i in range(252) if plain[i] != flagged[i]} == {108} and (plain[108], flagged[108]) == (0, 1) and plain[256:] == flagged[256:]
+    for data, on in ((plain, False), (flagged, True)):
+        path.write_bytes(data)
+        found = load_scene(path)
+        assert found.antialiased is on and pack_file(path, form).packed.image() == data
+        assert pack_file(path, PackedFormat.FP16).packed.antialiased is on
+        for copy in (reorder(found, np.arange(300)[::-1]), half_turn(found), largest(found, 4), Parameters.of(found).scene(), build_clusters(found)[0],
+                     *(through_memory(found, kind) for kind in MemoryFormat)):
+            assert copy.antialiased is on
+
+
 def test_an_image_is_a_scene(tmp_path: Path) -> None:
     """Under any name; packed again in its own format it stays as it is, in another it is converted."""
     result = pack(mixed_scene())
@@ -411,6 +429,7 @@ SOUND = {  # what is wrong with an image whose checksums are right: change, form
     "box of all": (at(80, "<f", 0.5), "chunk", "low: "),
     "sigma of all": (at(104, "<f", np.nan), "chunk", "sigma: nan"),
     "reserved": (at(200, "<I", 1), "chunk", "reserved: not zero"),
+    "flags of the image": (at(108, "<I", 3), "chunk", "flags: 3: reserved bits"),
     "box not a number": (at(TABLE + 32, "<f", np.nan), "chunk", "cluster 1: low: not finite"),
     "box infinite": (at(TABLE + 32 + 20, "<f", np.inf), "chunk", "cluster 1: high: not finite"),
     "box turned": (at(TABLE + 64, "<f", 5.0), "chunk", "cluster 2: low: above high"),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 import zipfile
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -40,7 +41,10 @@ def rotation_matrix(q: np.ndarray) -> np.ndarray:
 def slow_projection(scene: Scene, camera: Camera) -> list[dict]:
     out = []
     world_to_camera = np.linalg.inv(camera.rotation)
-    half_x, half_y = camera.width / (2 * camera.fx), camera.height / (2 * camera.fy)
+    # gsplat's rule: the slopes of the picture's edges, counted from its corner, and 0.3 half fields of view beyond.
+    centre = np.array([camera.cx, camera.cy]) + 0.5
+    size, focal = np.array([camera.width, camera.height]), np.array([camera.fx, camera.fy])
+    most, least = (size - centre) / focal + 0.15 * size / focal, -centre / focal - 0.15 * size / focal
     for k in range(len(scene)):
         mean = scene.means[k].astype(float)
         t = world_to_camera @ (mean - camera.position)
@@ -49,17 +53,18 @@ def slow_projection(scene: Scene, camera: Camera) -> list[dict]:
         r = rotation_matrix(scene.quats[k].astype(float))
         s = np.diag(scene.scales[k].astype(float))
         sigma = r @ s @ s.T @ r.T
-        x = np.clip(t[0] / t[2], -1.3 * half_x, 1.3 * half_x) * t[2]
-        y = np.clip(t[1] / t[2], -1.3 * half_y, 1.3 * half_y) * t[2]
+        x, y = np.clip(t[:2] / t[2], least, most) * t[2]
         j = np.array([[camera.fx / t[2], 0, -camera.fx * x / t[2] ** 2], [0, camera.fy / t[2], -camera.fy * y / t[2] ** 2]])
-        cov = j @ world_to_camera @ sigma @ world_to_camera.T @ j.T + 0.3 * np.eye(2)
+        thin = j @ world_to_camera @ sigma @ world_to_camera.T @ j.T
+        cov = thin + 0.3 * np.eye(2)
+        factor = math.sqrt(max(0.0, np.linalg.det(thin) / np.linalg.det(cov))) if scene.antialiased else 1.0
         middle, det = np.trace(cov) / 2, np.linalg.det(cov)
         way = (mean - camera.position) / np.linalg.norm(mean - camera.position)
         values = samples.basis(way[None])[0, : scene.sh.shape[1]] @ scene.sh[k].astype(float)
         eigen = np.linalg.eigvalsh(cov)
         out.append({
-            "k": k, "depth": np.float32(t[2]), "cov": cov, "conic": np.linalg.inv(cov), "opacity": float(scene.opacities[k]),
-            "mean": np.array([camera.fx * t[0] / t[2] + (camera.width - 1) / 2, camera.fy * t[1] / t[2] + (camera.height - 1) / 2]),
+            "k": k, "depth": np.float32(t[2]), "cov": cov, "conic": np.linalg.inv(cov), "opacity": float(scene.opacities[k]) * factor,
+            "mean": focal * t[:2] / t[2] + centre - 0.5,
             "radius": math.ceil(3 * math.sqrt(middle + math.sqrt(max(0.1, middle**2 - det)))),
             "rgb": np.maximum(0, 0.5 + values), "spiky": math.sqrt(eigen[1] / eigen[0]) >= 3,
         })
@@ -97,22 +102,28 @@ def look(width: int, height: int, focal: float, position: tuple = (0, 0, -3), se
     return Camera(width, height, focal, 1.1 * focal, np.array(position, float), rotation_matrix(quat))
 
 
-@pytest.mark.parametrize(("degree", "scale", "position"), [
-    (0, 1.0, (0, 0, -3)), (1, 3.0, (0, 0, -2.5)), (2, 6.0, (0.5, 0.2, -1.2)),  # the last among the Gaussians
-    (3, 1.0, (0, 0, -3)), (3, 20.0, (0, 0, -2)),
+@pytest.mark.parametrize(("degree", "scale", "position", "antialiased", "centre"), [
+    (0, 1.0, (0, 0, -3), False, None), (1, 3.0, (0, 0, -2.5), False, None), (2, 6.0, (0.5, 0.2, -1.2), False, None),  # the last among the Gaussians
+    (3, 1.0, (0, 0, -3), False, None), (3, 20.0, (0, 0, -2), False, None), (0, 3.0, (0, 0, -2.5), True, (10.3, 19.0)),
+    (0, 6.0, (0, 0, -3), False, (-3.0, 26.25)),  # the principal point outside
 ])
-def test_against_independent_renderer(degree: int, scale: float, position: tuple[float, float, float]) -> None:
+def test_against_independent_renderer(
+    degree: int, scale: float, position: tuple[float, float, float], antialiased: bool, centre: tuple[float, float] | None,
+) -> None:
     scene = samples.random_scene(SEED + degree, count=120, degree=degree)
     scene.scales *= np.float32(scale)
     scene.scales[:, 0] *= np.float32(0.05)  # some of them spiky
     scene.means[:40] *= np.float32(2.5)  # beside and behind the camera
     scene.opacities[60:] = 0.995  # above the clamp
     scene.means[100:] = scene.means[80:100]  # equal depths
-    camera = look(45, 37, 40.0, position, seed=SEED)
+    scene.antialiased = antialiased
+    camera = look(*((45, 37) if centre is None else (29, 23)), 40.0, position, seed=SEED)
+    if centre is not None:
+        camera = replace(camera, cx=centre[0], cy=centre[1])
     wanted = slow_projection(scene, camera)
     got = project(scene, camera)
     kept = [g for g in wanted if g["k"] in set(got.index)]
-    assert [g["k"] for g in kept] == got.index.tolist() and got.n_visible > 60
+    assert [g["k"] for g in kept] == got.index.tolist() and got.n_visible > (60 if centre is None else 20)
     for name, array in (("mean", got.mean), ("rgb", got.rgb), ("opacity", got.opacity), ("depth", got.depth), ("spiky", got.spiky)):
         np.testing.assert_allclose(array, np.array([g[name] for g in kept]), rtol=1e-10, atol=1e-10, err_msg=name)
     for name, array in (("cov", got.cov2d), ("conic", got.conic)):
@@ -124,7 +135,7 @@ def test_against_independent_renderer(degree: int, scale: float, position: tuple
     image, left = render_with_transmittance(got, camera, background)
     slow_image, slow_left = slow_render(wanted, camera, background)  # all of them: culling must not show
     assert np.abs(image - slow_image).max() < 1e-9 and np.abs(left - slow_left).max() < 1e-9
-    assert slow_left.min() < (1e-3 if scale > 1 else 0.5)
+    assert slow_left.min() < (1e-3 if scale > 1 and centre is None else 0.5 if centre is None else 0.8)
 
 
 def one(mean: tuple, scale: float, opacity: float, colour: float = 0.0) -> Scene:
@@ -163,6 +174,28 @@ def test_nothing_to_see() -> None:
         image = render_reference(project(scene, camera), camera, (0.1, 0.2, 0.3))
         assert (image == np.array([0.1, 0.2, 0.3])).all()
     assert project(one((0, 0, -2.79), 0.01, 0.9), camera).n_visible == 1  # just past the near plane
+
+
+def test_principal_point_is_a_crop() -> None:
+    """A window of a larger picture is the picture of a camera whose principal point lies as far off its middle."""
+    scene = samples.random_scene(SEED, count=60, degree=1)
+    scene.means *= np.float32(0.3)  # no Gaussian where the Jacobian is clamped, which the smaller picture does sooner
+    camera = look(96, 80, 90.0, seed=SEED)
+    window = replace(camera, width=48, height=32, cx=camera.cx - 32, cy=camera.cy - 16)
+    large, small = (render_reference(project(scene, c), c) for c in (camera, window))
+    assert small.max() > 0.2 and np.abs(small - large[16:48, 32:80]).max() < 1e-12
+
+
+def test_antialiased_opacity_in_closed_form() -> None:
+    """A round splat of variance v before dilation keeps v / (v + 0.3) of its opacity; one without area, seen along its edge, is not there."""
+    camera = Camera(15, 13, 100.0, 100.0, np.array([0.0, 0, -4]), np.eye(3))
+    for scale in (0.001, 0.02, 0.5):
+        scene = replace(one((0, 0, 0), scale, 0.8), antialiased=True)
+        variance = (25 * float(scene.scales[0, 0])) ** 2
+        np.testing.assert_allclose(project(scene, camera).opacity, float(scene.opacities[0]) * variance / (variance + 0.3), rtol=1e-9)
+    flat = replace(one((0, 0, 0), 0.3, 0.8), antialiased=True)
+    flat.scales[0, 0] = 1e-30
+    assert (render_reference(project(flat, camera), camera) == 0).all()
 
 
 def test_equal_depths_keep_scene_order() -> None:

@@ -27,6 +27,7 @@ from flicker.front.projection import project
 from flicker.front.reference import render_reference
 from flicker.scene.camera import orbit_camera
 from flicker.scene.files import (
+    FLAT,
     KINDS,
     SCENE_SUFFIXES,
     Scene,
@@ -127,8 +128,8 @@ def test_save_ply_keeps_extremes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("field", "value", "reason"), [
     ("means", np.nan, "position not finite"), ("means", -np.inf, "position not finite"),
     ("scales", np.nan, "scale not finite"), ("scales", np.inf, "scale not finite"), ("scales", 1000.0, "scale not finite"),
-    ("scales", -1000.0, "scale not positive"), ("quats", np.nan, "rotation not finite"),
-    ("quats", 0.0, "rotation is zero"), ("opacities", np.nan, "opacity not finite"), ("opacities", np.inf, "opacity not finite"),
+    ("quats", np.nan, "rotation not finite"), ("quats", 0.0, "rotation is zero"), ("opacities", np.nan, "opacity not finite"),
+    ("opacities", -np.inf, "opacity not positive"),
     ("opacities", -1000.0, "opacity not positive"), ("sh0", np.inf, "colour not finite"), ("shN", np.nan, "colour not finite"),
 ])
 def test_bad_gaussian_is_counted(field: str, value: float, reason: str, tmp_path: Path) -> None:
@@ -152,9 +153,9 @@ def test_bad_records_of_splat(tmp_path: Path) -> None:
     samples.write_splat(tmp_path / "a.splat", scene)
     loaded = load_scene(tmp_path / "a.splat")
     assert loaded.rejected == {
-        "position not finite": 1, "scale not finite": 1, "scale not positive": 2, "rotation is zero": 1, "opacity not positive": 1,
+        "position not finite": 1, "scale not finite": 1, "scale negative": 1, "rotation is zero": 1, "opacity not positive": 1,
     }
-    assert len(loaded) == 4
+    assert len(loaded) == 5 and loaded.scales[0, 1] == loaded.scales[0].max() * FLAT
 
 
 def test_each_bad_gaussian_counts_once(tmp_path: Path) -> None:
@@ -250,17 +251,21 @@ def edited(path: Path, old: bytes, new: bytes) -> Path:
     ("ply", b"property float rot_3\n", b"property float rot_9\n", ("'rot_3' is missing",)),
     ("ply", b"property float f_rest_4\n", b"", ("8 properties f_rest_*",)),
     ("ply", b"property float f_rest_4\n", b"property float f_rest_77\n", ("'f_rest_4' is missing",)),
-    ("ply", b"property float opacity\n", b"property double opacity\n", ("'opacity' is double",)),
+    ("ply", b"property float opacity\n", b"property int opacity\n", ("'opacity' is int, not float, double or half",)),
+    ("ply", b"property float opacity\n", b"property long opacity\n", ("line ", "type 'long' is not known")),
+    ("ply", b"property float opacity\n", b"property list float int i\nproperty float opacity\n", ("the length of a list is float",)),
+    ("ply", b"property float opacity\n", b"property list uchar int opacity\n", ("'opacity' is list uchar int",)),
     ("ply", b"property float opacity\n", b"property float opacity\nproperty float opacity\n", ("there twice",)),
-    ("ply", b"property float opacity\n", b"property list uchar int i\nproperty float opacity\n", ("'i' is list uchar int",)),
-    ("ply", b"binary_little_endian", b"ascii", ("format 'ascii'",)),
-    ("ply", b"binary_little_endian", b"binary_big_endian", ("format 'binary_big_endian'",)),
+    ("ply", b"property float opacity\n", b"property list uchar int i\nproperty float opacity\n", ("truncated: element 'vertex'",)),
+    ("ply", b"binary_little_endian", b"ascii", ("'vertex'",)),
+    ("ply", b"binary_little_endian", b"binary_vax", ("format 'binary_vax', not ascii, ",)),
     ("ply", b"element vertex 20", b"element vertex 0", ("no Gaussians",)),
     ("ply", b"element vertex 20", b"element vertex -5", ("count -5",)),
     ("ply", b"element vertex 20", b"element vertex many", ("line 3",)),
     ("ply", b"element vertex 20", b"element vertex 99999999999999", ("truncated",)),
-    ("ply", b"end_header\n", b"element face 1\nproperty float w\nend_header\n", ("elements vertex, face",)),
-    ("ply", b"element vertex", b"element vortex", ("elements vortex",)),
+    ("ply", b"end_header\n", b"element face 1\nproperty float w\nend_header\n", ("truncated: element 'face'",)),
+    ("ply", b"element vertex", b"element vortex", ("elements vortex, but no vertex",)),
+    ("ply", b"property float x\n", b"property float x\nproperty float filter_3D\n", ("'filter_3D'", "create_fused_ply.py")),
     ("compressed", b"property float max_b\n", b"", ("'chunk'", "'max_b' is missing")),
     ("compressed", b"property float min_scale_x\n", b"", ("'min_scale_x' is missing",)),
     ("compressed", b"property uint packed_scale\n", b"", ("'packed_scale' is missing",)),
@@ -522,13 +527,13 @@ def test_splat_needs_its_suffix(tmp_path: Path) -> None:
     data[:4] = b"\x1f\x8b\x08\x3e"
     path.write_bytes(data)
     assert scene_kind(path) == "splat" and len(load_scene(path)) == 20
-    (tmp_path / "a.ply.gz").write_bytes(gzip.compress(b"ply\n"))
-    refused(tmp_path / "a.ply.gz", "unknown format '.gz'")
+    (tmp_path / "a.obj.gz").write_bytes(gzip.compress(b"v 1 2 3\n"))
+    refused(tmp_path / "a.obj.gz", "unknown format '.gz'", "unpack it")
 
 
 def test_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinds, names, files and digests of scenes, and what is none."""
-    assert set(SCENE_SUFFIXES) == {".ply", ".spz", ".sog", ".zip", ".splat", ".flk"}
+    assert set(SCENE_SUFFIXES) == {".ply", ".ply.gz", ".spz", ".sog", ".zip", ".glb", ".gltf", ".ksplat", ".splat", ".flk"}
     files = samples.sog_files(samples.random_scene(SEED, count=20))
     folder = unpacked(tmp_path / "St. Peter", files)
     ply = samples.write(tmp_path, "compressed", samples.random_scene(SEED, count=20))

@@ -13,6 +13,7 @@ import math
 import socket
 import threading
 import time
+from dataclasses import replace
 
 import browser
 import numpy as np
@@ -181,14 +182,16 @@ def test_camera_there_and_back() -> None:
     rng = np.random.default_rng(3)
     for _ in range(50):
         rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        camera = Camera(320, 180, rng.uniform(100, 900), rng.uniform(100, 900), rng.normal(size=3) * 10, rotation * np.sign(np.linalg.det(rotation)))
+        camera = Camera(320, 180, rng.uniform(100, 900), rng.uniform(100, 900), rng.normal(size=3) * 10, rotation * np.sign(np.linalg.det(rotation)),
+                        cx=rng.uniform(100, 200), cy=rng.uniform(-50, 200))
         pose = Pose.of(camera)
         assert math.isclose(np.linalg.norm(pose.wxyz), 1.0)
         back = pose.camera(camera)
+        assert (back.cx, back.cy) == (camera.cx, camera.cy)
         assert close(camera, back) and back.fx == pytest.approx(camera.fx) and np.allclose(back.rotation, camera.rotation)
         assert Pose(tuple(-w for w in pose.wxyz), pose.position, pose.fov).camera(camera).rotation == pytest.approx(back.rotation)
         moved = Pose(pose.wxyz, (pose.position[0] + 0.1, *pose.position[1:]), pose.fov).camera(camera)
-        assert not close(camera, moved)
+        assert not close(camera, moved) and not close(camera, replace(back, cx=camera.cx + 1))
         # The browser makes its rotation of position, target and up.
         up = upright(camera, rng.normal(size=3))
         ahead = camera.rotation[:, 2]
@@ -292,7 +295,7 @@ def test_refusals(view, tmp_path, monkeypatch) -> None:
             ((scene, "--size", "0x10", "--port", 0), "width"), ((scene, "--size", "90000x1", "--port", 0), "width"), (("demo", "--size", "big"), "--size"),
             (("demo", "--size", "9000x9000"), "--size"), ((scene, "--view", 99, "--port", 0), "view 99"), (("demo", "--dir", tmp_path / "file"), "--dir"),
             ((tmp_path / "none.ply", "--port", 0), "none.ply"), ((tmp_path / "bad.ply", "--port", 0), "bad.ply"),
-            (("demo", "--cameras", tmp_path / "none.json"), "--cameras"), (("demo", "--up", "z"), "--up"),
+            (("demo", "--port", 0, "--cameras", tmp_path / "none.json"), "none.json"), (("demo", "--port", 0, "--up", "z"), "up: z"),
             (("demo", "--port", 0, "--host", "nowhere.invalid"), "--host"),
         ):
             run = flicker("view", *arguments)
@@ -457,9 +460,9 @@ def interact(page: Page, view: View, viewer: server.Viewer, monkeypatch) -> None
     assert session.camera is session.goal and close(session.goal, view.camera)
 
     class Simulated:
-        def __init__(self, scene, camera, engine, config, told, done) -> None:
+        def __init__(self, view, engine, config, told, done) -> None:
             told("simulating")
-            shot = Shot(engine, camera, config, np.full((SIZE[1], SIZE[0], 3), [1.0, 0.0, 1.0]), {"visible": 1, "pixel_pairs": 2, "cycles": 1234})
+            shot = Shot(engine, view.camera, config, np.full((SIZE[1], SIZE[0], 3), [1.0, 0.0, 1.0]), {"visible": 1, "pixel_pairs": 2, "cycles": 1234})
             threading.Thread(target=done, args=(shot,)).start()
 
     monkeypatch.setattr(server, "Simulation", Simulated)

@@ -26,7 +26,8 @@ class Bench:
     def __init__(self, name: str) -> None:
         self.pipeline = next(p for p in PIPELINES if p.module == name)
         self.graph = self.pipeline.build(FORMATS)
-        _, plan = module(name, self.pipeline.head, self.graph, self.pipeline.interval)
+        text, plan = module(name, self.pipeline.head, self.graph, self.pipeline.interval)
+        self.reset = ".rst_ni, " if "rst_ni" in text else ""
         self.latency = plan.latency
         ends = [v for v in self.graph.values if v.operator is None]
         self.registers = {v.name: v.kind for v in ends if v.register}
@@ -37,7 +38,7 @@ class Bench:
     def _library(self) -> ctypes.CDLL:
         names = [*self.registers, *self.inputs]
         kinds = {**self.registers, **self.inputs}
-        lines = ["module datapath_bench (", "  input logic clk_i, en_i,", "  input logic [1:0] phase_i,"]
+        lines = ["module datapath_bench (", "  input logic clk_i, rst_ni, en_i,", "  input logic [1:0] phase_i,"]
         # Two outputs at least: an array of words in C++.
         lines += [f"  input logic [{64 * len(names) - 1}:0] in_i,", f"  output logic [{max(64 * len(self.outputs), 128) - 1}:0] out_o", ");"]
         phase = f".phase_i(phase_i[{max((self.pipeline.interval - 1).bit_length(), 1) - 1}:0]), " if self.pipeline.interval > 1 else ""
@@ -48,7 +49,7 @@ class Bench:
             ports.append(f".{n}_o(o{i})")
         if len(self.outputs) == 1:
             lines.append("  assign out_o[127:64] = '0;")
-        lines += [f"  {self.pipeline.module} i_dut (.clk_i, .en_i, {phase}{', '.join(ports)});", "endmodule", ""]
+        lines += [f"  {self.pipeline.module} i_dut (.clk_i, {self.reset}.en_i, {phase}{', '.join(ports)});", "endmodule", ""]
         folder = BUILD / "datapath" / self.pipeline.module
         folder.mkdir(parents=True, exist_ok=True)
         wrapper = folder / "datapath_bench.sv"

@@ -153,11 +153,12 @@ FIELDS = splat.Projection._fields
 
 @numba.njit
 def _projected(
-    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, inverse, shift, key_low, M, N, C, out, places, conic,
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, width, height, const, inverse, shift, key_low,
+    M, N, C, out, places, conic,
 ):
     for j in range(len(q)):
-        p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, limit,
-                              width, height, const, M, N)
+        p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, least,
+                              limit, middle, share, antialiased, const, M, N)
         steady = reach.steady_one(p, inverse, N)
         x0, x1 = splat.pixels(p.x, p.radius_x, width)
         y0, y1 = splat.pixels(p.y, p.radius_y, height)
@@ -166,15 +167,16 @@ def _projected(
         places[j, 5] = frame.depth_key(p.t2, shift, key_low, M)
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
+        out[j, 11] = p.scale
         out[j, 8], out[j, 9], out[j, 10] = ff_round(p.d0, C), ff_round(p.d1, C), ff_round(p.d2, C)
         conic[j, 0], conic[j, 1], conic[j, 2] = splat.conic_one(p, N)
 
 
-def projected(s: Sample, low, step, q, scales, quat) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def projected(s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, antialiased=False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
-    out, places, conic = np.zeros((len(q), 11)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
-    _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.limit, t.width, t.height, splat.constants(FORMATS),
-               inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places, conic)
+    out, places, conic = np.zeros((len(q), 12)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
+    _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.least, t.limit, t.middle, share, antialiased, t.width,
+               t.height, splat.constants(FORMATS), inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places, conic)
     return out, places, conic
 
 
@@ -184,9 +186,15 @@ def projection_inputs(s: Sample) -> tuple[np.ndarray, ...]:
             np.stack([g[f"q{k}"] for k in "wxyz"], 1))
 
 
+@pytest.mark.parametrize("features", [False, True], ids=["plain", "features"])
 @pytest.mark.parametrize("form", list(Form), ids=lambda form: form.name.lower())
-def test_projection(form: Form) -> None:
+def test_projection(form: Form, features: bool) -> None:
+    """features: of an antialiased scene, with the principal point at some place."""
     s, rng = demo(PackedFormat.CHUNK), random(3)
+    chunked = form is Form.CONIC or not features
+    if features:
+        camera = load_view(DEMO, 0, (640, 360)).camera
+        s = dataclasses.replace(s, setup=FrameSetup.of(dataclasses.replace(camera, cx=rng.uniform(-200, 900), cy=rng.uniform(-200, 600))))
     real = [a[: SOME // 2] for a in projection_inputs(s)]
     n = SOME // 2
     triple = lambda M, low, high: np.stack([wild(rng, n, M, low, high) for _ in range(3)], 1)  # noqa: E731
@@ -194,25 +202,29 @@ def test_projection(form: Form) -> None:
     odd.append(np.stack([wild(rng, n, S, 110, 140) for _ in range(4)], 1))
     far = [triple(P, 1, 254), triple(P, 1, 254), triple(P, 1, 254), np.abs(triple(S, 1, 254)), np.stack([wild(rng, n, S) for _ in range(4)], 1)]
     inputs = [np.concatenate(parts) for parts in zip(real, odd, far)]
-    out, places, conic = projected(s, *inputs)
+    share = frame.CHUNK_SHARE if chunked else frame.FP16_SHARE
+    out, places, conic = projected(s, *inputs, share, features)
     t = s.setup
     registers = {f"view_{i}{j}": t.view[i, j] for i in range(3) for j in range(3)} | {f"focal_{k}": t.focal[k] for k in range(2)}
     for name in ("row_x", "row_x_z", "row_y", "row_y_z"):
         registers |= {f"{name}_{k}": getattr(t, name)[k] for k in range(3)}
-    registers |= {f"limit_{k}": t.limit[k] for k in range(2)}
+    registers |= {f"{name}_{k}": getattr(t, name)[k] for name in ("least", "limit", "middle") for k in range(2)}
+    registers |= {"chunked": chunked, "antialiased": features}
     registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": ff_round(s.culled.nearest, P)}
     low, step, q, scales, quat = inputs
     got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic")(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},
     )
     want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key", "far"))}
-    want |= {name: out[:, k] for k, name in enumerate(("sx", "sy", "l0", "l1", "l2", "i0", "kappa", "lean"))} | of("direction", out[:, 8:])
+    want |= {name: out[:, k] for k, name in enumerate(("sx", "sy", "l0", "l1", "l2", "i0", "kappa", "lean"))}
+    want |= of("direction", out[:, 8:11]) | {"scale": out[:, 11]}
     if form is Form.CONIC:
         assert (np.abs(conic[places[:, 0] == 0]) < 65504.0).all()  # FP16 holds them
         del want["l0"], want["l1"]
         want |= of("conic", conic)
     near = places[:, 0] == 1
     assert near.any() and not near.all() and places[~near, 1].any() and not places[~near, 1].all()
+    assert (out[:, 11] <= 1.01 * share).all() and (out[:, 11] < 0.9 * share).any() == features
     same(got, want)
 
 
@@ -251,11 +263,16 @@ def test_splat_bounds(box: bool) -> None:
     sx, sy = (np.concatenate([out[:, k], np.abs(wild(rng, n, S))]) for k in (0, 1))
     lean = np.concatenate([out[:, 7], wild(rng, n, S)])
     chunked = not box
+    share = frame.CHUNK_SHARE if chunked else frame.FP16_SHARE
+    scale = np.array([ff_round(share * v, S) for v in np.where(rng.random(len(x)) < 0.5, 1.0, rng.random(len(x)))])
     raw = rng.integers(1, 256, len(x)) if chunked else rng.uniform(0, 1, len(x)).astype(np.float16).view(np.uint16).astype(np.int64)
-    code = raw if chunked else np.array([frame.opacity_code(False, v, S) for v in raw.astype(np.uint16).view(np.float16).astype(np.float64)])
+    number = raw.astype(np.float64) if chunked else raw.astype(np.uint16).view(np.float16).astype(np.float64)
+    code = np.array([frame.opacity_code(chunked, v, f, S) for v, f in zip(number.tolist(), scale.tolist())])
+    if chunked:
+        assert np.array_equal(code[scale == frame.CHUNK_SHARE], raw[scale == frame.CHUNK_SHARE])
     want, limit = bounded(s, box, x, y, sx, sy, lean, code)
-    registers = {"chunked": chunked, "box": box, "width": s.setup.width, "height": s.setup.height}
-    got = bench("flk_splat_bounds")(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, opacity=raw)
+    registers = {"box": box, "width": s.setup.width, "height": s.setup.height}
+    got = bench("flk_splat_bounds")(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, scale=scale, opacity=raw)
     assert np.array_equal(got["code"], code)
     empty = want[:, 0] == 1
     assert empty.any() and not empty.all()
@@ -305,7 +322,7 @@ def _basis(d, M, out):
 
 def test_colour_basis() -> None:
     s, rng = demo(PackedFormat.CHUNK), random(6)
-    d = np.concatenate([seen(s)[0][:, 8:], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
+    d = np.concatenate([seen(s)[0][:, 8:11], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
     out = np.zeros((len(d), 16), np.int64)
     _basis(d, C, out)
     got = bench("flk_colour_basis")({}, **of("direction", d))

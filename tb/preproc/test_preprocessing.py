@@ -129,12 +129,19 @@ def plain_camera(width: int = 200, height: int = 120) -> Camera:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_degrees_and_a_slow_memory(degree: int, kind: RecordKind) -> None:
-    """DRAM behind ports with pauses, two frames one after the other."""
+    """DRAM behind ports with pauses, two frames one after the other; of degrees 2 and 3 antialiased, with the principal point off the middle."""
     rng = np.random.default_rng(degree)
     scene = some(3000, sh=rng.normal(scale=0.3, size=(3000, 16, 3)))
     sh = scene.sh[:, : (degree + 1) ** 2]
     form = PackedFormat.CHUNK if degree % 2 else PackedFormat.FP16
-    _, rtl = check(pack(dataclasses.replace(scene, sh=sh), form).packed, plain_camera(), memory=lpddr4(), frames=2, kind=kind)
+    features, camera = degree >= 2, plain_camera()
+    if features:
+        camera = dataclasses.replace(camera, cx=rng.uniform(0, 150), cy=rng.uniform(-20, 200))
+    packed = pack(dataclasses.replace(scene, sh=sh, antialiased=features), form).packed
+    golden, rtl = check(packed, camera, memory=lpddr4(), frames=2, kind=kind)
+    if features:
+        plain = run_front(dataclasses.replace(packed, antialiased=False), camera, kind=kind)
+        assert golden.splats().opacity.mean() < 0.95 * plain.splats().opacity.mean() and len(golden.entry_tile) < len(plain.entry_tile)
     assert all(rtl.counters[f"{name}_waits"] > 0 for name in ("cluster", "colour", "entry", "merged", "line", "beat")) and rtl.counters["group_missing"] > 0
     assert rtl.counters["place_waits"] + rtl.counters["request_waits"] > 0
 

@@ -6,7 +6,7 @@ import itertools
 from typing import Any
 
 import cocotb
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge, RisingEdge, Timer
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp
 from flicker_tb.bench import Bench, config, rounds
 
@@ -284,3 +284,124 @@ async def interrupts(dut: Any) -> None:
             await regs.bench.cycles(1)
             assert await regs.read(word.address) == 1 << f["low"], f"{f['name']} while {other['name']} is cleared"
             await regs.write(word.address, 0xFFFFFFFF)
+
+
+PIN = "s_axil_{}"
+
+
+class Pins:
+    """The five channels, driven pin by pin: what a manager of any make may do."""
+
+    def __init__(self, dut: Any) -> None:
+        self.dut, self.bench = dut, Bench(dut)
+        self.rng = self.bench.rng
+        dut.hwif_in.value = 0
+        for name in ("awvalid", "wvalid", "arvalid"):
+            self.pin(name).value = 0
+        for name in ("bready", "rready"):
+            self.pin(name).value = 1
+        self.answers: list[tuple[str, int, int]] = []
+        cocotb.start_soon(self._watch())
+
+    def pin(self, name: str) -> Any:
+        return getattr(self.dut, PIN.format(name))
+
+    async def _watch(self) -> None:
+        while True:
+            await RisingEdge(self.dut.clk_i)
+            for channel, data in (("b", None), ("r", "rdata")):
+                if int(self.pin(f"{channel}valid").value) and int(self.pin(f"{channel}ready").value):
+                    self.answers.append((channel, int(self.pin(f"{channel}resp").value), int(self.pin(data).value) if data else 0))
+
+    async def send(self, channel: str, after: int, **values: int) -> None:
+        """A transfer that is offered `after` cycles from now; its pins hold noise before and behind."""
+        await self.bench.cycles(after)
+        for name, value in values.items():
+            self.pin(name).value = value
+        self.pin(f"{channel}valid").value = 1
+        while True:
+            await RisingEdge(self.dut.clk_i)
+            if int(self.pin(f"{channel}ready").value):
+                break
+        self.pin(f"{channel}valid").value = 0
+        for name in values:
+            self.pin(name).value = self.rng.getrandbits(len(self.pin(name)))
+
+    async def write(self, address: int, data: int, strobes: int, first: str) -> None:
+        """first: the channel that goes first, by up to 6 cycles; `both`: neither."""
+        ahead = 0 if first == "both" else self.rng.randint(1, 6)
+        address_at, data_at = (0, ahead) if first == "aw" else (ahead, 0)
+        tasks = [
+            cocotb.start_soon(self.send("aw", address_at, awaddr=address, awprot=self.rng.getrandbits(3))),
+            cocotb.start_soon(self.send("w", data_at, wdata=data, wstrb=strobes)),
+        ]
+        for task in tasks:
+            await task
+
+    async def read(self, address: int) -> None:
+        await self.send("ar", 0, araddr=address, arprot=self.rng.getrandbits(3))
+
+    async def settle(self, count: int) -> None:
+        await self.bench.until(lambda: len(self.answers) >= count, 50, "answers")
+        await self.bench.cycles(4)
+        assert len(self.answers) == count, "an answer that nobody waits for"
+
+
+@cocotb.test()
+async def any_order_address_and_protection(dut: Any) -> None:
+    """Address before data, behind or with them; the low two bits of addresses and all of PROT are not looked at; any strobes, none too."""
+    pins = Pins(dut)
+    await pins.bench.reset()
+    held = {word.path: word.reset & word.mask("written", "read", "!clear") for word in STORED}
+    seen = set()
+    for turn in range(rounds(300, 1000)):
+        word, data, strobes = pins.rng.choice(STORED), pins.rng.getrandbits(32), pins.rng.getrandbits(4)
+        first, low = pins.rng.choice(("aw", "w", "both")), pins.rng.randrange(4)
+        await pins.write(word.address + low, data, strobes, first)
+        await pins.settle(2 * turn + 1)
+        mask = word.mask("written", "read", "!clear") & sum(255 << 8 * k for k in range(4) if strobes >> k & 1)
+        held[word.path] = held[word.path] & ~mask | data & mask
+        await pins.read(word.address + pins.rng.randrange(4))
+        await pins.settle(2 * turn + 2)
+        assert pins.answers[-2] == ("b", 0, 0), pins.answers[-2]
+        assert pins.answers[-1] == ("r", 0, held[word.path] | word.reset & ~word.mask("written")), (word.path, first, low, strobes)
+        seen.add((first, low))
+    assert len(seen) == 12
+
+
+@cocotb.test()
+async def answers_wait_for_each_other(dut: Any) -> None:
+    """Two accesses are answered later, in the order in which they were decoded: an answer that is not taken holds up those of the other kind."""
+    pins = Pins(dut)
+    await pins.bench.reset()
+    for held, other in (("b", "r"), ("r", "b")):
+        pins.answers.clear()
+        pins.pin(f"{held}ready").value = 0
+        accesses = {"b": lambda: pins.write(STORED[0].address, 0, 15, "both"), "r": lambda: pins.read(0)}
+        await accesses[held]()
+        await pins.bench.cycles(6)
+        await accesses[other]()
+        await pins.bench.cycles(20)
+        assert int(pins.pin(f"{held}valid").value) and not int(pins.pin(f"{other}valid").value) and not pins.answers
+        pins.pin(f"{held}ready").value = 1
+        await pins.settle(2)
+        assert [channel for channel, *_ in pins.answers] == [held, other]
+
+
+@cocotb.test()
+async def outputs_come_from_registers(dut: Any) -> None:
+    """No input of the port reaches an output within the cycle, in any state of the five channels."""
+    pins = Pins(dut)
+    await pins.bench.reset()
+    inputs = ("awvalid", "awaddr", "wvalid", "wdata", "wstrb", "arvalid", "araddr", "bready", "rready")
+    outputs = ("awready", "wready", "arready", "bvalid", "bresp", "rvalid", "rdata", "rresp")
+    states = set()
+    for _ in range(400):
+        await FallingEdge(dut.clk_i)
+        before = [int(pins.pin(name).value) for name in outputs]
+        for name in inputs:
+            pins.pin(name).value = pins.rng.getrandbits(len(pins.pin(name)))
+        await Timer(1, unit="ns")
+        assert [int(pins.pin(name).value) for name in outputs] == before
+        states.add(tuple(before[k] for k in (0, 1, 2, 3, 5)))
+    assert len(states) > 10, states

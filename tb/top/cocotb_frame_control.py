@@ -14,7 +14,7 @@ from flicker.params import CatMode
 
 # Fields, most significant first, as in flk_top_pkg.descriptor_t, flk_preproc_pkg.front_registers_t and flk_rendering_pkg.rendering_registers_t.
 CULL = 32 * (3 + 15 + 5 + 5)
-LANE = (("chunked", 1), ("box", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 2)))
+LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 4) + 2 * 23))
 ADDRESSES = ("scene_table", "headers", "geometry", "colours", "records", "lists", "pointers", "frame_buffer")
 DESCRIPTOR = (
     ("tag", 16), ("mode", 3), ("rgba", 1), ("background", 24), ("cull", CULL), *LANE, *((name, 40) for name in ADDRESSES),
@@ -155,7 +155,11 @@ class ControlTest:
         self.refused = self.both = 0
         self.number = 0
         self.started = self.finished = 0
-        self.error = None                       # expected; None: not defined before the first post
+        self.shown = (0, 0, 0)                  # expected tag, error and bank
+        self.late = 0                           # error that is shown when the posted frame has been acknowledged
+        self.unacknowledged: Frame | None = None
+        self.ack_in = 0
+        self.stray = 0                          # acknowledgements that belong to no posted frame
         self.forget()
         self.command = 0                        # of the host, in the next cycle: clear, aborted, timed_out, reset as bits
         self.given = self.before = 0
@@ -171,8 +175,6 @@ class ControlTest:
         self.in_front: Frame | None = None
         self.in_rendering: Frame | None = None
         self.front_stage = self.rendering_stage = None  # what the half does with its frame: "run", "copy", then it is "over"
-        self.unacknowledged: Frame | None = None
-        self.ack_in = 0
         self.pins = dict.fromkeys(("start", "acknowledged", "front_done", "rendering_done", "copy_front_done", "copy_rendering_done"), 0)
         self.wait = self.host()
         self.next = None
@@ -241,7 +243,9 @@ class ControlTest:
         self.before, self.given, self.command = self.given, self.command, 0
         pins = self.pins
         if self.given:
-            pins |= {"start": 0, "acknowledged": 0}
+            pins |= {"start": 0, "acknowledged": int(bool(self.unacknowledged) and self.rng.random() < 0.2)}
+        elif not self.unacknowledged and self.rng.random() < 0.2:
+            pins["acknowledged"] = 1
         # Data that nobody asks for are noise.
         noise = self.rng.getrandbits
         front_error = self.in_front.front_error if pins["front_done"] and self.in_front else noise(6)
@@ -266,29 +270,20 @@ class ControlTest:
         pins, rng = self.pins, self.rng
         now = self.now
         # What the control says of before.
-        assert self.value("locked_o") in (0, 1) and (self.value("locked_o") == 0 or self.pending)
+        locked, refused = self.value("locked_o"), self.value("refused_o")
+        assert locked == 1 if pins["start"] else locked == 0 or self.pending, "a frame that is started can be written"
+        assert not refused or (pins["start"] and self.pending)
         assert self.value("started_o") == self.started % (1 << 16)
-        if self.pending and not self.value("locked_o"):  # taken in the cycle before
+        acknowledged = pins["acknowledged"] and self.unacknowledged
+        self.stray += pins["acknowledged"] and not self.unacknowledged
+        if self.pending and not (refused if pins["start"] else locked):  # taken in the cycle before
             assert self.in_front is None, "a second frame in the front end"
             self.in_front, self.pending = self.pending, None
             self.in_front.stamps[0] = (now - 1) % (1 << 32)
             self.front_stage = None
-        assert self.value("refused_o") == (pins["start"] and self.value("locked_o"))
-        self.refused += self.value("refused_o")
-        # Posts.
-        if self.value("post_o"):
-            frame, self.in_rendering = self.in_rendering, None
-            assert frame is not None and self.rendering_stage == "over", "a post of nothing"
-            assert self.unacknowledged is None, "posted before the last one was acknowledged"
-            assert self.value("tag_o") == frame.d["tag"] and self.value("bank_o") == frame.bank
-            self.error = frame.error
-            self.finished += 1
-            self.posted.append(frame)
-            assert [f.number for f in self.posted] == sorted(f.number for f in self.posted)
-            self.unacknowledged = frame
-            self.ack_in = self.acknowledge()
-        if self.error is not None:
-            assert self.value("error_o") == self.error
+        assert refused == (pins["start"] and bool(self.pending))
+        self.refused += refused
+        self.check_posted()
         assert self.value("finished_o") == self.finished % (1 << 16)
         # Rendering half: the frame that has left the front end.
         start_r = self.value("rendering_start_o")
@@ -343,7 +338,7 @@ class ControlTest:
         assert not (r and self.rendering_stage != "over") or self.value("rendering_busy_o")
         self.both += self.front.left is not None and self.rendering.left is not None
         # The next cycle.
-        accepted = pins["start"] and not self.value("locked_o")
+        accepted = pins["start"] and not refused
         if accepted:
             self.pending, self.next = self.next, None
             self.started += 1
@@ -356,16 +351,12 @@ class ControlTest:
             self.front_stage = "run"
         if start_r:
             self.rendering_stage = "run"
-        if pins["acknowledged"]:
-            self.unacknowledged = None
+        self.show(acknowledged)
         pins["front_done"] = int(self.front.step(bool(start_f)))
         pins["rendering_done"] = int(self.rendering.step(bool(start_r)))
         for name, copy, shown in (("copy_front_done", self.copies["front"], copying_front), ("copy_rendering_done", self.copies["rendering"], copying)):
             pins[name] = int(copy.step(bool(shown and not pins[name] and copy.left is None)))
-        pins["acknowledged"] = 0
-        if self.unacknowledged:
-            self.ack_in -= 1
-            pins["acknowledged"] = int(self.ack_in <= 0)
+        pins["acknowledged"] = self.next_acknowledged()
         pins["start"] = 0
         if self.pending and self.left and rng.random() < 0.02:  # refused, unless the other is taken now
             self.next = self.next or self.new_frame()
@@ -376,19 +367,53 @@ class ControlTest:
                 self.next = self.next or self.new_frame()
                 pins["start"], self.wait = 1, self.host()
 
+    def check_posted(self):
+        """A post, and what is shown of the frame posted last."""
+        if self.value("post_o"):
+            frame, self.in_rendering = self.in_rendering, None
+            assert frame is not None and self.rendering_stage == "over", "a post of nothing"
+            assert self.unacknowledged is None, "posted before the last one was acknowledged"
+            self.shown = (frame.d["tag"], frame.error, frame.bank)
+            self.finished += 1
+            self.posted.append(frame)
+            assert [f.number for f in self.posted] == sorted(f.number for f in self.posted)
+            self.unacknowledged = frame
+            self.ack_in = self.acknowledge()
+        assert (self.value("tag_o"), self.value("error_o"), self.value("bank_o")) == self.shown
+
+    def show(self, acknowledged):
+        """What is shown in the next cycle: an abort or a time-out once no posted frame waits."""
+        if self.late and not self.unacknowledged:
+            self.shown = (self.shown[0], self.late, self.shown[2])
+            self.late = 0
+        if acknowledged:
+            self.unacknowledged = None
+
+    def next_acknowledged(self) -> int:
+        if not self.unacknowledged:
+            return 0
+        self.ack_in -= 1
+        return int(self.ack_in <= 0)
+
     def check_cleared(self):
-        """A cycle with a command: what it does is there in the next one."""
+        """A cycle with a command: what it does is there in the next one. What is posted stays, unless all begins anew."""
         clear, aborted, timed_out, reset = (self.given >> k & 1 for k in range(4))
         assert not (self.before and self.value("post_o")), "a forgotten frame is posted"
-        if aborted or timed_out or reset:
-            self.error = 0 if reset else aborted * ABORTED | timed_out * TIMED_OUT
-        elif self.value("post_o"):
-            self.error = None
+        acknowledged = self.pins["acknowledged"] and self.unacknowledged
+        if reset:
+            assert not self.value("post_o")
+            self.unacknowledged, self.late, self.shown = None, 0, (0, 0, 0)
+            self.started = self.finished = 0
+        else:
+            self.check_posted()
+            self.late = TIMED_OUT if timed_out else (self.late or aborted * ABORTED)
+            if aborted and self.unacknowledged:
+                self.shown = (self.shown[0], self.shown[1] | ABORTED, self.shown[2])
+            self.show(acknowledged)
         if clear:
             self.finished = self.started
-        if reset:
-            self.started = self.finished = 0
         self.forget()
+        self.pins["acknowledged"] = self.next_acknowledged()
 
 
 @cocotb.test()
@@ -402,6 +427,7 @@ async def frames(dut, speeds):
     kinds = {(f.legal, f.front_error > 0 and f.legal, f.rendering_error > 0 and f.rendered) for f in test.posted}
     assert len(kinds) == 4
     assert {f.bank for f in test.posted} == {0, 1}
+    assert test.stray > 60
     if max(speeds) > 1 and speeds[4] == 1:
         assert test.both > 0 and test.refused > 0
 

@@ -31,7 +31,7 @@ from ..fit.parameters import SH, Parameters
 from ..fit.render import Draw, render
 from ..fit.start import extent_of
 from ..fit.through import through
-from ..progress import Steps
+from ..progress import Steps, undivided
 from ..scene.camera import Camera, cameras_text
 from ..scene.clusters import reorder
 from ..scene.gaussians import Scene
@@ -112,7 +112,7 @@ def sound(scene: Scene, cameras: Sequence[Camera], steps: Steps | None = None) -
         kept = np.flatnonzero(good)
         if not len(kept):
             raise FlickerError(f"{scene.path or 'scene'}: no Gaussian whose numbers are finite in every view")
-        here, pictures = Parameters(parameters.values[kept]), []
+        here, pictures = parameters.like(parameters.values[kept]), []
         with (steps or Steps()).bar("pictures of the full scene") as report:
             for k, camera in enumerate(cameras):
                 report(k, len(cameras))
@@ -154,7 +154,8 @@ class Reducer:
         self.best: tuple[np.ndarray, np.ndarray, float, int] | None = None  # values, coefficients, dB, removed of the best so far, which is returned to
         self.stale = 0
         self.good = self.parameters.values.copy(), self.coefficients.copy(), float("inf")  # the smallest scene that reaches dB, likewise
-        self._digest = hashlib.blake2b(self.parameters.values.tobytes(), digest_size=16).hexdigest()
+        content = self.parameters.values.tobytes() + b"antialiased" * self.parameters.antialiased
+        self._digest = hashlib.blake2b(content, digest_size=16).hexdigest()
         self._steps, self._told = Steps(), lambda row: None
 
     # -- what things are now ----------------------------------------------------------------------------------------------------------
@@ -162,7 +163,7 @@ class Reducer:
     def scene(self) -> Scene:
         """With no more SH coefficients than any Gaussian has."""
         values = self.parameters.values[:, : SH + 3 * int(self.coefficients.max(initial=1))]
-        return Parameters(values).scene()
+        return self.parameters.like(values).scene()
 
     def frame_cost(self, lanes: bool = False) -> FrameCost:
         """Of frames of some held-out views, at the chip's size."""
@@ -182,7 +183,7 @@ class Reducer:
     def _select(self, keep: np.ndarray) -> None:
         if not len(keep):
             raise FlickerError(f"budget: no Gaussian is left after {self.round} rounds")
-        self.parameters = Parameters(self.parameters.values[keep])
+        self.parameters = self.parameters.like(self.parameters.values[keep])
         self.coefficients = self.coefficients[keep]
         self.moments.select(keep, 0)
 
@@ -192,7 +193,7 @@ class Reducer:
     def _return_to_best(self) -> None:
         assert self.best is not None
         values, coefficients, _, self.removed = self.best
-        self.parameters, self.coefficients = Parameters(values.copy()), coefficients.copy()
+        self.parameters, self.coefficients = self.parameters.like(values.copy()), coefficients.copy()
         self.moments = Adam.of(values)
 
     def _merge(self) -> None:
@@ -203,7 +204,8 @@ class Reducer:
         self.phase = Phase.REMOVE
         if self.options.merge:
             values = merge(self.parameters.values, self.options.merge, self._steps)
-            self.parameters, self.coefficients, self.moments = Parameters(values), self.coefficients[: len(values)], Adam.of(values)  # all have as many
+            self.parameters, self.moments = self.parameters.like(values), Adam.of(values)
+            self.coefficients = self.coefficients[: len(values)]  # all have as many
             decibels = self.measure()
             if self.options.goal.kind is Kind.DB and decibels >= self.options.goal.value:
                 self.good = values.copy(), self.coefficients.copy(), decibels
@@ -292,7 +294,7 @@ class Reducer:
                 self.good = self.parameters.values.copy(), self.coefficients.copy(), decibels
                 over = len(self.parameters) * self.ratio < 1
             else:
-                self.parameters, self.coefficients = Parameters(self.good[0].copy()), self.good[1].copy()
+                self.parameters, self.coefficients = self.parameters.like(self.good[0].copy()), self.good[1].copy()
                 self.moments = Adam.of(self.parameters.values)
                 over = self.ratio >= _LEAST_SHRINK
                 self.ratio = float(np.sqrt(self.ratio))
@@ -316,7 +318,7 @@ class Reducer:
         cut(self.parameters, self.coefficients, lost, found, order[: np.searchsorted(np.cumsum(found.error[order]), self.options.degrees * error)])
         decibels = self.measure()
         if self.options.goal.kind is Kind.DB and decibels < self.options.goal.value:
-            self.parameters, self.coefficients, decibels = Parameters(before[0]), before[1], self.good[2]
+            self.parameters, self.coefficients, decibels = self.parameters.like(before[0]), before[1], self.good[2]
         self._told_row("SH coefficients", decibels)
 
     def _refit(self) -> None:
@@ -331,7 +333,7 @@ class Reducer:
             self.parameters, self.fitted, self.wanted, self.coefficients, iterations=self.options.refit, steps=self._steps, draw=self._draw,
         )
         for share in _REFIT_SHARES:
-            self.parameters = Parameters(before + np.float32(share) * (found.values - before))
+            self.parameters = self.parameters.like(before + np.float32(share) * (found.values - before))
             decibels = self.measure()
             if decibels > self.best[2]:
                 self._keep_best(decibels)
@@ -376,23 +378,34 @@ class Reducer:
             self._last()
 
     def run(self, steps: Steps | None = None, told: Callable[[Row], None] | None = None, keep: Callable[[], None] | None = None) -> None:
-        """All that is left. told(row): after each step of the table; keep(): every so many steps."""
+        """All that is left. told(row): after each step of the table; keep(): every so many steps, and at Ctrl-C between two steps of tuning."""
         self._steps, self._told = steps or Steps(), told or (lambda row: None)
+        keep = keep or (lambda: None)
         while self.phase is not Phase.DONE:
             if self.phase in (Phase.TUNE, Phase.LAST):
-                phase, most = self.phase, self.options.steps if self.phase is Phase.TUNE else self.options.last
-                with self._steps.bar("tuning") as report:
-                    while self.phase is phase:
-                        self.advance()
-                        report(self.step, most)
-                        if keep and self.step % SAVE_EVERY == 0:
-                            keep()
+                self._run_tuning(keep)
             else:
                 self.advance()
-                if keep:
-                    keep()
-        if keep:
-            keep()
+                keep()
+        keep()
+
+    def _run_tuning(self, keep: Callable[[], None]) -> None:
+        phase, most = self.phase, self.options.steps if self.phase is Phase.TUNE else self.options.last
+        whole = True
+        try:
+            with self._steps.bar("tuning") as report:
+                while self.phase is phase:
+                    with undivided():
+                        whole = False
+                        self.advance()
+                        whole = True
+                    report(self.step, most)
+                    if self.step % SAVE_EVERY == 0:
+                        keep()
+        except KeyboardInterrupt:
+            if whole:
+                keep()
+            raise
 
     # -- state ------------------------------------------------------------------------------------------------------------------------
 
@@ -428,7 +441,7 @@ class Reducer:
                 theirs = numbers["identity"][key]
                 if theirs != ours:
                     raise FlickerError(f"{path}: is of another {key.rstrip('s')}" if key in ("scene", "views") else f"{path}: has {key} {theirs}, not {ours}")
-            self.parameters, self.coefficients = Parameters(arrays["values"]), arrays["coefficients"]
+            self.parameters, self.coefficients = self.parameters.like(arrays["values"]), arrays["coefficients"]
             self.moments = Adam(arrays["m"], arrays["v"], numbers["adam"])
             self.order, self.phase = arrays["order"], Phase(numbers["phase"])
             self.step, self.round, self.removed, self.ratio = numbers["step"], numbers["round"], numbers["removed"], numbers["ratio"]

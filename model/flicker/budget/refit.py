@@ -285,7 +285,7 @@ def refit(
             direction = scaled + (size / old) * direction
     values = parameters.values.copy()
     values[:, SH:] = (x0 + delta).reshape(len(values), -1)
-    found = Parameters(values)
+    found = parameters.like(values)
     good = found.finite()
     values[~good] = parameters.values[~good]
     after = 0.0

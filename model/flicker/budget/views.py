@@ -44,9 +44,9 @@ def orbits(scene: Scene, count: int, size: tuple[int, int], up: str | None, seed
 def cameras_of(
     scene: Scene, path: Path | None = None, count: int = VIEWS, size: tuple[int, int] | None = None, up: str | None = None, seed: int = 1,
 ) -> tuple[list[Camera], list[Camera]]:
-    """Cameras to fit and cameras held out. path: a cameras.json, all of which are taken; None: `orbits`, `count` of them.
+    """Cameras to fit and cameras held out. path: a file or folder of cameras, all of which are taken; None: `orbits`, `count` of them.
 
-    size: (width, height) of the pictures; focal lengths scale with it. None: that of the cameras of the file, `SIZE` of an orbit. FlickerError names the
+    size: (width, height) of the pictures, as `Camera.resized` makes them. None: that of the cameras of the file, `SIZE` of an orbit. FlickerError names the
     file and the field.
     """
     if path is not None:

@@ -4,7 +4,7 @@ The cull is conservative with respect to `projection.project`: it never drops a 
 picture. With camera-space mean (X, Y, z), z > NEAR, standard deviations <= s and the Jacobian's clamped slopes a, b
 (|a| <= lim_x, |b| <= lim_y) the long axis of the undilated footprint is at most s f sqrt(1 + a^2 + b^2) / z =: s F /
 z with f = max(fx, fy), and the circle's radius at most 3 s F / z + 3 sqrt(DILATION + sqrt(0.1)) + 1 =: 3 s F / z + m
-(dilation, the rasterizer's floor under its discriminant, rounding up). The left border is therefore reached only if
+(dilation, the rasterizer's floor under its discriminant, rounding up). The clamped slopes lie in `slope_range`. The left border is therefore reached only if
 fx X + (c_x + m) z + 3 s F > 0, a half-space; likewise the others and z > NEAR. A cluster is dropped when the largest
 value of a left-hand side over its box or sphere of means, with its largest s, is not positive.
 """
@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import FlickerError
-from ..front.projection import _CLAMP, DILATION, NEAR
+from ..front.projection import DILATION, NEAR, slope_range
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.clusters import Clusters
@@ -28,12 +28,11 @@ def planes(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     A Gaussian can be visible only if normal . mean + offset + factor * sigma > 0 for all five.
     """
-    lim_x, lim_y = (_CLAMP * 0.5 * n / f for n, f in ((camera.width, camera.fx), (camera.height, camera.fy)))
+    lim_x, lim_y = np.abs(slope_range(camera)).max(axis=1)
     reach = 3.0 * max(camera.fx, camera.fy) * np.sqrt(1.0 + lim_x**2 + lim_y**2)
     m = _RADIUS_MARGIN
     normals = [(0.0, 0.0, 1.0)]
-    for axis, (f, n) in enumerate(((camera.fx, camera.width), (camera.fy, camera.height))):
-        middle = 0.5 * (n - 1)
+    for axis, (f, n, middle) in enumerate(((camera.fx, camera.width, camera.cx), (camera.fy, camera.height, camera.cy))):
         beyond = TILE * -(-n // TILE)  # the rasterizer's tiles may reach beyond the picture
         for sign, depth in ((1.0, middle + m), (-1.0, beyond - middle + m)):
             normal = [0.0, 0.0, depth]

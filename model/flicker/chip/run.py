@@ -16,7 +16,7 @@ from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
 from ..golden.lanes.render import LaneFrame
 from ..params import CHANNELS, CORES, Coords, RenderConfig
-from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_scene
+from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_for_picture
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..sim.chip import ChipFrame, ChipSession, build
@@ -54,11 +54,11 @@ def _picture(
     camera = view.camera
     red, green, blue = (round(255 * float(v)) for v in view.background)
     if engine is Engine.CHIP_GOLDEN:
-        front, _ = bit_true_front(view, config, Front.GOLDEN, options, steps)
+        front, packing = bit_true_front(view, config, Front.GOLDEN, options, steps)
         lists, stats = lane_lists(front, steps) if config.by_lanes else golden_lists(front, steps)
         with steps.step("rendering with the chip's golden model"):
             golden = render_chip(lists, config, background=(red, green, blue))
-        stats |= {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)}
+        stats |= packing | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)}
         if isinstance(golden.frame, LaneFrame):
             stats |= lane_stats(golden.frame, config)
         else:
@@ -66,14 +66,14 @@ def _picture(
             stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
         return _frame_image(golden.buffer, camera), stats
     with steps.step("packing the scene"):
-        packed = packed_scene(view, options.format)
+        packed, packing = packed_for_picture(view, options)
     with steps.step("building the chip's simulator (once per configuration)"):
         build(config)
     with steps.bar("simulating the chip") as report, ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
         seconds = time.process_time() - began
-        stats = chip_stats(chip, frame, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
+        stats = packing | chip_stats(chip, frame, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
     return _frame_image(frame.buffer, camera), stats
 
 

@@ -13,7 +13,8 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from .options import RichSteps, check_scene, check_there, console, parse_size, writable, write_atomically
+from .kept import Checkpoint, checkpoint_path
+from .options import RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 from .tables import decibels
 
@@ -40,16 +41,20 @@ def _show(rows, seconds: list[float | None]) -> None:
 
 
 def budget(
-    scene: Annotated[str, typer.Argument(help="scene file, or demo")],
+    scene: Annotated[str, typer.Argument(help="scene as for flicker render, or demo")],
     out: Annotated[Path, typer.Option("--out", "-o", help="scene: .ply, .compressed.ply, .spz or .flk")],
     keep: Annotated[float | None, typer.Option(help="share of the Gaussians that may stay, such as 0.4")] = None,
     db: Annotated[float | None, typer.Option(help="least mean PSNR against the full scene on held-out views; as few Gaussians as reach it")] = None,
     cycles: Annotated[float | None, typer.Option(help="of a frame, at most, as flicker cost counts them")] = None,
     mbytes: Annotated[float | None, typer.Option(help="10^6 bytes of a frame, at most, as flicker cost counts them")] = None,
-    views: Annotated[Path | None, typer.Option(help="INRIA cameras.json, every sixth held out (default: orbits at several distances and heights)")] = None,
+    views: Annotated[Path | None, typer.Option(
+        help="as --cameras of flicker render, every sixth held out (default: orbits at several distances and heights)",
+    )] = None,
     count: Annotated[int | None, typer.Option(help="cameras of the orbits, every sixth held out [default: 144]", min=3)] = None,
-    size: Annotated[str | None, typer.Option(help="WxH of the pictures that are fitted to [default: the cameras', 480x270 of orbits]")] = None,
-    frame: Annotated[str, typer.Option(help="WxH of the frames whose cycles and bytes are counted")] = "1280x720",
+    size: Annotated[str | None, typer.Option(
+        help="WxH of the pictures that are fitted to, as --size of flicker render [default: the cameras', 480x270 of orbits]",
+    )] = None,
+    frame: Annotated[str, typer.Option(help="WxH of the frames whose cycles and bytes are counted, as --size of flicker render")] = "1280x720",
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbits: x, y, z, -x, -y, -z [default: -y]")] = None,
     by: Annotated[ScoreChoice, typer.Option(help="of Gaussians: change of the pictures without it, or sum or largest of alpha T")] = ScoreChoice.CHANGE,
     rounds: Annotated[int, typer.Option(help="of removal, on the way to a share, cycles or bytes", min=1, max=40)] = 4,
@@ -63,7 +68,7 @@ def budget(
     engine: Annotated[str, typer.Option(help="what draws the views that are tuned: numba, or gsplat on a GPU, as --engine of flicker fit")] = "numba",
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     form: Annotated[FormatChoice, typer.Option("--format", help="in memory: of a .flk, and of the frames that are counted")] = FormatChoice["CHUNK"],
-    checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to, .npz")] = None,
+    checkpoint: Annotated[Path | None, typer.Option(help="file that the state is written to; default: OUT.checkpoint.npz, which goes when all is done")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="continue from the checkpoint, if it is there")] = False,
     json_: Annotated[Path | None, typer.Option("--json", help="what each step gave, as JSON")] = None,
 ) -> None:
@@ -81,10 +86,10 @@ def budget(
         from ..budget.write import check_suffix, save
         from ..fit.engines import engine as engine_of
         from ..fit.through import through as machine_of
-        from ..front.view import DEMO
-        from ..scene.demo import generate
+        from ..scene.camera import DEFAULT_UP, camera_files
         from ..scene.files import load_scene
         from ..scene.packed import PackedFormat
+        from ..scene.sources import read_scene
 
     (name, value), = given.items()
     goal = Goal(Kind(name), value)
@@ -92,10 +97,9 @@ def budget(
     if through is not None:
         machine_of(through)
     engine_of(engine, through is not None)
-    for path, option in ((out, "--out"), (checkpoint, "--checkpoint"), (json_, "--json")):
+    for path, option in ((out, "--out"), (json_, "--json")):
         writable(path, option)
-    if resume and checkpoint is None:
-        raise FlickerError("--resume: from which --checkpoint?")
+    place = checkpoint_path(checkpoint, out)
     if views is not None and count is not None:
         raise FlickerError(f"--count: all cameras of {views} are taken")
     counted = parse_size(frame)
@@ -103,17 +107,19 @@ def budget(
     options = Options(goal, Score(by.value), rounds, steps, last, degrees, seed, counted, PackedFormat(form.value), through, least, refit, merge, engine)
     progress = RichSteps()
     with progress.step(f"loading {scene}"):
-        full = generate() if scene == DEMO else load_scene(scene)
+        full = read_scene(scene)
     fitted, held = cameras_of(full, views, VIEWS if count is None else count, parse_size(size), up, seed)
     held[0].resized(*counted)
     clean, pictures, broken = sound(full, [*fitted, *held], progress)
     console.print(f"{scene}: {len(clean):,} Gaussians; {len(fitted)} views to fit, {len(held)} held out, {fitted[0].width}x{fitted[0].height}")
+    cameras_from = f"orbits, up {up or DEFAULT_UP}" if views is None else str(camera_files(views)[0])
+    say_source(full.path or scene, cameras_from)
     bad = sum(full.rejected.values()) + broken
     if bad:
         console.print(f"{bad:,} Gaussians were left out: numbers that are not finite, or make no sense")
     reducer = Reducer(clean, fitted, held, pictures, options)
-    if checkpoint is not None and resume and checkpoint.exists():
-        reducer.restore(checkpoint)
+    kept = Checkpoint(place, checkpoint is None, reducer.save, lambda: f"the state after {len(reducer.rows)} steps of the table, {reducer.phase.value} next")
+    if kept.begin(resume, reducer.restore):
         console.print(f"continues after {len(reducer.rows)} steps of the table")
     began = time.monotonic()
     seconds: list[float | None] = [None] * len(reducer.rows)
@@ -122,11 +128,13 @@ def budget(
         seconds.append(time.monotonic() - began)
         console.print(f"{row.step:20} {row.gaussians:9,} Gaussians {decibels(row.decibels):>9} on the held-out views {seconds[-1]:6.0f} s")
 
-    reducer.run(progress, told, None if checkpoint is None else lambda: write_atomically(checkpoint, reducer.save))
+    with kept.interruptible():
+        reducer.run(progress, told, kept.keep)
     found = reducer.scene()
     if not len(found):
         raise FlickerError("budget: no Gaussian is left")
     write_atomically(out, lambda path: save(found, out, path, options.form, progress))
+    kept.finish()
     written = load_scene(out)
     lost = reference_psnr(clean, written, held, progress)
     at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
@@ -148,7 +156,8 @@ def budget(
     console.print(table)
     if json_ is not None:
         text = json.dumps({
-            "scene": scene, "goal": {goal.kind.value: goal.value}, "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
+            "scene": scene, "cameras": cameras_from, "goal": {goal.kind.value: goal.value},
+            "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
             "held_out_db": lost, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
             "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
         }, indent=2)

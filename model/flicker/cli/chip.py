@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from .options import check_scene, check_there, console, parse_size, writable, write_atomically
+from .options import CAMERAS_HELP, SIZE_HELP, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .tables import decibels
 
 
@@ -61,11 +61,11 @@ def _show_built(fact: dict) -> None:
 
 
 def chip(
-    scene: Annotated[Path, typer.Argument(help="scene file")],
-    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    scene: Annotated[Path, typer.Argument(help="scene as for flicker render, or demo")],
+    cameras: Annotated[Path | None, typer.Option(help=CAMERAS_HELP)] = None,
     view: Annotated[int, typer.Option(help="number of the camera")] = 0,
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
-    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
+    size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     config: Annotated[str, typer.Option(help="configuration of the rendering stage (flicker report --list)")] = "flicker",
     render_cycles: Annotated[int | None, typer.Option(help="cycles of the rendering stage [default: its cycle model]")] = None,
     memory: Annotated[str, typer.Option(help="parameters in DRAM: fp16, fp16-local, chunk, chunk-sh")] = "chunk",
@@ -75,7 +75,7 @@ def chip(
     formats: Annotated[bool, typer.Option("--formats", help="picture quality and bytes of the memory formats")] = False,
     keys: Annotated[bool, typer.Option("--keys", help="picture quality of short depth keys")] = False,
     constants: Annotated[bool, typer.Option("--constants", help="list the constants with their sources")] = False,
-    out: Annotated[Path | None, typer.Option(help="the estimate as JSON")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="the estimate as JSON")] = None,
 ) -> None:
     """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, first by the models that are held to it."""
     writable(out, "--out")
@@ -89,6 +89,7 @@ def chip(
     from ..chip.frame import ChipConfig, frame_estimate, prepare
     from ..chip.schemes import RECOMMENDED, SCHEMES
     from ..explore.configurations import get_configuration
+    from ..front.unseen import why_empty
     from ..front.view import load_view
     from ..scene.memory import MemoryFormat
 
@@ -109,6 +110,9 @@ def chip(
         frame = estimate(prepared, configuration, setting)
     else:
         frame = frame_estimate(prepared, render_cycles, setting)
+    say_source(loaded.scene.path or scene, loaded.cameras_from)
+    if nothing := why_empty(loaded):
+        console.print(nothing, highlight=False, soft_wrap=True)
     console.print(f"{scene.name}, view {view}, {loaded.camera.width}x{loaded.camera.height}, {config}, memory {memory}, refresh {refresh}, scheme {scheme}")
     built = {}
     if render_cycles is None and scheme == RECOMMENDED and memory == FRONTS[configuration.form][0] and chip_stage(configuration) is not None:
@@ -142,6 +146,6 @@ def chip(
             table.add_row(name, f"{value:,}", source)
         console.print(table)
     if out is not None:
-        given = {"scene": str(scene), "view": view, "config": config, "memory": memory, "refresh": refresh, "scheme": scheme}
+        given = {"scene": str(scene), "view": view, "cameras": loaded.cameras_from, "config": config, "memory": memory, "refresh": refresh, "scheme": scheme}
         text = json.dumps(frame.as_dict() | given | {"rtl": built}, indent=2)
         write_atomically(out, lambda path: path.write_text(text + "\n"))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from .options import RichSteps, check_scene, check_there, console, parse_size, writable, write_atomically
+from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 
 
@@ -63,14 +63,14 @@ def _show(cost, numbers: list[int]) -> None:
 
 
 def cost(
-    scene: Annotated[str, typer.Argument(help="scene file, or demo")],
-    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
+    scene: Annotated[str, typer.Argument(help="scene as for flicker render, or demo")],
+    cameras: Annotated[Path | None, typer.Option(help=CAMERAS_HELP)] = None,
     view: Annotated[int | None, typer.Option(help="number of one camera [default: --views of them, evenly spread]")] = None,
     views: Annotated[int, typer.Option(help="how many cameras", min=1)] = 8,
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
-    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
+    size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory [default: chunk or as packed]")] = None,
-    out: Annotated[Path | None, typer.Option(help="picture: Gaussians visited per pixel of the dearest view")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="picture: Gaussians visited per pixel of the dearest view")] = None,
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
 ) -> None:
     """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
@@ -80,23 +80,27 @@ def cost(
     check_scene(scene)
     check_there(cameras)
     from ..chip.scene_cost import scene_cost
-    from ..front.view import DEMO, load_view
-    from ..scene.camera import find_cameras
-    from ..scene.demo import demo_cameras
+    from ..front.unseen import why_empty
+    from ..front.view import view_of
     from ..scene.packed import PackedFormat
+    from ..scene.sources import open_scene
 
-    loaded = load_view(scene, view or 0, wanted, cameras, up)
-    found = demo_cameras() if scene == DEMO else find_cameras(loaded.scene, cameras, up)
+    source = open_scene(scene, cameras, up)
+    found = source.cameras
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]
-    chosen = [found[n] if wanted is None else found[n].resized(*wanted) for n in numbers]
-    result = scene_cost(loaded.scene, chosen, form=None if form is None else PackedFormat(form.value), steps=RichSteps())
+    chosen = [view_of(source, n, wanted) for n in numbers]
+    result = scene_cost(source.scene, [of.camera for of in chosen], form=None if form is None else PackedFormat(form.value), steps=RichSteps())
     packed = result.packing.packed
     console.print(f"{scene}: {len(result.scene):,} Gaussians, {packed.format.value}, {len(packed.table):,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
+    say_source(source.file, source.cameras_from)
+    for of, found_of in zip(chosen, result.views):
+        if not found_of.recorded.any() and (nothing := why_empty(of)):
+            console.print(f"view {of.number}: {nothing}", highlight=False, soft_wrap=True)
     _show(result, numbers)
     if out is not None:
         dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
         _picture(result, dearest, out)
         console.print(f"view {numbers[dearest]}: {out}")
     if json_ is not None:
-        text = json.dumps({"scene": scene, "numbers": numbers} | result.summary(), indent=2)
+        text = json.dumps({"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary(), indent=2)
         write_atomically(json_, lambda path: path.write_text(text + "\n"))

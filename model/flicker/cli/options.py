@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import FlickerError
@@ -37,6 +38,22 @@ class RichSteps(Steps):
             yield lambda done, total: p.update(task, completed=done, total=total)
 
 
+def say_source(scene: object, cameras_from: str) -> None:
+    """Which scene and cameras are used."""
+    console.print(f"{scene}: cameras: {cameras_from}", highlight=False, soft_wrap=True)
+
+
+class Within(Steps):
+    """Progress of one of several runs: shares go to the bar of all. report: takes a number from 0 to 1."""
+
+    def __init__(self, report: Callable[[float], None]) -> None:
+        self.report = report
+
+    @contextmanager
+    def bar(self, text: str):
+        yield lambda done, total: self.report(done / max(total, 1))
+
+
 def parse_size(text: str | None) -> tuple[int, int] | None:
     """`WxH` to two integers; the camera checks the range."""
     if text is None:
@@ -45,6 +62,50 @@ def parse_size(text: str | None) -> tuple[int, int] | None:
     if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
         raise FlickerError(f"--size: expected WxH such as 1280x720, not '{text}'")
     return int(parts[0]), int(parts[1])
+
+
+CAMERAS_HELP = (
+    "cameras.json (INRIA), transforms.json, camera_path.json, or a folder of COLMAP's (default: cameras.json that goes with the scene, else an orbit)"
+)
+SIZE_HELP = "WxH; the vertical field of view stays, and the shape of the pixels: sideways the picture is cropped or extended"
+BACKGROUND_HELP = "black, white or r,g,b from 0 to 1: behind the scene"
+
+
+def parse_view(text: str) -> int | None:
+    """The number of a camera; None: `all`."""
+    if text == "all":
+        return None
+    try:
+        return int(text)
+    except ValueError:
+        raise FlickerError(f"--view: expected the number of a camera or all, not '{text}'") from None
+
+
+def background_of(text: str) -> tuple[float, float, float]:
+    """RGB of `--background`."""
+    from ..scene.photos import parse_background
+
+    try:
+        return parse_background(text)
+    except FlickerError as error:
+        raise FlickerError(f"--{error}") from None
+
+
+def writable_folder(folder: Path, option: str) -> None:
+    """Fail before any work when nothing could be written into a folder, which need not be there yet."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except FileExistsError:
+        raise FlickerError(f"{option}: {folder}: not a folder") from None
+    except OSError as error:
+        raise FlickerError(f"{option}: {folder}: cannot be written ({error.strerror})") from None
+    finally:
+        for place in missing:  # what was made to find out
+            with suppress(OSError):
+                place.rmdir()
 
 
 def writable(path: Path | None, option: str) -> None:
@@ -61,10 +122,11 @@ def writable(path: Path | None, option: str) -> None:
 
 def check_scene(scene: str | Path) -> None:
     """Fail before a second of imports where there is no such scene, or nothing that is one."""
-    if str(scene) != "demo":
-        from ..scene.files import scene_kind
+    from ..scene.files import scene_kind
+    from ..scene.sources import DEMO, scene_path
 
-        scene_kind(scene)
+    if str(scene) != DEMO:
+        scene_kind(scene_path(scene))
 
 
 def check_there(*paths: Path | None) -> None:

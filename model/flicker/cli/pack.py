@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..errors import FlickerError
+from ..errors import FlickerError, FlickerWarning
 from .options import RichSteps, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
@@ -48,7 +50,37 @@ def _contents(packed: PackedScene, title: str) -> Table:
     for name, corner in (("lowest mean", packed.table["low"].min(axis=0)), ("highest mean", packed.table["high"].max(axis=0))):
         table.add_row(name, " ".join(f"{x:.4g}" for x in corner))
     table.add_row("largest deviation", f"{packed.sigma.max():.4g}")
+    if packed.antialiased:
+        table.add_row("antialiased", "yes")
     return table
+
+
+def _measured(table: Table, packed: PackedScene, path: Path, brought: bool) -> None:
+    """How coarse positions and depth keys are, in the scene's own views or an orbit; warns where that is a loss to be seen. brought: the clusters are the
+    file's own."""
+    from ..golden.front.depths import DepthSteps
+    from ..golden.front.setup import MAX_PICTURE
+    from ..scene.camera import find_cameras
+    from ..scene.demo import demo_cameras
+    from ..scene.packed import decode
+    from ..scene.sources import DEMO
+    from ..scene.steps import chosen_views, measure_steps
+
+    scene = replace(decode(packed), path=path)
+    try:
+        cameras = demo_cameras() if str(path) == DEMO else find_cameras(scene)
+    except FlickerError as error:
+        warnings.warn(FlickerWarning(f"{error}; steps are measured in an orbit"), stacklevel=2)
+        cameras = find_cameras(replace(scene, path=None))
+    cameras = chosen_views(cameras)
+    steps = measure_steps(packed, cameras)
+    table.add_row("steps of positions", f"{steps.mean:.2g}, largest {steps.largest:.2g}", "units of the scene")
+    table.add_row("", f"{steps.mean_px:.2g}, largest {steps.largest_px:.2g}", f"pixels, in {steps.views} views")
+    if steps.coarse:
+        warnings.warn(FlickerWarning(f"{path}: {steps.warning(brought)}"), stacklevel=2)
+    depths = [DepthSteps.of(packed, camera) for camera in cameras if max(camera.width, camera.height) <= MAX_PICTURE]
+    if coarse := [found for found in depths if found.coarse]:
+        warnings.warn(FlickerWarning(f"{path}: in {len(coarse)} of {len(depths)} views, {coarse[0].warning}"), stacklevel=2)
 
 
 def _history(table: Table, packing: Packing) -> None:
@@ -65,18 +97,21 @@ def pack(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="memory image (.flk)")] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="how Gaussians lie in memory [default: chunk]")] = None,
     info: Annotated[bool, typer.Option("--info", help="check a memory image and say what is in it")] = False,
+    rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own: compressed .ply, .flk")] = False,
 ) -> None:
     """Pack a scene into the image that the chip's memory holds."""
     steps = RichSteps()
     if info:
-        for name, value in (("--out", out), ("--format", form)):
+        for name, value in (("--out", out), ("--format", form), ("--rechunk", rechunk or None)):
             if value is not None:
                 raise FlickerError(f"--info: reads an image, so it cannot be combined with {name}")
         from ..scene.packed import load_packed
 
         with steps.step(f"checking {scene.name}"):
             found = load_packed(scene)
-        console.print(_contents(found, f"{scene.name}, {found.format.value}"))
+            table = _contents(found, f"{scene.name}, {found.format.value}")
+            _measured(table, found, scene, True)
+        console.print(table)
         return
     if out is None:
         raise FlickerError("--out: name the image to write, such as -o scene.flk")
@@ -85,21 +120,23 @@ def pack(
     writable(out, "--out")
     check_scene(scene)
     with steps.step("starting"):
-        from ..scene.demo import generate
         from ..scene.files import scene_title
         from ..scene.packed import PackedFormat
         from ..scene.packing import pack as pack_scene
         from ..scene.packing import pack_file
-    chosen = PackedFormat(form.value if form else "chunk")
-    if str(scene) == "demo":
+        from ..scene.sources import DEMO, read_scene, scene_path
+    chosen, file = PackedFormat(form.value if form else "chunk"), scene_path(scene)
+    if str(scene) == DEMO:
         with steps.step("making the demo scene"):
-            made = generate()
-        packing, title = pack_scene(made, chosen, steps=steps), "demo"
+            made = read_scene(scene)
+        packing, title = pack_scene(made, chosen, steps=steps), DEMO
     else:
-        packing, title = pack_file(scene, chosen, steps=steps), scene_title(scene)
+        packing, title = pack_file(file, chosen, steps=steps, rechunk=rechunk), str(file) if file is not scene else scene_title(scene)
     with steps.step(f"writing {out.name}"):
         image = packing.packed.image()
         write_atomically(out, lambda path: path.write_bytes(image))
     table = _contents(packing.packed, f"{title} in {out.name}, {chosen.value}")
+    with steps.step("measuring"):
+        _measured(table, packing.packed, Path(file), packing.brought)
     _history(table, packing)
     console.print(table)

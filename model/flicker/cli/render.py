@@ -27,7 +27,23 @@ from ..params import (
     Precision,
     RenderConfig,
 )
-from .options import RichSteps, check_scene, check_there, console, parse_size, writable, write_atomically
+from ..progress import Steps
+from .options import (
+    BACKGROUND_HELP,
+    CAMERAS_HELP,
+    SIZE_HELP,
+    RichSteps,
+    Within,
+    background_of,
+    check_scene,
+    check_there,
+    console,
+    parse_size,
+    parse_view,
+    writable,
+    write_atomically,
+)
+from .pictures import Files, check_distinct, write_pictures
 from .tables import decibels
 
 
@@ -74,9 +90,10 @@ def summary(stats: dict, picture: Path | None) -> Table:
 
     table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
     table.add_column(style="bold")
-    table.add_column(justify="right")
+    table.add_column(justify="right", overflow="fold")  # long paths
     if picture is not None:
         table.add_row("picture", str(picture))
+    table.add_row("cameras", stats["cameras"])
     engine = stats["engine"]
     if "formats" in stats:
         engine += " (lanes)"
@@ -119,6 +136,13 @@ def summary(stats: dict, picture: Path | None) -> Table:
         table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
     for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
         table.add_row(Text(reason, "yellow"), _number(count))
+    for key, label in (("alpha", "alpha"), ("depth", "depth of the float64 reference")):
+        if key in stats:
+            table.add_row(label, stats[key]["file"])
+    if "unseen" in stats:
+        for reason, count in stats["unseen"].items():
+            table.add_row(Text(f"nothing is seen: {reason}", "yellow"), _number(count))
+        table.add_row(Text("what may help", "yellow"), stats["advice"])
     return table
 
 
@@ -140,16 +164,20 @@ def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str,
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(help="INRIA or compressed .ply, .spz, .sog, .zip, .splat, .flk; a SOG folder or its meta.json")],
-    cameras: Annotated[Path | None, typer.Option(help="INRIA cameras.json (default: beside the scene, else an orbit)")] = None,
-    view: Annotated[int, typer.Option(help="number of the camera")] = 0,
+    scene: Annotated[Path, typer.Argument(
+        help=".ply, .spz, .sog, .zip, .glb, .gltf, .ksplat, .splat, .flk; a SOG folder or its meta.json; a trainer's output folder; demo",
+    )],
+    cameras: Annotated[Path | None, typer.Option(help=CAMERAS_HELP)] = None,
+    view: Annotated[str, typer.Option(help="number of the camera, or all: --out and others are folders then, or names with %03d; --stats is a list")] = "0",
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
-    size: Annotated[str | None, typer.Option(help="WxH; scales the focal lengths")] = None,
+    size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
+    background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
     engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
     front: Annotated[FrontChoice | None, typer.Option(
         help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
     )] = None,
     memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
+    rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own, not for --front float")] = False,
     lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
     stage: Annotated[StageChoice | None, typer.Option(
         help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
@@ -167,12 +195,16 @@ def render(
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
-    out: Annotated[Path | None, typer.Option(help="picture (.png)")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="picture (.png)")] = None,
+    depth: Annotated[Path | None, typer.Option(
+        help="depth of the float64 reference, whatever the engine (.png of 16 bits, its scale in --stats; 0: nothing there)",
+    )] = None,
+    alpha: Annotated[Path | None, typer.Option(help="what the engine's Gaussians cover of each pixel (.png of 16 bits, 65535: all); not of a chip")] = None,
     stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
 ) -> None:
-    """Render one view of a scene."""
+    """Render one view of a scene, or all."""
     given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
-    chosen: dict[str, object] = {"format": memory, "lists": lists}
+    chosen: dict[str, object] = {"format": memory, "lists": lists, "rechunk": rechunk or None}
     whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
@@ -184,7 +216,7 @@ def render(
         if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
             raise FlickerError(f"{names}: for --front golden and rtl only")
     else:
-        given |= chosen
+        given |= {k: v for k, v in chosen.items() if k != "rechunk"}
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
@@ -200,41 +232,89 @@ def render(
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
     )
-    if out is not None and out.suffix.lower() != ".png":
-        raise FlickerError(f"--out: {out}: only .png is written")
-    writable(out, "--out")
+    number = parse_view(view)
+    results = [Files(option, path, number is None) for option, path in (("--out", out), ("--depth", depth), ("--alpha", alpha))]
+    check_distinct(results)
     writable(stats, "--stats")
-    wanted = parse_size(size)
+    if alpha is not None and whole:
+        raise FlickerError(f"--alpha: not with --engine {engine.value}, whose frame buffer has none; --engine golden has that of the same stage")
+    wanted, behind = parse_size(size), background_of(background)
     check_scene(scene)
     check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
         from ..chip.dram import DramConfig, Refresh
         from ..chip.run import render_on_chip
-        from ..front.view import load_view
+        from ..front.unseen import advice, unseen
+        from ..front.view import view_of
         from ..golden.front.frame import ListKind
         from ..pipeline import Engine, Front, FrontOptions, render_view
+        from ..scene.camera import select_view
         from ..scene.files import scene_title
-        from ..scene.image import save_png
         from ..scene.packed import PackedFormat
-    options = FrontOptions(PackedFormat.FP16, ListKind.BOX) if faithful else FrontOptions(
-        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value),
+        from ..scene.sources import open_scene
+    options = FrontOptions(PackedFormat.FP16, ListKind.BOX, rechunk) if faithful else FrontOptions(
+        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value), rechunk,
     )
     with steps.step(f"loading {scene_title(scene)}"):
-        loaded = load_view(scene, view, wanted, cameras, up)
-    if whole:
-        dram = DramConfig() if refresh is None else DramConfig(refresh=Refresh(refresh.value))
-        result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, dram=dram, compare=compare is not None, steps=steps)
-    else:
-        result = render_view(
-            loaded, engine=Engine(engine.value), config=config, front=Front((front or FrontChoice.FLOAT).value), options=options, compare=compare is not None,
-            steps=steps,
-        )
-    if out is not None:
-        write_atomically(out, lambda path: save_png(path, result.image))
-    if stats is not None:
-        write_atomically(stats, lambda path: path.write_text(json.dumps(result.stats, indent=2) + "\n"))
-    console.print(summary(result.stats, out))
+        source = open_scene(scene, cameras, up)
+        select_view(source.cameras, number or 0)
+
+    def one(k: int, told: Steps) -> dict:
+        """Render and write a view: its statistics."""
+        loaded = view_of(source, k, wanted, behind)
+        if whole:
+            dram = DramConfig() if refresh is None else DramConfig(refresh=Refresh(refresh.value))
+            result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, dram=dram, compare=compare is not None, steps=told)
+        else:
+            result = render_view(
+                loaded, engine=Engine(engine.value), config=config, front=Front((front or FrontChoice.FLOAT).value), options=options,
+                compare=compare is not None, alpha=alpha is not None, steps=told,
+            )
+        found = result.stats | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
+        empty = unseen(loaded, result.image, found.get("visible"))
+        return found if empty is None else found | {"unseen": empty, "advice": advice(empty, source.cameras_from, len(source.cameras))}
+
+    if number is not None:
+        found = one(number, steps)
+        if stats is not None:
+            write_atomically(stats, lambda path: path.write_text(json.dumps(found, indent=2) + "\n"))
+        table = summary(found, out)
+        if source.file != str(scene):
+            table.add_row("scene", source.file)
+        console.print(table)
+        return
+    rows: list[dict] = []
+    try:
+        with steps.bar("views") as report:
+            for k in range(len(source.cameras)):
+                rows.append(one(k, Within(lambda share: report(k + share, len(source.cameras)))))
+    finally:  # what is there is told, also when the rest is interrupted
+        if stats is not None and rows:
+            write_atomically(stats, lambda path: path.write_text(json.dumps(rows, indent=2) + "\n"))
+        if 0 < len(rows) < len(source.cameras):
+            console.print(f"{len(rows)} of {len(source.cameras)} views are written", highlight=False)
+    console.print(_of_all(rows, source.file))
+    for files in results:
+        if files.path is not None:
+            console.print(f"{files}: {len(rows)} views", highlight=False, soft_wrap=True)
+
+
+def _of_all(rows: list[dict], scene: str) -> Table:
+    """A line a view."""
+    keys = [(key, label) for key, label in (
+        ("visible", "visible"), ("subtile_pairs", "sub-tile pairs"), ("psnr_db", "PSNR against float64, dB"), ("cycles", "cycles"),
+    ) if any(key in row for row in rows)]
+    table = Table(title=f"{scene}, cameras: {rows[0]['cameras']}", title_justify="left")
+    for name in ("view", "size", *(label for _, label in keys)):
+        table.add_column(name, justify="right")
+    for row in rows:
+        cells = ["" if (value := row.get(key)) is None else f"{value:.2f}" if key == "psnr_db" else _number(value) for key, _ in keys]
+        table.add_row(str(row["view"]), f"{row['width']}x{row['height']}", *cells)
+    empty = [str(row["view"]) for row in rows if "unseen" in row]
+    if empty:
+        table.caption = f"nothing is seen in view {', '.join(empty)}: {rows[int(empty[0])]['advice']}"
+    return table
 
 
 def demo(

@@ -14,9 +14,13 @@ from .options import check_there, console, parse_size
 
 
 def report(
-    scenes: Annotated[list[str] | None, typer.Argument(help="scenes: FILE, FILE:VIEW, FILE:FIRST-LAST or FILE:all [default: the demo scene]")] = None,
-    out: Annotated[Path, typer.Option(help="folder for index.html, summary.csv, figures")] = Path("build/report"),
-    size: Annotated[str | None, typer.Option(help="WxH of every view [default: the camera's where there is a photograph, else 1280x720]")] = None,
+    scenes: Annotated[list[str] | None, typer.Argument(
+        help="scenes as for flicker render: FILE, FILE:VIEW, FILE:FIRST-LAST or FILE:all [default: demo]",
+    )] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder for index.html, summary.csv, figures")] = Path("build/report"),
+    size: Annotated[str | None, typer.Option(
+        help="WxH of every view, as --size of flicker render [default: the camera's where there is a photograph, else 1280x720]",
+    )] = None,
     photos: Annotated[str | None, typer.Option(help="folder of photographs by img_name, or none [default: those found beside cameras.json]")] = None,
     background: Annotated[str, typer.Option(help="black, white or r,g,b from 0 to 1: as the scene was fitted")] = "black",
     configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
@@ -52,6 +56,8 @@ def report(
     except FlickerError as error:
         raise FlickerError(f"--{error}") from None
     job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind, budget or ())
+    for line in dict.fromkeys(f"{target.scene.path}: cameras: {target.scene.cameras_from}" for target in job.targets):
+        console.print(line, highlight=False, soft_wrap=True)
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(

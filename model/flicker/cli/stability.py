@@ -19,7 +19,7 @@ def stability(
     front: Annotated[bool, typer.Option("--front", help="the packed front ends: records of 16 against 32 bytes, number formats")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen configurations")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
-    out: Annotated[Path, typer.Option(help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
     show: Annotated[bool, typer.Option("--list", help="list families and configurations, run nothing")] = False,
 ) -> None:
     """Run families of hard inputs through every configuration and front end: error against float64, and where each breaks."""

@@ -20,7 +20,7 @@ def sweep(
     config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/sweep.md)")],
     cluster: Annotated[str | None, typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
-    out: Annotated[Path | None, typer.Option(help="folder for results [default: build/sweep]")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for results [default: build/sweep]")] = None,
 ) -> None:
     """Run scenes x views x configurations on Dask; results in Parquet, resumed where an earlier run has stopped."""
     if cluster is not None and workers is not None:
@@ -38,6 +38,8 @@ def sweep(
         wanted = replace(wanted, workers=workers, address=None)
     if out is not None:
         wanted = replace(wanted, out=out)
+    for line in dict.fromkeys(f"{target.scene.path}: cameras: {target.scene.cameras_from}" for target in wanted.targets):
+        console.print(line, highlight=False, soft_wrap=True)
     with Progress(
         TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, transient=True, disable=not console.is_terminal,

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .options import RichSteps, console
+from .kept import printed
+from .options import RichSteps
 
 
 def undistort(
@@ -19,6 +20,14 @@ def undistort(
     from ..fit.undistort import undistort as write
 
     with RichSteps().bar("photographs") as report:
-        sizes = write(dataset, out, size, report)
-    smallest, largest = min(sizes), max(sizes)
-    console.print(f"{out}: {len(sizes)} photographs, {smallest[0]}x{smallest[1]}" + (f" to {largest[0]}x{largest[1]}" if smallest != largest else ""))
+        shots = write(dataset, out, size, report)
+    sizes = sorted({(shot.camera.width, shot.camera.height) for shot in shots})
+    models = sorted({shot.lens.model for shot in shots if shot.lens is not None})
+    printed(f"{out}: {len(shots)} photographs ({', '.join(models)}), {' to '.join(f'{w}x{h}' for w, h in dict.fromkeys((sizes[0], sizes[-1])))}")
+    for count, text in (
+        (sum(bool(shot.turned) for shot in shots), "were turned upright, as EXIF says"),
+        (sum(shot.mask is not None for shot in shots), "have a mask, in masks/"),
+        (sum(shot.solid() is not None for shot in shots), "had transparent parts, which are black"),
+    ):
+        if count:
+            printed(f"{count} of them {text}")

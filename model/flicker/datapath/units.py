@@ -11,7 +11,7 @@ from typing import Any
 
 from ..arithmetic.ff import ff_round, ff_sub
 from ..golden.front import colour, cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, FrontFormats
+from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, MIDDLE_INTEGER, FrontFormats
 from ..params import SUBTILE, Form
 from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
@@ -30,10 +30,15 @@ def reach_range(formats: FrontFormats) -> Int:
     return _signed(splat.MEAN_INTEGER + formats.mean)
 
 
+def middle_range(formats: FrontFormats) -> Int:
+    """Of the principal point."""
+    return _signed(MIDDLE_INTEGER + formats.mean)
+
+
 def mean_range(formats: FrontFormats) -> Int:
     """What `project_one` may give."""
-    far = reach_range(formats)
-    return Int(far.low, far.high + 1 + (MAX_PICTURE << formats.mean - 1))
+    far, middle = reach_range(formats), middle_range(formats)
+    return Int(far.low + middle.low, far.high + middle.high)
 
 
 def basis_range(formats: FrontFormats) -> Int:
@@ -140,11 +145,14 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
     quat = [g.input(n, Ff(S)) for n in ("qw", "qx", "qy", "qz")]
     view, focal = _Matrix(g.inputs("view", Ff(P), (3, 3), register=True)), g.inputs("focal", Ff(P), (2,), register=True)
     rows = [g.inputs(n, Ff(S), (3,), register=True) for n in ("row_x", "row_x_z", "row_y", "row_y_z")]
-    limit = g.inputs("limit", Ff(S), (2,), register=True)
+    least, limit = (g.inputs(n, Ff(S), (2,), register=True) for n in ("least", "limit"))
+    middle = g.inputs("middle", middle_range(formats), (2,), register=True)
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
+    chunked, antialiased = (g.input(n, BOOL, register=True) for n in ("chunked", "antialiased"))
+    share = g.pick(chunked, g.number(frame.CHUNK_SHARE, S), g.number(frame.FP16_SHARE, S))
     shift, key_low = g.input("key_shift", Int(-128, MAX_KEY_SHIFT), True), g.input("key_low", Ff(P), True)
     const = splat.constants(formats).tolist()
-    p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, limit, width, height, const, P, S, formats.mean)
+    p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, least, limit, middle, share, antialiased, const, P, S, formats.mean)
     _name(p)
     x0, x1 = retrace(splat.pixels)(p.x, p.radius_x, width, formats.mean)
     y0, y1 = retrace(splat.pixels)(p.y, p.radius_y, height, formats.mean)
@@ -153,7 +161,7 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
     g.output("near", p.near)
     g.output("outside", (x0 > x1) | (y0 > y1))
     factored = ("l0", "l1") if form == Form.FACTORED else ()
-    for name in ("far", "x", "y", "sx", "sy", *factored, "l2", "spiky"):
+    for name in ("far", "x", "y", "sx", "sy", *factored, "l2", "spiky", "scale"):
         g.output(name, getattr(p, name))
     if form == Form.CONIC:
         for k, value in enumerate(retrace(splat.conic_one)(p, S)):
@@ -174,16 +182,16 @@ def bounds(formats: FrontFormats) -> Graph:
     """Where a splat of a known opacity reaches."""
     g, S = Graph(), formats.shape
     x, y = (g.input(n, mean_range(formats)) for n in ("x", "y"))
-    sx, sy, lean = (g.input(n, Ff(S)) for n in ("sx", "sy", "lean"))
-    chunked, box = (g.input(n, BOOL, register=True) for n in ("chunked", "box"))
-    opacity = g.input("opacity", HALF)  # code of a chunk, or FP16
+    sx, sy, lean, scale = (g.input(n, Ff(S)) for n in ("sx", "sy", "lean", "scale"))
+    box = g.input("box", BOOL, register=True)
+    opacity = g.input("opacity", HALF, late=True)  # FP16; the code of a chunk is taken as its bits, too
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
     logs, sigmas, cut, _ = reach.reach_tables(formats)
     tables = [g.table(n, t, S) for n, t in (("log", logs), ("sigmas", sigmas), ("cut", cut))]
     zero = g.number(0.0, S)
     # The sign is that of an opacity: positive.
     half = g.wire("{0} & 16'h7fff", HALF, (opacity,))
-    code = g.pick(chunked, g.slice(opacity, 0, 8), retrace(frame.fp16_opacity)(g.from_fp16(half, S), S))
+    code = retrace(frame.scaled_opacity)(scale, g.from_fp16(half, S), S)
     code = g.wire("8'({0})", Int(0, 255), (code,))
     r = retrace(reach.reach_one)(x, y, sx, sy, reach.Steady(zero, zero, lean), code, box, width, height, *tables, S, formats.mean)
     g.output("empty", (r.x0 > r.x1) | (r.y0 > r.y1))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import ORBIT_VIEWS, Camera, cameras_beside, stored_cameras
+from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, photos_root, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
 from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
@@ -19,7 +19,7 @@ SIZE = (1280, 720)  # of views without a photograph when none is asked for
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene, its cameras, its photographs. path: a file, a folder, or `demo`. cameras: a file; None: what `find_cameras` finds. up: of the orbit.
+    """A scene, its cameras, its photographs. path: a file, a folder, or `demo`. cameras: a file or folder; None: what `find_cameras` finds. up: of the orbit.
     photos: a folder with the photograph of every camera; None: those found beside the cameras; `none`: none. background: RGB in [0, 1]."""
 
     path: str
@@ -40,10 +40,15 @@ class SceneFile:
 
     @property
     def cameras_file(self) -> Path | None:
-        """The file that the cameras come from; None: there is none."""
+        """The file or folder that the cameras come from; None: there is none."""
         if self.path == DEMO:
             return None
         return Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
+
+    @property
+    def cameras_from(self) -> str:
+        """Where the cameras come from, for people."""
+        return "the demo scene's own" if self.path == DEMO else cameras_said(self.path, self.cameras, self.up)
 
     @cached_property
     def _cameras(self) -> list[Camera] | None:
@@ -69,7 +74,7 @@ class SceneFile:
             raise FlickerError(f"photos: {self.path}: view {view} has no 'img_name' in a cameras.json, by which its photograph would be found")
         if self.photos is not None:
             return photo_in(Path(self.photos), camera.img_name)
-        return photo_beside(self.cameras_file, camera.img_name)
+        return photo_beside(photos_root(self.cameras_file) / self.cameras_file.name, camera.img_name)
 
     def target(self, view: int, size: tuple[int, int] | None = None) -> Target:
         """A view of the scene, with its photograph checked. size: None: that of the camera where it has a photograph, else `SIZE`. FlickerError."""
@@ -88,7 +93,8 @@ class SceneFile:
         if self.path == DEMO:
             return ""
         cameras = self.cameras_file
-        return "-".join((scene_digest(self.path)[:16], file_digest(cameras) if cameras else "orbit", self.up or ""))
+        digests = ["orbit"] if cameras is None else [file_digest(file) for file in camera_files(cameras)]
+        return "-".join((scene_digest(self.path)[:16], *digests, self.up or ""))
 
 
 @dataclass(frozen=True)

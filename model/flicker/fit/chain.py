@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..front.projection import _C0, _C1, _C2, _C3, _CLAMP, A, B, C
+from ..front.projection import _C0, _C1, _C2, _C3, DILATION, FACTOR, XX, XY, YY, A, B, C
 from .parameters import LOGIT, MEAN, QUAT, SCALE, SH
 from .raster import D_RED, G_X, G_XX, G_XY, G_Y, G_YY, RED, G
 
@@ -52,9 +52,7 @@ def _basis_slope(x, y, z, count, e):
 
 
 @numba.njit(error_model="numpy", cache=True)
-def _chain(n, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen, basis, weight):
-    lim_x = _CLAMP * 0.5 * width / fx
-    lim_y = _CLAMP * 0.5 * height / fy
+def _chain(n, values, index, place, table, rows, sums, view, position, fx, fy, slope, antialiased, coefficients, gradient, screen, basis, weight):
     k = np.uint64(place[n])
     i = np.uint64(index[k])
     gradient[n] = 0.0
@@ -69,6 +67,13 @@ def _chain(n, values, index, place, table, rows, sums, view, position, width, he
     left10, left11 = b * q0 + c * q1, b * q1 + c * q2
     cov00, cov01 = -(left00 * a + left01 * b), -(left00 * b + left01 * c)
     cov11 = -(left10 * b + left11 * c)
+    if antialiased:
+        # The opacity's factor is sqrt(det / dilated det): d log factor / dcov is half the difference of the inverses. What is drawn has a factor above 1/255.
+        per_det = a / (table[i, FACTOR] ** 2 * table[i, YY])
+        half = -0.5 * sums[k, G]
+        cov00 += half * ((table[i, YY] - DILATION) * per_det - a)
+        cov01 += half * (-table[i, XY] * per_det - b)
+        cov11 += half * ((table[i, XX] - DILATION) * per_det - c)
 
     dx = values[i, MEAN] - position[0]
     dy = values[i, MEAN + 1] - position[1]
@@ -76,7 +81,7 @@ def _chain(n, values, index, place, table, rows, sums, view, position, width, he
     z = view[2, 0] * dx + view[2, 1] * dy + view[2, 2] * dz
     tx = (view[0, 0] * dx + view[0, 1] * dy + view[0, 2] * dz) / z
     ty = (view[1, 0] * dx + view[1, 1] * dy + view[1, 2] * dz) / z
-    held_x, held_y = min(max(tx, -lim_x), lim_x), min(max(ty, -lim_y), lim_y)
+    held_x, held_y = min(max(tx, slope[0, 0]), slope[0, 1]), min(max(ty, slope[1, 0]), slope[1, 1])
     j00, j11, j02, j12 = fx / z, fy / z, -fx * held_x / z, -fy * held_y / z
 
     w = np.float64(values[i, QUAT])
@@ -163,23 +168,23 @@ def _chain(n, values, index, place, table, rows, sums, view, position, width, he
     gradient[n, MEAN + 1] = m1 + (sy - radial * oy) / distance
     gradient[n, MEAN + 2] = m2 + (sz - radial * oz) / distance
 
-    # alpha = o exp(-E): dL/do = -G / o, and do/dlogit = o (1 - o).
+    # alpha = o exp(-E): dL/do = -G / o, and do/dlogit = o (1 - o); a factor of o changes neither.
     gradient[n, LOGIT] = -sums[k, G] / (1.0 + np.exp(np.float64(values[i, LOGIT])))
 
 
 @numba.njit(error_model="numpy", cache=True)
-def _chain_block(block, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
+def _chain_block(block, values, index, place, table, rows, sums, view, position, fx, fy, slope, antialiased, coefficients, gradient, screen):
     basis, weight = np.zeros(16), np.zeros(16)
     for n in range(block * _BLOCK, min((block + 1) * _BLOCK, len(place))):
-        _chain(n, values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen, basis, weight)
+        _chain(n, values, index, place, table, rows, sums, view, position, fx, fy, slope, antialiased, coefficients, gradient, screen, basis, weight)
 
 
 @numba.njit(error_model="numpy", parallel=True, cache=True)
-def chain(values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen):
+def chain(values, index, place, table, rows, sums, view, position, fx, fy, slope, antialiased, coefficients, gradient, screen):
     """gradient: float32 (S, P), of the Gaussians index[place] in the columns of `values`; screen: float64 (S, 2), of their means in pixels.
 
-    place: int64 (S,), into rows and sums. sums: float64 (M, 9), of `raster`. view: world to camera (3, 3). coefficients: how many SH coefficients are trained;
-    the others' derivatives are 0.
+    place: int64 (S,), into rows and sums. sums: float64 (M, 9), of `raster`. view: world to camera (3, 3). slope: of `slope_range`.
+    antialiased: opacities have their factor. coefficients: how many SH coefficients are trained; the others' derivatives are 0.
     """
     for block in numba.prange((len(place) + _BLOCK - 1) // _BLOCK):
-        _chain_block(np.int64(block), values, index, place, table, rows, sums, view, position, width, height, fx, fy, coefficients, gradient, screen)
+        _chain_block(np.int64(block), values, index, place, table, rows, sums, view, position, fx, fy, slope, antialiased, coefficients, gradient, screen)

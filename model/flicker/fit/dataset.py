@@ -1,102 +1,145 @@
-"""Posed photographs: NeRF and nerfstudio `transforms.json`, COLMAP `sparse/0` with `images/`."""
+"""Posed photographs: `transforms.json` of NeRF and nerfstudio, NeRF's synthetic scenes, COLMAP models with their pictures (docs/fit.md)."""
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from ..errors import FlickerError
-from ..scene.camera import Camera
-from ..scene.image import load_coverage, load_picture, picture_size
-from ..scene.photos import BLACK, PLACES, SUFFIXES, area_average
-from .colmap import read_cameras, read_images, read_points
+from ..scene.colmap import ColmapCamera, find_model, model_file, read_cameras, read_images, read_points
+from ..scene.lens import COEFFICIENTS
+from ..scene.photos import PLACES, SUFFIXES
+from ..scene.transforms import FLAGS, Frame, photo_name, read_frames
+from .shot import Shot, shot_of
 
-TEST_EVERY = 8  # photographs 0, 8, 16, ... are for testing
+TEST_EVERY = 8  # photographs 0, 8, 16, ... are for testing where a data set has no test photographs of its own
 LEAST = 3  # photographs: one for testing, two to fit
-CENTRE = 0.5  # pixels that the principal point, or a pixel by distortion, may be off
-DISTORTIONS = ("k1", "k2", "k3", "k4", "p1", "p2")
-
-
-@dataclass(frozen=True, eq=False)
-class Shot:
-    """A photograph and the camera that took it, at the size at which it is used. camera.img_name: its name, as `flicker report` looks for it."""
-
-    camera: Camera
-    path: Path
-
-    def load(self, background: tuple[float, float, float] = BLACK) -> np.ndarray:
-        """float32 (H, W, 3) in [0, 1], transparent parts over the background."""
-        return area_average(load_picture(self.path, background), (self.camera.width, self.camera.height)).astype(np.float32)
-
-    def solid(self) -> np.ndarray | None:
-        """bool (H, W): pixels that are not wholly transparent; None for a picture without transparent parts."""
-        coverage = load_coverage(self.path)
-        return None if coverage is None else area_average(coverage[..., None], (self.camera.width, self.camera.height))[..., 0] > 0.0
+PICTURES = ("images", "images_2", "images_4", "images_8", "input", "photos")  # folders of a COLMAP data set, the first that is there
+MASKS = "masks"  # its folder of masks
+_FISHEYE_FLAGS = ("is_fisheye", "fisheye")
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """fitted, tests: photographs to fit to, and for testing. points: float64 (N, 3), colours: float64 (N, 3) in [0, 1], of COLMAP; None: there are none.
-    dropped: points that were left out because they are not finite."""
+    dropped: points that were left out because they are not finite. notes: lines for the user, on what was chosen and changed."""
 
     fitted: list[Shot]
     tests: list[Shot]
     points: np.ndarray | None = None
     colours: np.ndarray | None = None
     dropped: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def shots(self) -> list[Shot]:
+        return [*self.fitted, *self.tests]
 
 
-def load_dataset(path: Path, size: int | None = None) -> Dataset:
+def load_dataset(path: Path, size: int | None = None, images: str | None = None) -> Dataset:
     """Read cameras and sizes of a folder, or of a `transforms.json`; pictures are opened by `Shot.load`.
 
-    size: longer side of the pictures used, in pixels; larger ones are averaged, none is enlarged. FlickerError, naming file and field.
+    size: longer side of the pictures used, in pixels; larger ones are averaged, none is enlarged. images: folder of the pictures, in the data set or anywhere;
+    None: where the data set says. FlickerError, naming file and field.
     """
-    points = colours = None
-    dropped = 0
+    root = path.parent if path.is_file() else path
+    folder = None if images is None else _folder(root, images)
+    points, colours, dropped = None, None, 0
+    notes: list[str] = []
     if path.is_file():
-        shots = _transforms(path, size)
+        shots = _transforms(path, size, folder)
     elif (path / "transforms.json").is_file():
-        shots = _transforms(path / "transforms.json", size)
-    elif (path / "sparse" / "0").is_dir():
-        shots = _colmap(path, size)
-        points, colours = read_points(path / "sparse" / "0" / "points3D.bin")
-        good = np.isfinite(points).all(axis=1)
-        points, colours, dropped = points[good], colours[good], int((~good).sum())
-        if len(points) < 4:
-            points = colours = None
+        shots = _transforms(path / "transforms.json", size, folder)
+    elif (path / "transforms_train.json").is_file():
+        return _with_tests(path, size, folder)
+    elif (model := find_model(path)) is not None:
+        folder = folder or next((there for place in PICTURES if (there := path / place).is_dir()), None)
+        if folder is None:
+            raise FlickerError(f"{path}: none of the folders {', '.join(PICTURES)}: name that of the pictures by --images")
+        if folder != path / PICTURES[0]:
+            notes.append(f"photographs of {folder}")
+        shots = _colmap(model, path, folder, size)
+        points, colours, dropped = _points(model)
     elif path.is_dir():
-        raise FlickerError(f"{path}: neither transforms.json nor sparse/0 in this folder")
+        raise FlickerError(f"{path}: neither transforms.json, transforms_train.json nor a COLMAP model (sparse/0, sparse) in this folder")
     else:
         raise FlickerError(f"{path}: no such folder")
     if len(shots) < LEAST:
         raise FlickerError(f"{path}: {len(shots)} photograph{'s' * (len(shots) != 1)}, at least {LEAST} are needed: every {TEST_EVERY}th is for testing")
-    return Dataset([s for k, s in enumerate(shots) if k % TEST_EVERY], shots[::TEST_EVERY], points, colours, dropped)
+    fitted, tests = [s for k, s in enumerate(shots) if k % TEST_EVERY], shots[::TEST_EVERY]
+    return Dataset(fitted, tests, points, colours, dropped, notes + _told(root, shots))
 
 
-def _shot(where: str, picture: Path, root: Path, size: int | None, width: float | None, height: float | None, centre: tuple[float | None, float | None],
-          focal: Any, position: np.ndarray, rotation: np.ndarray) -> Shot:
-    """A photograph with its camera. focal: (fx, fy) of a width and height in pixels. root: folder of the dataset."""
-    own_width, own_height = picture_size(picture)
-    w, h = width or own_width, height or own_height
-    for name, value, side in (("cx", centre[0], w), ("cy", centre[1], h)):
-        if value is not None and not abs(value - side / 2) <= CENTRE:
-            off = f"{abs(value - side / 2):.1f} pixels off the middle, {side / 2:g}"
-            raise FlickerError(f"{where}: {name}: {value:g} is {off}: crop the pictures around it, or flicker undistort")
-    if abs(h * own_width / w - own_height) > 1.0:
-        raise FlickerError(f"{where}: {picture} is {own_width}x{own_height}, not of the shape of the camera's {w:g}x{h:g}")
-    shrink = min(1.0, size / max(own_width, own_height)) if size else 1.0
-    used = max(1, round(own_width * shrink)), max(1, round(own_height * shrink))
-    fx, fy = focal(w, h)
-    try:
-        camera = Camera(round(w), round(h), fx, fy, position, rotation, name=picture.stem, img_name=_name(picture, root))
-        return Shot(camera.scaled(*used), picture)
-    except FlickerError as error:
-        raise FlickerError(f"{where}: {error}") from None
+def photo_folder(shots: Sequence[Shot]) -> Path | None:
+    """The folder in which every photograph has the name of its camera, as `flicker report --photos` wants it; None: there is none, as of pictures with
+    a lens."""
+    folders = set()
+    for shot in shots:
+        name = PurePosixPath(str(shot.camera.img_name))
+        if shot.lens is not None or shot.path.parts[-len(name.parts) :] != name.parts:
+            return None
+        folders.add(shot.path.parents[len(name.parts) - 1])
+    return folders.pop() if len(folders) == 1 else None
+
+
+def _with_tests(root: Path, size: int | None, folder: Path | None) -> Dataset:
+    """NeRF's synthetic scenes as they are downloaded: `transforms_train.json`, and `transforms_test.json` or, without it, `transforms_val.json`."""
+    train = root / "transforms_train.json"
+    shots = _transforms(train, size, folder)
+    other = next((there for name in ("test", "val") if (there := root / f"transforms_{name}.json").is_file()), None)
+    if other is None:
+        fitted, tests = [s for k, s in enumerate(shots) if k % TEST_EVERY], shots[::TEST_EVERY]
+        notes = [f"no transforms_test.json: every {TEST_EVERY}th photograph of transforms_train.json is for testing"]
+    else:
+        fitted, tests = shots, _transforms(other, size, folder)
+        notes = [f"the photographs of {other.name} are for testing"]
+        seen = {shot.path.resolve() for shot in fitted}
+        if twice := sum(shot.path.resolve() in seen for shot in tests):
+            notes.append(f"{twice} of them are in {train.name}, too: their PSNR is not that of views which the fit has not seen")
+    if len(fitted) < LEAST - 1 or not tests:
+        raise FlickerError(f"{root}: {len(fitted)} photographs to fit and {len(tests)} for testing, at least {LEAST - 1} and 1 are needed")
+    return Dataset(fitted, tests, notes=notes + _told(root, fitted + tests))
+
+
+def _folder(root: Path, images: str) -> Path:
+    """The folder of pictures that the user names."""
+    for folder in (root / images, Path(images)):
+        if folder.is_dir():
+            return folder
+    raise FlickerError(f"--images: {images}: no such folder, neither in {root} nor from here")
+
+
+def _told(root: Path, shots: Sequence[Shot]) -> list[str]:
+    """What a user should know about the photographs."""
+    notes, total = [], len(shots)
+    bent = [shot for shot in shots if shot.lens is not None]
+    if bent:
+        kept = min(min(s.lens.new_size[k] / (s.lens.width, s.lens.height)[k] for k in (0, 1)) for s in bent if s.lens is not None)
+        models = ", ".join(sorted({shot.lens.model for shot in bent if shot.lens is not None}))
+        notes.append(f"{len(bent)} of {total} photographs are undistorted ({models}, principal point in the middle); {kept:.0%} of their sides or more stay")
+    stored = "are taken as they are stored: so they have the shape of their cameras, and not as EXIF turns them"
+    for turned, text in ((True, "are turned upright, as EXIF says"), (False, stored)):
+        if count := sum(shot.turned is turned for shot in shots):
+            notes.append(f"{count} of {total} photographs {text}")
+    if masked := sum(shot.mask is not None for shot in shots):
+        notes.append(f"{masked} of {total} photographs have a mask: black pixels do not count")
+    elif (root / MASKS).is_dir():
+        notes.append(f"{root / MASKS}: not used: no photograph has a mask of its name there, nor does a mask_path name one")
+    return notes
+
+
+def _picture(where: str, path: Path) -> Path:
+    """A picture by its path, with or without a suffix, or with another one."""
+    if path.suffix and path.is_file():
+        return path
+    for stem in (path.name, path.stem) if path.suffix.lower() in SUFFIXES else (path.name,):
+        for other in (path.with_name(stem + case) for suffix in SUFFIXES for case in (suffix, suffix.upper())):
+            if other.is_file():
+                return other
+    raise FlickerError(f"{where}: no picture {path}")
 
 
 def _name(picture: Path, root: Path) -> str:
@@ -107,132 +150,87 @@ def _name(picture: Path, root: Path) -> str:
     return picture.name
 
 
-def _found(where: str, root: Path, name: str) -> Path:
-    """A picture by its path, with or without a suffix."""
-    path = root / name
-    if path.suffix.lower() in SUFFIXES and path.is_file():
-        return path
-    for suffix in SUFFIXES:
-        if (other := path.with_name(path.name + suffix)).is_file():
-            return other
-    raise FlickerError(f"{where}: no picture {path}")
+def _model(frame: Frame) -> str | None:
+    """The lens model of a frame; None: none is named. FlickerError for other projections."""
+    for key, value in frame.data.items():
+        if (value and key in FLAGS and key not in _FISHEYE_FLAGS) or key.startswith("ftheta_"):
+            raise FlickerError(f"{frame.where}: {key}: pictures of this projection cannot be undistorted")
+    if frame.data.get("distortion_params") is not None:
+        raise FlickerError(f"{frame.where}: distortion_params: not read: coefficients are wanted by their names, k1, k2, ...")
+    model = frame.data.get("camera_model")
+    if model is not None and not isinstance(model, str):
+        raise FlickerError(f"{frame.where}: camera_model: not a text")
+    if any(frame.data.get(key) for key in _FISHEYE_FLAGS) and (model is None or "FISHEYE" not in model.upper()):
+        return "OPENCV_FISHEYE"
+    return model
 
 
-def _number(where: str, values: dict, key: str) -> float | None:
-    value = values.get(key)
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise FlickerError(f"{where}: {key}: not a number")
-    return float(value)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A frame of a transforms.json. where: for messages. data: as it stands in the file; number: its numbers, those of the whole file where it has none;
-    picture: file; picture_size: (width, height) in pixels."""
-
-    where: str
-    data: dict
-    number: dict[str, float | None]
-    picture: Path
-    picture_size: tuple[int, int]
-
-    def focal(self, w: float, h: float) -> tuple[float, float]:
-        """Focal lengths (x, y) of a picture of w x h pixels."""
-        angle_x, angle_y = self.number["camera_angle_x"], self.number["camera_angle_y"]
-        fx = self.number["fl_x"] or w / 2 / math.tan((angle_x or 0.0) / 2)
-        return fx, self.number["fl_y"] or (fx if self.number["fl_x"] or angle_y is None else h / 2 / math.tan(angle_y / 2))
-
-    def pose(self) -> np.ndarray:
-        """float64 (3, 4): camera to world, x right, y up, z back. FlickerError."""
-        matrix = np.array(self.data.get("transform_matrix"), object)
-        if matrix.shape not in ((4, 4), (3, 4)) or not all(isinstance(v, int | float) for v in matrix.flat):
-            raise FlickerError(f"{self.where}: transform_matrix: not 4x4 numbers")
-        return matrix[:3].astype(np.float64)
-
-
-def frames_of(path: Path) -> tuple[dict, list[Frame]]:
-    """A transforms.json and its frames, whose pictures are there. FlickerError, naming file and field."""
+def transforms_shot(frame: Frame, size: int | None, folder: Path | None = None, exact: bool = False) -> Shot:
+    """The photograph of a frame. folder: of the pictures, None: where the frame says. exact: as in `shot_of`."""
+    if frame.name is None:
+        raise FlickerError(f"{frame.where}: file_path: is missing")
+    picture = _picture(f"{frame.where}: file_path", frame.folder / frame.name if folder is None else folder / photo_name(frame.name))
+    mask: Path | None = None
+    named = frame.data.get("mask_path")
+    if named is not None:
+        if not isinstance(named, str):
+            raise FlickerError(f"{frame.where}: mask_path: not a text")
+        mask = frame.folder / named
+        if not mask.is_file():
+            raise FlickerError(f"{frame.where}: mask_path: no picture {mask}")
+    number = frame.number
     try:
-        data = json.loads(path.read_bytes())
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:
-        raise FlickerError(f"{path}: not JSON ({' '.join(str(error).split())})") from None
-    frames = data.get("frames") if isinstance(data, dict) else None
-    if not isinstance(frames, list):
-        raise FlickerError(f"{path}: frames: not a list")
-    found = []
-    for n, frame in enumerate(frames):
-        where = f"{path}: frames[{n}]"
-        if not isinstance(frame, dict):
-            raise FlickerError(f"{where}: not an object")
-        both = data | frame  # a frame may have a lens of its own
-        number = {key: _number(where, both, key) for key in ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", *DISTORTIONS)}
-        if not isinstance(frame.get("file_path"), str):
-            raise FlickerError(f"{where}: file_path: not a text")
-        for key in ("w", "h", "fl_x", "fl_y"):
-            if (value := number[key]) is not None and value <= 0:
-                raise FlickerError(f"{where}: {key}: {value:g} is not positive")
-        for key in ("camera_angle_x", "camera_angle_y"):
-            if (value := number[key]) is not None and not 0 < value < math.pi:
-                raise FlickerError(f"{where}: {key}: {value:g} is not between 0 and pi")
-        if number["fl_x"] is None and number["camera_angle_x"] is None:
-            raise FlickerError(f"{where}: neither fl_x nor camera_angle_x")
-        picture = _found(f"{where}: file_path", path.parent, frame["file_path"])
-        found.append(Frame(where, frame, number, picture, picture_size(picture)))
-    return data, found
+        pose = frame.pose()
+    except FlickerError as error:
+        raise FlickerError(f"{frame.where}: {error}") from None
+    return shot_of(
+        frame.where, picture, _name(picture, frame.folder) if folder is None else picture.relative_to(folder).as_posix(), size, (number["w"], number["h"]),
+        frame.focal, (number["cx"], number["cy"]), _model(frame), {key: number[key] for key in COEFFICIENTS}, pose, mask, exact,
+    )
 
 
-def _transforms(path: Path, size: int | None) -> list[Shot]:
+def _transforms(path: Path, size: int | None, folder: Path | None) -> list[Shot]:
+    return [transforms_shot(frame, size, folder) for frame in read_frames(path)]
+
+
+def _points(model: Path) -> tuple[np.ndarray | None, np.ndarray | None, int]:
+    """Points and colours of a model that are finite, and how many are not; None where it has fewer than four."""
+    try:
+        file = model_file(model, "points3D")
+    except FlickerError:  # a model of cameras alone
+        return None, None, 0
+    points, colours = read_points(file)
+    good = np.isfinite(points).all(axis=1)
+    dropped = int((~good).sum())
+    return (points[good], colours[good], dropped) if good.sum() >= 4 else (None, None, dropped)
+
+
+def _mask(root: Path, name: str) -> Path | None:
+    """COLMAP's mask of a picture: `masks/NAME.png`, or with .png in place of the picture's suffix."""
+    path = root / MASKS / name
+    return next((there for there in (path.with_name(path.name + ".png"), path.with_suffix(".png")) if there.is_file()), None)
+
+
+def _focal(camera: ColmapCamera) -> Callable[[float, float], tuple[float, float]]:
+    return lambda w, h: (camera.fx, camera.fy)
+
+
+def _colmap(model: Path, root: Path, folder: Path, size: int | None) -> list[Shot]:
+    file, images = model_file(model, "cameras"), model_file(model, "images")
+    cameras = read_cameras(file)
     shots = []
-    for frame in frames_of(path)[1]:
-
-        def focal(w: float, h: float, frame: Frame = frame) -> tuple[float, float]:
-            fx, fy = frame.focal(w, h)
-            _check_lens(frame.where, frame.number, w / 2 / fx, h / 2 / fy, fx)
-            return fx, fy
-
-        pose, number = frame.pose(), frame.number
-        # Right, up, back to right, down, forward.
-        shots.append(_shot(
-            frame.where, frame.picture, path.parent, size, number["w"], number["h"], (number["cx"], number["cy"]), focal, pose[:, 3],
-            pose[:, :3] * np.array([1.0, -1.0, -1.0]),
-        ))
-    return shots
-
-
-def _check_lens(where: str, number: dict[str, float | None], x: float, y: float, focal: float) -> None:
-    """FlickerError where distortion moves a corner at the tangents (x, y) by more than `CENTRE` pixels, at worst."""
-    r = math.hypot(x, y)
-    k1, k2, k3, k4, p1, p2 = (abs(number[key] or 0.0) for key in DISTORTIONS)
-    shift = focal * (k1 * r**3 + k2 * r**5 + k3 * r**7 + k4 * r**9 + 3 * (p1 + p2) * r**2)
-    if shift > CENTRE:
-        key = next(key for key in DISTORTIONS if number[key])
-        raise FlickerError(f"{where}: {key}: the lens distorts by up to {shift:.1f} pixels: flicker undistort first")
-
-
-def _colmap(root: Path, size: int | None) -> list[Shot]:
-    model = root / "sparse" / "0"
-    cameras = read_cameras(model / "cameras.bin")
-    shots = []
-    for n, image in enumerate(read_images(model / "images.bin")):
-        where = f"{model / 'images.bin'}: image {n} ({image.name})"
+    for n, image in enumerate(read_images(images)):
+        where = f"{images}: image {n} ({image.name})"
         if image.camera not in cameras:
-            raise FlickerError(f"{where}: camera {image.camera} is not in cameras.bin")
+            raise FlickerError(f"{where}: camera {image.camera} is not in {file.name}")
         c = cameras[image.camera]
-        norm = float(np.linalg.norm(image.quat))
-        if not (math.isfinite(norm) and norm > 0):
-            raise FlickerError(f"{where}: rotation: not a quaternion")
-        w, x, y, z = image.quat / norm
-        rotation = np.array([  # camera to world: the transpose of the quaternion's matrix
-            [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-            [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-            [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-        ])
-        shots.append(_shot(
-            where, _found(where, root / "images", image.name), root, size, c.width, c.height, (c.cx, c.cy), lambda w, h, c=c: (c.fx, c.fy),
-            -rotation @ image.shift, rotation,
+        try:
+            pose = image.pose()
+        except FlickerError as error:
+            raise FlickerError(f"{where}: {error}") from None
+        picture = _picture(where, folder / image.name)
+        shots.append(shot_of(
+            where, picture, picture.relative_to(folder).as_posix(), size, (c.width, c.height), _focal(c), (c.cx, c.cy), c.model, c.coefficients, pose,
+            _mask(root, image.name),
         ))
     return shots

@@ -15,9 +15,10 @@ MEAN, SCALE, QUAT, LOGIT, SH = 0, 3, 6, 10, 11
 @dataclass(eq=False)
 class Parameters:
     """values: float32 (N, 11 + 3 K). Mean, logarithms of the three standard deviations, quaternion (w first, of any length), logit of the opacity,
-    K SH coefficients as in `Scene.sh`."""
+    K SH coefficients as in `Scene.sh`. antialiased: as in `Scene`."""
 
     values: np.ndarray
+    antialiased: bool = False
 
     def __len__(self) -> int:
         return len(self.values)
@@ -47,6 +48,10 @@ class Parameters:
     def degree(self) -> int:
         return SH_DEGREES[self.sh.shape[1]]
 
+    def like(self, values: np.ndarray) -> Parameters:
+        """Others that are drawn by the same rules."""
+        return Parameters(values, self.antialiased)
+
     def finite(self) -> np.ndarray:
         """bool (N,): Gaussians all of whose numbers are finite."""
         return np.isfinite(self.values).all(axis=1)
@@ -54,7 +59,7 @@ class Parameters:
     @classmethod
     def of(cls, scene: Scene) -> Parameters:
         columns = (scene.means, np.log(scene.scales), scene.quats, logits(scene.opacities)[:, None], scene.sh.reshape(len(scene), -1))
-        return cls(np.concatenate(columns, axis=1, dtype=np.float32))
+        return cls(np.concatenate(columns, axis=1, dtype=np.float32), scene.antialiased)
 
     def scene(self) -> Scene:
         """The Gaussians as others see them; those that are not finite, or whose size or opacity float32 cannot hold, are left out."""
@@ -64,4 +69,4 @@ class Parameters:
             norm = np.linalg.norm(self.quats.astype(np.float64), axis=1, keepdims=True)
             quats = self.quats / norm
         good = self.finite() & np.isfinite(scales).all(axis=1) & (scales > 0).all(axis=1) & (opacities > 0) & np.isfinite(quats).all(axis=1)
-        return Scene(self.means[good], scales[good], quats[good], opacities[good], self.sh[good])
+        return Scene(self.means[good], scales[good], quats[good], opacities[good], self.sh[good], antialiased=self.antialiased)

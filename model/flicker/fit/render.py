@@ -16,7 +16,7 @@ import numpy as np
 
 from ..explore.machine import Configuration
 from ..front.binning import bin_boxes
-from ..front.projection import Projected, colours, geometry
+from ..front.projection import COLUMNS, FACTOR, Projected, colours, geometry, slope_range
 from ..params import TILE
 from ..scene.camera import Camera
 from . import raster
@@ -33,7 +33,7 @@ class Frame:
     image: (H, W, 3), neither clamped nor quantised. transmittance: (H, W). index: int64 (M,), those Gaussians, ascending.
     rows: (M, COLUMNS), `raster`, of the precision in which pictures are blended. start: int64 (tiles + 1,), entry: int32 (E,), into index, near to far; used:
     bool (E,), blended in a pixel or finishing one, as far as the engine tells. mask: uint16 (E,), 4x4 pixels of the tile that are visited (`through`).
-    bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, 10), of `front.projection.geometry`.
+    bad: bool (M,), Gaussians that were left out for a number that is not finite. table: float64 (N, COLUMNS), of `front.projection.geometry`.
     back: the engine's way back.
     """
 
@@ -84,11 +84,12 @@ def render(
     with np.errstate(all="ignore"):  # what is not finite is found below
         scales = np.exp(parameters.log_scales.astype(np.float64))
         opacity = 1.0 / (1.0 + np.exp(-parameters.logits.astype(np.float64)))
-    table, depth = np.empty((count, 10)), np.empty(count, np.float32)
-    view = np.ascontiguousarray(camera.rotation.T)
-    geometry(parameters.means, scales, parameters.quats, view, camera.position, width, height, camera.fx, camera.fy, table, depth)
+    table, depth = np.empty((count, COLUMNS)), np.empty(count, np.float32)
+    geometry(parameters.means, scales, parameters.quats, camera, table, depth)
     # By depth, then number: both in one key.
     index = np.flatnonzero(depth)
+    if parameters.antialiased:
+        opacity[index] *= table[index, FACTOR]
     key = np.sort(depth[index].view(np.uint32).astype(np.uint64) << np.uint64(32) | np.arange(len(index), dtype=np.uint64))
     order = (key & np.uint64(0xFFFFFFFF)).astype(np.int64)
     rgb = np.empty((len(index), 3))
@@ -123,7 +124,7 @@ def backward(frame: Frame, slope_of_image: np.ndarray, coefficients: int = 16) -
     place = np.flatnonzero(seen)
     gradient, screen = np.empty((len(place), values.shape[1]), np.float32), np.empty((len(place), 2))
     chain(
-        values, frame.index, place, frame.table, frame.rows, total, np.ascontiguousarray(camera.rotation.T), camera.position, camera.width, camera.height,
-        camera.fx, camera.fy, coefficients, gradient, screen,
+        values, frame.index, place, frame.table, frame.rows, total, np.ascontiguousarray(camera.rotation.T), camera.position, camera.fx, camera.fy,
+        slope_range(camera), frame.parameters.antialiased, coefficients, gradient, screen,
     )
     return Gradient(gradient, screen, frame.index[place])

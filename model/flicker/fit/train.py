@@ -23,7 +23,7 @@ from ..explore.machine import run
 from ..front.projection import project
 from ..front.reference import render_reference
 from ..front.view import View
-from ..progress import Steps
+from ..progress import Steps, undivided
 from ..scene.gaussians import Scene
 from ..scene.metrics import psnr, ssim
 from ..scene.photos import BLACK
@@ -40,6 +40,7 @@ from .through import through
 
 MEASURE_EVERY = 500  # iterations
 SAVE_EVERY = 500
+MEASURED = 24  # test photographs that are looked at on the way; in the end all are
 # Learning rates of the INRIA code, which makes 30,000 iterations: of means in extents of the scene, first and last.
 _MEAN_RATES = (1.6e-4, 1.6e-6)
 _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5e-3, 1 / 20
@@ -94,9 +95,14 @@ class Quality:
     machine: float
 
 
+def _where(counted: np.ndarray | None, image: np.ndarray, photo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of both pictures (H, W, 3) that count, (N, 3); both as they are where all do."""
+    return (image, photo) if counted is None else (image[counted], photo[counted])
+
+
 def affine_fit(image: np.ndarray, photo: np.ndarray) -> np.ndarray:
-    """The picture (H, W, 3) with the affine change of colour that brings it nearest to the photograph, least squares."""
-    columns = np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=2).reshape(-1, 4).astype(np.float64)
+    """The picture (..., 3) with the affine change of colour that brings it nearest to the photograph, least squares."""
+    columns = np.concatenate([image, np.ones((*image.shape[:-1], 1))], axis=-1).reshape(-1, 4).astype(np.float64)
     change = np.linalg.lstsq(columns, photo.reshape(-1, 3).astype(np.float64), rcond=None)[0]
     return (columns @ change).reshape(image.shape)
 
@@ -115,10 +121,17 @@ class Trainer:
         self.rng = np.random.default_rng(options.seed)
         self._photos = [shot.load(options.background) for shot in dataset.fitted]
         self._test_photos = [shot.load(options.background) for shot in dataset.tests]
-        begun = start(dataset, self._photos, options.gaussians, options.degree, self.rng) if parameters is None else Parameters(parameters.values.copy())
+        self._counted, self._test_counted = [shot.counted() for shot in dataset.fitted], [shot.counted() for shot in dataset.tests]
+        for photo, counted in zip(self._photos, self._counted):
+            if counted is not None:
+                photo[~counted] = 0.0
+        if parameters is None:
+            begun = start(dataset, self._photos, options.gaussians, options.degree, self.rng, self._counted)
+        else:
+            begun = parameters.like(parameters.values.copy())
         self.parameters = begun
         self.first = len(self.parameters)
-        self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes()).hexdigest()
+        self._began = None if parameters is None else hashlib.sha256(parameters.values.tobytes() + b"antialiased" * parameters.antialiased).hexdigest()
         self.moments = Adam.of(self.parameters.values)
         self.exposures = np.tile(np.eye(3, 4, dtype=np.float32).ravel(), (len(dataset.fitted), 1))
         self.exposure_moments = Adam.of(self.exposures)
@@ -169,9 +182,12 @@ class Trainer:
         if self.iteration == self.options.first_squared:
             self.moments = Adam.of(self.parameters.values)
         measure = loss_and_slope if self.iteration < self.options.first_squared else log_error_slope
+        counted = self._counted[view]
+        counts = np.float32(1.0) if counted is None else counted[..., None].astype(np.float32)
         if self.options.exposure:
             change = self.exposures[view].reshape(3, 4)
-            loss, slope = measure(np.ascontiguousarray(frame.image @ change[:, :3].T + change[:, 3]), photo)
+            loss, slope = measure(np.ascontiguousarray((frame.image @ change[:, :3].T + change[:, 3]) * counts), photo)
+            slope = slope * counts
             by_colour = np.einsum("hwi,hwj->ij", slope, frame.image, dtype=np.float64)
             gradient = np.concatenate([by_colour, slope.sum(axis=(0, 1), dtype=np.float64)[:, None]], axis=1).astype(np.float32)
             slope = slope @ change[:, :3]
@@ -179,7 +195,8 @@ class Trainer:
             rate = np.full(12, fast * (slow / fast) ** (self.iteration / self.options.iterations), np.float32)
             self.exposure_moments.step(self.exposures, np.array([view]), gradient.reshape(1, 12), rate)
         else:
-            loss, slope = measure(frame.image, photo)
+            loss, slope = measure(frame.image * counts, photo)
+            slope = slope * counts
         found = backward(frame, slope, (self.degree + 1) ** 2)
         refused = self.moments.step(self.parameters.values, found.index, found.values, self.rates())
         self._least.hold(self.parameters.values, found.index)
@@ -199,7 +216,7 @@ class Trainer:
         new = values[:0] if new is None else new
         if not len(keep) + len(new):
             raise FlickerError(f"fit: no Gaussian is left after {self.iteration} iterations")
-        self.parameters = Parameters(np.concatenate([values[keep], new]))
+        self.parameters = self.parameters.like(np.concatenate([values[keep], new]))
         self.moments.select(keep, len(new))
         self.score, self.seen = (np.concatenate([old[keep], np.zeros(len(new))]) for old in (self.score, self.seen))
 
@@ -226,38 +243,57 @@ class Trainer:
     def run(
         self, steps: Steps | None = None, told: Callable[[int, int, float], None] | None = None, keep: Callable[[], None] | None = None,
     ) -> None:
-        """All iterations that are left. told(iteration, Gaussians, PSNR of the test photographs), keep(): every so many."""
-        with (steps or Steps()).bar("fitting") as report:
-            while self.iteration < self.options.iterations:
-                self.step()
-                report(self.iteration, self.options.iterations)
-                if told and (self.iteration % MEASURE_EVERY == 0 or self.iteration == self.options.iterations):
-                    told(self.iteration, len(self.parameters), self.measure())
-                if keep and self.iteration % SAVE_EVERY == 0:
-                    keep()
+        """All iterations that are left. told(iteration, Gaussians, PSNR of the test photographs), keep(): every so many, and keep() at Ctrl-C."""
+        whole = True
+        try:
+            with (steps or Steps()).bar("fitting") as report:
+                while self.iteration < self.options.iterations:
+                    with undivided():
+                        whole = False
+                        self.step()
+                        whole = True
+                    report(self.iteration, self.options.iterations)
+                    if told and (self.iteration % MEASURE_EVERY == 0 or self.iteration == self.options.iterations):
+                        told(self.iteration, len(self.parameters), self.measure())
+                    if keep and self.iteration % SAVE_EVERY == 0:
+                        keep()
+        except KeyboardInterrupt:
+            if keep and whole:
+                keep()
+            raise
 
     def scene(self) -> Scene:
         return self.parameters.scene()
 
     def measure(self) -> float:
-        """Mean PSNR of the test photographs in dB, pictures of `render`; with exposure after an affine fit."""
+        """Mean PSNR in dB of the test photographs, of `MEASURED` of them where there are more; pictures of `render`, with exposure after an affine fit."""
         found = []
-        for shot, photo in zip(self.dataset.tests, self._test_photos):
-            image = render(self.parameters, shot.camera, self.options.background, self.machine).image
-            found.append(psnr(affine_fit(image, photo) if self.options.exposure else image, photo))
-        return float(np.mean(found))
+        every = -(-len(self._test_photos) // MEASURED)
+        for shot, photo, counted in list(zip(self.dataset.tests, self._test_photos, self._test_counted))[::every]:
+            image, photo = _where(counted, render(self.parameters, shot.camera, self.options.background, self.machine).image, photo)
+            found.append(psnr(affine_fit(image, photo) if self.options.exposure else image, photo) if photo.size else np.nan)
+        return float(np.nanmean(found)) if not np.isnan(found).all() else float("nan")
 
     def quality(self, scene: Scene) -> Quality:
         """A scene against the test photographs by the reference renderer."""
         rows = []
-        for shot, photo in zip(self.dataset.tests, self._test_photos):
+        for shot, photo, counted in zip(self.dataset.tests, self._test_photos, self._test_counted):
+            if counted is not None and not counted.any():
+                continue
             image = render_reference(project(scene, shot.camera), shot.camera, self.options.background)
-            same = ssim(image, photo) if min(photo.shape[:2]) >= 11 else float("nan")
+            same = ssim(image, photo, counted) if min(photo.shape[:2]) >= 11 else float("nan")
             drawn = float("nan")
             if self.machine is not None:
-                drawn = psnr(run(self.machine, View(shot.camera, scene, background=self.options.background)).image, photo)
+                drawn = psnr(*_where(counted, run(self.machine, View(shot.camera, scene, background=self.options.background)).image, photo))
+            image, photo = _where(counted, image, photo)
             rows.append((psnr(image, photo), same, psnr(affine_fit(image, photo), photo), drawn))
-        return Quality(*map(float, np.mean(rows, axis=0)))
+        return Quality(*map(float, np.mean(rows, axis=0))) if rows else Quality(*[float("nan")] * 4)
+
+    @property
+    def masked(self) -> float:
+        """Share of the photographs' pixels that do not count."""
+        every = [(shot.camera.width * shot.camera.height, counted) for shot, counted in zip(self.dataset.shots, self._counted + self._test_counted)]
+        return sum(0 if counted is None else int((~counted).sum()) for _, counted in every) / sum(size for size, _ in every)
 
     # -- state ------------------------------------------------------------------------------------------------------------------------
 
@@ -293,7 +329,7 @@ class Trainer:
                 if theirs[key] != ours[key]:
                     said = f"another {key}" if key == "scene" else f"other {key}" if key == "photographs" else f"{key} {theirs[key]}, not {ours[key]}"
                     raise FlickerError(f"{path}: is of a fit with {said}")
-            self.parameters = Parameters(arrays["values"])
+            self.parameters = self.parameters.like(arrays["values"])
             self.moments = Adam(arrays["m"], arrays["v"], numbers["steps"][0])
             self.exposures = arrays["exposures"]
             self.exposure_moments = Adam(arrays["exposure_m"], arrays["exposure_v"], numbers["steps"][1])

@@ -2,8 +2,12 @@
 
 Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), Sec. 4 and the published
 rasterizer. For a Gaussian with mean m, rotation R and scales s, seen by a camera with world-to-camera rotation W:
-t = W (m - position), mean = (fx t_x / t_z + (width - 1) / 2, ...), cov = J W R S S^T R^T W^T J^T + 0.3 I. The Jacobian J is
-taken at t with t_x / t_z and t_y / t_z clamped to 1.3 times the tangent of half the field of view.
+t = W (m - position), mean = (fx t_x / t_z + cx, ...), cov = J W R S S^T R^T W^T J^T + 0.3 I. The Jacobian J is taken at t with
+t_x / t_z and t_y / t_z clamped to the slopes of the picture's edges and 0.3 times the tangent of half the field of view beyond (`slope_range`).
+
+Of an antialiased scene (Yu et al., "Mip-Splatting" (2024), Sec. 4.2) an opacity is multiplied by sqrt(det of cov without 0.3 I / det of cov). The numerator
+is never below 0, as in gsplat (`rasterize_mode="antialiased"`); the code of Mip-Splatting has a floor of 0.000025 under the ratio, which keeps 1/200 of an
+opacity.
 """
 
 from __future__ import annotations
@@ -20,8 +24,10 @@ from ..scene.files import Scene
 NEAR = 0.2
 DILATION = 0.3
 _CLAMP = 1.3
-# Columns of the geometry table that the first pass fills.
-X, Y, XX, XY, YY, A, B, C, RADIUS, SPIKY = range(10)
+_LEAST_FACTOR = 1e-150  # opacities stay positive
+# Columns of the geometry table that the first pass fills. FACTOR: of the opacity in antialiased scenes.
+X, Y, XX, XY, YY, A, B, C, RADIUS, SPIKY, FACTOR = range(11)
+COLUMNS = 11
 
 # Real spherical harmonics, in the order and with the signs of the INRIA code.
 _C0 = 0.28209479177387814
@@ -41,7 +47,7 @@ class Projected:
 
     mean: float64 (M, 2), x and y in pixels. cov2d: float64 (M, 3), xx, xy, yy in px^2, dilated.
     conic: float64 (M, 3), a, b, c: the inverse of cov2d, [[a, b], [b, c]]. depth: float32 (M,), camera-space z, the sort key.
-    opacity: float64 (M,). rgb: float64 (M, 3), max(0, 0.5 + SH). spiky: bool (M,), axis ratio >= 3 after dilation.
+    opacity: float64 (M,), of antialiased scenes with its factor. rgb: float64 (M, 3), max(0, 0.5 + SH). spiky: bool (M,), axis ratio >= 3 after dilation.
     index: int64 (M,), position in the scene. radii: float64 (M, 2), 3 standard deviations along x and y.
     circle: float64 (M,), the radius of the INRIA rasterizer: 3 standard deviations along the long axis, rounded up.
     """
@@ -80,6 +86,18 @@ class Projected:
         return len(self.depth)
 
 
+def slope_range(camera: Camera) -> np.ndarray:
+    """float64 (2, 2): least and largest x / z and y / z (rows) that the Jacobian is taken at.
+
+    The INRIA rasterizer takes 1.3 times the tangent of half the field of view either way. With a principal point off the middle the edges of the picture lie
+    at other slopes: each side's is taken, and the same 0.3 times beyond it, as gsplat does.
+    """
+    size, focal = np.array([camera.width, camera.height]), np.array([camera.fx, camera.fy])
+    half, off = _CLAMP * 0.5 * size, np.array([camera.cx, camera.cy]) - 0.5 * (size - 1)
+    with np.errstate(over="ignore"):
+        return np.stack([(-half - off) / focal, (half - off) / focal], axis=1)
+
+
 @numba.njit(cache=True)
 def tile_range(centre, radius, tiles):
     """First and one-past-last tile of centre +- radius, with the roundings of the INRIA rasterizer."""
@@ -89,10 +107,7 @@ def tile_range(centre, radius, tiles):
 
 
 @numba.njit(parallel=True, cache=True)
-def geometry(means, scales, quats, view, position, width, height, fx, fy, table, depth):
-    """Fill the table and depth (0: not visible) of every Gaussian. view: world to camera (3, 3)."""
-    lim_x = _CLAMP * 0.5 * width / fx
-    lim_y = _CLAMP * 0.5 * height / fy
+def _geometry(means, scales, quats, view, position, width, height, fx, fy, cx, cy, slope, table, depth):
     tiles_x = (width + TILE - 1) // TILE
     tiles_y = (height + TILE - 1) // TILE
     for i in numba.prange(means.shape[0]):
@@ -105,10 +120,10 @@ def geometry(means, scales, quats, view, position, width, height, fx, fy, table,
             continue
         tx = (view[0, 0] * dx + view[0, 1] * dy + view[0, 2] * dz) / z
         ty = (view[1, 0] * dx + view[1, 1] * dy + view[1, 2] * dz) / z
-        x = fx * tx + 0.5 * (width - 1)
-        y = fy * ty + 0.5 * (height - 1)
-        jx = -fx * min(max(tx, -lim_x), lim_x) / z
-        jy = -fy * min(max(ty, -lim_y), lim_y) / z
+        x = fx * tx + cx
+        y = fy * ty + cy
+        jx = -fx * min(max(tx, slope[0, 0]), slope[0, 1]) / z
+        jy = -fy * min(max(ty, slope[1, 0]), slope[1, 1]) / z
         w = np.float64(quats[i, 0])
         p = np.float64(quats[i, 1])
         q = np.float64(quats[i, 2])
@@ -139,7 +154,8 @@ def geometry(means, scales, quats, view, position, width, height, fx, fy, table,
         c0 = u1 * v2 - u2 * v1
         c1 = u2 * v0 - u0 * v2
         c2 = u0 * v1 - u1 * v0
-        det = c0 * c0 + c1 * c1 + c2 * c2 + DILATION * (xx + yy) + DILATION * DILATION
+        gram = c0 * c0 + c1 * c1 + c2 * c2
+        det = gram + DILATION * (xx + yy) + DILATION * DILATION
         xx += DILATION
         yy += DILATION
         mid = 0.5 * (xx + yy)
@@ -161,6 +177,15 @@ def geometry(means, scales, quats, view, position, width, height, fx, fy, table,
         table[i, C] = xx / det
         table[i, RADIUS] = radius
         table[i, SPIKY] = long * long >= SPIKY_AXIS_RATIO**2 * det
+        table[i, FACTOR] = max(np.sqrt(gram / det), _LEAST_FACTOR)
+
+
+def geometry(means: np.ndarray, scales: np.ndarray, quats: np.ndarray, camera: Camera, table: np.ndarray, depth: np.ndarray) -> None:
+    """Fill the table, float64 (N, COLUMNS), and the depth, float32 (N,) (0: not visible), of every Gaussian."""
+    _geometry(
+        means, scales, quats, np.ascontiguousarray(camera.rotation.T), camera.position, camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+        slope_range(camera), table, depth,
+    )
 
 
 @numba.njit(parallel=True, cache=True)
@@ -199,14 +224,14 @@ def colours(means, sh, index, position, rgb):
 def project(scene: Scene, camera: Camera) -> Projected:
     """Project a scene into a camera and sort it near to far."""
     count = len(scene.means)
-    table = np.empty((count, 10))
+    table = np.empty((count, COLUMNS))
     depth = np.empty(count, np.float32)
-    geometry(
-        scene.means, scene.scales, scene.quats, np.ascontiguousarray(camera.rotation.T), camera.position,
-        camera.width, camera.height, camera.fx, camera.fy, table, depth,
-    )
+    geometry(scene.means, scene.scales, scene.quats, camera, table, depth)
     index = np.flatnonzero(depth)
     index = index[np.argsort(depth[index], kind="stable")]
     rgb = np.empty((len(index), 3))
     colours(scene.means, scene.sh, index, camera.position, rgb)
-    return Projected.of(table, depth, scene.opacities, rgb, index)
+    projected = Projected.of(table, depth, scene.opacities, rgb, index)
+    if scene.antialiased:
+        projected.opacity *= table[index, FACTOR]
+    return projected

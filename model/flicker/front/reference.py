@@ -9,6 +9,7 @@ and finishes the pixel. docs/reference.md says how this was checked.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -105,3 +106,12 @@ def render_with_transmittance(
 def render_reference(projected: Projected, camera: Camera, background: Sequence[float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """Picture float64 (height, width, 3), neither clamped nor quantised; background is an RGB colour."""
     return render_with_transmittance(projected, camera, background)[0]
+
+
+def expected_depth(projected: Projected, camera: Camera) -> np.ndarray:
+    """float64 (height, width): camera-space z of the Gaussians at a pixel, each by its share of the picture, sum of w z over sum of w; NaN where none is."""
+    values = np.zeros((projected.n_visible, 3))
+    values[:, 0], values[:, 1] = projected.depth, 1.0
+    sums = render_reference(replace(projected, rgb=values), camera)
+    with np.errstate(invalid="ignore"):
+        return np.where(sums[..., 1] > 0.0, sums[..., 0] / sums[..., 1], np.nan)

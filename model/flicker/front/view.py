@@ -11,16 +11,16 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..params import Coords, Form
-from ..scene import Scene, load_scene
-from ..scene.camera import Camera, find_cameras, select_view
-from ..scene.files import scene_name
+from ..scene import Scene
+from ..scene.camera import Camera, select_view
 from ..scene.photos import BLACK, load_photo
+from ..scene.sources import DEMO, Source, open_scene
 from .lists import DERIVED, subtile_lists
 from .projection import Projected, project
 from .records import SubtileLists
 from .reference import render_reference
 
-DEMO = "demo"  # the project's own scene, by this name instead of a file
+__all__ = ["DEMO", "View", "load_view", "view_of"]
 T = TypeVar("T")
 
 
@@ -30,19 +30,20 @@ class View:
     scene: of the view; None where only its projection is given. projected: splats near to far. name, number: of the scene and its camera, for
     tables. coords: where means are rounded to FP16. origin: position of the picture's first pixel on the screen, when the picture is a window of a larger one;
     matters for absolute coordinates only. background: RGB in [0, 1] that every picture of the view is drawn over. photo: float64 (H, W, 3) in [0, 1], what a
-    camera saw of it; None where nobody knows.
+    camera saw of it; None where nobody knows. cameras_from: where the camera comes from, for people.
     """
 
     def __init__(
         self, camera: Camera, scene: Scene | None = None, projected: Projected | None = None, *, name: str = "", number: int = 0,
         coords: Coords = Coords.LOCAL, origin: tuple[int, int] = (0, 0), background: tuple[float, float, float] = BLACK, photo: np.ndarray | None = None,
+        cameras_from: str = "",
     ) -> None:
         if scene is None and projected is None:
             raise ValueError("a view needs a scene or its projection")
         if photo is not None and photo.shape != (camera.height, camera.width, 3):
             raise ValueError(f"a photograph of shape {photo.shape} is not of a camera of {camera.width}x{camera.height}")
         self.camera, self._scene, self.name, self.number, self.coords, self.origin = camera, scene, name, number, coords, origin
-        self.background, self.photo = background, photo
+        self.background, self.photo, self.cameras_from = background, photo, cameras_from
         if projected is not None:
             self.projected = projected
         self._kept: dict = {}
@@ -88,25 +89,21 @@ def load_view(
     scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None, up: str | None = None,
     background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
 ) -> View:
-    """The view of a scene from its camera `number`. size: (width, height), scales the focal lengths; None: as the camera has it.
+    """The view of a scene from its camera `number`. size: (width, height); the vertical field of view and the shape of the pixels stay
+    (`Camera.resized`); None: as the camera has it.
 
-    scene: a file, a folder, `demo` for the project's own scene, or a loaded one. cameras, up: as in `find_cameras`.
-    background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`).
+    scene, cameras, up: as in `open_scene`. background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`).
     FlickerError, naming file and field, for what cannot be read.
     """
-    if isinstance(scene, Scene):
-        loaded, name = scene, "" if scene.path is None else scene_name(scene.path)
-        found = find_cameras(loaded, cameras, up)
-    elif str(scene) == DEMO:
-        from ..scene.demo import demo_cameras, generate
+    return view_of(open_scene(scene, cameras, up), number, size, background, photo)
 
-        loaded, found, name = generate(), demo_cameras(), DEMO
-    else:
-        loaded = load_scene(scene)
-        found = find_cameras(loaded, cameras, up)
-        name = scene_name(scene)
-    camera = select_view(found, number)
+
+def view_of(
+    source: Source, number: int = 0, size: tuple[int, int] | None = None, background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
+) -> View:
+    """`load_view` of a scene that is open."""
+    camera = select_view(source.cameras, number)
     if size is not None:
         camera = camera.resized(*size)
     seen = None if photo is None else load_photo(Path(photo), (camera.width, camera.height), background)
-    return View(camera, loaded, name=name, number=number, background=background, photo=seen)
+    return View(camera, source.scene, name=source.name, number=number, background=background, photo=seen, cameras_from=source.cameras_from)

@@ -233,6 +233,13 @@ def assemble(lists: Grid, pixels: np.ndarray, background=(0.0, 0.0, 0.0)) -> np.
     return np.ascontiguousarray(rgb[: lists.height, : lists.width])
 
 
+def coverage(lists: Grid, pixels: np.ndarray) -> np.ndarray:
+    """float64 (H, W): alpha of a picture whose pixels `assemble` takes, 1 less the transmittance that is left."""
+    clear = pixels.copy()
+    clear[..., 1:] = 0
+    return 1.0 - assemble(lists, clear, (1.0, 1.0, 1.0))[..., 0].astype(np.float64)
+
+
 def render_golden(lists: SubtileLists, config: RenderConfig, walk: tuple[np.ndarray, np.ndarray] | None = None) -> Frame:
     """Render a frame bit for bit as the RTL does. walk: of `stream_order`, on which the automatic mode depends."""
     n = lists.cols * lists.rows

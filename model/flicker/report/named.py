@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..scene.files import scene_kind
+from ..scene.sources import DEMO, scene_path
 
 
 def view_numbers(text: str, count: int) -> list[int] | None:
@@ -20,14 +21,16 @@ def view_numbers(text: str, count: int) -> list[int] | None:
 
 
 def named(text: str) -> tuple[Path, str]:
-    """The file, and the text of its views, of `FILE` (its view 0), `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such scene."""
+    """The file, and the text of its views, of `FILE` (its view 0) or `demo`, `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such scene."""
     path, of = Path(text), "0"
     head, colon, tail = text.rpartition(":")
     if colon and not path.exists() and view_numbers(tail, 0) is not None:
         path, of = Path(head), tail
-    if not path.exists():
-        raise FlickerError(f"{path}: no such scene")
-    if not os.access(path, os.R_OK):
-        raise FlickerError(f"{path}: not readable")
-    scene_kind(path)
+    if str(path) != DEMO:
+        if not path.exists():
+            raise FlickerError(f"{path}: no such scene")
+        if not os.access(path, os.R_OK):
+            raise FlickerError(f"{path}: not readable")
+        path = Path(scene_path(path))
+        scene_kind(path)
     return path, of

@@ -52,7 +52,7 @@ class Written:
 
 
 def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = None, background: tuple[float, float, float] = BLACK) -> list[Target]:
-    """`FILE` (its view 0), `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
+    """`FILE` (its view 0), or `demo`, `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
     path, of = named(text)
     scene = SceneFile(str(path), photos=photos, background=background)
     numbers = view_numbers(of, scene.views())
@@ -122,6 +122,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     about = {
         "views": ", ".join(v.target.title for v in views), "size": ", ".join(dict.fromkeys(f"{w}x{h}" for w, h in (t.size for t in job.targets))),
         "photographs": f"of {sum(t.photo is not None for t in job.targets)} of {len(views)} views, averaged to the picture's size",
+        "cameras": "; ".join(dict.fromkeys(f"{t.scene.name}: {t.scene.cameras_from}" for t in job.targets)),
         "background": ", ".join(dict.fromkeys(" ".join(f"{c:g}" for c in t.scene.background) for t in job.targets)), "configurations": str(len(job.configurations)),
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",

@@ -1,145 +1,94 @@
-"""Pinhole cameras: INRIA `cameras.json`, orbit cameras for scenes without one.
+"""The cameras of a scene: files of several formats by one door, `load_cameras`; orbit cameras for scenes without any.
 
-World and camera axes follow COLMAP and the INRIA code: camera x right, y down, z forward. Pixel centres lie on integers, so the middle of a picture
-is ((width - 1) / 2, (height - 1) / 2); files count from the picture's corner, half a pixel before the first centre.
+| what | format | read by |
+|---|---|---|
+| `cameras.json` | INRIA | `scene.cameras_json` |
+| `transforms.json` | NeRF, nerfstudio, instant-ngp | `scene.transforms` |
+| `camera_path.json` | nerfstudio's viewer | `scene.camera_path` |
+| `sparse/0` | COLMAP, binary or text | `scene.colmap` |
+
+Axes and pixels are those of `scene.pinhole`.
 """
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..errors import FlickerError
+from ..errors import FlickerError, one_line
+from . import camera_path, cameras_json, colmap, transforms
+from .cameras_json import cameras_text
+from .fields import read_json
 from .files import Scene, scene_folders
+from .folders import model_folder
+from .pinhole import MAX_SIZE, Camera
 
-MAX_SIZE = 16384
-_MAX_NUMBER = 1e30  # squares and products of such numbers stay finite in the projection
-_KEYS = ("width", "height", "fx", "fy", "position", "rotation")
+__all__ = [
+    "DEFAULT_UP", "MAX_SIZE", "ORBIT_VIEWS", "UP_AXES", "Camera", "camera_count", "camera_files", "cameras_beside", "cameras_said", "cameras_text",
+    "find_cameras", "load_cameras", "orbit_camera", "photos_root", "select_view", "stored_cameras",
+]
+
 ORBIT_VIEWS = 8  # of a scene without cameras of its own
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
 DEFAULT_UP = "-y"  # of the INRIA code and COLMAP, for upright scenes
+_LISTS = ("cameras.json", "transforms.json")  # of a folder, before a COLMAP model
 
 
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """A view.
-
-    width, height: pixels, 1 to 16384. fx, fy: focal lengths in pixels.
-    position: float64 (3,), camera centre in the world.
-    rotation: float64 (3, 3), camera to world, columns right, down, forward.
-    name: for people. img_name: name of its photograph; None: it has none.
-    cx, cy: principal point in pixels, pixel centres on integers; None: the middle of the picture.
-    Raises FlickerError, naming the field, when a value makes no camera.
+def camera_files(path: str | Path) -> list[Path]:
+    """The files that `load_cameras` reads of a file or folder, the one that gives the cameras first: itself; of a folder its `cameras.json`, else its
+    `transforms.json`, else cameras and images of its COLMAP model, which any of the model's files means too. FlickerError for a folder without any.
     """
-
-    width: int
-    height: int
-    fx: float
-    fy: float
-    position: np.ndarray
-    rotation: np.ndarray
-    name: str = field(default="")
-    img_name: str | None = None
-    cx: float = None  # type: ignore[assignment]  # None becomes the middle
-    cy: float = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        for key in ("width", "height"):
-            number = _numbers(getattr(self, key), key, ())
-            if not (1 <= number <= MAX_SIZE and number == int(number)):
-                raise FlickerError(f"{key}: {number:.12g} is not a whole number from 1 to {MAX_SIZE}")
-            object.__setattr__(self, key, int(number))
-        for key in ("fx", "fy"):
-            number = _numbers(getattr(self, key), key, ())
-            if number <= 0:
-                raise FlickerError(f"{key}: {number:.12g} is not positive")
-            object.__setattr__(self, key, float(number))
-        for key, side in (("cx", self.width), ("cy", self.height)):
-            given = getattr(self, key)
-            object.__setattr__(self, key, 0.5 * (side - 1) if given is None else float(_numbers(given, key, ())))
-        object.__setattr__(self, "position", _numbers(self.position, "position", (3,)))
-        rotation = _numbers(self.rotation, "rotation", (3, 3))
-        if np.abs(rotation).max() > 2 or np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-            raise FlickerError("rotation: not a rotation matrix")
-        object.__setattr__(self, "rotation", rotation)
-
-    def resized(self, width: int, height: int) -> Camera:
-        """The same view at another size: the vertical field of view and the shape of the pixels stay; sideways the picture is cropped or extended.
-
-        The principal point keeps its distance from the middle, in heights of the picture.
-        """
-        return self._at(width, height, height / self.height, height / self.height)
-
-    def scaled(self, width: int, height: int) -> Camera:
-        """The camera of the same picture after it was scaled to another size, each axis by its own factor."""
-        return self._at(width, height, width / self.width, height / self.height)
-
-    def _at(self, width: int, height: int, by_x: float, by_y: float) -> Camera:
-        cx, cy = 0.5 * (width - 1) + by_x * (self.cx - 0.5 * (self.width - 1)), 0.5 * (height - 1) + by_y * (self.cy - 0.5 * (self.height - 1))
-        other = replace(self, width=width, height=height, cx=cx, cy=cy)
-        return replace(other, fx=self.fx * by_x, fy=self.fy * by_y)
-
-
-def _numbers(value: Any, key: str, shape: tuple[int, ...]) -> np.ndarray:
-    """float64 array of the given shape, every number finite."""
-    what = "a number" if shape == () else f"{'x'.join(map(str, shape))} numbers"
-    try:
-        array = np.array(value)
-        if array.shape != shape or array.dtype.kind not in "iufO":  # integers beyond 64 bits are objects
-            raise FlickerError(f"{key}: not {what}")
-        array = array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise FlickerError(f"{key}: not {what}") from None
-    if not np.isfinite(array).all():
-        raise FlickerError(f"{key}: not finite")
-    if (np.abs(array) > _MAX_NUMBER).any():
-        raise FlickerError(f"{key}: beyond {_MAX_NUMBER:g}")
-    return array
+    path = Path(path)
+    if path.name in colmap.FILES and colmap.find_model(path.parent) == path.parent:
+        path = path.parent
+    elif not path.is_dir():
+        return [path]
+    listed = next((file for name in _LISTS if (file := path / name).is_file()), None)
+    if listed is not None:
+        return [listed]
+    model = colmap.find_model(path)
+    if model is not None:
+        return [colmap.model_file(model, "images"), colmap.model_file(model, "cameras")]
+    others = sorted(file.name for file in path.glob("transforms*.json"))
+    hint = f"; give one of its files: {', '.join(map(one_line, others))}" if others else ""
+    raise FlickerError(f"{path}: a directory without {', '.join(_LISTS)} or a COLMAP model{hint}")
 
 
 def load_cameras(path: str | Path) -> list[Camera]:
-    """Cameras of an INRIA `cameras.json`: a list of objects with img_name, width, height, position, rotation, fx, fy.
+    """The cameras of a file or folder, at least one; the content says the format.
 
-    Raises FlickerError naming the file, the index of the camera and the field.
+    INRIA `cameras.json`, `transforms.json` of NeRF and nerfstudio, nerfstudio's `camera_path.json`, or a COLMAP model (its folder, the data set's, or one of
+    its files), binary or text. Only pinholes: a lens that distorts is refused. FlickerWarning for sizes that the file does not name. FlickerError naming the
+    file, the camera and the field.
     """
-    path = Path(path)
-    try:
-        entries = json.loads(path.read_bytes())
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:
-        raise FlickerError(f"{path}: not JSON ({' '.join(str(error).split())})") from None
-    if not isinstance(entries, list) or not entries:
-        raise FlickerError(f"{path}: not a list of cameras" if entries != [] else f"{path}: no cameras")
-    cameras = []
-    for i, entry in enumerate(entries):
-        where = f"{path}: camera {i}"
-        if not isinstance(entry, dict):
-            raise FlickerError(f"{where}: not an object")
-        for key in _KEYS:
-            if key not in entry:
-                raise FlickerError(f"{where}: '{key}' is missing")
-        img_name = None if entry.get("img_name") is None else str(entry["img_name"])
-        try:
-            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name))
-        except FlickerError as error:
-            raise FlickerError(f"{where}: {error}") from None
-    return cameras
+    file = camera_files(path)[0]
+    if file.name in colmap.FILES:
+        found = colmap.cameras_of(file.parent)
+    else:
+        data = read_json(file)
+        if isinstance(data, list):
+            found = cameras_json.cameras_of(file, data)
+        elif isinstance(data, dict) and "frames" in data:
+            found = transforms.cameras_of(file, data)
+        elif isinstance(data, dict) and camera_path.KEY in data:
+            found = camera_path.cameras_of(file, data)
+        else:
+            raise FlickerError(f"{file}: not a list of cameras, nor has it 'frames' (transforms.json) or '{camera_path.KEY}' (nerfstudio)")
+    if not found:
+        raise FlickerError(f"{file}: no cameras")
+    return found
 
 
-def cameras_text(cameras: Sequence[Camera]) -> str:
-    """The text of an INRIA `cameras.json`; a camera without photograph goes by its name."""
-    return json.dumps([
-        {"id": k, "img_name": c.img_name or c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
-         "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy}
-        for k, c in enumerate(cameras)
-    ], indent=1) + "\n"
+def photos_root(path: str | Path) -> Path:
+    """The folder in and under which the photographs of cameras lie: that of the file; of a COLMAP model the data set's."""
+    file = camera_files(path)[0]
+    folder = file.parent
+    if file.name not in colmap.FILES:
+        return folder
+    above = [place for place in colmap.PLACES if place and folder.match(place)]
+    return folder.parents[max(map(len, (place.split("/") for place in above))) - 1] if above else folder
 
 
 def _box(scene: Scene) -> np.ndarray:
@@ -218,8 +167,24 @@ def orbit_camera(scene: Scene, view: float = 0, views: int = ORBIT_VIEWS, width:
 
 
 def cameras_beside(path: str | Path) -> Path | None:
-    """`cameras.json` that goes with a scene: beside the file; in an unpacked SOG's folder, else beside that folder. None: there is none."""
-    return next((file for folder in scene_folders(path) if (file := folder / "cameras.json").exists()), None)
+    """`cameras.json` that goes with a scene: beside the file; in an unpacked SOG's folder, else beside that folder; of a PLY in a trainer's
+    `point_cloud/iteration_N` at the top of the trainer's folder. None: there is none."""
+    trained = model_folder(path)
+    folders = [*scene_folders(path), *([] if trained is None else [trained])]
+    return next((file for folder in folders if (file := folder / "cameras.json").exists()), None)
+
+
+def cameras_said(path: str | Path | None, cameras: str | Path | None = None, up: str | None = None) -> str:
+    """Where the cameras of `find_cameras` come from, for people. Other files of cameras beside the scene, which are not taken, are named."""
+    found = cameras if cameras is not None or path is None else cameras_beside(path)
+    if found is not None:
+        return str(camera_files(found)[0])
+    orbit = f"orbit of {ORBIT_VIEWS}, up {up or DEFAULT_UP}"
+    if path is None:
+        return orbit
+    beside = [file for folder in scene_folders(path) for file in (folder / "transforms.json", folder / "camera_path.json") if file.is_file()]
+    beside += [model for folder in scene_folders(path) if (model := colmap.find_model(folder)) is not None]
+    return f"{orbit}; not {beside[0]}, which --cameras takes" if beside else f"{orbit}; no cameras.json goes with the scene"
 
 
 def stored_cameras(path: str | Path | None, cameras: str | Path | None = None, up: str | None = None) -> list[Camera] | None:

@@ -1,4 +1,8 @@
-"""Pictures in files, 8 bits a channel: PNG is written, what Pillow knows is read."""
+"""Pictures in files, 8 bits a channel: PNG is written, what Pillow knows is read.
+
+A photograph may be stored lying: EXIF's orientation (1 to 8) says how it is turned upright. It is turned, unless its camera's shape is known and only the
+stored pixels have that shape: then they are what the camera describes.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 
 from ..errors import FlickerError
+
+Shape = tuple[float, float]  # width and height of a camera, of which only the ratio counts here
 
 
 def save_png(path: str | Path, image: np.ndarray) -> None:
     """Write a float picture (H, W, 3), clamped to [0, 1] and rounded to 8 bits. Raises OSError."""
     pixels = np.rint(np.clip(np.nan_to_num(image), 0.0, 1.0) * 255.0).astype(np.uint8)
+    Image.fromarray(pixels).save(path, format="PNG")
+
+
+def save_grey16(path: str | Path, values: np.ndarray) -> None:
+    """Write numbers (H, W), clamped to [0, 1] and rounded to 16 bits, as a grey PNG. Raises OSError."""
+    pixels = np.rint(np.clip(np.nan_to_num(values), 0.0, 1.0) * 65535.0).astype(np.uint16)
     Image.fromarray(pixels).save(path, format="PNG")
 
 
@@ -30,25 +42,55 @@ def _opened(path: str | Path) -> Iterator[Image.Image]:
         raise FlickerError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
 
-def picture_size(path: str | Path) -> tuple[int, int]:
-    """(width, height) of a picture, without its pixels."""
+def same_shape(size: tuple[int, int], shape: Shape) -> bool:
+    """A picture of size (width, height) has the shape of a camera: at its width its height is the camera's within one pixel."""
+    return abs(shape[1] * size[0] / shape[0] - size[1]) <= 1.0
+
+
+def _orientation(picture: Image.Image) -> int:
+    """EXIF's orientation, 1 to 8; 1 (upright) where there is none, or another number."""
+    number = picture.getexif().get(ExifTags.Base.Orientation, 1)
+    return number if isinstance(number, int) and 1 <= number <= 8 else 1
+
+
+def _turned(picture: Image.Image, shape: Shape | None) -> tuple[bool, tuple[int, int]]:
+    """Whether the picture is to be turned, and its size (width, height) then."""
+    orientation, (width, height) = _orientation(picture), picture.size
+    upright = (height, width) if orientation >= 5 else (width, height)
+    if orientation == 1 or (shape is not None and same_shape((width, height), shape) and not same_shape(upright, shape)):
+        return False, (width, height)
+    return True, upright
+
+
+def picture_size(path: str | Path, shape: Shape | None = None) -> tuple[int, int]:
+    """(width, height) of a picture, without its pixels. shape: (width, height) of its camera."""
     with _opened(path) as picture:
-        return picture.size
+        return _turned(picture, shape)[1]
 
 
-def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0)) -> np.ndarray:
-    """float64 (H, W, 3) in [0, 1]; what is transparent is composed over the background, as the values are stored (no gamma)."""
+def picture_turned(path: str | Path, shape: Shape | None = None) -> bool | None:
+    """Whether EXIF turns a picture as it is read here; None: EXIF has it upright."""
+    with _opened(path) as picture:
+        return None if _orientation(picture) == 1 else _turned(picture, shape)[0]
+
+
+def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0), shape: Shape | None = None) -> np.ndarray:
+    """float64 (H, W, 3) in [0, 1]; what is transparent is composed over the background, as the values are stored (no gamma). shape: of its camera."""
     with _opened(path) as picture:
         if picture.mode.startswith(("I", "F")):
             raise FlickerError(f"{path}: pixels of more than 8 bits (mode {picture.mode}) are not read")
-        rgba = np.asarray(picture.convert("RGBA"), np.float64) / 255.0
+        upright = ImageOps.exif_transpose(picture) if _turned(picture, shape)[0] else picture
+        if not upright.has_transparency_data:
+            return np.asarray(upright.convert("RGB"), np.float64) / 255.0
+        rgba = np.asarray(upright.convert("RGBA"), np.float64) / 255.0
         return rgba[..., :3] * rgba[..., 3:] + np.asarray(background, np.float64) * (1.0 - rgba[..., 3:])
 
 
-def load_coverage(path: str | Path) -> np.ndarray | None:
-    """float64 (H, W) in [0, 1], alpha of a picture; None where it is 1 everywhere."""
+def load_coverage(path: str | Path, shape: Shape | None = None) -> np.ndarray | None:
+    """float64 (H, W) in [0, 1], alpha of a picture; None where it is 1 everywhere. shape: of its camera."""
     with _opened(path) as picture:
         if not picture.has_transparency_data:
             return None
-        alpha = np.asarray(picture.convert("RGBA").getchannel("A"), np.float64) / 255.0
+        upright = ImageOps.exif_transpose(picture) if _turned(picture, shape)[0] else picture
+        alpha = np.asarray(upright.convert("RGBA").getchannel("A"), np.float64) / 255.0
     return alpha if alpha.min() < 1.0 else None

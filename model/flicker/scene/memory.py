@@ -17,14 +17,16 @@ The chunk format is that of PlayCanvas' splat-transform: values are rounded to t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import FlickerError
+from ..errors import FlickerError, say
 from .gaussians import SH_C0, Scene
+from .ply import ANTIALIASED, Header, Ply, open_ply
+from .raw import KEPT, cut_note, degree_of
 
 CHUNK = 256  # Gaussians
 CLUSTER_HEADER_BYTES = 32  # of FP16: box of the means (6 float32), largest standard deviation, first Gaussian and count
@@ -132,12 +134,14 @@ class ChunkScene:
 
     packed: uint32 (N, 4): position, rotation, scale, colour. sh: uint8 (N, 3 (K - 1)), channel by channel (f_rest_*).
     sh_scale: float32 (C,), largest coefficient of a chunk, codes then being 128 + 127 coefficient / largest; None for PlayCanvas' codes.
+    antialiased: as in Scene.
     """
 
     bounds: np.ndarray
     packed: np.ndarray
     sh: np.ndarray
     sh_scale: np.ndarray | None = None
+    antialiased: bool = False
 
 
 def _unit(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -244,44 +248,74 @@ _BOUNDS += [f"{m}_{v}" for m in ("min", "max") for v in "rgb"]
 _PACKED = [f"packed_{v}" for v in ("position", "rotation", "scale", "color")]
 
 
-def save_chunks(data: ChunkScene, path: str | Path) -> None:
-    """Write a compressed PLY file. Raises OSError, and FlickerError for SH codes that the file format does not know."""
-    if data.sh_scale is not None:
-        raise FlickerError(f"{path}: compressed PLY has no SH codes scaled by chunk")
+def chunk_bytes(data: ChunkScene) -> bytes:
+    """The compressed PLY file of codes of PlayCanvas."""
     n, rest = data.sh.shape
-    header = ["ply", "format binary_little_endian 1.0", f"element chunk {len(data.bounds)}"]
-    header += [f"property float {name}" for name in _BOUNDS]
+    header = ["ply", "format binary_little_endian 1.0", *(["comment SplatRenderMode: mip"] if data.antialiased else [])]
+    header += [f"element chunk {len(data.bounds)}", *(f"property float {name}" for name in _BOUNDS)]
     header += [f"element vertex {n}"] + [f"property uint {name}" for name in _PACKED]
     if rest:
         header += [f"element sh {n}"] + [f"property uchar f_rest_{k}" for k in range(rest)]
     body = [data.bounds.astype("<f4").tobytes(), data.packed.astype("<u4").tobytes(), data.sh.tobytes()]
-    Path(path).write_bytes("\n".join([*header, "end_header", ""]).encode() + b"".join(body))
+    return "\n".join([*header, "end_header", ""]).encode() + b"".join(body)
+
+
+def save_chunks(data: ChunkScene, path: str | Path) -> None:
+    """Write a compressed PLY file. Raises OSError, and FlickerError for SH codes that the file format does not know."""
+    if data.sh_scale is not None:
+        raise FlickerError(f"{path}: compressed PLY has no SH codes scaled by chunk")
+    Path(path).write_bytes(chunk_bytes(data))
+
+
+def is_chunked(header: Header) -> bool:
+    """Whether a PLY file holds chunks, as PlayCanvas writes them."""
+    vertex = header.element("vertex")
+    return header.element("chunk") is not None and vertex is not None and any(p.name.startswith("packed_") for p in vertex.properties)
+
+
+def chunks_of(file: Ply) -> tuple[ChunkScene, tuple[str, ...]]:
+    """The bits of a compressed PLY file, and what was left out. Files of older writers, which have no bounds of colours, get 0 and 1. FlickerError for
+    properties that are missing and counts that do not match."""
+    path, header = file.path, file.header
+    counts = {e.name: e.count for e in header.elements}
+    chunks, n = counts["chunk"], counts["vertex"]
+    if n == 0:
+        raise FlickerError(f"{path}: no Gaussians")
+    properties = {e.name: [p.name for p in e.properties] for e in header.elements}
+    coloured = any(name in properties["chunk"] for name in _BOUNDS[12:])
+    file.require("chunk", _BOUNDS[: 18 if coloured else 12], ("f4", "f8"), "float")
+    file.require("vertex", _PACKED, ("u4", "i4"), "uint")
+    rest = sum(name.startswith("f_rest_") for name in properties.get("sh", []))
+    count = rest // 3 + 1
+    if rest % 3 or degree_of(count) is None:
+        raise FlickerError(f"{path}: {rest} properties f_rest_*, which no SH degree has: 0, 9, 24 or 45")
+    file.require("sh", [f"f_rest_{k}" for k in range(rest)], ("u1",), "uchar")
+    for name, number in (("chunk", -(-n // CHUNK)), ("sh", n)):
+        if counts.get(name, number) != number:
+            raise FlickerError(f"{path}: element '{name}': count {counts[name]}, not {number}")
+    bounds = np.tile(np.array([0.0] * 15 + [1.0] * 3, np.float32), (chunks, 1))
+    bounds[:, : 18 if coloured else 12] = file.numbers("chunk", _BOUNDS[: 18 if coloured else 12])
+    kept = [f"f_rest_{c * (count - 1) + k}" for c in range(3) for k in range(min(count, KEPT) - 1)]
+    sh = file.numbers("sh", kept, "u1") if kept else np.empty((n, 0), np.uint8)
+    packed = file.numbers("vertex", _PACKED, "i8").astype(np.uint32)
+    return ChunkScene(bounds, packed, sh, antialiased=header.mode == ANTIALIASED), cut_note(count)
 
 
 def load_chunks(path: str | Path) -> ChunkScene:
-    """The bits of a compressed PLY file with colour bounds, as `save_chunks` and PlayCanvas write it."""
-    path = Path(path)
-    data = path.read_bytes()
-    end = data.find(b"end_header\n")
-    words = [line.split() for line in data[: max(end, 0)].decode("ascii", "replace").splitlines()]
-    counts = {w[1]: int(w[2]) for w in words if w[:1] == ["element"] and len(w) == 3 and w[2].isdigit()}
-    names = [w[2] for w in words if w[:1] == ["property"] and len(w) == 3]
-    rest = len(names) - len(_BOUNDS) - len(_PACKED)
-    if end < 0 or names[: len(_BOUNDS) + len(_PACKED)] != _BOUNDS + _PACKED or rest not in (0, 9, 24, 45):
-        raise FlickerError(f"{path}: not a compressed PLY file with colour bounds")
-    chunks, n = counts["chunk"], counts["vertex"]
-    sizes = np.cumsum([end + len(b"end_header\n"), chunks * 72, n * 16, n * rest])
-    if chunks != -(-n // CHUNK) or sizes[-1] != len(data):
-        raise FlickerError(f"{path}: sizes do not match the header")
-    return ChunkScene(
-        np.frombuffer(data, "<f4", chunks * 18, sizes[0]).reshape(chunks, 18),
-        np.frombuffer(data, "<u4", n * 4, sizes[1]).reshape(n, 4),
-        np.frombuffer(data, "u1", n * rest, sizes[2]).reshape(n, rest),
-    )
+    """The bits of a compressed PLY file. FlickerWarning for what is left out; FlickerError, naming file and field, for what is none."""
+    file = open_ply(Path(path))
+    if not is_chunked(file.header):
+        raise FlickerError(f"{path}: not a compressed PLY file: elements chunk and vertex, the latter with packed_position, are missing")
+    data, notes = chunks_of(file)
+    for note in notes:
+        say(path, note)
+    return data
 
 
 def through_memory(scene: Scene, form: MemoryFormat, size: int = CHUNK) -> Scene:
     """The scene as it comes back out of memory in a format. It must be in the order of its clusters (`build_clusters`)."""
     if form.chunked:
-        return decode_chunks(encode_chunks(scene, scaled_sh=form is MemoryFormat.CHUNK_SH), scene.path)
-    return decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)
+        decoded = decode_chunks(encode_chunks(scene, scaled_sh=form is MemoryFormat.CHUNK_SH), scene.path)
+    else:
+        decoded = decode_fp16(encode_fp16(scene, size, form is MemoryFormat.FP16_LOCAL), scene.path)
+    return replace(decoded, antialiased=scene.antialiased)

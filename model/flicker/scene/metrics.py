@@ -53,15 +53,19 @@ def psnr(a: np.ndarray, b: np.ndarray) -> float:
 
 
 @_remembered(256)
-def ssim(a: np.ndarray, b: np.ndarray) -> float:
+def ssim(a: np.ndarray, b: np.ndarray, counted: np.ndarray | None = None) -> float:
     """Structural similarity of two pictures (H, W, 3), clamped to [0, 1].
 
-    Wang et al. (2004): Gaussian window of sigma 1.5, population covariance; mean over pixels and channels.
+    Wang et al. (2004): Gaussian window of sigma 1.5, population covariance; mean over pixels and channels, but for the five at each border.
+    counted: bool (H, W), pixels that count; the others are black in both pictures, and no part of the mean. NaN where none counts.
     """
     a, b = _pair(a, b)
-    return float(structural_similarity(
-        a, b, data_range=1.0, channel_axis=2, gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
-    ))
+    kind = {"data_range": 1.0, "channel_axis": 2, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    if counted is None:
+        return float(structural_similarity(a, b, **kind))
+    shown = counted[..., None]
+    values = structural_similarity(a * shown, b * shown, full=True, **kind)[1][5:-5, 5:-5][counted[5:-5, 5:-5]]
+    return float(values.mean()) if values.size else math.nan
 
 
 # -- FLIP ------------------------------------------------------------------------------------------------------------------------------

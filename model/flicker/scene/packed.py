@@ -93,7 +93,8 @@ IMAGE_HEADER = _record(
     ("low", "<f4", 3),  # box of the cluster boxes
     ("high", "<f4", 3),
     ("sigma", "<f4"),  # the largest of a cluster
-    ("reserved", "V144"),
+    ("flags", "<u4"),  # bit 0: antialiased
+    ("reserved", "V140"),
     ("crc", "<u4"),  # of the bytes before
 )
 TABLE_ENTRY = _record(
@@ -138,7 +139,7 @@ class PackedScene:
     """A scene as it lies in memory: C clusters, S slots (a multiple of 16), N Gaussians in the order of their slots.
 
     table: TABLE_ENTRY (C,). headers: CHUNK_HEADER or FP16_HEADER (C,). geometry: chunk: uint32 (S, 3), words of position, rotation, log2 scale; FP16:
-    uint16 (S, 10), bits of mean, scale, quaternion (w first). colour: uint8 (B,), B a multiple of 64.
+    uint16 (S, 10), bits of mean, scale, quaternion (w first). colour: uint8 (B,), B a multiple of 64. antialiased: as in `Scene`.
     """
 
     format: PackedFormat
@@ -147,6 +148,7 @@ class PackedScene:
     geometry: np.ndarray
     colour: np.ndarray
     path: Path | None = None
+    antialiased: bool = False
 
     def __len__(self) -> int:
         """Gaussians."""
@@ -219,6 +221,7 @@ class PackedScene:
         header["gaussians"], header["clusters"], header["slots"] = len(self), len(self.table), len(self.geometry)
         header["low"], header["high"] = self.table["low"].min(axis=0), self.table["high"].max(axis=0)
         header["sigma"] = self.sigma.max()
+        header["flags"] = self.antialiased
         parts = self.sections()
         offset = HEADER_BYTES // BEAT
         for name, part in parts.items():
@@ -303,7 +306,8 @@ class Values:
     sh: np.ndarray
 
 
-def _means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
+def means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
+    """Those of `values`, without the rest."""
     words, cluster, headers = packed.geometry[packed.slot], packed.cluster, packed.headers
     if packed.format is not PackedFormat.CHUNK:
         numbers = words[:, :6].view(np.float16).astype(np.float64)
@@ -318,7 +322,7 @@ def _means_and_scales(packed: PackedScene) -> tuple[np.ndarray, np.ndarray]:
 
 def values(packed: PackedScene) -> Values:
     """The numbers in the image, exact but for float64's own rounding: colours are turned back into coefficients, log2 scales into scales."""
-    means, scales = _means_and_scales(packed)
+    means, scales = means_and_scales(packed)
     if packed.format is not PackedFormat.CHUNK:
         bits = fp16_bits(packed)
         quats, opacities, sh = (x.view(np.float16).astype(np.float64) for x in (bits.quat, bits.opacity, np.ascontiguousarray(bits.sh)))
@@ -337,7 +341,7 @@ def decode(packed: PackedScene) -> Scene:
     """The scene that the image holds, in float32, Gaussian i being that of `packed.slot[i]`. Rotations are normalised; an opacity of 0 becomes 2^-24."""
     v = values(packed)
     quats = v.quats / np.linalg.norm(v.quats, axis=1, keepdims=True)
-    return Scene(v.means, v.scales, quats, np.maximum(v.opacities, _TINY), v.sh, packed.path)
+    return Scene(v.means, v.scales, quats, np.maximum(v.opacities, _TINY), v.sh, packed.path, antialiased=packed.antialiased)
 
 
 # ---- bounds of the clusters ----------------------------------------------------------------------------------------------------------
@@ -357,7 +361,7 @@ def upper_half(values: np.ndarray) -> np.ndarray:
 
 def bounds(packed: PackedScene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """low, high: float32 (C, 3), box of the decoded means, rounded outward; sigma: uint16 (C,), upper half of float32, largest decoded scale, rounded up."""
-    means, scales = _means_and_scales(packed)
+    means, scales = means_and_scales(packed)
     start = packed.start[:-1]
     low, high = np.minimum.reduceat(means, start), np.maximum.reduceat(means, start)
     with np.errstate(over="ignore"):
@@ -394,6 +398,7 @@ def parse(data: bytes, path: Path) -> PackedScene:
     packed = PackedScene(
         form, np.frombuffer(parts["table"], TABLE_ENTRY, clusters), np.frombuffer(parts["headers"], form.header, clusters),
         np.frombuffer(parts["geometry"], kind, slots * words).reshape(slots, words), np.frombuffer(parts["colour"], np.uint8), path,
+        bool(header["flags"] & 1),
     )
     _check_table(packed, header, path)
     _check_headers(packed, path)
@@ -435,6 +440,8 @@ def _image_header(data: bytes, path: Path) -> tuple[np.ndarray, PackedFormat]:
         end += size
     if end != beats:
         raise FlickerError(f"{path}: colour_beats: ends at beat {end}, the image has {beats}")
+    if header["flags"] > 1:
+        raise FlickerError(f"{path}: flags: {header['flags']}: reserved bits are not zero")
     if any(header["reserved"].tobytes()):
         raise FlickerError(f"{path}: reserved: not zero")
     return header, form
@@ -496,7 +503,7 @@ def _check_gaussians(packed: PackedScene, path: Path) -> None:
     _check_numbers(packed, path)
     with np.errstate(over="ignore"):
         low, high, sigma = bounds(packed)
-        _, scales = _means_and_scales(packed)
+        _, scales = means_and_scales(packed)
     _refuse(path, ~((low >= packed.table["low"]) & (high <= packed.table["high"])), "low, high", "a mean lies outside")
     _refuse(path, sigma > packed.table["sigma"], "sigma", "below a standard deviation")
     if packed.format is PackedFormat.CHUNK and (small := (scales < 2.0**-126).any(axis=1)).any():

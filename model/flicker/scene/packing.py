@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..progress import Steps
-from .clusters import cut_clusters, morton_order, reorder
+from .clusters import cluster_order, cut_clusters, reorder
 from .files import check_ply, load_scene, scene_kind, scene_title
 from .gaussians import SH_C0, SH_DEGREES, Scene
 from .memory import ChunkScene, load_chunks, rotation_word
@@ -64,7 +64,7 @@ class Packing:
     """A packed scene and how it came about.
 
     order: int64 (N,), number in the source of each Gaussian. clamped: values that were changed beyond rounding, by reason. left_out: Gaussians of the
-    source that are not in it, by reason. kept_chunks: codes and clusters are those of the source.
+    source that are not in it, by reason. kept_chunks: codes and clusters are those of the source, a compressed PLY; brought: of that or of an image.
     """
 
     packed: PackedScene
@@ -72,6 +72,7 @@ class Packing:
     clamped: dict[str, int] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     kept_chunks: bool = False
+    brought: bool = False
 
 
 def _merge(start: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -184,37 +185,44 @@ def pack(scene: Scene, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe =
         if int(visible.sum()) > SLOT_LIMIT:
             raise FlickerError(f"{where}: {int(visible.sum())} Gaussians, more than {SLOT_LIMIT}: a record's number has 24 bits")
         order = np.flatnonzero(visible)
-        order = order[morton_order(scene.means[order])]
+        reach = math.inf if form is PackedFormat.CHUNK else 2.0 * _MAX_FP16
+        along, start, near = cluster_order(scene.means[order], CLUSTER_LIMIT, reach)
+        order = order[along]
         scene = reorder(scene, order)
-        start = np.arange(0, len(scene), CLUSTER_LIMIT)
         if form is PackedFormat.CHUNK and recipe.cuts > 0:
             gaussian = 12 + form.colour_stride(scene.sh_degree)
+            far = start[start >= near]
             start = cut_clusters(
-                scene.means, start, int(recipe.cuts * gaussian * len(scene)), tuple((1 << bits) - 1 for bits in POSITION_BITS),
+                scene.means[:near], start[start < near], int(recipe.cuts * gaussian * near), tuple((1 << bits) - 1 for bits in POSITION_BITS),
                 TABLE_ENTRY.itemsize + form.header.itemsize + BEAT // 2, 12, SLOT_STEP,
             )
+            start = np.concatenate([start, far])
         counts = np.diff(np.append(start, len(scene)))
     with steps.step("codes"):
         if form is PackedFormat.CHUNK:
             packed, clamped = _chunks(scene, start, counts, recipe)
         else:
             packed, clamped = _fp16(scene, form, start, counts)
+    packed.antialiased = scene.antialiased
     return Packing(packed, order, clamped, left_out)
 
 
-def pack_file(path: str | Path, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None) -> Packing:
-    """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is.
+def pack_file(
+    path: str | Path, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None, rechunk: bool = False,
+) -> Packing:
+    """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is; rechunk: both
+    are decoded and their clusters made anew.
 
     Raises FlickerError naming file and field.
     """
     path, steps = Path(path), steps or Steps()
     title = scene_title(path)
-    kind = scene_kind(path)
+    kind = "decoded" if rechunk else scene_kind(path)
     if kind == "image":
         with steps.step(f"loading {title}"):
             packed = load_packed(path)
         if packed.format is form:
-            return Packing(packed, np.arange(len(packed)))
+            return Packing(packed, np.arange(len(packed)), brought=True)
     if kind == "PLY" and form is PackedFormat.CHUNK:
         with steps.step(f"loading {title}"):
             chunks = load_chunks(path) if check_ply(path) else None
@@ -287,7 +295,7 @@ def pack_chunks(data: ChunkScene, path: Path | None = None) -> Packing:
     rows = _colour_rows(data.packed[:, 3], sh)
     geometry = np.column_stack([data.packed[:, 0], rotation, data.packed[:, 2]])
     packed = _assemble(PackedFormat.CHUNK, headers, geometry, rows, start, counts, np.full(len(start), degree), path)
-    return Packing(packed, np.arange(n), {"rotation longer than 1": int(long.sum())} if long.any() else {}, kept_chunks=True)
+    return Packing(packed, np.arange(n), {"rotation longer than 1": int(long.sum())} if long.any() else {}, kept_chunks=True, brought=True)
 
 
 _BOUNDS_OF = {"position": "position", "scale": "scale", "dc": "colour"}

@@ -1,7 +1,7 @@
 """Photographs of views: how they are found, and how they are made comparable with a rendered picture (docs/report.md, "Photographs").
 
-A photograph has the name `img_name` of its camera, with or without the suffix. It is composed over the background where it is transparent, then averaged
-over the area of each pixel of the rendered picture.
+A photograph has the name `img_name` of its camera, with or without the suffix. It is turned upright as EXIF says (`scene.image`), composed over the background
+where it is transparent, then averaged over the area of each pixel of the rendered picture.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FlickerError
-from .image import load_picture, picture_size
+from .image import load_picture, picture_size, same_shape
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 # Folders beside cameras.json, searched in this order; the members of a group are equals, so that one name in two of them is refused.
@@ -39,7 +39,7 @@ def _named(folder: Path, name: str) -> list[Path]:
     wanted = folder / name
     if not Path(name).name:
         return []
-    if wanted.suffix.lower() in SUFFIXES and wanted.is_file():
+    if wanted.suffix and wanted.is_file():
         return [wanted]
     try:
         return sorted(p for p in wanted.parent.iterdir() if p.stem == wanted.name and p.suffix.lower() in SUFFIXES and p.is_file())
@@ -77,8 +77,8 @@ def check_photo(path: Path, size: tuple[int, int]) -> None:
 
     It must be as large or larger, and of the same shape: at the picture's width its height is the picture's within one pixel.
     """
-    (width, height), (w, h) = size, picture_size(path)
-    if abs(h * width / w - height) > 1.0:
+    (width, height), (w, h) = size, picture_size(path, size)
+    if not same_shape(size, (w, h)):
         raise FlickerError(f"{path}: is {w}x{h}, which is not the shape of {width}x{height}: leave out the size, or the photographs (--photos {NONE})")
     if w < width or h < height:
         raise FlickerError(f"{path}: is {w}x{h}, smaller than the picture of {width}x{height}: photographs are never enlarged")
@@ -102,4 +102,4 @@ def area_average(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 def load_photo(path: Path, size: tuple[int, int], background: tuple[float, float, float] = BLACK) -> np.ndarray:
     """float64 (height, width, 3) in [0, 1]: a photograph over the background, averaged to size (width, height). FlickerError as `check_photo`."""
     check_photo(path, size)
-    return area_average(load_picture(path, background), size)
+    return area_average(load_picture(path, background, size), size)

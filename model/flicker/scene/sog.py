@@ -13,16 +13,13 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from ..errors import FlickerError, one_line
+from .raw import FLAT_NOTE, Raw, of_gsply
 
-if TYPE_CHECKING:
-    import gsply  # loads numba: in the function that decodes
-
-T = TypeVar("T")
 META = "meta.json"
 LOD_META = "lod-meta.json"  # of a streamed SOG: an index of many SOG folders
 _GROUPS = {"means": 2, "scales": 1, "quats": 1, "sh0": 1, "shN": 2}  # group of meta.json: its pictures; shN may be missing
@@ -128,7 +125,7 @@ def _check(where: str, meta: dict[str, Any]) -> None:
         _numbers(where, meta, "shN", "codebook", 256)
 
 
-def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) -> gsply.GSData:
+def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) -> Raw:
     """text: `meta.json`, called `where` in messages. read: a member's content; raises FlickerError."""
     import gsply
 
@@ -141,7 +138,11 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
         for name, data in (members | {META: text}).items():
             bundle.writestr(name, data)
     try:
-        return gsply.sogread(packed.getvalue())
+        raw = of_gsply(gsply.sogread(packed.getvalue()))
+        raw.antialiased = meta.get("antialias") is True or meta.get("model") == "antialiased"
+        if meta.get("model") == "2dgs":
+            raw.notes = (FLAT_NOTE,)
+        return raw
     except Exception:  # of several libraries; the culprit is looked for now, so that good files are decoded once
         import imagecodecs
 
@@ -153,7 +154,7 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
         raise
 
 
-def read_folder(path: Path, meta: Path) -> gsply.GSData:
+def read_folder(path: Path, meta: Path) -> Raw:
     """An unpacked SOG. path: what the user gave, the folder or its `meta.json`; meta: the latter."""
     def read(name: str) -> bytes:
         try:
@@ -190,10 +191,10 @@ def _member(path: Path, bundle: zipfile.ZipFile, members: dict[str, zipfile.ZipI
         raise FlickerError(f"{path}: {name}: cannot be unpacked ({one_line(error)})") from None
 
 
-def read_zip(path: Path, decoded: Callable[[gsply.GSData], T], suffixes: tuple[str, ...], read: Callable[[Path], T]) -> T:
+def read_zip(path: Path, suffixes: tuple[str, ...], read: Callable[[Path], Raw]) -> Raw:
     """A zip: of a SOG, at its top or in one folder, else of a single scene file.
 
-    decoded: what becomes of a SOG. suffixes: of scene files. read: takes such a file, unpacked for the time of the call; its
+    suffixes: of scene files. read: takes such a file, unpacked for the time of the call; its
     FlickerErrors are told of zip and member.
     """
     with _zip(path) as (bundle, members):
@@ -208,10 +209,10 @@ def read_zip(path: Path, decoded: Callable[[gsply.GSData], T], suffixes: tuple[s
             raise FlickerError(f"{path}: {len(metas)} SOG scenes ({', '.join(metas[:2])}{', ...' if len(metas) > 2 else ''}): unpack it, give one")
         if metas:
             top = metas[0].removesuffix(META)
-            return decoded(_decoded(
+            return _decoded(
                 path, f"{path}: {metas[0]}", _member(path, bundle, members, metas[0]),
                 lambda name: _member(path, bundle, members, top + name),
-            ))
+            )
         inside = [name for name in members if name.lower().endswith(suffixes)]
         if len(inside) > 1:
             raise FlickerError(

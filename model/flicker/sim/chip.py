@@ -219,12 +219,9 @@ class ChipSession(Half):
         lists: ListKind = ListKind.ELLIPSE, tag: int = 0,
     ) -> driver.CFrame:
         """The driver's description of a frame."""
-        c = driver.CCamera(
-            (ctypes.c_double * 9)(*camera.rotation.ravel()), (ctypes.c_double * 3)(*camera.position), camera.fx, camera.fy, camera.width, camera.height,
-        )
         return driver.CFrame(
-            ctypes.pointer(self.scene), c, place.region, place.frame_buffer, place.stride, int(format_), (ctypes.c_uint8 * 3)(*background),
-            int(self.config.cat), lists is ListKind.BOX, tag,
+            ctypes.pointer(self.scene), driver.CCamera.of(camera), place.region, place.frame_buffer, place.stride, int(format_),
+            (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag,
         )
 
     def start(self, frame: driver.CFrame, other: driver.CFrame | None = None) -> int:

@@ -6,6 +6,7 @@ import ctypes
 import functools
 
 from ..chip_registers import REGISTERS
+from ..scene.camera import Camera
 from ..toolchain import ROOT, compile_library
 
 SW = ROOT / "sw"
@@ -21,18 +22,29 @@ class CScene(ctypes.Structure):
     _fields_ = [
         ("address", u64), ("bytes", u64), ("format", u32), ("degree", u32), ("gaussians", u32), ("clusters", u32), ("slots", u32), ("part", u64 * 4),
         ("low", ctypes.c_float * 3), ("high", ctypes.c_float * 3), ("sigma", ctypes.c_float),
+        ("antialiased", ctypes.c_int),
     ]
 
 
 class CCamera(ctypes.Structure):
-    _fields_ = [("rotation", double * 9), ("position", double * 3), ("fx", double), ("fy", double), ("width", u32), ("height", u32)]
+    _fields_ = [
+        ("rotation", double * 9), ("position", double * 3), ("fx", double), ("fy", double), ("width", u32), ("height", u32),
+        ("off_x", double), ("off_y", double),
+    ]
+
+    @classmethod
+    def of(cls, camera: Camera) -> CCamera:
+        return cls(
+            (double * 9)(*camera.rotation.ravel()), (double * 3)(*camera.position), camera.fx, camera.fy, camera.width, camera.height,
+            camera.cx - 0.5 * (camera.width - 1), camera.cy - 0.5 * (camera.height - 1),
+        )
 
 
-NUMBERS = ("position", "normal", "offset", "reach", "view", "focal", "row_x", "row_x_z", "row_y", "row_y_z", "limit")
+NUMBERS = ("position", "normal", "offset", "reach", "view", "focal", "row_x", "row_x_z", "row_y", "row_y_z", "least", "limit", "middle")
 
 
 class CCameraRegisters(ctypes.Structure):
-    _fields_ = [(name, u32 * REGISTERS[name].count) for name in NUMBERS]
+    _fields_ = [*((name, u32 * REGISTERS[name].count) for name in NUMBERS), ("off_centre", ctypes.c_int)]
 
 
 class CRegion(ctypes.Structure):

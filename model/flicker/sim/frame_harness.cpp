@@ -61,6 +61,7 @@ struct Sim {
     top->reg_b_ready_i = top->reg_r_ready_i = 1;
     top->reg_aw_prot_i = top->reg_ar_prot_i = 0;
     top->reg_w_strb_i = 15;
+    top->test_en_i = 0;
 #else
     top->start_i = 0;
 #endif

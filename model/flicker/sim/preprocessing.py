@@ -16,7 +16,7 @@ from ..errors import FlickerError
 from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
-from ..golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
+from ..golden.front.setup import CLUSTER_M, FORMATS, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
@@ -84,11 +84,15 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
 
     for values in (setup.position, setup.normal, setup.offset, setup.reach):
         numbers(values, CLUSTER_M)
-    bits += [(packed.format is PackedFormat.CHUNK, 1), (lists is ListKind.BOX, 1), (camera.width, 13), (camera.height, 13)]
+    bits += [
+        (packed.format is PackedFormat.CHUNK, 1), (lists is ListKind.BOX, 1), (packed.antialiased, 1), (camera.width, 13), (camera.height, 13),
+    ]
     numbers(setup.view, f.position)
     numbers(setup.focal, f.position)
-    for values in (setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit):
+    for values in (setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.least, setup.limit):
         numbers(values, f.shape)
+    middle_bits = MIDDLE_INTEGER + f.mean
+    bits += [(int(v) & (1 << middle_bits) - 1, middle_bits) for v in setup.middle[::-1]]
     offset = regions.image // BEAT + HEADER_BYTES // BEAT
     for part in packed.sections().values():
         bits.append((offset, 34))

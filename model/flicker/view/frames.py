@@ -85,7 +85,7 @@ class Frame:
 
 def camera_key(camera: Camera) -> tuple:
     """Equal for cameras that see the same."""
-    return camera.width, camera.height, camera.fx, camera.fy, camera.position.tobytes(), camera.rotation.tobytes()
+    return camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.position.tobytes(), camera.rotation.tobytes()
 
 
 def largest(scene: Scene, share: int) -> Scene:
@@ -96,14 +96,14 @@ def largest(scene: Scene, share: int) -> Scene:
     count = -(-len(scene) // share)
     size = scene.opacities * axes[:, 1] * axes[:, 2]
     keep = np.sort(np.argpartition(size, len(scene) - count)[len(scene) - count :]) if len(scene) else np.zeros(0, np.int64)
-    return Scene(scene.means[keep], scene.scales[keep], scene.quats[keep], scene.opacities[keep], scene.sh[keep])
+    return Scene(scene.means[keep], scene.scales[keep], scene.quats[keep], scene.opacities[keep], scene.sh[keep], antialiased=scene.antialiased)
 
 
 class Renderer:
     """Frames of one scene. shots: the last simulated frames. Not to be used by two threads at once: the engines' kernels share theirs."""
 
     def __init__(self, view: View) -> None:
-        self.scene, self.name = view.scene, view.name
+        self.scene, self.name, self.background = view.scene, view.name, view.background
         self.shots: dict[Engine, Shot] = {}
         self._views: dict[tuple, View] = {}
         self._parts: dict[int, Scene] = {}
@@ -114,13 +114,17 @@ class Renderer:
         if coarse > 1:
             if coarse not in self._parts:
                 self._parts[coarse] = largest(self.scene, coarse)
-            return View(camera, self._parts[coarse], name=self.name)
+            return View(camera, self._parts[coarse], name=self.name, background=self.background)
         key = camera_key(camera)
-        found = self._views.pop(key, None) or View(camera, self.scene, name=self.name)
+        found = self._views.pop(key, None) or self.fresh(camera)
         self._views[key] = found
         while len(self._views) > KEPT_VIEWS:
             self._views.pop(next(iter(self._views)))
         return found
+
+    def fresh(self, camera: Camera) -> View:
+        """The view of a camera with nothing made yet."""
+        return View(camera, self.scene, name=self.name, background=self.background)
 
     def drawn(self, view: View, config: RenderConfig) -> Result:
         """Picture, masks and work of a configuration, bit for bit."""

@@ -27,10 +27,10 @@ class Pose:
         return cls(tuple(map(float, wxyz)), tuple(map(float, camera.position)), 2 * math.atan(camera.height / (2 * camera.fy)))
 
     def camera(self, like: Camera) -> Camera:
-        """The camera with the size and the shape of the pixels of another."""
+        """The camera with the size, the shape of the pixels and the principal point of another: a browser knows of none of these."""
         fy = like.height / (2 * math.tan(self.fov / 2))
         rotation = Rotation.from_quat(self.wxyz, scalar_first=True).as_matrix()
-        return Camera(like.width, like.height, fy * like.fx / like.fy, fy, np.array(self.position), rotation, "browser")
+        return Camera(like.width, like.height, fy * like.fx / like.fy, fy, np.array(self.position), rotation, "browser", cx=like.cx, cy=like.cy)
 
 
 def close(a: Camera, b: Camera) -> bool:
@@ -38,6 +38,7 @@ def close(a: Camera, b: Camera) -> bool:
     far = 1e-4 * (1.0 + float(np.abs(a.position).max()))
     return (
         (a.width, a.height) == (b.width, b.height) and abs(a.fy - b.fy) < 1e-4 * a.fy and abs(a.fx - b.fx) < 1e-4 * a.fx
+        and abs(a.cx - b.cx) < 1e-3 and abs(a.cy - b.cy) < 1e-3
         and float(np.abs(a.position - b.position).max()) < far and float(np.abs(a.rotation - b.rotation).max()) < 1e-4
     )
 
@@ -57,8 +58,8 @@ def upright(camera: Camera, up: np.ndarray) -> np.ndarray:
 
 
 def target(camera: Camera, projected: Projected) -> np.ndarray:
-    """float64 (3,): the point ahead that is orbited, as far as the middle one of the Gaussians in the middle of the picture."""
+    """float64 (3,): the point ahead that is orbited, as far as the middle one of the Gaussians about the principal point."""
     size = np.array([camera.width, camera.height])
-    middle = (np.abs(projected.mean - (size - 1) / 2) < size / 4).all(axis=1) & (projected.opacity > 0.5)
+    middle = (np.abs(projected.mean - (camera.cx, camera.cy)) < size / 4).all(axis=1) & (projected.opacity > 0.5)
     depth = projected.depth[middle] if middle.any() else projected.depth
     return camera.position + camera.rotation[:, 2] * (float(np.median(depth)) if len(depth) else 1.0)

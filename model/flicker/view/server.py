@@ -182,7 +182,7 @@ class Session:
     def moved(self) -> None:
         """The browser's camera has moved, or its window has another shape."""
         at = self.client.camera
-        camera = Pose(tuple(at.wxyz), tuple(at.position), float(at.fov)).camera(self.viewer.start)
+        camera = Pose(tuple(at.wxyz), tuple(at.position), float(at.fov)).camera(self.goal)
         if close(camera, self.goal):
             camera = self.goal
         if self._aspect() != self.whole[0] / self.whole[1]:
@@ -376,7 +376,7 @@ class Viewer:
         with self.changed:
             if self._simulation is None:
                 self._tell("starting")
-                self._simulation = Simulation(self.renderer.scene, camera, engine, config, self._tell, self._done)
+                self._simulation = Simulation(self.renderer.fresh(camera), engine, config, self._tell, self._done)
 
     def stop_simulation(self) -> None:
         with self.changed:

@@ -14,8 +14,6 @@ from ..front.view import View
 from ..params import RenderConfig
 from ..pipeline import Engine, Rendered, render_view
 from ..progress import Steps
-from ..scene.camera import Camera
-from ..scene.gaussians import Scene
 from .frames import Shot
 
 
@@ -35,8 +33,8 @@ class _Told(Steps):
         yield lambda done, total: self.pipe.send(f"{text}: {done / max(total, 1):.0%}")
 
 
-def _child(pipe: Connection, scene: Scene, camera: Camera, engine: Engine, config: RenderConfig) -> None:
-    view, steps = View(camera, scene), _Told(pipe)
+def _child(pipe: Connection, view: View, engine: Engine, config: RenderConfig) -> None:
+    steps = _Told(pipe)
     try:
         if engine is Engine.CHIP:
             pipe.send(render_on_chip(view, engine, config=config, steps=steps))
@@ -47,14 +45,14 @@ def _child(pipe: Connection, scene: Scene, camera: Camera, engine: Engine, confi
 
 
 class Simulation:
-    """A simulation that runs. told: called from a thread with every step; done: with the frame, or with why there is none."""
+    """A simulation of a view that runs. told: called from a thread with every step; done: with the frame, or with why there is none."""
 
     def __init__(
-        self, scene: Scene, camera: Camera, engine: Engine, config: RenderConfig, told: Callable[[str], None], done: Callable[[Shot | str], None],
+        self, view: View, engine: Engine, config: RenderConfig, told: Callable[[str], None], done: Callable[[Shot | str], None],
     ) -> None:
         spawn = multiprocessing.get_context("spawn")  # a copy of this process would have the kernels' threads without what they hold
         self._pipe, other = spawn.Pipe(duplex=False)
-        self._process = spawn.Process(target=_child, args=(other, scene, camera, engine, config), daemon=True)
+        self._process = spawn.Process(target=_child, args=(other, view, engine, config), daemon=True)
         self._process.start()
         other.close()
         self._stopped = False
@@ -65,7 +63,7 @@ class Simulation:
                 while True:
                     message = self._pipe.recv()
                     if isinstance(message, Rendered):
-                        result = Shot(engine, camera, config, message.image, message.stats)
+                        result = Shot(engine, view.camera, config, message.image, message.stats)
                         break
                     if isinstance(message, FlickerError):
                         result = str(message)

@@ -94,6 +94,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_top": [
         "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_lane", "flk_preprocessing", "flk_rendering",
     ],
+    "flk_top_axi": ["flk_top", "flk_reset_sync"],
     # The wrapper has no logic of its own.
     "flk_mask_generator": [generator.module for generator in MASK_GENERATORS.values()],
 }
@@ -163,6 +164,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         ],
         # Words are addressed; protection means nothing here.
         "flk_registers": [f"s_axil_{channel}{name}[{bit}]" for channel in ("aw", "ar") for name, bits in (("addr", 2), ("prot", 3)) for bit in range(bits)],
+        "flk_top_axi": ["m_axi_buser[0]", "m_axi_ruser[0]"],  # answers carry nothing beside them
         "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
         "flk_axi_lane": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
         # Of a magnitude.
@@ -380,9 +382,9 @@ def _top() -> list[Unit]:
     """The chip around its two halves."""
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
-        unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_top"),
+        unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
         unit("flk_top", "faithful", **FAITHFUL.chip_parameters()),
-        unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()),
+        unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()), unit("flk_top_axi"),
     ]
 
 

@@ -153,7 +153,7 @@ def crop(projected: Projected, camera: Camera, x0: int, y0: int, size: int = SIZ
     mean = projected.mean - (x0, y0)
     near = (np.abs(mean - (size - 1) / 2) <= (size - 1) / 2 + projected.circle[:, None] + 16).all(axis=1)
     fields = {k: v[near] for k, v in vars(projected).items()} | {"mean": mean[near]}
-    return Projected(**fields), replace(camera, width=size, height=size)
+    return Projected(**fields), replace(camera, width=size, height=size, cx=camera.cx - x0, cy=camera.cy - y0)
 
 
 def _screen(x0: float, rng: np.random.Generator) -> Case:
@@ -278,6 +278,33 @@ def _behind(share: float, rng: np.random.Generator) -> Case:
     return _case(replace(scene, means=np.where(where[:, None], -scene.means, scene.means)), camera)
 
 
+def _with_flyaways(distance: float, rng: np.random.Generator, seen: bool) -> Case:
+    """Layers, and 40 Gaussians of about their sizes spread evenly in log distance up to `distance`: all of them in the picture, or none."""
+    n, away = 600, 40
+    camera = _camera()
+    scene = _scene(_inside(rng, n), rng.uniform(1.0, 6.0, (n, 2)), rng.uniform(0, 3, n), _layers(rng, n), rng.uniform(0.1, 0.9, n), _colours(rng, n), camera)
+    direction = rng.normal(size=(away, 3))
+    direction[:, 2] = np.abs(direction[:, 2]) * (1.0 if seen else -1.0)
+    if seen:
+        direction[:, :2] = rng.uniform(-0.45, 0.45, (away, 2)) * direction[:, 2:]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    far = direction * np.exp(rng.uniform(math.log(8.0), math.log(distance), away))[:, None]
+    means = np.concatenate([scene.means, far])
+    scales = np.concatenate([scene.scales, np.exp(rng.uniform(-3.5, -1.5, (away, 3)))])
+    quats, opacities = np.concatenate([scene.quats, _turned(rng, away)]), np.concatenate([scene.opacities, rng.uniform(0.1, 0.9, away)])
+    return _case(Scene(means, scales, quats, opacities, np.concatenate([scene.sh, (_colours(rng, away)[:, None] - 0.5) / _C0])), camera)
+
+
+def _flyaway(distance: float, rng: np.random.Generator) -> Case:
+    """`_with_flyaways` that lie behind the camera."""
+    return _with_flyaways(distance, rng, False)
+
+
+def _flyaway_seen(distance: float, rng: np.random.Generator) -> Case:
+    """`_with_flyaways` that lie in the picture, behind the layers."""
+    return _with_flyaways(distance, rng, True)
+
+
 def _one_tile(extent: float, rng: np.random.Generator) -> Case:
     """The 256 Gaussians of a cluster about a point of the only tile, in layers."""
     n = 256
@@ -326,6 +353,8 @@ FAMILIES: dict[str, Family] = {f.name: f for f in (
     Family("inside", "camera inside Gaussians", "sigma / distance", (0.1, 0.3, 1, 3, 10, 30, 100), _inside_gaussian),
     Family("cluster", "camera inside a cluster", "half the cluster's extent", (2, 4, 10, 30, 100, 300, 1e3, 1e4), _cluster),
     Family("behind", "Gaussians behind the camera", "share of them", (0.0, 0.5, 0.9, 0.99, 1.0), _behind),
+    Family("flyaway", "Gaussians far away, out of the picture", "largest distance", (10, 100, 1e3, 1e5, 1e6, 1e7), _flyaway),
+    Family("flyaway_seen", "Gaussians far away, in the picture", "largest distance", (10, 100, 1e3, 1e5, 1e6, 1e7), _flyaway_seen),
     Family("one_tile", "a whole cluster in one tile", "extent in px", (16, 8, 4, 1, 0.1, 0.01, 0.0), _one_tile),
     Family("covering", "one Gaussian over a whole picture", "side of the picture in px", (64, 256, 1024, 2048, 4096), _covering),
 )}

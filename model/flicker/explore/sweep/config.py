@@ -16,6 +16,7 @@ from ...front.view import DEMO
 from ...scene.camera import MAX_SIZE
 from ...scene.files import scene_kind
 from ...scene.photos import NONE, parse_background
+from ...scene.sources import scene_path
 from ...toolchain import BUILD
 from ..configurations import GROUPS, matching
 from ..digest import code_digest, key
@@ -208,7 +209,7 @@ def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
         if section.cameras is not None:
             raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
         return SceneFile(DEMO, photos=section.photos, background=background)
-    path = _path(base, section.path, where)
+    path = Path(scene_path(_path(base, section.path, where)))
     cameras = None if section.cameras is None else str(_path(base, section.cameras, f"{where}: cameras"))
     try:
         scene_kind(path)

@@ -10,7 +10,7 @@ import numpy as np
 from ...arithmetic.ff import ff_round
 from ...errors import FlickerError
 from .colour import COLOUR_FRACTION
-from .frame import OPACITY_LIMIT, FrontFrame, fp16_opacity
+from .frame import OPACITY_LIMIT, FrontFrame, scaled_opacity
 from .record import SHAPE_MANTISSA, RecordKind, Splats, decode_shape, encode_shape
 
 
@@ -39,7 +39,7 @@ def _shapes(numbers, bits):
 def _opacities(opacity, limit, M):
     out = np.empty(len(opacity))
     for i in range(len(opacity)):
-        out[i] = fp16_opacity(ff_round(opacity[i], M), M, limit) / limit
+        out[i] = scaled_opacity(1.0 * limit, ff_round(opacity[i], M), M, limit) / limit
     return out
 
 

@@ -43,6 +43,7 @@ SCALE_STEP_BITS = 17  # of the step, saturated, not negative: up to 1/8
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
 OPACITY_LIMIT = 255
+FP16_SHARE, CHUNK_SHARE = 255.0, 2.0**24  # what makes a code of an opacity, by format
 FP16_STEP = 2.0**-COEFFICIENT_FRACTION  # in place of a header's
 
 
@@ -146,7 +147,9 @@ def _quaternion(chunked, c, M):
 
 
 @numba.njit
-def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, fraction=MEAN_FRACTION):
+def project_lane(
+    i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, P, S, fraction=MEAN_FRACTION,
+):
     """Projection of Gaussian i."""
     c = lanes.cluster[i]
     s = np.empty(3)
@@ -154,8 +157,8 @@ def project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, 
         s[k] = _scale(lanes.chunked, lanes.s[i, k], values.scale_low[c, k], values.scale_step[c, k], S)
     w, x, y, z = _quaternion(lanes.chunked, lanes.quat[i], S)
     return project_one(
-        values.low[c], values.step[c], lanes.q[i], s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S,
-        fraction,
+        values.low[c], values.step[c], lanes.q[i], s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle,
+        CHUNK_SHARE if lanes.chunked else FP16_SHARE, antialiased, const, P, S, fraction,
     )
 
 
@@ -166,17 +169,18 @@ def depth_key(depth, shift, low, M, bits=KEY_BITS):
 
 
 @numba.njit
-def fp16_opacity(opacity, M, limit=OPACITY_LIMIT):
-    """Code of an opacity, an ff number; that of 1 is `limit`."""
-    return min(ff_to_fixed_round(ff_mul(1.0 * limit, opacity, M), 0, 16), limit)
+def scaled_opacity(scale, opacity, M, limit=OPACITY_LIMIT):
+    """Nearest integer to an opacity, an ff number, times `scale`; at most `limit`."""
+    return min(ff_to_fixed_round(ff_mul(scale, opacity, M), 0, 16), limit)
 
 
 @numba.njit
-def opacity_code(chunked, opacity, M):
-    """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself."""
-    if chunked:
-        return np.int64(opacity)
-    return fp16_opacity(ff_round(opacity, M), M)
+def opacity_code(chunked, opacity, scale, M):
+    """255 times the opacity, to the nearest integer, at most 255; in chunks the code itself. scale: of `project_one`, with an antialiased splat's factor.
+
+    opacity: FP16's number, or the code of a chunk, which as the bits of an FP16 number means 2^-24 of itself.
+    """
+    return scaled_opacity(scale, opacity / CHUNK_SHARE if chunked else ff_round(opacity, M), M)
 
 
 @numba.njit
@@ -208,15 +212,15 @@ def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
 
 @numba.njit(parallel=True, cache=True)
 def _splats(
-    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, factor, logs, sigmas, cut, inverse, box, conic,
-    shift, key_low, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
+    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, factor, logs, sigmas, cut,
+    inverse, box, conic, shift, key_low, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
     none = np.empty(0, np.int32)
     for j in numba.prange(len(index)):
         i = index[j]
-        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, w.mean)
+        p = project_lane(i, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, P, S, w.mean)
         if p.near:
             outcome[j] = Outcome_NEAR
             continue
@@ -225,7 +229,7 @@ def _splats(
         if x0 > x1 or y0 > y1:
             outcome[j] = Outcome_OUTSIDE
             continue
-        code = opacity_code(lanes.chunked, lanes.opacity[i], S)
+        code = opacity_code(lanes.chunked, lanes.opacity[i], p.scale, S)
         steady = steady_one(p, inverse, S)
         r = reach_one(p.x, p.y, p.sx, p.sy, steady, code, box, width, height, logs, sigmas, cut, S, w.mean)
         count = tiles_of(box, p.x, p.y, p.l2, r, cols, S, 0, none, none, w.mean) if code > 0 else 0
@@ -238,7 +242,7 @@ def _splats(
         rgb = np.empty(3, np.int64)
         colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
         unrounded[j, 0], unrounded[j, 1], unrounded[j, 2] = conic_one(p, S) if conic else (p.l0, p.l1, p.l2)
-        unrounded[j, 3] = code / 255.0 if lanes.chunked else lanes.opacity[i]
+        unrounded[j, 3] = code / 255.0 if lanes.chunked or antialiased else lanes.opacity[i]
         for k in range(3):
             unrounded[j, 4 + k] = max(rgb[k], 0) / (1 << w.term)
         flags[j, 2] = p.spiky
@@ -358,7 +362,10 @@ def run_front(
     conic = kind is RecordKind.CONIC32
     unrounded, entries, flags = np.zeros((n, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
     places, numbers = np.zeros((n, 7), np.int64), np.zeros((n, 4))
-    registers = (setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.limit, setup.width, setup.height, constants(formats))
+    registers = (
+        setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.least, setup.limit, setup.middle, packed.antialiased,
+        constants(formats), setup.width, setup.height,
+    )
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(

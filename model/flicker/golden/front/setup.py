@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike
 
 from ...arithmetic.ff import MIN_NORMAL, ff_round
 from ...errors import FlickerError
-from ...front.projection import _CLAMP, DILATION, NEAR
+from ...front.projection import DILATION, NEAR, slope_range
 from ...params import TILE
 from ...scene.camera import Camera
 
 MAX_PICTURE = 4096
+MIDDLE_INTEGER = 16  # bits of the principal point in pixels, with its sign
+MAX_MIDDLE = (1 << MIDDLE_INTEGER - 1) - 1  # pixels from the first pixel's centre
 CLUSTER_M = 23  # mantissa bits of the cluster test: those of the image's own float32
 MEAN_FRACTION = 7  # fraction bits of a mean in pixels
 KEY_BITS = 24
@@ -83,7 +85,7 @@ class FrameSetup:
     width, height: pixels, at most 4096.
     position: (3,) C, of the camera. view: (3, 3) position, world to camera. focal: (2,) position.
     row_x, row_x_z: (3,) shape, fx times the first and third row of `view`. row_y, row_y_z: fy times the second and third.
-    limit: (2,) shape, of tx and ty in the Jacobian.
+    least, limit: (2,) shape, the least and the largest tx and ty in the Jacobian. middle: int64 (2,), principal point in 1/128 pixel.
     normal: (5, 3) C, half-spaces of the cull: the near plane, left, right, top, bottom. offset: (5,) C, with the position taken off. reach: (5,) C,
     factor of sigma.
     """
@@ -97,7 +99,9 @@ class FrameSetup:
     row_x_z: np.ndarray
     row_y: np.ndarray
     row_y_z: np.ndarray
+    least: np.ndarray
     limit: np.ndarray
+    middle: np.ndarray
     normal: np.ndarray
     offset: np.ndarray
     reach: np.ndarray
@@ -105,30 +109,39 @@ class FrameSetup:
 
     @staticmethod
     def of(camera: Camera, formats: FrontFormats = FORMATS) -> FrameSetup:
-        """The registers of a camera. FlickerError for pictures that the lists cannot address."""
+        """The registers of a camera. FlickerError for pictures that the lists cannot address, and a principal point beyond its register."""
         for side in ("width", "height"):
             if getattr(camera, side) > MAX_PICTURE:
                 raise FlickerError(f"{side}: {getattr(camera, side)} is beyond the front end's {MAX_PICTURE}")
+        for side in ("cx", "cy"):
+            if abs(getattr(camera, side)) > MAX_MIDDLE:
+                raise FlickerError(f"{side}: {getattr(camera, side):g} is beyond the front end's {MAX_MIDDLE} pixels")
         view = camera.rotation.T
-        limit = np.array([_CLAMP * 0.5 * n / f for n, f in ((camera.width, camera.fx), (camera.height, camera.fy))])
-        normal, offset, reach = _half_spaces(camera, limit)
+        least, limit = slope_range(camera).T
+        normal, offset, reach = _half_spaces(camera, np.maximum(-least, limit))
+        middle = np.floor(np.ldexp(_centre(camera), formats.mean) + 0.5).astype(np.int64)
         p, s = formats.position, formats.shape
         return FrameSetup(
             camera.width, camera.height, rounded(camera.position, CLUSTER_M), rounded(view, p), rounded([camera.fx, camera.fy], p),
             rounded(camera.fx * view[0], s), rounded(camera.fx * view[2], s), rounded(camera.fy * view[1], s), rounded(camera.fy * view[2], s),
-            rounded(limit, s), rounded(normal, CLUSTER_M), rounded(offset, CLUSTER_M), rounded(reach, CLUSTER_M), formats,
+            rounded(least, s), rounded(limit, s), middle, rounded(normal, CLUSTER_M), rounded(offset, CLUSTER_M), rounded(reach, CLUSTER_M), formats,
         )
+
+
+def _centre(camera: Camera) -> list[float]:
+    """The principal point as the driver (sw/flk.c) has it: what it is off the middle, added to the middle."""
+    return [0.5 * (n - 1) + (c - 0.5 * (n - 1)) for c, n in ((camera.cx, camera.width), (camera.cy, camera.height))]
 
 
 def _half_spaces(camera: Camera, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Normals (5, 3) in world axes, offsets (5,), factors of sigma (5,): normal . (mean - position) + offset + factor sigma > 0 for every visible Gaussian.
 
-    As `chip.cull.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose (docs/front_end.md).
+    limit: (2,), of the magnitude of slopes. As `chip.cull.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose
+    (docs/front_end.md).
     """
     reach = 3.0 * max(camera.fx, camera.fy) * np.sqrt(1.0 + (limit**2).sum())
     normals = [(0.0, 0.0, 1.0)]
-    for axis, (f, n) in enumerate(((camera.fx, camera.width), (camera.fy, camera.height))):
-        middle = 0.5 * (n - 1)
+    for axis, (f, n, middle) in enumerate(zip((camera.fx, camera.fy), (camera.width, camera.height), _centre(camera))):
         beyond = TILE * -(-n // TILE)
         for sign, depth in ((1.0, middle + _RADIUS_MARGIN), (-1.0, beyond - middle + _RADIUS_MARGIN)):
             normal = [0.0, 0.0, depth]

@@ -9,6 +9,8 @@ product, so that nothing cancels), and the shape comes from two reciprocal squar
 
 so that (conic) / 2 log2(e) = L L^T with u = l0 dx + l1 dy, v = l2 dy. Sums of three are ((a + b) + c). The conic form (`conic_one`) takes the inverse of
 the covariance as it is: its determinant is the square of a reciprocal square root.
+
+Of an antialiased scene an opacity is multiplied by sqrt(gram) / sqrt(det), the determinants before and after dilation, sqrt(gram) being gram / sqrt(gram).
 """
 
 from __future__ import annotations
@@ -64,19 +66,21 @@ def place_largest(number, most, a, b, d):
 
 # d: mean less the camera's position, world axes. t: the same in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
 # u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
-# xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel. rxx, ryy, rdet: reciprocal square roots.
-# far: the mean on the screen is saturated.
+# scale: of an opacity's number, which makes its code. xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel.
+# rxx, ryy, rdet: reciprocal square roots. far: the mean on the screen is saturated.
 Projection = namedtuple(
     "Projection",
     "d0 d1 d2 t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
-    "xx xy yy det trace spiky rxx ryy rdet m l0 l1 l2 sx sy radius_x radius_y near far",
+    "xx xy yy det trace spiky rxx ryy rdet scale m l0 l1 l2 sx sy radius_x radius_y near far",
 )
 
 
 @numba.njit
-def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, limit, width, height, const, P, S, fraction=MEAN_FRACTION):
+def project_one(
+    d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, const, P, S, fraction=MEAN_FRACTION,
+):
     """Projection of a Gaussian. d0c: (3,) of the cluster, ff (P bits), stepc: (3,); q: (3,) ff numbers of the mean; s: (3,) ff (S bits); w to z:
-    quaternion, any length. fraction: of means and radii, 1/128 pixel where it is 7.
+    quaternion, any length. middle: principal point. share: `scale` where nothing is antialiased. fraction: of means and radii, 1/128 pixel where it is 7.
 
     Without `near` (nearer than 0.2) the other values mean nothing.
     """
@@ -90,14 +94,14 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     iz = ff_recip(t2, P)
     tx = ff_mul(t0, iz, P)
     ty = ff_mul(t1, iz, P)
-    half, bits = 1 << (fraction - 1), fraction + MEAN_INTEGER
+    bits = fraction + MEAN_INTEGER
     top = (1 << (bits - 1)) - 1
     off_x = ff_to_fixed_round(ff_mul(focal[0], tx, P), fraction, bits)
     off_y = ff_to_fixed_round(ff_mul(focal[1], ty, P), fraction, bits)
     far = (off_x >= top) | (off_x < -top) | (off_y >= top) | (off_y < -top)
-    screen_x, screen_y = off_x + (width - 1) * half, off_y + (height - 1) * half
-    ax = min(max(ff_round(tx, S), ff_neg(limit[0])), limit[0])
-    ay = min(max(ff_round(ty, S), ff_neg(limit[1])), limit[1])
+    screen_x, screen_y = off_x + middle[0], off_y + middle[1]
+    ax = min(max(ff_round(tx, S), least[0]), limit[0])
+    ay = min(max(ff_round(ty, S), least[1]), limit[1])
     u0 = ff_sub(row_x[0], ff_mul(ax, row_x_z[0], S), S)
     u1 = ff_sub(row_x[1], ff_mul(ax, row_x_z[1], S), S)
     u2 = ff_sub(row_x[2], ff_mul(ax, row_x_z[2], S), S)
@@ -134,6 +138,7 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     trace = ff_add(xx, yy, S)
     spiky = ff_mul(trace, trace, S) >= ff_mul(det, const[4], S)
     rxx, ryy, rdet = ff_rsqrt(xx, S), ff_rsqrt(yy, S), ff_rsqrt(det, S)
+    scale = pick(antialiased, ff_mul(ff_mul(ff_mul(share, gram, S), ff_rsqrt(gram, S), S), rdet, S), share)
     m = ff_mul(const[1], ff_mul(ryy, rdet, S), S)
     l2 = ff_mul(const[1], ryy, S)
     l0 = ff_mul(yy, m, S)
@@ -143,7 +148,7 @@ def project_one(d0c, stepc, q, s, w, x, y, z, view, focal, row_x, row_x_z, row_y
     radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), fraction, bits)
     return Projection(
         d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
-        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, m, l0, l1, l2, sx, sy,
+        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, scale, m, l0, l1, l2, sx, sy,
         radius_x, radius_y, near, far,
     )
 

@@ -1,0 +1,89 @@
+"""A photograph, the camera that took it, and what lies between them: EXIF's orientation, a lens, a mask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FlickerError
+from ..scene.image import Shape, load_coverage, load_picture, picture_size, picture_turned, same_shape
+from ..scene.photos import BLACK, area_average
+from ..scene.pinhole import Camera
+from .lens import Lens
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """camera: of the photograph at the size at which it is used, a pinhole that looks through its middle. camera.img_name: name of the photograph, as `flicker
+    report` looks for it. shape: width and height that the data set has for it; None: it has none. lens: taken out when it is loaded; None: there is none.
+    mask: picture whose black pixels do not count. turned: whether EXIF's orientation was followed, or not since the stored pixels have the shape; None: it is
+    upright."""
+
+    camera: Camera
+    path: Path
+    shape: Shape | None = None
+    lens: Lens | None = None
+    mask: Path | None = None
+    turned: bool | None = None
+
+    def _used(self, values: np.ndarray) -> np.ndarray:
+        """A picture (H, W, C) of the file's size, without the lens, at the size at which it is used."""
+        return area_average(values if self.lens is None else self.lens.straight(values), (self.camera.width, self.camera.height))
+
+    def load(self, background: tuple[float, float, float] = BLACK) -> np.ndarray:
+        """float32 (H, W, 3) in [0, 1], transparent parts over the background."""
+        return self._used(load_picture(self.path, background, self.shape)).astype(np.float32)
+
+    def solid(self) -> np.ndarray | None:
+        """bool (H, W): pixels that are not wholly transparent; None for a picture without transparent parts."""
+        coverage = load_coverage(self.path, self.shape)
+        return None if coverage is None else self._used(coverage[..., None])[..., 0] > 0.0
+
+    def counted(self) -> np.ndarray | None:
+        """bool (H, W): pixels that count, those of which the mask hides no part; None without a mask.
+
+        A mask is white where pixels count, by half of its largest value; one of 0 and 1 counts where it is 1, transparent parts are black.
+        """
+        if self.mask is None:
+            return None
+        values = load_picture(self.mask, shape=self.shape).mean(axis=2)
+        white = values > (0.0 if values.max() < 2 / 255 else 0.5)
+        width, height = picture_size(self.path, self.shape)
+        line, column = ((np.arange(side) + 0.5) * own / side for side, own in zip((height, width), white.shape))
+        return self._used(white[line.astype(int)][:, column.astype(int)][..., None].astype(np.float64))[..., 0] > 0.999
+
+
+def shot_of(
+    where: str, picture: Path, name: str, size: int | None, shape: tuple[float | None, float | None], focal: Callable[[float, float], tuple[float, float]],
+    centre: tuple[float | None, float | None], model: str | None, coefficients: Mapping[str, float | None], pose: tuple[np.ndarray, np.ndarray],
+    mask: Path | None = None, exact: bool = False,
+) -> Shot:
+    """A photograph with its camera. where: for messages. name: by which `flicker report` finds it. size: longer side that is used, at most. shape: width and
+    height that the data set has. focal: (fx, fy) of a width and height. centre: principal point from the picture's corner. model, coefficients: of the lens.
+    pose: position, rotation. exact: a lens is taken out even where it moves no pixel by half of one. FlickerError, naming file and field."""
+    given = None if shape[0] is None or shape[1] is None else (shape[0], shape[1])
+    own = picture_size(picture, given)
+    w, h = shape[0] or own[0], shape[1] or own[1]
+    if not same_shape(own, (w, h)):
+        raise FlickerError(f"{where}: {picture} is {own[0]}x{own[1]}, not of the shape of the camera's {w:g}x{h:g}")
+    if mask is not None and not same_shape(found := picture_size(mask, given), own):
+        raise FlickerError(f"{where}: mask {mask} is {found[0]}x{found[1]}, not of the shape of its picture's {own[0]}x{own[1]}")
+    fx, fy = focal(w, h)
+    try:
+        lens: Lens | None = Lens.of(model, coefficients, own, (w, h), (fx, fy), centre)
+        assert lens is not None
+        if lens.needed or exact:
+            left, focals = lens.new_size, lens.focal
+            name = name if name.lower().endswith(".png") else name + ".png"  # as it is written without its lens
+            whole = Camera(*left, *focals, *pose, name=picture.stem, img_name=name)
+        else:
+            lens, left = None, own
+            whole = Camera(round(w), round(h), fx, fy, *pose, name=picture.stem, img_name=name)
+        shrink = min(1.0, size / max(left)) if size else 1.0
+        used = max(1, round(left[0] * shrink)), max(1, round(left[1] * shrink))
+        return Shot(whole.scaled(*used), picture, given, lens, mask, picture_turned(picture, given))
+    except FlickerError as error:
+        raise FlickerError(f"{where}: {error}") from None

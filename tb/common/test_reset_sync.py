@@ -1,0 +1,21 @@
+"""Reset synchroniser: resets that begin and end anywhere in a cycle, of any length, in use and in a scan test; a chain of one flip-flop is refused.
+
+Not covered: metastability, which no simulation has.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flicker_tb.bench import netlist
+from flicker_tb.runner import build, build_and_test, refused
+
+
+@pytest.mark.parametrize("stages", [2, 3])
+def test_reset_sync(stages: int) -> None:
+    build_and_test("flk_reset_sync", "cocotb_reset_sync", parameters={"Stages": stages}, config={"stages": stages})
+
+
+@pytest.mark.skipif(netlist(), reason="elaboration of the RTL")
+def test_one_stage_is_refused() -> None:
+    with refused("flk_reset_sync: Stages must be at least 2"):
+        build("flk_reset_sync", parameters={"Stages": 1})

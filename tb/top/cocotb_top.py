@@ -1,0 +1,403 @@
+"""cocotb tests of flk_top with stand-ins for its halves: registers, frames, interrupts, abort, time-out, reset; a memory that can fall silent."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import cocotb
+from cocotb.triggers import RisingEdge
+from flicker_tb.bench import Bench, config
+
+from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
+
+SETTINGS = config()
+START, ABORT, RESET = 1, 2, 4
+FRONT_DONE, FRAME_DONE, ERROR, ABORTED, REFUSED = (1 << REGISTERS["interrupt"].fields[name][0] for name in (
+    "front_done", "frame_done", "error", "aborted", "refused"))
+ALL = FRONT_DONE | FRAME_DONE | ERROR | ABORTED | REFUSED
+
+
+class Chip:
+    """The design, a memory that answers each burst of one beat after `latency` cycles, and a host."""
+
+    def __init__(self, dut: Any) -> None:
+        self.dut, self.bench = dut, Bench(dut)
+        self.rng = self.bench.rng
+        self.silent = self.away = False  # no channel moves; the memory's side is in reset
+        self.failing = False             # reads are answered with an error
+        self.latency = 3
+        self.reads: deque[tuple[int, int]] = deque()
+        self.writes: deque[tuple[int, int]] = deque()
+        self.places: deque[int] = deque()
+        self.taken = {"ar": 0, "aw": 0, "w": 0}
+        for name in ("reg_aw_valid", "reg_w_valid", "reg_ar_valid", "r_valid", "b_valid", "ar_ready", "aw_ready", "w_ready", "reg_aw_prot", "reg_ar_prot"):
+            getattr(dut, f"{name}_i").value = 0
+        dut.reg_b_ready_i.value = dut.reg_r_ready_i.value = 1
+        dut.r_data_i.value, dut.r_last_i.value = 0, 1
+        dut.reg_w_strb_i.value = 15
+
+    async def begin(self) -> None:
+        await self.bench.reset()
+        cocotb.start_soon(self.memory())
+        await self.cycles(20)
+
+    async def cycles(self, count: int) -> None:
+        await self.bench.cycles(count)
+
+    def value(self, name: str) -> int:
+        return int(getattr(self.dut, name).value)
+
+    async def memory(self) -> None:
+        dut, edge, now = self.dut, RisingEdge(self.dut.clk_i), 0
+        while True:
+            ready = not (self.silent or self.away)
+            for name in ("ar", "aw", "w"):
+                getattr(dut, f"{name}_ready_i").value = int(ready)
+            answers = {}
+            for channel, queue, resp in (("r", self.reads, 2 * self.failing), ("b", self.writes, 0)):
+                answers[channel] = bool(ready and queue and queue[0][1] <= now)
+                getattr(dut, f"{channel}_valid_i").value = int(answers[channel])
+                if answers[channel]:
+                    getattr(dut, f"{channel}_id_i").value = queue[0][0]
+                    getattr(dut, f"{channel}_resp_i").value = resp
+            await edge
+            now += 1
+            if self.away:
+                self.reads.clear(), self.writes.clear(), self.places.clear()
+                continue
+            for channel, queue in (("r", self.reads), ("b", self.writes)):
+                if answers[channel] and self.value(f"{channel}_ready_o"):
+                    queue.popleft()
+            if ready and self.value("ar_valid_o"):
+                assert self.value("ar_len_o") == 0
+                self.taken["ar"] += 1
+                self.reads.append((self.value("ar_id_o"), now + self.latency))
+            if ready and self.value("aw_valid_o"):
+                self.taken["aw"] += 1
+                self.places.append(self.value("aw_id_o"))
+            if ready and self.value("w_valid_o"):
+                self.taken["w"] += 1
+                self.writes.append((self.places.popleft(), now + self.latency))
+
+    # ---- registers ----
+
+    async def write_all(self, *items: tuple[str, int]) -> None:
+        """A write a cycle, the next one right behind."""
+        dut, edge = self.dut, RisingEdge(self.dut.clk_i)
+        left, answers = {"aw": 0, "w": 0}, 0
+        for _ in range(100):
+            for channel in ("aw", "w"):
+                getattr(dut, f"reg_{channel}_valid_i").value = int(left[channel] < len(items))
+            if left["aw"] < len(items):
+                dut.reg_aw_addr_i.value = REGISTERS[items[left["aw"]][0]].offset
+            if left["w"] < len(items):
+                dut.reg_w_data_i.value = items[left["w"]][1]
+            await edge
+            for channel in ("aw", "w"):
+                left[channel] += left[channel] < len(items) and self.value(f"reg_{channel}_ready_o")
+            answers += self.value("reg_b_valid_o")
+            if answers == len(items):
+                return
+        raise AssertionError("a register does not answer")
+
+    async def write(self, name: str, value: int) -> None:
+        await self.write_all((name, value))
+
+    async def read(self, name: str) -> int:
+        dut, edge = self.dut, RisingEdge(self.dut.clk_i)
+        dut.reg_ar_valid_i.value, dut.reg_ar_addr_i.value = 1, REGISTERS[name].offset
+        for _ in range(100):
+            await edge
+            if self.value("reg_ar_ready_o"):
+                dut.reg_ar_valid_i.value = 0
+            if self.value("reg_r_valid_o"):
+                dut.reg_ar_valid_i.value = 0
+                return self.value("reg_r_data_o")
+        raise AssertionError("a register does not answer")
+
+    async def field(self, register: str, name: str) -> int:
+        low, bits = REGISTERS[register].fields[name]
+        return await self.read(register) >> low & (1 << bits) - 1
+
+    async def counter(self, index: int) -> int:
+        await self.write("counter_select", index)
+        return await self.read("counter_value")
+
+    async def result(self) -> tuple[int, int]:
+        """Tag and error."""
+        return await self.field("result", "tag"), await self.field("result", "error")
+
+    async def describe(self, tag: int, front: int = 2, rendering: int = 3) -> None:
+        """A frame with so many turns in its halves."""
+        await self.write("frame", tag)
+        for name, value in (("size", 16 << 16 | 16), ("clusters", front), ("chunks", rendering), ("stride", 96), ("table_low", 1 << 12),
+                            ("lists_low", 1 << 13), ("records_low", 1 << 14), ("frame_buffer_low", 1 << 15)):
+            await self.write(name, value)
+
+    async def start(self, tag: int, front: int = 2, rendering: int = 3) -> None:
+        for _ in range(400):
+            if await self.field("status", "ready"):
+                break
+        else:
+            raise AssertionError("not ready")
+        await self.describe(tag, front, rendering)
+        await self.write("control", START)
+
+    async def until(self, bits: int, limit: int = 2000) -> None:
+        """Until one of these interrupts waits."""
+        for _ in range(limit):
+            if await self.read("interrupt") & bits:
+                return
+        raise AssertionError(f"no interrupt of {bits:05b}")
+
+    async def ended(self, tag: int, error: int = 0, front: int = 2, rendering: int = 3) -> None:
+        """The frame posted next, which is released."""
+        await self.until(FRAME_DONE)
+        assert await self.result() == (tag, error)
+        if not error:
+            assert await self.counter(0) == front * 0x01010101 and await self.counter(ChipCounter.RENDERING_CYCLES) == rendering * 0x01010101
+        await self.write("interrupt", FRAME_DONE)
+
+    async def die(self) -> None:
+        """A time-out."""
+        self.silent = True
+        await self.write("timeout", 50)
+        for _ in range(400):
+            if await self.field("status", "dead"):
+                return
+        raise AssertionError("no time-out")
+
+    async def revive(self) -> None:
+        self.silent, self.away = False, True
+        await self.write("control", RESET)
+        for _ in range(20):
+            if not await self.field("status", "aborting"):
+                break
+        else:
+            raise AssertionError("the reset does not end")
+        self.away = False
+
+
+@cocotb.test()
+async def before_the_first_frame(dut: Any) -> None:
+    """Nothing has happened: result and frames are 0, and what the chip was built with can be read."""
+    chip = Chip(dut)
+    await chip.begin()
+    assert await chip.read("result") == await chip.read("frames") == await chip.read("interrupt") == 0
+    assert await chip.read("status") == 1 << REGISTERS["status"].fields["ready"][0]
+    for name, value in SETTINGS["capability"].items():
+        assert await chip.field("capability", name) == value, name
+    await chip.start(5)
+    await chip.ended(5)
+
+
+@cocotb.test()
+async def frames(dut: Any) -> None:
+    """Back to back, each with its counters; nothing is posted over a frame that was not released. What ran on is what the memory saw."""
+    chip = Chip(dut)
+    await chip.begin()
+    rng = chip.rng
+    turns = [(rng.randint(1, 5), rng.randint(1, 5)) for _ in range(8)]
+    for number, (front, rendering) in enumerate(turns[:2]):
+        await chip.start(number, front, rendering)
+    for number in range(8):
+        await chip.until(FRAME_DONE)
+        await chip.cycles(rng.choice([0, 300]))
+        assert await chip.field("frames", "finished") == number + 1
+        await chip.ended(number, 0, *turns[number])
+        if number + 2 < 8:
+            await chip.start(number + 2, *turns[number + 2])
+    assert await chip.field("frames", "started") == 8 and await chip.field("status", "ready")
+    front, rendering = (sum(column) for column in zip(*turns))
+    for counter, count in ((ChipCounter.LIVE_TABLE_BEATS, front), (ChipCounter.LIVE_LIST_BEATS, rendering), (ChipCounter.LIVE_FRONT_WRITTEN, front),
+                           (ChipCounter.LIVE_FRAME_WRITTEN, rendering), (ChipCounter.LIVE_COLOUR_BEATS, 0), (ChipCounter.LIVE_RECORD_WAITS, 0)):
+        assert await chip.counter(counter) == count, counter
+    assert await chip.counter(ChipCounter.STAGE + 7) == 7 + turns[-1][1]
+    assert chip.taken["ar"] == chip.taken["aw"] == chip.taken["w"] == front + rendering
+
+
+@cocotb.test()
+async def interrupts(dut: Any) -> None:
+    """Each event sets its bit, and the output follows the enables."""
+    chip = Chip(dut)
+    await chip.begin()
+    await chip.write("interrupt_enable", FRAME_DONE)
+    await chip.start(1)
+    await chip.until(FRONT_DONE)
+    await chip.until(FRAME_DONE)
+    assert chip.value("irq_o") == 1 and await chip.read("interrupt") == FRONT_DONE | FRAME_DONE
+    await chip.write("interrupt", FRONT_DONE)
+    assert chip.value("irq_o") == 1
+    await chip.write("interrupt", FRAME_DONE)
+    await chip.cycles(2)
+    assert chip.value("irq_o") == 0 and await chip.read("interrupt") == 0
+    chip.failing = True
+    await chip.start(2)
+    await chip.until(FRAME_DONE)
+    assert await chip.read("interrupt") == FRONT_DONE | FRAME_DONE | ERROR and await chip.result() == (2, 1 << ResultError.FRONT_READ)
+    await chip.write("interrupt", ALL)
+    chip.failing = False
+    # The front end and the registers are taken: a third start is refused, and so is one while frames are forgotten.
+    chip.latency = 100
+    await chip.start(3)
+    await chip.start(4)
+    assert not await chip.field("status", "ready")
+    await chip.write("control", START)
+    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 4
+    await chip.write("interrupt", REFUSED)
+    await chip.write_all(("control", ABORT), ("control", START))
+    assert await chip.read("interrupt") == REFUSED and not await chip.field("status", "ready") and await chip.field("status", "aborting")
+    await chip.write("interrupt", REFUSED)
+    await chip.until(ABORTED)
+    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 4
+    assert (await chip.result())[1] == 1 << ResultError.ABORTED
+
+
+@cocotb.test()
+async def writes_behind_a_start(dut: Any) -> None:
+    """In the cycles right behind a start the descriptor does not change any more, however early the write is."""
+    chip = Chip(dut)
+    await chip.begin()
+    for busy in (False, True):
+        for changed, value in (("frame", 99), ("clusters", 0), ("stride", 0), ("chunks", 77), ("records_low", 4)):
+            if busy:
+                await chip.start(3)
+            await chip.describe(7)
+            await chip.write_all(("control", START), (changed, value))
+            if busy:
+                await chip.ended(3)
+            await chip.ended(7)
+
+
+@cocotb.test()
+async def write_long_behind_a_start(dut: Any) -> None:
+    """Once the frame is taken the descriptor is the next one's."""
+    chip = Chip(dut)
+    await chip.begin()
+    await chip.describe(7)
+    await chip.write("control", START)
+    await chip.write("frame", 8)
+    await chip.ended(7)
+    await chip.write("control", START)
+    await chip.ended(8)
+
+
+@cocotb.test()
+async def time_out_before_a_release(dut: Any) -> None:
+    """What a frame left stays until it is released; the time-out's result and interrupt come then, and neither is lost in the release."""
+    chip = Chip(dut)
+    await chip.begin()
+    for failing in (False, True):
+        chip.failing = failing
+        tag, error = 11 + failing, failing << ResultError.FRONT_READ
+        await chip.start(tag)
+        await chip.until(FRAME_DONE)
+        read = await chip.read("interrupt") & (FRAME_DONE | ERROR)  # a handler begins
+        assert read == FRAME_DONE | ERROR * failing
+        await chip.start(13)
+        await chip.die()
+        assert await chip.read("interrupt") & ERROR and await chip.result() == (tag, error)
+        assert await chip.counter(0) == 2 * 0x01010101
+        await chip.write("interrupt", read)  # and releases what it has read
+        await chip.cycles(4)
+        assert (await chip.result())[1] == 1 << ResultError.TIMED_OUT and await chip.read("interrupt") & ERROR
+        await chip.write("interrupt", ALL)
+        assert await chip.read("interrupt") == 0
+        await chip.revive()
+        assert await chip.read("interrupt") == 0 and await chip.read("result") == 0
+    chip.failing = False
+    await chip.start(14)
+    await chip.ended(14)
+
+
+@cocotb.test()
+async def dead(dut: Any) -> None:
+    """A time-out is told once; an abort and starts do nothing; a reset tells nothing and all is as at the beginning."""
+    chip = Chip(dut)
+    await chip.begin()
+    for drained in (False, True):
+        await chip.start(1, front=200)
+        await chip.cycles(30)
+        if drained:
+            chip.silent = True
+            await chip.write("control", ABORT)
+            assert await chip.field("status", "aborting")
+        await chip.die()
+        assert await chip.read("interrupt") == ERROR and (await chip.result())[1] == 1 << ResultError.TIMED_OUT
+        await chip.write("interrupt", ERROR)
+        assert await chip.read("interrupt") == 0
+        await chip.write("control", ABORT)
+        await chip.write("control", START)
+        await chip.cycles(100)
+        assert await chip.field("status", "dead") and await chip.read("interrupt") == REFUSED
+        await chip.write("interrupt", REFUSED)
+        await chip.revive()
+        await chip.cycles(20)
+        assert await chip.read("interrupt") == await chip.read("result") == await chip.read("frames") == 0
+        assert not await chip.field("status", "dead") and await chip.field("status", "ready")
+        await chip.start(2)
+        await chip.ended(2)
+        await chip.write("interrupt", ALL)
+
+
+@cocotb.test()
+async def aborts(dut: Any) -> None:
+    """Frames under way are forgotten. One that was posted waits for its release, which may be late: the next ones wait for it, none is passed over."""
+    chip = Chip(dut)
+    await chip.begin()
+    for wait in (0, 40, 400):
+        await chip.start(21, 1, 1)
+        await chip.until(FRAME_DONE)
+        await chip.start(22, front=200)
+        await chip.cycles(20)
+        await chip.write("control", ABORT)
+        await chip.until(ABORTED)
+        kept = 21, 1 << ResultError.ABORTED  # added to what the frame left
+        assert await chip.result() == kept and await chip.counter(0) == 0x01010101
+        await chip.write("interrupt", ABORTED)
+        finished = await chip.field("frames", "finished")
+        assert finished == await chip.field("frames", "started")
+        await chip.start(23)
+        await chip.start(24)
+        await chip.cycles(wait)
+        assert await chip.result() == kept and await chip.counter(0) == 0x01010101 and await chip.field("frames", "finished") == finished
+        await chip.write("interrupt", FRAME_DONE)
+        await chip.until(FRAME_DONE)
+        await chip.cycles(200)
+        assert await chip.field("frames", "finished") == finished + 1
+        await chip.ended(23)
+        await chip.ended(24)
+        assert await chip.read("interrupt") & (ERROR | REFUSED | ABORTED) == 0
+    await chip.start(25, front=200)
+    await chip.until(FRONT_DONE)
+    await chip.write("control", ABORT)
+    await chip.until(ABORTED)
+    assert (await chip.result())[1] == 1 << ResultError.ABORTED
+
+
+@cocotb.test()
+async def resets(dut: Any) -> None:
+    """At once, also in an abort; a frame that was posted is forgotten with its interrupt, so that no late release meets the next one."""
+    chip = Chip(dut)
+    await chip.begin()
+    await chip.start(31)
+    await chip.until(FRAME_DONE)
+    await chip.start(32, front=200)
+    await chip.write("interrupt", FRONT_DONE)
+    await chip.revive()
+    assert await chip.read("interrupt") & FRAME_DONE == 0 and await chip.read("result") == await chip.read("frames") == 0
+    await chip.start(33)
+    await chip.until(FRAME_DONE)
+    await chip.start(34)
+    await chip.cycles(200)
+    assert await chip.field("frames", "finished") == 1
+    await chip.ended(33)
+    await chip.ended(34)
+    await chip.start(35, front=200)
+    chip.silent = True
+    await chip.write("control", ABORT)
+    await chip.write("interrupt", ALL)
+    await chip.revive()
+    await chip.cycles(20)
+    assert await chip.read("interrupt") == 0 and await chip.field("status", "ready")
