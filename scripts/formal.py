@@ -31,8 +31,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from flicker import toolchain
+from flicker.cli.tables import Terminal
 from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
@@ -338,7 +340,7 @@ def table(proofs: list[Proof], pairs: Pairs) -> Table:
     for column in COLUMNS:
         sheet.add_column(column, justify="left" if column in ("proof", "method") else "right")
     for row in rows(proofs, pairs):
-        sheet.add_row(*row)
+        sheet.add_row(*map(Text.from_markup, row))
     return sheet
 
 
@@ -349,7 +351,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="tasks at a time")
     parser.add_argument("--proofs", type=Path, default=PROOFS, help="another list of proofs")
     arguments = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 120)
+    console = Terminal()
 
     proofs = read_proofs(arguments.proofs)
     if arguments.unit:

@@ -28,11 +28,11 @@ from functools import cache
 from pathlib import Path
 
 import grimp
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from flicker import markdown, toolchain
+from flicker.cli.tables import Terminal
 from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
@@ -311,7 +311,7 @@ def main() -> int:
 
 def _run(mutants: list[Mutant], jobs: int, seed: int) -> int:
     """Run those whose outcome is not known, show all; the exit code."""
-    console = Console()
+    console = Terminal()
     kept = _kept()
     outcomes = {m.number: kept[m.number] for m in mutants if m.number in kept and _current(kept[m.number])}
     left = [m for m in mutants if m.number not in outcomes]

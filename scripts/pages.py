@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from flicker.errors import FlickerError
+from flicker.output import write_text
 from flicker.toolchain import ROOT
 
 END = "<!-- end -->"
@@ -77,6 +78,6 @@ def put(texts: Mapping[Place, str], root: Path = ROOT) -> list[Path]:
             if place in texts:
                 text = f"{text[:begin]}{texts[place].strip()}\n{text[end:]}"
         if text != old:
-            page.write_text(text)
+            write_text(page, text)
             changed.append(page)
     return changed

@@ -13,9 +13,9 @@ import sys
 import time
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from flicker.cli.tables import Terminal
 from flicker.cost.stamp import LIBERTY
 from flicker.cost.synth import report
 from flicker.cost.synth.run import FOLDER, Runner
@@ -31,7 +31,7 @@ def main() -> int:
     parser.add_argument("--config", help="only this parameter set of the unit, such as 'factored fixed'")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     arguments = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 180)
+    console = Terminal()
 
     units = all_units()
     if arguments.unit:

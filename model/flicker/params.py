@@ -7,11 +7,10 @@ Everything that RTL, model, tests and docs must agree on is defined here once: `
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
-
-import numpy as np
 
 from .errors import FlickerError
 
@@ -135,15 +134,13 @@ def vru_stages(form: Form) -> tuple[int, int]:
 
 def fp16_bits_up(x: float) -> int:
     """Bits of the smallest FP16 number >= x (x > 0)."""
-    h = np.float16(x)
-    if float(h) < x:
-        h = np.nextafter(h, np.float16(np.inf))
-    return int(h.view(np.uint16))
+    bits = fp16_bits_nearest(x)
+    return bits + (struct.unpack("<e", struct.pack("<H", bits))[0] < x)
 
 
 def fp16_bits_nearest(x: float) -> int:
     """Bits of x rounded to FP16."""
-    return int(np.float16(x).view(np.uint16))
+    return struct.unpack("<H", struct.pack("<e", x))[0]
 
 
 FP16_ONE_BITS = fp16_bits_nearest(1.0)

@@ -36,7 +36,7 @@ from flicker.scene.files import save_ply
 SIZE = 160, 90
 NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "lanes"] + [
     f"flicker-{mode}-mixed-conic" for mode in ("dense", "sparse", "smooth", "spiky")
-] + ["flicker-smooth-fp16-conic", "flicker-smooth-fp8-conic"]
+] + ["flicker-smooth-fp16-conic", "flicker-smooth-fp8-conic", "log-lanes"]  # stages with other parts of energy than the first
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +154,9 @@ def test_summary(made):
     rows = _rows(written.summary)
     assert [r["config"] for r in rows] == NAMES and set(SUMMARY) <= set(rows[0])
     data = load_view(DEMO, 0, SIZE)
-    for name in ("faithful", "vanilla"):
+    parts = {r["config"]: {key for key in r if key.startswith("energy_uj_") and r[key]} for r in rows}
+    assert parts["log-lanes"] - parts["faithful"] and parts["faithful"] - parts["log-lanes"]
+    for name in ("faithful", "vanilla", "log-lanes"):
         row = next(r for r in rows if r["config"] == name)
         fresh = evaluate(data, name).row
         assert int(row["cycles"]) == fresh["cycles"] and row["model_only"] == str(fresh["model_only"])
@@ -402,7 +404,7 @@ def test_bad_input(scene, tmp_path, monkeypatch, arguments, message):
 
 def test_unwritable_folder(tmp_path, monkeypatch):
     """A folder that cannot be written is found before any work, also one in the way of a file."""
-    monkeypatch.setattr("flicker.explore.stability.write.os.access", lambda *a: False)
+    monkeypatch.setattr("flicker.output.os.access", lambda *a: False)
     with pytest.raises(FlickerError, match="not writable"):
         check([], tmp_path / "out", SIZE, NAMES)
     monkeypatch.undo()

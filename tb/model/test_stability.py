@@ -23,11 +23,12 @@ from flicker.explore.stability import BROKEN_PSNR, FAMILIES, FRONT_ENDS, Case, S
 from flicker.explore.stability.families import SIZE, _scene, crop
 from flicker.explore.stability.front_ends import Drawer, FrontEnd, draw, drawable, in_float64
 from flicker.explore.stability.run import ABSOLUTE, suite
-from flicker.explore.stability.write import FRONT_TABLES, check_folder
+from flicker.explore.stability.write import FRONT_TABLES
 from flicker.front.records import build_lists
 from flicker.front.view import View
 from flicker.golden.front.frame import run_front
 from flicker.golden.front.record import RecordKind
+from flicker.output import check_folder
 from flicker.params import TILE, Coords, RenderConfig
 from flicker.scene.metrics import psnr
 from flicker.scene.packed import PackedFormat

@@ -91,6 +91,22 @@ RENDERING_WAITS = {
     "record_waits": "records for cores", "pair_waits": "cores for the frame writer", "frame_waits": "lines of the frame buffer",
 }
 
+# Stalls that are sums over several units.
+SUMMED = {
+    **{FRONT_WAITS[name]: "4 lanes" for name in ("colour_waits", "record_waits", "entry_waits")},
+    **{FRONT_WAITS[name]: "4 list writers" for name in ("merged_waits", "line_waits")},
+    **{RENDERING_WAITS[name]: "4 sorting units" for name in ("list_waits", "sorted_waits")},
+    **{RENDERING_WAITS[name]: f"{CORES} cores" for name in ("record_waits", "pair_waits")},
+    **dict.fromkeys(("contribution test", "no records for the contribution test"), f"{CORES} cores"),
+    "feature FIFO full": f"{CORES * CHANNELS} channels",
+    **dict.fromkeys(("no records for the lanes", "no slot in the lanes' store", "no room in a lane's queue"), f"{CORES} cores"),
+}
+
+
+def stalled(cause: str, cycles: int) -> str:
+    """Cycles of a stall of `chip_stats` with their unit."""
+    return f"{cycles:,} cycle{'s' * (cycles != 1)}" + (f", sum over {SUMMED[cause]}" if cause in SUMMED else "")
+
 
 def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
     """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.

@@ -14,8 +14,9 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from .kept import Checkpoint, checkpoint_path, measuring
-from .options import RichSteps, console, parse_size, say_source, writable, write_atomically
+from .options import RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
+from .tables import decibels
 
 ScoreChoice = Enum("ScoreChoice", {"CHANGE": "change", "WEIGHT": "weight", "PEAK": "peak"}, type=str)
 
@@ -32,7 +33,7 @@ def _show(rows, seconds: list[float | None]) -> None:
     for row, second in zip(rows, seconds):
         cost = row.cost
         table.add_row(
-            row.step, f"{row.gaussians:,}", f"{row.coefficients:.2f}", f"{row.decibels:.2f}" if row.decibels < 200 else "equal",
+            row.step, f"{row.gaussians:,}", f"{row.coefficients:.2f}", decibels(row.decibels, unit=""),
             f"{cost.cycles:,.0f}" if cost else "", f"{cost.lane_cycles:,.0f}" if cost and cost.lane_cycles else "", _megabytes(cost.bytes) if cost else "",
             _megabytes(cost.image_bytes) if cost else "", "" if second is None else f"{second:,.0f}",
         )
@@ -75,6 +76,8 @@ def budget(
     given = {name: value for name, value in (("keep", keep), ("db", db), ("cycles", cycles), ("mbytes", mbytes)) if value is not None}
     if len(given) != 1:
         raise FlickerError(f"--keep, --db, --cycles, --mbytes: one is needed, not {' and '.join('--' + name for name in given) or 'none'}")
+    check_scene(scene)
+    check_there(views)
     with RichSteps().step("starting"):
         from ..budget.goal import Goal, Kind
         from ..budget.reduce import Options, Reducer, sound
@@ -123,7 +126,7 @@ def budget(
 
     def told(row) -> None:
         seconds.append(time.monotonic() - began)
-        console.print(f"{row.step:20} {row.gaussians:9,} Gaussians {min(row.decibels, 999):6.2f} dB on the held-out views {seconds[-1]:6.0f} s")
+        console.print(f"{row.step:20} {row.gaussians:9,} Gaussians {decibels(row.decibels):>9} on the held-out views {seconds[-1]:6.0f} s")
 
     with kept.interruptible():
         reducer.run(progress, told, kept.keep)
@@ -134,7 +137,7 @@ def budget(
     kept.finish()
     written = load_scene(out)
     with measuring(out):
-        decibels = reference_psnr(clean, written, held, progress)
+        lost = reference_psnr(clean, written, held, progress)
         at_frame = reference_psnr(clean, written, [camera.resized(*counted) for camera in held], progress)
         drawn = None if reducer.machine is None else [machine_psnr(of, held, reducer.wanted_held, reducer.machine, progress) for of in (clean, written)]
     _show(reducer.rows, seconds)
@@ -145,18 +148,18 @@ def budget(
     table.add_row("Gaussians", f"{len(found):,}, {len(found) / len(full):.1%}")
     if removed := reducer.removed + len(reducer.parameters) - len(found):
         table.add_row("taken out, not finite", f"{removed:,}")
-    table.add_row("PSNR of the file on the held-out views, mean", f"{sum(decibels) / len(decibels):.2f} dB")
-    table.add_row("  worst view", f"{min(decibels):.2f} dB")
-    table.add_row(f"  at {counted[0]}x{counted[1]}, mean", f"{sum(at_frame) / len(at_frame):.2f} dB")
+    table.add_row("PSNR of the file on the held-out views, mean", decibels(sum(lost) / len(lost)))
+    table.add_row("  worst view", decibels(min(lost)))
+    table.add_row(f"  at {counted[0]}x{counted[1]}, mean", decibels(sum(at_frame) / len(at_frame)))
     if drawn is not None:
-        table.add_row(f"as {through} draws it, mean", f"{sum(drawn[1]) / len(held):.2f} dB, the full scene {sum(drawn[0]) / len(held):.2f} dB")
+        table.add_row(f"as {through} draws it, mean", f"{decibels(sum(drawn[1]) / len(held))}, the full scene {decibels(sum(drawn[0]) / len(held))}")
     table.add_row("bytes", f"{out.stat().st_size:,}")
     console.print(table)
     if json_ is not None:
         text = json.dumps({
             "scene": scene, "cameras": cameras_from, "goal": {goal.kind.value: goal.value},
             "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
-            "held_out_db": decibels, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
+            "held_out_db": lost, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
             "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
         }, indent=2)
         write_atomically(json_, lambda path: path.write_text(text + "\n"))

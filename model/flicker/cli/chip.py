@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from ..errors import FlickerError
-from .options import CAMERAS_HELP, SIZE_HELP, parse_size, say_source, writable, write_atomically
-
-console = Console()
+from .options import CAMERAS_HELP, SIZE_HELP, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
+from .tables import decibels
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -80,6 +78,10 @@ def chip(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="the estimate as JSON")] = None,
 ) -> None:
     """Estimate a whole frame: culling, memory, lists, sorting, rendering; where the chip exists as RTL, first by the models that are held to it."""
+    writable(out, "--out")
+    check_scene(scene)
+    check_there(cameras)
+    wanted = parse_size(size)
     from ..chip.compare import FRONTS, chip_estimates, chip_stage, estimate
     from ..chip.constants import constant_table
     from ..chip.dram import DramConfig, Refresh
@@ -100,9 +102,8 @@ def chip(
         raise FlickerError(f"--refresh: '{refresh}' is not one of {', '.join(Refresh)}")
     if render_cycles is not None and render_cycles < 0:
         raise FlickerError(f"--render-cycles: must not be negative, not {render_cycles}")
-    writable(out, "--out")
     configuration = get_configuration(config)
-    loaded = load_view(scene, view, parse_size(size), cameras, up)
+    loaded = load_view(scene, view, wanted, cameras, up)
     setting = ChipConfig(memory=MemoryFormat(memory), scheme=SCHEMES[scheme], dram=DramConfig(refresh=Refresh(refresh)))
     prepared = prepare(loaded, setting.cluster_size)
     if render_cycles is None:
@@ -130,14 +131,14 @@ def chip(
 
         table = _table("memory formats", "format", "MB", "bytes a Gaussian", "float64 dB", "golden dB")
         for q in format_quality(loaded):
-            table.add_row(q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), f"{q.reference_db:.1f}", f"{q.golden_db:.1f}")
+            table.add_row(q.form, f"{q.scene_bytes / 1e6:.2f}", str(q.gaussian_bytes), decibels(q.reference_db, 1, ""), decibels(q.golden_db, 1, ""))
         console.print(table)
     if keys:
         from ..chip.quality import key_quality
 
         table = _table("depth keys", "key", "bits", "dB")
         for kind, bits, value in key_quality(prepared.view.projected, loaded.camera):
-            table.add_row(kind, str(bits), f"{value:.1f}")
+            table.add_row(kind, str(bits), decibels(value, 1, ""))
         console.print(table)
     if constants:
         table = _table("constants", "name", "value", "source")

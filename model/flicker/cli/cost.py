@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, console, parse_size, say_source, writable, write_atomically
+from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 
 
@@ -74,15 +74,17 @@ def cost(
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
 ) -> None:
     """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
+    writable(out, "--out")
+    writable(json_, "--json")
+    wanted = parse_size(size)
+    check_scene(scene)
+    check_there(cameras)
     from ..chip.scene_cost import scene_cost
     from ..front.unseen import why_empty
     from ..front.view import view_of
     from ..scene.packed import PackedFormat
     from ..scene.sources import open_scene
 
-    writable(out, "--out")
-    writable(json_, "--json")
-    wanted = parse_size(size)
     source = open_scene(scene, cameras, up)
     found = source.cameras
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from ..errors import FlickerError, FlickerWarning
+from ..errors import FlickerError, FlickerWarning, Interrupted, one_line
 from .budget import budget
 from .chip import chip
 from .convert import convert
@@ -28,6 +29,19 @@ for command in (render, demo, view, convert, pack, chip, cost, fit, undistort, b
     app.command()(command)
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"flicker {version('flicker')}")
+        raise typer.Exit
+
+
+@app.callback()
+def flicker(version: Annotated[bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)] = False) -> None:
+    """What stands before the name of a command."""
+
+
 _show_others = warnings.showwarning
 
 
@@ -39,20 +53,44 @@ def _show_warning(message: Any, category: Any, *rest: Any) -> None:
         _show_others(message, category, *rest)
 
 
+def _run(words: list[str]) -> int:
+    """The command that the words name; its exit code. Typer's own `main` would take Ctrl-C without what it says."""
+    with typer.main.get_command(app).make_context("flicker", words) as context:
+        context.command.invoke(context)
+    sys.stdout.flush()  # a full disk behind it is an error of this command
+    return 0
+
+
+def _no_more_output() -> None:
+    """Nobody reads what is still to be written: Python must not fail again when it flushes at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]
+
+
 def main() -> None:
-    """Entry point: bad input is one line on standard error and exit code 2."""
+    """Entry point: bad input is one line on standard error and exit code 2; Ctrl-C is one line and 130."""
     warnings.showwarning = _show_warning  # type: ignore[assignment]  # the rest is handed on as it comes
     try:
-        sys.exit(app(standalone_mode=False) or 0)
+        sys.exit(_run(sys.argv[1:]))
+    except typer.Exit as exit:
+        sys.exit(exit.exit_code)
     except FlickerError as error:
         message = str(error)
     except typer.exceptions.TyperException as error:  # wrong use of the command line
         message = error.format_message()
         if not message:  # help was asked for by giving no arguments, and printed
             sys.exit(2)
-        message += " (see 'flicker --help')"
+        context = getattr(error, "ctx", None)
+        message += f" (see '{context.command_path if context else 'flicker'} --help')"
     except BrokenPipeError:
+        _no_more_output()
         sys.exit(1)
+    except OSError as error:  # what no command has put into words, such as a full disk behind standard output
+        message = f"{error.filename or 'standard output'}: {error.strerror or one_line(error)}"
+        if error.filename is None:
+            _no_more_output()
+    except Interrupted as kept:
+        print(f"flicker: interrupted: {kept}", file=sys.stderr)
+        sys.exit(130)
     except (KeyboardInterrupt, typer.Abort):
         print("flicker: interrupted", file=sys.stderr)
         sys.exit(130)

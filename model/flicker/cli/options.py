@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-from ..errors import FlickerError, one_line
+from ..errors import FlickerError
+from ..output import write_atomically as write_atomically
 from ..progress import Steps
+from .tables import Terminal
 
-console = Console()
+console = Terminal()
 
 
 class RichSteps(Steps):
@@ -22,14 +21,18 @@ class RichSteps(Steps):
 
     @contextmanager
     def step(self, text: str) -> Iterator[None]:
-        with Progress(SpinnerColumn(), TextColumn(text), TimeElapsedColumn(), console=console, transient=True,
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        with Progress(SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn(), console=console, transient=True,
                       disable=not console.is_terminal) as p:
             p.add_task(text, total=None)
             yield
 
     @contextmanager
     def bar(self, text: str):
-        with Progress(TextColumn(text), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn(),
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        with Progress(TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn(),
                       console=console, transient=True, disable=not console.is_terminal) as p:
             task = p.add_task(text, total=None)
             yield lambda done, total: p.update(task, completed=done, total=total)
@@ -117,13 +120,20 @@ def writable(path: Path | None, option: str) -> None:
         raise FlickerError(f"{option}: {path}: not writable")
 
 
-def write_atomically(path: Path, write) -> None:
-    """Call write(temporary path), then put the file in place: no partial results."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        write(temporary)
-        temporary.replace(path)
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror or one_line(error)})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+def check_scene(scene: str | Path) -> None:
+    """Fail before a second of imports where there is no such scene, or nothing that is one."""
+    from ..scene.files import scene_kind
+    from ..scene.sources import DEMO, scene_path
+
+    if str(scene) != DEMO:
+        scene_kind(scene_path(scene))
+
+
+def check_there(*paths: Path | None) -> None:
+    """Fail before a second of imports where a file or folder is not there."""
+    for path in paths:
+        try:
+            if path is not None:
+                path.stat()
+        except OSError as error:
+            raise FlickerError(f"{path}: cannot be read ({error.strerror})") from None

@@ -8,12 +8,12 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.table import Table
+from rich.text import Text
 
 from ..errors import FlickerError, FlickerWarning
-from .options import RichSteps, console, writable, write_atomically
+from .options import RichSteps, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
     from ..scene.packed import PackedScene
@@ -24,6 +24,8 @@ FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local
 
 def _contents(packed: PackedScene, title: str) -> Table:
     """Where the bytes are, and what is in the clusters."""
+    import numpy as np
+
     from ..scene.packed import HEADER_BYTES
 
     table = Table(show_header=False, title=title)
@@ -87,7 +89,7 @@ def _history(table: Table, packing: Packing) -> None:
         table.add_row("chunks", "kept", "codes of the file")
     for what, counts in (("left out", packing.left_out), ("changed", packing.clamped)):
         for reason, count in counts.items():
-            table.add_row(f"[yellow]{reason}[/yellow]", f"{count:,}", what)
+            table.add_row(Text(reason, "yellow"), f"{count:,}", what)
 
 
 def pack(
@@ -116,6 +118,7 @@ def pack(
     if out.suffix.lower() != ".flk":
         raise FlickerError(f"--out: {out}: only .flk is written")
     writable(out, "--out")
+    check_scene(scene)
     with steps.step("starting"):
         from ..scene.files import scene_title
         from ..scene.packed import PackedFormat

@@ -9,8 +9,10 @@ from typing import Annotated
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
-from ..errors import FlickerError
+from ..errors import FlickerError, Interrupted
+from ..output import folder_atomically
 from ..params import (
     CHIP_MEMORIES,
     FAITHFUL,
@@ -26,8 +28,23 @@ from ..params import (
     RenderConfig,
 )
 from ..progress import Steps
-from .options import BACKGROUND_HELP, CAMERAS_HELP, SIZE_HELP, RichSteps, Within, background_of, console, parse_size, parse_view, writable, write_atomically
+from .options import (
+    BACKGROUND_HELP,
+    CAMERAS_HELP,
+    SIZE_HELP,
+    RichSteps,
+    Within,
+    background_of,
+    check_scene,
+    check_there,
+    console,
+    parse_size,
+    parse_view,
+    writable,
+    write_atomically,
+)
 from .pictures import Files, check_distinct, write_pictures
+from .tables import decibels
 
 
 def _choices(enum: type) -> type[Enum]:
@@ -86,7 +103,7 @@ def summary(stats: dict, picture: Path | None) -> Table:
     if stats.get("front") != "float":
         table.add_row("front end", f"{stats['front']} ({stats['format']}, records {stats['records']})")
     if "psnr_db" in stats:
-        table.add_row("PSNR against float64", "equal" if stats["psnr_db"] is None else f"{stats['psnr_db']:.2f} dB")
+        table.add_row("PSNR against float64", decibels(stats["psnr_db"]))
     for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("list_entries", "list entries"), ("subtile_pairs", "sub-tile pairs"),
                        ("minitiles_sent", "mini-tiles sent"), ("front_cycles", "cycles of the front end"), ("cycles", "cycles")):
         if stats.get(key) is not None:
@@ -97,33 +114,35 @@ def summary(stats: dict, picture: Path | None) -> Table:
         if "least_cycles" in lanes:
             table.add_row(f"cycles of {lanes['lanes']} lanes, at least", _number(lanes["least_cycles"]))
         for cause, share in lanes.get("waiting", {}).items():
-            table.add_row(f"  lanes waiting: {cause}", f"{share:.1%}")
+            table.add_row(f"  lanes waiting: {cause}", f"{share:.1%} of their cycles")
     for key, label in (("lane_utilisation", "lanes with a pair that counts"), ("vru_utilisation", "VRU utilisation"),
                        ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
         if key in stats:
             table.add_row(label, f"{stats[key]:.1%}")
     if "phases" in stats:
+        from ..chip.run import stalled
+
         for name, cycles in stats["phases"].items():
-            table.add_row(f"  {name}", _number(cycles))
+            table.add_row(f"  {name}", f"{cycles:,} cycles")
         for name, (read, written) in stats["dram_bytes"].items():
             table.add_row(f"  bytes of {name}", " + ".join(f"{_number(n)} {what}" for n, what in ((read, "read"), (written, "written")) if n))
         moved = sum(map(sum, stats["dram_bytes"].values()))
         table.add_row("memory", f"{moved / 1e6:.2f} MB, {stats['dram_efficiency']:.0%} of the peak rate, refresh {stats['refresh']}")
         for cause, cycles in stats["stalls"].items():
             if cycles:
-                table.add_row(f"  stalled: {cause}", _number(cycles))
+                table.add_row(f"  stalled: {cause}", stalled(cause, cycles))
         table.add_row("bottleneck", stats["bottleneck"])
     if stats.get("simulated_cycles_per_second"):
         table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
     for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
-        table.add_row(f"[yellow]{reason}[/yellow]", _number(count))
+        table.add_row(Text(reason, "yellow"), _number(count))
     for key, label in (("alpha", "alpha"), ("depth", "depth of the float64 reference")):
         if key in stats:
             table.add_row(label, stats[key]["file"])
     if "unseen" in stats:
         for reason, count in stats["unseen"].items():
-            table.add_row(f"[yellow]nothing is seen: {reason}[/yellow]", _number(count))
-        table.add_row("[yellow]what may help[/yellow]", stats["advice"])
+            table.add_row(Text(f"nothing is seen: {reason}", "yellow"), _number(count))
+        table.add_row(Text("what may help", "yellow"), stats["advice"])
     return table
 
 
@@ -220,6 +239,8 @@ def render(
     if alpha is not None and whole:
         raise FlickerError(f"--alpha: not with --engine {engine.value}, whose frame buffer has none; --engine golden has that of the same stage")
     wanted, behind = parse_size(size), background_of(background)
+    check_scene(scene)
+    check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
         from ..chip.dram import DramConfig, Refresh
@@ -310,18 +331,22 @@ def demo(
         from ..pipeline import Engine
         from ..scene.demo import write_demo
         from ..scene.image import save_png
-    with steps.step(f"making the demo scene (seed {seed})"):
-        scene_path, cameras_path = write_demo(folder, seed)
-    view = load_view(scene_path, 0, wanted, cameras_path)
-    with steps.step("rendering the float64 reference (compiling on the first run)"):
-        _ = view.reference
-    golden = render_on_chip(view, Engine.CHIP_GOLDEN, config=RECOMMENDED, compare=True, steps=steps)
-    rtl = render_on_chip(view, Engine.CHIP, config=RECOMMENDED, compare=True, steps=steps)
-    if not (golden.image == rtl.image).all():
-        raise FlickerError("demo: the chip's picture differs from its golden model's")
-    picture = folder / "demo.png"
-    write_atomically(picture, lambda path: save_png(path, rtl.image))
-    write_atomically(folder / "stats.json", lambda path: path.write_text(json.dumps(rtl.stats, indent=2) + "\n"))
-    table = summary(rtl.stats, picture)
+    try:
+        with folder_atomically(folder) as made:
+            with steps.step(f"making the demo scene (seed {seed})"):
+                scene_path, cameras_path = write_demo(made, seed)
+            view = load_view(scene_path, 0, wanted, cameras_path)
+            with steps.step("rendering the float64 reference (compiling on the first run)"):
+                _ = view.reference
+            golden = render_on_chip(view, Engine.CHIP_GOLDEN, config=RECOMMENDED, compare=True, steps=steps)
+            rtl = render_on_chip(view, Engine.CHIP, config=RECOMMENDED, compare=True, steps=steps)
+            if not (golden.image == rtl.image).all():
+                raise FlickerError("demo: the chip's picture differs from its golden model's")
+            stats = rtl.stats | {"scene": str(folder / scene_path.name)}
+            write_atomically(made / "demo.png", lambda path: save_png(path, rtl.image))
+            write_atomically(made / "stats.json", lambda path: path.write_text(json.dumps(stats, indent=2) + "\n"))
+    except KeyboardInterrupt:
+        raise Interrupted(f"nothing was written to {folder}; simulators that were built are kept, and the same command begins anew") from None
+    table = summary(stats, folder / "demo.png")
     table.add_row("golden model", "equal, bit for bit")
     console.print(table)

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+from rich.text import Text
 
-from ..errors import FlickerError
-from .options import parse_size
+from ..errors import FlickerError, Interrupted
+from ..output import check_folder
+from .options import check_there, console, parse_size
 
 
 def report(
@@ -29,7 +30,14 @@ def report(
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:
     """Measure configurations on every view; write tables and figures as one page."""
-    console = Console()
+    if not show:
+        from ..report.named import named
+
+        check_folder(out)
+        for text in scenes or ():
+            named(text)
+        check_there(*(budget or ()))
+    wanted = parse_size(size)
     with console.status("starting"):
         from ..explore.configurations import CONFIGURATIONS
         from ..explore.store import DEFAULT
@@ -37,9 +45,9 @@ def report(
         from ..scene.photos import parse_background
     if show:
         for c in CONFIGURATIONS.values():
-            console.print(f"[bold]{c.name}[/bold]  {c.title}{' (model only)' if c.model_only else ''}", soft_wrap=True, highlight=False)
+            title = f"  {c.title}{' (model only)' if c.model_only else ''}"
+            console.print(Text.assemble((c.name, "bold"), title), soft_wrap=True, highlight=False)
         return
-    wanted = parse_size(size) or (1280, 720)
     names = None if configs is None else [n.strip() for n in configs.split(",")]
     if names is not None and not all(names):
         raise FlickerError(f"--configs: an empty name in '{configs}'")
@@ -53,13 +61,16 @@ def report(
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     with Progress(
-        BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn(), TextColumn("{task.description}"), console=console, transient=True,
-        disable=not console.is_terminal,
+        BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn(), TextColumn("{task.description}", markup=False), console=console,
+        transient=True, disable=not console.is_terminal,
     ) as bar:
         task = bar.add_task("", total=None)
-        written = write_report(job, seed, lambda done, total, text: bar.update(task, completed=done, total=total, description=text))
+        try:
+            written = write_report(job, seed, lambda done, total, text: bar.update(task, completed=done, total=total, description=text))
+        except KeyboardInterrupt:
+            raise Interrupted(f"what is measured is kept in {job.store}, and the same command goes on from there; no page was written") from None
     for verdict in written.verdicts:
         colour = {"yes": "green", "no": "red", "partly": "yellow", "open": "dim"}[verdict.kind]
         outcome = verdict.verdict.split(" (")[0].split(", because")[0]
-        console.print(f"[bold]{verdict.figure}[/bold] {verdict.claim}: [{colour}]{outcome}[/{colour}]", soft_wrap=True, highlight=False)
+        console.print(Text.assemble((verdict.figure, "bold"), f" {verdict.claim}: ", (outcome, colour)), soft_wrap=True, highlight=False)
     console.print(f"{written.page}, {written.summary}; seed {seed}", soft_wrap=True)

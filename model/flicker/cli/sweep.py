@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+
+from ..errors import FlickerError, Interrupted
+from .options import check_there, console
+from .tables import decibels
 
 TABLE_ROWS = 60  # longer results are in the file only
 
@@ -22,12 +23,14 @@ def sweep(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for results [default: build/sweep]")] = None,
 ) -> None:
     """Run scenes x views x configurations on Dask; results in Parquet, resumed where an earlier run has stopped."""
-    from ..errors import FlickerError
+    if cluster is not None and workers is not None:
+        raise FlickerError("--cluster: has its own workers, so it cannot be combined with --workers")
+    check_there(config)
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
     from ..explore.sweep.config import load_sweep
     from ..explore.sweep.run import run_sweep
 
-    if cluster is not None and workers is not None:
-        raise FlickerError("--cluster: has its own workers, so it cannot be combined with --workers")
     wanted = load_sweep(config)
     if cluster is not None:
         wanted = replace(wanted, address=cluster, workers=None)
@@ -35,11 +38,10 @@ def sweep(
         wanted = replace(wanted, workers=workers, address=None)
     if out is not None:
         wanted = replace(wanted, out=out)
-    console = Console(width=None if sys.stdout.isatty() else 140)
     for line in dict.fromkeys(f"{target.scene.path}: cameras: {target.scene.cameras_from}" for target in wanted.targets):
         console.print(line, highlight=False, soft_wrap=True)
     with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("points"), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, transient=True, disable=not console.is_terminal,
     ) as progress:
         task = progress.add_task("sweep", total=len(wanted.points))
@@ -52,8 +54,7 @@ def sweep(
             result = run_sweep(wanted, on_point=report)
         except KeyboardInterrupt:
             done = int(progress.tasks[task].completed)
-            typer.echo(f"flicker: interrupted; {done} of {len(wanted.points)} points are kept, the next run continues", err=True)
-            raise typer.Exit(130) from None
+            raise Interrupted(f"{done} of {len(wanted.points)} points are kept in {wanted.store}; the same command continues") from None
     if len(result.rows) <= TABLE_ROWS:
         console.print(summary(result.rows))
     note = f", {result.lost} workers lost" if result.lost else ""
@@ -69,14 +70,15 @@ def summary(rows: list[dict]) -> Table:
         ("photo dB", "right"), ("GE", "right"), ("uJ", "right"),
     )
     for name, justify in columns:
-        table.add_column(name, justify=justify, no_wrap=True)
+        table.add_column(name, justify=justify)
 
     def text(value, form: str) -> str:
         return "" if value is None else format(value, form)
 
     for row in rows:
         table.add_row(
-            row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), text(row["psnr_db"], ".2f"), text(row["ssim"], ".4f"),
-            text(row["flip"], ".4f"), text(row["photo_psnr_db"], ".2f"), text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
+            row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), decibels(row["psnr_db"], unit=""), text(row["ssim"], ".4f"),
+            text(row["flip"], ".4f"), "" if row["photo_psnr_db"] is None else decibels(row["photo_psnr_db"], unit=""),
+            text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
         )
     return table

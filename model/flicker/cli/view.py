@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 from ..errors import FlickerError
-from .options import BACKGROUND_HELP, CAMERAS_HELP, SIZE_HELP, RichSteps, background_of, console, parse_size, say_source, writable_folder
+from .options import (
+    BACKGROUND_HELP,
+    CAMERAS_HELP,
+    SIZE_HELP,
+    RichSteps,
+    background_of,
+    check_scene,
+    check_there,
+    console,
+    parse_size,
+    say_source,
+    writable_folder,
+)
 
 MAX_PIXELS = 3840 * 2160
 
@@ -31,6 +43,8 @@ def view(
         raise FlickerError(f"--size: {size} is more than {MAX_PIXELS:,} pixels")
     writable_folder(folder, "--dir")
     behind = background_of(background)
+    check_scene(scene)
+    check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
         from ..front.view import view_of

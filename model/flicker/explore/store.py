@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlickerError
+from ..output import write_atomically, write_text, writing
 from ..toolchain import BUILD
 
 DEFAULT = BUILD / "sweep" / "points"
@@ -34,12 +34,10 @@ class Store:
     def __init__(self, folder: Path = DEFAULT) -> None:
         self.folder = folder
         probe = folder / f".probe.{os.getpid()}"
-        try:
+        with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
             probe.write_bytes(b"")
             probe.unlink()
-        except OSError as error:
-            raise FlickerError(f"{folder}: cannot be written ({error.strerror})") from None
 
     def load(self, key: str) -> dict | None:
         """The stored numbers; None when there are none, or damaged ones."""
@@ -59,13 +57,6 @@ class Store:
 
     def put(self, key: str, data: dict, arrays: dict[str, np.ndarray] | None = None) -> None:
         """Write a result: arrays first, numbers last, each put in place whole."""
-        try:
-            if arrays:
-                temporary = self.folder / f".{key}.{os.getpid()}.npz"
-                np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
-                temporary.replace(self.folder / f"{key}.npz")
-            temporary = self.folder / f".{key}.{os.getpid()}.json"
-            temporary.write_text(json.dumps(data, default=plain))
-            temporary.replace(self.folder / f"{key}.json")
-        except OSError as error:
-            raise FlickerError(f"{self.folder}: cannot be written ({error.strerror})") from None
+        if arrays:
+            write_atomically(self.folder / f"{key}.npz", lambda path: np.savez_compressed(path, **arrays))  # type: ignore[arg-type]
+        write_text(self.folder / f"{key}.json", json.dumps(data, default=plain))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import csv
 import io
 import math
 from collections.abc import Callable, Sequence
@@ -24,10 +23,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: 
 from ..budget.curve import Curve  # noqa: E402
 from ..cost.area import in_table  # noqa: E402
 from ..cost.chip_area import CHIPS, PAPER_MM2, UM2_PER_BIT, UM2_PER_GE, components, in_all, square_millimetres  # noqa: E402
-from ..errors import FlickerError  # noqa: E402
 from ..explore.configurations import CONFIGURATIONS  # noqa: E402
 from ..explore.facts import MAPS, TILE_SIZES  # noqa: E402
 from ..explore.stability.run import Stability  # noqa: E402
+from ..output import write_atomically, write_csv  # noqa: E402
 from .claims import (  # noqa: E402
     DENSE,
     FAITHFUL,
@@ -74,11 +73,7 @@ class Figure:
 
     def write(self, folder: Path) -> None:
         """NAME.csv, NAME.png, NAME.svg; the picture's bytes stay in `written`. Raises FlickerError."""
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.header)
-        writer.writerows([_cell(v) for v in row] for row in self.rows)
-        files = {f"{self.name}.csv": text.getvalue().encode()}
+        write_csv(folder / f"{self.name}.csv", [self.header, *([_cell(v) for v in row] for row in self.rows)])
         if self.canvas is not None:
             engine = self.canvas.get_layout_engine()
             if engine is not None:
@@ -89,13 +84,9 @@ class Figure:
                 buffer = io.BytesIO()
                 with plt.rc_context(STYLE):
                     self.canvas.savefig(buffer, format=kind, metadata=metadata, dpi=110)
-                files[f"{self.name}.{kind}"] = self.written[kind] = buffer.getvalue()
+                data = self.written[kind] = buffer.getvalue()
+                write_atomically(folder / f"{self.name}.{kind}", lambda path: path.write_bytes(data))
             plt.close(self.canvas)
-        try:
-            for name, data in files.items():
-                (folder / name).write_bytes(data)
-        except OSError as error:
-            raise FlickerError(f"{folder}: cannot be written ({error.strerror})") from None
 
     @property
     def image(self) -> str:

@@ -45,6 +45,8 @@ def _number(value: object) -> str:
     if isinstance(value, int):
         return f"{value:,}"
     if isinstance(value, float):
+        if value == math.inf:  # a PSNR
+            return "equal"
         return f"{value:,.0f}" if abs(value) >= 10000 else f"{value:.4g}"
     return _e(value)
 
@@ -82,7 +84,7 @@ def _stability(result: Stability, figure: Figure) -> str:
         for name in result.configurations:
             point = result.breaks(family, name)
             lowest = min(p.psnr_db for p in result.sweep(family, name))
-            cells.append(f"<td>- ({lowest:.0f})</td>" if point is None else
+            cells.append(f"<td>- ({_number(lowest) if lowest == math.inf else f'{lowest:.0f}'})</td>" if point is None else
                          f'<td class="broken" title="error {point.max_error:.2f}">{point.value:g} ({point.psnr_db:.0f})</td>')
         rows.append(f"<tr><th>{_e(family)}</th>{''.join(cells)}</tr>")
     return (

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,16 +17,15 @@ from ..explore.configurations import group, matching
 from ..explore.digest import code_digest, key
 from ..explore.points import SceneFile, Target
 from ..explore.stability.run import Point, Stability, run_stability
-from ..explore.stability.write import check_folder
 from ..explore.store import DEFAULT, Store
 from ..front.view import DEMO
+from ..output import check_folder, write_csv, write_records, write_text
 from ..scene.camera import Camera
-from ..scene.files import scene_kind
 from ..scene.photos import BLACK
-from ..scene.sources import scene_path
 from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import budget_curves, own_figures, paper_figures, stability_table
+from .named import named, view_numbers
 from .page import page
 
 SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "photo_psnr_db", "photo_ssim", "area_ge", "energy_uj", "model_only")
@@ -54,33 +51,13 @@ class Written:
     verdicts: tuple[Verdict, ...]
 
 
-def _views(text: str, count: int) -> list[int] | None:
-    """What stands behind the colon of a scene: `3`, `0-12` or `all`; None: it is no such thing."""
-    first, dash, last = text.partition("-")
-    if text == "all":
-        return list(range(count))
-    if not first.isdigit() or (dash and not last.isdigit()):
-        return None
-    return list(range(int(first), int(last if dash else first) + 1))
-
-
 def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = None, background: tuple[float, float, float] = BLACK) -> list[Target]:
     """`FILE` (its view 0), or `demo`, `FILE:VIEW`, `FILE:FIRST-LAST` or `FILE:all`; FlickerError when there is no such file, view or photograph."""
-    path, views = Path(text), "0"
-    head, colon, tail = text.rpartition(":")
-    if colon and not path.exists() and _views(tail, 0) is not None:
-        path, views = Path(head), tail
-    if str(path) != DEMO:
-        if not path.exists():
-            raise FlickerError(f"{path}: no such scene")
-        if not os.access(path, os.R_OK):
-            raise FlickerError(f"{path}: not readable")
-        path = Path(scene_path(path))
-        scene_kind(path)
+    path, of = named(text)
     scene = SceneFile(str(path), photos=photos, background=background)
-    numbers = _views(views, scene.views())
+    numbers = view_numbers(of, scene.views())
     if not numbers:
-        raise FlickerError(f"{path}: views {views}: there are none")
+        raise FlickerError(f"{path}: views {of}: there are none")
     try:
         return [scene.target(number, size) for number in numbers]
     except FlickerError as error:
@@ -152,18 +129,10 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
     }
     text = page(views, verdicts, paper, charts, heats, budgets, (stability, table), about)
     rows = [view.rows[name] for view in views for name in view.rows]
-    columns = list(dict.fromkeys([*SUMMARY, *(key for row in rows for key in row)]))  # stages differ in the parts that their energy has
     index, summary = job.folder / "index.html", job.folder / "summary.csv"
-    try:
-        with summary.open("w", newline="") as file:
-            writer = csv.DictWriter(file, columns, lineterminator="\n", restval="")
-            writer.writeheader()
-            writer.writerows(rows)
-        with (job.folder / "verdicts.csv").open("w", newline="") as file:
-            lines = csv.writer(file, lineterminator="\n")
-            lines.writerow(["figure", "claim", "paper", "here", "verdict"])
-            lines.writerows([v.figure, v.claim, v.paper, json.dumps(v.ours), v.verdict] for v in verdicts)
-        index.write_text(text)
-    except OSError as error:
-        raise FlickerError(f"{job.folder}: cannot be written ({error.strerror})") from None
+    write_records(summary, SUMMARY, rows)  # stages differ in the parts that their energy has
+    write_csv(job.folder / "verdicts.csv", [
+        ["figure", "claim", "paper", "here", "verdict"], *([v.figure, v.claim, v.paper, json.dumps(v.ours), v.verdict] for v in verdicts),
+    ])
+    write_text(index, text)
     return Written(index, summary, tuple(verdicts))

@@ -22,7 +22,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import gsply
 import numpy as np
 
 from ..errors import FlickerError, one_line, say
@@ -309,6 +308,8 @@ def scene_digest(path: str | Path) -> str:
 
 def save_ply(scene: Scene, path: str | Path) -> None:
     """Write a scene as an INRIA PLY file (log scales, logit opacities), with the comment `SplatRenderMode: mip` where it is antialiased. Raises OSError."""
+    import gsply  # loads numba
+
     gsply.plywrite(path, gsply.GSData.from_arrays(
         means=scene.means, scales=np.log(scene.scales), quats=scene.quats,
         opacities=logits(scene.opacities).astype(np.float32), sh0=np.ascontiguousarray(scene.sh[:, 0]),

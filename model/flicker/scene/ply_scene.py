@@ -14,7 +14,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import gsply
 import numpy as np
 
 from ..errors import FlickerError, one_line
@@ -45,6 +44,8 @@ def read_ply(path: Path) -> Raw:
     if not is_chunked(file.header):
         return _gaussians(file)
     chunks, notes = chunks_of(file)
+    import gsply  # loads numba
+
     raw = of_gsply(gsply.decompress_from_bytes(chunk_bytes(chunks)))
     raw.antialiased, raw.notes = chunks.antialiased, notes
     return raw

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import gsply
 import numpy as np
 
 from .gaussians import SH_C0, SH_DEGREES
+
+if TYPE_CHECKING:
+    import gsply  # loads numba
 
 MAX_DEGREE = 3
 KEPT = (MAX_DEGREE + 1) ** 2  # SH coefficients a colour

@@ -15,8 +15,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import gsply
-import imagecodecs
 import numpy as np
 
 from ..errors import FlickerError, one_line
@@ -129,6 +127,8 @@ def _check(where: str, meta: dict[str, Any]) -> None:
 
 def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) -> Raw:
     """text: `meta.json`, called `where` in messages. read: a member's content; raises FlickerError."""
+    import gsply
+
     meta = parse_meta(where, text)
     names = member_names(where, meta)
     _check(where, meta)
@@ -144,6 +144,8 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
             raw.notes = (FLAT_NOTE,)
         return raw
     except Exception:  # of several libraries; the culprit is looked for now, so that good files are decoded once
+        import imagecodecs
+
         for name, data in members.items():
             try:
                 imagecodecs.webp_decode(data)

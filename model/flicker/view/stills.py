@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
 from PIL import Image
 
-from ..errors import FlickerError
+from ..output import cannot_write, write_atomically, write_text
 from ..scene.camera import Camera, cameras_text, load_cameras
 
 
@@ -18,12 +17,10 @@ def save(folder: Path, picture: Image.Image, camera: Camera) -> tuple[Path, int]
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / "cameras.json"
         cameras = load_cameras(path) if path.exists() else []
-        number = len(cameras)
-        still = folder / f"view_{number:03d}.png"
-        picture.save(still)
-        temporary = folder / f".cameras.{os.getpid()}.json"
-        temporary.write_text(cameras_text([*cameras, replace(camera, name=still.name, img_name=None)]))
-        temporary.replace(path)
     except OSError as error:
-        raise FlickerError(f"{folder}: cannot be written ({error.strerror})") from None
+        raise cannot_write(folder, error) from None
+    number = len(cameras)
+    still = folder / f"view_{number:03d}.png"
+    write_atomically(still, picture.save)
+    write_text(path, cameras_text([*cameras, replace(camera, name=still.name, img_name=None)]))
     return still, number

@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from ... import markdown
+from ... import markdown, output
 from ..chip_area import CHIPS, OTHERS, PAPER_MM2, UM2_PER_BIT, UM2_PER_GE, components, in_all, square_millimetres
 from .run import Runner
 from .units import FIFO_DEPTHS, FORMS, PRECISIONS, Unit, channel_config, vru_config
@@ -284,23 +284,23 @@ class Comparison:
         axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), frameon=False, reverse=True)
         axes.spines[["top", "right"]].set_visible(False)
         for ending in ("png", "svg"):
-            figure.savefig(folder / f"area.{ending}", dpi=150, metadata={"Date": None} if ending == "svg" else None)
+            metadata = {"Date": None} if ending == "svg" else None
+            output.write_atomically(folder / f"area.{ending}", lambda path: figure.savefig(path, dpi=150, metadata=metadata))
         pyplot.close(figure)
 
 
 def write_csv(path: Path, results: Results) -> None:
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CSV_COLUMNS)
-        for unit, result in results.items():
-            writer.writerow([
-                unit.name, unit.config, f"{result['ge']:.1f}", f"{result['ge_seq']:.1f}", f"{result['ge_comb']:.1f}",
-                result["mem_bits"], result["sram_bits"], result["ff"], f"{result['fo4']:.1f}",
-            ])
+    output.write_csv(path, [CSV_COLUMNS, *(
+        [
+            unit.name, unit.config, f"{result['ge']:.1f}", f"{result['ge_seq']:.1f}", f"{result['ge_comb']:.1f}",
+            result["mem_bits"], result["sram_bits"], result["ff"], f"{result['fo4']:.1f}",
+        ]
+        for unit, result in results.items()
+    )])
 
 
 def write_markdown(path: Path, sheets: Iterable[Sheet]) -> None:
-    path.write_text("\n".join(sheet.markdown() for sheet in sheets))
+    output.write_text(path, "\n".join(sheet.markdown() for sheet in sheets))
 
 
 def _areas(folder: Path) -> Areas | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import os
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -11,21 +9,14 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from ... import markdown
-from ...errors import FlickerError
+from ... import markdown, output
 from .families import FAMILIES
 from .front_ends import IMAGES, RECORDS, WIDE, WIDE_IMAGE, FrontEnd
 from .run import BROKEN_ERROR, BROKEN_PSNR, Point, Stability
 
 
-def check_folder(folder: Path) -> None:
-    """Make the folder; FlickerError when that fails or nothing can be written into it."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FlickerError(f"{folder}: no folder can be made there ({error.strerror})") from None
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise FlickerError(f"{folder}: not writable")
+def _db(x: float) -> str:
+    return "equal" if x == np.inf else f"{x:.0f}"
 
 
 def _value(x: float) -> str:
@@ -64,7 +55,7 @@ def markdown_table(result: Stability) -> str:
         for name in shown:
             point = result.breaks(family, name)
             lowest = min(p.psnr_db for p in result.sweep(family, name))
-            cells.append(f"- ({lowest:.0f})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
+            cells.append(f"- ({_db(lowest)})" if point is None else f"**{_value(point.value)}** ({point.psnr_db:.0f}, {point.max_error:.2f})")
         rows.append([family, *cells])
     return markdown.table(["family", *(f"`{m}`" for m in shown)], rows)
 
@@ -72,7 +63,7 @@ def markdown_table(result: Stability) -> str:
 def _first_and_lowest(result: Stability, family: str, front: FrontEnd) -> str:
     point = result.breaks(family, front.name)
     lowest = min(p.psnr_db for p in result.sweep(family, front.name))
-    return f"{'-' if point is None else f'**{_value(point.value)}**'} ({lowest:.0f})"
+    return f"{'-' if point is None else f'**{_value(point.value)}**'} ({_db(lowest)})"
 
 
 def _breaks_earlier(result: Stability, family: str, front: FrontEnd, other: FrontEnd) -> bool:
@@ -119,34 +110,18 @@ def format_table(result: Stability) -> str:
 FRONT_TABLES: dict[str, Callable[[Stability], str]] = {"records": record_table, "formats": format_table}
 
 
-def write_markdown(text: str, path: Path) -> None:
-    """A table into a file. Raises FlickerError when it cannot be written."""
-    try:
-        path.write_text(text + "\n")
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
-
-
 def write_csv(result: Stability, path: Path) -> None:
     """One line per point. Raises FlickerError when the file cannot be written."""
     names = [f.name for f in fields(Point)] + ["broken"]
-    try:
-        with path.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(names)
-            for p in result.points:
-                writer.writerow([int(v) if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in (getattr(p, n) for n in names)])
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+    rows = ([int(v) if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in (getattr(p, n) for n in names)] for p in result.points)
+    output.write_csv(path, [names, *rows])
 
 
 def _save(figure, path: Path) -> None:
     import matplotlib.pyplot as plt
 
     try:
-        figure.savefig(path, dpi=110)
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror})") from None
+        output.write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=110))
     finally:
         plt.close(figure)
 

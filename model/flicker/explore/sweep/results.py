@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...errors import FlickerError
+from ...output import write_atomically, write_text, writing
 from ..points import Point
 from ..store import Store, plain
 from .config import Sweep
@@ -27,14 +27,7 @@ def write_rows(path: Path, rows: list[dict[str, Any]]) -> None:
     """Rows to a Parquet file, atomically; columns in order of first appearance."""
     columns = list(dict.fromkeys(name for row in rows for name in row))
     table = pa.table({name: [row.get(name) for row in rows] for name in columns})
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        pq.write_table(table, temporary)
-        temporary.replace(path)
-    except OSError as error:
-        raise FlickerError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_atomically(path, lambda temporary: pq.write_table(table, temporary))
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -52,11 +45,9 @@ class Rows:
         self.sweep, self.folder = sweep, sweep.folder
         self.path = self.folder / "results.parquet"
         self.store = Store(sweep.store)
-        try:
+        with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-            (self.folder / "sweep.json").write_text(json.dumps(sweep.description(), indent=2) + "\n")
-        except OSError as error:
-            raise FlickerError(f"{self.folder}: cannot be written ({error.strerror})") from None
+        write_text(self.folder / "sweep.json", json.dumps(sweep.description(), indent=2) + "\n")
         self.rows: dict[str, dict[str, Any]] = {}
         for point in sweep.points:
             if (row := self.store.load(point.key)) is not None:

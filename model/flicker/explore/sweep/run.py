@@ -11,6 +11,8 @@ import contextlib
 import logging
 import os
 import queue
+import signal
+import threading
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -66,6 +68,19 @@ def _quiet() -> None:
 
 
 @contextlib.contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Processes that begin here never see the terminal's Ctrl-C, which would print their tracebacks: it is this process that stops the workers."""
+    if threading.current_thread() is not threading.main_thread():  # signals are not its business
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
 def connect(sweep: Sweep) -> Iterator:
     """A client of the sweep's cluster: the given address, else processes of this machine. FlickerError when it cannot be reached."""
     import dask
@@ -83,11 +98,13 @@ def connect(sweep: Sweep) -> Iterator:
     workers = sweep.workers or min(2, os.cpu_count() or 1)
     # A lost worker's task comes back to this process at once, which knows what is finished.
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        with (
-            LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
-                         silence_logs=logging.CRITICAL) as cluster,
-            Client(cluster) as client,
-        ):
+        with contextlib.ExitStack() as stack:
+            with _without_ctrl_c():
+                cluster = stack.enter_context(LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",  # any free port
+                    memory_limit=0, silence_logs=logging.CRITICAL,
+                ))
+                client = stack.enter_context(Client(cluster))
             yield client
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flicker.errors import FlickerError
+from flicker.output import write_atomically, write_text, writing
 from flicker.scene.camera import cameras_text
 from flicker.scene.demo.splats import Rand, Splats, dot, unit
 from flicker.scene.demo.views import EYES, demo_cameras, to_world
@@ -48,12 +48,11 @@ def write_demo(folder: str | Path, seed: int = 1) -> tuple[Path, Path]:
     """
     folder = Path(folder)
     scene_path, cameras_path = folder / "demo.ply", folder / "cameras.json"
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        save_ply(generate(seed), scene_path)
-        cameras_path.write_text(cameras_text(demo_cameras()))
-    except OSError as error:
-        raise FlickerError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    scene = generate(seed)
+    write_atomically(scene_path, lambda path: save_ply(scene, path))
+    write_text(cameras_path, cameras_text(demo_cameras()))
     return scene_path, cameras_path
 
 
