@@ -40,11 +40,12 @@ def build(top: str, parameters: Mapping[str, str | int], sources: list[Path]) ->
             folder.mkdir(parents=True, exist_ok=True)
             verilog = folder / f"{top}.v"
             words = ["read_slang", "--std 1800-2023", *map(str, sources), f"--top {top}", *(f"-G {name}={value}" for name, value in parameters.items())]
-            # A process of its own: Yosys writes to standard output and keeps global state.
-            _run([sys.executable, "-c", READ, " ".join(words), f"hierarchy -check -top {top}", "proc", "opt_expr", "opt_clean", f"write_verilog -noattr {verilog}"])
+            commands = [" ".join(words), f"hierarchy -check -top {top}", "proc", "opt_expr", "opt_clean", f"write_verilog -noattr {verilog}"]
+            _run([sys.executable, "-c", READ, *commands])  # a process of its own: Yosys writes to standard output and keeps global state
             values = _parameters(top, parameters, sources, folder)
             lines = "".join(f"  parameter {name} = {value};\n" for name, value in values.items())
-            verilog.write_text("`timescale 1ns/1ps\n" + re.sub(rf"(?m)^(module \\?{top}\s?\(.*?\);\n)", lambda m: m[1] + lines, verilog.read_text(), count=1, flags=re.S))
+            head = re.compile(rf"^(module {top}\s?\(.*?\);\n)", re.M | re.S)
+            verilog.write_text("`timescale 1ns/1ps\n" + head.sub(lambda match: match[1] + lines, verilog.read_text(), count=1))
             done = subprocess.run(["iverilog", "-g2012", "-s", top, "-o", str(program), str(verilog)], text=True, capture_output=True)
             if done.returncode:
                 program.unlink(missing_ok=True)

@@ -107,8 +107,8 @@ def compare(
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
-    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i of the walk is of
-    # sorting unit i mod 4, which delivers what the core that needs most of the tile's list needs.
+    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i of the walk is
+    # of sorting unit i mod 4, which delivers what the core that needs most of the tile's list needs.
     counters = params.STAGES[config.stage].counters
     taken, of_frame = done.stage[:, counters.index("gaussians_in")], want.frame.lists
     lengths, needed = (of_cores(values, of_frame.cols) for values in (np.diff(of_frame.start), want.frame.needed))

@@ -8,7 +8,7 @@ from cocotb.triggers import RisingEdge
 from flicker_tb.bench import Bench, config, rounds
 from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
-from flicker.golden.lists import entry_words, pointer_lines, write_lists
+from flicker.golden.lists import MAX_CHUNKS, entry_words, pointer_lines, write_lists
 
 LIST_BASE, POINTER_BASE = 0x2_12FF_FFC0, 0x1_0000_0077  # lists: lines from 64 on carry through all parts of an address
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "alternate")]
@@ -196,7 +196,7 @@ async def frames(dut, idle, stall):
 @cocotb.test()
 @cocotb.parametrize((("idle", "stall"), PATTERNS[:3]))
 async def out_of_memory(dut, idle, stall):
-    """Chunks that just suffice, one too few, none: what was written before stays the model's, and the next frame begins anew."""
+    """Chunks that just suffice, one too few, none, as many as there may be: what was written before stays the model's, and the next frame begins anew."""
     test = Writer(dut, idle, stall)
     rng = test.bench.rng
     await test.bench.reset()
@@ -208,6 +208,8 @@ async def out_of_memory(dut, idle, stall):
             frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks)
             assert frame.image.failed[frame.writer] == (chunks < need)
             await test.run(frame)
+        full.chunks = MAX_CHUNKS  # the largest region there is; the model's memory is as large as the lists need
+        await test.run(full)
 
 
 @cocotb.test()

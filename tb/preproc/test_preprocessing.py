@@ -334,6 +334,18 @@ def test_records_beyond_their_region(kind: RecordKind) -> None:
     assert rtl.counters["survivors"] == written.sum()
 
 
+def test_the_last_record_at_the_end_of_its_region() -> None:
+    """The last Gaussian's record alone would be in a further beat: without that beat its cluster has no place, with it all is right."""
+    last = lambda packed: int(packed.first[-1]) + int(packed.counts[-1]) - 1  # noqa: E731
+    packed = next(p for n in range(236, 256) if last(p := pack(some(n), PackedFormat.CHUNK).packed) % 4 == 0)
+    camera, kind, full = plain_camera(), RecordKind.FACTORED16, last(packed) // 4
+    image = front_memory(run_front(packed, camera, kind=kind))
+    regions = Regions.of(packed, camera, image.lists.chunks, kind)
+    for beats, error in ((full, 1 << ERRORS.index("a cluster's records lie beyond their region")), (full + 1, 0)):
+        rtl = front_rtl(packed, camera, kind=kind, chunks=image.lists.chunks, regions=dataclasses.replace(regions, record_bytes=64 * beats), seed=seed())
+        assert rtl.error == error and rtl.counters["survivors"] == image.written[: int(packed.first[-1]) if error else None].sum()
+
+
 def test_a_table_that_points_beyond_the_image() -> None:
     """The memory refuses the read, which ends the frame; nothing is written outside of the regions."""
     packed = pack(some(1500), PackedFormat.CHUNK).packed

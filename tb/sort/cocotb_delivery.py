@@ -253,6 +253,15 @@ async def pace(dut, slow):
 
 
 @cocotb.test()
+async def ends_alone(dut):
+    """Empty lists, and a core that takes an element in forty cycles: as many ends as there may be are between the units and it."""
+    test = Delivery(dut, pace=(40, 1, 1, 1))
+    await test.bench.reset()
+    await test.ready()
+    await test.run([[] for _ in range(240)] + make(test.rng, 8))
+
+
+@cocotb.test()
 @cocotb.parametrize(deaf=[False, True])
 async def all_finished(dut, deaf):
     """All cores finished with their tiles at once: of long lists no more is looked up than before they are there, whether the unit drops the rest or not."""

@@ -21,7 +21,7 @@ WIDE = {"InWidth": 2, "Queue": 32}
 
 @pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in ({}, {"RecordBits": 256}, SMALL | {"InWidth": 2})), SMALL, WIDE])
 def test_delivery(parameters: dict[str, int]) -> None:
-    tests = [] if parameters in ({}, WIDE) else ["tiles", "finishing", "all_finished", "latency", "clear"]
+    tests = [] if parameters in ({}, WIDE) else ["tiles", "finishing", "ends_alone", "all_finished", "latency", "clear"]
     build_and_test("flk_delivery", "cocotb_delivery", parameters=parameters, tests=tests)
 
 

@@ -473,6 +473,7 @@ async def forgets(dut, command):
     posts = 0
     for _ in range(400 if command == "reset before" else 60):  # a post that reset_i alone must hold back is rare
         test.left = 100
+        test.acknowledge = test.draw(test.rng.choice([4, 60]))
         for _ in range(test.rng.randrange(60)):
             test.drive()
             await edge

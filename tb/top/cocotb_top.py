@@ -255,6 +255,22 @@ async def interrupts(dut: Any) -> None:
 
 
 @cocotb.test()
+async def most_lists(dut: Any) -> None:
+    """As many tile lists as the chip has, in pictures as wide and as high as there are; one row or column of pairs more is refused."""
+    chip = Chip(dut)
+    await chip.begin()
+    longest = 2 ** SETTINGS["capability"]["log2_lists"] // 128 * 32  # pixels, beside 4096
+    for width, height in ((4096, longest), (4096, longest + 1), (longest, 4096), (longest + 1, 4096)):
+        error = 0 if min(width, height) == longest else 1 << ResultError.DESCRIPTOR
+        await chip.describe(9)
+        await chip.write("size", height << 16 | width)
+        await chip.write("stride", 4096 * 3)
+        await chip.write("control", START)
+        await chip.ended(9, error)
+        await chip.write("interrupt", ALL)
+
+
+@cocotb.test()
 async def writes_behind_a_start(dut: Any) -> None:
     """In the cycles right behind a start the descriptor does not change any more, however early the write is."""
     chip = Chip(dut)
