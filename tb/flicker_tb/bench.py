@@ -40,7 +40,7 @@ def rounds(few: int, many: int) -> int:
 
 
 class Bench:
-    """One test's view of a design with ``clk_i`` and ``rst_ni``, and perhaps ``clear_i``, which stays low until ``clear``.
+    """One test's view of a design with ``clk_i`` and ``rst_ni``, and perhaps ``clear_i``, which stays low until ``clear``, and ``test_en_i``, low.
 
     The clock runs from the constructor on. Make sources and sinks before ``reset``, so that
     no input is random when reset ends. ``rng`` is seeded by FLICKER_SEED and the test's name.
@@ -52,8 +52,9 @@ class Bench:
         # At once: the inputs' random start values must not make a clock edge out of reset.
         dut.rst_ni.value = Immediate(0)
         dut.clk_i.value = Immediate(0)
-        if hasattr(dut, "clear_i"):
-            dut.clear_i.value = 0
+        for name in ("clear_i", "test_en_i"):
+            if hasattr(dut, name):
+                getattr(dut, name).value = 0
         cocotb.start_soon(Clock(dut.clk_i, PERIOD_NS, unit="ns").start())
 
     def stall(self, pattern: str) -> Any:

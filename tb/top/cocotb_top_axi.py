@@ -9,7 +9,7 @@ from typing import Any
 import cocotb
 from cocotb.clock import Clock
 from cocotb.handle import Immediate
-from cocotb.triggers import ClockCycles, RisingEdge
+from cocotb.triggers import ClockCycles, RisingEdge, Timer
 from cocotbext.axi import AxiBus, AxiLiteBus, AxiLiteMaster, AxiRam
 from flicker_tb.bench import config
 from flicker_tb.pins import reader
@@ -73,7 +73,10 @@ class Watch:
 @cocotb.test()
 async def frame(dut: Any) -> None:
     files = Path(SETTINGS["files"])
-    dut.aclk.value, dut.aresetn.value, dut.test_en.value = Immediate(0), Immediate(0), Immediate(0)
+    dut.aclk.value, dut.aresetn.value, dut.test_en.value = Immediate(0), Immediate(1), Immediate(0)
+    await Timer(1, unit="ns")
+    dut.aresetn.value = 0  # an edge, which flip-flops without a clock want to see in simulation
+    await Timer(1, unit="ns")
     for pin in ("ruser", "buser"):
         getattr(dut, f"m_axi_{pin}").value = 0
     cocotb.start_soon(Clock(dut.aclk, 10, unit="ns").start())

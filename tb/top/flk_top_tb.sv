@@ -27,7 +27,7 @@ module flk_top_tb #(
   localparam int unsigned Limit = 1000;  // cycles that anything may take
 
   logic        clk = 1'b0;
-  logic        rst_n = 1'b0;
+  logic        rst_n = 1'b1;
   logic        irq;
   logic [9:0]  awaddr, araddr;
   logic [31:0] wdata, rdata;
@@ -47,7 +47,7 @@ module flk_top_tb #(
     .aclk          (clk),
     .aresetn       (rst_n),
     .test_en       (1'b0),
-    .irq,
+    .irq           (irq),
     .s_axil_awaddr (awaddr),
     .s_axil_awprot (3'd0),
     .s_axil_awvalid(awvalid),
@@ -67,14 +67,41 @@ module flk_top_tb #(
     .s_axil_rresp  (rresp),
     .s_axil_rvalid (rvalid),
     .s_axil_rready (rready),
+    .m_axi_awid    (),
+    .m_axi_awaddr  (),
+    .m_axi_awlen   (),
+    .m_axi_awsize  (),
+    .m_axi_awburst (),
+    .m_axi_awlock  (),
+    .m_axi_awcache (),
+    .m_axi_awprot  (),
+    .m_axi_awqos   (),
+    .m_axi_awregion(),
+    .m_axi_awuser  (),
     .m_axi_awvalid (mem_awvalid),
     .m_axi_awready (1'b0),
+    .m_axi_wdata   (),
+    .m_axi_wstrb   (),
+    .m_axi_wlast   (),
+    .m_axi_wuser   (),
     .m_axi_wvalid  (mem_wvalid),
     .m_axi_wready  (1'b0),
     .m_axi_bid     ('0),
     .m_axi_bresp   (2'd0),
     .m_axi_buser   (1'b0),
     .m_axi_bvalid  (1'b0),
+    .m_axi_bready  (),
+    .m_axi_arid    (),
+    .m_axi_araddr  (),
+    .m_axi_arlen   (),
+    .m_axi_arsize  (),
+    .m_axi_arburst (),
+    .m_axi_arlock  (),
+    .m_axi_arcache (),
+    .m_axi_arprot  (),
+    .m_axi_arqos   (),
+    .m_axi_arregion(),
+    .m_axi_aruser  (),
     .m_axi_arvalid (mem_arvalid),
     .m_axi_arready (1'b0),
     .m_axi_rid     ('0),
@@ -82,43 +109,55 @@ module flk_top_tb #(
     .m_axi_rresp   (2'd0),
     .m_axi_rlast   (1'b0),
     .m_axi_ruser   (1'b0),
-    .m_axi_rvalid  (1'b0)
+    .m_axi_rvalid  (1'b0),
+    .m_axi_rready  ()
   );
 
-  // An access: pins change behind the edge, so that no simulator has a race.
+  // An access: pins change, and are looked at, at falling edges, so that no simulator has a race.
   task automatic write(input logic [9:0] address, input logic [31:0] value);
     int unsigned cycles = 0;
-    awaddr  <= address;
-    wdata   <= value;
-    awvalid <= 1'b1;
-    wvalid  <= 1'b1;
-    bready  <= 1'b1;
+    logic        took_address, took_data, done;
+    logic [1:0]  answer;
+    awaddr  = address;
+    wdata   = value;
+    awvalid = 1'b1;
+    wvalid  = 1'b1;
+    bready  = 1'b1;
     do begin
-      @(posedge clk);
-      if (awready) awvalid <= 1'b0;
-      if (wready) wvalid <= 1'b0;
+      took_address = awready;
+      took_data    = wready;
+      done         = bvalid;
+      answer       = bresp;
+      @(negedge clk);
+      if (took_address) awvalid = 1'b0;
+      if (took_data) wvalid = 1'b0;
       cycles++;
       if (cycles > Limit) $fatal(1, "flk_top_tb: write of %h: no answer", address);
-    end while (!bvalid);
-    bready <= 1'b0;
-    if (bresp != 2'd0) $fatal(1, "flk_top_tb: write of %h: answer %0d", address, bresp);
+    end while (!done);
+    bready = 1'b0;
+    if (answer != 2'd0) $fatal(1, "flk_top_tb: write of %h: answer %0d", address, answer);
   endtask
 
   task automatic read(input logic [9:0] address, output logic [31:0] value,
-                      input logic [1:0] answer = 2'd0);
+                      input logic [1:0] wanted = 2'd0);
     int unsigned cycles = 0;
-    araddr  <= address;
-    arvalid <= 1'b1;
-    rready  <= 1'b1;
+    logic        took_address, done;
+    logic [1:0]  answer;
+    araddr  = address;
+    arvalid = 1'b1;
+    rready  = 1'b1;
     do begin
-      @(posedge clk);
-      if (arready) arvalid <= 1'b0;
+      took_address = arready;
+      done         = rvalid;
+      answer       = rresp;
+      value        = rdata;
+      @(negedge clk);
+      if (took_address) arvalid = 1'b0;
       cycles++;
       if (cycles > Limit) $fatal(1, "flk_top_tb: read of %h: no answer", address);
-    end while (!rvalid);
-    value = rdata;
-    rready <= 1'b0;
-    if (rresp != answer) $fatal(1, "flk_top_tb: read of %h: answer %0d", address, rresp);
+    end while (!done);
+    rready = 1'b0;
+    if (answer != wanted) $fatal(1, "flk_top_tb: read of %h: answer %0d", address, answer);
   endtask
 
   task automatic expect_read(input logic [9:0] address, input logic [31:0] wanted);
@@ -136,9 +175,9 @@ module flk_top_tb #(
   initial begin
     logic [31:0] value;
     int unsigned cycles;
-    repeat (4) @(posedge clk);
-    rst_n <= 1'b1;
-    @(posedge clk);
+    #1 rst_n = 1'b0;  // an edge: before the first one of the clock
+    repeat (4) @(negedge clk);
+    rst_n = 1'b1;
     expect_read(ID, ID_VALUE);  // offered before the chip is out of reset
     read(CAPABILITY, value);
     if (value[3:0] != 4'(Stage)) $fatal(1, "flk_top_tb: stage %0d", value[3:0]);
@@ -158,14 +197,14 @@ module flk_top_tb #(
     write(CONTROL, 32'd1);
     cycles = 0;
     while (!irq) begin
-      @(posedge clk);
+      @(negedge clk);
       cycles++;
       if (cycles > Limit) $fatal(1, "flk_top_tb: no interrupt");
     end
     expect_read(RESULT, {DESCRIPTOR_ERROR, TAG});
     expect_read(FRAMES, {16'd1, 16'd1});
     write(INTERRUPT, FRAME_DONE);
-    repeat (4) @(posedge clk);
+    repeat (4) @(negedge clk);
     if (irq) $fatal(1, "flk_top_tb: the interrupt stays");
     $display("flk_top_tb: passed");
     $finish;

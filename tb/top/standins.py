@@ -19,7 +19,7 @@ HALVES = {
         "registers_i.chunks[7:0]", "list_", "{registers_i.lists_beat, 6'b0}", "{registers_i.frame_beat, 6'b0}", "3'(failed_q)",
         """  logic [COUNTER_LATENCY-1:0][COUNTER_BITS-1:0] counter_q;  // the oldest highest
   always_ff @(posedge clk_i) begin
-    counter_q <= {counter_q, COUNTER_BITS'(counter_addr_i) + COUNTER_BITS'(turns)};
+    counter_q <= $bits(counter_q)'({counter_q, COUNTER_BITS'(counter_addr_i) + COUNTER_BITS'(turns)});
   end
   assign counter_data_o = counter_q[COUNTER_LATENCY-1];
 """,
