@@ -23,7 +23,6 @@ _LATEST = 4
 _MOST_DEGREE = 4
 _ANTIALIASED, _EXTENDED = 1, 2  # flags
 _AXES = 0xADBE0003  # type of the extension that names the axes
-_RATIO = 1100  # deflate does not compress further
 _COLOUR = 0.15  # a colour is 0.5 + 0.15 SH
 _EXTENSIONS = 1 << 24  # bytes that may follow the sections
 # Numbers of the axes that differ from right, down, front by half a turn at most; the others mirror or exchange axes.
@@ -61,8 +60,6 @@ def decode_spz(data: bytes, where: str) -> tuple[Raw, int]:
         take, rest = _gzip(data, where)
     version, count, degree, bits, flags, _ = _header(take(16), "<IIBBBB", where)
     sizes = _sizes(version, count, degree)
-    if sum(sizes) > len(data) * (1 if data[:4] == MAGIC else _RATIO):
-        raise FlickerError(f"{where}: truncated: {count} Gaussians have {sum(sizes)} bytes, more than a file of {len(data)} holds")
     sections = [np.frombuffer(take(size), np.uint8) for size in sizes]
     extensions = rest()
     return _decoded(sections, version, degree, bits, flags, extensions if flags & _EXTENDED else b"", where)
