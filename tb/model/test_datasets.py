@@ -27,7 +27,8 @@ from flicker.budget.reduce import Reducer
 from flicker.errors import FlickerError
 from flicker.fit import undistort as undistorting
 from flicker.fit.dataset import load_dataset
-from flicker.fit.train import Options, Trainer
+from flicker.fit.loss import loss_and_slope
+from flicker.fit.train import Options, Trainer, _masked
 from flicker.report.write import parse_targets
 from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.colmap import read_cameras, read_images, read_points
@@ -96,8 +97,8 @@ LENSES = {
     "fisheye, no coefficients": ("OPENCV_FISHEYE", 5, {}, (0, 0, 0, 0), fisheye),
     "fisheye": ("OPENCV_FISHEYE", 5, {"k1": 0.05, "k2": -0.03}, (0.05, -0.03, 0, 0), lambda x, y: fisheye(x, y, 0.05, -0.03)),
     "simple radial fisheye": ("SIMPLE_RADIAL_FISHEYE", 8, {"k1": -0.06}, (-0.06,), lambda x, y: fisheye(x, y, -0.06)),
-    "thin prism": ("THIN_PRISM_FISHEYE", 10, {"k1": 0.04, "k2": 0.02, "p1": 0.005, "p2": -0.004, "sx1": 0.01, "sy1": -0.02},
-                   (0.04, 0.02, 0.005, -0.004, 0, 0, 0.01, -0.02), lambda x, y: thin_prism(x, y, 0.04, 0.02, 0.005, -0.004, 0.01, -0.02)),
+    "thin prism": ("THIN_PRISM_FISHEYE", 10, {"k1": 0.04, "k2": 0.02, "p1": 0.005, "p2": -0.004, "sx1": 0.06, "sy1": -0.08},
+                   (0.04, 0.02, 0.005, -0.004, 0, 0, 0.06, -0.08), lambda x, y: thin_prism(x, y, 0.04, 0.02, 0.005, -0.004, 0.06, -0.08)),
     "radial": ("RADIAL", 3, {"k1": 0.15, "k2": -0.1}, (0.15, -0.1), lambda x, y: rational(x, y, 0.15, -0.1, 0, 0)),
     "rational": ("FULL_OPENCV", 6, {"k1": 0.1, "k2": 0.05, "k4": 0.15, "k5": -0.05}, (0.1, 0.05, 0, 0, 0, 0.15, -0.05, 0),
                  lambda x, y: rational(x, y, 0.1, 0.05, 0.15, -0.05)),
@@ -269,6 +270,20 @@ def test_masked_pixels_do_not_count(shots, tmp_path) -> None:
     assert ssim(np.where(mask_of(8)[..., None], picture, 0.3), other, mask_of(8)) == ssim(picture, other, mask_of(8)) < 1
     done = flicker("undistort", tmp_path / "1", "-o", tmp_path / "flat")
     assert "17 of them have a mask" in done.stdout and np.array_equal(load_dataset(tmp_path / "flat").tests[1].counted(), mask_of(8))
+
+
+def test_slope_of_a_masked_loss() -> None:
+    """None where pixels do not count, elsewhere that of the loss of both pictures with black there, by central differences."""
+    rng, counted = np.random.default_rng(3), mask_of(3)
+    image, photo = rng.random((2, HEIGHT, WIDTH, 3))
+    photo[~counted] = 0.0
+    loss, slope = _masked(loss_and_slope, image, photo, counted)
+    assert loss == loss_and_slope(image * counted[..., None], photo)[0] and (slope[~counted] == 0).all()
+    for at in ((7, 9, 1), (16, 24, 0), (30, 30, 2)):
+        step = np.zeros_like(image)
+        step[at] = 1e-5
+        ends = [_masked(loss_and_slope, image + sign * step, photo, counted)[0] for sign in (1, -1)]
+        assert slope[at] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-10)
 
 
 def test_masks_that_are_not_there(shots, tmp_path) -> None:
