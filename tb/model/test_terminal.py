@@ -13,6 +13,7 @@ import resource
 import subprocess
 import sys
 import tomllib
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,7 +30,7 @@ from flicker import output
 from flicker.chip.run import stalled
 from flicker.cli import main as entry
 from flicker.cli.tables import Terminal, decibels
-from flicker.errors import FlickerError, Interrupted
+from flicker.errors import FlickerError, FlickerWarning, Interrupted
 from flicker.scene.files import save_ply
 from flicker.toolchain import ROOT
 
@@ -38,12 +39,12 @@ CLI = ROOT / "model" / "flicker" / "cli"
 
 # ---- start-up -----------------------------------------------------------------------------------
 
-HEAVY = ("numba", "scipy", "matplotlib", "dask", "distributed", "gsply", "viser", "skimage", "pandas", "pyarrow", "PIL", "yaml", "imagecodecs")
+HEAVY = ("numba", "scipy", "matplotlib", "dask", "distributed", "gsply", "viser", "skimage", "pandas", "pyarrow", "yaml", "imagecodecs")
 LIGHT = (
     ["--version"], ["--help"], ["rendr"], [], *([name, "--help"] for name in sorted(c.name or c.callback.__name__ for c in entry.app.registered_commands)),
     ["render", "scene.ply", "--engin", "rtl"], ["render", "scene.ply", "--engine", "rtll"], ["demo", "--size", "3"],
 )
-# These load numpy to look at what is there.
+# These look at what is there.
 NO_FILE = (
     ["render", "none.ply"], ["cost", "none.ply"], ["chip", "none.ply"], ["view", "none.ply"], ["pack", "none.ply", "-o", "x.flk"], ["report", "none.ply:3"],
     ["budget", "none.ply", "-o", "x.ply", "--keep", "0.4"], ["sweep", "none.yaml"], ["stability", "--out", "/proc/none"],
@@ -63,7 +64,7 @@ for words in json.loads(sys.argv[1]):
 
 
 def test_start_is_light(tmp_path: Path) -> None:
-    """Help, versions and errors of the command line load none of the packages that take seconds; what is asked of files adds numpy alone."""
+    """Help, versions and errors of the command line load none of the packages that take seconds; what is asked of files may add numpy and Pillow."""
     done = subprocess.run([sys.executable, "-c", COUNT, json.dumps([*LIGHT, *NO_FILE])], cwd=tmp_path, capture_output=True, text=True)
     found = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(found) == len(LIGHT) + len(NO_FILE), done.stderr
@@ -91,6 +92,22 @@ def test_wrong_words_are_one_line(words: list[str], said: str) -> None:
     done = flicker(*words)
     assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1
     assert done.stderr.startswith("flicker: ") and said in done.stderr
+
+
+def test_warnings_of_libraries_are_not_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ours are one line; with -W all are there."""
+    def warn(*args: object) -> None:
+        warnings.warn("of a library", UserWarning, stacklevel=1)
+        warnings.warn(FlickerWarning("of ours"), stacklevel=1)
+        raise FlickerError("end")
+
+    monkeypatch.setattr("flicker.cli.pack.check_scene", warn)
+    monkeypatch.setattr(entry, "_show_others", lambda message, *rest: print(message, file=sys.stderr))
+    for asked in ([], ["default"]):
+        monkeypatch.setattr(sys, "warnoptions", asked)
+        done = flicker("pack", "a.ply", "-o", tmp_path / "a.flk")
+        assert done.returncode == 2 and ("of a library" in done.stderr) == bool(asked)
+        assert "flicker: warning: of ours\n" in done.stderr and done.stderr.endswith("flicker: end\n")
 
 
 def test_no_words_show_help() -> None:
@@ -197,7 +214,7 @@ def test_ctrl_c_says_what_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     }
     for words, line in told.items():
         done = flicker_command(words)
-        assert (done.returncode, done.stdout, done.stderr) == (130, "", f"flicker: interrupted: {line}\n"), done
+        assert (done.returncode, done.stderr) == (130, f"flicker: interrupted: {line}\n"), done
     assert not (tmp_path / "demo").exists() and (tmp_path / "kept").is_dir() and not list((tmp_path / "made").glob("*.html"))
     monkeypatch.setattr("flicker.cli.pack.check_scene", raises(KeyboardInterrupt()))
     done = flicker_command(("pack", "scene.ply", "-o", "x.flk"))

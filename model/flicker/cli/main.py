@@ -46,10 +46,10 @@ _show_others = warnings.showwarning
 
 
 def _show_warning(message: Any, category: Any, *rest: Any) -> None:
-    """Warnings of our own are one line on standard error."""
+    """Warnings of our own are one line on standard error; those of libraries are for who asks (`python -W`, `PYTHONWARNINGS`)."""
     if issubclass(category, FlickerWarning):
         print(f"flicker: warning: {message}", file=sys.stderr)
-    else:
+    elif sys.warnoptions:
         _show_others(message, category, *rest)
 
 
