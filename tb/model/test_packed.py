@@ -373,6 +373,9 @@ def test_antialiased_travels(form: PackedFormat, tmp_path: Path) -> None:
         for copy in (reorder(found, np.arange(300)[::-1]), half_turn(found), largest(found, 4), Parameters.of(found).scene(), build_clusters(found)[0],
                      *(through_memory(found, kind) for kind in MemoryFormat)):
             assert copy.antialiased is on
+        save_chunks(encode_chunks(build_clusters(found)[0]), tmp_path / "scene.compressed.ply")
+        kept = pack_file(tmp_path / "scene.compressed.ply")
+        assert kept.kept_chunks and kept.packed.antialiased is on
 
 
 def test_an_image_is_a_scene(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def test_degrees_and_a_slow_memory(degree: int, kind: RecordKind) -> None:
     golden, rtl = check(packed, camera, memory=lpddr4(), frames=2, kind=kind)
     if features:
         plain = run_front(dataclasses.replace(packed, antialiased=False), camera, kind=kind)
-        assert golden.splats().opacity.mean() < 0.95 * plain.splats().opacity.mean() and len(golden.entry_tile) < len(plain.entry_tile)
+        assert (golden.splats().opacity < plain.splats().opacity).mean() > 0.3 and len(golden.entry_tile) < len(plain.entry_tile)
     assert all(rtl.counters[f"{name}_waits"] > 0 for name in ("cluster", "colour", "entry", "merged", "line", "beat")) and rtl.counters["group_missing"] > 0
     assert rtl.counters["place_waits"] + rtl.counters["request_waits"] > 0
 

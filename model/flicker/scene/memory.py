@@ -206,13 +206,13 @@ def encode_chunks(scene: Scene, bounds: np.ndarray | None = None, scaled_sh: boo
     packed[:, 1] = rotation_word(scene.quats)
     rest = scene.sh[:, 1:].transpose(0, 2, 1).reshape(n, -1).astype(np.float64)
     if not scaled_sh:
-        return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8))
+        return ChunkScene(bounds, packed, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8), antialiased=scene.antialiased)
     largest = np.zeros(len(bounds), np.float32)
     if rest.shape[1]:
         largest = np.maximum.reduceat(np.abs(rest).max(axis=1), np.arange(0, n, CHUNK)).astype(np.float32)
     scale = np.repeat(np.where(largest > 0, largest, 1).astype(np.float64), CHUNK)[:n, None]
     codes = np.clip(np.floor(rest / scale * 127.0 + 128.5), 1, 255).astype(np.uint8)
-    return ChunkScene(bounds, packed, codes, largest)
+    return ChunkScene(bounds, packed, codes, largest, scene.antialiased)
 
 
 def _unpack_111011(word: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -240,7 +240,7 @@ def decode_chunks(data: ChunkScene, path: Path | None = None) -> Scene:
     if data.sh_scale is not None:
         rest = (data.sh - 128.0) / 127.0 * np.repeat(data.sh_scale.astype(np.float64), CHUNK)[:n, None]
     sh[:, 1:] = rest.reshape(n, 3, -1).transpose(0, 2, 1)
-    return Scene(means, scales, quats / np.linalg.norm(quats, axis=1, keepdims=True), opacities, sh, path)
+    return Scene(means, scales, quats / np.linalg.norm(quats, axis=1, keepdims=True), opacities, sh, path, antialiased=data.antialiased)
 
 
 _BOUNDS = [f"{m}_{v}" for group in ("{}", "scale_{}") for m in ("min", "max") for v in map(group.format, "xyz")]

@@ -295,6 +295,7 @@ def pack_chunks(data: ChunkScene, path: Path | None = None) -> Packing:
     rows = _colour_rows(data.packed[:, 3], sh)
     geometry = np.column_stack([data.packed[:, 0], rotation, data.packed[:, 2]])
     packed = _assemble(PackedFormat.CHUNK, headers, geometry, rows, start, counts, np.full(len(start), degree), path)
+    packed.antialiased = data.antialiased
     return Packing(packed, np.arange(n), {"rotation longer than 1": int(long.sum())} if long.any() else {}, kept_chunks=True, brought=True)
 
 
