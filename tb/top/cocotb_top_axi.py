@@ -107,7 +107,7 @@ async def frame(dut: Any) -> None:
     await write(AT["interrupt_enable"], 2)
     # An empty descriptor: refused, and nothing asked of the memory.
     await write(AT["control"], 1)
-    assert await ended(100) == SETTINGS["descriptor_error"] << 16 and not watch.seen
+    assert await ended(1000) == SETTINGS["descriptor_error"] << 16 and not watch.seen
     await write(AT["interrupt"], 31)
     while not await read("status") & 1:
         pass
