@@ -207,7 +207,7 @@ def test_ply_says_antialiased(comments: list[str], wanted: bool, compressed: boo
     if compressed:
         save_chunks(encode_chunks(base()), path)
         path.write_bytes(path.read_bytes().replace(b"element chunk", "\n".join([*comments, "element chunk"]).encode(), 1))
-        assert load_chunks(path).antialiased is wanted
+        assert load_chunks(path).antialiased is wanted and pack_file(path).packed.antialiased is wanted
     else:
         path.write_bytes(formats.ply([("vertex", formats.vertex(base()))], comments=comments))
     assert quiet(path).antialiased is wanted

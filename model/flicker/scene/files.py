@@ -32,14 +32,14 @@ from .gltf import gltf_files, is_gltf, read_gltf
 from .ksplat import is_ksplat, read_ksplat
 from .packed import decode, is_image, load_packed
 from .ply import is_ply
-from .ply_scene import check_ply, read_ply
+from .ply_scene import has_chunks, read_ply
 from .raw import FLAT_NOTE, Raw
 from .splat import read_splat
 from .spz import is_spz, read_spz
 from .turns import ABOUT_X
 from .turns import half_turn as turned
 
-__all__ = ["Scene", "check_ply", "load_scene", "save_ply"]  # and what the page lists
+__all__ = ["Scene", "has_chunks", "load_scene", "save_ply"]  # and what the page lists
 FLAT = 2.0**-16  # a scale of 0 becomes this share of the largest one
 _LEAST = 2.0**-30  # and this at least
 

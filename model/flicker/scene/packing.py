@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import FlickerError
 from ..progress import Steps
 from .clusters import cluster_order, cut_clusters, reorder
-from .files import check_ply, load_scene, scene_kind, scene_title
+from .files import has_chunks, load_scene, scene_kind, scene_title
 from .gaussians import SH_C0, SH_DEGREES, Scene
 from .memory import ChunkScene, load_chunks, rotation_word
 from .packed import (
@@ -225,7 +225,7 @@ def pack_file(
             return Packing(packed, np.arange(len(packed)), brought=True)
     if kind == "PLY" and form is PackedFormat.CHUNK:
         with steps.step(f"loading {title}"):
-            chunks = load_chunks(path) if check_ply(path) else None
+            chunks = load_chunks(path) if has_chunks(path) else None
         if chunks is not None:
             with steps.step("codes"):
                 return pack_chunks(chunks, path)

@@ -33,7 +33,7 @@ _REFUSED = {
 }
 
 
-def check_ply(path: Path) -> bool:
+def has_chunks(path: Path) -> bool:
     """Whether a PLY file is a compressed one. FlickerError for a header that is not PLY."""
     return is_chunked(open_ply(path).header)
 
