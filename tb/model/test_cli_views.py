@@ -23,7 +23,7 @@ from flicker.cli.options import parse_view, writable_folder
 from flicker.errors import FlickerError
 from flicker.explore.points import SceneFile
 from flicker.explore.sweep.config import load_sweep
-from flicker.front.unseen import BEHIND, FAINT, INSIDE, places
+from flicker.front.unseen import BEHIND, FAINT, INSIDE, places, unseen
 from flicker.front.view import load_view
 from flicker.report.write import parse_targets
 from flicker.scene.camera import Camera, cameras_beside, cameras_text, load_cameras
@@ -223,6 +223,10 @@ def test_why_nothing_is_seen(tmp_path: Path) -> None:
         BEHIND: 2, "left of the picture": 1, "right of the picture": 2, "above the picture": 1, "below the picture": 1, FAINT: 1, INSIDE: 1,
     }
     path = stored(tmp_path, balls(*means[:6]), c, c)
+    view = load_view(path, background=(0.5, 0.5, 0.5))
+    grey_picture = np.full((80, 48, 3), 0.5)
+    assert unseen(view, grey_picture) == unseen(view, np.ones((80, 48, 3)), 0) == places(view.scene, c)
+    assert unseen(view, np.ones((80, 48, 3))) is None and unseen(view, grey_picture + np.eye(80, 48)[..., None] * 0.1, 7) is None
     for engine in ("reference", "golden", "chip-golden"):
         told = run("render", path, "--engine", engine, "--stats", tmp_path / "s.json")
         stats = json.loads((tmp_path / "s.json").read_text())
