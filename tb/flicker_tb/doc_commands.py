@@ -14,7 +14,8 @@ _CODE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 
 # What stands for something of the reader's, as whole words; a path of the sandbox of tb/model/test_commands.py takes its place.
 PLACEHOLDERS = {
-    "SCENE": "scene.ply", "CONFIG.yaml": "sweep.yaml", "DATASET": "lego", "FOLDER": "made", "N": "1", "WxH": "48x32", "path": "cells.lib", "folder": "scenes",
+    "SCENE": "scene.ply", "CONFIG.yaml": "sweep.yaml", "DATASET": "lego", "FOLDER": "made", "IN": "scene.ply", "OUT": "made.spz",
+    "N": "1", "WxH": "48x32", "path": "cells.lib", "folder": "scenes",
     "<unit>": "fifo", "name": "fifo", "[options]": None, "[SCENES...]": None, "[PART=name]": None, "UNIT=": "UNIT=fifo",
 }
 

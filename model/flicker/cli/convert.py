@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
 from ..errors import FlickerError
-from .options import RichSteps, console, writable, write_atomically
+from .options import RichSteps, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
     from ..scene.write import Written
@@ -41,6 +42,7 @@ def convert(
 ) -> None:
     """Convert a scene to another format; what is lost is measured and told."""
     wanted = _box(box)
+    check_scene(scene)
     steps = RichSteps()
     with steps.step("starting"):
         from ..scene.demo import generate
@@ -65,10 +67,10 @@ def convert(
     for name, (largest, mean) in done.losses.items():
         table.add_row(f"{name}: change", f"{largest:.2g}", f"at most; {mean:.2g} in the mean")
     for reason, count in {**loaded.rejected, **left_out, **done.left_out}.items():
-        table.add_row(f"[yellow]{reason}[/yellow]", f"{count:,}", "left out")
+        table.add_row(Text(reason, "yellow"), f"{count:,}", "left out")
     notes = list(done.notes)
     if chosen.sh_degree < loaded.sh_degree:
         notes.insert(0, f"harmonics of degree {loaded.sh_degree} are cut to {chosen.sh_degree}")
     for note in notes:
-        table.add_row("[yellow]lost[/yellow]", "", note)
+        table.add_row(Text("lost", "yellow"), "", note)
     console.print(table)

@@ -43,9 +43,9 @@ def _copy(shots: Sequence[Shot], folder: Path, background: tuple[float, float, f
         except OSError as error:
             raise FlickerError(f"{path.parent}: cannot be written ({error.strerror})") from None
         if shot.lens is None:
-            write_atomically(path, lambda to, shot=shot: shutil.copyfile(shot.path, to))
+            write_atomically(path, lambda to: shutil.copyfile(shot.path, to))
         else:
-            write_atomically(path, lambda to, shot=shot: save_png(to, shot.load(background)))
+            write_atomically(path, lambda to: save_png(to, shot.load(background)))
 
 
 def fit(
