@@ -140,6 +140,7 @@ def test_output_folder_of_a_trainer(tmp_path: Path) -> None:
     shutil.copy(best, clouds / "iteration_50000" / "point_cloud_rk0.ply")
     assert trained_scene(folder).parent.name == "iteration_50000"
     shutil.rmtree(clouds / "iteration_50000")
+    assert "iteration_30000" in "".join(run("convert", folder, tmp_path / "c.ply").split()) and len(load_scene(tmp_path / "c.ply")) == 2
     told = run("render", folder, "--engine", "reference", "--stats", tmp_path / "s.json")
     stats = json.loads((tmp_path / "s.json").read_text())
     assert (stats["scene"], stats["cameras"]) == (str(best), str(folder / "cameras.json"))

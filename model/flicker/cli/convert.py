@@ -45,14 +45,16 @@ def convert(
     check_scene(scene)
     steps = RichSteps()
     with steps.step("starting"):
-        from ..scene.demo import generate
-        from ..scene.files import load_scene, scene_title
+        from ..scene.files import scene_title
+        from ..scene.sources import DEMO, read_scene
         from ..scene.write import Selection, write_scene, writer_of
     suffix = writer_of(out)
     writable(out, "OUT")
-    title = str(scene) if str(scene) == "demo" else scene_title(scene)
+    title = DEMO if str(scene) == DEMO else scene_title(scene)
     with steps.step(f"loading {title}"):
-        loaded = generate() if str(scene) == "demo" else load_scene(scene)
+        loaded = read_scene(scene)
+    if loaded.path not in (None, scene):
+        title = str(loaded.path)  # in a trainer's folder
     chosen, left_out = Selection(wanted, not no_flyaways, degree).of(loaded)
     written: list[Written] = []
     with steps.step(f"writing {out.name}"):
