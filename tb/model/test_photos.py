@@ -104,7 +104,8 @@ def test_transparent_pixels_show_the_background(tmp_path):
 
 
 def test_photographs_are_found_by_name(tmp_path):
-    """With or without a suffix, in any case, with dots in the name; images/ before the folder itself; two in equal places are refused."""
+    """With or without a suffix, in any case, with dots in the name; a name with a suffix is that file, whatever it holds; images/ before the folder itself;
+    two in equal places are refused."""
     cameras, picture = tmp_path / "cameras.json", np.zeros((2, 2, 3))
     assert photo_beside(cameras, "a") is None
     assert photo_beside(cameras, "") is None
@@ -117,8 +118,8 @@ def test_photographs_are_found_by_name(tmp_path):
     (tmp_path / "images" / "c.txt").write_text("no picture")
     found = {name: photo_beside(cameras, name) for name in ("a", "a.JPG", "b.01", "b", "left/a", "c", "c.txt", "images")}
     assert {name: path and str(path.relative_to(tmp_path)) for name, path in found.items()} == {
-        "a": "images/a.JPG", "a.JPG": "images/a.JPG", "b.01": "images/b.01.png", "b": None, "left/a": "images/left/a.png", "c": None, "c.txt": None,
-        "images": None,
+        "a": "images/a.JPG", "a.JPG": "images/a.JPG", "b.01": "images/b.01.png", "b": None, "left/a": "images/left/a.png", "c": None,
+        "c.txt": "images/c.txt", "images": None,
     }
     store(tmp_path / "train" / "d.png", picture)
     assert photo_beside(cameras, "d") == tmp_path / "train" / "d.png"
