@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 
 import cocotb
-from cocotb.handle import Immediate
 from cocotb.triggers import Timer
 from flicker_tb.bench import config
 
@@ -17,7 +16,13 @@ class Cell:
 
     def __init__(self, dut):
         self.dut, self.rng, self.edges = dut, random.Random(random.getrandbits(64)), 0
-        dut.clk_i.value, dut.rst_ni.value, dut.test_en_i.value = Immediate(0), Immediate(0), Immediate(0)
+
+    async def begin(self):
+        """In reset, the clock low."""
+        for value in (1, 0):  # an edge, from whatever it is
+            self.dut.clk_i.value, self.dut.rst_ni.value, self.dut.test_en_i.value = 0, value, 0
+            await Timer(1, unit="ns")
+        return self
 
     async def change(self, pin, value):
         before = int(pin.value)
@@ -33,7 +38,7 @@ class Cell:
 
 @cocotb.test()
 async def falls_at_once_rises_with_the_clock(dut):
-    cell = Cell(dut)
+    cell = await Cell(dut).begin()
     rises = 0
     for _ in range(600):
         await cell.change(dut.clk_i, 1 - int(dut.clk_i.value))
@@ -45,7 +50,7 @@ async def falls_at_once_rises_with_the_clock(dut):
 
 @cocotb.test()
 async def scan_test_puts_it_through(dut):
-    cell = Cell(dut)
+    cell = await Cell(dut).begin()
     await cell.change(dut.test_en_i, 1)
     for _ in range(200):
         await cell.change(cell.rng.choice([dut.clk_i, dut.rst_ni, dut.rst_ni, dut.clk_i]), cell.rng.getrandbits(1))
