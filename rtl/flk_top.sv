@@ -190,10 +190,11 @@ module flk_top
             end
           end
           DEAD: ;
-          default: begin  // RESET
+          default: begin  // RESET: an abort that comes here has nothing to forget, but is told
+            abort_q <= abort_q || from_host.control.abort.value;
             if (32'(reset_q) == ResetCycles - 1) begin
               state_q   <= RUN;
-              aborted_q <= abort_q;
+              aborted_q <= abort_q || from_host.control.abort.value;
               abort_q   <= 1'b0;
             end
           end

@@ -417,3 +417,43 @@ async def resets(dut: Any) -> None:
     await chip.revive()
     await chip.cycles(20)
     assert await chip.read("interrupt") == 0 and await chip.field("status", "ready")
+
+
+@cocotb.test()
+async def abort_in_a_reset(dut: Any) -> None:
+    """An abort that comes while a reset or another abort is under way is told as any other, at every distance; it does nothing else."""
+    chip = Chip(dut)
+    await chip.begin()
+    told = 0
+    for command in (RESET, ABORT):
+        for distance in range(14):
+            await chip.write_all(("control", command), *[("counter_select", 0)] * distance, ("control", ABORT))
+            await chip.until(ABORTED)
+            await chip.cycles(20)
+            told += (await chip.read("interrupt")) == ABORTED
+            await chip.write("interrupt", ALL)
+            assert await chip.field("status", "ready")
+    assert told == 28
+    await chip.start(41)
+    await chip.ended(41)
+
+
+@cocotb.test()
+async def scan_test(dut: Any) -> None:
+    """In a scan test the halves' reset is the chip's alone: one that works goes on over a reset by a register, and takes no new frame."""
+    chip = Chip(dut)
+    await chip.begin()
+    for test in (0, 1):
+        await chip.start(51, front=200)
+        await chip.cycles(40)
+        dut.test_en_i.value = test
+        await chip.revive()
+        await chip.write("interrupt", ALL)
+        await chip.start(52)
+        await chip.cycles(300)
+        assert bool(await chip.read("interrupt") & FRONT_DONE) == (not test)
+        dut.test_en_i.value = 0
+        await chip.revive()
+        await chip.write("interrupt", ALL)
+    await chip.start(53)
+    await chip.ended(53)
