@@ -19,7 +19,7 @@ from flicker.toolchain import ROOT
 # Test file and a word that chooses among its tests.
 UNITS = {
     "axi": "split", "axi_fetch": "parameters0", "axi_lane": "", "delay": "8-4", "entry_merge": "test_entry_merge", "event_counter": "1", "frame_control": "",
-    "line_writer": "", "pair_fifo": "3-4", "priority_arbiter": "", "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg", "top": "test_top",
+    "line_writer": "", "pair_fifo": "3-4", "priority_arbiter": "", "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg",
 }
 
 
