@@ -32,6 +32,8 @@ extern "C" int64_t run(int64_t n, int interval, int latency, int fixed_words, co
   // Phase 0 stands for a clock before the first element.
   model.en_i = 0;
   model.phase_i = 0;
+  model.rst_ni = 1;  // a reset is an edge
+  model.eval();
   model.rst_ni = 0;
   model.eval();
   model.rst_ni = 1;

@@ -56,6 +56,8 @@ extern "C" void run(int64_t n, const uint32_t* in, uint32_t* out, int64_t room, 
     model.eval();
   };
   model.clk_i = 0;
+  model.rst_ni = 1;  // a reset is an edge
+  model.eval();
   model.rst_ni = 0;
   model.in_valid_i = 0;
   model.out_ready_i = 0;
