@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import shutil
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,12 +29,22 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Call write(temporary path), then put the file in place: no partial results, also after Ctrl-C. FlickerError names file and reason."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    """Call write(temporary path), then put the file in place: no partial results, also after Ctrl-C. FlickerError names file and reason.
+
+    Of a link, the file that it leads to is replaced. Devices and pipes stay what they are and get the content.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        with writing(path), tempfile.TemporaryDirectory() as folder:
+            write(Path(folder) / path.name)
+            with path.open("wb", buffering=0) as stream:
+                stream.write((Path(folder) / path.name).read_bytes())
+        return
+    place = Path(os.path.realpath(path)) if path.is_symlink() else path
+    temporary = place.with_name(f".{place.stem}.{os.getpid()}{place.suffix}")
     try:
         with writing(path):
             write(temporary)
-            temporary.replace(path)
+            temporary.replace(place)
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import io
 import json
+import os
 import re
 import resource
 import subprocess
@@ -277,6 +278,29 @@ def test_full_disk(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         write()
     assert re.fullmatch(rf"{re.escape(str(tmp_path / name))}: cannot be written \([^\n]+\)", str(caught.value)), caught.value
     assert (tmp_path / name).read_text() == "before" and [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_what_a_name_leads_to_stays(tmp_path: Path) -> None:
+    """A device or pipe gets the content and is not replaced by a file; a link still leads to its file, which is new."""
+    pipe, link, file = tmp_path / "pipe.json", tmp_path / "link.json", tmp_path / "deep" / "file.json"
+    os.mkfifo(pipe)
+    file.parent.mkdir()
+    file.write_text("before")
+    link.symlink_to("deep/file.json")
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        for path in (pipe, link):
+            output.write_text(path, "x" * 5000)
+        assert os.read(reader, 9000) == b"x" * 5000 and pipe.is_fifo()
+    finally:
+        os.close(reader)
+    assert link.is_symlink() and file.read_text() == "x" * 5000
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["deep", "file.json", "link.json", "pipe.json"]
+    full = tmp_path / "full.json"
+    full.symlink_to("/dev/full")
+    with pytest.raises(FlickerError, match=r"full.json: cannot be written \(No space left on device\)"):
+        output.write_text(full, "x")
+    assert full.is_symlink() and full.is_char_device()
 
 
 def test_full_disk_behind_a_command(tmp_path: Path) -> None:
