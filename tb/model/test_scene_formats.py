@@ -111,6 +111,7 @@ PLY = {  # elements, layout and further arguments of `ply`
     "elements before": lambda v: ([*SHARP, EMPTY, ("vertex", v)], "binary_little_endian"),
     "faces before": lambda v: ([FACES, ("vertex", v)], "binary_little_endian"),
     "faces behind": lambda v: ([("vertex", v), FACES], "binary_little_endian"),
+    "ascii, faces around": lambda v: ([("face", FACES[1][:1]), ("vertex", v), ("edge", FACES[1][:1])], "ascii"),
     "empty faces": lambda v: ([("vertex", v), EMPTY], "binary_little_endian"),
     "lists": lambda v: ([("vertex", shuffled(v + LISTS)), FACES], "binary_little_endian"),
     "lists, big endian": lambda v: ([("vertex", shuffled(v + LISTS))], "binary_big_endian"),
@@ -199,6 +200,7 @@ def test_ply_of_higher_degree_is_cut(degree: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("comments", "wanted"), [
     ([], False), (["comment SplatRenderMode: mip"], True), (["comment  splatrendermode: MIP "], True), (["comment SplatRenderMode: default"], False),
     (["comment SplatRenderMode: mip", "comment SplatRenderMode: default"], False), (["comment antialiased 1"], True), (["comment antialiased 0"], False),
+    (["comment antialiased: true"], True), (["comment SplatRenderMode=mip"], True), (["comment antialiased false"], False),
     (["obj_info antialiased 1"], True), (["comment not antialiased 1"], False), (["comment SplatRenderMode: other"], False),
 ])
 @pytest.mark.parametrize("compressed", [False, True], ids=["INRIA", "compressed"])
@@ -381,7 +383,7 @@ def test_flat_gaussians_are_the_same_in_every_engine() -> None:
 
 @pytest.mark.parametrize("text", [
     b"x y z\n1 2 3\n" * 8, "höher, weiter\n".encode() * 20, "\u9ad8\u65af\n".encode() * 100, b'{"a": [1, 2, 3, 4, 5, 6, 7, 8, 9, 0]}    ' * 8,
-    b"caf\xe9 au lait\n\n\n\n" * 20,
+    b"caf\xe9 au lait\n\n\n\n" * 20, "x y z\r\n1 2 3\r\n".encode("utf-16") + "höher\r\n, weiter\r\n".encode("utf-16-le") * 20,
 ])
 @pytest.mark.parametrize("suffix", [".splat", ".ply", ".spz", ".ksplat", ".sog", ".flk", ".ply.gz"])
 def test_text_is_no_scene(text: bytes, suffix: str, tmp_path: Path) -> None:

@@ -219,15 +219,22 @@ def _text(head: bytes) -> str:
     """What a file is whose first bytes are text; empty for none."""
     if head.startswith(b"version https://git-lfs"):
         return "a pointer of Git LFS (get the file with git lfs pull)"
+    wide = head[: len(head) & ~1].decode("utf-16", "replace") if head[:2] in (b"\xff\xfe", b"\xfe\xff") else ""
+    if wide and _readable(wide):
+        return "text"
     plain = sum(32 <= byte < 127 or byte in b"\t\n\f\r" for byte in head)
     decoder = codecs.getincrementaldecoder("utf-8")("ignore" if plain > 0.9 * len(head) else "strict")
     try:
         words = decoder.decode(head)  # a character may be cut at the end
     except UnicodeDecodeError:
         return ""
-    if b"\0" in head or not all(c.isprintable() or c.isspace() for c in words):
+    if b"\0" in head or not _readable(words):
         return ""
     return "a web page" if words.lstrip().startswith("<") else "text"
+
+
+def _readable(words: str) -> bool:
+    return all(c.isprintable() or c.isspace() for c in words)
 
 
 def _check_folder(path: Path) -> None:

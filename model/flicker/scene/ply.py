@@ -66,12 +66,12 @@ class Header:
         """How the comments say that the scene is rendered, as brush, gsplat and Postshot write it: default, mip (antialiased) or 2dgs; the last one holds."""
         found = "default"
         for comment in self.comments:
-            key, _, value = comment.lower().replace(":", " ").partition(" ")
+            key, _, value = comment.lower().replace(":", " ").replace("=", " ").partition(" ")
             value = value.strip()
             if key == "splatrendermode" and value in ("default", ANTIALIASED, "2dgs"):
                 found = value
-            elif key == "antialiased" and value in ("0", "1"):
-                found = ANTIALIASED if value == "1" else "default"
+            elif key == "antialiased" and value in ("0", "1", "false", "true"):
+                found = ANTIALIASED if value in ("1", "true") else "default"
         return found
 
 
@@ -296,8 +296,10 @@ def _text(path: Path, header: Header, body: np.ndarray) -> dict[str, dict[str, n
 def _text_columns(path: Path, element: Element, text: bytes, newline: bytes) -> dict[str, np.ndarray]:
     where = f"{path}: element '{element.name}'"
     plain = [p for p in element.properties if not p.length]
-    if element.lists:
+    if element.lists:  # a record is a line here
         text = b" ".join(b" ".join(_without_lists(where, element, line.split())) for line in text.split(newline) if line.strip())
+    if not plain:
+        return {}
     if b"#" in text:  # as one compiler's library writes what is not finite
         text = re.sub(rb"1\.#INF\d*", b"inf", re.sub(rb"1\.#(IND|QNAN|SNAN)\d*", b"nan", text))
     try:
