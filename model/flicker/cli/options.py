@@ -59,7 +59,7 @@ def parse_size(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     parts = text.lower().split("x")
-    if len(parts) != 2 or not all(p.strip().isdigit() for p in parts):
+    if len(parts) != 2 or not all(p.strip().isdecimal() for p in parts):
         raise FlickerError(f"--size: expected WxH such as 1280x720, not '{text}'")
     return int(parts[0]), int(parts[1])
 

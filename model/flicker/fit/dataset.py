@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..scene.colmap import ColmapCamera, find_model, model_file, read_cameras, read_images, read_points
-from ..scene.lens import COEFFICIENTS
+from ..scene.lens import COEFFICIENTS, FLAGS
 from ..scene.photos import PLACES, SUFFIXES
-from ..scene.transforms import FLAGS, Frame, photo_name, read_frames
+from ..scene.transforms import Frame, photo_name, read_frames
 from .shot import Shot, shot_of
 
 TEST_EVERY = 8  # photographs 0, 8, 16, ... are for testing where a data set has no test photographs of its own

@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import FlickerError, one_line
 from ..scene.fields import read_json
 from ..scene.image import save_png
-from ..scene.lens import COEFFICIENTS
-from ..scene.transforms import FLAGS, FROM_OPENGL, frames_of
+from ..scene.lens import COEFFICIENTS, FLAGS
+from ..scene.transforms import FROM_OPENGL, frames_of
 from .dataset import transforms_shot
 from .shot import Shot
 

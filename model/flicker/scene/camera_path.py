@@ -11,12 +11,10 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import FlickerError, FlickerWarning
 from .fields import numbers, renamed
 from .pinhole import Camera
-from .transforms import FROM_OPENGL
+from .transforms import pose_of
 
 KEY = "camera_path"
 _NAMES = {"width": "render_width", "height": "render_height", "position": "camera_to_world", "rotation": "camera_to_world"}
@@ -60,4 +58,4 @@ def _camera(entry: dict[str, Any], size: list[Any], name: str) -> Camera:
     if not 0 < degrees < 180:
         raise FlickerError(f"fov: {degrees:g} is not between 0 and 180 degrees")
     focal = 0.5 * float(numbers(size[1], "render_height", ())) / math.tan(math.radians(degrees) / 2)
-    return Camera(size[0], size[1], focal, focal, np.array(pose[:3, 3]), pose[:3, :3] * FROM_OPENGL, name)
+    return Camera(size[0], size[1], focal, focal, *pose_of(pose, "camera_to_world"), name)

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import FlickerError
 from .fields import numbers
+from .lens import said_fault
 from .pinhole import Camera
 
 _KEYS = ("width", "height", "fx", "fy", "position", "rotation")
@@ -30,6 +31,8 @@ def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
                 raise FlickerError(f"{where}: '{key}' is missing")
         img_name = None if entry.get("img_name") is None else str(entry["img_name"])
         try:
+            if (fault := said_fault(entry)) is not None:
+                raise FlickerError(fault)
             centre: dict[str, Any] = {key: float(numbers(entry[key], key, ())) - 0.5 for key in ("cx", "cy") if entry.get(key) is not None}
             cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name, **centre))
         except FlickerError as error:

@@ -7,7 +7,6 @@ picture's corner.
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,12 +18,11 @@ import numpy as np
 from ..errors import FlickerError, FlickerWarning, one_line
 from .fields import numbers, read_json, renamed
 from .image import picture_size
-from .lens import COEFFICIENTS, lens_fault
+from .lens import COEFFICIENTS, said_fault
 from .photos import SUFFIXES
 from .pinhole import Camera
 
 NUMBERS = ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", *COEFFICIENTS)
-FLAGS = ("is_fisheye", "fisheye", "latlong", "equirectangular", "orthographic")  # other projections, when true
 SIZE = (800, 800)  # of NeRF's synthetic scenes, whose files name none
 FROM_OPENGL = np.array([1.0, -1.0, -1.0])  # signs of the columns right, up, back to make them right, down, forward
 _NAMES = {"width": "w", "height": "h", "fx": "fl_x", "fy": "fl_y", "position": "transform_matrix", "rotation": "transform_matrix"}
@@ -54,20 +52,7 @@ class Frame:
     @property
     def fault(self) -> str | None:
         """Why its lens is no pinhole, as `field: reason`; None: it is one."""
-        for key in FLAGS:
-            if self.data.get(key):
-                return f"{key}: this is no pinhole, and only pinholes are drawn: undistort the pictures first"
-        if any(re.match(r"ftheta_", key) for key in self.data):
-            return "ftheta: this is no pinhole, and only pinholes are drawn: undistort the pictures first"
-        model = self.data.get("camera_model")
-        if model is not None and not isinstance(model, str):
-            return "camera_model: not a text"
-        listed = self.data.get("distortion_params")
-        try:
-            given = [] if listed is None else numbers(listed, "distortion_params", (len(listed),)).tolist()
-        except (FlickerError, TypeError):
-            return "distortion_params: not a list of numbers"
-        return lens_fault(model, {key: self.number[key] for key in COEFFICIENTS} | {f"distortion_params[{k}]": value for k, value in enumerate(given)})
+        return said_fault(self.data)
 
     def focal(self, w: float, h: float) -> tuple[float, float]:
         """Focal lengths (x, y) in pixels of a picture of w x h pixels; where one is not given, it is the other."""
@@ -89,8 +74,15 @@ class Frame:
         if matrix is None:
             raise FlickerError("transform_matrix: is missing")
         rows = len(matrix) if isinstance(matrix, list) else 0
-        found = numbers(matrix, "transform_matrix", (3, 4) if rows == 3 else (4, 4))
-        return found[:3, 3], found[:3, :3] * FROM_OPENGL
+        return pose_of(numbers(matrix, "transform_matrix", (3, 4) if rows == 3 else (4, 4)), "transform_matrix")
+
+
+def pose_of(matrix: np.ndarray, key: str) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) and rotation (3, 3), camera to world, columns right, down, forward, of a matrix (3, 4) or (4, 4) with columns right, up, back, position.
+    FlickerError, naming `key`, for a last row that is none, as of a matrix written column by column."""
+    if len(matrix) == 4 and np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
+        raise FlickerError(f"{key}: its last row is {' '.join(f'{v:g}' for v in matrix[3])}, not 0 0 0 1")
+    return np.array(matrix[:3, 3]), matrix[:3, :3] * FROM_OPENGL
 
 
 def frames_of(path: Path, data: Any) -> list[Frame]:
