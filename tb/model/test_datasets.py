@@ -33,7 +33,7 @@ from flicker.report.write import parse_targets
 from flicker.scene.camera import Camera, load_cameras
 from flicker.scene.colmap import read_cameras, read_images, read_points
 from flicker.scene.files import load_scene, save_ply
-from flicker.scene.image import load_picture, save_png
+from flicker.scene.image import load_picture, picture_size, save_png
 from flicker.scene.metrics import psnr, ssim
 from flicker.scene.photos import load_photo
 
@@ -228,6 +228,23 @@ def test_exif_of_the_stored_shape(nerf, shots) -> None:
     data = load_dataset(changed(nerf, w=2 * WIDTH, h=2 * HEIGHT))
     assert "17 of 17 photographs are taken as they are stored" in data.notes[0]
     assert psnr(data.tests[1].load(), shots[8][1]) > 50 and psnr(load_photo(nerf / "images" / "r_8.png", (WIDTH, HEIGHT)), shots[8][1]) > 50
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".webp", ".tif"])
+def test_exif_of_each_format(tmp_path, suffix: str) -> None:
+    """Size and pixels are those of the upright picture, or of the stored one where the camera has its shape; Pillow turns a TIFF by itself."""
+    rows, columns = np.mgrid[0:24, 0:32]
+    upright = np.stack([rows * 6, columns * 6, rows + columns], axis=2).astype(np.uint8)
+    for orientation in range(1, 9):
+        path = tmp_path / f"{orientation}{suffix}"
+        picture = Image.fromarray(upright)
+        lying = picture.transpose(TURNS[orientation]) if orientation in TURNS else picture
+        exif = Image.Exif()
+        exif[274] = orientation
+        lying.save(path, exif=exif, **({"lossless": True} if suffix == ".webp" else {"quality": 98} if suffix == ".jpg" else {}))
+        for shape in (None, (32.0, 24.0), lying.size):
+            wanted = np.asarray(lying) if shape == (24, 32) else upright
+            assert picture_size(path, shape) == wanted.shape[1::-1] and psnr(load_picture(path, shape=shape), wanted / 255.0) > 35
 
 
 # -- masks ----------------------------------------------------------------------------------------------------------------------------

@@ -16,6 +16,8 @@ from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 from ..errors import FlickerError
 
 Shape = tuple[float, float]  # width and height of a camera, of which only the ratio counts here
+# What makes the stored picture of an upright one, by the orientations of EXIF that exchange width and height.
+_BACK = {5: Image.Transpose.TRANSPOSE, 6: Image.Transpose.ROTATE_90, 7: Image.Transpose.TRANSVERSE, 8: Image.Transpose.ROTATE_270}
 
 
 def save_png(path: str | Path, image: np.ndarray) -> None:
@@ -56,10 +58,23 @@ def _orientation(picture: Image.Image) -> int:
 def _turned(picture: Image.Image, shape: Shape | None) -> tuple[bool, tuple[int, int]]:
     """Whether the picture is to be turned, and its size (width, height) then."""
     orientation, (width, height) = _orientation(picture), picture.size
+    if orientation >= 5 and picture.format == "TIFF":  # whose size Pillow tells as of the upright picture
+        width, height = height, width
     upright = (height, width) if orientation >= 5 else (width, height)
     if orientation == 1 or (shape is not None and same_shape((width, height), shape) and not same_shape(upright, shape)):
         return False, (width, height)
     return True, upright
+
+
+def _as_taken(picture: Image.Image, shape: Shape | None) -> Image.Image:
+    """The picture upright, or as it is stored where its camera has that shape."""
+    turned, orientation = _turned(picture, shape)[0], _orientation(picture)
+    picture.load()
+    if turned:
+        return ImageOps.exif_transpose(picture)
+    if orientation != _orientation(picture):  # Pillow turns a TIFF as it reads it
+        return picture.transpose(_BACK[orientation])
+    return picture
 
 
 def picture_size(path: str | Path, shape: Shape | None = None) -> tuple[int, int]:
@@ -79,7 +94,7 @@ def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0)
     with _opened(path) as picture:
         if picture.mode.startswith(("I", "F")):
             raise FlickerError(f"{path}: pixels of more than 8 bits (mode {picture.mode}) are not read")
-        upright = ImageOps.exif_transpose(picture) if _turned(picture, shape)[0] else picture
+        upright = _as_taken(picture, shape)
         if not upright.has_transparency_data:
             return np.asarray(upright.convert("RGB"), np.float64) / 255.0
         rgba = np.asarray(upright.convert("RGBA"), np.float64) / 255.0
@@ -91,6 +106,6 @@ def load_coverage(path: str | Path, shape: Shape | None = None) -> np.ndarray | 
     with _opened(path) as picture:
         if not picture.has_transparency_data:
             return None
-        upright = ImageOps.exif_transpose(picture) if _turned(picture, shape)[0] else picture
+        upright = _as_taken(picture, shape)
         alpha = np.asarray(upright.convert("RGBA").getchannel("A"), np.float64) / 255.0
     return alpha if alpha.min() < 1.0 else None
