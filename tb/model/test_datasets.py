@@ -92,6 +92,11 @@ def fov(x, y, omega):
     return x * bent, y * bent
 
 
+def division(x, y, k):
+    radial = 2 / (1 + np.sqrt(1 - 4 * k * (x * x + y * y)))
+    return x * radial, y * radial
+
+
 # COLMAP's name and number, coefficients, the parameters behind the principal point in its file, the formula.
 LENSES = {
     "fisheye, no coefficients": ("OPENCV_FISHEYE", 5, {}, (0, 0, 0, 0), fisheye),
@@ -103,6 +108,8 @@ LENSES = {
     "rational": ("FULL_OPENCV", 6, {"k1": 0.1, "k2": 0.05, "k4": 0.15, "k5": -0.05}, (0.1, 0.05, 0, 0, 0, 0.15, -0.05, 0),
                  lambda x, y: rational(x, y, 0.1, 0.05, 0.15, -0.05)),
     "FOV": ("FOV", 7, {"omega": 0.7}, (0.7,), lambda x, y: fov(x, y, 0.7)),
+    "division": ("DIVISION", 13, {"k": -0.1}, (-0.1,), lambda x, y: division(x, y, -0.1)),
+    "plain fisheye": ("SIMPLE_FISHEYE", 14, {}, (), fisheye),
 }
 
 
@@ -132,7 +139,7 @@ def test_lens(shots, tmp_path, name: str, colmap: bool) -> None:
     focal = 100.0
     picture = photograph(formula, focal, centre)
     if colmap:
-        names = {"SIMPLE_RADIAL_FISHEYE": (focal,), "RADIAL": (focal,)}
+        names = {"SIMPLE_RADIAL_FISHEYE": (focal,), "RADIAL": (focal,), "SIMPLE_FISHEYE": (focal,)}
         write_colmap(tmp_path, shots[:3], number, lens=(*names.get(model, (focal, focal)), *centre, *parameters), size=SIZE, pictures=[picture] * 3)
     else:
         write_transforms(tmp_path, [(camera, picture) for camera, _ in shots[:3]], camera_angle_x=None, camera_model=model, w=SIZE[0], h=SIZE[1], fl_x=focal,
@@ -151,17 +158,18 @@ def test_lens(shots, tmp_path, name: str, colmap: bool) -> None:
 
 def test_lenses_of_no_effect(shots, tmp_path, nerf) -> None:
     """A radial model whose coefficients are 0 is a pinhole, in COLMAP, too; so is one that moves no pixel by half of one."""
-    for number, parameters in ((2, (0,)), (3, (0, 0)), (4, (0, 0, 0, 0)), (6, (0,) * 8), (7, (0,)), (4, (1e-4, 0, 0, 0))):
-        focal = (80.0,) if number in (2, 3) else (80.0, 80.0)
+    for number, parameters in ((2, (0,)), (3, (0, 0)), (4, (0, 0, 0, 0)), (6, (0,) * 8), (7, (0,)), (12, (0,)), (13, (0,)), (4, (1e-4, 0, 0, 0))):
+        focal = (80.0,) if number in (2, 3, 12) else (80.0, 80.0)
         data = load_dataset(write_colmap(tmp_path / "c", shots[:3], number, lens=(*focal, WIDTH, HEIGHT, *parameters)))
         assert not data.notes and all(shot.lens is None for shot in data.shots) and data.tests[0].camera.fx == 40.0
     for model in ("PINHOLE", "simple_radial", "OPENCV", "FULL_OPENCV", "PERSPECTIVE"):
-        data = load_dataset(changed(nerf, camera_model=model, k1=0.0, k2=0, p1=0.0, is_fisheye=False))
+        data = load_dataset(changed(nerf, camera_model=model, k1=0.0, k2=0, p1=0.0, is_fisheye=False, distortion_params=[0, 0.0, 0, 0, 0, 0]))
         assert not data.notes and all(shot.lens is None for shot in data.shots)
 
 
 @pytest.mark.parametrize(("more", "message"), [
-    ({"camera_model": "EQUIRECTANGULAR"}, "camera_model: EQUIRECTANGULAR is not one of those that can be undistorted: FOV, FULL_OPENCV"),
+    ({"camera_model": "EQUIRECTANGULAR"}, "camera_model: EQUIRECTANGULAR is not one of those that can be undistorted: DIVISION, FISHEYE, FOV"),
+    ({"camera_model": "EQUIRECTANGULAR", "is_fisheye": True}, "camera_model: EQUIRECTANGULAR is not one of"),
     ({"camera_model": "FISHEYE624"}, "camera_model: FISHEYE624 is not one of"), ({"camera_model": "VR180_L"}, "camera_model: VR180_L is not one of"),
     ({"camera_model": 5}, "camera_model: not a text"), ({"camera_model": "OPENCV", "k5": 0.1}, "k5: 0.1: camera_model OPENCV has no such coefficient"),
     ({"k6": 0.1}, "k6: 0.1: of which camera_model?"), ({"equirectangular": True}, "equirectangular: pictures of this projection"),
@@ -316,6 +324,22 @@ def test_masks_that_are_not_there(shots, tmp_path) -> None:
     assert "masks: not used" in load_dataset(folder).notes[0]
 
 
+def test_photographs_of_which_no_pixel_counts(shots, tmp_path) -> None:
+    """All photographs to fit to: the masks are named; those for testing: a line says why there is no PSNR; a place that two views see is enough to begin."""
+    folder = with_masks(tmp_path / "set", shots[:4], 0.0)
+    options = ("--iterations", 2, "--gaussians", 40, "--degree", 0)
+    for hidden, words in (((0,), "1 of 4 photographs are masked wholly"), ((0, 1, 2, 3), "masks: no pixel of the photographs to fit to counts: those")):
+        for k in hidden:
+            Image.new("L", (WIDTH, HEIGHT)).save(folder / "masks" / f"{k}.png")
+        done = flicker("fit", folder, "-o", tmp_path / "a.ply", *options)
+        assert (done.returncode, words in done.stdout + done.stderr) == (2 if len(hidden) == 4 else 0, True), done.stderr
+    narrow = np.zeros((HEIGHT, WIDTH), np.uint8)
+    narrow[20, 24] = 255
+    for k in range(4):
+        Image.fromarray(narrow).save(folder / "masks" / f"{k}.png")
+    assert 0 < Trainer(load_dataset(folder), Options(2, 4, 0)).first < 4
+
+
 @pytest.mark.parametrize("form", ["{0}.png.png", "{0}.png"])
 def test_masks_of_colmap(shots, tmp_path, form: str) -> None:
     """`masks/NAME.png`, or by the stem; photographs without one count wholly."""
@@ -401,6 +425,47 @@ def test_images_of_a_transforms_json(nerf, shots) -> None:
     assert psnr(data.tests[1].load(), 1 - shots[8][1]) > 50 and data.tests[1].camera.img_name == "r_8.png"
     with pytest.raises(FlickerError, match="--images: nowhere: no such folder"):
         load_dataset(nerf, None, "nowhere")
+
+
+def test_paths_of_windows(shots, tmp_path) -> None:
+    """Pictures and masks whose paths have backslashes."""
+    folder = with_masks(tmp_path, shots[:3], 0.0)
+    data = json.loads((folder / "transforms.json").read_text())
+    for frame in data["frames"]:
+        frame |= {key: frame[key].replace("/", "\\") for key in ("file_path", "mask_path")}
+    (folder / "transforms.json").write_text(json.dumps(data))
+    assert [(shot.path.name, shot.mask.name, shot.camera.img_name) for shot in load_dataset(folder).tests] == [("r_0.png", "0.png", "r_0.png")]
+    assert load_cameras(folder / "transforms.json")[1].width == WIDTH
+
+
+def test_numbers_that_are_no_camera(shots, tmp_path, nerf) -> None:
+    """Of COLMAP and of a transforms.json, each by its name; a camera larger than any picture here is one whose pictures are small."""
+    for lens, size, message in (
+        ((0.0, 48, 40), (96, 80), "fx: 0 is not positive"), ((math.nan, 48, 40), (96, 80), "fx: nan is not positive"),
+        ((80.0, math.inf, 40), (96, 80), "cx: inf is not finite"), ((80.0, 48, 40), (0, 0), "width: 0 is not positive"),
+    ):
+        write_colmap(tmp_path / "c", shots[:3], 0, lens=lens, size=size)
+        store_turned(tmp_path / "c" / "images" / "shot.00.png", 3)
+        with pytest.raises(FlickerError, match=re.escape(f"images.bin: image 0 (shot.00.png): {message}")):
+            load_dataset(tmp_path / "c")
+    huge = load_dataset(write_colmap(tmp_path / "c", shots[:3], 0, lens=(80_000.0, 48_000, 40_000), size=(96_000, 80_000))).tests[0].camera
+    assert (huge.width, huge.height, huge.fx, huge.fy) == (WIDTH, HEIGHT, 40.0, 40.0)
+    assert load_dataset(changed(nerf, w=48_000, h=40_000)).tests[0].camera.width == WIDTH
+
+
+def test_undistort_of_folders(shots, tmp_path) -> None:
+    """Pictures of one name in two folders stay in theirs; a file without frames is refused."""
+    data = write_transforms(tmp_path / "a", shots[:4])
+    for k, frame in enumerate(data["frames"]):
+        frame["file_path"] = f"images/cam {k % 2}/{k // 2}.png"
+        (tmp_path / "a" / frame["file_path"]).parent.mkdir(exist_ok=True)
+        (tmp_path / "a" / "images" / f"r_{k}.png").rename(tmp_path / "a" / frame["file_path"])
+    (tmp_path / "a" / "transforms.json").write_text(json.dumps(data))
+    assert flicker("undistort", tmp_path / "a", "-o", tmp_path / "b").returncode == 0
+    for before, after in zip(load_dataset(tmp_path / "a").shots, load_dataset(tmp_path / "b").shots):
+        assert before.camera.img_name == after.camera.img_name and np.array_equal(before.load(), after.load())
+    done = flicker("undistort", changed(tmp_path / "a", frames=[]), "-o", tmp_path / "c")
+    assert (done.returncode, done.stderr) == (2, f"flicker: {tmp_path}/a/transforms.json: frames: none\n") and not (tmp_path / "c").exists()
 
 
 def test_kinds_of_pictures(tmp_path) -> None:

@@ -110,6 +110,8 @@ def fit(
         printed(note)
     if any(shot.mask is not None for shot in data.shots):
         printed(f"{trainer.masked:.1%} of all pixels are masked: they have no part in loss, start and PSNR")
+    if trainer.hidden:
+        printed(f"{trainer.hidden} of {len(data.shots)} photographs are masked wholly")
     before = None if given is None else trainer.quality(given.scene())
     if data.dropped and scene is None:
         console.print(f"{data.dropped:,} points were left out: not finite")

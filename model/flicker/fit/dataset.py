@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..scene.colmap import ColmapCamera, find_model, model_file, read_cameras, read_images, read_points
-from ..scene.lens import COEFFICIENTS, FLAGS
+from ..scene.lens import COEFFICIENTS, FLAGS, PERSPECTIVE
 from ..scene.photos import PLACES, SUFFIXES
 from ..scene.transforms import Frame, photo_name, read_frames
 from .shot import Shot, shot_of
@@ -152,17 +152,21 @@ def _name(picture: Path, root: Path) -> str:
     return picture.name
 
 
+def _zeros(values: object) -> bool:
+    return isinstance(values, list) and all(isinstance(value, (int, float)) and value == 0 for value in values)
+
+
 def _model(frame: Frame) -> str | None:
     """The lens model of a frame; None: none is named. FlickerError for other projections."""
     for key, value in frame.data.items():
         if (value and key in FLAGS and key not in _FISHEYE_FLAGS) or key.startswith("ftheta_"):
             raise FlickerError(f"{frame.where}: {key}: pictures of this projection cannot be undistorted")
-    if frame.data.get("distortion_params") is not None:
+    if frame.data.get("distortion_params") is not None and not _zeros(frame.data["distortion_params"]):
         raise FlickerError(f"{frame.where}: distortion_params: not read: coefficients are wanted by their names, k1, k2, ...")
     model = frame.data.get("camera_model")
     if model is not None and not isinstance(model, str):
         raise FlickerError(f"{frame.where}: camera_model: not a text")
-    if any(frame.data.get(key) for key in _FISHEYE_FLAGS) and (model is None or "FISHEYE" not in model.upper()):
+    if any(frame.data.get(key) for key in _FISHEYE_FLAGS) and (model is None or model.upper() in PERSPECTIVE):
         return "OPENCV_FISHEYE"
     return model
 
@@ -177,7 +181,7 @@ def transforms_shot(frame: Frame, size: int | None, folder: Path | None = None, 
     if named is not None:
         if not isinstance(named, str):
             raise FlickerError(f"{frame.where}: mask_path: not a text")
-        mask = frame.folder / named
+        mask = frame.folder / named.replace("\\", "/")
         if not mask.is_file():
             raise FlickerError(f"{frame.where}: mask_path: no picture {mask}")
     number = frame.number

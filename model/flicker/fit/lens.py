@@ -5,6 +5,7 @@ A direction (x, y, 1) of the camera falls on pixel (fx x' + cx, fy y' + cy), edg
     radial, tangential   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + 2 p1 x y + p2 (r^2 + 2 x^2), y' likewise with p1 and p2 exchanged
     FULL_OPENCV          x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + the same
     FOV                  x' = x atan(2 r tan(omega / 2)) / (r omega)
+    division             x' = 2 x / (1 + sqrt(1 - 4 k1 r^2))
     fisheye              x' = x theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8) / r
     THIN_PRISM_FISHEYE   with (u, v) = (x, y) theta / r in place of (x, y) in the first line, + sx1 (u^2 + v^2), sy1 (u^2 + v^2)
 
@@ -30,8 +31,12 @@ _GRID = 33  # places along a side where a lens is looked at
 _RADIAL = ("k", "k1", "k2", "k3", "k4", "p1", "p2")
 _FISHEYE = ("k", "k1", "k2", "k3", "k4")
 # Coefficients that a model has. k: of the models of one; it is k1 of the others.
-_FISHEYES = {"OPENCV_FISHEYE": _FISHEYE, "SIMPLE_RADIAL_FISHEYE": _FISHEYE, "RADIAL_FISHEYE": _FISHEYE, "THIN_PRISM_FISHEYE": (*_RADIAL, "sx1", "sy1")}
-_MODELS = {model: _RADIAL for model in PERSPECTIVE} | {"FULL_OPENCV": (*_RADIAL, "k5", "k6"), "FOV": ("omega",)} | _FISHEYES
+_FISHEYES = {
+    "SIMPLE_FISHEYE": (), "FISHEYE": _FISHEYE, "OPENCV_FISHEYE": _FISHEYE, "SIMPLE_RADIAL_FISHEYE": _FISHEYE, "RADIAL_FISHEYE": _FISHEYE,
+    "THIN_PRISM_FISHEYE": (*_RADIAL, "sx1", "sy1"),
+}
+_DIVISIONS = {"SIMPLE_DIVISION": ("k", "k1"), "DIVISION": ("k", "k1")}
+_MODELS = {model: _RADIAL for model in PERSPECTIVE} | {"FULL_OPENCV": (*_RADIAL, "k5", "k6"), "FOV": ("omega",)} | _DIVISIONS | _FISHEYES
 PLAIN = "OPENCV"  # where a file names coefficients and no model
 
 
@@ -78,6 +83,8 @@ class Lens:
         s = r * r
         if self.model == "FULL_OPENCV":
             radial = (1.0 + s * (k1 + s * (k2 + s * k3))) / (1.0 + s * (k4 + s * (k5 + s * k6)))
+        elif self.model in _DIVISIONS:
+            radial = 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * k1 * s))
         elif "omega" in self.coefficients:
             omega = self.coefficients["omega"]
             wide = 2.0 * np.tan(omega / 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +65,9 @@ def shot_of(
     """A photograph with its camera. where: for messages. name: by which `flicker report` finds it. size: longer side that is used, at most. shape: width and
     height that the data set has. focal: (fx, fy) of a width and height. centre: principal point from the picture's corner. model, coefficients: of the lens.
     pose: position, rotation. exact: a lens is taken out even where it moves no pixel by half of one. FlickerError, naming file and field."""
+    for key, value in zip(("width", "height"), shape):
+        if value is not None and not 0 < value < math.inf:
+            raise FlickerError(f"{where}: {key}: {value:g} is not positive")
     given = None if shape[0] is None or shape[1] is None else (shape[0], shape[1])
     own = picture_size(picture, given)
     w, h = shape[0] or own[0], shape[1] or own[1]
@@ -73,17 +77,19 @@ def shot_of(
         raise FlickerError(f"{where}: mask {mask} is {found[0]}x{found[1]}, not of the shape of its picture's {own[0]}x{own[1]}")
     fx, fy = focal(w, h)
     try:
+        for key, number in (("fx", fx), ("fy", fy), *zip(("cx", "cy"), centre), *coefficients.items()):
+            if number is not None and not (math.isfinite(number) and (number > 0 or key not in ("fx", "fy"))):
+                raise FlickerError(f"{key}: {number:g} is not {'positive' if key in ('fx', 'fy') else 'finite'}")
         lens: Lens | None = Lens.of(model, coefficients, own, (w, h), (fx, fy), centre)
         assert lens is not None
         if lens.needed or exact:
-            left, focals = lens.new_size, lens.focal
+            left, sides, (fx, fy) = lens.new_size, lens.new_size, lens.focal
             name = name if name.lower().endswith(".png") else name + ".png"  # as it is written without its lens
-            whole = Camera(*left, *focals, *pose, name=picture.stem, img_name=name)
         else:
-            lens, left = None, own
-            whole = Camera(round(w), round(h), fx, fy, *pose, name=picture.stem, img_name=name)
+            lens, left, sides = None, own, (round(w), round(h))
         shrink = min(1.0, size / max(left)) if size else 1.0
         used = max(1, round(left[0] * shrink)), max(1, round(left[1] * shrink))
-        return Shot(whole.scaled(*used), picture, given, lens, mask, picture_turned(picture, given))
+        camera = Camera(*used, fx * (used[0] / sides[0]), fy * (used[1] / sides[1]), *pose, name=picture.stem, img_name=name)
+        return Shot(camera, picture, given, lens, mask, picture_turned(picture, given))
     except FlickerError as error:
         raise FlickerError(f"{where}: {error}") from None

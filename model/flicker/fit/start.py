@@ -166,7 +166,7 @@ def start(dataset: Dataset, photos: Sequence[np.ndarray], gaussians: int, degree
         solid, count, focus = [shot.solid() for shot in dataset.fitted], max(4, int(RANDOM * gaussians)), _focus(cameras)
         places = _swept(cameras, photos, solid, counts, count, rng) if focus is None else _boxed(cameras, focus, solid, counts, count, rng)
         colours = _colours_of(places, cameras, photos, counts)
-    distance = KDTree(places).query(places, k=min(4, len(places)))[0][:, 1:]
+    distance = KDTree(places).query(places, k=min(4, len(places)))[0].reshape(len(places), -1)[:, 1:]
     size = np.clip(np.sqrt((distance**2).mean(axis=1)) if len(places) > 1 else np.ones(1), 1e-4 * extent_of(cameras), 0.1 * extent_of(cameras))
     values = np.zeros((len(places), SH + 3 * (degree + 1) ** 2), np.float32)
     values[:, MEAN:SCALE] = places

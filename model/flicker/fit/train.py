@@ -135,6 +135,8 @@ class Trainer:
         for photo, counted in zip(self._photos, self._counted):
             if counted is not None:
                 photo[~counted] = 0.0
+        if all(counted is not None and not counted.any() for counted in self._counted):
+            raise FlickerError("masks: no pixel of the photographs to fit to counts: those count that are white in a mask")
         if parameters is None:
             begun = start(dataset, self._photos, options.gaussians, options.degree, self.rng, self._counted)
         else:
@@ -301,6 +303,11 @@ class Trainer:
         """Share of the photographs' pixels that do not count."""
         every = [(shot.camera.width * shot.camera.height, counted) for shot, counted in zip(self.dataset.shots, self._counted + self._test_counted)]
         return sum(0 if counted is None else int((~counted).sum()) for _, counted in every) / sum(size for size, _ in every)
+
+    @property
+    def hidden(self) -> int:
+        """Photographs of which no pixel counts."""
+        return sum(counted is not None and not counted.any() for counted in self._counted + self._test_counted)
 
     # -- state ------------------------------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from .dataset import transforms_shot
 from .shot import Shot
 
 # Of the file: they say what the new pictures do not have any more, or name the old ones.
-_GONE = {"camera_angle_x", "camera_angle_y", "fl_x", "fl_y", "cx", "cy", "w", "h", "frames", "camera_model", *FLAGS, *COEFFICIENTS,
+_GONE = {"camera_angle_x", "camera_angle_y", "fl_x", "fl_y", "cx", "cy", "w", "h", "frames", "camera_model", "distortion_params", *FLAGS, *COEFFICIENTS,
          "train_filenames", "val_filenames", "test_filenames"}
 
 
@@ -32,9 +32,13 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
         raise FlickerError(f"{dataset}: no transforms.json; COLMAP undistorts its own (image_undistorter), and flicker fit does so by itself")
     data = read_json(path)
     shots = [transforms_shot(frame, size, exact=True) for frame in frames_of(path, data)]
+    if not shots:
+        raise FlickerError(f"{path}: frames: none")
     names = [shot.path.with_suffix(".png").name for shot in shots]
+    if len(set(names)) != len(names):  # of several folders: those stay
+        names = ["/".join(shot.path.with_suffix(".png").parts[-len(PurePosixPath(str(shot.camera.img_name)).parts) :]) for shot in shots]
     if len(set(names)) != len(names):
-        raise FlickerError(f"{path}: two of its pictures have one name, and all go into one folder")
+        raise FlickerError(f"{path}: two of its pictures have one name but for the suffix")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise FlickerError(f"{out}: is there already, and not empty")
     place = next(folder for folder in out.absolute().parents if folder.is_dir())
@@ -62,12 +66,13 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
 def _write(shot: Shot, folder: Path, name: str) -> dict[str, Any]:
     """A photograph and its mask; its frame of the new transforms.json. Raises OSError."""
     camera = shot.camera
+    (folder / "images" / name).parent.mkdir(parents=True, exist_ok=True)
     save_png(folder / "images" / name, shot.load())
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = camera.rotation * FROM_OPENGL, camera.position
     frame = {"file_path": f"images/{name}", "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy, "transform_matrix": pose.tolist()}
     if (counted := shot.counted()) is not None:
-        (folder / "masks").mkdir(exist_ok=True)
+        (folder / "masks" / name).parent.mkdir(parents=True, exist_ok=True)
         save_png(folder / "masks" / name, np.repeat(counted[..., None].astype(np.float64), 3, axis=2))
         frame["mask_path"] = f"masks/{name}"
     return frame

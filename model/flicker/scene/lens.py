@@ -23,9 +23,13 @@ COLMAP_MODELS: dict[str, tuple[str, ...]] = {
     "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
     "THIN_PRISM_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"),
     "RAD_TAN_THIN_PRISM_FISHEYE": ("fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"),
+    "SIMPLE_DIVISION": ("f", "cx", "cy", "k"),
+    "DIVISION": ("fx", "fy", "cx", "cy", "k"),
+    "SIMPLE_FISHEYE": ("f", "cx", "cy"),
+    "FISHEYE": ("fx", "fy", "cx", "cy"),
 }
 # A pinhole when all their coefficients are zero. PERSPECTIVE: as nerfstudio calls it.
-PERSPECTIVE = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "FOV", "PERSPECTIVE")
+PERSPECTIVE = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "FOV", "SIMPLE_DIVISION", "DIVISION", "PERSPECTIVE")
 FLAGS = ("is_fisheye", "fisheye", "latlong", "equirectangular", "orthographic")  # other projections, when true
 COEFFICIENTS = ("k", "k0", "k1", "k2", "k3", "k4", "k5", "k6", "p0", "p1", "p2", "p3", "p4", "s0", "s1", "s2", "s3", "s4", "sx1", "sy1", "omega")
 

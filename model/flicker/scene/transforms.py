@@ -111,7 +111,7 @@ def frames_of(path: Path, data: Any) -> list[Frame]:
         name = both.get("file_path")
         if name is not None and not isinstance(name, str):
             raise FlickerError(f"{where}: file_path: not a text")
-        found.append(Frame(where, both, number, path.parent, name))
+        found.append(Frame(where, both, number, path.parent, None if name is None else name.replace("\\", "/")))  # a path of Windows is one, too
     return found
 
 
