@@ -517,8 +517,8 @@ def test_command(tmp_path: Path) -> None:
     for wrong, text in (
         ((), "one is needed, not none"), (("--keep", 0.4, "--db", 40), "one is needed, not --keep and --db"), (("--keep", 1.4), "--keep: 1.4 is not above 0"),
         (("--db", "nan"), "--db: nan is not a positive number"), (("--mbytes", -3), "--mbytes: -3 is not a positive number"),
-        (("--keep", 0.4, "--resume"), "--resume: from which --checkpoint?"), (("--keep", 0.4, "--views", tmp_path / "no.json"), "no.json: cannot be read"),
-        (("--keep", 0.4, "--views", tmp_path / "no.json", "--count", 9), "--count: all cameras of"), (("--keep", 0.4, "--size", "ab"), "--size"),
+        (("--keep", 0.4, "--views", tmp_path / "no.json"), "no.json: cannot be read"),
+        (("--keep", 0.4, "--views", tmp_path / "a.json", "--count", 9), "--count: all cameras of"), (("--keep", 0.4, "--size", "ab"), "--size"),
         (("--keep", 0.4, "--up", "w"), "up: 'w'"), (("--keep", 0.4, "-o", tmp_path / "a.sog"), "gsply writes no SOG"),
         (("--keep", 1, "--through", "log-lanes"), "its masks are not of 4x4"),
         (("--keep", 0.4, "-o", tmp_path / "no" / "a.ply"), "no such folder"), (("--keep", 0.4, "--frame", "0x9"), "width"),

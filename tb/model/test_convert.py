@@ -21,6 +21,7 @@ from flicker.errors import FlickerError
 from flicker.scene import load_scene
 from flicker.scene.files import save_ply
 from flicker.scene.gaussians import SH_C0, Scene
+from flicker.scene.packing import pack
 from flicker.scene.sog_write import _codes
 from flicker.scene.write import WRITERS, write_scene
 
@@ -112,8 +113,8 @@ def test_codebook() -> None:
     assert np.abs(np.array(book)[codes] - many)[:-1].max() < 0.02 and book[codes[-1]] == pytest.approx(1000.0)
 
 
-def run(*words: object) -> tuple[int, str]:
-    result = CliRunner().invoke(app, ["convert", *map(str, words)])
+def run(*words: object, command: str = "convert") -> tuple[int, str]:
+    result = CliRunner().invoke(app, [command, *map(str, words)])
     return (result.exit_code if not isinstance(result.exception, FlickerError) else 2), str(result.exception or result.output)
 
 
@@ -141,6 +142,19 @@ def test_command_refuses(tmp_path: Path, words: tuple[str, ...], told: str) -> N
     save_ply(scene_of(0), tmp_path / "a.ply")
     code, said = run(tmp_path / "a.ply", tmp_path / words[0], *words[1:])
     assert code == 2 and told in said and sorted(p.name for p in tmp_path.iterdir()) == ["a.ply"]
+
+
+@pytest.mark.parametrize("words", ["convert {0} {0} --degree 0", "convert {0} {1}", "budget {0} -o {0} --keep 0.5", "pack {2} -o {2}"])
+def test_a_scene_is_not_written_over_itself(tmp_path: Path, words: str) -> None:
+    """Also by another name of the file."""
+    names = [tmp_path / name for name in ("a.ply", "b.ply", "c.flk")]
+    save_ply(scene_of(1), names[0])
+    names[1].symlink_to(names[0])
+    names[2].write_bytes(pack(scene_of(0)).packed.image())
+    before = [name.read_bytes() for name in names]
+    command, *rest = words.format(*names).split()
+    code, said = run(*rest, command=command)
+    assert code == 2 and "is the scene itself" in said and [name.read_bytes() for name in names] == before
 
 
 def test_nothing_half_written(tmp_path: Path) -> None:

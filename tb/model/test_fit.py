@@ -357,7 +357,8 @@ def test_bad_transforms(nerf, tmp_path) -> None:
 
     refused(r"frames\[5\]: file_path: no picture .*r_99", {"file_path": "images/r_99"})
     refused(r"frames\[5\]: file_path: not a text", {"file_path": 5})
-    refused(r"frames\[5\]: rotation: not a rotation matrix", {"transform_matrix": np.zeros((4, 4)).tolist()})
+    refused(r"frames\[5\]: rotation: not a rotation matrix", {"transform_matrix": np.diag([0.0, 0.0, 0.0, 1.0]).tolist()})
+    refused(r"frames\[5\]: transform_matrix: its last row", {"transform_matrix": np.zeros((4, 4)).tolist()})
     refused(r"frames\[5\]: transform_matrix: not finite", {"transform_matrix": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})
     refused(r"frames\[5\]: transform_matrix: not 4x4 numbers", {"transform_matrix": [[1, 2], [3]]})
     refused(r"frames\[5\]: fl_x: not a number", {"fl_x": "wide"})

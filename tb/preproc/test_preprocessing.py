@@ -147,7 +147,8 @@ def test_degrees_and_a_slow_memory(degree: int, kind: RecordKind) -> None:
 
 
 def test_survivors_of_one_lane(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every fourth Gaussian of a row lies behind the near plane, the others before it: one lane has all survivors, and groups wait for it. Packed as they come."""
+    """Every fourth Gaussian of a row lies behind the near plane, the others before it: one lane has all survivors, and groups wait for it. Packed as they
+    come."""
     count = 3000
     number = np.arange(count)
     means = np.stack([np.linspace(-0.05, 0.05, count), np.zeros(count), np.where(number % 4 == 0, 0.25, 0.15)], axis=1)

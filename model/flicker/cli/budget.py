@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from .kept import Checkpoint, checkpoint_path, measuring
-from .options import RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
+from .options import RichSteps, check_apart, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 from .tables import decibels
 
@@ -99,6 +99,7 @@ def budget(
     engine_of(engine, through is not None)
     for path, option in ((out, "--out"), (json_, "--json")):
         writable(path, option)
+    check_apart(out, "--out", Path(scene))
     place = checkpoint_path(checkpoint, out)
     if views is not None and count is not None:
         raise FlickerError(f"--count: all cameras of {views} are taken")

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import FlickerError
-from .options import RichSteps, check_scene, console, writable, write_atomically
+from .options import RichSteps, check_apart, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
     from ..scene.write import Written
@@ -50,6 +50,7 @@ def convert(
         from ..scene.write import Selection, write_scene, writer_of
     suffix = writer_of(out)
     writable(out, "OUT")
+    check_apart(out, "OUT", scene)
     title = DEMO if str(scene) == DEMO else scene_title(scene)
     with steps.step(f"loading {title}"):
         loaded = read_scene(scene)

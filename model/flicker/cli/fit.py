@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from .kept import Checkpoint, checkpoint_path, measuring, printed
-from .options import RichSteps, console, writable, write_atomically
+from .options import RichSteps, check_apart, console, writable, write_atomically
 
 if TYPE_CHECKING:
     from ..fit.shot import Shot
@@ -88,6 +88,7 @@ def fit(
     if out.suffix.lower() != ".ply":
         raise FlickerError(f"--out: {out}: not a .ply")
     writable(out, "--out")
+    check_apart(out, "--out", scene)
     place = checkpoint_path(checkpoint, out)
     if begin is not None and scene is None:
         raise FlickerError("--begin: of which scene, --from?")

@@ -120,6 +120,12 @@ def writable(path: Path | None, option: str) -> None:
         raise FlickerError(f"{option}: {path}: not writable")
 
 
+def check_apart(out: Path, option: str, scene: Path | None) -> None:
+    """Fail before any work where a result would take the place of the scene that it is made of."""
+    if scene is not None and scene.exists() and out.exists() and out.samefile(scene):
+        raise FlickerError(f"{option}: {out} is the scene itself: name another file")
+
+
 def check_scene(scene: str | Path) -> None:
     """Fail before a second of imports where there is no such scene, or nothing that is one."""
     from ..scene.files import scene_kind

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import FlickerError, FlickerWarning
-from .options import RichSteps, check_scene, console, writable, write_atomically
+from .options import RichSteps, check_apart, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
     from ..scene.packed import PackedScene
@@ -118,6 +118,7 @@ def pack(
     if out.suffix.lower() != ".flk":
         raise FlickerError(f"--out: {out}: only .flk is written")
     writable(out, "--out")
+    check_apart(out, "--out", scene)
     check_scene(scene)
     with steps.step("starting"):
         from ..scene.files import scene_title
