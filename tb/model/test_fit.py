@@ -595,8 +595,8 @@ def test_exposure(shots, nerf) -> None:
 
 def test_command(nerf, tmp_path) -> None:
     """Scene and cameras that the other commands read; the same file whether interrupted or not; bad requests in one line."""
-    def fit(*args: object, code: int = 0):
-        done = flicker("fit", nerf, "-o", tmp_path / "a.ply", "--gaussians", 800, "--size", 40, *args)
+    def fit(*args: object, code: int = 0, out: str = "a.ply"):
+        done = flicker("fit", nerf, "-o", tmp_path / out, "--gaussians", 800, "--size", 40, *args)
         assert done.returncode == code, done.stderr
         assert code == 0 or done.stderr.count("\n") == 1
         return " ".join((done.stdout + done.stderr).split())
@@ -614,8 +614,9 @@ def test_command(nerf, tmp_path) -> None:
     assert "continues after 70 iterations" in told and (tmp_path / "a.ply").read_bytes() == first
     done = flicker("render", tmp_path / "a.ply", "--engine", "reference", "--out", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
-    told = fit("--from", tmp_path / "a.ply", "--through", "faithful", "--iterations", 20)
-    assert "as faithful draws" in told and len(load_scene(tmp_path / "a.ply")) == len(scene)
+    told = fit("--from", tmp_path / "a.ply", "--through", "faithful", "--iterations", 20, out="b.ply")
+    assert "as faithful draws" in told and len(load_scene(tmp_path / "b.ply")) == len(scene)
+    assert "a.ply is the scene itself" in fit("--from", tmp_path / "a.ply", code=2) and (tmp_path / "a.ply").read_bytes() == first
     assert "its masks are not of 4x4 mini-tiles" in fit("--through", "log-lanes", code=2)
     assert "configuration 'fiathful' is unknown; close names: faithful" in fit("--through", "fiathful", code=2)
     assert "a.ply.checkpoint.npz: no checkpoint there: begins anew" in fit("--iterations", 1, "--resume")
