@@ -613,7 +613,7 @@ module flk_top
     front_counters.request_waits, front_counters.place_waits, front_counters.lane_waits,
     front_counters.group_missing, front_counters.cluster_waits,
     front_counters.fetched, front_counters.spilled,
-    32'(front_counters.key_low), 32'(front_counters.key_shift),
+    64'b0,  // 30 and 31 have no counter
     32'(front_counters.taken[3]), 32'(front_counters.taken[2]),
     32'(front_counters.taken[1]), 32'(front_counters.taken[0]),
     front_counters.evicted, front_counters.lines, front_counters.entries,

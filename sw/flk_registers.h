@@ -396,8 +396,6 @@
 #define FLK_COUNTER_LIST_LINES 18  /* lines written, of each of 4 list writers */
 #define FLK_COUNTER_LIST_EVICTED 22  /* lines written for another tile's sake, of each of 4 list writers */
 #define FLK_COUNTER_LIST_TAKEN 26  /* chunks taken, of each of 4 list writers */
-#define FLK_COUNTER_KEY_SHIFT 30  /* depth keys: shift of the frame, two's complement */
-#define FLK_COUNTER_KEY_LOW 31  /* depth keys: least depth of the frame */
 #define FLK_COUNTER_POINTERS_SPILLED 32  /* lines of list pointers written to make room for others, of all list writers */
 #define FLK_COUNTER_POINTERS_FETCHED 33  /* lines of list pointers read back */
 #define FLK_COUNTER_RENDERING_CYCLES 34  /* cycles of the rendering half, start to end */

@@ -115,8 +115,6 @@ class ChipCounter(IntEnum):
     LIST_LINES = 18  # lines written, of each of 4 list writers
     LIST_EVICTED = 22  # lines written for another tile's sake, of each of 4 list writers
     LIST_TAKEN = 26  # chunks taken, of each of 4 list writers
-    KEY_SHIFT = 30  # depth keys: shift of the frame, two's complement
-    KEY_LOW = 31  # depth keys: least depth of the frame
     POINTERS_SPILLED = 32  # lines of list pointers written to make room for others, of all list writers
     POINTERS_FETCHED = 33  # lines of list pointers read back
     RENDERING_CYCLES = 34  # cycles of the rendering half, start to end

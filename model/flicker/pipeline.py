@@ -16,7 +16,6 @@ from .front.records import SubtileLists, bin_splats, build_lists
 from .front.reference import render_with_transmittance
 from .front.view import View
 from .golden.front.blend import blend_records
-from .golden.front.depths import DepthSteps
 from .golden.front.frame import FrontFrame, ListKind, run_front
 from .golden.front.record import RecordKind
 from .golden.lanes.formats import FORMATS as LANE_FORMATS
@@ -154,15 +153,13 @@ def packed_scene(view: View, form: PackedFormat | None, rechunk: bool = False) -
 
 def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, dict[str, Any]]:
     """`packed_scene` of a view that is to be drawn, and statistics of what its number formats cost there. FlickerWarning where that is a loss to be seen: steps
-    of positions that are `coarse`, or depths of which the keys tell too few apart (`DepthSteps`)."""
+    of positions that are `coarse`."""
     packing = _kept_packing(view.scene, options.format, options.rechunk)
     packed, where = packing.packed, view.scene.path or view.name or "scene"
-    found, depths = measure_steps(packed, [view.camera]), DepthSteps.of(packed, view.camera)
+    found = measure_steps(packed, [view.camera])
     if found.coarse:
         warnings.warn(FlickerWarning(f"{where}: {found.warning(packing.brought)}"), stacklevel=2)
-    if depths.coarse:
-        warnings.warn(FlickerWarning(f"{where}: {depths.warning}"), stacklevel=2)
-    return packed, {"position_steps": found.as_dict(), "depth_keys": depths.as_dict()}
+    return packed, {"position_steps": found.as_dict()}
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:

@@ -1,22 +1,18 @@
-// Cluster cull: reads the cluster table twice (docs/memory_image.md). The first pass bounds the
-// depths of the kept clusters, which gives the key's shift and offset, the second hands the kept
-// clusters on, in the order of the table (docs/front_end.md).
+// Cluster cull: reads the cluster table (docs/memory_image.md) and hands the clusters on that can
+// hold a visible Gaussian, in the order of the table (docs/front_end.md).
 //
 // A frame: start_i while idle_o; setup_i, table_i (beat of the table) and clusters_i stay until
 // done_o, which is high for a cycle when the last element has been taken. The last element has
-// out_end_o and no cluster; there is one in every frame. Kept clusters come only while
-// bounds_valid_o, with which key_shift_o and key_low_o are valid until the next start; the counts
-// of what was culled stay too. An error of the memory: error_o rises and stays until the next
+// out_end_o and no cluster; there is one in every frame. The counts of what was culled are valid
+// from done_o to the next start. An error of the memory: error_o rises and stays until the next
 // start, what is under way is read and dropped, no kept cluster is added, the end element follows;
-// bounds_valid_o remains low if it happened in the first pass, and the counts mean nothing.
-// A box or sigma with exponent code 255, which no packed scene has: the same, with damaged_o.
-// Floats of the table with exponent code 0 count as 0.
+// the counts mean nothing. A box or sigma with exponent code 255, which no packed scene has: the
+// same, with damaged_o. Floats of the table with exponent code 0 count as 0.
 //
-// Throughput: a cluster every four cycles; a pass begins about the memory's latency and 40 cycles
-// before its end, the second pass' beats come while the first one's clusters are tested. Beats wait
-// in a buffer of BufferBeats, requests in its free places: the port never waits. Back-pressure of
-// the clusters stops the second pass. No combinational paths but r_*_i to the buffer and
-// ar_ready_i to the requests.
+// Throughput: a cluster every four cycles; the first one leaves about the memory's latency and 40
+// cycles after start_i. Beats wait in a buffer of BufferBeats, requests in its free places: the
+// port never waits. Back-pressure of the clusters stops the test. No combinational paths but
+// r_*_i to the buffer and ar_ready_i to the requests.
 module flk_cluster_cull
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
@@ -40,9 +36,6 @@ module flk_cluster_cull
   output logic                 done_o,
   output logic                 error_o,
   output logic                 damaged_o,
-  output logic                 bounds_valid_o,
-  output logic signed [7:0]    key_shift_o,
-  output position_t            key_low_o,
   output logic [31:0]          culled_clusters_o,
   output logic [31:0]          culled_gaussians_o,
   // Kept clusters
@@ -69,21 +62,16 @@ module flk_cluster_cull
   localparam int unsigned Interval = 4;  // of flk_cluster_test
   localparam int unsigned Inside = (CLUSTER_TEST_LATENCY + Interval - 1) / Interval;
   localparam logic [1:0] OUT_PHASE = 2'(CLUSTER_TEST_LATENCY % Interval);
-  localparam cluster_t NEAR = 32'h3E4C_CCCD;  // 0.2: no depth is nearer
-  localparam logic signed [8:0] MAX_SHIFT = 9'sd63;
-  localparam int unsigned KeyBits = 24;
 
   // ---- frame ----------------------------------------------------------------------------------------
 
-  typedef enum logic [2:0] {IDLE, FIRST, BOUNDS, SECOND, FAILED, LAST, LEAVE} state_e;
+  typedef enum logic [2:0] {IDLE, TEST, FAILED, LAST, LEAVE} state_e;
 
   state_e      state_d, state_q;
-  logic [2:0]  step_q;  // of BOUNDS
-  logic        start, testing, fails, tested_all, out_room, out_empty, fetch_idle;
-  logic [23:0] tested_q;  // clusters of the pass that have been tested
+  logic        start, fails, tested_all, out_room, out_empty, fetch_idle;
+  logic [23:0] tested_q;  // clusters that have been tested
 
   assign start      = state_q == IDLE && start_i;
-  assign testing    = state_q == FIRST || state_q == SECOND;
   assign tested_all = tested_q == clusters_i;
 
   always_comb begin
@@ -91,20 +79,10 @@ module flk_cluster_cull
     unique case (state_q)
       IDLE: begin
         if (start_i) begin
-          state_d = FIRST;
+          state_d = TEST;
         end
       end
-      FIRST: begin
-        if (tested_all) begin
-          state_d = BOUNDS;
-        end
-      end
-      BOUNDS: begin
-        if (step_q == 3'd5) begin
-          state_d = SECOND;
-        end
-      end
-      SECOND: begin
+      TEST: begin
         if (tested_all) begin
           state_d = LAST;
         end
@@ -134,16 +112,14 @@ module flk_cluster_cull
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q <= IDLE;
-      step_q  <= '0;
     end else begin
       state_q <= state_d;
-      step_q  <= state_q == BOUNDS ? step_q + 1'b1 : '0;
     end
   end
 
   // ---- table ----------------------------------------------------------------------------------------
 
-  logic [1:0]       passes_q;  // to be requested
+  logic             asks_q;  // the table is to be requested
   logic             request_ready;
   logic             beat_valid, beat_error, unused_tag;
   logic [Width-1:0] beat_data;
@@ -164,7 +140,7 @@ module flk_cluster_cull
     .rst_ni,
     .stop_i     (state_q == FAILED),
     .idle_o     (fetch_idle),
-    .in_valid_i (passes_q != '0 && clusters_i != '0),
+    .in_valid_i (asks_q),
     .in_ready_o (request_ready),
     .in_beat_i  (table_i),
     .in_beats_i (24'(clusters_i[23:1]) + 24'(clusters_i[0])),
@@ -214,13 +190,11 @@ module flk_cluster_cull
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      passes_q <= '0;
+      asks_q <= 1'b0;
     end else if (start) begin
-      passes_q <= 2'd2;
-    end else if (state_q == FAILED) begin
-      passes_q <= '0;
-    end else if (passes_q != '0 && (request_ready || clusters_i == '0)) begin
-      passes_q <= passes_q - 1'b1;
+      asks_q <= clusters_i != '0;
+    end else if (state_q == FAILED || request_ready) begin
+      asks_q <= 1'b0;
     end
   end
 
@@ -250,13 +224,13 @@ module flk_cluster_cull
   entry_t         entry;
   logic [6:0]     not_finite;  // box, sigma
   logic           entry_valid_d, entry_valid_q, half_q, load, take;
-  logic [23:0]    loads_q;  // entries of the pass still to be loaded
+  logic [23:0]    loads_q;  // entries still to be loaded
   cluster_t [2:0] low_q, high_q;
   cluster_t       sigma_q;
   about_t         about_q;
 
   assign entry         = line[half_q];
-  assign load          = testing && line_valid && loads_q != '0 && (!entry_valid_q || take);
+  assign load          = state_q == TEST && line_valid && loads_q != '0 && (!entry_valid_q || take);
   assign line_pop      = load && (half_q || loads_q == 24'd1);
   assign entry_valid_d = load || (entry_valid_q && !take);
 
@@ -282,7 +256,7 @@ module flk_cluster_cull
       entry_valid_q <= 1'b0;
       half_q        <= 1'b0;
       loads_q       <= '0;
-    end else if (start || state_q == BOUNDS || state_q == FAILED) begin
+    end else if (start || state_q == FAILED) begin
       entry_valid_q <= 1'b0;
       half_q        <= 1'b0;
       loads_q       <= clusters_i;
@@ -314,7 +288,6 @@ module flk_cluster_cull
   logic              move, at_output, kept;
   logic [1:0]        phase_q;
   logic [Inside-1:0] inside_q;  // there is a cluster, the youngest lowest
-  cluster_t          nearest, farthest;
   about_t            about;
 
   assign take      = entry_valid_q && move && phase_q == '0;
@@ -385,105 +358,45 @@ module flk_cluster_cull
     .reach_2_i   (setup_i.reach[2]),
     .reach_3_i   (setup_i.reach[3]),
     .reach_4_i   (setup_i.reach[4]),
-    .keep_o      (kept),
-    .nearest_o   (nearest),
-    .farthest_o  (farthest)
+    .keep_o      (kept)
   );
 
   always_ff @(posedge clk_i) begin
-    if (start || state_q == BOUNDS) begin
+    if (start) begin
       tested_q <= '0;
-    end else if (testing && at_output) begin
+    end else if (state_q == TEST && at_output) begin
       tested_q <= tested_q + 1'b1;
     end
   end
 
-  // ---- first pass: bounds and counts ----------------------------------------------------------------
+  // ---- counts and errors ----------------------------------------------------------------------------
 
-  logic               any_q, bounds_valid_q, error_q, damaged_q, done_q;
-  cluster_t           nearest_q, farthest_q, span;
-  logic signed [8:0]  shift_span;
-  logic signed [7:0]  shift;
-  logic signed [7:0]  shift_q;
-  position_t          key_low, key_low_q;
-  logic [31:0]        clusters_q, gaussians_q;
+  logic        error_q, damaged_q, done_q;
+  logic [31:0] clusters_q, gaussians_q;
 
-  // Depths here are at least NEAR, so that their codes compare as numbers do.
   always_ff @(posedge clk_i) begin
     if (start) begin
-      any_q       <= 1'b0;
-      nearest_q   <= NEAR;
-      farthest_q  <= NEAR;
       clusters_q  <= '0;
       gaussians_q <= '0;
-    end else if (state_q == FIRST && at_output) begin
-      if (kept) begin
-        any_q <= 1'b1;
-        if (nearest[31] || nearest < NEAR) begin
-          nearest_q <= NEAR;
-        end else if (!any_q || nearest < nearest_q) begin
-          nearest_q <= nearest;
-        end
-        if (!farthest[31] && farthest > farthest_q) begin
-          farthest_q <= farthest;
-        end
-      end else begin
-        clusters_q  <= clusters_q + 1'b1;
-        gaussians_q <= gaussians_q + 32'(about.last) + 1'b1;
-      end
-    end else if (state_q == BOUNDS && step_q == 3'd0 && farthest_q < nearest_q) begin
-      farthest_q <= nearest_q;
+    end else if (state_q == TEST && at_output && !kept) begin
+      clusters_q  <= clusters_q + 1'b1;
+      gaussians_q <= gaussians_q + 32'(about.last) + 1'b1;
     end
   end
-
-  flk_ff_add #(
-    .ManBits(23),
-    .Stages (3)
-  ) i_span (
-    .clk_i,
-    .en_i (state_q == BOUNDS),
-    .a_i  (farthest_q),
-    .b_i  ({1'b1, nearest_q[30:0]}),
-    .sum_o(span)
-  );
-
-  logic unused_span;  // but its exponent
-  assign unused_span = ^{span[31], span[22:0]};
-
-  // Keys of KeyBits for all depths of the span; a span of 0, code 0, has the largest shift.
-  assign shift_span = 9'(KeyBits - 1 + 127) - 9'(span[30:23]);
-  assign shift      = shift_span > MAX_SHIFT ? 8'(MAX_SHIFT) : 8'(shift_span);
-
-  always_ff @(posedge clk_i) begin
-    if (state_q == BOUNDS && step_q == 3'd4) begin
-      shift_q   <= shift;
-      key_low_q <= key_low;
-    end
-  end
-
-  flk_ff_narrow #(
-    .FromBits(23),
-    .ManBits (POSITION_MAN_BITS)
-  ) i_low (
-    .x_i(nearest_q),
-    .y_o(key_low)
-  );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      bounds_valid_q <= 1'b0;
-      error_q        <= 1'b0;
-      damaged_q      <= 1'b0;
-      done_q         <= 1'b0;
+      error_q   <= 1'b0;
+      damaged_q <= 1'b0;
+      done_q    <= 1'b0;
     end else begin
-      bounds_valid_q <= !start && (bounds_valid_q || (state_q == BOUNDS && step_q == 3'd5));
-      error_q        <= !start && (error_q || (beat_valid && beat_error));
-      damaged_q      <= !start && (damaged_q || not_finite_q);
-      done_q         <= state_q == LEAVE && out_empty;
+      error_q   <= !start && (error_q || (beat_valid && beat_error));
+      damaged_q <= !start && (damaged_q || not_finite_q);
+      done_q    <= state_q == LEAVE && out_empty;
     end
   end
 
-  // ---- second pass: kept clusters -------------------------------------------------------------------
+  // ---- kept clusters --------------------------------------------------------------------------------
 
   logic       unused_full;
   logic [1:0] unused_usage;
@@ -499,7 +412,7 @@ module flk_cluster_cull
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
-    .in_valid_i ((state_q == SECOND && at_output && kept) || state_q == LAST),
+    .in_valid_i ((state_q == TEST && at_output && kept) || state_q == LAST),
     .in_ready_o (out_room),
     .in_data_i  ({state_q == LAST, cluster}),
     .out_valid_o,
@@ -514,9 +427,6 @@ module flk_cluster_cull
   assign done_o             = done_q;
   assign error_o            = error_q;
   assign damaged_o          = damaged_q;
-  assign bounds_valid_o     = bounds_valid_q;
-  assign key_shift_o        = shift_q;
-  assign key_low_o          = key_low_q;
   assign culled_clusters_o  = clusters_q;
   assign culled_gaussians_o = gaussians_q;
 
@@ -530,10 +440,6 @@ module flk_cluster_cull
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) beat_valid |-> unused_room)
   else $error("flk_cluster_cull: a beat without a place");
-
-  assert property (@(posedge clk_i) disable iff (!rst_ni)
-      out_valid_o && !out_end_o |-> bounds_valid_o)
-  else $error("flk_cluster_cull: a kept cluster before the bounds");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       state_q == LAST |-> fetch_idle && !line_valid)

@@ -192,8 +192,6 @@ package flk_preproc_pkg;
     logic [3:0][31:0]  lines;
     logic [3:0][31:0]  evicted;
     logic [3:0][24:0]  taken;           // chunks
-    logic signed [7:0] key_shift;
-    position_t         key_low;
     logic [31:0]       spilled;         // lines of pointers, by all list writers
     logic [31:0]       fetched;
     // Cycles in which something waits, added up over lanes and list writers.

@@ -205,9 +205,7 @@ module flk_preprocessing
   logic              group_valid, group_ready, group_end;
   group_t            group;
   logic              cull_error, geometry_error, colour_error, cull_damaged, geometry_damaged;
-  logic signed [7:0] key_shift;
-  position_t         key_low;
-  logic              unused_bounds, unused_cull_done, unused_geometry_done;
+  logic              unused_cull_done, unused_geometry_done;
 
   flk_cluster_cull #(
     .IdBits(IdBits)
@@ -222,9 +220,6 @@ module flk_preprocessing
     .done_o            (unused_cull_done),
     .error_o           (cull_error),
     .damaged_o         (cull_damaged),
-    .bounds_valid_o    (unused_bounds),
-    .key_shift_o       (key_shift),
-    .key_low_o         (key_low),
     .culled_clusters_o (counters_o.culled_clusters),
     .culled_gaussians_o(counters_o.culled_gaussians),
     .out_valid_o       (kept_valid),
@@ -623,8 +618,6 @@ module flk_preprocessing
       .clk_i,
       .rst_ni,
       .setup_i       (registers_i.lane),
-      .key_shift_i   (key_shift),
-      .key_low_i     (key_low),
       .idle_o        (lane_idle[k]),
       .front_en_i    (front_en),
       .front_phase_i (front_phase_q),
@@ -1074,8 +1067,6 @@ module flk_preprocessing
   assign counters_o.lines        = list_lines;
   assign counters_o.evicted      = list_evicted;
   assign counters_o.taken        = list_taken;
-  assign counters_o.key_shift    = key_shift;
-  assign counters_o.key_low      = key_low;
 
   assign error_o = {geometry_damaged, cull_damaged, |list_failed, beyond_q,
                     write_error_q || pointer_write_error,
@@ -1083,8 +1074,7 @@ module flk_preprocessing
 
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,
-                    unused_bounds, unused_cull_done, unused_geometry_done, unused_done,
-                    unused_index, fill[3]};
+                    unused_cull_done, unused_geometry_done, unused_done, unused_index, fill[3]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

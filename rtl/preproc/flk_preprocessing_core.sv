@@ -10,7 +10,7 @@
 // Spherical harmonics of those that wait are ready when their colours come. progress_o: no entry of
 // this lane with a seq before it is to come; issued_i is the next seq that will be given to any lane.
 // Counters are pulses: a survivor whose mean was saturated, whose colour was clipped, whose opacity
-// code is 0, that has no entry. setup_i, key_*_i stay while idle_o is low.
+// code is 0, that has no entry. setup_i stays while idle_o is low.
 // Throughput: a Gaussian every two cycles in front, behind every two cycles (SH degree 0 to 2) or
 // four (3), a band of tiles a cycle, an entry a cycle. No combinational path from ready to ready but
 // within the streams' own stages.
@@ -29,8 +29,6 @@ module flk_preprocessing_core
   input  logic                        clk_i,
   input  logic                        rst_ni,
   input  lane_setup_t                 setup_i,
-  input  logic signed [7:0]           key_shift_i,
-  input  position_t                   key_low_i,
   output logic                        idle_o,       // nothing behind the front
   // Front, in step with the other lanes
   input  logic                        front_en_i,
@@ -191,8 +189,6 @@ module flk_preprocessing_core
       .height_i     (setup_i.height),
       .chunked_i    (setup_i.chunked),
       .antialiased_i(setup_i.antialiased),
-      .key_shift_i,
-      .key_low_i,
       .near_o,
       .outside_o,
       .far_o        (far),
@@ -268,8 +264,6 @@ module flk_preprocessing_core
       .height_i     (setup_i.height),
       .chunked_i    (setup_i.chunked),
       .antialiased_i(setup_i.antialiased),
-      .key_shift_i,
-      .key_low_i,
       .near_o,
       .outside_o,
       .far_o        (far),

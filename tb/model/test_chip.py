@@ -373,17 +373,17 @@ def test_frame_bottleneck_and_choices(prepared):
 
 
 def test_preprocessing_by_phases():
-    """Three phases of full queues and a rest: the longer of units and DRAM in each, the first pass over the table apart."""
+    """Three phases of full queues and a rest: the longer of units and DRAM in each."""
     step = WAITING * LANES
     went = np.concatenate([np.linspace(0, 99, step), np.linspace(100, 1099, step), np.linspace(1100, 1199, step), [1200.0] * 3]).astype(np.int64)
-    units = UnitCycles(50, np.arange(len(went), dtype=float), went, 50 + 1300)
-    table = Beats("table", np.zeros(40, np.int64), np.zeros(40), False)  # 20 in the first pass
+    units = UnitCycles(np.arange(len(went), dtype=float), went, 1300)
+    table = Beats("table", np.zeros(20, np.int64), np.zeros(20), False)
     even = Beats("geometry", np.zeros(300, np.int64), np.repeat(np.arange(3) * step, 100).astype(float), False)
     assert phases(units, [table, even], 0) == units.all
     # A cycle a beat: the first phase's 120 are more than its 100 cycles, the third's 100 are not.
-    assert phases(units, [table, even], 340) == 50 + 120 + 1000 + 100 + 100
-    assert phases(units, [table, even], 34_000) == 34_000 + 100
-    assert phases(units, [table, replace(even, due=even.due + step)], 340) == 50 + 100 + 1000 + 100 + 100
+    assert phases(units, [table, even], 320) == 120 + 1000 + 100 + 100
+    assert phases(units, [table, even], 32_000) == 32_000 + 100
+    assert phases(units, [table, replace(even, due=even.due + step)], 320) == 100 + 1000 + 100 + 100
 
 
 def test_recommended_scheme_fits_the_feature_buffers():

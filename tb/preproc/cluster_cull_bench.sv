@@ -32,19 +32,15 @@ module cluster_cull_bench
   input  logic            mem_r_last_i
 );
 
-  logic error, damaged, bounds_valid, out_end, unused;
-  logic signed [7:0] key_shift;
-  flk_front_pkg::position_t key_low;
+  logic error, damaged, out_end, unused;
   logic [31:0] clusters, gaussians;
   kept_t cluster;
 
   assign in_ready_o = 1'b0;
   assign unused = ^{in_valid_i, in_data_i, registers_i[959:954]};
 
-  // Word by word: error, bounds valid and damaged, shift, lowest depth, culled clusters and Gaussians.
-  assign status_o = 192'({
-    gaussians, clusters, 32'(key_low), 32'(key_shift), 29'b0, damaged, bounds_valid, error
-  });
+  // Word by word: error and damaged, culled clusters and Gaussians.
+  assign status_o = 192'({gaussians, clusters, 30'b0, damaged, error});
   assign out_data_o = 96'({out_end, cluster});
 
   flk_cluster_cull #(
@@ -60,9 +56,6 @@ module cluster_cull_bench
     .done_o,
     .error_o           (error),
     .damaged_o         (damaged),
-    .bounds_valid_o    (bounds_valid),
-    .key_shift_o       (key_shift),
-    .key_low_o         (key_low),
     .culled_clusters_o (clusters),
     .culled_gaussians_o(gaussians),
     .out_valid_o,

@@ -53,7 +53,6 @@ class Sample:
     index: np.ndarray
     lanes: Any
     values: Any
-    culled: Any
 
 
 @cache
@@ -62,7 +61,7 @@ def demo(form: PackedFormat) -> Sample:
     packed = pack(view.scene, form).packed
     setup = FrameSetup.of(view.camera)
     index = np.sort(random(1).choice(len(packed), SOME, replace=False))
-    return Sample(packed, setup, index, lanes_of(packed), cluster_values(packed, setup), cull.cull(packed, setup))
+    return Sample(packed, setup, index, lanes_of(packed), cluster_values(packed, setup))
 
 
 @cache
@@ -93,11 +92,11 @@ def test_cluster_test() -> None:
     low = np.concatenate([table["low"], np.stack([wild(rng, n, CLUSTER_M) for _ in range(3)], 1)]).astype(np.float64)
     high = np.concatenate([table["high"], np.stack([wild(rng, n, CLUSTER_M) for _ in range(3)], 1)]).astype(np.float64)
     sigma = np.concatenate([s.packed.sigma, np.abs(wild(rng, n, CLUSTER_M))]).astype(np.float64)
-    keep, depth = np.zeros(len(low), np.bool_), np.zeros((len(low), 2))
-    cull._cull(low, high, sigma, s.setup.position, s.setup.normal, s.setup.offset, s.setup.reach, keep, depth)
+    keep = np.zeros(len(low), np.bool_)
+    cull._cull(low, high, sigma, s.setup.position, s.setup.normal, s.setup.offset, s.setup.reach, keep)
     assert keep[: len(table)].any() and not keep[: len(table)].all()
     got = bench("flk_cluster_test")(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
-    same(got, {"keep": keep.astype(np.int64), "nearest": depth[:, 0], "farthest": depth[:, 1]})
+    same(got, {"keep": keep.astype(np.int64)})
 
 
 def test_cluster_header() -> None:
@@ -153,8 +152,8 @@ FIELDS = splat.Projection._fields
 
 @numba.njit
 def _projected(
-    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, width, height, const, inverse, shift, key_low,
-    M, N, C, out, places, conic,
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, width, height, const, inverse, M, N, C, out,
+    places, conic,
 ):
     for j in range(len(q)):
         p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, least,
@@ -164,7 +163,7 @@ def _projected(
         y0, y1 = splat.pixels(p.y, p.radius_y, height)
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4] = p.near, x0 > x1 or y0 > y1, p.x, p.y, p.spiky
         places[j, 6] = p.far
-        places[j, 5] = frame.depth_key(p.t2, shift, key_low, M)
+        places[j, 5] = frame.depth_key(p.t2, M)
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
         out[j, 11] = p.scale
@@ -176,7 +175,7 @@ def projected(s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, an
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
     out, places, conic = np.zeros((len(q), 12)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
     _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.least, t.limit, t.middle, share, antialiased, t.width,
-               t.height, splat.constants(FORMATS), inverse, s.culled.key_shift, ff_round(s.culled.nearest, P), P, S, C, out, places, conic)
+               t.height, splat.constants(FORMATS), inverse, P, S, C, out, places, conic)
     return out, places, conic
 
 
@@ -210,7 +209,7 @@ def test_projection(form: Form, features: bool) -> None:
         registers |= {f"{name}_{k}": getattr(t, name)[k] for k in range(3)}
     registers |= {f"{name}_{k}": getattr(t, name)[k] for name in ("least", "limit", "middle") for k in range(2)}
     registers |= {"chunked": chunked, "antialiased": features}
-    registers |= {"width": t.width, "height": t.height, "key_shift": s.culled.key_shift, "key_low": ff_round(s.culled.nearest, P)}
+    registers |= {"width": t.width, "height": t.height}
     low, step, q, scales, quat = inputs
     got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic")(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},

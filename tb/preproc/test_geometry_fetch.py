@@ -47,7 +47,7 @@ def demo(form: PackedFormat) -> tuple[PackedScene, FrameSetup, np.ndarray]:
     """Scene, registers, kept clusters."""
     view = load_view(DEMO, 0, (640, 360))
     packed, setup = pack(view.scene, form).packed, FrameSetup.of(view.camera)
-    return packed, setup, np.flatnonzero(cull.cull(packed, setup).keep)
+    return packed, setup, np.flatnonzero(cull.cull(packed, setup))
 
 
 @cache

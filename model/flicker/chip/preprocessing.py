@@ -25,7 +25,7 @@ from .dram import READ, WRITE, DramConfig, Stream, simulate
 
 # Of the RTL, times in cycles.
 LANES = 4
-CLUSTER_CYCLES = 4  # of the cluster test; the frame begins with a pass over all clusters
+CLUSTER_CYCLES = 4  # of the cluster test
 GROUP_CYCLES = 2  # a group of four enters the front
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
@@ -71,7 +71,7 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     for name, part in packed.sections().items():
         base[name] = at
         at += len(part) // BEAT
-    keep = np.flatnonzero(cull(packed, FrameSetup.of(camera)).keep)
+    keep = np.flatnonzero(cull(packed, FrameSetup.of(camera)))
     size = packed.counts[keep]
     before = np.concatenate([[0], np.cumsum(size)])  # Gaussians of kept clusters, by cluster
     table = np.arange(-(-len(packed.table) * packed.table.itemsize // BEAT))
@@ -86,7 +86,7 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     per_beat = BEAT / each
     inside = geometry_beats - np.repeat(first, geometry)
     out = [
-        Beats("table", base["table"] + np.concatenate([table, table]), np.concatenate([np.zeros(len(table)), due_table.astype(np.float64)]), False),
+        Beats("table", base["table"] + table, due_table.astype(np.float64), False),
         Beats("headers", base["headers"] + _ranges(keep * header, np.full(len(keep), header)), np.repeat(before[:-1], header).astype(np.float64), False),
         Beats("geometry", geometry_beats, np.repeat(before[:-1], geometry) + inside * per_beat, False),
     ]
@@ -173,13 +173,13 @@ def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER
 
 
 @numba.njit(cache=True)
-def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency):
+def _unit_cycles(enters, lane, busy, first, bank, bands, waiting, depth, latency):
     """Cycles until the last entry is with its list writer; and when each survivor left the front.
 
-    Survivors in the order of the scene: group (cycle // 2 at which it may leave the front), lane, busy (cycles of the colour stage), first entry (S + 1,),
-    bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
+    Survivors in the order of the scene: enters (cycle in which its group may leave the front; no two groups in one), lane, busy (cycles of the colour stage),
+    first entry (S + 1,), bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
     """
-    survivors = len(group)
+    survivors = len(enters)
     went = np.zeros(survivors, np.int64)
     own = np.empty((4, survivors), np.int64)  # survivors of each lane
     count = np.zeros(4, np.int64)
@@ -236,12 +236,12 @@ def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency)
                 at[k] = 0
                 until[k] = clock + 1
         # The front: the survivors of a group leave together when all lanes have room.
-        while next_survivor < survivors and 2 * group[next_survivor] + shift <= clock:
+        while next_survivor < survivors and enters[next_survivor] + shift <= clock:
             if (out - begun).max() >= waiting:
-                shift += clock + 1 - (2 * group[next_survivor] + shift)
+                shift += clock + 1 - (enters[next_survivor] + shift)
                 break
-            g = group[next_survivor]
-            while next_survivor < survivors and group[next_survivor] == g:
+            g = enters[next_survivor]
+            while next_survivor < survivors and enters[next_survivor] == g:
                 k = lane[next_survivor]
                 free[k] = max(free[k], clock) + busy[next_survivor]
                 ready[next_survivor] = free[k] + latency
@@ -256,10 +256,9 @@ def _unit_cycles(group, lane, busy, first, bank, bands, waiting, depth, latency)
 
 @dataclass(frozen=True, eq=False)
 class UnitCycles:
-    """A frame if the memory were perfect. first_pass: over the table. place: float64 (S,), Gaussians that entered the front with a survivor; went: int64 (S,),
-    the cycle after the first pass in which it left it. all: until the last entry."""
+    """A frame if the memory were perfect. place: float64 (S,), Gaussians that entered the front with a survivor; went: int64 (S,), the cycle in which it left
+    it. all: until the last entry."""
 
-    first_pass: int
     place: np.ndarray
     went: np.ndarray
     all: int
@@ -268,13 +267,14 @@ class UnitCycles:
 def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
     """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries."""
     packed = frame.packed
-    keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)).keep)
+    keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)))
     groups = -(-packed.counts[keep] // LANES)
     start = np.concatenate([[0], np.cumsum(groups)])
     cluster = packed.cluster[frame.gaussian]
     within = frame.gaussian - packed.start[cluster]
     slot = np.searchsorted(keep, cluster)
-    group = start[slot] + within // LANES
+    # A cluster enters when it has been tested and those before it have.
+    enters = GROUP_CYCLES * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES * (keep + 1) - GROUP_CYCLES * start[:-1])
     place = np.concatenate([[0], np.cumsum(packed.counts[keep])])[slot] + within
     degree = packed.degrees[cluster]
     lane = within % LANES
@@ -286,24 +286,22 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
     band = (frame.entry_splat.astype(np.int64)[:, None] << 20 | y[:, None].astype(np.int64) << 1 | np.arange(2))[half]
     bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
     front, went = _unit_cycles(
-        group, lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, waiting, MERGE_DEPTH, LATENCY,
+        enters[slot] + GROUP_CYCLES * (within // LANES), lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, waiting,
+        MERGE_DEPTH, LATENCY,
     )
-    first_pass = CLUSTER_CYCLES * len(packed.table)
-    return UnitCycles(first_pass, place.astype(np.float64), went, int(max(front, GROUP_CYCLES * start[-1])) + first_pass)
+    fed = enters[-1] + GROUP_CYCLES * groups[-1] if len(keep) else 0
+    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES * len(packed.table))))
 
 
 def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING) -> int:
     """Cycles of a frame whose traffic takes the DRAM `dram` cycles, beats at an even rate."""
     step = waiting * LANES
     bounds = np.arange(step, len(units.went), step)  # the first survivor of each phase but the first
-    unit = np.diff(np.concatenate([[0], units.went[bounds], [units.all - units.first_pass]]))
+    unit = np.diff(np.concatenate([[0], units.went[bounds], [units.all]]))
     due = np.concatenate([b.due for b in beats])
     phase = np.searchsorted(units.place[bounds], due, side="right") if len(bounds) else np.zeros(len(due), np.int64)
-    first = sum(len(b.beat) for b in beats if b.name == "table") // 2  # of the first pass
-    count = np.bincount(phase, minlength=len(unit))
-    count[0] -= first
     each = dram / max(len(due), 1)
-    return round(max(units.first_pass, each * first) + np.maximum(unit, each * count).sum())
+    return round(np.maximum(unit, each * np.bincount(phase, minlength=len(unit))).sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -279,7 +279,7 @@ def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig
     np.maximum.at(largest, number[lists.entry], peak)
     seen = np.where(entry >= 0, number[lists.entry[entry]], -1) if len(lists.entry) else entry
     fetched, recorded = np.zeros((2, gaussians), np.bool_)
-    kept = cull(packed, FrameSetup.of(camera)).keep
+    kept = cull(packed, FrameSetup.of(camera))
     fetched[packing.order[kept[packed.cluster]]] = True
     recorded[number] = True
     return ViewCost(

@@ -56,10 +56,8 @@ def _contents(packed: PackedScene, title: str) -> Table:
 
 
 def _measured(table: Table, packed: PackedScene, path: Path, brought: bool) -> None:
-    """How coarse positions and depth keys are, in the scene's own views or an orbit; warns where that is a loss to be seen. brought: the clusters are the
+    """How coarse positions are, in the scene's own views or an orbit; warns where that is a loss to be seen. brought: the clusters are the
     file's own."""
-    from ..golden.front.depths import DepthSteps
-    from ..golden.front.setup import MAX_PICTURE
     from ..scene.camera import find_cameras
     from ..scene.demo import demo_cameras
     from ..scene.packed import decode
@@ -78,9 +76,6 @@ def _measured(table: Table, packed: PackedScene, path: Path, brought: bool) -> N
     table.add_row("", f"{steps.mean_px:.2g}, largest {steps.largest_px:.2g}", f"pixels, in {steps.views} views")
     if steps.coarse:
         warnings.warn(FlickerWarning(f"{path}: {steps.warning(brought)}"), stacklevel=2)
-    depths = [DepthSteps.of(packed, camera) for camera in cameras if max(camera.width, camera.height) <= MAX_PICTURE]
-    if coarse := [found for found in depths if found.coarse]:
-        warnings.warn(FlickerWarning(f"{path}: in {len(coarse)} of {len(depths)} views, {coarse[0].warning}"), stacklevel=2)
 
 
 def _history(table: Table, packing: Packing) -> None:

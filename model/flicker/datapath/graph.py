@@ -142,6 +142,8 @@ class Value:
         return self.graph.integer(0) - self
 
     def __lshift__(self, places: int) -> Value:
+        if not places:
+            return self
         return self.graph.wire(f"{{0}} <<< {places}", Int(self.range.low << places, self.range.high << places), (self,))
 
     def __rshift__(self, places: int) -> Value:
@@ -270,6 +272,10 @@ class Graph:
     def ff_neg(self, x: Value) -> Value:
         top = x.kind.bits - 1
         return self.wire(f"{{{{{{0}}[{top}] ^ (|{{0}}[{top - 1}:{x.M}]), {{0}}[{top - 1}:0]}}}}", x.kind, (x,))
+
+    def ff_bits(self, x: Value) -> Value:
+        """The code of a number."""
+        return self.wire("{0}", Int(0, (1 << x.kind.bits) - 1), (x,))
 
     def ff_round(self, x: Value, M: int) -> Value:
         if x.M == M:
@@ -419,6 +425,7 @@ def _symbolic() -> dict[str, Any]:
         "ff_sqrt": lambda x, M: x.graph.ff_function("flk_ff_sqrt", x, M),
         "ff_neg": lambda x: x.graph.ff_neg(x),
         "ff_round": lambda x, M: x.graph.ff_round(x, M),
+        "ff_bits": lambda x, M: x.graph.ff_bits(x),
         "ff_ldexp": lambda x, shift, M: x.graph.ldexp(x, shift),
         "ff_to_fixed_round": lambda x, frac_bits, bits: x.graph.to_fixed(x, frac_bits, bits, True),
         "ff_to_fixed_floor": lambda x, frac_bits, bits: x.graph.to_fixed(x, frac_bits, bits, False),

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..arithmetic.ff import ff_round, ff_sub
 from ..golden.front import colour, cull, frame, reach, splat
-from ..golden.front.setup import CLUSTER_M, MAX_KEY_SHIFT, MAX_PICTURE, MIDDLE_INTEGER, FrontFormats
+from ..golden.front.setup import CLUSTER_M, MAX_PICTURE, MIDDLE_INTEGER, FrontFormats
 from ..params import SUBTILE, Form
 from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
@@ -86,9 +86,7 @@ def cluster_test(formats: FrontFormats) -> Graph:
     position = g.inputs("position", kind, (3,), register=True)
     normal = _Matrix(g.inputs("normal", kind, (5, 3), register=True))
     offset, far = (g.inputs(n, kind, (5,), register=True) for n in ("offset", "reach"))
-    keep, nearest, farthest = retrace(cull.test_cluster)(low, high, sigma, position, normal, offset, far)
-    for name, value in (("keep", keep), ("nearest", nearest), ("farthest", farthest)):
-        g.output(name, value)
+    g.output("keep", retrace(cull.test_cluster)(low, high, sigma, position, normal, offset, far))
     return g
 
 
@@ -150,7 +148,6 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
     chunked, antialiased = (g.input(n, BOOL, register=True) for n in ("chunked", "antialiased"))
     share = g.pick(chunked, g.number(frame.CHUNK_SHARE, S), g.number(frame.FP16_SHARE, S))
-    shift, key_low = g.input("key_shift", Int(-128, MAX_KEY_SHIFT), True), g.input("key_low", Ff(P), True)
     const = splat.constants(formats).tolist()
     p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, least, limit, middle, share, antialiased, const, P, S, formats.mean)
     _name(p)
@@ -168,7 +165,7 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
             g.output(f"conic_{k}", value)
     for name, value in steady._asdict().items():
         g.output(name, value)
-    g.output("key", retrace(frame.depth_key)(p.t2, shift, key_low, P, formats.key))
+    g.output("key", retrace(frame.depth_key)(p.t2, P, formats.key))
     for k, value in enumerate((p.d0, p.d1, p.d2)):
         g.output(f"direction_{k}", g.ff_round(value, formats.colour))
     return g

@@ -34,7 +34,10 @@ LIMIT = 100_000_000  # cycles of a frame
 SLICE = 5_000  # cycles between looks at the progress
 
 # Names in the order of their words, and how many words each has.
-FRONT, FRONT_WAITS = ([(name, n) for name, _, n in fields] for fields in (preprocessing.WORK, preprocessing.WAITS))
+# Two words between the list writers' and the pointers' have no counter.
+FRONT, POINTERS, FRONT_WAITS = (
+    [(name, n) for name, _, n in fields] for fields in (preprocessing.WORK[:-2], preprocessing.WORK[-2:], preprocessing.WAITS)
+)
 RENDERING, RENDERING_WAITS = ([(name, n) for name, _, n in fields] for fields in (rendering.WORK, rendering.WAITS))
 STAMPS = [(counter.name.removeprefix("STAMP_").lower(), 1) for counter in ChipCounter if counter.name.startswith("STAMP_")]
 LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCounter if counter.name.startswith("LIVE_")]
@@ -285,8 +288,8 @@ class ChipSession(Half):
         else:
             self._wait_with(progress, frame, limit)
         buffer = self.buffer(frame)
-        front = self._counters(ChipCounter.FRONT_CYCLES, FRONT) | self._counters(ChipCounter.FRONT_CLUSTER_WAITS, FRONT_WAITS)
-        front["key_shift"] = int(np.int32(np.uint32(front["key_shift"])))
+        front = self._counters(ChipCounter.FRONT_CYCLES, FRONT) | self._counters(ChipCounter.POINTERS_SPILLED, POINTERS)
+        front |= self._counters(ChipCounter.FRONT_CLUSTER_WAITS, FRONT_WAITS)
         rendering_ = self._counters(ChipCounter.RENDERING_CYCLES, RENDERING) | self._counters(ChipCounter.LIST_LINE_WAITS, RENDERING_WAITS)
         stamps = {name: int(value) for name, value in self._counters(ChipCounter.STAMP_TAKEN, STAMPS).items()}
         words = 1 << COUNTER_INDEX_BITS

@@ -16,7 +16,7 @@ from ..errors import FlickerError
 from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
-from ..golden.front.setup import CLUSTER_M, FORMATS, MIDDLE_INTEGER, FrameSetup
+from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..params import TILE
 from ..scene.camera import Camera
@@ -37,8 +37,7 @@ WORK = (
         "cycles", "culled_clusters", "culled_gaussians", "too_near", "outside", "survivors", "faint", "unlisted", "saturated", "clipped", "header_beats",
         "geometry_beats", "colour_beats", "record_beats",
     )),
-    ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("key_shift", 8, 1), ("key_low", 9 + FORMATS.position, 1),
-    ("spilled", 32, 1), ("fetched", 32, 1),
+    ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("spilled", 32, 1), ("fetched", 32, 1),
 )
 WAITS = tuple((name, 32, 1) for name in (
     "cluster_waits", "group_missing", "lane_waits", "place_waits", "request_waits", "colour_waits", "record_waits", "entry_waits", "merged_waits", "line_waits",

@@ -69,7 +69,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_sort_select": [MEMORY],
     "flk_sorting_unit": ["flk_sort_runs", "flk_sort_merge", "flk_sort_select"],
     "flk_axi_fetch": ["flk_axi_read"],
-    "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_ff_add", "flk_fifo"],
+    "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
     "flk_preprocessing_core": [

@@ -14,7 +14,7 @@ from enum import Enum
 import numba
 import numpy as np
 
-from ...arithmetic.ff import ff_exp2_fixed, ff_ldexp, ff_mul, ff_round, ff_sub, ff_to_fixed_floor, ff_to_fixed_round, pick
+from ...arithmetic.ff import ff_bits, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_round, pick
 from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE
 from ...scene.camera import Camera
@@ -42,6 +42,8 @@ SCALE_HEADER_BITS = 27  # of the low end, saturated
 SCALE_STEP_BITS = 17  # of the step, saturated, not negative: up to 1/8
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
+KEY_FIRST_EXPONENT = 124  # code of the least depth's exponent: 0.2 is 1.6 times 2^-3
+KEY_EXPONENT_BITS = 5  # up to 2^29
 OPACITY_LIMIT = 255
 FP16_SHARE, CHUNK_SHARE = 255.0, 2.0**24  # what makes a code of an opacity, by format
 FP16_STEP = 2.0**-COEFFICIENT_FRACTION  # in place of a header's
@@ -163,9 +165,12 @@ def project_lane(
 
 
 @numba.njit
-def depth_key(depth, shift, low, M, bits=KEY_BITS):
-    """Key of a depth: its steps of 2^-shift beyond the lowest depth, saturated. The difference keeps the order; numbers next to each other may share a key."""
-    return max(ff_to_fixed_floor(ff_ldexp(ff_sub(depth, low, M), shift, M), 0, bits + 1), 0)
+def depth_key(depth, M, bits=KEY_BITS):
+    """Key of a depth, `bits` bits: its ff number's code less that of 2^-3, saturated, first bits first. Codes keep the order; a step is 2^-19 of a depth with
+    24 bits, depths from 2^29 on share the last key."""
+    drop = KEY_EXPONENT_BITS + M - bits
+    code = min(max(ff_bits(max(depth, 0.0), M) - (KEY_FIRST_EXPONENT << M), 0), (1 << (KEY_EXPONENT_BITS + M)) - 1)
+    return code >> drop if drop > 0 else code << -drop
 
 
 @numba.njit
@@ -213,7 +218,7 @@ def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
 @numba.njit(parallel=True, cache=True)
 def _splats(
     index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, factor, logs, sigmas, cut,
-    inverse, box, conic, shift, key_low, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
+    inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
@@ -237,7 +242,7 @@ def _splats(
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
-        key[j] = depth_key(p.t2, shift, key_low, P, w.key)
+        key[j] = depth_key(p.t2, P, w.key)
         flags[j, 0] = p.far
         rgb = np.empty(3, np.int64)
         colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
@@ -354,9 +359,9 @@ def run_front(
 ) -> FrontFrame:
     """Cull, project, colour, record and list a packed scene. FlickerError for pictures beyond 4096x4096."""
     setup = FrameSetup.of(camera, formats)
-    culled = cull(packed, setup)
+    keep = cull(packed, setup)
     lanes, values = lanes_of(packed), cluster_values(packed, setup)
-    index = np.flatnonzero(culled.keep[packed.cluster])
+    index = np.flatnonzero(keep[packed.cluster])
     n = len(index)
     outcome, key, words = np.zeros(n, np.int8), np.zeros(n, np.uint32), np.zeros((n, 2), np.int64)
     conic = kind is RecordKind.CONIC32
@@ -369,7 +374,7 @@ def run_front(
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
-        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, culled.key_shift, ff_round(culled.nearest, P), P, S, C, formats.widths,
+        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, P, S, C, formats.widths,
         outcome, key, words, unrounded, entries, flags, places, numbers,
     )
     kept = np.flatnonzero(outcome >= Outcome.FAINT)
@@ -385,7 +390,7 @@ def run_front(
     unrounded = unrounded[kept]
     records, adjusted = _records(kind, words[kept], unrounded, flags[kept])
     return FrontFrame(
-        camera, packed, kind, int(culled.keep.sum()), gaussian, number, records, key[kept],
+        camera, packed, kind, int(keep.sum()), gaussian, number, records, key[kept],
         np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted, unrounded, formats,
     )
 

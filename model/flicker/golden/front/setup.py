@@ -20,7 +20,6 @@ MAX_MIDDLE = (1 << MIDDLE_INTEGER - 1) - 1  # pixels from the first pixel's cent
 CLUSTER_M = 23  # mantissa bits of the cluster test: those of the image's own float32
 MEAN_FRACTION = 7  # fraction bits of a mean in pixels
 KEY_BITS = 24
-MAX_KEY_SHIFT = 63
 _RADIUS_MARGIN = 3.0 * np.sqrt(DILATION + np.sqrt(0.1)) + 2.0
 _SLACK = 1.0 + 2.0**-14
 
