@@ -310,9 +310,11 @@ def test_full_disk_behind_a_command(tmp_path: Path) -> None:
         done = flicker("pack", tmp_path / "scene.ply", "-o", tmp_path / "scene.flk")
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert done.stderr.startswith(f"flicker: {tmp_path / 'scene.flk'}: cannot be written (") and [p.name for p in tmp_path.iterdir()] == ["scene.ply"]
-    with open("/dev/full", "w") as full:
-        done = subprocess.run([sys.executable, "-m", "flicker.cli.main", "--version"], stdout=full, stderr=subprocess.PIPE, text=True)
-    assert (done.returncode, done.stderr) == (2, "flicker: standard output: No space left on device\n")
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    for words in ("--version", "--help"):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([sys.executable, "-m", "flicker.cli.main", words], stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
+        assert (done.returncode, done.stderr) == (2, "flicker: standard output: No space left on device\n"), words
 
 
 def test_whole_folder_or_none(tmp_path: Path) -> None:

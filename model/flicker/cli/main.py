@@ -15,6 +15,7 @@ from .chip import chip
 from .convert import convert
 from .cost import cost
 from .fit import fit
+from .grow import grow
 from .pack import pack
 from .render import demo, render
 from .report import report
@@ -25,7 +26,7 @@ from .view import view
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
-for command in (render, demo, view, convert, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
+for command in (render, demo, view, convert, grow, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
     app.command()(command)
 
 
@@ -55,10 +56,14 @@ def _show_warning(message: Any, category: Any, *rest: Any) -> None:
 
 def _run(words: list[str]) -> int:
     """The command that the words name; its exit code. Typer's own `main` would take Ctrl-C without what it says."""
-    with typer.main.get_command(app).make_context("flicker", words) as context:
-        context.command.invoke(context)
+    code = 0
+    try:
+        with typer.main.get_command(app).make_context("flicker", words) as context:
+            context.command.invoke(context)
+    except typer.Exit as exit:
+        code = exit.exit_code
     sys.stdout.flush()  # a full disk behind it is an error of this command
-    return 0
+    return code
 
 
 def _no_more_output() -> None:
@@ -71,8 +76,6 @@ def main() -> None:
     warnings.showwarning = _show_warning  # type: ignore[assignment]  # the rest is handed on as it comes
     try:
         sys.exit(_run(sys.argv[1:]))
-    except typer.Exit as exit:
-        sys.exit(exit.exit_code)
     except FlickerError as error:
         message = str(error)
     except typer.exceptions.TyperException as error:  # wrong use of the command line
