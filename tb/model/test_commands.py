@@ -48,7 +48,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"(?:\.venv/bin/)?flicker render .*--engine (?:rtl|chip)\b(?!-).*", "slow"),
     (r"flicker (?:chip .* --.*|cost .* --size .*)", "slow"),
     (r"(?:\.venv/bin/)?flicker render .*", "run"),
-    (r"flicker (?:chip|convert|cost|pack) .*|\.venv/bin/flicker pack .*", "run"),
+    (r"flicker (?:chip|convert|cost|grow|pack) .*|\.venv/bin/flicker pack .*", "run"),
     (r"flicker (?:(?:report|stability) --list|--version)", "run"),
     (r"(?:\.venv/bin/)?flicker (?:fit|budget|undistort|report|stability|sweep|view)( .*)?", "slow"),
     (r"flicker demo", "slow"),

@@ -1,0 +1,62 @@
+"""`flicker grow`: a larger scene that looks much the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from .options import RichSteps, check_apart, check_scene, console, writable, write_atomically
+
+SIZE = (640, 360)  # of the picture that is compared
+
+
+def grow(
+    scenes: Annotated[list[Path], typer.Argument(help="scene as for flicker render, or demo; several are put side by side")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="file to write, as for flicker convert")],
+    times: Annotated[float, typer.Option(help="Gaussians for each of the scenes, split along their longest axis")] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="which Gaussians are split once more where TIMES is no power of two")] = 0,
+) -> None:
+    """Make a scene of more Gaussians, to measure how a frame grows with them; says how much the picture changed."""
+    for scene in scenes:
+        check_scene(scene)
+    steps = RichSteps()
+    with steps.step("starting"):
+        from ..errors import FlickerError
+        from ..front.projection import project
+        from ..front.reference import render_reference
+        from ..front.view import load_view
+        from ..scene.grow import grown, joined
+        from ..scene.metrics import psnr
+        from ..scene.write import Written, write_scene, writer_of
+    suffix = writer_of(out)
+    writable(out, "--out")
+    for scene in scenes:
+        check_apart(out, "--out", scene)
+    views = []
+    for scene in scenes:
+        with steps.step(f"loading {scene}"):
+            views.append(load_view(scene, 0, SIZE))
+    before = views[0].scene if len(views) == 1 else joined([view.scene for view in views])
+    with steps.step("splitting"):
+        try:
+            after = grown(before, times, seed)
+        except FlickerError as error:
+            raise FlickerError(f"--times: {error}") from error
+    written: list[Written] = []
+    with steps.step(f"writing {out.name}"):
+        write_atomically(out, lambda path: written.append(write_scene(after, path, suffix)))
+    with steps.step("comparing pictures"):
+        camera = views[0].camera
+        pictures = [render_reference(project(scene, camera), camera) for scene in (before, after)]
+    table = Table(show_header=False, title=f"{' '.join(map(str, scenes))} in {out.name}")
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column()
+    table.add_row("Gaussians", f"{written[0].count:,}", f"of {len(before):,}")
+    table.add_row("seed", str(seed))
+    if after is not before:
+        table.add_row("picture", f"{psnr(*pictures):.1f} dB", f"of view 0 at {SIZE[0]}x{SIZE[1]}, against what it was")
+    console.print(table)
