@@ -97,12 +97,14 @@ def build(
 
 
 @contextlib.contextmanager
-def refused(message: str) -> Iterator[None]:
-    """Expects a build that fails with ``message`` in its log; the units inside may have something to say first."""
+def refused(*messages: str) -> Iterator[None]:
+    """Expects a build that fails with all ``messages`` in its log; the units inside may have something to say first."""
     with pytest.raises(FlickerError) as raised:
         yield
     log = re.search(r"\(see (.*)\)", str(raised.value))
-    assert log is not None and message in Path(log[1]).read_text(), str(raised.value)
+    assert log is not None, str(raised.value)
+    text = Path(log[1]).read_text()
+    assert not [message for message in messages if message not in text], str(raised.value)
 
 
 def build_and_test(
