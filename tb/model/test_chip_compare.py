@@ -10,7 +10,7 @@ import pytest
 from scene_samples import random_scene
 
 from flicker.chip import preprocessing, rendering
-from flicker.chip.compare import FRONTS, by_oriented_boxes, chip_estimates, chip_stage
+from flicker.chip.compare import FRONTS, by_oriented_boxes, chip_estimates, chip_stage, own_sorter
 from flicker.chip.dram import DramConfig
 from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import WholeFrame, whole_frame
@@ -72,6 +72,17 @@ def test_stages(view: View) -> None:
     assert chip_stage(get_configuration("rows-ellipse")) is None
     with pytest.raises(FlickerError, match="rows-ellipse: no RTL of its rendering stage"):
         chip_estimates(view, ["rows-ellipse"])
+
+
+def test_rivals_have_their_own_sorter(view: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    """GSCore and stages without a contribution test, lanes not: an ideal one, so that ours slows none of them."""
+    assert {name for name in group("chip") if own_sorter(get_configuration(name))} == {"no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic"}
+    names = ["no-ctu-64-conic", "faithful"]
+    ideal = chip_estimates(view, names)
+    monkeypatch.setattr("flicker.chip.compare.own_sorter", lambda configuration: False)
+    ours = chip_estimates(view, names)
+    assert ideal["faithful"] == ours["faithful"] and ideal["no-ctu-64-conic"]["render_cycles"] < ours["no-ctu-64-conic"]["render_cycles"]
+    assert ideal["no-ctu-64-conic"]["dram_bytes"] <= ours["no-ctu-64-conic"]["dram_bytes"]
 
 
 def test_estimates(view: View) -> None:

@@ -93,6 +93,18 @@ def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:
     assert small.bytes["lists"] == default.bytes["lists"]
 
 
+def test_ideal_sorter() -> None:
+    """Reads each list once, adds nothing to the time of its bytes, whatever the memories; records as with a sorting unit."""
+    config = RenderConfig(memories="small")
+    ideal = TileLists.of(*frame(), None)
+    free, sorted_ = estimate(ideal, config, None), modelled(config)
+    assert free.bytes["lists"] == 64 * ideal.lines.sum() < sorted_.bytes["lists"] and free.cycles < sorted_.cycles
+    assert np.array_equal(ideal.record, TileLists.of(*frame(), config.chip_memories.sorted_entries).record)
+    # One list of n entries: with a sorting unit at least n cycles more than without, beside its latency.
+    t = int(np.diff(ideal.start).argmax())
+    assert len(ideal.reading_size) == len(ideal.lines) and ideal.reading_size[t] == np.diff(ideal.start)[t] > config.chip_memories.sorted_entries
+
+
 def test_cycles() -> None:
     """No frame is faster than its slowest core's blending; memory and VRUs tell."""
     perfect, slow = modelled(RenderConfig()), modelled(RenderConfig(), DramConfig())

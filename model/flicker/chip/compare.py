@@ -75,24 +75,31 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
+def own_sorter(configuration: Configuration) -> bool:
+    """Whether a configuration is a rival, whose lists an ideal sorter sorts: GSCore, and stages of channels without a contribution test."""
+    stage = chip_stage(configuration)
+    return isinstance(configuration.stage, SubtileVrus) or (stage is not None and not stage.by_lanes and stage.mask_generator == "all")
+
+
 def chip_estimates(view: View, names: Sequence[str], memories: str = "default", dram: DramConfig | None = None) -> dict[str, dict]:
     """Cycles, bytes and the bottleneck of configurations in whole frames, by name; front ends by the form of the stage (`FRONTS`), lists of GSCore by oriented
-    boxes. memories: `RenderConfig.memories`. FlickerError for one that the chip cannot have."""
+    boxes. Rivals (`own_sorter`) have an ideal sorter, which costs the bytes of one reading and no time. memories: `RenderConfig.memories`. FlickerError for one
+    that the chip cannot have."""
     dram, sizes = dram or DramConfig(), CHIP_MEMORIES[memories]
-    fronts: dict[tuple[Form, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
+    fronts: dict[tuple[Form, bool, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
     facts = {}
     for name in names:
         configuration = get_configuration(name)
         stage = chip_stage(configuration)
         if stage is None:
             raise FlickerError(f"{name}: no RTL of its rendering stage, so no chip")
-        key = configuration.form, configuration.lists == "obb"
+        key = configuration.form, configuration.lists == "obb", own_sorter(configuration)
         if key not in fronts:
             format_, lists = FRONTS[configuration.form]
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
             front = by_oriented_boxes(front) if key[1] else front
             image = front_memory(front)
-            fronts[key] = preprocessing.estimate(front, image, dram, sizes), TileLists.of(front, image, sizes.sorted_entries)
+            fronts[key] = preprocessing.estimate(front, image, dram, sizes), TileLists.of(front, image, None if key[2] else sizes.sorted_entries)
         first, tables = fronts[key]
         frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
         facts[name] = {

@@ -488,6 +488,8 @@ def estimate(
     `max_reads`, by default those of `sim.chip.PORT`. stride: bytes from
     row to row; None: as few as a row needs.
 
+    Lists of an ideal sorting unit (`TileLists.capacity`) are sorted in no time once their last line is there, any number of entries at once.
+
     Lanes take a record a cycle each core here, whatever `config.delivered`, and the frame as long as they need alone at least: their queues and what they wait
     for are not followed.
     """
@@ -498,9 +500,13 @@ def estimate(
     finish_events(cores.finish, lists.start, cores.pace, finish, finish_op)
     listed = (tables.x < -(-lists.width // TILE)).astype(np.bool_)
     sizes = config.chip_memories
-    if tables.capacity != sizes.sorted_entries:
+    lengths, chunk_entries, held = np.diff(tables.start), tables.chunk_entries, held_entries(sizes.sorted_entries, sizes.sort_ways)
+    if tables.capacity is None:  # a list is sorted when its last line is there
+        delay, chunk_entries, held = lengths + 1, np.zeros_like(chunk_entries), int(NEVER)
+    elif tables.capacity == sizes.sorted_entries:
+        delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages, ways=sizes.sort_ways) for n in lengths])
+    else:
         raise ValueError(f"lists are read for a capacity of {tables.capacity}, the configuration's is {sizes.sorted_entries}")
-    delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages, ways=sizes.sort_ways) for n in np.diff(tables.start)])
     # Rows stay open: a line of a list finds another one than its own.
     each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
     list_latency = latency_cycles + (dram.idle_cycles(BEAT) + math.ceil(dram.trp * each) if dram else 0)
@@ -515,12 +521,12 @@ def estimate(
     early = config.by_lanes or config.cat != CatMode.AUTO or config.mask_generator != "ctu"
     missed = np.empty(len(tables.record), np.int64)
     clock, misses, readings, given = _frame(
-        tables.start, tables.record, tables.mask, tables.chunk_start, tables.chunk_entries, delay, tables.reading_start, tables.reading_size,
+        tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.reading_start, tables.reading_size,
         tables.reading_cuts, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
         RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
         cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
         tables.regions.records // RECORD_LINE, memory,
-        (held_entries(sizes.sorted_entries, sizes.sort_ways), cut_cycles(sizes.sorted_entries, sizes.sort_ways), sizes.list_chunks,
+        (held, cut_cycles(sizes.sorted_entries, sizes.sort_ways), sizes.list_chunks,
          sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
     )
     stride = stride or least_stride(lists.width, format_)

@@ -42,7 +42,7 @@ class TileLists:
 
     x, y (T,): column and row of each tile. start (T + 1,), record, mask: sorted entries. lines (T,): of each list; of list t, chunks chunk_start[t] to
     chunk_start[t + 1] have chunk_entries entries, and readings reading_start[t] and on take reading_size entries after reading_cuts cuts. addresses: lines of
-    all lists, in the order of the walk.
+    all lists, in the order of the walk. capacity: entries of the sorting unit; None: an ideal one, that reads lists once and takes no time.
     """
 
     frame: FrontFrame
@@ -61,12 +61,12 @@ class TileLists:
     reading_start: np.ndarray
     reading_size: np.ndarray
     reading_cuts: np.ndarray
-    capacity: int
+    capacity: int | None
     regions: Regions
 
     @staticmethod
-    def of(frame: FrontFrame, image: FrontImage, capacity: int = CAPACITY) -> TileLists:
-        """capacity: of a sorting unit, entries."""
+    def of(frame: FrontFrame, image: FrontImage, capacity: int | None = CAPACITY) -> TileLists:
+        """capacity: of a sorting unit, entries; None: it is ideal."""
         cols, rows = -(-frame.camera.width // PAIR) * (PAIR // TILE), -(-frame.camera.height // TILE)
         x, y = tile_walk(cols // 2, rows)
         start, record, mask = tile_lists(frame, x, y)
@@ -84,7 +84,7 @@ class TileLists:
                 used = [line.used for line in read.lines]
                 first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
                 chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
-                if length > capacity:
+                if capacity is not None and length > capacity:
                     entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in read.lines for k in range(line.used)]
                     found = sort_list(np.array(entries, np.uint64), capacity).readings
                     sizes += [len(r.gathered) for r in found]
