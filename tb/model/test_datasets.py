@@ -13,6 +13,7 @@ import re
 import shlex
 import shutil
 import signal
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,13 +25,13 @@ from PIL import Image
 
 from flicker.budget.goal import FrameCost
 from flicker.budget.reduce import Reducer
-from flicker.errors import FlickerError
+from flicker.errors import FlickerError, FlickerWarning
 from flicker.fit import undistort as undistorting
 from flicker.fit.dataset import load_dataset
 from flicker.fit.loss import loss_and_slope
 from flicker.fit.train import Options, Trainer, _masked
 from flicker.report.write import parse_targets
-from flicker.scene.camera import Camera, load_cameras
+from flicker.scene.camera import Camera, load_cameras, photos_root
 from flicker.scene.colmap import read_cameras, read_images, read_points
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.image import load_picture, picture_size, save_png
@@ -197,6 +198,61 @@ def test_undistort_of_fisheye(shots, tmp_path) -> None:
     assert not data.notes and psnr(data.tests[0].load(), seen_by_pinhole(data.tests[0].camera)) > 45
 
 
+@pytest.mark.parametrize(("more", "message"), [
+    ({"camera_type": "fisheye"}, "camera_type: fisheye: not read: a lens is wanted as camera_model"), ({"lens_model": "EQUIRECTANGULAR"}, "lens_model: EQUI"),
+    ({"camera_model": "OPENCV", "projection": "Spherical"}, "projection: Spherical: not read"),
+    ({"distortion": [0.1, 0, 0, 0]}, "distortion: not read: coefficients are wanted by their names"), ({"distortion": {"k1": 0.1}}, "distortion: not read"),
+    ({"distortion_coefficients": [0, 0, 1e-3]}, "distortion_coefficients: not read"), ({"is_fisheye": "perhaps"}, "is_fisheye: 'perhaps' is neither true nor"),
+    ({"equirectangular": "True"}, "equirectangular: "), ({"is_fisheye": ["false"]}, "is_fisheye: neither true nor false"),
+])
+def test_lenses_by_keys_of_other_tools(nerf, more: dict, message: str) -> None:
+    """What they say is not passed over: fit and cameras alike refuse it, naming the field; so is a flag that is neither true nor false."""
+    changed(nerf, **more)
+    for read in (load_dataset, load_cameras):
+        with pytest.raises(FlickerError, match=re.escape(f"{nerf}/transforms.json: frames[0]: {message}")):
+            read(nerf)
+
+
+def test_words_that_mean_a_pinhole(nerf) -> None:
+    """Flags as texts that are false, other tools' names of a pinhole, no distortion in any form; a name that is not known is told, once. "true" is true."""
+    plain = load_dataset(nerf)
+    for more in (
+        {"is_fisheye": "false", "fisheye": "0", "latlong": "False", "orthographic": ""}, {"camera_type": "perspective", "lens_model": "PINHOLE"},
+        {"distortion": None, "distortion_coeffs": [0, 0.0, 0, 0], "dist_coeffs": {"k1": 0}, "distortion_model": "none"},
+    ):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            data = load_dataset(changed(nerf, **more))
+        assert not data.notes and all(a.camera.fx == b.camera.fx and b.lens is None for a, b in zip(plain.shots, data.shots))
+    with pytest.warns(FlickerWarning, match="transforms.json: camera_type: phone: not known, taken for a pinhole") as caught:
+        load_dataset(changed(nerf, camera_type="phone"))
+    assert len(caught) == 1
+    assert load_dataset(changed(nerf, camera_type="fisheye", is_fisheye="true", camera_model="FISHEYE")).tests[0].lens.model == "FISHEYE"
+    assert load_dataset(changed(nerf, camera_type=None, camera_model=None)).tests[0].lens.model == "OPENCV_FISHEYE"
+
+
+def test_crop_of_a_fisheye(shots, tmp_path) -> None:
+    """Pixels outside of the circle do not count, by the camera's pixels; undistort writes it as masks. Of another lens it is told and not used."""
+    picture = photograph(fisheye, 100.0, (64.0, 48.0))
+    write_transforms(tmp_path / "a", [(camera, picture) for camera, _ in shots[:3]], camera_angle_x=None, fl_x=200.0, w=256, h=192, is_fisheye=True,
+                     fisheye_crop_radius=80.0)
+    shot = load_dataset(changed(tmp_path / "a")).tests[0]
+    counted, (height, width) = shot.counted(), (shot.camera.height, shot.camera.width)
+    y, x = np.mgrid[:height, :width] + 0.5
+    far = 100.0 * np.arctan(np.hypot(x - width / 2, y - height / 2) / 100.0)  # from the middle of the photograph, where the pixel comes from
+    assert counted[far < 38].all() and not counted[far > 42].any() and 0.2 < counted.mean() < 0.9
+    data = load_dataset(tmp_path / "a")
+    assert data.notes[-1] == "3 of 3 photographs have a fisheye_crop_radius: pixels outside of the circle do not count"
+    assert Trainer(data, Options(2, 40, 0)).masked == pytest.approx(1 - counted.mean())
+    undistorting.undistort(tmp_path / "a", tmp_path / "b")
+    assert np.array_equal(load_dataset(tmp_path / "b").tests[0].counted(), counted)
+    assert set(json.loads((tmp_path / "b" / "transforms.json").read_text())) == {"frames"}
+    data = load_dataset(changed(tmp_path / "a", is_fisheye="false"))
+    assert data.notes == ["fisheye_crop_radius: not used: the camera_model is no fisheye"] and data.tests[0].counted() is None
+    with pytest.raises(FlickerError, match=r"frames\[0\]: fisheye_crop_radius: -1 is not positive"):
+        load_dataset(changed(tmp_path / "a", fisheye_crop_radius=-1))
+
+
 # -- EXIF -----------------------------------------------------------------------------------------------------------------------------
 
 
@@ -238,6 +294,33 @@ def test_exif_of_the_stored_shape(nerf, shots) -> None:
     assert psnr(data.tests[1].load(), shots[8][1]) > 50 and psnr(load_photo(nerf / "images" / "r_8.png", (WIDTH, HEIGHT)), shots[8][1]) > 50
 
 
+@pytest.mark.parametrize(("size", "orientation", "turned"), [((96, 80), 3, False), ((80, 96), 6, False), ((96, 80), 6, True), ((88, 88), 6, None)])
+def test_exif_of_colmap(shots, tmp_path, monkeypatch, size: tuple[int, int], orientation: int, turned: bool | None) -> None:
+    """COLMAP reads pixels as they are stored: so they are used where the camera has their shape, half a turn too; turned where it has only that of the turned
+    ones; refused where it has neither. What a fit prints to measure it finds the same pixels."""
+    views = shots[:4]
+    write_colmap(tmp_path / "set", views, 0, lens=(80.0, size[0] / 2, size[1] / 2), size=size)
+    pictures = sorted((tmp_path / "set" / "images").iterdir())
+    for picture in pictures:
+        store_turned(picture, orientation)
+    if turned is None:
+        with pytest.raises(FlickerError, match=r"shot.00.png is 48x40, not of the shape of the camera's 88x88, as it is stored or as EXIF turns it"):
+            load_dataset(tmp_path / "set")
+        return
+    data = load_dataset(tmp_path / "set")
+    shot, picture = data.tests[0], views[0][1]
+    wanted = picture if turned else picture[::-1, ::-1] if orientation == 3 else np.rot90(picture)
+    assert psnr(shot.load(), wanted) > 50 and all(shot.turned is turned for shot in data.shots)
+    assert f"4 of 4 photographs are {'turned upright' if turned else 'taken as they are stored'}" in data.notes[0]
+    if orientation != 3:
+        return
+    monkeypatch.chdir(tmp_path)
+    done = flicker("fit", "set", "-o", "a.ply", "--iterations", 2, "--gaussians", 40, "--degree", 0)
+    words = last_command(done.stdout)
+    target, = parse_targets(words[2], None, words[4])
+    assert psnr(load_photo(target.photo, target.size), wanted) > 45
+
+
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".webp", ".tif"])
 def test_exif_of_each_format(tmp_path, suffix: str) -> None:
     """Size and pixels are those of the upright picture, or of the stored one where the camera has its shape; Pillow turns a TIFF by itself."""
@@ -250,6 +333,7 @@ def test_exif_of_each_format(tmp_path, suffix: str) -> None:
         exif = Image.Exif()
         exif[274] = orientation
         lying.save(path, exif=exif, **({"lossless": True} if suffix == ".webp" else {"quality": 98} if suffix == ".jpg" else {}))
+        assert psnr(load_picture(path, shape=lying.size, stored=True), np.asarray(lying) / 255.0) > 35
         for shape in (None, (32.0, 24.0), lying.size):
             wanted = np.asarray(lying) if shape == (24, 32) else upright
             assert picture_size(path, shape) == wanted.shape[1::-1] and psnr(load_picture(path, shape=shape), wanted / 255.0) > 35
@@ -396,6 +480,38 @@ def test_layouts_of_colmap(shots, tmp_path, layout: str) -> None:
         assert np.array_equal(a.load(), b.load()) and a.camera.name == b.camera.name
 
 
+@pytest.mark.parametrize(("model", "root"), [("sparse/1", ""), ("dense/sparse", "dense"), ("dense/0/sparse", "dense/0")])
+def test_other_places_of_colmap(shots, tmp_path, model: str, root: str) -> None:
+    """A model of another number where there is no 0, those of COLMAP's dense folders with the pictures beside them: found, and said."""
+    plain = write_colmap(tmp_path / "plain", shots[:4])
+    folder = tmp_path / "set"
+    shutil.copytree(plain / "sparse" / "0", folder / model)
+    shutil.copytree(plain / "images", folder / root / "images")
+    for given in (folder, folder / model):
+        data = load_dataset(given)
+        assert len(data.shots) == 4 and len(data.points) == 50 and data.shots[0].path.parent == folder / root / "images"
+        assert f"the model of {folder / model}" in data.notes
+        assert photos_root(given) == folder / root and len(load_cameras(given)) == 4
+
+
+def test_several_models_of_colmap(shots, tmp_path) -> None:
+    """The first is taken, the others are named; each by its folder. A model elsewhere is named in the error."""
+    folder = write_colmap(tmp_path / "set", shots[:4])
+    for n in (1, 10):
+        shutil.copytree(folder / "sparse" / "0", folder / "sparse" / str(n))
+    others = [str(folder / "sparse" / str(n)) for n in (0, 1, 10)]
+    assert load_dataset(folder).notes == [f"{others[1]}, {others[2]}: not used; a model is taken by the name of its folder"]
+    data = load_dataset(folder / "sparse" / "10")
+    assert data.notes == [f"the model of {others[2]}", f"{others[0]}, {others[1]}: not used; a model is taken by the name of its folder",
+                          f"photographs of {folder / 'images'}"]
+    shutil.rmtree(folder / "sparse" / "0")
+    assert load_dataset(folder).notes[0] == f"the model of {others[1]}"
+    (folder / "sparse").rename(folder / "distorted")
+    for read in (load_dataset, load_cameras):
+        with pytest.raises(FlickerError, match=re.escape(f"{folder / 'distorted' / '1'} holds a model: give that folder")):
+            read(folder)
+
+
 def test_nerf_synthetic(shots, tmp_path) -> None:
     """transforms_train.json and transforms_test.json: the test photographs are the set's own; a picture of both is told; without them every eighth."""
     write_transforms(tmp_path, shots[:9], "transforms_train.json", "train")
@@ -411,6 +527,58 @@ def test_nerf_synthetic(shots, tmp_path) -> None:
     (tmp_path / "transforms_val.json").unlink()
     data = load_dataset(tmp_path)
     assert (len(data.fitted), len(data.tests)) == (7, 2) and "every 8th" in data.notes[0]
+
+
+def test_lists_of_nerfstudio(nerf, tmp_path) -> None:
+    """Which photographs are fitted to and which are for testing, by nerfstudio's lists; without one of them what is in no list is fitted to; names that no
+    frame has are refused. undistort keeps them."""
+    def split(**lists: list[str] | None) -> tuple[list[int], list[int], list[str]]:
+        data = load_dataset(changed(nerf, **lists))
+        return *([int(s.path.stem[2:]) for s in shots] for shots in (data.fitted, data.tests)), data.notes
+
+    def names(*numbers: int) -> list[str]:
+        return [f"images/r_{k}" for k in numbers]
+
+    every = list(range(17))
+    assert split(train_filenames=names(5, 3, 1), test_filenames=["./images/r_2.png", "images\\r_4"], val_filenames=names(6)) == (
+        [1, 3, 5], [2, 4], ["the photographs of test_filenames are for testing",
+                            "12 of 17 photographs are not used: they are not in train_filenames nor test_filenames"])
+    undistorting.undistort(nerf, tmp_path / "flat")
+    flat = load_dataset(tmp_path / "flat")
+    assert [[s.path.name for s in shots] for shots in (flat.fitted, flat.tests)] == [["r_1.png", "r_3.png", "r_5.png"], ["r_2.png", "r_4.png"]]
+    assert split(train_filenames=None, test_filenames=[], val_filenames=names(6, 7)) == (
+        [k for k in every if k not in (6, 7)], [6, 7], ["the photographs of val_filenames are for testing"])
+    fitted, tests, notes = split(train_filenames=names(*range(9)), val_filenames=None)
+    assert (fitted, tests) == ([1, 2, 3, 4, 5, 6, 7], [0, 8]) and notes == ["8 of 17 photographs are not used: they are not in train_filenames"]
+    assert "1 of them are fitted to, too" in split(train_filenames=names(1, 2), val_filenames=names(2))[2][1]
+    for lists, message in (
+        ({"val_filenames": ["images/r_1", "r_2"]}, "val_filenames[1]: 'r_2' is the file_path of no frame"),
+        ({"val_filenames": "r_1"}, "val_filenames: not a list"),
+        ({"val_filenames": names(1), "train_filenames": names(2)}, "1 photographs to fit and 1 for testing, at least 2 and 1 are needed"),
+    ):
+        with pytest.raises(FlickerError, match=re.escape(message)):
+            split(**lists)
+
+
+def test_points_of_a_transforms_json(nerf, tmp_path) -> None:
+    """The PLY that `ply_file_path` names is what the fit starts from, and goes with an undistorted set; one that is not there is told, a cut one refused."""
+    points = np.random.default_rng(1).uniform(-1, 1, (30, 3)).astype(np.float32)
+    rows = np.zeros(30, np.dtype([("p", "<f4", 3), ("c", "u1", 3)]))
+    rows["p"], rows["c"] = points, (255, 0, 51)
+    head = "".join(f"property {kind} {name}\n" for kind, axes in (("float", "xyz"), ("uchar", ("red", "green", "blue"))) for name in axes)
+    ply = f"ply\nformat binary_little_endian 1.0\nelement vertex 30\n{head}end_header\n".encode() + rows.tobytes()
+    (nerf / "points.ply").write_bytes(ply)
+    undistorting.undistort(changed(nerf, ply_file_path="points.ply"), tmp_path / "flat")
+    for folder in (nerf, tmp_path / "flat"):
+        data = load_dataset(folder)
+        assert np.array_equal(data.points, points) and data.colours[7].tolist() == [1.0, 0.0, 0.2] and data.points_of == "points.ply"
+    assert Trainer(data, Options(2, 100, 0)).first == 30
+    (nerf / "points.ply").write_bytes(ply[:-3])
+    with pytest.raises(FlickerError, match="points.ply"):
+        load_dataset(nerf)
+    (nerf / "points.ply").unlink()
+    data = load_dataset(nerf)
+    assert data.points is None and data.notes == [f"ply_file_path: {nerf}/points.ply: is not there, the start is without its points"]
 
 
 def test_images_of_a_transforms_json(nerf, shots) -> None:
@@ -466,7 +634,7 @@ def test_undistort_of_folders(shots, tmp_path) -> None:
 
 
 def test_kinds_of_pictures(tmp_path) -> None:
-    """Grey, palettes, transparency, CMYK: what Pillow makes of them over the background; 16 bits of grey are refused."""
+    """Grey, palettes, transparency, CMYK: what Pillow makes of them over the background."""
     rgba = np.zeros((4, 4, 4), np.uint8)
     rgba[:2] = (255, 128, 0, 128)
     wanted = rgba[..., :3] / 255 * rgba[..., 3:] / 255 + (1 - rgba[..., 3:] / 255) * np.array((0.0, 1.0, 0.5))

@@ -451,8 +451,8 @@ def test_start_where_nothing_is_empty(shots, tmp_path) -> None:
 # -- training -------------------------------------------------------------------------------------------------------------------------
 
 
-def test_fit_and_resume(nerf, tmp_path) -> None:
-    """It learns; interrupted and resumed it has the same bits; other options are refused."""
+def test_fit_and_resume(nerf, tmp_path, monkeypatch) -> None:
+    """It learns; interrupted and resumed it has the same bits; other options, other contents of photographs and other cameras are refused."""
     data, options = load_dataset(nerf), Options(iterations=200, gaussians=1500, degree=1, exposure=True)
     whole = Trainer(data, options)
     before = whole.measure()
@@ -471,6 +471,15 @@ def test_fit_and_resume(nerf, tmp_path) -> None:
         assert (a.values if name == "parameters" else a).tobytes() == (b.values if name == "parameters" else b).tobytes()
     with pytest.raises(FlickerError, match="is of a fit with seed 1, not 2"):
         Trainer(data, replace(options, seed=2)).restore(saved)
+    first = data.fitted[0]
+    with monkeypatch.context() as patch:  # of the same names and sizes
+        load = type(first).load
+        patch.setattr(type(first), "load", lambda shot, background: load(shot, background) * np.float32(0.9 if shot is first else 1.0))
+        with pytest.raises(FlickerError, match="state.npz: is of a fit with photographs or masks of other contents"):
+            Trainer(data, options).restore(saved)
+    moved = replace(first, camera=replace(first.camera, position=first.camera.position + 0.01))
+    with pytest.raises(FlickerError, match="state.npz: is of a fit with other cameras"):
+        Trainer(replace(data, fitted=[moved, *data.fitted[1:]]), options).restore(saved)
     saved.write_bytes(saved.read_bytes()[:-100])
     with pytest.raises(FlickerError, match="not a checkpoint"):
         Trainer(data, options).restore(saved)

@@ -32,6 +32,7 @@ from flicker.report.collect import ViewResult, by_scene, collect
 from flicker.report.write import check
 from flicker.scene.camera import orbit_camera
 from flicker.scene.files import save_ply
+from flicker.scene.image import load_coverage, load_picture
 from flicker.scene.photos import area_average, load_photo, parse_background, photo_beside
 from flicker.scene.real import real_scenes
 
@@ -330,11 +331,27 @@ def test_bad_input(fitted, tmp_path, monkeypatch, arguments, message):
     assert re.search(message, str(result.exception)) and "\n" not in str(result.exception), result.exception
 
 
-def test_deep_pictures_are_refused(tmp_path):
-    """16 bits a pixel would be cut, not scaled."""
-    Image.fromarray(np.full((4, 4), 40000, np.uint16)).save(tmp_path / "deep.png")
-    with pytest.raises(FlickerError, match="deep.png: pixels of more than 8 bits"):
-        load_photo(tmp_path / "deep.png", (4, 4))
+def test_deep_pictures(tmp_path):
+    """Grey of 16 bits is scaled, not cut, upright or turned, one value of it transparent; 32 bits and floats are refused."""
+    values = np.linspace(0, 65535, 24).astype(np.uint16).reshape(4, 6)
+    for suffix in (".png", ".tif"):
+        Image.fromarray(values).save(tmp_path / f"deep{suffix}")
+        assert np.array_equal(load_photo(tmp_path / f"deep{suffix}", (6, 4)), np.repeat(values[..., None] / 65535, 3, axis=2))
+        assert load_coverage(tmp_path / f"deep{suffix}") is None
+    exif = Image.Exif()
+    exif[274] = 6
+    Image.fromarray(values).save(tmp_path / "lying.png", exif=exif)
+    assert np.array_equal(load_picture(tmp_path / "lying.png")[..., 0], np.rot90(values, -1) / 65535)
+    Image.fromarray(values).save(tmp_path / "hole.png", transparency=int(values[1, 2]))
+    assert load_picture(tmp_path / "hole.png", (0.25, 0.5, 0.75))[1, 2].tolist() == [0.25, 0.5, 0.75]
+    assert np.argwhere(load_coverage(tmp_path / "hole.png") == 0).tolist() == [[1, 2]]
+    for mode in ("I", "F"):
+        Image.new(mode, (4, 4)).save(tmp_path / "deeper.tif")
+        with pytest.raises(FlickerError, match=f"deeper.tif: pixels of mode {mode} are not read"):
+            load_photo(tmp_path / "deeper.tif", (4, 4))
+
+
+def test_parse_background():
     assert [parse_background(text) for text in ("white", "0.25,0,1")] == [(1.0, 1.0, 1.0), (0.25, 0.0, 1.0)]
 
 

@@ -33,7 +33,7 @@ def _cameras_beside(out: Path, text: str) -> Path:
 
 
 def _copy(shots: Sequence[Shot], folder: Path, background: tuple[float, float, float]) -> None:
-    """The photographs by the names of their cameras: without their lenses, else as they are."""
+    """The photographs by the names of their cameras: without their lenses, as they were turned, else as they are."""
     from ..scene.image import save_png
 
     for shot in shots:
@@ -42,7 +42,7 @@ def _copy(shots: Sequence[Shot], folder: Path, background: tuple[float, float, f
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FlickerError(f"{path.parent}: cannot be written ({error.strerror})") from None
-        if shot.lens is None:
+        if not shot.changed:
             write_atomically(path, lambda to: shutil.copyfile(shot.path, to))
         else:
             write_atomically(path, lambda to: save_png(to, shot.load(background)))
@@ -105,11 +105,11 @@ def fit(
     continued = kept.begin(resume, trainer.restore)
     sizes = sorted({(shot.camera.width, shot.camera.height) for shot in data.shots})
     size_text = " to ".join(f"{w}x{h}" for w, h in dict.fromkeys((sizes[0], sizes[-1])))
-    beginning = scene or ("random places" if data.points is None else f"{len(data.points):,} points of COLMAP")
+    beginning = scene or ("random places" if data.points is None else f"{len(data.points):,} points of {data.points_of}")
     console.print(f"{dataset}: {len(data.fitted)} photographs to fit, {len(data.tests)} for testing, {size_text}; starts from {beginning}")
     for note in data.notes:
         printed(note)
-    if any(shot.mask is not None for shot in data.shots):
+    if any(shot.masked for shot in data.shots):
         printed(f"{trainer.masked:.1%} of all pixels are masked: they have no part in loss, start and PSNR")
     if trainer.hidden:
         printed(f"{trainer.hidden} of {len(data.shots)} photographs are masked wholly")
@@ -162,5 +162,5 @@ def fit(
         printed(f"{folder}: the test photographs as they were measured against")
     elif folder.resolve() in (out.parent.resolve(), (out.parent / "images").resolve()):
         return
-    masks = ", masked pixels too" if any(shot.mask is not None for shot in data.tests) else ""
+    masks = ", masked pixels too" if any(shot.masked for shot in data.tests) else ""
     printed(f"measures against the test photographs{masks}:\n{shlex.join(['flicker', 'report', f'{out}:all', '--photos', str(folder)])}")

@@ -26,7 +26,7 @@ def undistort(
     printed(f"{out}: {len(shots)} photographs ({', '.join(models)}), {' to '.join(f'{w}x{h}' for w, h in dict.fromkeys((sizes[0], sizes[-1])))}")
     for count, text in (
         (sum(bool(shot.turned) for shot in shots), "were turned upright, as EXIF says"),
-        (sum(shot.mask is not None for shot in shots), "have a mask, in masks/"),
+        (sum(shot.masked for shot in shots), "have a mask, in masks/"),
         (sum(shot.solid() is not None for shot in shots), "had transparent parts, which are black"),
     ):
         if count:

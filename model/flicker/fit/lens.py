@@ -31,12 +31,12 @@ _GRID = 33  # places along a side where a lens is looked at
 _RADIAL = ("k", "k1", "k2", "k3", "k4", "p1", "p2")
 _FISHEYE = ("k", "k1", "k2", "k3", "k4")
 # Coefficients that a model has. k: of the models of one; it is k1 of the others.
-_FISHEYES = {
+FISHEYES = {
     "SIMPLE_FISHEYE": (), "FISHEYE": _FISHEYE, "OPENCV_FISHEYE": _FISHEYE, "SIMPLE_RADIAL_FISHEYE": _FISHEYE, "RADIAL_FISHEYE": _FISHEYE,
     "THIN_PRISM_FISHEYE": (*_RADIAL, "sx1", "sy1"),
 }
 _DIVISIONS = {"SIMPLE_DIVISION": ("k", "k1"), "DIVISION": ("k", "k1")}
-_MODELS = {model: _RADIAL for model in PERSPECTIVE} | {"FULL_OPENCV": (*_RADIAL, "k5", "k6"), "FOV": ("omega",)} | _DIVISIONS | _FISHEYES
+_MODELS = {model: _RADIAL for model in PERSPECTIVE} | {"FULL_OPENCV": (*_RADIAL, "k5", "k6"), "FOV": ("omega",)} | _DIVISIONS | FISHEYES
 PLAIN = "OPENCV"  # where a file names coefficients and no model
 
 
@@ -77,7 +77,7 @@ class Lens:
         k1, k2, k3, k4, k5, k6, p1, p2, sx1, sy1 = (self.coefficients.get(key, 0.0) for key in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "sx1", "sy1"))
         u, v = np.broadcast_arrays(x, y)
         r = np.sqrt(u * u + v * v)
-        if self.model in _FISHEYES:
+        if self.model in FISHEYES:
             scale = np.where(r > 1e-9, np.arctan(r) / np.maximum(r, 1e-9), 1.0)
             u, v, r = u * scale, v * scale, r * scale
         s = r * r

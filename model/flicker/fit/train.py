@@ -13,6 +13,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,8 @@ _SCALE_RATE, _QUAT_RATE, _LOGIT_RATE, _SH_RATE, _SH_REST = 5e-3, 1e-3, 5e-2, 2.5
 _ITERATIONS, _LONGEST, _OTHERS = 30_000, 4.0, 2.0
 _EXPOSURE_RATES = (1e-2, 1e-3)
 _LAST_RATE = 0.1  # of all rates but the means', which fall evenly over the last third
+# Of a checkpoint's identity, what cannot be shown: how it is called where it is another one.
+_DIGESTS = {"scene": "another scene", "photographs": "other photographs", "pixels": "photographs or masks of other contents", "cameras": "other cameras"}
 _DEGREE_EVERY = 1000  # iterations until the next SH degree, or an eighth of all
 
 
@@ -317,7 +320,22 @@ class Trainer:
             "scene": self._began,
             "background": list(self.options.background),
             "photographs": [[str(s.camera.img_name), s.camera.width, s.camera.height] for s in (*self.dataset.fitted, *self.dataset.tests)],
+            "pixels": self._pixels, "cameras": self._cameras,
         }
+
+    @cached_property
+    def _pixels(self) -> str:
+        """Digest of the photographs and their masks, as they are used."""
+        digest = hashlib.blake2b(digest_size=16)
+        for array in (*self._photos, *self._test_photos, *self._counted, *self._test_counted):
+            digest.update(b"none" if array is None else np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+    @cached_property
+    def _cameras(self) -> str:
+        """Digest of the photographs' poses and focal lengths, and of which are for testing."""
+        cameras = [[shot.camera.fx, shot.camera.fy, shot.camera.position.tolist(), shot.camera.rotation.tolist()] for shot in self.dataset.shots]
+        return hashlib.blake2b(json.dumps([len(self.dataset.fitted), cameras]).encode(), digest_size=16).hexdigest()
 
     def save(self, path: Path) -> None:
         """Write the state. Raises OSError."""
@@ -340,8 +358,10 @@ class Trainer:
             numbers = json.loads(str(arrays.pop("numbers")))
             theirs, ours = numbers["identity"], json.loads(json.dumps(self._identity()))
             for key in ours:
+                if key in _DIGESTS and theirs.get(key) != ours[key]:
+                    raise FlickerError(f"{path}: is of a fit with {_DIGESTS[key]}")
                 if theirs[key] != ours[key]:
-                    said = f"another {key}" if key == "scene" else f"other {key}" if key == "photographs" else f"{key} {theirs[key]}, not {ours[key]}"
+                    said = f"{key} {theirs[key]}, not {ours[key]}"
                     raise FlickerError(f"{path}: is of a fit with {said}")
             self.parameters = self.parameters.like(arrays["values"])
             self.moments = Adam(arrays["m"], arrays["v"], numbers["steps"][0])

@@ -14,24 +14,27 @@ import numpy as np
 from ..errors import FlickerError, one_line
 from ..scene.fields import read_json
 from ..scene.image import save_png
-from ..scene.lens import COEFFICIENTS, FLAGS
-from ..scene.transforms import FROM_OPENGL, frames_of
-from .dataset import transforms_shot
+from ..scene.lens import COEFFICIENTS, FLAGS, FOREIGN
+from ..scene.transforms import FROM_OPENGL, frames_of, splits_of
+from .dataset import ply_of, transforms_shot
 from .shot import Shot
 
 # Of the file: they say what the new pictures do not have any more, or name the old ones.
-_GONE = {"camera_angle_x", "camera_angle_y", "fl_x", "fl_y", "cx", "cy", "w", "h", "frames", "camera_model", "distortion_params", *FLAGS, *COEFFICIENTS,
-         "train_filenames", "val_filenames", "test_filenames"}
+_GONE = {"camera_angle_x", "camera_angle_y", "fl_x", "fl_y", "cx", "cy", "w", "h", "frames", "camera_model", "distortion_params", "fisheye_crop_radius",
+         *FLAGS, *COEFFICIENTS, *FOREIGN}
 
 
 def undistort(dataset: Path, out: Path, size: int | None = None, progress: Callable[[int, int], None] = lambda done, total: None) -> list[Shot]:
     """Write the photographs as PNG, upright, their masks, and a transforms.json that has no lens any more, into folder `out`, whole or not at all: the
-    photographs. size: longer side, larger ones are averaged. Transparent parts are composed over black. FlickerError, naming file and field."""
+    photographs. size: longer side, larger ones are averaged. Transparent parts are composed over black. Lists of names follow, and the points of
+    `ply_file_path` are copied. FlickerError, naming file and field."""
     path = dataset / "transforms.json" if dataset.is_dir() else dataset
     if not path.is_file():
         raise FlickerError(f"{dataset}: no transforms.json; COLMAP undistorts its own (image_undistorter), and flicker fit does so by itself")
     data = read_json(path)
-    shots = [transforms_shot(frame, size, exact=True) for frame in frames_of(path, data)]
+    listed = frames_of(path, data)
+    splits, ply = splits_of(path, data, listed), ply_of(path, data)
+    shots = [transforms_shot(frame, size, exact=True) for frame in listed]
     if not shots:
         raise FlickerError(f"{path}: frames: none")
     names = [shot.path.with_suffix(".png").name for shot in shots]
@@ -51,6 +54,12 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
             frames.append(_write(shot, temporary, name))
         progress(len(shots), len(shots))
         kept = {key: value for key, value in data.items() if key not in _GONE}
+        kept |= {key: [f"images/{names[n]}" for n in numbers] for key, numbers in splits.items()}
+        if ply is not None and ply.is_file():
+            shutil.copyfile(ply, temporary / ply.name)
+            kept["ply_file_path"] = ply.name
+        else:
+            kept.pop("ply_file_path", None)
         (temporary / "transforms.json").write_text(json.dumps(kept | {"frames": frames}, indent=2) + "\n")
         out.parent.mkdir(parents=True, exist_ok=True)
         if out.exists():

@@ -53,7 +53,7 @@ def camera_files(path: str | Path) -> list[Path]:
         return [colmap.model_file(model, "images"), colmap.model_file(model, "cameras")]
     others = sorted(file.name for file in path.glob("transforms*.json"))
     hint = f"; give one of its files: {', '.join(map(one_line, others))}" if others else ""
-    raise FlickerError(f"{path}: a directory without {', '.join(_LISTS)} or a COLMAP model{hint}")
+    raise FlickerError(f"{path}: a directory without {', '.join(_LISTS)} or a COLMAP model{hint or colmap.model_hint(path)}")
 
 
 def load_cameras(path: str | Path) -> list[Camera]:
@@ -87,8 +87,7 @@ def photos_root(path: str | Path) -> Path:
     folder = file.parent
     if file.name not in colmap.FILES:
         return folder
-    above = [place for place in colmap.PLACES if place and folder.match(place)]
-    return folder.parents[max(map(len, (place.split("/") for place in above))) - 1] if above else folder
+    return colmap.data_root(folder)
 
 
 def _box(scene: Scene) -> np.ndarray:

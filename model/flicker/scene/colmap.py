@@ -17,7 +17,8 @@ from ..errors import FlickerError, one_line
 from .lens import COEFFICIENTS, COLMAP_MODELS, lens_fault
 from .pinhole import Camera
 
-PLACES = ("", "sparse/0", "sparse", "colmap/sparse/0")  # of a model in a folder
+PLACES = ("", "sparse/0", "sparse", "colmap/sparse/0", "dense/sparse", "dense/0/sparse")  # of a model in a folder
+_NUMBERED = "sparse"  # folder of models 0, 1, ...: that of the least number is taken
 SUFFIXES = (".bin", ".txt")  # of its files; with both, the first is read
 FILES = tuple(stem + suffix for stem in ("images", "cameras") for suffix in SUFFIXES)
 
@@ -82,8 +83,40 @@ class ColmapImage:
 
 
 def find_model(folder: Path) -> Path | None:
-    """The model in a folder: there, in `sparse/0`, `sparse` or `colmap/sparse/0`; None: there is none."""
-    return next((there for place in PLACES if _file(there := folder / place, "cameras") and _file(there, "images")), None)
+    """The model in a folder: in the first of `PLACES` that has one, else that of the least number in `sparse`; None: there is none."""
+    found = next((there for place in PLACES if _model(there := folder / place)), None)
+    return found or next(iter(numbered(folder / _NUMBERED)), None)
+
+
+def _model(folder: Path) -> bool:
+    return _file(folder, "cameras") is not None and _file(folder, "images") is not None
+
+
+def numbered(folder: Path) -> list[Path]:
+    """The models 0, 1, ... in a folder, by their numbers."""
+    try:
+        places = [place for place in folder.iterdir() if place.name.isdecimal() and _model(place)]
+    except OSError:
+        return []
+    return sorted(places, key=lambda place: (int(place.name), place.name))
+
+
+def model_hint(folder: Path) -> str:
+    """Names a model that lies deeper in a folder than `find_model` looks, for the end of an error; empty: there is none."""
+    for pattern in ("*", "*/*", "*/*/*"):
+        for place in sorted(folder.glob(pattern)):
+            if place.is_dir() and _model(place):
+                return f"; {place} holds a model: give that folder"
+    return ""
+
+
+def data_root(model: Path) -> Path:
+    """The folder of the data set that a model belongs to, by the place in which it lies; of a model in another place its own."""
+    if model.name.isdecimal() and model.parent.name == _NUMBERED:
+        model = model.parent
+    if model.name != _NUMBERED:
+        return model
+    return model.parents[1] if model.parent.name == "colmap" else model.parent
 
 
 def _file(model: Path, stem: str) -> Path | None:

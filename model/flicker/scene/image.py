@@ -1,7 +1,8 @@
-"""Pictures in files, 8 bits a channel: PNG is written, what Pillow knows is read.
+"""Pictures in files: PNG is written, what Pillow knows is read.
 
 A photograph may be stored lying: EXIF's orientation (1 to 8) says how it is turned upright. It is turned, unless its camera's shape is known and only the
-stored pixels have that shape: then they are what the camera describes.
+stored pixels have that shape: then they are what the camera describes. Of a program that reads pixels as they are stored, such as COLMAP, they come first
+where both have the shape (`stored`). Grey of 16 bits is read as such; of colours with 16 bits Pillow gives the upper 8.
 """
 
 from __future__ import annotations
@@ -16,8 +17,11 @@ from PIL import ExifTags, Image, ImageOps, UnidentifiedImageError
 from ..errors import FlickerError
 
 Shape = tuple[float, float]  # width and height of a camera, of which only the ratio counts here
-# What makes the stored picture of an upright one, by the orientations of EXIF that exchange width and height.
-_BACK = {5: Image.Transpose.TRANSPOSE, 6: Image.Transpose.ROTATE_90, 7: Image.Transpose.TRANSVERSE, 8: Image.Transpose.ROTATE_270}
+# What makes the stored picture of an upright one, by the orientations of EXIF.
+_BACK = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180, 4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE, 6: Image.Transpose.ROTATE_90, 7: Image.Transpose.TRANSVERSE, 8: Image.Transpose.ROTATE_270,
+}
 
 
 def save_png(path: str | Path, image: np.ndarray) -> None:
@@ -55,20 +59,20 @@ def _orientation(picture: Image.Image) -> int:
     return number if isinstance(number, int) and 1 <= number <= 8 else 1
 
 
-def _turned(picture: Image.Image, shape: Shape | None) -> tuple[bool, tuple[int, int]]:
+def _turned(picture: Image.Image, shape: Shape | None, stored: bool) -> tuple[bool, tuple[int, int]]:
     """Whether the picture is to be turned, and its size (width, height) then."""
     orientation, (width, height) = _orientation(picture), picture.size
     if orientation >= 5 and picture.format == "TIFF":  # whose size Pillow tells as of the upright picture
         width, height = height, width
     upright = (height, width) if orientation >= 5 else (width, height)
-    if orientation == 1 or (shape is not None and same_shape((width, height), shape) and not same_shape(upright, shape)):
+    if orientation == 1 or (shape is not None and same_shape((width, height), shape) and (stored or not same_shape(upright, shape))):
         return False, (width, height)
     return True, upright
 
 
-def _as_taken(picture: Image.Image, shape: Shape | None) -> Image.Image:
+def _as_taken(picture: Image.Image, shape: Shape | None, stored: bool) -> Image.Image:
     """The picture upright, or as it is stored where its camera has that shape."""
-    turned, orientation = _turned(picture, shape)[0], _orientation(picture)
+    turned, orientation = _turned(picture, shape, stored)[0], _orientation(picture)
     picture.load()
     if turned:
         return ImageOps.exif_transpose(picture)
@@ -77,35 +81,50 @@ def _as_taken(picture: Image.Image, shape: Shape | None) -> Image.Image:
     return picture
 
 
-def picture_size(path: str | Path, shape: Shape | None = None) -> tuple[int, int]:
-    """(width, height) of a picture, without its pixels. shape: (width, height) of its camera."""
+def picture_size(path: str | Path, shape: Shape | None = None, stored: bool = False) -> tuple[int, int]:
+    """(width, height) of a picture, without its pixels. shape: (width, height) of its camera. stored: of a camera of stored pixels."""
     with _opened(path) as picture:
-        return _turned(picture, shape)[1]
+        return _turned(picture, shape, stored)[1]
 
 
-def picture_turned(path: str | Path, shape: Shape | None = None) -> bool | None:
+def picture_turned(path: str | Path, shape: Shape | None = None, stored: bool = False) -> bool | None:
     """Whether EXIF turns a picture as it is read here; None: EXIF has it upright."""
     with _opened(path) as picture:
-        return None if _orientation(picture) == 1 else _turned(picture, shape)[0]
+        return None if _orientation(picture) == 1 else _turned(picture, shape, stored)[0]
 
 
-def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0), shape: Shape | None = None) -> np.ndarray:
-    """float64 (H, W, 3) in [0, 1]; what is transparent is composed over the background, as the values are stored (no gamma). shape: of its camera."""
+def _grey16(picture: Image.Image) -> bool:
+    """Whether it is grey of 16 bits, of which Pillow would cut what is above 255."""
+    return picture.mode.startswith("I;16")
+
+
+def load_picture(path: str | Path, background: Sequence[float] = (0.0, 0.0, 0.0), shape: Shape | None = None, stored: bool = False) -> np.ndarray:
+    """float64 (H, W, 3) in [0, 1]; what is transparent is composed over the background, as the values are stored (no gamma). shape: of its camera. stored: as
+    in `picture_size`."""
     with _opened(path) as picture:
-        if picture.mode.startswith(("I", "F")):
-            raise FlickerError(f"{path}: pixels of more than 8 bits (mode {picture.mode}) are not read")
-        upright = _as_taken(picture, shape)
+        deep = _grey16(picture)
+        if picture.mode.startswith(("I", "F")) and not deep:
+            raise FlickerError(f"{path}: pixels of mode {picture.mode} are not read: 8 bits a channel, or 16 of grey")
+        upright = _as_taken(picture, shape, stored)
+        behind = np.asarray(background, np.float64)
+        if deep:
+            values = np.asarray(upright, np.uint16)
+            grey, through = np.repeat(values[..., None] / 65535.0, 3, axis=2), upright.info.get("transparency")
+            return grey if through is None else np.where((values == through)[..., None], behind, grey)
         if not upright.has_transparency_data:
             return np.asarray(upright.convert("RGB"), np.float64) / 255.0
         rgba = np.asarray(upright.convert("RGBA"), np.float64) / 255.0
-        return rgba[..., :3] * rgba[..., 3:] + np.asarray(background, np.float64) * (1.0 - rgba[..., 3:])
+        return rgba[..., :3] * rgba[..., 3:] + behind * (1.0 - rgba[..., 3:])
 
 
-def load_coverage(path: str | Path, shape: Shape | None = None) -> np.ndarray | None:
-    """float64 (H, W) in [0, 1], alpha of a picture; None where it is 1 everywhere. shape: of its camera."""
+def load_coverage(path: str | Path, shape: Shape | None = None, stored: bool = False) -> np.ndarray | None:
+    """float64 (H, W) in [0, 1], alpha of a picture; None where it is 1 everywhere. shape: of its camera. stored: as in `picture_size`."""
     with _opened(path) as picture:
         if not picture.has_transparency_data:
             return None
-        upright = _as_taken(picture, shape)
-        alpha = np.asarray(upright.convert("RGBA").getchannel("A"), np.float64) / 255.0
+        upright = _as_taken(picture, shape, stored)
+        if _grey16(picture):
+            alpha = (np.asarray(upright, np.uint16) != upright.info.get("transparency")).astype(np.float64)
+        else:
+            alpha = np.asarray(upright.convert("RGBA").getchannel("A"), np.float64) / 255.0
     return alpha if alpha.min() < 1.0 else None

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import FlickerError
+from ..errors import FlickerError, one_line
 from .fields import numbers
 
 # Parameters of COLMAP's models, in the order of the files.
@@ -31,6 +31,12 @@ COLMAP_MODELS: dict[str, tuple[str, ...]] = {
 # A pinhole when all their coefficients are zero. PERSPECTIVE: as nerfstudio calls it.
 PERSPECTIVE = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "FOV", "SIMPLE_DIVISION", "DIVISION", "PERSPECTIVE")
 FLAGS = ("is_fisheye", "fisheye", "latlong", "equirectangular", "orthographic")  # other projections, when true
+# Keys by which other tools name a lens; camera_model is the one that is read.
+_NAMES = ("camera_type", "lens_model", "lens_type", "projection", "projection_type", "distortion_model")
+_DISTORTIONS = ("distortion", "distortion_coefficients", "distortion_coeffs", "dist_coeffs")  # and its coefficients, without their names
+FOREIGN = (*_NAMES, *_DISTORTIONS)
+_OTHER_PROJECTION = re.compile("fish|equirect|equidist|spher|panoram|omni|ortho|latlong|vr180|cylind|division|kannala|f-?theta", re.IGNORECASE)
+_TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False, "none": False, "": False}  # of values that are texts
 COEFFICIENTS = ("k", "k0", "k1", "k2", "k3", "k4", "k5", "k6", "p0", "p1", "p2", "p3", "p4", "s0", "s1", "s2", "s3", "s4", "sx1", "sy1", "omega")
 
 
@@ -45,19 +51,66 @@ def lens_fault(model: str | None, coefficients: Mapping[str, float | None]) -> s
     return None if bent is None else f"{bent[0]}: {bent[1]:g}: the lens distorts, and only pinholes are drawn: undistort the pictures first"
 
 
+def truth(data: Mapping[str, Any], key: str) -> bool:
+    """Whether a key of a JSON object is true; "false" and the like are not, as texts too. FlickerError for what is neither."""
+    value = data.get(key)
+    if isinstance(value, str):
+        value = _TRUTHS.get(value.strip().lower())
+        if value is None:
+            raise FlickerError(f"{key}: '{one_line(data[key])}' is neither true nor false")
+    elif not (value is None or isinstance(value, (bool, int, float))):
+        raise FlickerError(f"{key}: neither true nor false")
+    return bool(value)
+
+
+def _nothing(value: Any) -> bool:
+    """Whether a value says that there is no distortion: none, false, 0, "none", lists and objects of such values."""
+    if isinstance(value, (list, dict)):
+        return all(map(_nothing, value.values() if isinstance(value, dict) else value))
+    return value is None or value == 0 or (isinstance(value, str) and _TRUTHS.get(value.strip().lower()) is False)
+
+
+def foreign_fault(data: Mapping[str, Any]) -> str | None:
+    """What a JSON object says of a lens by keys of other tools that would be passed over, as `field: reason`; None: nothing but a pinhole, or no more than
+    its camera_model says."""
+    said = data.get("camera_model")
+    for key in () if said is not None and str(said).upper() not in PERSPECTIVE else _NAMES:
+        value = data.get(key)
+        if isinstance(value, str) and _OTHER_PROJECTION.search(value):
+            return f"{key}: {one_line(value)}: not read: a lens is wanted as camera_model, with its coefficients by their names"
+    for key in _DISTORTIONS:
+        if not _nothing(data.get(key)):
+            return f"{key}: not read: coefficients are wanted by their names, k1, k2, ..."
+    return None
+
+
+def foreign_note(data: Mapping[str, Any]) -> str | None:
+    """A name of a lens by another tool's key that is not known, as `field: value`, which is taken for a pinhole; None: there is none.
+
+    Names of other projections are `foreign_fault`'s."""
+    known = {*COLMAP_MODELS, *PERSPECTIVE, "NONE", "", str(data.get("camera_model")).upper()}
+    for key in _NAMES:
+        value = data.get(key)
+        if value is not None and not (isinstance(value, str) and (value.strip().upper() in known or _OTHER_PROJECTION.search(value))):
+            return f"{key}: {one_line(value)}"
+    return None
+
+
 def said_fault(data: Mapping[str, Any]) -> str | None:
     """Why the lens that a JSON object describes, by the keys of nerfstudio and instant-ngp, is no pinhole, as `field: reason`; None: it is one.
 
-    FlickerError for a coefficient that is no number.
+    FlickerError for a coefficient that is no number, a flag that is neither true nor false.
     """
     for key in FLAGS:
-        if data.get(key):
+        if truth(data, key):
             return f"{key}: this is no pinhole, and only pinholes are drawn: undistort the pictures first"
     if any(re.match(r"ftheta_", key) for key in data):
         return "ftheta: this is no pinhole, and only pinholes are drawn: undistort the pictures first"
     model = data.get("camera_model")
     if model is not None and not isinstance(model, str):
         return "camera_model: not a text"
+    if (fault := foreign_fault(data)) is not None:
+        return fault
     listed = data.get("distortion_params")
     try:
         given = [] if listed is None else numbers(listed, "distortion_params", (len(listed),)).tolist()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -15,14 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlickerError, FlickerWarning, one_line
+from ..errors import FlickerError, FlickerWarning, one_line, say
 from .fields import numbers, read_json, renamed
 from .image import picture_size
-from .lens import COEFFICIENTS, said_fault
+from .lens import COEFFICIENTS, foreign_note, said_fault
 from .photos import SUFFIXES
 from .pinhole import Camera
 
-NUMBERS = ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", *COEFFICIENTS)
+NUMBERS = ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "fisheye_crop_radius", *COEFFICIENTS)
+SPLITS = ("train_filenames", "val_filenames", "test_filenames")  # nerfstudio's lists of pictures
 SIZE = (800, 800)  # of NeRF's synthetic scenes, whose files name none
 FROM_OPENGL = np.array([1.0, -1.0, -1.0])  # signs of the columns right, up, back to make them right, down, forward
 _NAMES = {"width": "w", "height": "h", "fx": "fl_x", "fy": "fl_y", "position": "transform_matrix", "rotation": "transform_matrix"}
@@ -100,7 +102,7 @@ def frames_of(path: Path, data: Any) -> list[Frame]:
             number = {key: None if both.get(key) is None else float(numbers(both[key], key, ())) for key in NUMBERS}
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
-        for key in ("w", "h", "fl_x", "fl_y"):
+        for key in ("w", "h", "fl_x", "fl_y", "fisheye_crop_radius"):
             if (value := number[key]) is not None and value <= 0:
                 raise FlickerError(f"{where}: {key}: {value:g} is not positive")
         for key in ("camera_angle_x", "camera_angle_y"):
@@ -112,12 +114,42 @@ def frames_of(path: Path, data: Any) -> list[Frame]:
         if name is not None and not isinstance(name, str):
             raise FlickerError(f"{where}: file_path: not a text")
         found.append(Frame(where, both, number, path.parent, None if name is None else name.replace("\\", "/")))  # a path of Windows is one, too
+    for note in dict.fromkeys(note for frame in found if (note := foreign_note(frame.data)) is not None):
+        say(path, f"{note}: not known, taken for a pinhole")
     return found
 
 
 def read_frames(path: Path) -> list[Frame]:
     """The frames of a file."""
     return frames_of(path, read_json(path))
+
+
+def splits_of(path: Path, data: dict[str, Any], frames: Sequence[Frame]) -> dict[str, list[int]]:
+    """Numbers of the frames in each of `SPLITS` that the file has, in the order of the frames. A picture is named as its frame names it, or without its suffix.
+    FlickerError, naming file and field, for one that no frame has."""
+    exact: dict[PurePosixPath, list[int]] = {}
+    bare: dict[PurePosixPath, list[int]] = {}
+    for n, frame in enumerate(frames):
+        if frame.name:
+            place = PurePosixPath(frame.name)
+            exact.setdefault(place, []).append(n)
+            bare.setdefault(place.with_suffix("") if place.suffix.lower() in SUFFIXES else place, []).append(n)
+    found = {}
+    for key in SPLITS:
+        names = data.get(key)
+        if names is None:
+            continue
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise FlickerError(f"{path}: {key}: not a list of texts")
+        chosen: set[int] = set()
+        for k, name in enumerate(names):
+            place = PurePosixPath(name.replace("\\", "/"))
+            there = exact.get(place) or bare.get(place.with_suffix("") if place.suffix.lower() in SUFFIXES else place)
+            if not there:
+                raise FlickerError(f"{path}: {key}[{k}]: '{one_line(name)}' is the file_path of no frame")
+            chosen.update(there)
+        found[key] = sorted(chosen)
+    return found
 
 
 def photo_name(name: str) -> str:
