@@ -11,6 +11,7 @@ is missing. A part that is named must be possible: else exit 1, as for any error
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -55,7 +56,8 @@ from doc_parts import (
 from doc_parts.common import Say, scenes_missing
 from rich.console import Console
 
-from flicker.errors import FlickerError
+from flicker.errors import FlickerError, Interrupted
+from flicker.progress import undivided
 from flicker.toolchain import ROOT
 
 
@@ -148,7 +150,9 @@ def write(part: Part, console: Console) -> None:
             status.update(f"{part.name}: {text}")
 
         done = [part.before(say)] if part.before is not None else []
-        changed = pages.put(texts(part, say))
+        made = texts(part, say)
+        with undivided():  # all its pages or none
+            changed = pages.put(made)
     done.append(", ".join(str(page.relative_to(ROOT)) for page in changed) or "no page changed")
     console.print(f"docs: {part.name}: {'; '.join(done)} ({time.monotonic() - began:.0f} s)", highlight=False, soft_wrap=True)
 
@@ -169,21 +173,40 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--list", action="store_true", help="list the parts with what each lacks, write nothing")
     options = parser.parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else 180)
-    wrong = 0
-    for part in chosen(options.part):
-        reason = part.missing()
-        if options.list:
-            console.print(f"{part.name:15} {part.what}" + (f" [missing: {reason}]" if reason else ""), highlight=False, soft_wrap=True, markup=False)
-        elif reason:
-            console.print(f"docs: {part.name}: {'not written' if options.part else 'skipped'}, {reason}", highlight=False, soft_wrap=True, markup=False)
-            wrong += bool(options.part)
-        else:
-            try:
-                write(part, console)
-            except FlickerError as error:
-                console.print(f"docs: {part.name}: {error}", highlight=False, soft_wrap=True, markup=False)
-                wrong += 1
+    wrong, parts = 0, chosen(options.part)
+    ended: list[Part] = []
+    try:
+        for part in parts:
+            wrong += _one(part, bool(options.part), options.list, console)
+            ended.append(part)
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(ended, parts[len(ended) :], bool(options.part))) from None
     return 1 if wrong else 0
+
+
+def _kept(ended: list[Part], left: list[Part], asked: bool) -> str:
+    """What Ctrl-C in the first of the parts `left` leaves, and how to go on. asked: the parts were named; else those that lack something are skipped."""
+    written = [part.name for part in ended if part.missing() is None]
+    rest = [part.name for part in left if asked or part.missing() is None]
+    kept = f", {', '.join(written)} {'are' if len(written) > 1 else 'is'} written" if written else ""
+    return f"{left[0].name} is not finished{kept}; to go on: make docs PART={shlex.quote(' '.join(rest))}"
+
+
+def _one(part: Part, asked: bool, listed: bool, console: Console) -> int:
+    """Write or list a part; 1 where it was asked for and could not be written, 0 else."""
+    reason = part.missing()
+    if listed:
+        console.print(f"{part.name:15} {part.what}" + (f" [missing: {reason}]" if reason else ""), highlight=False, soft_wrap=True, markup=False)
+        return 0
+    if reason:
+        console.print(f"docs: {part.name}: {'not written' if asked else 'skipped'}, {reason}", highlight=False, soft_wrap=True, markup=False)
+        return int(asked)
+    try:
+        write(part, console)
+    except FlickerError as error:
+        console.print(f"docs: {part.name}: {error}", highlight=False, soft_wrap=True, markup=False)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
@@ -191,3 +214,6 @@ if __name__ == "__main__":
         sys.exit(main())
     except FlickerError as error:
         sys.exit(f"docs: {error}")
+    except KeyboardInterrupt as kept:
+        print(f"docs: interrupted{f': {kept}' if isinstance(kept, Interrupted) else ''}", file=sys.stderr)
+        sys.exit(130)

@@ -15,7 +15,7 @@ from doc_parts import areas, frames
 
 from flicker.cost import stamp
 from flicker.cost.area import TABLE, parts
-from flicker.errors import FlickerError
+from flicker.errors import FlickerError, Interrupted
 from flicker.explore.configurations import get_configuration, group
 from flicker.toolchain import ROOT
 
@@ -73,6 +73,21 @@ def test_pages_are_split_and_put_together(tmp_path: Path) -> None:
 def test_unknown_part_is_one_line() -> None:
     with pytest.raises(FlickerError, match=r"^PART: no part 'nosuch'; there are [^\n]*areas[^\n]*$"):
         docs.main(["nosuch"])
+
+
+def test_interruption_says_what_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which parts are written, that the one under way is not, and a command for the rest: of all parts without those that lack something."""
+    def write(part: docs.Part, console: object) -> None:
+        if part.name == "c":
+            raise KeyboardInterrupt
+
+    parts = [docs.Part(name, "", ("",), lambda say: {}, lambda name=name: "no input" if name in "be" else None) for name in "abcdef"]
+    monkeypatch.setattr(docs, "PARTS", tuple(parts))
+    monkeypatch.setattr(docs, "write", write)
+    with pytest.raises(Interrupted, match="^c is not finished, a is written; to go on: make docs PART='c d f'$"):
+        docs.main([])
+    with pytest.raises(Interrupted, match="^c is not finished; to go on: make docs PART='c e'$"):
+        docs.main(["c", "e"])
 
 
 def test_missing_inputs_are_said_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+import math
 import os
 import shutil
 import tempfile
@@ -52,6 +54,19 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 def write_text(path: Path, text: str) -> None:
     """A text file, as `write_atomically` writes."""
     write_atomically(path, lambda temporary: temporary.write_text(text))
+
+
+def json_text(data: object) -> str:
+    """Data as JSON that every reader takes: numbers that are not finite are null. Ends in a line feed."""
+    return json.dumps(_finite(data), indent=2, allow_nan=False) + "\n"
+
+
+def _finite(data: object) -> object:
+    if isinstance(data, Mapping):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def write_csv(path: Path, rows: Iterable[Sequence[object]]) -> None:

@@ -122,6 +122,8 @@ def test_select_view() -> None:
     for n in (-1, 3, 10**9):
         with pytest.raises(FlickerError, match=f"view {n}.*3 cameras"):
             select_view(cameras, n)
+    with pytest.raises(FlickerError, match="^view 1: there is one camera, 0$"):
+        select_view(cameras[:1], 1)
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 1), (0.1, 5, 0.1), (30, 0.2, 30), (0.01, 0.01, 0.01)])

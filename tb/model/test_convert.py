@@ -132,6 +132,7 @@ def test_command_selects(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words, told", [
+    (("/dev/full",), "/dev/full: no suffix, which says the format; written are .compressed.ply, .ply, .spz, .sog, .splat, .flk"),
     (("b.obj",), "unknown suffix '.obj'; written are .compressed.ply, .ply, .spz, .sog, .splat, .flk"),
     (("b.ply", "--box", "1,2,3"), "--box: expected six numbers"),
     (("b.ply", "--box", "1,0,0,0,1,1"), "--box: x0 = 1 is above x1 = 0"),

@@ -771,7 +771,11 @@ def test_interrupted_budget(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("flicker.budget.reduce.chip_cost", lambda *a, **k: FrameCost(1.0, 1.0, 1.0, 0.0, 1))  # takes seconds, and decides nothing here
     save_ply(scene_of_shots(), tmp_path / "set.ply")
     options = ("--keep", 0.5, "--count", 6, "--size", "16x12", "--frame", "16x12", "--rounds", 1, "--steps", 0, "--last", 10, "--refit", 0, "--degrees", 0)
-    assert flicker("budget", "set.ply", "-o", "whole.ply", *options).returncode == 0
+    with monkeypatch.context() as patch:  # equal pictures have no number of decibels, and JSON no infinity
+        patch.setattr("flicker.budget.views.reference_psnr", lambda *a: [math.inf, 30.0])
+        assert flicker("budget", "set.ply", "-o", "whole.ply", *options, "--json", "whole.json").returncode == 0
+    told = json.loads(Path("whole.json").read_text(), parse_constant=lambda word: pytest.fail(word))
+    assert told["held_out_db"] == told["held_out_db_at_frame"] == [None, 30.0]
     for name, (method, calls, what) in {"a.ply": ("_tune", 7, "last next"), "b.ply": ("_remove", 1, "remove next")}.items():
         with monkeypatch.context() as patch:
             interrupt_after(patch, Reducer, method, calls)

@@ -11,6 +11,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from flicker_tb.command import flicker
 from scene_samples import random_scene
@@ -22,6 +23,7 @@ from flicker.explore.sweep import load_results, load_sweep, run_sweep
 from flicker.explore.sweep.results import KEY
 from flicker.explore.sweep.run import connect
 from flicker.front.view import load_view
+from flicker.scene.camera import Camera, cameras_text
 from flicker.scene.files import save_ply
 
 CONFIGURATIONS = ["no-ctu-32", "no-ctu-64", "gscore", "oracle", "flicker-*-fp16-factored", "flicker-*-mixed-factored"]
@@ -131,7 +133,19 @@ def test_hash_follows_content(folder):
     assert len(hashes) == 5
 
 
+def test_demo_with_other_cameras(folder, monkeypatch):
+    """As other commands take them: their view, their name, another key."""
+    (folder / "own.json").write_text(cameras_text([Camera(48, 32, 40.0, 40.0, np.array([0.0, 0.0, -5.0]), np.eye(3))]))
+    given, = load_sweep(write(folder, scenes=[{"path": "demo", "cameras": "own.json"}], views=[0])).targets
+    own, = load_sweep(write(folder, scenes=["demo"], views=[0])).targets
+    assert given.scene.views() == 1 and given.scene.cameras_from == str(folder / "own.json") and given.key() != own.key()
+    monkeypatch.setattr("flicker.scene.demo.generate", lambda: random_scene(5, 20, 0))
+    assert given.load().camera.position.tolist() == [0.0, 0.0, -5.0]
+
+
 @pytest.mark.parametrize(("changes", "message"), [
+    ({"scenes": [{"path": "demo", "up": "z"}]}, r"scenes\[0\]: up: z: only orbit cameras can be turned"),
+    ({"scenes": [{"path": "demo", "cameras": "x.json"}]}, r"scenes\[0\]: cameras: .*x.json: no such file"),
     ({"scenes": ["no.ply"]}, r"scenes\[0\]: .*no.ply: no such file"),
     ({"scenes": ["sweep.yaml"]}, r"scenes\[0\]: .*unknown format"),
     ({"scenes": [{"path": "tiny.ply", "camera": "x"}]}, r"scenes\[0\]: unknown key 'camera'; did you mean 'cameras'"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import asdict
 from enum import Enum
@@ -13,6 +12,7 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
+from ..output import json_text, write_text
 from .kept import Checkpoint, checkpoint_path, measuring
 from .options import RichSteps, check_apart, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
@@ -157,10 +157,10 @@ def budget(
     table.add_row("bytes", f"{out.stat().st_size:,}")
     console.print(table)
     if json_ is not None:
-        text = json.dumps({
+        text = json_text({
             "scene": scene, "cameras": cameras_from, "goal": {goal.kind.value: goal.value},
             "gaussians": [len(full), len(found)], "left_out": bad, "taken_out": removed,
             "held_out_db": lost, "held_out_db_at_frame": at_frame, "through": through, "drawn_db": drawn and {"full": drawn[0], "scene": drawn[1]},
             "steps": [asdict(row) | {"decibels": row.decibels if row.decibels < 200 else None} for row in reducer.rows],
-        }, indent=2)
-        write_atomically(json_, lambda path: path.write_text(text + "\n"))
+        })
+        write_text(json_, text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,8 @@ import typer
 from rich.table import Table
 
 from ..errors import FlickerError
-from .options import CAMERAS_HELP, SIZE_HELP, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
+from ..output import json_text, write_text
+from .options import CAMERAS_HELP, SIZE_HELP, check_scene, check_there, console, parse_size, say_source, writable
 from .tables import decibels
 
 
@@ -147,5 +147,4 @@ def chip(
         console.print(table)
     if out is not None:
         given = {"scene": str(scene), "view": view, "cameras": loaded.cameras_from, "config": config, "memory": memory, "refresh": refresh, "scheme": scheme}
-        text = json.dumps(frame.as_dict() | given | {"rtl": built}, indent=2)
-        write_atomically(out, lambda path: path.write_text(text + "\n"))
+        write_text(out, json_text(frame.as_dict() | given | {"rtl": built}))

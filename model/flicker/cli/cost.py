@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from ..output import json_text, write_text
 from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
 from .render import FormatChoice
 
@@ -102,5 +102,4 @@ def cost(
         _picture(result, dearest, out)
         console.print(f"view {numbers[dearest]}: {out}")
     if json_ is not None:
-        text = json.dumps({"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary(), indent=2)
-        write_atomically(json_, lambda path: path.write_text(text + "\n"))
+        write_text(json_, json_text({"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import FlickerError, Interrupted
-from ..output import folder_atomically
+from ..output import folder_atomically, json_text, write_text
 from ..params import (
     CHIP_MEMORIES,
     FAITHFUL,
@@ -278,7 +277,7 @@ def render(
     if number is not None:
         found = one(number, steps)
         if stats is not None:
-            write_atomically(stats, lambda path: path.write_text(json.dumps(found, indent=2) + "\n"))
+            write_text(stats, json_text(found))
         table = summary(found, out)
         if source.file != str(scene):
             table.add_row("scene", source.file)
@@ -291,7 +290,7 @@ def render(
                 rows.append(one(k, Within(lambda share: report(k + share, len(source.cameras)))))
     finally:  # what is there is told, also when the rest is interrupted
         if stats is not None and rows:
-            write_atomically(stats, lambda path: path.write_text(json.dumps(rows, indent=2) + "\n"))
+            write_text(stats, json_text(rows))
         if 0 < len(rows) < len(source.cameras):
             console.print(f"{len(rows)} of {len(source.cameras)} views are written", highlight=False)
     console.print(_of_all(rows, source.file))
@@ -344,7 +343,7 @@ def demo(
                 raise FlickerError("demo: the chip's picture differs from its golden model's")
             stats = rtl.stats | {"scene": str(folder / scene_path.name)}
             write_atomically(made / "demo.png", lambda path: save_png(path, rtl.image))
-            write_atomically(made / "stats.json", lambda path: path.write_text(json.dumps(stats, indent=2) + "\n"))
+            write_text(made / "stats.json", json_text(stats))
     except KeyboardInterrupt:
         raise Interrupted(f"nothing was written to {folder}; simulators that were built are kept, and the same command begins anew") from None
     table = summary(stats, folder / "demo.png")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, photos_root, stored_cameras
+from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, no_such_view, photos_root, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
 from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
@@ -41,19 +41,21 @@ class SceneFile:
     @property
     def cameras_file(self) -> Path | None:
         """The file or folder that the cameras come from; None: there is none."""
-        if self.path == DEMO:
-            return None
-        return Path(self.cameras) if self.cameras is not None else cameras_beside(self.path)
+        if self.cameras is not None:
+            return Path(self.cameras)
+        return None if self.path == DEMO else cameras_beside(self.path)
 
     @property
     def cameras_from(self) -> str:
         """Where the cameras come from, for people."""
-        return "the demo scene's own" if self.path == DEMO else cameras_said(self.path, self.cameras, self.up)
+        if self.path == DEMO:
+            return "the demo scene's own" if self.cameras is None else cameras_said(None, self.cameras)
+        return cameras_said(self.path, self.cameras, self.up)
 
     @cached_property
     def _cameras(self) -> list[Camera] | None:
         """The cameras; None: an orbit, which needs the scene."""
-        if self.path == DEMO:
+        if self.path == DEMO and self.cameras is None:
             from ..scene.demo import demo_cameras
 
             return demo_cameras()
@@ -79,7 +81,7 @@ class SceneFile:
     def target(self, view: int, size: tuple[int, int] | None = None) -> Target:
         """A view of the scene, with its photograph checked. size: None: that of the camera where it has a photograph, else `SIZE`. FlickerError."""
         if view >= (count := self.views()):
-            raise FlickerError(f"view {view}: there are {count} cameras, 0 to {count - 1}")
+            raise no_such_view(view, count)
         photo = self.photo(view)
         if photo is None or self._cameras is None:
             return Target(self, view, size or SIZE)
@@ -89,11 +91,11 @@ class SceneFile:
 
     @cached_property
     def digest(self) -> str:
-        """Of the contents of scene and cameras; the demo scene is code."""
-        if self.path == DEMO:
-            return ""
+        """Of the contents of scene and cameras; the demo scene and its own cameras are code."""
         cameras = self.cameras_file
         digests = ["orbit"] if cameras is None else [file_digest(file) for file in camera_files(cameras)]
+        if self.path == DEMO:
+            return "" if cameras is None else "-".join(digests)
         return "-".join((scene_digest(self.path)[:16], *digests, self.up or ""))
 
 

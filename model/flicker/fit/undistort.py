@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlickerError, one_line
+from ..output import json_text
 from ..scene.fields import read_json
 from ..scene.image import save_png
 from ..scene.lens import COEFFICIENTS, FLAGS, FOREIGN
@@ -60,7 +60,7 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
             kept["ply_file_path"] = ply.name
         else:
             kept.pop("ply_file_path", None)
-        (temporary / "transforms.json").write_text(json.dumps(kept | {"frames": frames}, indent=2) + "\n")
+        (temporary / "transforms.json").write_text(json_text(kept | {"frames": frames}))
         out.parent.mkdir(parents=True, exist_ok=True)
         if out.exists():
             out.rmdir()

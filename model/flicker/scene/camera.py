@@ -27,7 +27,7 @@ from .pinhole import MAX_SIZE, Camera
 
 __all__ = [
     "DEFAULT_UP", "MAX_SIZE", "ORBIT_VIEWS", "UP_AXES", "Camera", "camera_count", "camera_files", "cameras_beside", "cameras_said", "cameras_text",
-    "find_cameras", "load_cameras", "orbit_camera", "photos_root", "select_view", "stored_cameras",
+    "find_cameras", "load_cameras", "no_such_view", "orbit_camera", "photos_root", "select_view", "stored_cameras",
 ]
 
 ORBIT_VIEWS = 8  # of a scene without cameras of its own
@@ -220,5 +220,10 @@ def find_cameras(scene: Scene, cameras: str | Path | None = None, up: str | None
 def select_view(cameras: list[Camera], n: int) -> Camera:
     """Camera n, counted from 0; FlickerError when there is none."""
     if not 0 <= n < len(cameras):
-        raise FlickerError(f"view {n}: there are {len(cameras)} cameras, 0 to {len(cameras) - 1}")
+        raise no_such_view(n, len(cameras))
     return cameras[n]
+
+
+def no_such_view(n: int, count: int) -> FlickerError:
+    """What is said of a number that is none of `count` cameras."""
+    return FlickerError(f"view {n}: " + (f"there are {count} cameras, 0 to {count - 1}" if count != 1 else "there is one camera, 0"))

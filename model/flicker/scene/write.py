@@ -125,7 +125,8 @@ def writer_of(path: Path) -> str:
     for suffix in WRITERS:
         if path.name.lower().endswith(suffix):
             return suffix
-    raise FlickerError(f"{path}: unknown suffix '{path.suffix}'; written are {', '.join(WRITERS)}")
+    what = f"unknown suffix '{path.suffix}'" if path.suffix else "no suffix, which says the format"
+    raise FlickerError(f"{path}: {what}; written are {', '.join(WRITERS)}")
 
 
 def write_scene(scene: Scene, path: Path, suffix: str) -> Written:

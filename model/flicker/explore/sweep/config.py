@@ -85,7 +85,7 @@ class SceneSection(_Section):
     """A scene with settings of its own."""
 
     path: Annotated[StrictStr, Field(min_length=1, description="scene file, relative to the YAML file, or demo")]
-    cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras.json instead of the one beside the scene")] = None
+    cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras instead of those beside the scene")] = None
     views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
     up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
     photos: Annotated[StrictStr | None, Field(min_length=1, description="folder of photographs instead of those beside the cameras, or none")] = None
@@ -205,17 +205,17 @@ def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
         background = parse_background(section.background)
     except FlickerError as error:
         raise FlickerError(f"{base}: {where}: {error}") from None
-    if section.path == DEMO:
-        if section.cameras is not None:
-            raise FlickerError(f"{base}: {where}: the demo scene has its own cameras")
-        return SceneFile(DEMO, photos=section.photos, background=background)
-    path = Path(scene_path(_path(base, section.path, where)))
     cameras = None if section.cameras is None else str(_path(base, section.cameras, f"{where}: cameras"))
+    photos = section.photos if section.photos in (None, NONE) else str((base.parent / Path(section.photos).expanduser()).resolve())
+    if section.path == DEMO:
+        if section.up is not None:
+            raise FlickerError(f"{base}: {where}: up: {section.up}: only orbit cameras can be turned, and the demo scene has its own")
+        return SceneFile(DEMO, cameras, None, photos, background)
+    path = Path(scene_path(_path(base, section.path, where)))
     try:
         scene_kind(path)
     except FlickerError as error:
         raise FlickerError(f"{base}: {where}: {error}") from None
-    photos = section.photos if section.photos in (None, NONE) else str((base.parent / Path(section.photos).expanduser()).resolve())
     return SceneFile(str(path), cameras, section.up, photos, background)
 
 

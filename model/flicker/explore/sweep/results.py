@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...errors import FlickerError
-from ...output import write_atomically, write_text, writing
+from ...output import json_text, write_atomically, write_text, writing
 from ..points import Point
 from ..store import Store, plain
 from .config import Sweep
@@ -47,7 +46,7 @@ class Rows:
         self.store = Store(sweep.store)
         with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-        write_text(self.folder / "sweep.json", json.dumps(sweep.description(), indent=2) + "\n")
+        write_text(self.folder / "sweep.json", json_text(sweep.description()))
         self.rows: dict[str, dict[str, Any]] = {}
         for point in sweep.points:
             if (row := self.store.load(point.key)) is not None:
