@@ -528,9 +528,11 @@ unsigned flk_next_region(const flk_device_t *device)
 flk_status_t flk_poll(flk_device_t *device, uint16_t number)
 {
   const uint32_t finished = GET(FLK_FRAMES_FINISHED, get(device, FLK_FRAMES_OFFSET));
-  if ((uint16_t)(finished - number) < 0x8000u)
-    return FLK_OK;
-  return GET(FLK_STATUS_DEAD, get(device, FLK_STATUS_OFFSET)) != 0 ? FLK_DEAD : FLK_BUSY;
+  const int ended = (uint16_t)(finished - number) < 0x8000u;
+  if (GET(FLK_STATUS_DEAD, get(device, FLK_STATUS_OFFSET)) == 0)
+    return ended ? FLK_OK : FLK_BUSY;
+  /* A time-out counts frames that it forgets as finished: only one whose result waits for its release has ended. */
+  return ended && GET(FLK_INTERRUPT_FRAME_DONE, get(device, FLK_INTERRUPT_OFFSET)) != 0 ? FLK_OK : FLK_DEAD;
 }
 
 flk_status_t flk_wait(flk_device_t *device, uint16_t number, uint32_t polls, flk_pause_t pause, void *user)

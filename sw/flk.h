@@ -190,7 +190,8 @@ flk_status_t flk_start(flk_device_t *device, uint16_t *number);
 /* Which of two regions the next frame takes, 0 or 1; a start moves on. */
 unsigned flk_next_region(const flk_device_t *device);
 
-/* FLK_OK: the frame has ended, with errors or without; FLK_BUSY: not yet; FLK_DEAD. */
+/* FLK_OK: the frame has ended, with errors or without (an abort ends those that it forgets); FLK_BUSY: not yet. Of a frame before which all are released.
+ * FLK_DEAD: a time-out has ended it; after a time-out FLK_OK tells of a frame that ended before and waits for flk_release, FLK_DEAD of all others. */
 flk_status_t flk_poll(flk_device_t *device, uint16_t number);
 /* FLK_OK: a start is taken; FLK_BUSY: not yet; FLK_DEAD. */
 flk_status_t flk_ready(flk_device_t *device);

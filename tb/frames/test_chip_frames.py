@@ -555,7 +555,8 @@ def test_silent_memory(channel: str) -> None:
             chip.finish(frame, 15_000)
         assert chip.field("status", "dead") and chip.field("interrupt", "error")
         assert chip.field("result", "error") == 1 << ResultError.TIMED_OUT
-        assert chip.call("flk_ready", ctypes.byref(chip.device)) == "DEAD"
+        assert chip.field("frames", "finished") == chip.field("frames", "started") == 1  # the frame that was forgotten counts as finished
+        assert chip.call("flk_ready", ctypes.byref(chip.device)) == chip.call("flk_poll", ctypes.byref(chip.device), ctypes.c_uint16(1)) == "DEAD"
         chip.set_register("control", 2)  # an abort does not help
         chip.set_register("control", 1)
         chip.step(500)
@@ -593,7 +594,9 @@ def test_time_out_before_a_release() -> None:
         assert chip.field("status", "dead") and chip.field("interrupt", "error")
         result = chip.driver.flk_result(device)
         assert (result.tag, result.error) == (21, 0) and chip.counter(ChipCounter.SURVIVORS) == survivors
+        assert chip.call("flk_poll", device, ctypes.c_uint16(1)) == "OK"
         chip.driver.flk_release(device)
+        assert chip.call("flk_poll", device, ctypes.c_uint16(2)) == "DEAD"
         assert chip.field("interrupt", "error") and chip.driver.flk_result(device).error == 1 << ResultError.TIMED_OUT
         chip.set_register("interrupt", 31)
         revive(chip)
