@@ -226,6 +226,8 @@ def test_focal_lengths_of_transforms(tmp_path: Path) -> None:
     assert focal(camera_angle_x=2 * np.arctan(0.5)) == pytest.approx((WIDTH, WIDTH))
     assert focal(camera_angle_y=2 * np.arctan(0.5)) == pytest.approx((HEIGHT, HEIGHT))
     assert focal(camera_angle_x=2 * np.arctan(0.5), camera_angle_y=2 * np.arctan(1.0)) == pytest.approx((WIDTH, HEIGHT / 2))
+    assert focal(x_fov=90.0, fl_x=50.0, camera_angle_x=1.0) == pytest.approx((WIDTH / 2, WIDTH / 2))  # instant-ngp's, in degrees, comes first
+    assert focal(y_fov=90.0) == pytest.approx((HEIGHT / 2, HEIGHT / 2)) and focal(fl_x=50.0, y_fov=90.0) == pytest.approx((50.0, HEIGHT / 2))
     own, = load_cameras(written(tmp_path / "u.json", NERF | {"frames": [NERF["frames"][0] | {"fl_x": 70, "w": 32}]}))
     assert (own.fx, own.fy, own.width, own.height) == (70, 70, 32, HEIGHT)
 
@@ -242,6 +244,7 @@ def test_focal_lengths_of_transforms(tmp_path: Path) -> None:
     ([INRIA | {"camera_model": "OPENCV_FISHEYE"}], "camera 0: camera_model: OPENCV_FISHEYE is no"),
     ([INRIA | {"is_fisheye": True}], "camera 0: is_fisheye: this is no pinhole"), ([INRIA | {"k2": "a"}], "camera 0: k2: not a number"),
     (NERF | {"fl_x": None}, "neither fl_x nor camera_angle_x"), (NERF | {"fl_x": -3}, "fl_x: -3 is not positive"),
+    (NERF | {"x_fov": 180}, "x_fov: 180 is not between 0 and 180 degrees"),
     (NERF | {"fl_x": "50"}, "fl_x: not a number"),
     (NERF | {"w": 3.5}, "w: 3.5 is not a whole"), (NERF | {"cx": float("nan")}, "cx: not finite"), (NERF | {"camera_angle_y": 4}, "camera_angle_y: 4 is not"),
     ({"camera_path": 3}, "camera_path: not a list"), (PATH | {"camera_path": []}, "no cameras"), (PATH | {"render_width": None}, "render_width: is missing"),
@@ -289,6 +292,12 @@ def test_faults_of_binary(tmp_path: Path) -> None:
     for given in (tmp_path / "alone", tmp_path / "alone" / "images.txt"):
         with pytest.raises(FlickerError, match="alone"):
             load_cameras(given)
+
+
+def test_words_in_other_cases(tmp_path: Path) -> None:
+    """Names of kinds of cameras, texts for truths."""
+    for content in (PATH | {"camera_type": "Perspective"}, NERF | {"camera_model": "Pinhole", "is_fisheye": "False"}, [INRIA | {"fisheye": "false"}]):
+        assert len(load_cameras(written(tmp_path / "c.json", content))) == 1
 
 
 def test_crop_of_a_camera_path(tmp_path: Path) -> None:

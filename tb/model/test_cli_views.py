@@ -190,6 +190,27 @@ def test_photographs_beside_other_formats(tmp_path: Path) -> None:
     assert SceneFile(str(path), str(model)).digest not in digests
 
 
+def test_photographs_of_colmap_are_as_they_are_stored(tmp_path: Path) -> None:
+    """By half a turn, of which both have the shape: COLMAP's camera is of the stored pixels, that of a transforms.json of the upright ones."""
+    path = stored(tmp_path, balls((0, 0, 0)), camera())
+    (tmp_path / "cameras.json").unlink()
+    model = tmp_path / "data" / "sparse" / "0"
+    model.mkdir(parents=True)
+    (model / "cameras.txt").write_text("1 PINHOLE 48 80 100 100 24 40\n")
+    (model / "images.txt").write_text("1 1 0 0 0 0 0 6 1 sub\\a.png\n\n")  # as on Windows
+    (tmp_path / "data" / "images" / "sub").mkdir(parents=True)
+    values = np.arange(48 * 80, dtype=np.uint16).reshape(80, 48) * 17
+    exif = Image.Exif()
+    exif[274] = 3
+    Image.fromarray(values).save(tmp_path / "data" / "images" / "sub" / "a.png", exif=exif)
+    pose = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, -6], [0, 0, 0, 1]]
+    nerf = {"fl_x": 100, "w": 48, "h": 80, "frames": [{"file_path": "images/sub/a", "transform_matrix": pose}]}
+    (tmp_path / "data" / "transforms.json").write_text(json.dumps(nerf))
+    for cameras, wanted in ((model, values), (tmp_path / "data" / "transforms.json", values[::-1, ::-1])):
+        scene = SceneFile(str(path), str(cameras))
+        assert np.array_equal(scene.target(0).load().photo[..., 0], wanted / 65535)
+
+
 def test_demo_is_a_scene_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By its name, with a title; its own cameras unless others are given."""
     monkeypatch.setattr("flicker.scene.demo.generate", lambda: balls((0, 0, 0)))

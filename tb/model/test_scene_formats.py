@@ -518,7 +518,8 @@ def test_spz_that_is_refused(version: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("more", "antialiased", "notes"), [
-    ({}, False, 0), ({"antialias": True}, True, 0), ({"antialias": False}, False, 0), ({"model": "antialiased"}, True, 0), ({"model": "2dgs"}, False, 1),
+    ({}, False, 0), ({"antialias": True}, True, 0), ({"antialias": False}, False, 0), ({"antialias": 1}, True, 0),
+    ({"antialias": "true"}, True, 0), ({"antialias": "false"}, False, 0), ({"model": "antialiased"}, True, 0), ({"model": "2dgs"}, False, 1),
 ])
 def test_sog_says_antialiased(more: dict, antialiased: bool, notes: int, tmp_path: Path) -> None:
     files = samples.sog_files(base())

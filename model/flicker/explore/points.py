@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import FlickerError
 from ..front.view import DEMO, View, load_view
-from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, no_such_view, photos_root, stored_cameras
+from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, no_such_view, of_colmap, photos_root, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
 from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
 from .configurations import get_configuration
@@ -44,6 +44,11 @@ class SceneFile:
         if self.cameras is not None:
             return Path(self.cameras)
         return None if self.path == DEMO else cameras_beside(self.path)
+
+    @cached_property
+    def stored(self) -> bool:
+        """Whether the cameras are of pixels as they are stored, whatever EXIF says: COLMAP's."""
+        return self.cameras_file is not None and of_colmap(self.cameras_file)
 
     @property
     def cameras_from(self) -> str:
@@ -86,7 +91,7 @@ class SceneFile:
         if photo is None or self._cameras is None:
             return Target(self, view, size or SIZE)
         size = size or (self._cameras[view].width, self._cameras[view].height)
-        check_photo(photo, size)
+        check_photo(photo, size, self.stored)
         return Target(self, view, size)
 
     @cached_property
@@ -122,7 +127,7 @@ class Target:
         return f"{self.scene.background} {'' if self.photo is None else file_digest(self.photo)}"
 
     def load(self) -> View:
-        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up, self.scene.background, self.photo)
+        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up, self.scene.background, self.photo, self.scene.stored)
 
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""

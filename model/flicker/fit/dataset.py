@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..scene.colmap import PLACES, ColmapCamera, data_root, find_model, model_file, model_hint, numbered, read_cameras, read_images, read_points
-from ..scene.fields import read_json
-from ..scene.lens import COEFFICIENTS, FLAGS, PERSPECTIVE, foreign_fault, truth
+from ..scene.fields import read_json, truth
+from ..scene.lens import COEFFICIENTS, FLAGS, PERSPECTIVE, foreign_fault
 from ..scene.photos import PLACES as PHOTO_PLACES
 from ..scene.photos import SUFFIXES
 from ..scene.ply import open_ply
@@ -272,9 +272,9 @@ def transforms_shot(frame: Frame, size: int | None, folder: Path | None = None, 
     picture = _picture(f"{frame.where}: file_path", frame.folder / frame.name if folder is None else folder / photo_name(frame.name))
     mask: Path | None = None
     named = frame.data.get("mask_path")
-    if named is not None:
-        if not isinstance(named, str):
-            raise FlickerError(f"{frame.where}: mask_path: not a text")
+    if named is not None and not isinstance(named, str):
+        raise FlickerError(f"{frame.where}: mask_path: not a text")
+    if named:
         mask = frame.folder / named.replace("\\", "/")
         if not mask.is_file():
             raise FlickerError(f"{frame.where}: mask_path: no picture {mask}")

@@ -14,14 +14,13 @@ from ..errors import FlickerError, one_line
 from ..output import json_text
 from ..scene.fields import read_json
 from ..scene.image import save_png
-from ..scene.lens import COEFFICIENTS, FLAGS, FOREIGN
-from ..scene.transforms import FROM_OPENGL, frames_of, splits_of
+from ..scene.lens import FLAGS, FOREIGN
+from ..scene.transforms import FROM_OPENGL, NUMBERS, frames_of, splits_of
 from .dataset import ply_of, transforms_shot
 from .shot import Shot
 
 # Of the file: they say what the new pictures do not have any more, or name the old ones.
-_GONE = {"camera_angle_x", "camera_angle_y", "fl_x", "fl_y", "cx", "cy", "w", "h", "frames", "camera_model", "distortion_params", "fisheye_crop_radius",
-         *FLAGS, *COEFFICIENTS, *FOREIGN}
+_GONE = {"frames", "camera_model", "distortion_params", *NUMBERS, *FLAGS, *FOREIGN}
 
 
 def undistort(dataset: Path, out: Path, size: int | None = None, progress: Callable[[int, int], None] = lambda done, total: None) -> list[Shot]:

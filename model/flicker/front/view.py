@@ -87,23 +87,25 @@ class View:
 
 def load_view(
     scene: str | Path | Scene, number: int = 0, size: tuple[int, int] | None = None, cameras: str | Path | None = None, up: str | None = None,
-    background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
+    background: tuple[float, float, float] = BLACK, photo: str | Path | None = None, stored: bool = False,
 ) -> View:
     """The view of a scene from its camera `number`. size: (width, height); the vertical field of view and the shape of the pixels stay
     (`Camera.resized`); None: as the camera has it.
 
-    scene, cameras, up: as in `open_scene`. background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`).
+    scene, cameras, up: as in `open_scene`. background: RGB in [0, 1]. photo: picture file of what that camera saw (`scene.photos`); stored: of its pixels as
+    they are stored, as of COLMAP.
     FlickerError, naming file and field, for what cannot be read.
     """
-    return view_of(open_scene(scene, cameras, up), number, size, background, photo)
+    return view_of(open_scene(scene, cameras, up), number, size, background, photo, stored)
 
 
 def view_of(
     source: Source, number: int = 0, size: tuple[int, int] | None = None, background: tuple[float, float, float] = BLACK, photo: str | Path | None = None,
+    stored: bool = False,
 ) -> View:
     """`load_view` of a scene that is open."""
     camera = select_view(source.cameras, number)
     if size is not None:
         camera = camera.resized(*size)
-    seen = None if photo is None else load_photo(Path(photo), (camera.width, camera.height), background)
+    seen = None if photo is None else load_photo(Path(photo), (camera.width, camera.height), background, stored)
     return View(camera, source.scene, name=source.name, number=number, background=background, photo=seen, cameras_from=source.cameras_from)

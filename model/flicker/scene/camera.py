@@ -27,7 +27,7 @@ from .pinhole import MAX_SIZE, Camera
 
 __all__ = [
     "DEFAULT_UP", "MAX_SIZE", "ORBIT_VIEWS", "UP_AXES", "Camera", "camera_count", "camera_files", "cameras_beside", "cameras_said", "cameras_text",
-    "find_cameras", "load_cameras", "no_such_view", "orbit_camera", "photos_root", "select_view", "stored_cameras",
+    "find_cameras", "load_cameras", "no_such_view", "of_colmap", "orbit_camera", "photos_root", "select_view", "stored_cameras",
 ]
 
 ORBIT_VIEWS = 8  # of a scene without cameras of its own
@@ -54,6 +54,11 @@ def camera_files(path: str | Path) -> list[Path]:
     others = sorted(file.name for file in path.glob("transforms*.json"))
     hint = f"; give one of its files: {', '.join(map(one_line, others))}" if others else ""
     raise FlickerError(f"{path}: a directory without {', '.join(_LISTS)} or a COLMAP model{hint or colmap.model_hint(path)}")
+
+
+def of_colmap(path: str | Path) -> bool:
+    """Whether the cameras of a file or folder are those of a COLMAP model. FlickerError as of `camera_files`."""
+    return camera_files(path)[0].name in colmap.FILES
 
 
 def load_cameras(path: str | Path) -> list[Camera]:

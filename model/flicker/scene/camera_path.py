@@ -46,7 +46,7 @@ def cameras_of(path: Path, data: dict[str, Any]) -> list[Camera]:
 
 def _camera(entry: dict[str, Any], size: list[Any], name: str) -> Camera:
     kind = entry.get("camera_type") or "perspective"
-    if kind != "perspective":
+    if str(kind).lower() != "perspective":
         raise FlickerError(f"camera_type: {kind} is no pinhole, and only pinholes are drawn")
     matrix = entry.get("camera_to_world")
     nested = isinstance(matrix, list) and len(matrix) == 4

@@ -61,7 +61,7 @@ class ColmapCamera:
 
 @dataclass(frozen=True, eq=False)
 class ColmapImage:
-    """quat: float64 (4,), w first, shift: float64 (3,): world to camera."""
+    """name: with forward slashes, also as COLMAP writes it on Windows. quat: float64 (4,), w first, shift: float64 (3,): world to camera."""
 
     name: str
     camera: int
@@ -229,7 +229,7 @@ def _images_binary(path: Path) -> list[ColmapImage]:
         numbers = file.take("I7dI")
         name = file.text()
         file.skip(24 * file.take("Q")[0])
-        found.append(ColmapImage(name, numbers[8], np.array(numbers[1:5]), np.array(numbers[5:8])))
+        found.append(ColmapImage(name.replace("\\", "/"), numbers[8], np.array(numbers[1:5]), np.array(numbers[5:8])))
     file.end()
     return found
 
@@ -249,7 +249,7 @@ def _images_text(path: Path) -> list[ColmapImage]:
             _, values, camera, name = int(words[0]), [float(word) for word in words[1:8]], int(words[8]), line.split(None, 9)[9]
         except (ValueError, IndexError):
             raise FlickerError(f"{path}: line {at}: not an image: number, 4 of a quaternion, 3 of a shift, camera, name") from None
-        found.append(ColmapImage(name, camera, np.array(values[:4]), np.array(values[4:])))
+        found.append(ColmapImage(name.replace("\\", "/"), camera, np.array(values[:4]), np.array(values[4:])))
         points = True
     return found
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FlickerError
+from ..errors import FlickerError, one_line
 
+TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False, "none": False, "": False}  # of values that are texts
 MAX_NUMBER = 1e30  # squares and products of such numbers stay finite in the projection
 
 
@@ -38,6 +40,18 @@ def numbers(value: Any, key: str, shape: tuple[int, ...]) -> np.ndarray:
     if (np.abs(array) > MAX_NUMBER).any():
         raise FlickerError(f"{key}: beyond {MAX_NUMBER:g}")
     return array
+
+
+def truth(data: Mapping[str, Any], key: str) -> bool:
+    """Whether a key of a JSON object is true; "false" and the like are not, as texts too. FlickerError for what is neither."""
+    value = data.get(key)
+    if isinstance(value, str):
+        value = TRUTHS.get(value.strip().lower())
+        if value is None:
+            raise FlickerError(f"{key}: '{one_line(data[key])}' is neither true nor false")
+    elif not (value is None or isinstance(value, (bool, int, float))):
+        raise FlickerError(f"{key}: neither true nor false")
+    return bool(value)
 
 
 def renamed(error: FlickerError, names: dict[str, str]) -> FlickerError:

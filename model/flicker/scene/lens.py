@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import FlickerError, one_line
-from .fields import numbers
+from .fields import TRUTHS, numbers, truth
 
 # Parameters of COLMAP's models, in the order of the files.
 COLMAP_MODELS: dict[str, tuple[str, ...]] = {
@@ -36,7 +36,6 @@ _NAMES = ("camera_type", "lens_model", "lens_type", "projection", "projection_ty
 _DISTORTIONS = ("distortion", "distortion_coefficients", "distortion_coeffs", "dist_coeffs")  # and its coefficients, without their names
 FOREIGN = (*_NAMES, *_DISTORTIONS)
 _OTHER_PROJECTION = re.compile("fish|equirect|equidist|spher|panoram|omni|ortho|latlong|vr180|cylind|division|kannala|f-?theta", re.IGNORECASE)
-_TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False, "none": False, "": False}  # of values that are texts
 COEFFICIENTS = ("k", "k0", "k1", "k2", "k3", "k4", "k5", "k6", "p0", "p1", "p2", "p3", "p4", "s0", "s1", "s2", "s3", "s4", "sx1", "sy1", "omega")
 
 
@@ -51,23 +50,11 @@ def lens_fault(model: str | None, coefficients: Mapping[str, float | None]) -> s
     return None if bent is None else f"{bent[0]}: {bent[1]:g}: the lens distorts, and only pinholes are drawn: undistort the pictures first"
 
 
-def truth(data: Mapping[str, Any], key: str) -> bool:
-    """Whether a key of a JSON object is true; "false" and the like are not, as texts too. FlickerError for what is neither."""
-    value = data.get(key)
-    if isinstance(value, str):
-        value = _TRUTHS.get(value.strip().lower())
-        if value is None:
-            raise FlickerError(f"{key}: '{one_line(data[key])}' is neither true nor false")
-    elif not (value is None or isinstance(value, (bool, int, float))):
-        raise FlickerError(f"{key}: neither true nor false")
-    return bool(value)
-
-
 def _nothing(value: Any) -> bool:
     """Whether a value says that there is no distortion: none, false, 0, "none", lists and objects of such values."""
     if isinstance(value, (list, dict)):
         return all(map(_nothing, value.values() if isinstance(value, dict) else value))
-    return value is None or value == 0 or (isinstance(value, str) and _TRUTHS.get(value.strip().lower()) is False)
+    return value is None or value == 0 or (isinstance(value, str) and TRUTHS.get(value.strip().lower()) is False)
 
 
 def foreign_fault(data: Mapping[str, Any]) -> str | None:

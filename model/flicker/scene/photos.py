@@ -72,12 +72,13 @@ def photo_beside(cameras: Path, name: str) -> Path | None:
     return None
 
 
-def check_photo(path: Path, size: tuple[int, int]) -> None:
+def check_photo(path: Path, size: tuple[int, int], stored: bool = False) -> None:
     """FlickerError when a photograph cannot be averaged to a picture of size (width, height).
 
-    It must be as large or larger, and of the same shape: at the picture's width its height is the picture's within one pixel.
+    It must be as large or larger, and of the same shape: at the picture's width its height is the picture's within one pixel. stored: of a camera of COLMAP,
+    as in `picture_size`.
     """
-    (width, height), (w, h) = size, picture_size(path, size)
+    (width, height), (w, h) = size, picture_size(path, size, stored)
     if not same_shape(size, (w, h)):
         raise FlickerError(f"{path}: is {w}x{h}, which is not the shape of {width}x{height}: leave out the size, or the photographs (--photos {NONE})")
     if w < width or h < height:
@@ -99,7 +100,7 @@ def area_average(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return image
 
 
-def load_photo(path: Path, size: tuple[int, int], background: tuple[float, float, float] = BLACK) -> np.ndarray:
-    """float64 (height, width, 3) in [0, 1]: a photograph over the background, averaged to size (width, height). FlickerError as `check_photo`."""
-    check_photo(path, size)
-    return area_average(load_picture(path, background, size), size)
+def load_photo(path: Path, size: tuple[int, int], background: tuple[float, float, float] = BLACK, stored: bool = False) -> np.ndarray:
+    """float64 (height, width, 3) in [0, 1]: a photograph over the background, averaged to size (width, height). stored, FlickerError: as `check_photo`."""
+    check_photo(path, size, stored)
+    return area_average(load_picture(path, background, size, stored), size)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlickerError, one_line
+from .fields import truth
 from .raw import FLAT_NOTE, Raw, of_gsply
 
 META = "meta.json"
@@ -132,6 +133,10 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
     meta = parse_meta(where, text)
     names = member_names(where, meta)
     _check(where, meta)
+    try:
+        antialiased = truth(meta, "antialias") or meta.get("model") == "antialiased"
+    except FlickerError as error:
+        raise FlickerError(f"{where}: {error}") from None
     members = {name: read(name) for name in names}
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as bundle:
@@ -139,7 +144,7 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
             bundle.writestr(name, data)
     try:
         raw = of_gsply(gsply.sogread(packed.getvalue()))
-        raw.antialiased = meta.get("antialias") is True or meta.get("model") == "antialiased"
+        raw.antialiased = antialiased
         if meta.get("model") == "2dgs":
             raw.notes = (FLAT_NOTE,)
         return raw

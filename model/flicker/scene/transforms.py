@@ -23,7 +23,7 @@ from .lens import COEFFICIENTS, foreign_note, said_fault
 from .photos import SUFFIXES
 from .pinhole import Camera
 
-NUMBERS = ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "fisheye_crop_radius", *COEFFICIENTS)
+NUMBERS = ("w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov", "fisheye_crop_radius", *COEFFICIENTS)
 SPLITS = ("train_filenames", "val_filenames", "test_filenames")  # nerfstudio's lists of pictures
 SIZE = (800, 800)  # of NeRF's synthetic scenes, whose files name none
 FROM_OPENGL = np.array([1.0, -1.0, -1.0])  # signs of the columns right, up, back to make them right, down, forward
@@ -57,14 +57,17 @@ class Frame:
         return said_fault(self.data)
 
     def focal(self, w: float, h: float) -> tuple[float, float]:
-        """Focal lengths (x, y) in pixels of a picture of w x h pixels; where one is not given, it is the other."""
+        """Focal lengths (x, y) in pixels of a picture of w x h pixels; where one is not given, it is the other. As instant-ngp has it, x_fov and y_fov, fields
+        of view in degrees, come before fl_x and fl_y, and these before camera_angle_x and camera_angle_y, in radians."""
 
         def one(axis: str, side: float) -> float | None:
-            angle = self.number[f"camera_angle_{axis}"]
-            return self.number[f"fl_{axis}"] or (None if angle is None else side / 2 / math.tan(angle / 2))
+            degrees, length, angle = (self.number[key] for key in (f"{axis}_fov", f"fl_{axis}", f"camera_angle_{axis}"))
+            if degrees is not None:
+                angle, length = math.radians(degrees), None
+            return length or (None if angle is None else side / 2 / math.tan(angle / 2))
 
         fx, fy = one("x", w), one("y", h)
-        if self.number["fl_x"] and not self.number["fl_y"]:
+        if self.number["fl_x"] and not self.number["fl_y"] and self.number["y_fov"] is None:
             fy = fx  # an angle of the other axis is of less worth than a focal length
         known = fx or fy
         assert known is not None
@@ -108,7 +111,10 @@ def frames_of(path: Path, data: Any) -> list[Frame]:
         for key in ("camera_angle_x", "camera_angle_y"):
             if (value := number[key]) is not None and not 0 < value < math.pi:
                 raise FlickerError(f"{where}: {key}: {value:g} is not between 0 and pi")
-        if all(number[key] is None for key in ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")):
+        for key in ("x_fov", "y_fov"):
+            if (value := number[key]) is not None and not 0 < value < 180:
+                raise FlickerError(f"{where}: {key}: {value:g} is not between 0 and 180 degrees")
+        if all(number[key] is None for key in ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "x_fov", "y_fov")):
             raise FlickerError(f"{where}: neither fl_x nor camera_angle_x")
         name = both.get("file_path")
         if name is not None and not isinstance(name, str):
