@@ -529,6 +529,9 @@ def test_splat_needs_its_suffix(tmp_path: Path) -> None:
     assert scene_kind(path) == "splat" and len(load_scene(path)) == 20
     (tmp_path / "a.obj.gz").write_bytes(gzip.compress(b"v 1 2 3\n"))
     refused(tmp_path / "a.obj.gz", "unknown format '.gz'", "unpack it")
+    for suffix in ("splat", "ksplat", "glb", "sog"):
+        (tmp_path / f"b.{suffix}").write_bytes(gzip.compress(bytes(range(256)) * 8))
+        refused(tmp_path / f"b.{suffix}", "gzip of something that is neither PLY nor SPZ: unpack it")
 
 
 def test_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

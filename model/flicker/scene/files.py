@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -204,15 +205,25 @@ def scene_kind(path: str | Path) -> str:
     for name, kind in KINDS.items():
         if kind.holds is not None and kind.holds(head):
             return name
-    text = _text(head)
+    text, packed = _text(head), "gzip of something that is neither PLY nor SPZ: unpack it"
     if said is not None and text and said != "glTF":
         raise FlickerError(f"{path}: {text}, not {KINDS[said].title}")
+    if said not in (None, "PLY", "SPZ") and _unpacks(head):  # those two are read from gzip, and say more
+        raise FlickerError(f"{path}: {packed}")
     if said is None:
-        what = text or ("gzip of something that is neither PLY nor SPZ: unpack it" if head[:2] == b"\x1f\x8b" else "")
+        what = text or (packed if head[:2] == b"\x1f\x8b" else "")
         raise FlickerError(
             f"{path}: unknown format '{path.suffix}'{what and f' ({what})'}; known are {', '.join(SCENE_SUFFIXES)}, a SOG folder and its {sog.META}"
         )
     return said
+
+
+def _unpacks(head: bytes) -> bool:
+    """Whether a file's first bytes begin a gzip stream, and not records of a `.splat` that happen to begin as one."""
+    try:
+        return head[:3] == b"\x1f\x8b\x08" and len(zlib.decompressobj(wbits=31).decompress(head, 64)) > 0
+    except zlib.error:
+        return False
 
 
 def _text(head: bytes) -> str:

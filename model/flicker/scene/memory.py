@@ -298,7 +298,7 @@ def chunks_of(file: Ply) -> tuple[ChunkScene, tuple[str, ...]]:
     kept = [f"f_rest_{c * (count - 1) + k}" for c in range(3) for k in range(min(count, KEPT) - 1)]
     sh = file.numbers("sh", kept, "u1") if kept else np.empty((n, 0), np.uint8)
     packed = file.numbers("vertex", _PACKED, "i8").astype(np.uint32)
-    return ChunkScene(bounds, packed, sh, antialiased=header.mode == ANTIALIASED), cut_note(count)
+    return ChunkScene(bounds, packed, sh, antialiased=header.mode == ANTIALIASED), cut_note(count) + header.mode_notes
 
 
 def load_chunks(path: str | Path) -> ChunkScene:

@@ -27,6 +27,13 @@ _MOST = 1 << 20  # bytes of a header
 _BLOCK = 4096  # records
 
 
+# Comments that say how a scene is rendered: key, values, what they mean.
+_MODES = {
+    "splatrendermode": {"default": "default", ANTIALIASED: ANTIALIASED, "2dgs": "2dgs"},
+    "antialiased": {"0": "default", "false": "default", "1": ANTIALIASED, "true": ANTIALIASED},
+}
+
+
 @dataclass(frozen=True)
 class Property:
     """type: as the header spells it. kind: of the value, or of a list's items. length: kind of a list's length; empty for no list."""
@@ -62,17 +69,24 @@ class Header:
         return next((e for e in self.elements if e.name == name), None)
 
     @property
-    def mode(self) -> str:
-        """How the comments say that the scene is rendered, as brush, gsplat and Postshot write it: default, mip (antialiased) or 2dgs; the last one holds."""
-        found = "default"
+    def _modes(self) -> list[tuple[str, str]]:
+        """Keys and values of the comments that say how the scene is rendered."""
+        found = []
         for comment in self.comments:
             key, _, value = comment.lower().replace(":", " ").replace("=", " ").partition(" ")
-            value = value.strip()
-            if key == "splatrendermode" and value in ("default", ANTIALIASED, "2dgs"):
-                found = value
-            elif key == "antialiased" and value in ("0", "1", "false", "true"):
-                found = ANTIALIASED if value in ("1", "true") else "default"
+            if key in _MODES:
+                found.append((key, value.strip()))
         return found
+
+    @property
+    def mode(self) -> str:
+        """How the comments say that the scene is rendered, as brush, gsplat and Postshot write it: default, mip (antialiased) or 2dgs; the last one holds."""
+        return next((_MODES[key][value] for key, value in reversed(self._modes) if value in _MODES[key]), "default")
+
+    @property
+    def mode_notes(self) -> tuple[str, ...]:
+        """What is said of ways of rendering that are not known."""
+        return tuple(f"{key} '{one_line(value)}' is not known: drawn as {self.mode}" for key, value in self._modes if value not in _MODES[key])
 
 
 @dataclass(eq=False)

@@ -109,7 +109,7 @@ def _gaussians(file: Ply) -> Raw:
 def _notes(file: Ply, scales: int) -> tuple[str, ...]:
     vertex = file.header.element("vertex")
     properties = [] if vertex is None else vertex.properties
-    notes = []
+    notes = [*file.header.mode_notes]
     if scales == 2 or file.header.mode == "2dgs":
         notes.append(FLAT_NOTE)
     if any(p.kind == "u2" and not p.length and p.name not in _COLOURS and _KNOWN.fullmatch(p.name) for p in properties):
