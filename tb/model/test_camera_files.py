@@ -264,6 +264,7 @@ def test_faults_of_json(content: Any, words: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("cameras", "images", "words"), [
     ("1 PINHOLE 64 48 60 60 32\n", IMAGES_TEXT, "cameras.txt: line 1: 3 parameters, PINHOLE has 4"), ("1 LENS 64 48 1\n", IMAGES_TEXT, "unknown model LENS"),
+    (CAMERAS_TEXT + CAMERAS_TEXT, IMAGES_TEXT, "cameras.txt: line 6: camera 1: is there twice"),
     ("1 PINHOLE x 48 60 60 32 24\n", IMAGES_TEXT, "line 1: not a number among 1 x 48"), ("1\n", IMAGES_TEXT, "line 1: not a camera"),
     (CAMERAS_TEXT, "1 1 0 0 0 0 0 0 2 a.png\n\n", "image 'a.png': camera 2 is not in cameras.txt"),
     (CAMERAS_TEXT, "1 2 3\n", "images.txt: line 1: not an image"),
@@ -285,6 +286,10 @@ def test_faults_of_binary(tmp_path: Path) -> None:
             with pytest.raises(FlickerError, match=f"{name}: {words}"):
                 load_cameras(good)
         (good / name).write_bytes(whole)
+    whole = (good / "cameras.bin").read_bytes()
+    (good / "cameras.bin").write_bytes(struct.pack("<Q", 2) + 2 * whole[8:])
+    with pytest.raises(FlickerError, match="cameras.bin: camera 1: is there twice"):
+        load_cameras(good)
     colmap_binary(tmp_path / "n", 99)
     with pytest.raises(FlickerError, match="cameras.bin: camera 1: unknown model 99"):
         load_cameras(tmp_path / "n")

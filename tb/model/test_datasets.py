@@ -224,9 +224,13 @@ def test_words_that_mean_a_pinhole(nerf) -> None:
             warnings.simplefilter("error")
             data = load_dataset(changed(nerf, **more))
         assert not data.notes and all(a.camera.fx == b.camera.fx and b.lens is None for a, b in zip(plain.shots, data.shots))
-    with pytest.warns(FlickerWarning, match="transforms.json: camera_type: phone: not known, taken for a pinhole") as caught:
-        load_dataset(changed(nerf, camera_type="phone"))
-    assert len(caught) == 1
+    for more, message in (({"camera_type": "phone"}, "camera_type: phone: not known, taken for a pinhole"),
+                          ({"rolling_shutter": [0, 0, 1, 0], "camera_type": None, "camera_model": ""}, "rolling_shutter: not used")):
+        with pytest.warns(FlickerWarning, match=f"transforms.json: {message}") as caught:
+            load_dataset(changed(nerf, **more))
+            load_cameras(nerf)
+        assert len([warning for warning in caught if message in str(warning.message)]) == 2
+    changed(nerf, rolling_shutter=None)
     assert load_dataset(changed(nerf, camera_type="fisheye", is_fisheye="true", camera_model="FISHEYE")).tests[0].lens.model == "FISHEYE"
     assert load_dataset(changed(nerf, camera_type=None, camera_model=None)).tests[0].lens.model == "OPENCV_FISHEYE"
 
@@ -631,6 +635,16 @@ def test_undistort_of_folders(shots, tmp_path) -> None:
         assert before.camera.img_name == after.camera.img_name and np.array_equal(before.load(), after.load())
     done = flicker("undistort", changed(tmp_path / "a", frames=[]), "-o", tmp_path / "c")
     assert (done.returncode, done.stderr) == (2, f"flicker: {tmp_path}/a/transforms.json: frames: none\n") and not (tmp_path / "c").exists()
+
+
+def test_undistort_of_other_sets(shots, tmp_path) -> None:
+    """Of COLMAP, and of NeRF's synthetic scenes: what to do instead; of nothing."""
+    write_colmap(tmp_path / "a", shots[:3])
+    write_transforms(tmp_path / "b", shots[:3], "transforms_train.json")
+    for name, message in (("a", "a: a COLMAP model, no transforms.json: COLMAP undistorts its own (image_undistorter)"),
+                          ("b", "b: no transforms.json; give one of its files: transforms_train.json"), ("c", "c: no such file or folder")):
+        with pytest.raises(FlickerError, match=re.escape(f"{tmp_path}/{message}")):
+            undistorting.undistort(tmp_path / name, tmp_path / "out")
 
 
 def test_kinds_of_pictures(tmp_path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import FlickerError, one_line
 from ..output import json_text
+from ..scene.colmap import find_model
 from ..scene.fields import read_json
 from ..scene.image import save_png
 from ..scene.lens import FLAGS, FOREIGN
@@ -29,7 +30,12 @@ def undistort(dataset: Path, out: Path, size: int | None = None, progress: Calla
     `ply_file_path` are copied. FlickerError, naming file and field."""
     path = dataset / "transforms.json" if dataset.is_dir() else dataset
     if not path.is_file():
-        raise FlickerError(f"{dataset}: no transforms.json; COLMAP undistorts its own (image_undistorter), and flicker fit does so by itself")
+        if not dataset.is_dir():
+            raise FlickerError(f"{dataset}: no such file or folder")
+        if find_model(dataset) is not None:
+            raise FlickerError(f"{dataset}: a COLMAP model, no transforms.json: COLMAP undistorts its own (image_undistorter), flicker fit does so by itself")
+        others = ", ".join(sorted(one_line(file.name) for file in dataset.glob("transforms*.json")))
+        raise FlickerError(f"{dataset}: no transforms.json" + (f"; give one of its files: {others}" if others else ""))
     data = read_json(path)
     listed = frames_of(path, data)
     splits, ply = splits_of(path, data, listed), ply_of(path, data)

@@ -191,6 +191,8 @@ def _cameras_binary(path: Path) -> dict[int, ColmapCamera]:
         if not 0 <= model < len(names):
             raise FlickerError(f"{path}: camera {number}: unknown model {model}")
         keys = COLMAP_MODELS[names[model]]
+        if number in found:
+            raise FlickerError(f"{path}: camera {number}: is there twice")
         found[number] = ColmapCamera(names[model], width, height, dict(zip(keys, file.take(f"{len(keys)}d"))))
     file.end()
     return found
@@ -211,9 +213,12 @@ def _cameras_text(path: Path) -> dict[int, ColmapCamera]:
         if len(words) != 4 + len(keys):
             raise FlickerError(f"{where}: {len(words) - 4} parameters, {words[1]} has {len(keys)}: {', '.join(keys)}")
         try:
-            found[int(words[0])] = ColmapCamera(words[1], int(words[2]), int(words[3]), dict(zip(keys, map(float, words[4:]))))
+            number, camera = int(words[0]), ColmapCamera(words[1], int(words[2]), int(words[3]), dict(zip(keys, map(float, words[4:]))))
         except ValueError:
             raise FlickerError(f"{where}: not a number among {one_line(' '.join([words[0], *words[2:]]))}") from None
+        if number in found:
+            raise FlickerError(f"{where}: camera {number}: is there twice")
+        found[number] = camera
     return found
 
 

@@ -61,7 +61,7 @@ def foreign_fault(data: Mapping[str, Any]) -> str | None:
     """What a JSON object says of a lens by keys of other tools that would be passed over, as `field: reason`; None: nothing but a pinhole, or no more than
     its camera_model says."""
     said = data.get("camera_model")
-    for key in () if said is not None and str(said).upper() not in PERSPECTIVE else _NAMES:
+    for key in () if said and str(said).upper() not in PERSPECTIVE else _NAMES:
         value = data.get(key)
         if isinstance(value, str) and _OTHER_PROJECTION.search(value):
             return f"{key}: {one_line(value)}: not read: a lens is wanted as camera_model, with its coefficients by their names"
@@ -72,15 +72,15 @@ def foreign_fault(data: Mapping[str, Any]) -> str | None:
 
 
 def foreign_note(data: Mapping[str, Any]) -> str | None:
-    """A name of a lens by another tool's key that is not known, as `field: value`, which is taken for a pinhole; None: there is none.
+    """What is said of a name of a lens by another tool's key that is not known, which is taken for a pinhole, and of a rolling shutter; None: nothing.
 
     Names of other projections are `foreign_fault`'s."""
     known = {*COLMAP_MODELS, *PERSPECTIVE, "NONE", "", str(data.get("camera_model")).upper()}
     for key in _NAMES:
         value = data.get(key)
         if value is not None and not (isinstance(value, str) and (value.strip().upper() in known or _OTHER_PROJECTION.search(value))):
-            return f"{key}: {one_line(value)}"
-    return None
+            return f"{key}: {one_line(value)}: not known, taken for a pinhole"
+    return None if _nothing(data.get("rolling_shutter")) else "rolling_shutter: not used: all lines of a picture are taken for one moment's"
 
 
 def said_fault(data: Mapping[str, Any]) -> str | None:
@@ -96,6 +96,7 @@ def said_fault(data: Mapping[str, Any]) -> str | None:
     model = data.get("camera_model")
     if model is not None and not isinstance(model, str):
         return "camera_model: not a text"
+    model = model or None
     if (fault := foreign_fault(data)) is not None:
         return fault
     listed = data.get("distortion_params")

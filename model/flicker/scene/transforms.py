@@ -121,7 +121,7 @@ def frames_of(path: Path, data: Any) -> list[Frame]:
             raise FlickerError(f"{where}: file_path: not a text")
         found.append(Frame(where, both, number, path.parent, None if name is None else name.replace("\\", "/")))  # a path of Windows is one, too
     for note in dict.fromkeys(note for frame in found if (note := foreign_note(frame.data)) is not None):
-        say(path, f"{note}: not known, taken for a pinhole")
+        say(path, note)
     return found
 
 
