@@ -305,6 +305,13 @@ def test_words_in_other_cases(tmp_path: Path) -> None:
         assert len(load_cameras(written(tmp_path / "c.json", content))) == 1
 
 
+def test_names_that_are_not_known(tmp_path: Path) -> None:
+    """Taken for pinholes, and told."""
+    for content in ([INRIA | {"lens_model": "phone"}], NERF | {"lens_model": "phone"}):
+        with pytest.warns(FlickerWarning, match="c.json: lens_model: phone: not known, taken for a pinhole"):
+            assert len(load_cameras(written(tmp_path / "c.json", content))) == 1
+
+
 def test_crop_of_a_camera_path(tmp_path: Path) -> None:
     with pytest.warns(FlickerWarning, match="crop: is not applied"):
         camera, = load_cameras(written(tmp_path / "p.json", PATH | {"crop": {"crop_center": {"x": 0}}}))

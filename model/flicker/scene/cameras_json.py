@@ -11,16 +11,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import FlickerError
+from ..errors import FlickerError, say
 from .fields import numbers
-from .lens import said_fault
+from .lens import foreign_note, said_fault
 from .pinhole import Camera
 
 _KEYS = ("width", "height", "fx", "fy", "position", "rotation")
 
 
 def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
-    """The cameras, in the order of the file. FlickerError, naming file, camera and field."""
+    """The cameras, in the order of the file. FlickerError, naming file, camera and field; FlickerWarning for names of lenses that are not known."""
     cameras = []
     for i, entry in enumerate(entries):
         where = f"{path}: camera {i}"
@@ -37,6 +37,8 @@ def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
             cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name, **centre))
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
+    for note in dict.fromkeys(note for entry in entries if (note := foreign_note(entry)) is not None):
+        say(path, note)
     return cameras
 
 
