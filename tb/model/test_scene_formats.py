@@ -522,12 +522,26 @@ def test_spz_that_is_refused(version: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("more", "antialiased", "notes"), [
     ({}, False, 0), ({"antialias": True}, True, 0), ({"antialias": False}, False, 0), ({"antialias": 1}, True, 0),
     ({"antialias": "true"}, True, 0), ({"antialias": "false"}, False, 0), ({"model": "antialiased"}, True, 0), ({"model": "2dgs"}, False, 1),
+    ({"model": "other", "antialias": True}, True, 1),
 ])
 def test_sog_says_antialiased(more: dict, antialiased: bool, notes: int, tmp_path: Path) -> None:
     files = samples.sog_files(base())
     files["meta.json"] = json.dumps(json.loads(files["meta.json"]) | more).encode()
     got, said = told(written(tmp_path / "a.sog", samples.sog_bundle(files)))
-    assert got.antialiased is antialiased and len(said) == notes and all("2DGS" in note for note in said)
+    assert got.antialiased is antialiased and len(said) == notes and all("2DGS" in note or "model" in note for note in said)
+
+
+def test_sog_that_says_other_things(tmp_path: Path) -> None:
+    """Ways of rendering that are not known, no harmonics as null, versions that are none."""
+    files = samples.sog_files(base())
+
+    def path(**more: object) -> Path:
+        return written(tmp_path / "a.sog", samples.sog_bundle(files | {"meta.json": json.dumps(json.loads(files["meta.json"]) | more).encode()}))
+
+    assert told(path(model="new"))[1] == ['model "new" is not known: drawn as default']
+    assert quiet(path(shN=None)).sh_degree == 0
+    for version, text in (("2", '"2"'), (3, "3")):
+        refused(path(version=version), f"version: {text}, not 2")
 
 
 # ---- glTF ----------------------------------------------------------------------------------------------------------------------------
@@ -634,6 +648,13 @@ def test_gltf_of_several_parts(tmp_path: Path) -> None:
     primitive["extensions"][formats.SPLATS]["colorSpace"] = "lin_rec709_display"
     got, notes = told(written(tmp_path / "a.glb", formats.glb(document, buffer)))
     assert len(got) == 2 * N and len(notes) == 2 and "lin_rec709_display" in notes[0] and notes[1].startswith("2 primitives without Gaussians")
+    document["nodes"][2]["extensions"] = {"KHR_node_visibility": {"visible": False}}  # the far one
+    document["animations"] = [{}]
+    got, notes = told(written(tmp_path / "a.glb", formats.glb(document, buffer)))
+    assert len(got) == N and got.means[:, 0].max() < 5 and notes[-1] == "animations are not played: everything stands where its nodes put it"
+    document["nodes"][0]["extensions"] = {"KHR_node_visibility": {"visible": False}}  # all, which are below it
+    refused(written(tmp_path / "a.glb", formats.glb(document, buffer)), "no Gaussians")
+    del document["nodes"][0]["extensions"], document["nodes"][2]["extensions"], document["animations"]
     for name in ("KHR_gaussian_splatting_compression_spz", "KHR_gaussian_splatting_compression_spz_2"):
         data = formats.spz(scene, 3, flags=1)
         document, _ = formats.gltf({"POSITION": scene.means})

@@ -26,7 +26,7 @@ MAGIC = b"glTF"
 SPLATS = "KHR_gaussian_splatting"
 _SPZ = ("KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz")
 _DRAFTS = ("KHR_spz_gaussian_splats_compression", "KHR_spz_compression")  # on the primitive itself
-_HARMLESS = {SPLATS, *_SPZ, *_DRAFTS, "KHR_materials_unlit", "KHR_mesh_quantization"}  # extensions that a file may require
+_HARMLESS = {SPLATS, *_SPZ, *_DRAFTS, "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_node_visibility"}  # extensions that a file may require
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
@@ -68,6 +68,8 @@ def read_gltf(path: Path) -> Raw:
         raise FlickerError(f"{path}: no Gaussians: no node shows a primitive with the extension {SPLATS}" + (f", {others} without" if others else ""))
     if others:
         notes.append(f"{others} primitives without Gaussians (meshes, points) are left out")
+    if file.list("animations"):
+        notes.append("animations are not played: everything stands where its nodes put it")
     antialiased = all(part.antialiased for part in parts)
     if not antialiased and any(part.antialiased for part in parts):
         notes.append("some primitives were trained antialiased, others not: all are drawn as the latter")
@@ -269,6 +271,8 @@ class _File:
             if index in seen:
                 raise FlickerError(f"{self.path}: nodes[{index}]: below itself or below two nodes")
             seen.add(index)
+            if node.get("extensions", {}).get("KHR_node_visibility", {}).get("visible") is False:
+                continue  # with all below it
             if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
                 raise FlickerError(f"{self.path}: nodes[{index}]: EXT_mesh_gpu_instancing, which is not read; export without it")
             matrix = above @ self._matrix(node, index)

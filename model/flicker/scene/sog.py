@@ -23,6 +23,7 @@ from .raw import FLAT_NOTE, Raw, of_gsply
 
 META = "meta.json"
 LOD_META = "lod-meta.json"  # of a streamed SOG: an index of many SOG folders
+_MODELS = (None, "", "default", "3dgs", "antialiased")  # ways of rendering, beside 2dgs
 _GROUPS = {"means": 2, "scales": 1, "quats": 1, "sh0": 1, "shN": 2}  # group of meta.json: its pictures; shN may be missing
 
 
@@ -36,6 +37,8 @@ def parse_meta(where: str, text: bytes) -> dict[str, Any]:
         raise FlickerError(f"{where}: index of a streamed SOG, which is not read as a whole; {_lod_advice(meta)}")
     if not isinstance(meta, dict) or "means" not in meta:
         raise FlickerError(f"{where}: not the {META} of a SOG: 'means' is missing")
+    if meta.get("shN", meta) is None:  # as if it were missing
+        del meta["shN"]
     return meta
 
 
@@ -100,7 +103,7 @@ def _check(where: str, meta: dict[str, Any]) -> None:
     """Everything in `meta.json` but the names of the pictures."""
     version = meta.get("version")
     if version not in (None, 2):
-        raise FlickerError(f"{where}: version: {one_line(version)}, not 2 (or none: version 1)")
+        raise FlickerError(f"{where}: version: {one_line(json.dumps(version))}, not 2 (or none: version 1)")
     first = version is None
     if first:
         shape = meta["means"].get("shape")
@@ -140,13 +143,15 @@ def _decoded(path: Path, where: str, text: bytes, read: Callable[[str], bytes]) 
     members = {name: read(name) for name in names}
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as bundle:
-        for name, data in (members | {META: text}).items():
+        for name, data in (members | {META: json.dumps(meta).encode()}).items():
             bundle.writestr(name, data)
     try:
         raw = of_gsply(gsply.sogread(packed.getvalue()))
         raw.antialiased = antialiased
         if meta.get("model") == "2dgs":
             raw.notes = (FLAT_NOTE,)
+        elif meta.get("model") not in _MODELS:
+            raw.notes = (f"model {one_line(json.dumps(meta['model']))} is not known: drawn as {'antialiased' if antialiased else 'default'}",)
         return raw
     except Exception:  # of several libraries; the culprit is looked for now, so that good files are decoded once
         import imagecodecs
