@@ -9,6 +9,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
 LATENCY = 3
+HIGH = (1 << 24) - 1  # the upper bits, all ones
 
 
 @cocotb.test()
@@ -42,6 +43,28 @@ async def counts(dut):
         for _ in range(LATENCY):
             await FallingEdge(dut.clk_i)
             assert int(dut.value_o.value) == 0
+
+
+@cocotb.test()
+async def wraps(dut):
+    """The upper bits set to their end in between: the count goes from 2^32 - 1 to 0 and on."""
+    most = (1 << int(dut.CountBits.value)) - 1
+    dut.rst_ni.value = dut.clear_i.value = dut.count_i.value = 0
+    Clock(dut.clk_i, 10, unit="ns").start()
+    await FallingEdge(dut.clk_i)
+    dut.rst_ni.value = 1
+    await FallingEdge(dut.clk_i)
+    for high in (HIGH - 1, HIGH):
+        total = int(dut.value_o.value) & 0xFF | high << 8
+        dut.high_q.value = high
+        for _ in range(300):
+            dut.count_i.value = most
+            await FallingEdge(dut.clk_i)
+            total += most
+        dut.count_i.value = 0
+        for _ in range(LATENCY):
+            await FallingEdge(dut.clk_i)
+        assert int(dut.value_o.value) == total % (1 << 32) and total >> 32 == 1
 
 
 @cocotb.test()

@@ -1,15 +1,21 @@
 """Counters of events: one and several a cycle, carries into the upper bits, clear with events on their way; several counters of several
-sources each. Not covered: counts of more than 2^13."""
+sources each; counts about 2^32, where the upper bits are set to their end."""
 
 from __future__ import annotations
 
 import pytest
+from flicker_tb.bench import four_state, netlist
 from flicker_tb.runner import build_and_test, refused
 
 
 @pytest.mark.parametrize("bits", [1, 3])
 def test_event_counter(bits: int) -> None:
     build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": bits}, tests=["counts"])
+
+
+@pytest.mark.skipif(netlist() or four_state(), reason="sets a register")
+def test_end_of_the_count() -> None:
+    build_and_test("flk_event_counter", "cocotb_event_counter", parameters={"CountBits": 3}, tests=["wraps"], inner=True)
 
 
 @pytest.mark.parametrize(("counters", "sources"), [(1, 1), (3, 4), (2, 5)])

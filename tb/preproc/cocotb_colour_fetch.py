@@ -32,11 +32,12 @@ class Survivors:
 class Fetch:
     """The design with its memory."""
 
-    def __init__(self, dut, chunked: bool, perfect: bool, idle: str = "never", stall: str = "never", latency: int = 5):
-        self.dut, self.bench, self.chunked = dut, Bench(dut), chunked
+    def __init__(self, dut, chunked: bool, perfect: bool, idle: str = "never", stall: str = "never", latency: int = 5, first: int = 0):
+        """first: beat that the colours begin with."""
+        self.dut, self.bench, self.chunked, self.first = dut, Bench(dut), chunked, first
         self.memory = Memory(DramConfig().timing, perfect)
-        self.memory.allocate(BASE, SIZE, 77)
-        self.data = self.memory.read(BASE, SIZE)
+        self.memory.allocate(BASE + 64 * first, SIZE, 77)
+        self.data = self.memory.read(BASE + 64 * first, SIZE)
         rng = self.bench.rng
         stalls = {k: rng.choice([0.0, 0.3]) for k in ("AR", "R")} if not perfect else {}
         self.port = MemoryPort(dut, self.memory, PortConfig(max_reads=64, latency=latency, stall=stalls), writes=False)
@@ -75,7 +76,7 @@ class Fetch:
             for k in range(4):
                 if not g.alive >> k & 1:
                     continue
-                at = g.colour * 64 + (4 * g.group + k) * stride
+                at = (g.colour - self.first) * 64 + (4 * g.group + k) * stride
                 head = [number(at + size * i) for i in range(4)]
                 opacity, dc = (head[0], head[:0:-1]) if self.chunked else (head[0], head[1:])
                 for part, used in enumerate(USED[g.degree]):
@@ -135,9 +136,9 @@ class Fetch:
         return cycles
 
 
-def frame(rng, chunked: bool, clusters: int, degree: int | None = None, full: bool = False) -> list[Survivors]:
+def frame(rng, chunked: bool, clusters: int, degree: int | None = None, full: bool = False, first: int = 0) -> list[Survivors]:
     """Groups of clusters of any size and degree; some clusters and some stretches without survivors."""
-    groups, colour = [], rng.randrange(4)
+    groups, colour = [], first + rng.randrange(4)
     for cluster in range(clusters):
         d = rng.randrange(4) if degree is None else degree
         size = 256 if full else rng.choice([1, 2, 5, rng.randint(1, 64), 64])
@@ -160,6 +161,18 @@ async def parts(dut, chunked, idle, stall):
     await fetch.bench.reset()
     for _ in range(2):
         await fetch.run(frame(fetch.bench.rng, chunked, 14))
+
+
+@cocotb.test()
+@cocotb.parametrize(chunked=[True, False])
+async def last_colours(dut, chunked):
+    """The highest beats that a header can name."""
+    first = (1 << 32) - 3000
+    fetch = Fetch(dut, chunked, True, first=first)
+    await fetch.bench.reset()
+    groups = frame(fetch.bench.rng, chunked, 6, 3, full=True, first=first)
+    last = max(g.colour for g in groups)
+    await fetch.run([Survivors(g.cluster, g.colour + (1 << 32) - 1 - last, g.degree, g.group, g.alive) for g in groups])
 
 
 @cocotb.test()

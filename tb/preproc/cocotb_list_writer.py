@@ -5,10 +5,10 @@ from __future__ import annotations
 import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, config, rounds
+from flicker_tb.bench import Bench, config, four_state, netlist, rounds
 from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
-from flicker.golden.lists import MAX_CHUNKS, entry_words, pointer_lines, write_lists
+from flicker.golden.lists import COUNT_BITS, HEADER_AT, LINK_BITS, MAX_CHUNKS, entry_words, pointer_lines, write_lists
 
 LIST_BASE, POINTER_BASE = 0x2_12FF_FFC0, 0x1_0000_0077  # lists: lines from 64 on carry through all parts of an address
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "alternate")]
@@ -31,6 +31,22 @@ class Frame:
         self.pointer_lines = pointer_lines(cols, rows) // 4
         self.table = [int.from_bytes(part.tobytes(), "little") for part in image.pointers.reshape(-1, 4, 16)[:, writer]]
         self.written += [(POINTER_BASE + 4 * line + writer, self.table[line]) for line in image.closed[writer].tolist()]
+        self.ahead = 0
+
+    def move(self, chunks: int) -> None:
+        """The same with so many chunks taken before the first one."""
+        def line(at: int, data: int) -> tuple[int, int]:
+            linked = data >> HEADER_AT + COUNT_BITS + LINK_BITS & 1
+            return at + 32 * chunks, data + (linked * chunks << HEADER_AT + COUNT_BITS)
+
+        def pointers(data: int) -> int:
+            return data + sum(chunks << at for at in range(0, 512, 32) if data >> at & 0xFFFFFFFF)
+
+        lists = len(self.image.writes[self.writer])
+        self.written = [line(*item) for item in self.written[:lists]] + [(at, pointers(data)) for at, data in self.written[lists:]]
+        self.table = [pointers(data) for data in self.table]
+        self.chunks += chunks
+        self.ahead = chunks
 
 
 class Mover:
@@ -121,6 +137,9 @@ class Writer:
         self.out.clear()
         self.mover.moves.clear()
         self.mover.table.clear()
+        if frame.ahead:
+            await RisingEdge(dut.clk_i)
+            dut.taken_q.value = frame.ahead
         self.source.send(frame.items)
 
     async def run(self, frame: Frame) -> None:
@@ -137,7 +156,7 @@ class Writer:
         assert all(due - 2 <= got <= due for (got, *_), (due, *_) in zip(self.mover.moves, moves))
         left = self.mover.table | {(address - POINTER_BASE) // 4: data for address, data in self.out[image.lines[w] :]}
         assert all(left.get(line, 0) == due for line, due in enumerate(frame.table)), "pointers"
-        counters = {"entries": image.entries, "lines": image.lines, "evicted": image.evicted, "taken": image.taken, "failed": image.failed}
+        counters = {"entries": image.entries, "lines": image.lines, "evicted": image.evicted, "taken": image.taken + frame.ahead, "failed": image.failed}
         for name, value in counters.items():
             assert int(getattr(dut, f"{name}_o").value) == value[w], f"{name}: {int(getattr(dut, f'{name}_o').value)}, due {value[w]}"
 
@@ -210,6 +229,36 @@ async def out_of_memory(dut, idle, stall):
             await test.run(frame)
         full.chunks = MAX_CHUNKS  # the largest region there is; the model's memory is as large as the lists need
         await test.run(full)
+
+
+@cocotb.test(skip=netlist() or four_state())  # it sets a register
+async def last_chunks(dut):
+    """The last chunks of the largest region, the ones before counted as taken: as many as there are, and one too few."""
+    test = Writer(dut)
+    rng = test.bench.rng
+    await test.bench.reset()
+    full = random_frame(rng, config()["lists"], 800)
+    need, tiles = int(full.image.taken[full.writer]), [(u, v) for end, u, v, _ in full.items if not end]
+    assert need > 10
+    for chunks in (need, need - 1):
+        frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks)
+        frame.move(MAX_CHUNKS - chunks)
+        await test.run(frame)
+        assert int(dut.taken_o.value) == MAX_CHUNKS and int(dut.failed_o.value) == (chunks < need)
+    await test.run(full)
+
+
+@cocotb.test()
+async def corners(dut):
+    """A picture with as many lists as there may be: entries in its corners and its middle."""
+    test = Writer(dut)
+    rng = test.bench.rng
+    await test.bench.reset()
+    lists = config()["lists"]
+    width = 1 << (lists.bit_length() - 1 + 1) // 2
+    places = [(u, v) for u in (0, width // 2, width - 1) for v in (0, lists // width // 2, lists // width - 1)]
+    tiles = [rng.choice(places) for _ in range(120)]
+    await test.run(Frame(rng, 3, 2 * width, 2 * (lists // width), tiles))
 
 
 @cocotb.test()

@@ -2,7 +2,7 @@
 
 Covered: the demo scene, tables of numbers from all over their range (subnormal ones too) and of every length up to 40, none and all kept, one
 cluster, frames one after the other and after a reset in a frame, errors of the memory at each beat, numbers that are not finite, rates.
-Not covered: tables of more than 2**16 clusters.
+A table of more than 2**16 clusters. Not covered: of more than 2**17.
 """
 
 from __future__ import annotations
@@ -129,6 +129,21 @@ def test_numbers() -> None:
         want = check(outcome, packed, registers_of)
         kinds |= {(len(table) > 0, bool(want.any()), bool(want.all()))}
     assert kinds >= {(False, False, True), (True, True, True), (True, True, False), (True, False, False)}
+
+
+def test_a_long_table() -> None:
+    """More clusters than 16 bits number, most of them culled; the last ones are kept."""
+    rng = np.random.default_rng([seed(), 33])
+    setup = FrameSetup.of(demo_cameras()[0])
+    near = dataclasses.replace(setup, position=np.zeros(3), offset=np.array([-0.19998779296875, 0.0, 0.0, 0.0, 0.0]))
+    n = (1 << 16) + 37
+    table = near_table(rng, n, setup)
+    table["low"][:-5] *= -1
+    table["high"][:-5] *= -1
+    unit = bench()
+    unit.open({BASE: contents(table)}, latency=7)
+    want = check(unit.frame(registers(near, BASE // BEAT, n), limit=4 * n + 2000), scene(table), near)
+    assert want[-5:].any() and want[: 1 << 16].mean() < 0.5
 
 
 def test_errors() -> None:

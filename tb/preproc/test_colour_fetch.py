@@ -1,7 +1,7 @@
 """Colour fetch: parts of survivors' colours against memory, in both formats and all degrees, under pauses of memory and lanes.
 
-State space: clusters of one to 256 Gaussians, without survivors, with gaps; more clusters than numbers of them; frames one after the other. Parameter
-space: the default. Not covered: errors of the memory (tb/preproc/test_preprocessing.py).
+State space: clusters of one to 256 Gaussians, without survivors, with gaps; more clusters than numbers of them; frames one after the other; the
+highest beats that a header can name. Parameter space: the default. Not covered: errors of the memory (tb/preproc/test_preprocessing.py).
 """
 
 from __future__ import annotations

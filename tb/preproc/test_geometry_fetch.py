@@ -2,7 +2,7 @@
 
 Covered: the demo scene in chunks and in FP16, clusters of every size, headers of numbers from all over their range (subnormal ones too), none, one cluster
 of one Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, headers
-with numbers that are not finite, rates.
+with numbers that are not finite, rates, the last clusters and slots that there are.
 Not covered: counts of more than 2**16 beats.
 """
 
@@ -82,10 +82,10 @@ def registers(packed: PackedScene, setup: FrameSetup, headers: int = HEADERS, ge
     return packed_bits(*codes(setup.position, CLUSTER_M), (headers // BEAT, 34), (geometry // BEAT, 34), (chunked, 1))
 
 
-def items(packed: PackedScene, kept: np.ndarray) -> list[int]:
-    """The stream of kept clusters, with its end."""
+def items(packed: PackedScene, kept: np.ndarray, index: int = 0, first: int = 0) -> list[int]:
+    """The stream of kept clusters, with its end; index, first: of the scene's first cluster."""
     t = packed.table[kept]
-    rows = zip(t["flags"].tolist(), t["last"].tolist(), t["first"].tolist(), kept.tolist())
+    rows = zip(t["flags"].tolist(), t["last"].tolist(), (t["first"].astype(np.int64) + first).tolist(), (kept + index).tolist())
     return [*(packed_bits((flags & 3, 2), (last, 8), (first, 20), (index, 24)) for flags, last, first, index in rows), 1 << 54]
 
 
@@ -276,6 +276,26 @@ def test_demo(form: PackedFormat) -> None:
         unit.open(contents(packed), perfect, **PORT)
         check(unit.frame(registers(packed, setup), items(packed, kept), idle="rare", stall="half"), packed, setup, kept)
         assert unit.waits == 0
+
+
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
+def test_the_last_places(form: PackedFormat) -> None:
+    """Clusters with the highest numbers that there are, whose slots are the last ones."""
+    rng, setup = np.random.default_rng([seed(), 47]), some_setup()
+    packed = wild(rng, form, rng.choice([1, 16, 17, 255, 256], 12))
+    words = 3 if form is PackedFormat.CHUNK else 5
+    index, first = (1 << 24) - 12, (1 << 20) - len(packed.geometry) // 16
+    base = 0x80_0000_0FC0, 0x90_4567_8040
+    places = base[0] + index * form.header.itemsize, base[1] + first * 16 * words * 4
+    unit, kept = bench(), np.arange(12)
+    unit.open(contents(packed, *places), latency=20)
+    outcome = unit.frame(registers(packed, setup, *base), items(packed, kept, index, first))
+    got, want = fields(outcome), expected(packed, setup, kept)
+    assert outcome.done and outcome.status[0] == 0 and len(got["group"]) == len(want["group"]) + 1
+    for name, values in want.items():
+        ahead = {"index": index, "slots": first}.get(name, 0)
+        assert ((got[name][:-1] == values + ahead) | (values < 0)).all(), name
+    assert got["index"][-2, 0] == (1 << 24) - 1
 
 
 @pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])

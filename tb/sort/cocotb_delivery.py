@@ -254,11 +254,16 @@ async def pace(dut, slow):
 
 @cocotb.test()
 async def ends_alone(dut):
-    """Empty lists, and a core that takes an element in forty cycles: as many ends as there may be are between the units and it."""
-    test = Delivery(dut, pace=(40, 1, 1, 1))
+    """Empty lists, and a core that takes nothing until all stands still: as many ends as there may be are between the units and it."""
+    test = Delivery(dut)
+    room = int(dut.Queue.value) + int(dut.Depth.value)
     await test.bench.reset()
     await test.ready()
-    await test.run([[] for _ in range(240)] + make(test.rng, 8))
+    test.rest[0] = 3 * room
+    test.give([[] for _ in range(room + room % UNITS + 40)])
+    await test.bench.until(lambda: test.rest[0] < room, 3 * room, "a core that takes again")
+    assert test.tile[0] == 0 and len(test.tiles) > len(test.tiles) - sum(len(unit.lists) for unit in test.units) >= room, "ends that are under way"
+    await test.run(make(test.rng, 8))
 
 
 @cocotb.test()

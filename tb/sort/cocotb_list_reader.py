@@ -13,7 +13,7 @@ from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.list_reader import Line, pointer_line, read_tile
-from flicker.golden.lists import HEADER_AT, write_lists, writer_columns
+from flicker.golden.lists import COUNT_BITS, HEADER_AT, MAX_CHUNKS, write_lists, writer_columns
 from flicker.sim.memory import Memory, PortConfig
 
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts")]
@@ -45,6 +45,24 @@ class Frame:
         for line in self.written:
             memory.write((self.list_base + int(line)) * LINE, self.memory[line].tobytes())
         memory.write(self.pointer_base * LINE, self.pointers.tobytes())
+
+    def spread(self, rng) -> list[int]:
+        """Chunks get numbers all over the range that there is, up to the last one, in the same order; `memory` then has the lines that exist, by number.
+        Returns the chunks."""
+        old = sorted({int(line) // 32 for line in self.written})
+        new = dict(zip(old, [*sorted(rng.sample(range(MAX_CHUNKS - 1), len(old) - 1)), MAX_CHUNKS - 1]))
+        memory: dict[int, np.ndarray] = {}
+        link_at = HEADER_AT + COUNT_BITS
+        for line in self.written.tolist():
+            word = int.from_bytes(self.memory[line].tobytes(), "little")
+            if word >> link_at + 24 & 1:
+                link = word >> link_at & MAX_CHUNKS - 1
+                word += new[link] - link << link_at
+            memory[new[line // 32] * 32 + line % 32] = np.frombuffer(word.to_bytes(LINE, "little"), np.uint64)
+        used = self.pointers != 0
+        self.pointers[used] = [int(p) + new[int(p) & MAX_CHUNKS - 1] - (int(p) & MAX_CHUNKS - 1) for p in self.pointers[used]]
+        self.memory, self.written, self.chunks = memory, np.array(list(memory)), MAX_CHUNKS
+        return list(new.values())
 
     def same_burst(self, line: int, other: int) -> bool:
         return line // 8 == other // 8 and (self.list_base + line) // PAGE_LINES == (self.list_base + other) // PAGE_LINES
@@ -185,6 +203,26 @@ async def wide(dut):
     for x, y in walk:
         sizes[x + 256 * y] = reader.rng.randrange(40)
     await reader.run(make(reader, 256, 256, sizes), walk)
+
+
+@cocotb.test()
+async def largest_region(dut):
+    """Chunks all over the largest region of lists, which ends with the address space; then the same with the last chunk outside."""
+    reader = Reader(dut, latency=10)
+    rng = reader.rng
+    await reader.bench.reset()
+    base, there = (1 << 34) - 32 * MAX_CHUNKS, set()
+    for failing in (False, True):
+        frame = Frame(rng, 4, 4, sizes_of(rng, 16), base, 0x1000 + 0x100 * failing)
+        chunks = set(frame.spread(rng))
+        for chunk in chunks - there:
+            reader.memory.allocate((base + 32 * chunk) * LINE, 32 * LINE, rng.getrandbits(30))
+        there |= chunks
+        reader.memory.allocate(frame.pointer_base * LINE, 0x100 * LINE, rng.getrandbits(30))
+        frame.put(reader.memory)
+        frame.chunks -= failing
+        await reader.run(frame, frame.walk(rng))
+        assert int(dut.error_o.value) == failing
 
 
 @cocotb.test()

@@ -14,6 +14,7 @@ from flicker.golden.delivery import LINE_BYTES, RecordCache
 from flicker.sim.memory import Memory, PortConfig
 
 RECORDS = 1 << 13
+LAST = (1 << 24) - 64  # the last numbers that there are
 BASE = (1 << 40) - (1 << 29) - 0xABC0  # the sum of an address carries far up, behind a sixth or a third of the records
 Element = tuple[int, int, int]  # skip, record, tag
 
@@ -28,7 +29,9 @@ class Cache:
         self.base = BASE // LINE_BYTES * LINE_BYTES
         memory = Memory(DramConfig().timing, perfect)
         memory.allocate(self.base, RECORDS * self.bytes, rng.getrandbits(30))
+        memory.allocate(self.base + LAST * self.bytes, 64 * self.bytes, rng.getrandbits(30))
         self.data = memory.read(self.base, RECORDS * self.bytes)
+        self.last = memory.read(self.base + LAST * self.bytes, 64 * self.bytes)
         self.port = MemoryPort(dut, memory, PortConfig(
             data_bits=256, latency=latency, max_reads=256, max_beats=1, stall={"AR": pauses, "R": pauses}, run={"AR": 4, "R": 3}, seed=rng.getrandbits(30),
         ), writes=False)
@@ -126,7 +129,8 @@ class Cache:
                 assert got == tag, f"output {c}: tag {got}, due {tag}"
                 if not skip and not self.wrong:
                     data = int(dut.out_record_o.value) >> 8 * self.bytes * c & (1 << 8 * self.bytes) - 1
-                    want = int.from_bytes(self.data[record * self.bytes : (record + 1) * self.bytes], "little")
+                    data_of, at = (self.last, record - LAST) if record >= LAST else (self.data, record)
+                    want = int.from_bytes(data_of[at * self.bytes : (at + 1) * self.bytes], "little")
                     assert data == want, f"output {c}: record {record}: {data:#x}, due {want:#x}"
 
     async def ready(self) -> None:
@@ -145,7 +149,7 @@ def elements(rng, count: int, tag_bits: int) -> list[Element]:
     out: list[int] = []
     while len(out) < count:
         first, n = rng.randrange(RECORDS), rng.randrange(1, 20)
-        kind = rng.randrange(5)
+        kind = rng.randrange(6)
         if kind == 0:
             out += [first ^ rng.getrandbits(1) for _ in range(n)]
         elif kind == 1:
@@ -154,6 +158,8 @@ def elements(rng, count: int, tag_bits: int) -> list[Element]:
             out += [(first + k) % RECORDS for k in range(n)]
         elif kind == 3 and out:
             out += [rng.choice(out[-100:]) for _ in range(2 * n)]
+        elif kind == 4:  # the last ones, and the same with one bit less
+            out += [LAST + rng.choice((63, rng.randrange(64))) if rng.random() < 0.7 else first for _ in range(n)]
         else:
             out += [rng.randrange(RECORDS) for _ in range(n)]
     return [(int(rng.random() < 0.05), record, rng.getrandbits(tag_bits)) for record in out[:count]]

@@ -2,7 +2,8 @@
 
 State space: lists of 0 to 300 entries, masks of all kinds, cores of different pace, idle and back-pressure patterns, memory with and without pauses; cores that
 finish with their tiles at random, none or all of them; latency; clear at any time. Parameter space: short queues and a small cache; two
-elements a cycle for a core; with SLOW=1 the default, records of 32 bytes, a small cache with two elements.
+elements a cycle for a core; the default for as many ends of empty lists as there may be, with SLOW=1 for all; with SLOW=1 records of 32 bytes, a small
+cache with two elements.
 """
 
 from __future__ import annotations
@@ -23,6 +24,11 @@ WIDE = {"InWidth": 2, "Queue": 32}
 def test_delivery(parameters: dict[str, int]) -> None:
     tests = [] if parameters in ({}, WIDE) else ["tiles", "finishing", "ends_alone", "all_finished", "latency", "clear"]
     build_and_test("flk_delivery", "cocotb_delivery", parameters=parameters, tests=tests)
+
+
+def test_ends_of_the_product() -> None:
+    """Ends are counted as far as the product's own queues let them come."""
+    build_and_test("flk_delivery", "cocotb_delivery", tests=["ends_alone"])
 
 
 def test_illegal_parameters() -> None:

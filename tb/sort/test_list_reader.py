@@ -2,7 +2,8 @@
 
 State space: lists of 0 to 3,000 entries, chunks begun and full, chunks across 4 KB, lists given again, idle and back-pressure patterns on tiles, lines and
 answers, memory with and without pauses, latency 1 to 100 and DRAM timing; faults of the memory and of each field of pointer and header; clear at any time.
-Parameter space: two, four, eight contexts; 4, 11, 32 slots. Not covered: chunk numbers of more than 12 bits, several managers at one port.
+Chunks all over the largest region, up to its last one, at the end of the address space. Parameter space: two, four, eight contexts; 4, 11, 32 slots. Not
+covered: several managers at one port.
 """
 
 from __future__ import annotations
