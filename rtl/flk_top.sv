@@ -604,7 +604,7 @@ module flk_top
   logic                             unused_ready;
   logic [9:0]                       counter_index;
   logic [31:0]                      kept_value, live_value_q;
-  logic                             live_q_chosen;
+  logic                             live_q_chosen, kept_chosen, posted_q;
 
   // Words of a frame: the first field of the counters' structures first.
   assign front_words = {
@@ -671,6 +671,22 @@ module flk_top
   assign live_q_chosen = 32'(counter_index) >= COUNTER_LIVE &&
                          32'(counter_index) < COUNTER_LIVE + LIVE_WORDS;
 
+  // Words of frames exist once one has been posted; the others that nothing writes are none.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      posted_q <= 1'b0;
+    end else begin
+      posted_q <= !from_host.control.reset.value && (posted_q || post);
+    end
+  end
+
+  assign kept_chosen = posted_q && (
+      32'(counter_index) < COUNTER_RENDERING + RENDERING_WORDS ||
+      (32'(counter_index) >= COUNTER_FRONT_WAITS &&
+       32'(counter_index) < COUNTER_FRONT_WAITS + FRONT_WAITS) ||
+      (32'(counter_index) >= COUNTER_STAGE &&
+       32'(counter_index) < COUNTER_STAGE + 2 ** COUNTER_ADDR_BITS));
+
   always_ff @(posedge clk_i) begin
     live_value_q <= live_q[counter_index[$clog2(LIVE_WORDS)-1:0]];
   end
@@ -705,7 +721,8 @@ module flk_top
   assign to_host.result.error.next           = 16'(frame_error);
   assign to_host.frames.started.next         = started;
   assign to_host.frames.finished.next        = finished;
-  assign to_host.counter_value.value.next    = live_q_chosen ? live_value_q : kept_value;
+  assign to_host.counter_value.value.next    = live_q_chosen ? live_value_q
+                                               : kept_chosen ? kept_value : '0;
 
 `ifndef SYNTHESIS
   for (genvar k = 0; k < READERS; k++) begin : gen_check_reader

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import cocotb
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, four_state, netlist
 
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.lists import WRITERS, pointer_lines, writer_columns
@@ -430,6 +430,16 @@ async def frames(dut, speeds):
     assert test.stray > 60
     if max(speeds) > 1 and speeds[4] == 1:
         assert test.both > 0 and test.refused > 0
+
+
+@cocotb.test(skip=netlist() or four_state())  # it sets registers
+async def numbers_wrap(dut):
+    """Numbers of frames, set to their last values in between, go on from 0; as many are started as finished at the end."""
+    test = ControlTest(dut, (1, 1, 1, 1, 1))
+    await test.bench.reset()
+    dut.started_q.value = dut.finished_q.value = test.started = test.finished = (1 << 16) - 5
+    await test.run(12)
+    assert int(dut.started_o.value) == int(dut.finished_o.value) == 7
 
 
 @cocotb.test()

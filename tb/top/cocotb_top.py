@@ -16,6 +16,9 @@ START, ABORT, RESET = 1, 2, 4
 FRONT_DONE, FRAME_DONE, ERROR, ABORTED, REFUSED = (1 << REGISTERS["interrupt"].fields[name][0] for name in (
     "front_done", "frame_done", "error", "aborted", "refused"))
 ALL = FRONT_DONE | FRAME_DONE | ERROR | ABORTED | REFUSED
+# Numbers of counters that a frame leaves; 30 and 31 have none.
+PLACES = {*range(30), *range(32, ChipCounter.FRAME_WAITS + 1), *range(ChipCounter.FRONT_CLUSTER_WAITS, ChipCounter.FRONT_BEAT_WAITS + 1),
+          *range(ChipCounter.STAGE, ChipCounter.STAGE + 128)}
 
 
 class Chip:
@@ -36,6 +39,7 @@ class Chip:
         dut.reg_b_ready_i.value = dut.reg_r_ready_i.value = 1
         dut.r_data_i.value, dut.r_last_i.value = 0, 1
         dut.reg_w_strb_i.value = 15
+        dut.test_en_i.value = 0
 
     async def begin(self) -> None:
         await self.bench.reset()
@@ -181,15 +185,51 @@ class Chip:
 
 @cocotb.test()
 async def before_the_first_frame(dut: Any) -> None:
-    """Nothing has happened: result and frames are 0, and what the chip was built with can be read."""
+    """Nothing has happened: result, frames and counters of frames are 0, and what the chip was built with can be read."""
     chip = Chip(dut)
     await chip.begin()
     assert await chip.read("result") == await chip.read("frames") == await chip.read("interrupt") == 0
     assert await chip.read("status") == 1 << REGISTERS["status"].fields["ready"][0]
     for name, value in SETTINGS["capability"].items():
         assert await chip.field("capability", name) == value, name
+    assert not any([await chip.counter(index) for index in PLACES])
     await chip.start(5)
     await chip.ended(5)
+
+
+@cocotb.test()
+async def counters(dut: Any) -> None:
+    """Those of frames are there once one has ended, until a reset; a number that no counter has gives 0."""
+    chip = Chip(dut)
+    await chip.begin()
+    live = range(ChipCounter.LIVE_CYCLES, ChipCounter.LIVE_DATA_WAITS + 1)
+    for fresh in (True, False):
+        if not fresh:
+            await chip.revive()
+        assert not any([await chip.counter(index) for index in PLACES])
+        await chip.start(6)
+        await chip.ended(6)
+        values = {index: await chip.counter(index) for index in range(1 << 10) if index not in live}
+        assert {index for index, value in values.items() if value} == PLACES
+        assert await chip.counter(ChipCounter.LIVE_CYCLES) > 1000
+
+
+@cocotb.test()
+async def clocks(dut: Any) -> None:
+    """Those of the halves stand still between frames, and in a scan test run on."""
+    chip = Chip(dut)
+    await chip.begin()
+    edges = []
+    for test in (0, 1, 0):  # what comes behind each frame
+        await chip.cycles(1000)
+        dut.test_en_i.value = 0
+        await chip.start(7)
+        await chip.until(FRAME_DONE)
+        edges.append((await chip.counter(ChipCounter.FRONT_BEAT_WAITS), await chip.counter(ChipCounter.FRAME_WAITS)))
+        await chip.write("interrupt", ALL)
+        dut.test_en_i.value = test
+    for half in range(2):
+        assert edges[1][half] - edges[0][half] < 500 < 1000 < edges[2][half] - edges[1][half]
 
 
 @cocotb.test()

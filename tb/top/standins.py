@@ -1,6 +1,7 @@
 """Stand-ins for the chip's halves: what flk_top does itself is seen without the minutes that the halves take to build.
 
-Each has the ports of its module and makes `turns` turns of a read and a write of one beat, the low byte of a register; its counters are that byte, repeated.
+Each has the ports of its module and makes `turns` turns of a read and a write of one beat, the low byte of a register; its counters are that byte, repeated,
+but for the last one, which counts the edges of its clock since reset.
 """
 
 from __future__ import annotations
@@ -32,6 +33,15 @@ BODY = """
   logic       failed_q;
 
   assign turns = {turns};
+
+  logic [31:0] edges_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      edges_q <= '0;
+    end else begin
+      edges_q <= edges_q + 1'b1;
+    end
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -67,7 +77,10 @@ BODY = """
   assign idle_o = state_q == IDLE;
   assign done_o = state_q == DONE;
   assign error_o = {error};
-  assign counters_o = {{($bits(counters_o) / 8){{turns}}}};
+  localparam int unsigned Bits = $bits(counters_o);
+  logic [(Bits + 7) / 8 * 8 - 1:0] repeated;
+  assign repeated = {{((Bits + 7) / 8){{turns}}}};
+  assign counters_o = {{repeated[$bits(repeated)-1-:Bits-32], edges_q}};
   assign {port}ar_valid_o = state_q == READ;
   assign {port}ar_addr_o = {read};
   assign {port}ar_size_o = 3'd6;
