@@ -85,13 +85,14 @@ class ListLayout:
 class Keyed:
     """Entries of a view with what layouts and readers need.
 
-    key: uint32 (S,) of each splat, fixed point of 24 bits between the depths that the kept clusters bound. needed: int64 (T,), entries of each tile's sorted
-    list up to the one that finishes its last pixel. quantiles: int64 (256,), key below which k / 256 of the Gaussians of kept clusters lie, each cluster taken
-    to be spread evenly in depth.
+    key: uint32 (S,) of each splat, fixed point of 24 bits between the depths that the kept clusters bound. depth: float64 (S,). needed: int64 (T,), entries
+    of each tile's sorted list up to the one that finishes its last pixel. quantiles: int64 (256,), key below which k / 256 of the Gaussians of kept clusters
+    lie, each cluster taken to be spread evenly in depth.
     """
 
     entries: TileEntries
     key: np.ndarray
+    depth: np.ndarray
     needed: np.ndarray
     quantiles: np.ndarray
 
@@ -125,7 +126,7 @@ def key_entries(prepared: Prepared) -> Keyed:
     sub = np.arange(len(count))
     np.maximum.at(reach, sub // lists.cols // 2 * entries.cols + sub % lists.cols // 2, last)
     taken = prepared.splats.projected[entries.splat] <= reach[entries.tile]
-    return Keyed(entries, key, np.bincount(entries.tile[taken], minlength=len(reach)), quantiles)
+    return Keyed(entries, key, depth, np.bincount(entries.tile[taken], minlength=len(reach)), quantiles)
 
 
 def bin_numbers(keyed: Keyed, layout: ListLayout) -> np.ndarray:
