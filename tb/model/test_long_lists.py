@@ -53,13 +53,14 @@ def test_chains() -> None:
 
 
 def test_lines() -> None:
-    """What is written back: entries and counts of the layout of lists, nothing else."""
+    """What is written back: entries and counts of the layout of lists; the last entry again in places that are left."""
     entries = make_list(np.random.default_rng(2), CAPACITY + 5, "random")
     memory = sort_long(entries).memory()
     assert memory.shape == (228 + 1, 8)
     words = [int.from_bytes(line.tobytes(), "little") for line in memory]
     back = [word >> 52 * i & (1 << 52) - 1 for word in words for i in range(word >> 468)]
     assert back == [*np.sort(entries[:CAPACITY]).tolist(), *np.sort(entries[CAPACITY:]).tolist()]
+    assert all(words[line] >> 52 * i & (1 << 52) - 1 == words[line] >> 52 * 4 & (1 << 52) - 1 for line in (227, 228) for i in range(4, 9))
     assert [word >> 468 for word in words] == [9] * 227 + [5, 5]
     assert pack_lines(entries[:0]).shape == (0, 8)
 

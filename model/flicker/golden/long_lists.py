@@ -83,10 +83,12 @@ def batch_lines(chains: int, capacity: int = CAPACITY) -> int:
 
 
 def pack_lines(entries: np.ndarray) -> np.ndarray:
-    """uint64 (lines, 8): entries by nine, the last line perhaps with fewer."""
+    """uint64 (lines, 8): entries by nine, the last line perhaps with fewer and its last one in the places that are left, so that a line's key is in one
+    place."""
     count = -(-len(entries) // LINE_ENTRIES)
     padded = np.zeros(count * LINE_ENTRIES, np.uint64)
     padded[: len(entries)] = entries
+    padded[len(entries) :] = entries[-1:]
     lines = np.zeros((count, WORDS), np.uint64)
     for i in range(LINE_ENTRIES):
         at, entry = i * ENTRY_BITS, padded[i::LINE_ENTRIES]
