@@ -201,7 +201,7 @@ def look(shapes: Sequence[Shape], *defines: str) -> tuple[str, dict[str, dict]]:
 
 
 def _facts(modules: list[dict]) -> dict[str, dict]:
-    return {"outermost": outermost(modules), "registers": registers.registers_of(modules)}
+    return {"outermost": outermost(modules), "registers": registers.registers_of(modules), "state": registers.with_reset(modules)}
 
 
 def outermost(modules: list[dict]) -> dict[str, int]:
@@ -293,7 +293,7 @@ def main() -> int:
         jobs.append(pool.submit(elaborate, shapes))
         jobs += [pool.submit(run, command) for command in [*CHECKS[1:], verible]]
         outputs = [out, *(job.result()[0] for job in jobs)]
-    findings += [] if out else registers.check(seen["registers"], REGISTER_LIST)
+    findings += [] if out else registers.check(seen["registers"], REGISTER_LIST, seen["state"])
     findings += unseen([output for output in outputs if output])
 
     for finding in findings:

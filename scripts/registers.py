@@ -11,7 +11,7 @@ import fnmatch
 import re
 import tomllib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -384,11 +384,20 @@ def registers_of(modules: list[dict[str, Any]]) -> dict[str, dict[str, str]]:
     return {name: dict(sorted(own.items())) for name, own in sorted(out.items()) if own}
 
 
-def check(found: dict[str, dict[str, str]], path: Path) -> list[str]:
-    """Findings: registers that the list does not have as what they are, and names and modules of the list that nothing needs."""
+def with_reset(modules: list[dict[str, Any]]) -> list[str]:
+    """Names of modules that have a register with a reset."""
+    reader = Reader(modules)
+    return sorted({module.name for module in map(reader.module, reader.trees) if module.registers})
+
+
+def check(found: dict[str, dict[str, str]], path: Path, state: Collection[str] = ()) -> list[str]:
+    """Findings: registers that the list does not have as what they are, names and modules of the list that nothing needs, and "*" for data of a module in
+    `state`, which has registers with a reset: names are listed there, so that a new one is looked at."""
     entries = tomllib.loads(path.read_text())["register"]
     findings = [f"{path.name}: entry {k + 1}: kind must be one of {', '.join(KINDS)}, with a reason" for k, entry in enumerate(entries)
                 if entry.get("kind") not in KINDS or not entry.get("reason")]
+    findings += [f"{path.name}: entry {k + 1}: {module} has registers with a reset: name those without" for k, entry in enumerate(entries)
+                 if "*" in entry["names"] for module in entry["modules"] if module in state]
     used: set[tuple[int, str]] = set()
     for module, registers in found.items():
         for name, kind in registers.items():

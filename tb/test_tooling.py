@@ -333,6 +333,9 @@ def test_registers_without_reset(name: str, tmp_path: Path) -> None:
     wrong = "data" if kind != "data" else "feeds itself"
     allowed.write_text(allowed.read_text().replace(kind, wrong))
     assert any("inner: q has no reset" in line for line in registers.check(found, allowed))
+    state = registers.with_reset(json.loads(tree.read_text())["modulesp"])
+    allowed.write_text(allowed.read_text().replace(names, '["*"]'))
+    assert state == ["inner"] and "list.toml: entry 1: inner has registers with a reset: name those without" in registers.check(found, allowed, state)
 
 
 # ---- manifests for other tools ------------------------------------------------------------------
