@@ -1,7 +1,8 @@
 """Units with state in a 4-state simulator: registers and memories begin with X, which must have left valid, ready and data that are compared.
 
-Each runs tests of its own in Icarus Verilog (`flicker_tb.four_state`). Slow: a second of Verilator takes Icarus a minute. Not covered: units whose tests look
-at inner signals or at the noise that `flk_sram` gives for a collision, and whole halves.
+Each runs tests of its own in Icarus Verilog (`flicker_tb.four_state`), of some units a part. Slow: a second of Verilator takes Icarus a minute. `top` is
+flk_top with stand-ins for its halves: no output that says something is X from reset to the end of a frame. Not covered: units whose tests look at inner
+signals or at the noise that `flk_sram` gives for a collision, and whole halves.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from flicker.toolchain import ROOT
 
 # Test file and a word that chooses among its tests.
 UNITS = {
-    "axi": "split", "axi_fetch": "parameters0", "axi_lane": "", "delay": "8-4", "entry_merge": "test_entry_merge", "event_counter": "1", "frame_control": "",
-    "line_writer": "", "pair_fifo": "3-4", "priority_arbiter": "", "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg",
+    "axi": "split", "axi_arbiter": "Width", "axi_fetch": "parameters0", "axi_lane": "", "colour_fetch": "", "delay": "8-4", "entry_merge": "test_entry_merge",
+    "event_counter": "1", "frame_control": "", "line_writer": "", "list_writer": "64-64", "pair_fifo": "3-4", "pointer_port": "test_pointer_port",
+    "priority_arbiter": "", "record_writer": "", "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg", "top": "test_top",
 }
 
 

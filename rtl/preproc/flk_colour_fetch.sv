@@ -184,25 +184,26 @@ module flk_colour_fetch
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       known_q   <= 1'b0;
+      asked_q   <= '0;  // what is over goes by it before the first request, too
       c_valid_q <= 1'b0;
     end else begin
       known_q   <= !start_i && ((known_q && !over) || b_move);
       c_valid_q <= c_valid_q ? !request_ready : b_move && !nothing;
+      if (b_move) begin
+        asked_q <= b_cluster_q;
+      end
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (b_move) begin
-      asked_q <= b_cluster_q;
-      if (!nothing) begin
-        reached_q   <= b_last_q;
-        c_cluster_q <= b_cluster_q;
-        c_low_q     <= b_low_q[LowBits-1:0];
-        c_high_q    <= b_high_q + HighBits'(b_low_q[LowBits]);
-        c_next_q    <= b_high_q + HighBits'(b_low_q[LowBits]) + 1'b1;
-        c_first_q   <= first;
-        c_beats_q   <= BeatBits'(b_last_q - first) + 1'b1;
-      end
+    if (b_move && !nothing) begin
+      reached_q   <= b_last_q;
+      c_cluster_q <= b_cluster_q;
+      c_low_q     <= b_low_q[LowBits-1:0];
+      c_high_q    <= b_high_q + HighBits'(b_low_q[LowBits]);
+      c_next_q    <= b_high_q + HighBits'(b_low_q[LowBits]) + 1'b1;
+      c_first_q   <= first;
+      c_beats_q   <= BeatBits'(b_last_q - first) + 1'b1;
     end
   end
 

@@ -9,6 +9,7 @@ drains at random times; each channel that stops. Parameter space: 2 to 6 readers
 from __future__ import annotations
 
 import pytest
+from flicker_tb.bench import four_state
 from flicker_tb.runner import build, build_and_test, refused
 
 
@@ -16,7 +17,7 @@ from flicker_tb.runner import build, build_and_test, refused
     {"Width": 64}, pytest.param({"Readers": 2, "Writers": 3, "Width": 128, "IdBits": 2, "AddrBits": 32, "Patience": 2, "Orders": 2}, marks=pytest.mark.slow),
 ], ids=str)
 def test_axi_arbiter(parameters: dict[str, int]) -> None:
-    build_and_test("flk_axi_arbiter", "cocotb_axi_arbiter", parameters=parameters)
+    build_and_test("flk_axi_arbiter", "cocotb_axi_arbiter", parameters=parameters, tests=["rate"] if four_state() else [])
 
 
 def test_of_the_chip() -> None:

@@ -102,12 +102,12 @@ class Writer:
             freed += int(dut.freed_o.value)
             if int(dut.out_valid_o.value):
                 beat = beats[lines]
-                strobe, data = int(dut.out_strobe_o.value), int(dut.out_data_o.value)
-                got = (int(dut.out_beat_o.value), strobe, data)
+                strobe, data = int(dut.out_strobe_o.value), dut.out_data_o.value
+                shown_records = {r: int(data[self.record_bits * (r + 1) - 1 : self.record_bits * r]) for r in beat.records}  # the others hold anything
+                got = (int(dut.out_beat_o.value), strobe, shown_records)
                 assert held in (None, got), "line changed before its transfer"
                 held = None if ready else got
                 if ready:
-                    shown_records = {r: data >> self.record_bits * r & (1 << self.record_bits) - 1 for r in beat.records}
                     assert (got[0], strobe, shown_records) == (beat.address, self.marked(beat.records), beat.records), f"line {lines}"
                     lines += 1
                     inside -= len(shown_records)
