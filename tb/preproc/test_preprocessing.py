@@ -1,8 +1,9 @@
 """The whole front end in RTL against the golden model: memory after the frame, byte by byte, and the counters.
 
 State space: formats, list kinds, records of 16 and of 32 bytes, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters
-all culled, one Gaussian, a Gaussian over 4096x4096 (SLOW=1), a camera inside a cluster, errors of the memory by address, list memory that runs out, a table
-that points beyond the records. Registers and memories begin random; bytes that no one should write are compared too.
+all culled, one Gaussian, pictures of 4096x4096, 4096x1 and 1x4096, a Gaussian over the whole of the largest (SLOW=1), a camera inside a cluster, errors of the
+memory by address, list memory that runs out, a table that points beyond the records. Registers and memories begin random; bytes that no one should write are
+compared too.
 """
 
 from __future__ import annotations
@@ -242,6 +243,17 @@ def test_the_largest_picture() -> None:
     packed, camera = wide(150, size=(4096, 4096))
     golden, rtl = check(packed, camera)
     assert len(golden.entry_tile) > 20_000 and rtl.counters["spilled"] > 1000 and rtl.counters["fetched"] > 500
+
+
+@pytest.mark.parametrize(("width", "height"), [(4096, 1), (1, 4096)])
+def test_the_narrowest_pictures(width: int, height: int) -> None:
+    """A row and a column of pixels, as long as there are: Gaussians on all of it and beside it."""
+    rng, count = np.random.default_rng(seed()), 300
+    z = rng.uniform(1.0, 6.0, count)
+    means = np.stack([rng.uniform(-0.6, 0.6, count) * z * size / 4096 for size in (width, height)] + [z], axis=1)
+    packed = pack(some(count, means=means, scales=rng.uniform(0.0005, 0.01, (count, 3))), PackedFormat.CHUNK).packed
+    golden, _ = check(packed, Camera(width, height, 4096.0, 4096.0, np.zeros(3), np.eye(3)))
+    assert {0, 255} <= set(golden.entry_tile.tolist())
 
 
 def test_out_of_list_memory_after_pointers_have_moved() -> None:

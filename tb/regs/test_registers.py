@@ -10,7 +10,6 @@ import re
 from typing import Any
 
 import gen_registers
-from flicker_tb.bench import four_state
 from flicker_tb.runner import build_and_test
 
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
@@ -65,8 +64,7 @@ def places(struct: str) -> dict[str, tuple[int, int]]:
 
 def test_registers() -> None:
     config = {"registers": described(), "in": places("flk_registers__in_t"), "out": places("flk_registers__out_t")}
-    tests = ["commands"] if four_state() else []
-    build_and_test("flk_registers", "cocotb_registers", config=config, tests=tests)
+    build_and_test("flk_registers", "cocotb_registers", config=config)
 
 
 def test_python_module_is_the_description() -> None:
