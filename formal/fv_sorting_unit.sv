@@ -1,16 +1,13 @@
-// flk_sorting_unit, small: every list comes out sorted, each entry exactly once, then its end; a list that
-// does not fit as well, by cuts and readings.
+// flk_sorting_unit, small: every list that fits comes out sorted, each entry exactly once, then its end.
 //
 // The lists are one list, chosen freely (constant), of up to Entries entries with different keys, given
-// again and again with free pauses, in lines of two: a list again is what a second reading is, and
-// what follows is the same list as a new one. An entry at the output must be the one of which as many are
+// again and again with free pauses, in lines of two. An entry at the output must be the one of which as many are
 // smaller as have left before it.
 module fv_sorting_unit #(
   parameter  int unsigned Entries = 4,
   parameter  int unsigned Steps   = 2,  // 4 << Steps / 2 entries fit
   parameter  int unsigned Ways    = 2,
-  parameter  bit          Last    = 0,  // lists of one more than fit
-  localparam int unsigned Most    = Last ? (2 << Steps) + 1 : Entries,
+  localparam int unsigned Most    = Entries,
   localparam int unsigned Bits    = 4,  // three of the key
   localparam int unsigned CountBits = 4
 ) (
@@ -19,17 +16,16 @@ module fv_sorting_unit #(
   input logic [Most-1:0][Bits-1:0] list_i,
   input logic [CountBits-1:0]      length_i,
   input logic                      in_valid_i,
-  input logic                      next_ready_i,
   input logic                      out_ready_i
 );
 
-  logic rst_n, in_ready, next_valid, next_again, out_valid, out_end, offered_q, asked_q, in_last;
+  logic rst_n, in_ready, out_valid, out_end, offered_q, in_last;
   logic [Most-1:0][Bits-1:0] list_q;
   logic [CountBits-1:0] length_q, at_q, left, out_q, smaller;
   logic [1:0][Bits-1:0] line;
   logic [1:0] count;
   logic [Bits-1:0] out_entry;
-  logic found, different;
+  logic found, different, run_valid;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -44,26 +40,37 @@ module fv_sorting_unit #(
     .OutBits    (Bits)
   ) dut (
     .clk_i,
-    .rst_ni      (rst_n),
-    .clear_i     (1'b0),
-    .start_i     (1'b0),
-    .idle_o      (),
-    .entries_o   (),
-    .readings_o  (),
-    .dropped_o   (),
-    .in_valid_i  (in_valid_i && !asked_q),
-    .in_ready_o  (in_ready),
-    .in_entries_i(line),
-    .in_count_i  (count),
-    .in_last_i   (in_last),
-    .next_valid_o(next_valid),
-    .next_ready_i,
-    .next_again_o(next_again),
-    .out_valid_o (out_valid),
+    .rst_ni         (rst_n),
+    .clear_i        (1'b0),
+    .start_i        (1'b0),
+    .idle_o         (),
+    .entries_o      (),
+    .readings_o     (),
+    .dropped_o      (),
+    .in_valid_i,
+    .in_ready_o     (in_ready),
+    .in_entries_i   (line),
+    .in_count_i     (count),
+    .in_last_i      (in_last),
+    .run_valid_o    (run_valid),
+    .run_ready_i    (1'b0),
+    .run_end_o      (),
+    .run_entry_o    (),
+    .merging_o      (),
+    .merge_stop_o   (),
+    .merge_valid_i  (1'b0),
+    .merge_ready_o  (),
+    .merge_entries_i('0),
+    .merge_count_i  ('0),
+    .merge_limited_i(1'b0),
+    .merge_limit_i  ('0),
+    .merge_last_i   (1'b0),
+    .merge_final_i  (1'b0),
+    .out_valid_o    (out_valid),
     .out_ready_i,
-    .out_end_o   (out_end),
-    .out_entry_o (out_entry),
-    .finish_i    (1'b0)
+    .out_end_o      (out_end),
+    .out_entry_o    (out_entry),
+    .finish_i       (1'b0)
   );
 
   assign left    = length_q - at_q;
@@ -84,16 +91,12 @@ module fv_sorting_unit #(
   always_ff @(posedge clk_i or negedge rst_n) begin
     if (!rst_n) begin
       offered_q <= 1'b0;
-      asked_q   <= 1'b0;
       at_q      <= '0;
       out_q     <= '0;
     end else begin
-      offered_q <= in_valid_i && !asked_q && !in_ready;
-      if (in_valid_i && !asked_q && in_ready) begin
-        at_q    <= in_last ? '0 : at_q + CountBits'(2);
-        asked_q <= in_last;
-      end else if (next_valid && next_ready_i) begin
-        asked_q <= 1'b0;
+      offered_q <= in_valid_i && !in_ready;
+      if (in_valid_i && in_ready) begin
+        at_q <= in_last ? '0 : at_q + CountBits'(2);
       end
       if (out_valid && out_ready_i) begin
         out_q   <= out_end ? '0 : out_q + 1'b1;
@@ -130,19 +133,15 @@ module fv_sorting_unit #(
 
   always_comb begin
     assume (list_i == list_q && length_i == length_q && length_q <= CountBits'(Most) && different);
-    assume (!Last || length_q == CountBits'(Most));
     if (rst_n) begin
       assume (!offered_q || in_valid_i);
-      if (Last) begin
-        assume (in_valid_i && next_ready_i && out_ready_i);
-      end
+      a_fits: assert (!run_valid);
       if (out_valid && !out_end) begin
         a_entry: assert (found && smaller == out_q && out_q < length_q);
       end
       if (out_valid && out_end) begin
         a_end: assert (out_q == length_q);
       end
-      c_again: cover (next_valid && (next_again || !Last));
       c_list: cover (out_valid && out_end && length_q == CountBits'(Most));
     end
   end

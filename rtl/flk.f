@@ -98,7 +98,10 @@ sort/flk_compare_exchange.sv
 sort/flk_delivery.sv
 sort/flk_entry_buffer.sv
 sort/flk_list_reader.sv
+sort/flk_list_sorter.sv
 sort/flk_record_cache.sv
+sort/flk_run_merge.sv
+sort/flk_run_writer.sv
 sort/flk_sort_memory.sv
 sort/flk_sort_merge.sv
 sort/flk_sort_runs.sv

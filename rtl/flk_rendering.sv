@@ -6,7 +6,9 @@
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
 // error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
-// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3), records (read, 256 bits), frame buffer (write, 512 bits).
+// Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
+// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/long_lists.md).
+// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3, of runs 4 to 7), records (read, 256 bits), frame buffer and runs (write, 512 bits).
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four cores of a tile say so the
 // sorting unit drops the list (not in the automatic mode, flk_render_stage).
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
@@ -27,7 +29,8 @@ module flk_rendering
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,    // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
-  parameter  int unsigned SortWays       = 2,    // runs that its last step merges
+  parameter  int unsigned SortWays       = 8,    // runs that its last step merges
+  parameter  int unsigned MergeLines     = 128,  // for lists that do not fit; half as many runs
   parameter  int unsigned Chunks         = 16,   // in a list reader's memory
   parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
   parameter  int unsigned Queue          = 64,   // records of each core
@@ -103,7 +106,7 @@ module flk_rendering
 
   state_e     state_q;
   logic       start, pixels_done, lines_idle, quiet, done_q;
-  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error;
+  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error;
   logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
 
   assign start  = state_q == START && delivery_idle;
@@ -145,7 +148,7 @@ module flk_rendering
   end
 
   assign done_o  = done_q;
-  assign error_o = {write_error_q, record_error, |list_error};
+  assign error_o = {write_error_q, record_error, |(list_error | run_error)};
 
   // ---- lists ----------------------------------------------------------------------------------------
 
@@ -153,18 +156,26 @@ module flk_rendering
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
   logic [1:0]                  turn_q;
   logic [3:0]                  tile_ready, tile_valid;
-  logic [3:0]                  ask_valid, ask_ready, beat_valid, beat_ready;
+  logic [7:0]                  ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
   logic [3:0]                  list_valid, list_ready;  // lines
-  logic [3:0][AddrBits-1:0]    ask_addr;
-  logic [3:0][7:0]             ask_len;
-  logic [3:0][2:0]             ask_size;
-  logic [3:0][1:0]             ask_burst;
+  logic [7:0][AddrBits-1:0]    ask_addr;
+  logic [7:0][7:0]             ask_len;
+  logic [7:0][2:0]             ask_size;
+  logic [7:0][1:0]             ask_burst;
   logic [3:0]                  sorted_valid, sorted_ready, sorted_end, finish;
   logic [3:0][27:0]            sorted_entry;
   logic [3:0]                  finish_unit, entry_ready;
   logic [3:0][1:0]             entry_valid, entry_end;
   logic [3:0][1:0][27:0]       entry;
   logic [3:0][31:0]            entries, readings, dropped;
+
+  // Runs: lines to memory, and whether those of a unit are there.
+  localparam int unsigned Runs     = MergeLines / 2;
+  localparam int unsigned RunLines = ((16 << SortStages) + 8) / 9;
+
+  logic [3:0]               run_valid, run_ready, run_waits, run_open_q;
+  logic [3:0][BeatBits-1:0] run_beat, run_base_q;
+  logic [3:0][511:0]        run_data;
 
   flk_tile_walk #(
     .CoordBits(TILE_COORD_BITS)
@@ -192,10 +203,10 @@ module flk_rendering
   end
 
   for (genvar u = 0; u < 4; u++) begin : gen_unit
-    logic              line_last, next_valid, next_ready, next_again;
+    logic              line_last;
     logic [8:0][51:0]  line_entries;
     logic [3:0]        line_count;
-    logic [IdBits-1:0] unused_id;
+    logic [IdBits-1:0] unused_id, unused_run_id;
 
     assign tile_valid[u] = !walk_done && turn_q == 2'(u);
 
@@ -223,9 +234,6 @@ module flk_rendering
       .out_entries_o (line_entries),
       .out_count_o   (line_count),
       .out_last_o    (line_last),
-      .next_valid_i  (next_valid),
-      .next_ready_o  (next_ready),
-      .next_again_i  (next_again),
       .ar_valid_o    (ask_valid[u]),
       .ar_ready_i    (ask_ready[u]),
       .ar_id_o       (unused_id),
@@ -241,31 +249,57 @@ module flk_rendering
       .r_last_i      (list_r_last_i)
     );
 
-    flk_sorting_unit #(
-      .Stages(SortStages),
-      .Ways  (SortWays)
+    always_ff @(posedge clk_i) begin
+      run_base_q[u] <= registers_i.lists_beat + BeatBits'({registers_i.chunks, 5'b0})
+                       + BeatBits'(u * Runs * RunLines);
+    end
+
+    flk_list_sorter #(
+      .Stages    (SortStages),
+      .Ways      (SortWays),
+      .Runs      (Runs),
+      .MergeLines(MergeLines),
+      .IdBits    (IdBits),
+      .Id        (4 + u)
     ) i_sorter (
       .clk_i,
       .rst_ni,
-      .clear_i     (1'b0),
-      .start_i     (start),
-      .idle_o      (sorter_idle[u]),
-      .entries_o   (entries[u]),
-      .readings_o  (readings[u]),
-      .dropped_o   (dropped[u]),
-      .in_valid_i  (list_valid[u]),
-      .in_ready_o  (list_ready[u]),
-      .in_entries_i(line_entries),
-      .in_count_i  (line_count),
-      .in_last_i   (line_last),
-      .next_valid_o(next_valid),
-      .next_ready_i(next_ready),
-      .next_again_o(next_again),
-      .out_valid_o (sorted_valid[u]),
-      .out_ready_i (sorted_ready[u]),
-      .out_end_o   (sorted_end[u]),
-      .out_entry_o (sorted_entry[u]),
-      .finish_i    (finish_unit[u])
+      .start_i      (start),
+      .idle_o       (sorter_idle[u]),
+      .error_o      (run_error[u]),
+      .base_i       (run_base_q[u]),
+      .entries_o    (entries[u]),
+      .readings_o   (readings[u]),
+      .dropped_o    (dropped[u]),
+      .in_valid_i   (list_valid[u]),
+      .in_ready_o   (list_ready[u]),
+      .in_entries_i (line_entries),
+      .in_count_i   (line_count),
+      .in_last_i    (line_last),
+      .out_valid_o  (sorted_valid[u]),
+      .out_ready_i  (sorted_ready[u]),
+      .out_end_o    (sorted_end[u]),
+      .out_entry_o  (sorted_entry[u]),
+      .finish_i     (finish_unit[u]),
+      .write_valid_o(run_valid[u]),
+      .write_ready_i(run_ready[u]),
+      .write_beat_o (run_beat[u]),
+      .write_data_o (run_data[u]),
+      .waits_o      (run_waits[u]),
+      .written_i    (!run_open_q[u]),
+      .ar_valid_o   (ask_valid[4+u]),
+      .ar_ready_i   (ask_ready[4+u]),
+      .ar_id_o      (unused_run_id),
+      .ar_addr_o    (ask_addr[4+u]),
+      .ar_len_o     (ask_len[4+u]),
+      .ar_size_o    (ask_size[4+u]),
+      .ar_burst_o   (ask_burst[4+u]),
+      .r_valid_i    (beat_valid[4+u]),
+      .r_ready_o    (beat_ready[4+u]),
+      .r_id_i       (list_r_id_i),
+      .r_data_i     (list_r_data_i),
+      .r_resp_i     (list_r_resp_i),
+      .r_last_i     (list_r_last_i)
     );
 
     flk_entry_buffer #(
@@ -289,7 +323,7 @@ module flk_rendering
   end
 
   flk_axi_read_mux #(
-    .Managers(4),
+    .Managers(8),
     .AddrBits(AddrBits),
     .IdBits  (IdBits)
   ) i_lists (
@@ -472,6 +506,66 @@ module flk_rendering
   logic [3:0]          line_strobe;
   logic [511:0]        line_data;
 
+  // Lines of runs go with them.
+  localparam int unsigned WriteBits = BeatBits + 4 + 512;
+  localparam int unsigned SeqBits   = 12;  // more lines than are ever under way
+
+  logic [4:0]                write_valid, write_ready;
+  logic [4:0][WriteBits-1:0] write;
+  logic                      store_valid, store_ready, answered;
+  logic [WriteBits-1:0]      store;
+  logic [2:0]                unused_from;
+  logic [SeqBits-1:0]        stored_q, answered_q;
+  logic [3:0][SeqBits-1:0]   mark_q;  // number of a unit's last line
+
+  assign write_valid = {run_valid, line_valid};
+  assign write       = {{run_beat[3], 4'hf, run_data[3]}, {run_beat[2], 4'hf, run_data[2]},
+                        {run_beat[1], 4'hf, run_data[1]}, {run_beat[0], 4'hf, run_data[0]},
+                        {line_beat, line_strobe, line_data}};
+  assign {run_ready, line_ready} = write_ready;
+
+  flk_stream_arbiter #(
+    .Inputs(5),
+    .Width (WriteBits)
+  ) i_store (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (write_valid),
+    .in_ready_o (write_ready),
+    .in_data_i  (write),
+    .out_valid_o(store_valid),
+    .out_ready_i(store_ready),
+    .out_data_o (store),
+    .out_index_o(unused_from)
+  );
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      stored_q   <= '0;
+      answered_q <= '0;
+      run_open_q <= '0;
+    end else begin
+      stored_q   <= stored_q + SeqBits'(store_valid && store_ready);
+      answered_q <= answered_q + SeqBits'(answered);
+      for (int unsigned u = 0; u < 4; u++) begin
+        if (run_valid[u] && run_ready[u]) begin
+          run_open_q[u] <= 1'b1;
+        end else if (answered && answered_q == mark_q[u]) begin
+          run_open_q[u] <= 1'b0;
+        end
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    for (int unsigned u = 0; u < 4; u++) begin
+      if (run_valid[u] && run_ready[u]) begin
+        mark_q[u] <= stored_q;
+      end
+    end
+  end
+
   flk_frame_writer #(
     .Pairs     (Pairs),
     .BeatBits  (BeatBits),
@@ -511,13 +605,14 @@ module flk_rendering
     .rst_ni,
     .empty_o    (unused_empty),
     .idle_o     (lines_idle),
-    .flush_i    (writer_idle),
+    .flush_i    (writer_idle || run_waits != '0),
+    .answered_o (answered),
     .failed_o   (write_failed),
-    .in_valid_i (line_valid),
-    .in_ready_o (line_ready),
-    .in_beat_i  (line_beat),
-    .in_strobe_i(line_strobe),
-    .in_data_i  (line_data),
+    .in_valid_i (store_valid),
+    .in_ready_o (store_ready),
+    .in_beat_i  (store[512+4+:BeatBits]),
+    .in_strobe_i(store[512+:4]),
+    .in_data_i  (store[511:0]),
     .aw_valid_o,
     .aw_ready_i,
     .aw_id_o,

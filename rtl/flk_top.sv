@@ -31,7 +31,8 @@ module flk_top
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
   parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
-  parameter  int unsigned SortWays       = 2,
+  parameter  int unsigned SortWays       = 8,
+  parameter  int unsigned MergeLines     = 128,
   parameter  int unsigned Chunks         = 16,
   parameter  int unsigned Entries        = 512,
   parameter  int unsigned Pairs          = 4,
@@ -536,6 +537,7 @@ module flk_top
     .InWidth       (InWidth),
     .SortStages    (SortStages),
     .SortWays      (SortWays),
+    .MergeLines    (MergeLines),
     .Chunks        (Chunks),
     .Entries       (Entries),
     .Pairs         (Pairs),

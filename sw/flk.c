@@ -292,6 +292,8 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
 /* ---- sizes of regions ------------------------------------------------------------------------------------------------------------------- */
 
 enum { FACTORED_RECORD_BYTES = 16, CONIC_RECORD_BYTES = 32 };
+/* Runs of lists that the chip's sorting units do not hold: four units, 64 runs of 228 lines. */
+enum { RUN_BYTES = 4 * 64 * 228 * 64 };
 enum { WRITERS = 4, CHUNK_BYTES = 512, CHUNK_ENTRIES = 72, POINTERS_PER_LINE = 16, MAX_CHUNKS = 1 << 24 };
 
 /* Lists of each writer: every other tile in both directions. */
@@ -313,7 +315,7 @@ uint32_t flk_list_chunks(uint32_t width, uint32_t height, uint64_t entries)
 
 uint64_t flk_list_bytes(uint32_t chunks)
 {
-  return (uint64_t)chunks * WRITERS * CHUNK_BYTES;
+  return (uint64_t)chunks * WRITERS * CHUNK_BYTES + RUN_BYTES;
 }
 
 uint64_t flk_pointer_bytes(uint32_t width, uint32_t height)

@@ -117,6 +117,7 @@ uint64_t flk_record_bytes(const flk_scene_t *scene, uint32_t form);
 /* Chunks of each list writer for `entries` Gaussians in tiles, all together, in the worst order; two for each Gaussian of the scene are a good guess. When a frame ends with
  * list_memory, there were more: four times as many chunks, once more. */
 uint32_t flk_list_chunks(uint32_t width, uint32_t height, uint64_t entries);
+/* Of lists, and behind them of runs, which long lists are sorted in: 3.7 MB. */
 uint64_t flk_list_bytes(uint32_t chunks);
 uint64_t flk_pointer_bytes(uint32_t width, uint32_t height);
 uint32_t flk_least_stride(uint32_t width, unsigned pixel_format);

@@ -161,6 +161,7 @@ class ChipMemories:
     sorted_entries: longest list that a sorting unit takes in one reading. list_chunks: in a list reader's memory. sorted_ahead: entries of a sorting unit that
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
+    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; they have half as many runs, at most (docs/long_lists.md).
     """
 
     sorted_entries: int = 2048
@@ -168,17 +169,26 @@ class ChipMemories:
     sorted_ahead: int = 512
     pairs: int = 4
     survivors: int = 128
-    sort_ways: int = 2
+    sort_ways: int = 8
     gathered_lines: int = 256
+    merge_lines: int = 128
 
     @property
     def sort_stages(self) -> int:
         """Merging steps of a sorting unit by two: doublings of its first runs."""
         return (self.sorted_entries // SORT_CELLS).bit_length() - 1
 
+    @property
+    def sort_runs(self) -> int:
+        """Runs of a list, at most: it has so many times `sorted_entries`."""
+        return self.merge_lines // 2
+
     def rendering_parameters(self) -> dict[str, int]:
         """Of `flk_rendering` and `flk_top`; none where all sizes are the default ones."""
-        values = {"SortStages": self.sort_stages, "SortWays": self.sort_ways, "Chunks": self.list_chunks, "Entries": self.sorted_ahead, "Pairs": self.pairs}
+        values = {
+            "SortStages": self.sort_stages, "SortWays": self.sort_ways, "MergeLines": self.merge_lines, "Chunks": self.list_chunks,
+            "Entries": self.sorted_ahead, "Pairs": self.pairs,
+        }
         return values if self != ChipMemories() else {}
 
     def front_parameters(self) -> dict[str, int]:
@@ -187,7 +197,7 @@ class ChipMemories:
 
 
 SORT_CELLS = 16  # entries of a sorting unit's first runs
-CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(2048, 8, 128, 2, 64, 8, 64)}  # small: within the paper's 288 KB
+CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64)}  # small: within the paper's 288 KB
 
 
 @dataclass(frozen=True)

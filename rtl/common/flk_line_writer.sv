@@ -2,7 +2,7 @@
 //
 // A line has an address in beats and a strobe for each of its quarters (16 bytes); it is one AXI4 burst of one beat, under the
 // identifier Id. Lines wait in memories until Gather - 2 are there, none has come for 127 cycles, or flush_i is high; then all that
-// wait leave, those that come meanwhile with them. Order is kept. failed_o is high for a cycle when an answer was an error.
+// wait leave, those that come meanwhile with them. Order is kept. answered_o is high for a cycle with each answer, of lines in their order; failed_o when it was an error.
 // empty_o: no line waits here; idle_o: none is under way at the memory either.
 // Throughput a line a cycle. Combinational: w_ready_i to the memory's read enable; in_ready_o comes from registers.
 module flk_line_writer #(
@@ -20,6 +20,7 @@ module flk_line_writer #(
   output logic                empty_o,
   output logic                idle_o,
   input  logic                flush_i,
+  output logic                answered_o,
   output logic                failed_o,
   // Lines
   input  logic                in_valid_i,
@@ -64,6 +65,7 @@ module flk_line_writer #(
   assign left       = data_valid && data_ready;
   assign empty_o    = address_empty && data_empty;
   assign idle_o     = empty_o && write_idle;
+  assign answered_o = answer;
   assign failed_o   = answer && failed;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin

@@ -901,6 +901,8 @@ module flk_preprocessing
     .out_index_o(unused_index)
   );
 
+  logic unused_answered;
+
   assign arbiter_empty = !chosen_valid && lines_empty;
 
   flk_line_writer #(
@@ -914,6 +916,7 @@ module flk_preprocessing
     .empty_o    (lines_empty),
     .idle_o     (write_idle),
     .flush_i    (lists_end),
+    .answered_o (unused_answered),
     .failed_o   (write_failed),
     .in_valid_i (chosen_valid),
     .in_ready_o (chosen_ready),

@@ -3,8 +3,7 @@
 //
 // Tiles come as columns and rows of the picture. Of each the lines of its list are given: the newest
 // chunk first, lines of a chunk in ascending order, entries as they lie there; the last line is
-// marked. An empty list is one element with count 0. After the last line the reader asks what next
-// (next_again_i): the same list from its beginning, or the next one.
+// marked. An empty list is one element with count 0.
 // Pointers of Ahead tiles are fetched before there is a place for their lists. Contexts lists are
 // under way at once; a chunk is asked for when the line with its link has arrived and a slot of the
 // line memory is free for it, so that the port never waits. Earlier lists come first, and the last two
@@ -61,10 +60,6 @@ module flk_list_reader #(
   output logic [LineEntries-1:0][EntryBits-1:0] out_entries_o,
   output logic [3:0]                            out_count_o,
   output logic                                  out_last_o,
-  // After a last line
-  input  logic                                  next_valid_i,
-  output logic                                  next_ready_o,
-  input  logic                                  next_again_i,
   // AXI4
   output logic                                  ar_valid_o,
   input  logic                                  ar_ready_i,
@@ -173,7 +168,7 @@ module flk_list_reader #(
   // are in the memory and free of faults, and whether more of these will come; its slots, as a chain.
   logic [Contexts-1:0]                valid_q, want_q, ended_q;
   logic [Contexts-1:0][1:0]           writer_q;
-  logic [Contexts-1:0][ChunkBits-1:0] newest_q, chunk_q;
+  logic [Contexts-1:0][ChunkBits-1:0] chunk_q;
   logic [Contexts-1:0][LinesBits-1:0] used_q, lines_q;
   logic [Contexts-1:0][PendingBits-1:0] pending_q;
   logic [Contexts-1:0][CountBits-1:0] good_q;
@@ -433,7 +428,7 @@ module flk_list_reader #(
   // ---- what is given ------------------------------------------------------------------------------------
 
   // A line is read from the memory when another one follows for certain, or none; so the last one before a fault is marked.
-  logic give, give_last, read, move, given_q, over_q, next, again, done;
+  logic give, give_last, read, move, given_q, over_q, done;
   logic out_valid_q, out_last_q, out_none_q;
   logic [EntriesBits+HeaderCount-1:0] out_line;
 
@@ -459,7 +454,7 @@ module flk_list_reader #(
       read_new_q   <= 1'b1;
       read_first_q <= 1'b1;
       read_at_q    <= '0;
-    end else if (stop || next) begin
+    end else if (stop || done) begin
       read_new_q   <= 1'b1;
       read_first_q <= 1'b1;
       read_at_q    <= '0;
@@ -489,11 +484,11 @@ module flk_list_reader #(
         if (take_slot && spare == SlotBits'(s)) begin
           busy_q[s] <= 1'b1;
         end else if ((leave_slot && read_slot == SlotBits'(s)) ||
-                     (next && owner_q[s] == head_q)) begin
+                     (done && owner_q[s] == head_q)) begin
           busy_q[s] <= 1'b0;
         end
       end
-      free_slots_q <= free_slots_q + (next ? held_q[head_q] : HeldBits'(leave_slot))
+      free_slots_q <= free_slots_q + (done ? held_q[head_q] : HeldBits'(leave_slot))
                       - HeldBits'(take_slot);
     end
   end
@@ -521,10 +516,7 @@ module flk_list_reader #(
   );
 
   // All that was asked for must have come before a context is used again.
-  assign next_ready_o = over_q && pending_q[head_q] == '0;
-  assign next         = next_valid_i && next_ready_o;
-  assign again        = next && next_again_i;
-  assign done         = next && !next_again_i;
+  assign done = over_q && pending_q[head_q] == '0;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -537,8 +529,8 @@ module flk_list_reader #(
       over_q      <= 1'b0;
     end else begin
       out_valid_q <= give || (out_valid_q && !out_ready_i);
-      given_q     <= (given_q && !next) || (give && move && give_last);
-      over_q      <= (over_q && !next) || (out_valid_q && out_ready_i && out_last_q);
+      given_q     <= (given_q && !done) || (give && move && give_last);
+      over_q      <= (over_q && !done) || (out_valid_q && out_ready_i && out_last_q);
     end
   end
 
@@ -557,11 +549,10 @@ module flk_list_reader #(
   // ---- the contexts -------------------------------------------------------------------------------------
 
   for (genvar k = 0; k < Contexts; k++) begin : gen_context
-    logic here, mine, begins, comes, leaves, ends, follows;
+    logic here, mine, comes, leaves, ends, follows;
 
     assign here    = load && free_q == CtxBits'(k);                    // a list enters
     assign mine    = head_q == CtxBits'(k);
-    assign begins  = here || (again && mine);
     assign comes   = line && h_ctx == CtxBits'(k);
     assign leaves  = read && mine;
     assign ends    = comes && !dropped && (wrong || (h_last_q && !h_linked));
@@ -593,17 +584,14 @@ module flk_list_reader #(
         if (here) begin
           want_q[k]  <= p_out.used != '0;
           ended_q[k] <= p_out.used == '0;
-        end else if (begins) begin
-          want_q[k]  <= used_q[k] != '0;
-          ended_q[k] <= used_q[k] == '0;
         end else begin
           want_q[k]  <= (want_q[k] && !asked[k] && !ends) || follows;
           ended_q[k] <= ended_q[k] || ends;
         end
         pending_q[k] <= pending_q[k] + (asked[k] ? PendingBits'(lines_q[k]) : '0)
                         - PendingBits'(comes);
-        begun_q[k]   <= !begins && (begun_q[k] || asked[k]);
-        if (next && mine) begin
+        begun_q[k]   <= !here && (begun_q[k] || asked[k]);
+        if (done && mine) begin
           held_q[k] <= '0;
         end else begin
           held_q[k] <= held_q[k] + HeldBits'(asked[k]) - HeldBits'(leave_slot && mine);
@@ -619,12 +607,11 @@ module flk_list_reader #(
     always_ff @(posedge clk_i) begin
       if (here) begin
         writer_q[k] <= p_out.writer;
-        newest_q[k] <= p_out.chunk;
         used_q[k]   <= p_out.used;
       end
-      if (begins) begin
-        chunk_q[k] <= here ? p_out.chunk : newest_q[k];
-        lines_q[k] <= here ? p_out.used : used_q[k];
+      if (here) begin
+        chunk_q[k] <= p_out.chunk;
+        lines_q[k] <= p_out.used;
       end else if (follows) begin
         chunk_q[k] <= h_q.link;
         lines_q[k] <= LinesBits'(ChunkLines);
@@ -647,7 +634,7 @@ module flk_list_reader #(
     else $error("flk_list_reader: a line that nobody asked for");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        begins && !stop |-> pending_q[k] == '0 && good_q[k] == '0)
+        here && !stop |-> pending_q[k] == '0 && good_q[k] == '0)
     else $error("flk_list_reader: a list begins before the last one's lines are through");
 `endif
   end

@@ -4,8 +4,7 @@
 // the others; the user sees that full_o is low, or that the entry at the head leaves in this cycle.
 // head_o, with head_valid_o, is the entry of place head_at_o; pop_i takes it. Latency: an entry is at the
 // head three cycles after it was written. Throughput: an entry a cycle, in and out.
-// jump_i: the head goes to place jump_at_i, before pop_i, and nothing counts as read; with cut_i what
-// lies behind place cut_at_i is no more. Combinational: pop_i to the memory's read port. clear_i
+// jump_i: the head goes to place jump_at_i, before pop_i, and nothing counts as read. Combinational: pop_i to the memory's read port. clear_i
 // (synchronous) empties it.
 module flk_sort_memory #(
   parameter  int unsigned Width     = 52,
@@ -27,9 +26,7 @@ module flk_sort_memory #(
   input  logic                 pop_i,
   // Places
   input  logic                 jump_i,
-  input  logic [PlaceBits-1:0] jump_at_i,
-  input  logic                 cut_i,
-  input  logic [PlaceBits-1:0] cut_at_i
+  input  logic [PlaceBits-1:0] jump_at_i
 );
 
   localparam int unsigned SlotBits = PlaceBits - 1;
@@ -75,9 +72,6 @@ module flk_sort_memory #(
       fetch_at_d   = jump_at_i;
       read_valid_d = 1'b0;
       head_valid_d = 1'b0;
-    end
-    if (cut_i) begin
-      write_at_d = cut_at_i;
     end
     if (clear_i) begin
       head_at_d    = '0;

@@ -140,9 +140,7 @@ module flk_sort_merge #(
       .head_at_o   (head_at[s]),
       .pop_i       (pop[s]),
       .jump_i      (drop),
-      .jump_at_i   (complete ? finish.place[s] : write_at[s]),
-      .cut_i       (1'b0),
-      .cut_at_i    ('0)
+      .jump_at_i   (complete ? finish.place[s] : write_at[s])
     );
 
     assign at_limit[s] = head_at[s] == limit_at_q[s];

@@ -1,4 +1,4 @@
-// Last step of sorting: a list's sorted runs of Run entries into one, Ways at a time; what does not fit is cut off.
+// Last step of sorting: a list's sorted runs of Run entries into one, Ways at a time.
 //
 // A list is up to Ways Run entries, in runs of Run, the last one perhaps shorter, then an element with
 // in_end_i (no entry; in_flag_i goes with it and leaves as out_flag_o). Runs go to Ways memories in turn,
@@ -12,14 +12,6 @@
 // the registers below the root, with two ways the memories' read ports. clear_i (synchronous) empties it.
 // drop_i: what there is of the list that leaves is left out, its end leaves; drop_o: what arrives at the
 // input belongs to this list too. empty_o: no entry and no end inside.
-//
-// cut_i, for a list whose end is not on the way: when all memories are full, the entries are reduced to
-// the smaller half. They are counted off at the root (limit_o: out_entry_o is the last of them), the
-// heads go back to where they were, and the counted entries leave again and go to the lower half of the
-// memories, each to the first one with room: parts of a sorted sequence are sorted. Each entry read
-// leaves room for one, since those that were not counted are no more. They are then the list's first
-// runs; what follows are the others. busy_o is high meanwhile, done_o in its last cycle: Ways Run
-// cycles and a few for the pipeline from cut_i on.
 module flk_sort_select #(
   parameter  int unsigned Run         = 1024,  // entries of a memory
   parameter  int unsigned Ways        = 2,
@@ -47,12 +39,7 @@ module flk_sort_select #(
   input  logic                 drop_i,
   output logic                 drop_o,
   output logic                 empty_o,
-  // Selection
-  input  logic                 closed_i,
-  input  logic                 cut_i,
-  output logic                 busy_o,
-  output logic                 limit_o,
-  output logic                 done_o
+  input  logic                 closed_i
 );
 
   if (Run < 2 || (Run & (Run - 1)) != 0) begin : gen_check
@@ -65,7 +52,6 @@ module flk_sort_select #(
   localparam int unsigned RunBits   = $clog2(Run);
   localparam int unsigned WayBits   = $clog2(Ways);
   localparam int unsigned CountBits = RunBits + WayBits + 1;
-  localparam int unsigned Half      = Ways / 2;
 
   typedef logic [RunBits:0] place_t;  // with a bit that says how often a memory has gone round
   typedef logic [RunBits:0] run_t;    // 0 to Run
@@ -79,8 +65,6 @@ module flk_sort_select #(
     logic [RunBits-1:0] rest;
   } finish_t;
 
-  typedef enum logic [1:0] {NONE, COUNT, MOVE} cut_e;
-
   // ---- input --------------------------------------------------------------------------------------
 
   logic [CountBits-1:0] length_d, length_q;  // entries of the list that arrives
@@ -89,12 +73,11 @@ module flk_sort_select #(
   logic                 take, take_end;
   logic [WayBits-1:0]   side;
   logic [Ways-1:0]      full;
-  cut_e                 cut_d, cut_q;
   logic                 complete, finish_pop, finish_ready, finish_empty;
   finish_t              taken, finish;
 
   assign side       = first_q + length_q[RunBits+:WayBits];
-  assign in_ready_o = !full[side] && finish_ready && cut_q == NONE;
+  assign in_ready_o = !full[side] && finish_ready;
   assign take       = in_valid_i && in_ready_o && !in_end_i;
   assign take_end   = in_valid_i && in_ready_o && in_end_i;
 
@@ -139,10 +122,6 @@ module flk_sort_select #(
       length_d = length_q + 1'b1;
       only_d   = in_flag_i;
     end
-    if (done_o) begin
-      length_d = CountBits'(Half * Run);
-      first_d  = '0;
-    end
     if (take_end || clear_i) begin
       length_d = '0;
       first_d  = clear_i ? '0 : length_q[RunBits-1:0] == '0 ? side : side + 1'b1;
@@ -153,14 +132,12 @@ module flk_sort_select #(
   // ---- tree -----------------------------------------------------------------------------------------
 
   // Node 1 is the root, those below node n are 2 n and 2 n + 1, Ways and on are the memories.
-  logic            drop, move, begins, rewind;
-  logic [Ways-1:0] into;  // where the entry moves
+  logic drop, move;
 
   for (genvar n = 1; n < 2 * Ways; n++) begin : gen_node
     logic               valid, pop;
     logic               over;  // nothing of the list that leaves is left here, or comes
     entry_t             entry;
-    logic [WayBits-1:0] from;  // memory of the entry
 
     if (n == 1) begin : gen_taken
       assign pop = move;
@@ -171,13 +148,11 @@ module flk_sort_select #(
     if (n < Ways) begin : gen_choice
       logic [1:0]               valid_below, over_below, pop_below;
       entry_t [1:0]             entry_below;
-      logic [1:0][WayBits-1:0]  from_below;
       logic                     less, prefer_b, can, load;  // can: there is an entry to choose
 
       assign valid_below = {gen_node[2*n+1].valid, gen_node[2*n].valid};
       assign over_below  = {gen_node[2*n+1].over, gen_node[2*n].over};
       assign entry_below = {gen_node[2*n+1].entry, gen_node[2*n].entry};
-      assign from_below  = {gen_node[2*n+1].from, gen_node[2*n].from};
 
       assign less      = entry_below[1][EntryBits-1:PayloadBits] <
                          entry_below[0][EntryBits-1:PayloadBits];
@@ -190,7 +165,6 @@ module flk_sort_select #(
         assign valid = can;
         assign over  = over_below == '1;
         assign entry = entry_below[prefer_b];
-        assign from  = from_below[prefer_b];
       end else begin : gen_inner
         logic ready;
 
@@ -198,37 +172,26 @@ module flk_sort_select #(
         assign over = !valid && over_below == '1;
 
         flk_skid_buffer #(
-          .Width(EntryBits + WayBits)
+          .Width(EntryBits)
         ) i_node (
           .clk_i,
           .rst_ni,
-          .clear_i    (clear_i || drop || rewind),
+          .clear_i    (clear_i || drop),
           .in_valid_i (can),
           .in_ready_o (ready),
-          .in_data_i  ({entry_below[prefer_b], from_below[prefer_b]}),
+          .in_data_i  (entry_below[prefer_b]),
           .out_valid_o(valid),
           .out_ready_i(pop),
-          .out_data_o ({entry, from})
+          .out_data_o (entry)
         );
       end
     end else begin : gen_side
       localparam int unsigned S = n - Ways;
 
-      logic   write, counted;
-      entry_t data;
       place_t head_at, write_at, jump_at;
       place_t begin_d, begin_q;    // of the list's first entry
-      place_t keep_d, keep_q;      // behind the last one that was counted
       run_t   popped_d, popped_q;  // entries of the list that have left
       run_t   due;                 // of the whole list
-
-      if (S < Half) begin : gen_back
-        assign data  = cut_q == MOVE ? out_entry_o : in_entry_i;
-        assign write = (take && side == WayBits'(S)) || (cut_q == MOVE && move && into[S]);
-      end else begin : gen_in
-        assign data  = in_entry_i;
-        assign write = take && side == WayBits'(S);
-      end
 
       flk_sort_memory #(
         .Width(EntryBits),
@@ -237,29 +200,23 @@ module flk_sort_select #(
         .clk_i,
         .rst_ni,
         .clear_i,
-        .write_i     (write),
-        .data_i      (data),
+        .write_i     (take && side == WayBits'(S)),
+        .data_i      (in_entry_i),
         .full_o      (full[S]),
         .write_at_o  (write_at),
         .head_valid_o(valid),
         .head_o      (entry),
         .head_at_o   (head_at),
         .pop_i       (pop),
-        .jump_i      (drop || rewind),
-        .jump_at_i   (jump_at),
-        .cut_i       (rewind),
-        .cut_at_i    (keep_d)
+        .jump_i      (drop),
+        .jump_at_i   (jump_at)
       );
 
-      assign from    = WayBits'(S);
       assign due     = finish.whole[S] ? run_t'(Run) : finish.part[S] ? run_t'(finish.rest) : '0;
-      assign jump_at = rewind ? begin_q : complete ? begin_q + due : write_at;
-      assign counted = cut_q == COUNT && move && gen_node[1].from == WayBits'(S);
+      assign jump_at = complete ? begin_q + due : write_at;
 
       always_comb begin
-        if (cut_q == MOVE) begin
-          over = head_at == keep_q;
-        end else if (!complete || finish.whole[S]) begin
+        if (!complete || finish.whole[S]) begin
           over = popped_q[RunBits] || (!complete && only_q && first_q != WayBits'(S));
         end else begin
           over = popped_q == (finish.part[S] ? run_t'(finish.rest) : '0);
@@ -268,18 +225,11 @@ module flk_sort_select #(
 
       always_comb begin
         begin_d  = begin_q;
-        keep_d   = counted ? keep_q + 1'b1 : keep_q;
         popped_d = pop ? popped_q + 1'b1 : popped_q;
-        if (begins) begin
-          keep_d = begin_q;
-        end
         if (drop && complete) begin
           popped_d = due;
         end
-        if (rewind) begin
-          popped_d = '0;
-        end
-        if (finish_pop || done_o) begin
+        if (finish_pop) begin
           begin_d  = head_at;
           popped_d = '0;
         end
@@ -292,11 +242,9 @@ module flk_sort_select #(
       always_ff @(posedge clk_i or negedge rst_ni) begin
         if (!rst_ni) begin
           begin_q  <= '0;
-          keep_q   <= '0;
           popped_q <= '0;
         end else begin
           begin_q  <= begin_d;
-          keep_q   <= keep_d;
           popped_q <= popped_d;
         end
       end
@@ -309,78 +257,33 @@ module flk_sort_select #(
 
   assign list_done = complete && gen_node[1].over;
   assign may       = complete || closed_i;
-  assign drop      = drop_i && !list_done && cut_q == NONE;
-  assign move      = gen_node[1].valid && (cut_q != NONE || (may && !drop && out_ready_i));
+  assign drop      = drop_i && !list_done;
+  assign move      = gen_node[1].valid && may && !drop && out_ready_i;
 
   assign finish_pop  = list_done && out_ready_i;
-  assign out_valid_o = cut_q == NONE && (list_done || (gen_node[1].valid && may && !drop));
+  assign out_valid_o = list_done || (gen_node[1].valid && may && !drop);
   assign out_end_o   = list_done;
   assign out_flag_o  = finish.flag;
   assign out_entry_o = gen_node[1].entry;
-
-  // ---- selection ----------------------------------------------------------------------------------
-
-  logic [RunBits+WayBits-2:0] total_d, total_q;  // entries that were counted
-
-  assign begins  = cut_q == NONE && cut_i && !closed_i && !drop_i && !complete &&
-                   length_q[CountBits-1];
-  assign rewind  = cut_q == COUNT && move && total_q == '1;
-  assign busy_o  = cut_q != NONE;
-  assign limit_o = rewind;
-  assign done_o  = cut_q == MOVE && gen_node[1].over;
-
-  // The first memory of the lower half with room; the last one of them has it when the others have none.
-  always_comb begin
-    into         = '0;
-    into[Half-1] = 1'b1;
-    for (int unsigned s = Half - 1; s > 0; s--) begin
-      if (!full[s-1]) begin
-        into      = '0;
-        into[s-1] = 1'b1;
-      end
-    end
-  end
-
-  always_comb begin
-    cut_d   = cut_q;
-    total_d = cut_q == COUNT && move ? total_q + 1'b1 : total_q;
-    if (begins) begin
-      cut_d   = COUNT;
-      total_d = '0;
-    end
-    if (rewind) begin
-      cut_d = MOVE;
-    end
-    if (done_o || clear_i) begin
-      cut_d = NONE;
-    end
-  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       length_q  <= '0;
       first_q   <= '0;
       only_q    <= 1'b0;
-      cut_q     <= NONE;
-      total_q   <= '0;
     end else begin
       length_q  <= length_d;
       first_q   <= first_d;
       only_q    <= only_d;
-      cut_q     <= cut_d;
-      total_q   <= total_d;
     end
   end
 
-  assign drop_o  = drop_i && finish_empty && cut_q == NONE;
-  assign empty_o = finish_empty && length_q == '0 && cut_q == NONE;
+  assign drop_o  = drop_i && finish_empty;
+  assign empty_o = finish_empty && length_q == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) take |-> !length_q[CountBits-1])
   else $error("flk_sort_select: more entries than fit");
-  assert property (@(posedge clk_i) disable iff (!rst_ni)
-      cut_q == MOVE && move && Ways > 2 |-> (into & full) == '0)
-  else $error("flk_sort_select: no room for an entry that is kept");
 `endif
 
 endmodule

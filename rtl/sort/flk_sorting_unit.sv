@@ -2,24 +2,26 @@
 //
 // Entries are {key 24, record 24, mask 4}; order is that of the upper 48 bits, unsigned, which are
 // distinct within a list. Lines hold in_count_i entries, the lowest, in any order; 0 only in the one line
-// of an empty list. After the line with in_last_i the unit says on next_* whether it wants the same
-// list again (1) or the next one (0); it takes no line before that is taken. Out come {record, mask},
-// then an element with out_end_o that carries no entry.
+// of an empty list. Out come {record, mask}, then an element with out_end_o that carries no entry.
+// A list of more than Capacity entries (docs/long_lists.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
+// then an element with run_end_o. merging_o says that all of them have left; from then on its lines
+// come a second time as merge_*, in batches of at most Capacity entries: the entries of a batch are those
+// above the limit of the one before and, of lines with merge_limited_i, not above merge_limit_i.
+// After the batch with merge_final_i the list ends. Of the next list no line is taken before that.
 // finish_i, from any cycle until the end of the list at the output is taken: what there is of this
-// list is left out, its end follows; a reading under way is let run out and not repeated.
-// start_i, while idle_o, sets the counters to 0. entries_o: delivered. readings_o: lists read,
-// each reading. dropped_o: entries taken of finished lists, but not delivered; both entries_o and
+// list is left out, its end follows. Of a list that leaves as runs these leave first; merge_stop_o then
+// says that nothing of it is wanted: a line with merge_last_i and merge_final_i has to end it.
+// start_i, while idle_o, sets the counters to 0. entries_o: delivered. readings_o: lists read.
+// dropped_o: entries taken of finished lists, but not delivered; both entries_o and
 // dropped_o while idle_o. clear_i (synchronous) empties the unit.
 //
-// Structure: a line's entries one by one, dropped at or below the bound of what was delivered and above
+// Structure: a line's entries one by one, in a batch dropped at or below the bound and above
 // the limit; runs of Cells by insertion (flk_sort_runs); Stages steps that merge them two by two
 // (flk_sort_merge), each while its runs arrive, so that an entry a cycle goes through all of them,
 // whatever the lengths of the lists. The last step (flk_sort_select) merges Ways runs and takes the place of
-// $clog2(Ways) steps; it holds Capacity = Cells << Stages entries. When
-// one more comes it keeps the nearest half, and the limit is the largest of these. At the end of a
-// reading what it has leaves; if there was a limit, it is the bound of the next reading.
+// $clog2(Ways) steps; it holds Capacity = Cells << Stages entries.
 // Throughput: a list of n <= Capacity entries in n + 1 cycles, back to back. Latency: docs/sorting_unit.md.
-// Combinational paths: none from an input to a handshake output; outputs of out_* and next_* are registers.
+// Combinational paths: none from an input to a handshake output; outputs of out_* and run_* are registers.
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,
   parameter  int unsigned Stages      = 7,
@@ -29,6 +31,7 @@ module flk_sorting_unit #(
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
   parameter  int unsigned OutBits     = 28,
+  localparam int unsigned KeyBits     = EntryBits - MaskBits,
   localparam int unsigned CountBits   = $clog2(LineEntries + 1)
 ) (
   input  logic                                  clk_i,
@@ -46,10 +49,22 @@ module flk_sorting_unit #(
   input  logic [LineEntries-1:0][EntryBits-1:0] in_entries_i,
   input  logic [CountBits-1:0]                  in_count_i,
   input  logic                                  in_last_i,
-  // What to read next
-  output logic                                  next_valid_o,
-  input  logic                                  next_ready_i,
-  output logic                                  next_again_o,
+  // Runs of a list that does not fit
+  output logic                                  run_valid_o,
+  input  logic                                  run_ready_i,
+  output logic                                  run_end_o,
+  output logic [EntryBits-1:0]                  run_entry_o,
+  output logic                                  merging_o,
+  output logic                                  merge_stop_o,
+  // Its lines again
+  input  logic                                  merge_valid_i,
+  output logic                                  merge_ready_o,
+  input  logic [LineEntries-1:0][EntryBits-1:0] merge_entries_i,
+  input  logic [CountBits-1:0]                  merge_count_i,
+  input  logic                                  merge_limited_i,
+  input  logic [KeyBits-1:0]                    merge_limit_i,
+  input  logic                                  merge_last_i,
+  input  logic                                  merge_final_i,
   // Sorted entries
   output logic                                  out_valid_o,
   input  logic                                  out_ready_i,
@@ -58,7 +73,6 @@ module flk_sorting_unit #(
   input  logic                                  finish_i
 );
 
-  localparam int unsigned KeyBits  = EntryBits - MaskBits;
   localparam int unsigned Capacity = Cells << Stages;
   localparam int unsigned Steps    = Stages - $clog2(Ways) + 1;  // of merging, with the last one
   localparam int unsigned GatherBits = $clog2(Capacity + 1);
@@ -75,32 +89,41 @@ module flk_sorting_unit #(
   typedef logic [EntryBits-1:0] entry_t;
   typedef logic [KeyBits-1:0] key_t;
 
+  // Of the list at the gate: it fits so far; it leaves as runs; all of it is in runs, which leave; its lines come again.
+  typedef enum logic [1:0] {LIST, RUNS, LEAVE, MERGE} mode_e;
+
+  mode_e mode_q;
+
   // ---- a line -------------------------------------------------------------------------------------
 
-  logic                         line_valid_d, line_valid_q, line_last_q, line_told_q;
+  logic                         line_valid_d, line_valid_q;
+  logic                         line_last_q, line_limited_q, line_final_q;
   entry_t [LineEntries-1:0]     line_q;
   logic [CountBits-1:0]         line_left_d, line_left_q;  // entries, then the end of a last line
   logic [CountBits-1:0]         line_at_d, line_at_q;
-  logic                         line_take, line_entry, line_one, line_end, line_done;
-  logic                         line_drop, early;
-  logic                         next_valid_q, next_again_q;
-  logic                         x_valid_d, x_valid_q, x_end_q, x_told_q, x_go, x_free;
+  logic                         line_take, list_take, line_free, line_entry, line_one, line_end;
+  logic                         line_done, line_drop, fits, hold_q, again;
+  logic                         x_valid_d, x_valid_q, x_end_q, x_limited_q, x_final_q, x_go, x_free;
   entry_t                       x_q;
 
-  assign line_entry = line_valid_q && line_left_q != '0;
-  assign line_end   = line_valid_q && line_left_q == '0;
-  assign x_free     = !x_valid_q || x_go;
-  assign line_done  = line_entry ? !line_last_q && (line_drop || (x_free && line_one)) : x_free;
-  assign line_one   = line_left_q == CountBits'(1);
-  assign in_ready_o = !line_valid_q || line_done;
-  assign line_take  = in_valid_i && in_ready_o;
+  assign again         = mode_q == MERGE;
+  assign line_entry    = line_valid_q && line_left_q != '0;
+  assign line_end      = line_valid_q && line_left_q == '0;
+  assign x_free        = !x_valid_q || x_go;
+  assign line_done     = line_entry ? !line_last_q && (line_drop || (x_free && line_one)) : x_free;
+  assign line_one      = line_left_q == CountBits'(1);
+  assign line_free     = !line_valid_q || line_done;
+  assign in_ready_o    = line_free && !hold_q;
+  assign merge_ready_o = line_free && again;
+  assign list_take     = in_valid_i && in_ready_o;
+  assign line_take     = list_take || (merge_valid_i && merge_ready_o);
 
   always_comb begin
     line_valid_d = line_take || (line_valid_q && !line_done);
     line_left_d  = line_left_q;
     line_at_d    = line_at_q;
     if (line_take) begin
-      line_left_d = in_count_i;
+      line_left_d = again ? merge_count_i : in_count_i;
       line_at_d   = '0;
     end else if (line_drop) begin
       line_left_d = '0;
@@ -125,13 +148,15 @@ module flk_sorting_unit #(
     line_left_q <= line_left_d;
     line_at_q   <= line_at_d;
     if (line_take) begin
-      line_q      <= in_entries_i;
-      line_last_q <= in_last_i;
-      line_told_q <= early && in_last_i;
+      line_q         <= again ? merge_entries_i : in_entries_i;
+      line_last_q    <= again ? merge_last_i : in_last_i;
+      line_limited_q <= again && merge_limited_i;
+      line_final_q   <= merge_final_i;
     end
     if (x_free && line_valid_q) begin
-      x_end_q  <= line_end;
-      x_told_q <= line_told_q;
+      x_end_q     <= line_end;
+      x_limited_q <= line_limited_q;
+      x_final_q   <= line_final_q;
     end
     if (x_free && line_entry) begin
       x_q <= line_q[line_at_q];
@@ -147,79 +172,64 @@ module flk_sorting_unit #(
 
   // ---- the gate -----------------------------------------------------------------------------------
 
-  logic                  bounded_q, limited_q, pass, full, more, drop_here;
-  logic                  cut, cutting, cut_done, limit_set;
-  key_t                  bound_q, limit_q, limit;
+  logic                  bounded_q, pass, full, drop_here, whole, goes_on;
+  key_t                  bound_q, limit_q;
   logic [GatherBits-1:0] gathered_q;
   logic                  runs_valid, runs_ready, runs_end, runs_empty;
-  logic                  x_ends;  // the list's end goes on
+  logic                  x_ends;     // the end of a list or batch goes on
+  logic                  gate_ends;  // this, or the end of a run
 
+  // A line with a limit comes behind one without, whose entries have gone on by the time they are compared.
   assign pass       = (!bounded_q || x_q[EntryBits-1:MaskBits] > bound_q) &&
-                      (!limited_q || x_q[EntryBits-1:MaskBits] <= limit_q);
+                      (!x_limited_q || x_q[EntryBits-1:MaskBits] <= limit_q);
   assign full       = gathered_q[GatherBits-1];
-  // While the last step cuts, nothing moves: the limit is changing.
-  assign runs_valid = x_valid_q && (x_end_q || (pass && !full && !drop_here)) && !cutting;
-  assign x_go       = x_valid_q && !cutting && (x_end_q ? runs_ready
-                                                : drop_here || !pass || (!full && runs_ready));
-  assign cut        = x_valid_q && !x_end_q && pass && full && !drop_here;
+  // An entry more than fits: the run ends before it.
+  assign whole      = x_valid_q && !x_end_q && pass && full && !drop_here;
+  assign runs_valid = x_valid_q && (x_end_q || (pass && !drop_here));
+  assign x_go       = x_valid_q && (x_end_q ? runs_ready
+                                            : drop_here || !pass || (!full && runs_ready));
   assign x_ends     = x_end_q && x_go;
-  assign more       = limited_q && !drop_here;
+  assign gate_ends  = x_ends || (whole && runs_ready);
+  assign goes_on    = again && !x_final_q;
   // What is behind an end in x is of the next list.
   assign line_drop  = drop_here && line_entry && !(x_valid_q && x_end_q);
   // The list ends, and what is on its way fits.
-  assign early      = !limited_q && 32'(gathered_q) + LineEntries + 3 < Capacity;
+  assign fits       = mode_q == LIST && 32'(gathered_q) + LineEntries + 3 < Capacity;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      bounded_q    <= 1'b0;
-      limited_q    <= 1'b0;
-      gathered_q   <= '0;
-      next_valid_q <= 1'b0;
-      next_again_q <= 1'b0;
+      bounded_q  <= 1'b0;
+      gathered_q <= '0;
+      hold_q     <= 1'b0;
     end else if (clear_i) begin
-      bounded_q    <= 1'b0;
-      limited_q    <= 1'b0;
-      gathered_q   <= '0;
-      next_valid_q <= 1'b0;
+      bounded_q  <= 1'b0;
+      gathered_q <= '0;
+      hold_q     <= 1'b0;
     end else begin
       if (x_ends) begin
-        bounded_q <= more;
+        bounded_q <= goes_on;
       end
-      if (x_ends) begin
-        limited_q <= 1'b0;
-      end else if (cut_done) begin
-        limited_q <= 1'b1;
-      end
-      if (x_ends) begin
+      if (gate_ends) begin
         gathered_q <= '0;
-      end else if (cut_done) begin
-        gathered_q <= GatherBits'(Capacity / 2);
       end else if (x_go && runs_valid) begin
         gathered_q <= gathered_q + 1'b1;
       end
-      if (line_take && in_last_i && early) begin
-        next_valid_q <= 1'b1;
-        next_again_q <= 1'b0;
-      end else if (x_ends && !x_told_q) begin
-        next_valid_q <= 1'b1;
-        next_again_q <= more;
-      end else if (next_ready_i) begin
-        next_valid_q <= 1'b0;
+      if (list_take && in_last_i && !fits) begin
+        hold_q <= 1'b1;
+      end else if (x_ends && (mode_q == LIST || (again && x_final_q))) begin
+        hold_q <= 1'b0;
       end
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (limit_set) begin
-      limit_q <= limit;
+    if (line_take && again && merge_limited_i) begin
+      limit_q <= merge_limit_i;
     end
-    if (x_ends && more) begin
+    if (x_ends && goes_on) begin
       bound_q <= limit_q;
     end
   end
-
-  assign next_valid_o = next_valid_q;
-  assign next_again_o = next_again_q;
 
   // ---- runs and their merging -----------------------------------------------------------------------
 
@@ -237,8 +247,8 @@ module flk_sorting_unit #(
     .clear_i,
     .in_valid_i (runs_valid),
     .in_ready_o (runs_ready),
-    .in_end_i   (x_end_q),
-    .in_flag_i  (more),
+    .in_end_i   (x_end_q || full),
+    .in_flag_i  (goes_on),
     .in_entry_i (x_q),
     .out_valid_o(runs_out_valid),
     .out_ready_i(first_ready),
@@ -300,11 +310,7 @@ module flk_sorting_unit #(
         .drop_i     (drop_in),
         .drop_o     (drop_out),
         .empty_o    (empty[i]),
-        .closed_i   (closed),
-        .cut_i      (cut),
-        .busy_o     (cutting),
-        .limit_o    (limit_set),
-        .done_o     (cut_done)
+        .closed_i   (closed)
       );
     end else begin : gen_earlier
       assign ready   = gen_step[i+1].in_ready;
@@ -339,7 +345,6 @@ module flk_sorting_unit #(
     end
   end
 
-  assign limit     = final_entry[EntryBits-1:MaskBits];
   assign drop_here = first_drop && !runs_end;
 
   // Ends between the gate and the last step.
@@ -352,33 +357,73 @@ module flk_sorting_unit #(
       ends_q <= '0;
     end else if (clear_i) begin
       ends_q <= '0;
-    end else if (x_ends != ends_less) begin
-      ends_q <= x_ends ? ends_q + 1'b1 : ends_q - 1'b1;
+    end else if (gate_ends != ends_less) begin
+      ends_q <= gate_ends ? ends_q + 1'b1 : ends_q - 1'b1;
     end
   end
 
   // ---- output -------------------------------------------------------------------------------------
 
-  logic               out_valid_q, out_end_q, finish_q, end_sent;
-  logic [OutBits-1:0] out_q;
+  logic   out_valid_q, out_end_q, finish_q, end_sent, end_left, out_runs;
+  entry_t out_q;
 
-  // An end that is followed by another reading of the list is none.
-  assign out_free = !out_valid_q || out_ready_i;
-  assign end_sent = out_valid_q && out_end_q && out_ready_i;
-  assign out_drop = finish_q && !(out_valid_q && out_end_q);
+  // Ends that are inside, and those of them that belong to lists before the one that leaves as runs.
+  logic [EndsBits-1:0] inside_q, before_q;
+
+  // An end that is followed by another batch of the list is none.
+  assign out_runs  = (mode_q == RUNS || mode_q == LEAVE) && before_q == '0;
+  assign out_free  = !out_valid_q || (out_runs ? run_ready_i : out_ready_i);
+  assign end_sent  = out_valid_q && out_end_q && out_ready_i && !out_runs;
+  assign end_left  = (out_valid_q && out_end_q && out_free) ||
+                     (out_free && final_valid && final_end && final_flag);
+  assign out_drop  = finish_q && !(out_valid_q && out_end_q) && !out_runs;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      mode_q      <= LIST;
+      inside_q    <= '0;
+      before_q    <= '0;
       out_valid_q <= 1'b0;
       out_end_q   <= 1'b0;
       finish_q    <= 1'b0;
     end else begin
+      inside_q <= inside_q + EndsBits'(gate_ends) - EndsBits'(end_left);
+      if (mode_q == LIST) begin
+        before_q <= inside_q - EndsBits'(end_left);
+      end else if (before_q != '0) begin
+        before_q <= before_q - EndsBits'(end_left);
+      end
+      unique case (mode_q)
+        LIST: begin
+          if (whole && runs_ready) begin
+            mode_q <= RUNS;
+          end
+        end
+        RUNS: begin
+          if (x_ends) begin
+            mode_q <= LEAVE;
+          end
+        end
+        LEAVE: begin
+          if (inside_q == '0) begin
+            mode_q <= MERGE;
+          end
+        end
+        default: begin
+          if (x_ends && x_final_q) begin
+            mode_q <= LIST;
+          end
+        end
+      endcase
       if (out_free) begin
         out_valid_q <= final_valid && !(final_end && final_flag);
         out_end_q   <= final_end;
       end
       finish_q <= (finish_q || finish_i) && !end_sent;
       if (clear_i) begin
+        mode_q      <= LIST;
+        inside_q    <= '0;
+        before_q    <= '0;
         out_valid_q <= 1'b0;
         finish_q    <= 1'b0;
       end
@@ -387,13 +432,18 @@ module flk_sorting_unit #(
 
   always_ff @(posedge clk_i) begin
     if (out_free && final_valid) begin
-      out_q <= final_entry[OutBits-1:0];
+      out_q <= final_entry;
     end
   end
 
-  assign out_valid_o = out_valid_q;
-  assign out_end_o   = out_end_q;
-  assign out_entry_o = out_q;
+  assign out_valid_o  = out_valid_q && !out_runs;
+  assign out_end_o    = out_end_q;
+  assign out_entry_o  = out_q[OutBits-1:0];
+  assign run_valid_o  = out_valid_q && out_runs;
+  assign run_end_o    = out_end_q;
+  assign run_entry_o  = out_q;
+  assign merging_o    = again;
+  assign merge_stop_o = again && finish_q;
 
   // ---- counters -------------------------------------------------------------------------------------
 
@@ -406,9 +456,9 @@ module flk_sorting_unit #(
 
   always_comb begin
     more_taken = '0;
-    if (x_ends) begin
+    if (gate_ends && !again) begin
       more_taken = 16'(gathered_q);
-    end else if (drop_here && !bounded_q) begin
+    end else if (drop_here && !again) begin
       more_taken = 16'(line_drop ? line_left_q : '0) + 16'(x_valid_q && !x_end_q);
     end
   end
@@ -444,7 +494,7 @@ module flk_sorting_unit #(
     .clk_i,
     .rst_ni,
     .clear_i(start_i || clear_i),
-    .count_i(out_valid_q && out_ready_i && !out_end_q),
+    .count_i(out_valid_o && out_ready_i && !out_end_q),
     .value_o(delivered)
   );
 
@@ -452,7 +502,7 @@ module flk_sorting_unit #(
     .clk_i,
     .rst_ni,
     .clear_i(start_i || clear_i),
-    .count_i(line_take && in_last_i),
+    .count_i(list_take && in_last_i),
     .value_o(readings_o)
   );
 
@@ -472,34 +522,20 @@ module flk_sorting_unit #(
         reading_q <= 1'b0;
       end else if (line_take) begin
         reading_q <= 1'b1;
-      end else if (x_ends && !line_valid_q && !more) begin
+      end else if (x_ends && !line_valid_q && !goes_on) begin
         reading_q <= 1'b0;
       end
       quiet_q <= {quiet_q[4:0], quiet};
     end
   end
 
-  assign quiet  = !line_valid_q && !x_valid_q && !reading_q && !next_valid_q && runs_empty &&
+  assign quiet  = !line_valid_q && !x_valid_q && !reading_q && mode_q == LIST && runs_empty &&
                   (&empty) && !out_valid_q && !closed;
   assign idle_o = (&quiet_q) && quiet;
 
 `ifndef SYNTHESIS
-  logic asked_q;  // after a list's last line, until what to read next is taken
-
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      asked_q <= 1'b0;
-    end else if (clear_i) begin
-      asked_q <= 1'b0;
-    end else if (line_take && in_last_i) begin
-      asked_q <= 1'b1;
-    end else if (next_valid_o && next_ready_i) begin
-      asked_q <= 1'b0;
-    end
-  end
-
-  assert property (@(posedge clk_i) disable iff (!rst_ni) asked_q |-> !in_valid_i)
-  else $error("flk_sorting_unit: a line before what to read next was taken");
+  assert property (@(posedge clk_i) disable iff (!rst_ni) again && whole |-> 1'b0)
+  else $error("flk_sorting_unit: a batch of more entries than fit");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
       in_valid_i |-> 32'(in_count_i) <= LineEntries && (in_count_i != '0 || in_last_i))
@@ -514,8 +550,9 @@ module flk_sorting_unit #(
   else $error("flk_sorting_unit: output changed before its transfer");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      next_valid_o && !next_ready_i && !clear_i |=> next_valid_o && $stable(next_again_o))
-  else $error("flk_sorting_unit: what to read next changed before its transfer");
+      run_valid_o && !run_ready_i && !clear_i |=>
+      run_valid_o && $stable({run_end_o, run_entry_o}))
+  else $error("flk_sorting_unit: a run changed before its transfer");
 `endif
 
 endmodule

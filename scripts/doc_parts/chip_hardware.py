@@ -100,10 +100,10 @@ def tables(say: Say) -> dict[str, str]:
         image = front_memory(front)
         golden = render_chip(front.subtile_lists(), config)
         sizes = config.chip_memories
-        lists_there = TileLists.of(front, image, sizes.sorted_entries)
+        lists_there = TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines)
         second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
         # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
-        loose = {"records"} | ({"lists"} if len(lists_there.reading_size) > len(lists_there.lines) else set())
+        loose = {"records"} | ({"lists"} if lists_there.run_lines.any() else set())
         model = whole_frame(preprocessing.estimate(front, image, dram, sizes), second, dram)
         say(f"{title}: alone")
         with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:

@@ -11,7 +11,8 @@ from flicker.golden.front.memory import front_memory
 from flicker.golden.render import render_golden
 from flicker.markdown import table
 from flicker.params import RenderConfig
-from flicker.perf.sorting import list_cycles, reading_cycles
+from flicker.perf.long_lists import BEGIN, MEMORY
+from flicker.perf.sorting import latency, list_cycles
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.delivery import deliver
@@ -25,9 +26,9 @@ def _sorting(lists: TileLists) -> int:
     """Cycles of the sorting unit that has most to do, lists back to back."""
     cycles = np.zeros(UNITS, np.int64)
     for t, n in enumerate(np.diff(lists.start)):
-        first, last = lists.reading_start[t : t + 2]
-        cuts = int(lists.reading_cuts[first:last].sum())
-        cycles[t % UNITS] += reading_cycles(int(n), int(last - first), cuts, lists.capacity) if n > lists.capacity else list_cycles(int(n))
+        last = lists.batch_start[t + 1] - 1
+        again = BEGIN + MEMORY + lists.batch_given[last] + latency(int(lists.batch_size[last])) if n > lists.capacity else 0
+        cycles[t % UNITS] += list_cycles(int(n)) + (latency(lists.capacity) + again if again else 0)
     return int(cycles.max())
 
 

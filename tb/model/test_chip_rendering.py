@@ -19,8 +19,10 @@ from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
+from flicker.golden.long_lists import RUNS
 from flicker.golden.walk import tile_walk
 from flicker.params import CHIP_MEMORIES, CatMode, ChipMemories, RenderConfig
+from flicker.perf.long_lists import LINES
 from flicker.pipeline import packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.chip import PORT
@@ -37,7 +39,7 @@ def frame() -> tuple[FrontFrame, FrontImage]:
 
 
 def modelled(config: RenderConfig, dram: DramConfig | None = None, **options) -> Rendering:
-    return estimate(TileLists.of(*frame(), config.chip_memories.sorted_entries), config, dram, **options)
+    return estimate(TileLists.of(*frame(), config.chip_memories.sorted_entries, config.chip_memories.merge_lines), config, dram, **options)
 
 
 @pytest.mark.parametrize("change", [
@@ -64,7 +66,8 @@ def test_sizes() -> None:
     for top in ("flk_rendering", "flk_top"):
         assert (sizes.sort_stages, sizes.list_chunks) == (default(top, "SortStages"), default(top, "Chunks"))
         assert (sizes.sorted_ahead, sizes.pairs) == (default(top, "Entries"), default(top, "Pairs"))
-        assert sizes.sort_ways == default(top, "SortWays")
+        assert (sizes.sort_ways, sizes.merge_lines) == (default(top, "SortWays"), default(top, "MergeLines"))
+    assert sizes.merge_lines == default("sort/flk_list_sorter", "MergeLines") == 2 * default("sort/flk_list_sorter", "Runs") == 2 * RUNS == LINES
     for top in ("flk_top", "preproc/flk_preprocessing", "preproc/flk_preprocessing_core"):
         assert sizes.survivors == default(top, "Waiting")
     for top in ("flk_top", "preproc/flk_preprocessing"):
@@ -80,17 +83,18 @@ def test_sizes() -> None:
 
 
 def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lists of more entries than the sorting unit takes are read again; with a last step of many runs no more often."""
-    tables = TileLists.of(*frame(), 64)
-    with pytest.raises(ValueError, match="capacity of 64"):
+    """Lists of more entries than the sorting unit takes are written back and read once more, whatever their length."""
+    tables = TileLists.of(*frame(), 512)
+    with pytest.raises(ValueError, match="sizes 512"):
         estimate(tables, RenderConfig(), None)
-    assert tables.capacity == 64 and len(tables.reading_size) > len(tables.lines)
     lengths = np.diff(tables.start)
-    assert (np.add.reduceat(tables.reading_size, tables.reading_start[:-1]) == lengths).all()
+    assert tables.capacity == 512 and ((tables.run_lines > 0) == (lengths > 512)).all() and (tables.run_lines > 0).any()
+    assert (np.add.reduceat(tables.batch_size, tables.batch_start[:-1]) == lengths).all()
+    assert (np.abs(tables.run_lines - lengths / 9)[lengths > 512] <= lengths[lengths > 512] / 512 + 1).all()
     monkeypatch.setitem(CHIP_MEMORIES, "half", ChipMemories(1024))
     half, small, default = (modelled(RenderConfig(memories=name)) for name in ("half", "small", "default"))
-    assert half.bytes["lists"] > 1.5 * default.bytes["lists"] and half.cycles > default.cycles  # lists of up to 10,000 entries
-    assert small.bytes["lists"] == default.bytes["lists"]
+    assert half.bytes["lists"] > default.bytes["lists"]  # of lists of 1,025 to 2,048 entries
+    assert default.bytes["lists"] < small.bytes["lists"] <= half.bytes["lists"]  # fewer lines are read ahead
 
 
 def test_ideal_sorter() -> None:
@@ -102,7 +106,7 @@ def test_ideal_sorter() -> None:
     assert np.array_equal(ideal.record, TileLists.of(*frame(), config.chip_memories.sorted_entries).record)
     # One list of n entries: with a sorting unit at least n cycles more than without, beside its latency.
     t = int(np.diff(ideal.start).argmax())
-    assert len(ideal.reading_size) == len(ideal.lines) and ideal.reading_size[t] == np.diff(ideal.start)[t] > config.chip_memories.sorted_entries
+    assert len(ideal.batch_size) == len(ideal.lines) and ideal.batch_size[t] == np.diff(ideal.start)[t] > config.chip_memories.sorted_entries
 
 
 def test_cycles() -> None:

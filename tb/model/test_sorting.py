@@ -17,37 +17,23 @@ def entries(rng: np.random.Generator, n: int, kind: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["random", "few", "ascending", "descending"])
-@pytest.mark.parametrize("n", [0, 1, 15, 16, 17, 2047, 2048, 2049, 3259, 20000])
+@pytest.mark.parametrize("n", [0, 1, 15, 16, 17, 2047, 2048])
 def test_order(n: int, kind: str) -> None:
     words = entries(np.random.default_rng(n), n, kind)
     result = sort_list(words)
     np.testing.assert_array_equal(result.order >> np.uint64(4), np.sort(words >> np.uint64(4)))
     np.testing.assert_array_equal(np.sort(result.order), np.sort(words))
-    assert sum(result.chunks) == n and all(CAPACITY // 2 <= c <= CAPACITY for c in result.chunks[:-1])
-    assert [r.again for r in result.readings] == [True] * (len(result.readings) - 1) + [False]
-    assert (len(result.readings) > 1) == (n > CAPACITY)
-    for reading in result.readings:
-        assert len(reading.limits) == len(reading.cut_at) and reading.limits == sorted(reading.limits, reverse=True)
-        assert all(len(run) == 16 and (np.diff(run.astype(np.int64)) > 0).all() for run in reading.runs(16)[:-1])
-
-
-def test_worst_orders() -> None:
-    """In ascending order the first cut has the nearest; in descending order all entries pass the limit."""
-    rng = np.random.default_rng(1)
-    up, down = (sort_list(entries(rng, 5000, kind)) for kind in ("ascending", "descending"))
-    assert [len(r.limits) for r in up.readings] == [1, 1, 1, 0] and up.chunks == [1024, 1024, 1024, 1928]
-    assert [len(r.limits) for r in down.readings][0] == 3
+    assert all(len(run) == 16 and (np.diff(run.astype(np.int64)) > 0).all() for run in result.runs(16)[:-1])
 
 
 def test_refused() -> None:
     with pytest.raises(FlickerError, match="52 bits"):
         sort_list(np.array([1 << 52], np.uint64))
-    with pytest.raises(FlickerError, match="capacity 7"):
-        sort_list(np.zeros(0, np.uint64), 7)
+    with pytest.raises(FlickerError, match="2049 entries, more than 2048"):
+        sort_list(np.arange(CAPACITY + 1).astype(np.uint64))
 
 
 def test_cycles() -> None:
     alone = [perf.unit_cycles(n) for n in range(CAPACITY + 1)]
     assert alone[0] == 11 and alone[256] == 790 and alone[CAPACITY] == 4120
     assert perf.back_to_back([261] * 4) >= 3 * perf.list_cycles(261)
-    assert perf.long_cycles(sort_list(entries(np.random.default_rng(3), 3259, "random"))) > 2 * 3259

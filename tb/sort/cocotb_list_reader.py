@@ -83,8 +83,8 @@ class Frame:
 class Reader:
     """The design with its memory."""
 
-    def __init__(self, dut, idle: str = "never", stall: str = "never", latency: int = 5, pauses: float = 0.0, perfect: bool = True, share: float = 0.3):
-        self.dut, self.bench, self.share = dut, Bench(dut), share
+    def __init__(self, dut, idle: str = "never", stall: str = "never", latency: int = 5, pauses: float = 0.0, perfect: bool = True):
+        self.dut, self.bench = dut, Bench(dut)
         rng = self.rng = self.bench.rng
         self.memory = Memory(DramConfig().timing, perfect)
         self.port = MemoryPort(dut, self.memory, PortConfig(
@@ -94,11 +94,7 @@ class Reader:
         lines = Stream(dut, "out", ("entries", "count", "last"))
         self.sink = StreamSink(lines, self.bench.stall(stall))
         self.output = Monitor(lines, self._line)
-        verdicts = Stream(dut, "next", ("again",))
-        self.next = StreamSource(verdicts, self.bench.stall(idle))
-        self.verdicts = Monitor(verdicts)
-        self.due: deque[tuple[Line, int, int]] = deque()  # element, tile, reading
-        self.plan: deque[bool] = deque()  # what is said after each last element
+        self.due: deque[tuple[Line, int]] = deque()  # element, tile
         self.beats: Counter[int] = Counter()
         for name in ("start", "list_base", "pointer_base", "columns", "chunks"):
             getattr(dut, f"{name}_i").value = 0
@@ -106,13 +102,11 @@ class Reader:
 
     def _line(self, item: tuple[int, int, int]) -> None:
         assert self.due, f"element {item} of no list"
-        line, tile, reading = self.due.popleft()
+        line, tile = self.due.popleft()
         entries, count, last = item
-        where = f"tile {tile}, reading {reading}"
+        where = f"tile {tile}"
         assert (count, last) == (line.used, line.last), f"{where}: count {count}, last {last}; due {line.used}, {line.last}"
         assert not count or entries == line.entries, f"{where}: entries {entries:#x}, due {line.entries:#x}"
-        if last:
-            self.next.send([int(self.plan.popleft())])
 
     async def _watch(self) -> None:
         dut, edge = self.dut, RisingEdge(self.dut.clk_i)
@@ -142,12 +136,9 @@ class Reader:
             found = frame.read(x, y)
             fault |= found.fault
             lines[frame.pointer_base + pointer_line(x, y, frame.cols)] += 1
-            readings = 1 + (self.rng.randrange(1, 3) if self.rng.random() < self.share else 0)
-            for reading in range(readings):
-                self.due.extend((line, number, reading) for line in found.lines)
-                self.plan.append(reading < readings - 1)
-                for first, used in found.requests:
-                    lines.update(range(frame.list_base + first, frame.list_base + first + used))
+            self.due.extend((line, number) for line in found.lines)
+            for first, used in found.requests:
+                lines.update(range(frame.list_base + first, frame.list_base + first + used))
         self.tiles.send(walk)
         return lines, fault
 
@@ -155,7 +146,7 @@ class Reader:
         """A whole frame, and what it must give and read. Returns its cycles."""
         lines, fault = await self.start(frame, walk)
         limit = 3000 + 60 * len(self.due) + 2000 * len(walk)
-        cycles = await self.bench.until(lambda: not self.due and not self.next.pending and not self.tiles.pending, limit, "last line")
+        cycles = await self.bench.until(lambda: not self.due and not self.tiles.pending, limit, "last line")
         await self.bench.cycles(2)
         if not fault:
             assert self.beats == lines, f"lines read: {self.beats - lines} more than due, {lines - self.beats} missing"
@@ -186,7 +177,7 @@ def sizes_of(rng, tiles: int) -> list[int]:
 @cocotb.parametrize((("idle", "stall"), PATTERNS))
 async def lists(dut, idle, stall):
     """Lists of all lengths; frames one after the other."""
-    reader = Reader(dut, idle, stall, latency=1 if idle == "half" else 7, pauses=0.3 if stall != "never" else 0.0, share=0.1)
+    reader = Reader(dut, idle, stall, latency=1 if idle == "half" else 7, pauses=0.3 if stall != "never" else 0.0)
     await reader.bench.reset()
     for slot, (cols, rows) in enumerate(((5, 6), (1, 3), (2, 1), (17, 2), (1, 1))):
         frame = make(reader, cols, rows, sizes_of(reader.rng, cols * rows), slot, aligned=slot != 3)
@@ -229,7 +220,7 @@ async def largest_region(dut):
 @cocotb.parametrize(latency=[3, 100])
 async def long(dut, latency):
     """3,000 entries between short lists; latency hidden as far as the chain allows."""
-    reader = Reader(dut, latency=latency, share=0.0)
+    reader = Reader(dut, latency=latency)
     await reader.bench.reset()
     frame = make(reader, 3, 2, [5, 3000, 0, 90, 2, 30])
     walk = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]
@@ -240,19 +231,9 @@ async def long(dut, latency):
 
 
 @cocotb.test()
-@cocotb.parametrize((("idle", "stall"), PATTERNS[:3]))
-async def again(dut, idle, stall):
-    """Most lists given more than once, short ones and such as do not fit their places; the lists behind them wait."""
-    reader = Reader(dut, idle, stall, latency=12, share=0.8)
-    await reader.bench.reset()
-    frame = make(reader, 4, 4, [0, 1, 9, 72, 73, 145, 300, 8, 0, 12, 2, 80, 64, 0, 0, 10])
-    await reader.run(frame, frame.walk(reader.rng))
-
-
-@cocotb.test()
 async def dram(dut):
     """DRAM timing."""
-    reader = Reader(dut, "rare", "rare", latency=30, perfect=False, share=0.2)
+    reader = Reader(dut, "rare", "rare", latency=30, perfect=False)
     await reader.bench.reset()
     for slot in range(2):
         frame = make(reader, 6, 6, sizes_of(reader.rng, 36), slot)
@@ -262,7 +243,7 @@ async def dram(dut):
 @cocotb.test()
 async def clear(dut):
     """Clear at any time: nothing is asked for after it, what is under way is read, and the next frame is right."""
-    reader = Reader(dut, "rare", "rare", latency=40, share=0.3)
+    reader = Reader(dut, "rare", "rare", latency=40)
     rng = reader.rng
     await reader.bench.reset()
     frames = [make(reader, 5, 5, sizes_of(rng, 25), slot) for slot in range(3)]
@@ -276,18 +257,15 @@ async def clear(dut):
         await RisingEdge(dut.clk_i)
         dut.clear_i.value = 0
         reader.tiles._task.cancel()
-        reader.next._task.cancel()
-        dut.tile_valid_i.value = dut.next_valid_i.value = 0
+        dut.tile_valid_i.value = 0
         await RisingEdge(dut.clk_i)  # what was taken in the cycle of the clear has been seen
         reader.due.clear()
-        reader.plan.clear()
         await RisingEdge(dut.clk_i)
         asked = reader.beats.total()
         await reader.bench.until(lambda: int(dut.idle_o.value) == 1, 400, "idle after clear")
         assert reader.beats.total() <= asked + 3 * 8, "requests after clear"  # two in the splitter
         assert reader.port.port.idle, "idle with answers to come"
         reader.tiles = StreamSource(Stream(dut, "tile", ("x", "y")), reader.bench.stall("rare"))
-        reader.next = StreamSource(Stream(dut, "next", ("again",)), reader.bench.stall("rare"))
         if turn % 2:
             await reader.run(frame, frame.walk(rng))
 
@@ -315,7 +293,7 @@ def break_header(frame: Frame, rng, line: int, kind: str) -> None:
 @cocotb.parametrize(stall=["never", "half"])
 async def faults(dut, stall):
     """Each fault of a pointer and of a header, and errors of the memory: the list ends, the next ones are whole, the next frame has no error."""
-    reader = Reader(dut, stall, stall, latency=9, share=0.2)
+    reader = Reader(dut, stall, stall, latency=9)
     rng = reader.rng
     await reader.bench.reset()
     kinds = ["used none", "used many", "used high", "chunk", "pool", "memory", "pointer memory",
@@ -359,7 +337,7 @@ async def faults(dut, stall):
 @cocotb.test()
 async def latency(dut):
     """From a tile to its list."""
-    reader = Reader(dut, latency=50, share=0.0)
+    reader = Reader(dut, latency=50)
     await reader.bench.reset()
     frame = make(reader, 3, 1, [0, 5, 100])
     for x in range(3):
@@ -368,5 +346,5 @@ async def latency(dut):
         await reader.bench.until(lambda: dut.tile_valid_i.value == 1, 20, "tile")
         cycles = await reader.bench.until(lambda: reader.output.count > before, 1000, "line")
         dut._log.info("list of %d: %d cycles", frame.read(x, 0).lines[0].count, cycles)
-        await reader.bench.until(lambda: not reader.due and not reader.next.pending, 1000, "list")
+        await reader.bench.until(lambda: not reader.due, 1000, "list")
         await reader.bench.cycles(10)

@@ -52,7 +52,6 @@ module list_readers_bench #(
     .tile_x_i(tile_x_i[8*n+:8]), .tile_y_i(tile_y_i[8*n+:8]), \
     .out_valid_o(out_valid_o[n]), .out_ready_i(1'b1), .out_entries_o(entries_``n), \
     .out_count_o(count_``n), .out_last_o(out_last_o[n]), \
-    .next_valid_i(1'b1), .next_ready_o(), .next_again_i(1'b0), \
     .ar_valid_o(p``n``_ar_valid_o), .ar_ready_i(p``n``_ar_ready_i), .ar_id_o(p``n``_ar_id_o), \
     .ar_addr_o(p``n``_ar_addr_o), .ar_len_o(p``n``_ar_len_o), .ar_size_o(p``n``_ar_size_o), \
     .ar_burst_o(p``n``_ar_burst_o), .r_valid_i(p``n``_r_valid_i), .r_ready_o(p``n``_r_ready_o), \

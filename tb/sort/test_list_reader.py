@@ -1,6 +1,6 @@
 """List reader: lines of every list in the order of the tiles against the golden model, and exactly the lines of memory that it says; faults; clear.
 
-State space: lists of 0 to 3,000 entries, chunks begun and full, chunks across 4 KB, lists given again, idle and back-pressure patterns on tiles, lines and
+State space: lists of 0 to 3,000 entries, chunks begun and full, chunks across 4 KB, idle and back-pressure patterns on tiles, lines and
 answers, memory with and without pauses, latency 1 to 100 and DRAM timing; faults of the memory and of each field of pointer and header; clear at any time.
 Chunks all over the largest region, up to its last one, at the end of the address space. Parameter space: two, four, eight contexts; 4, 11, 32 slots. Not
 covered: several managers at one port.
@@ -24,7 +24,7 @@ from flicker.scene.real import REAL_VIEWS, real_scenes
 
 @pytest.mark.parametrize("parameters", [{}, {"Contexts": 2, "Slots": 4, "Ahead": 1}, {"Contexts": 8, "Slots": 11, "Ahead": 3, "Bursts": 3}])
 def test_list_reader(parameters: dict[str, int]) -> None:
-    tests = [] if not parameters else ["lists", "again", "faults"]
+    tests = [] if not parameters else ["lists", "faults"]
     build_and_test("flk_list_reader", "cocotb_list_reader", parameters=parameters, tests=tests)
 
 

@@ -29,6 +29,7 @@ from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.record import RecordKind
 from flicker.golden.front.setup import CLUSTER_M, FrameSetup
 from flicker.golden.lists import CHUNK_LINES, LINE_BYTES, MAX_CHUNKS, WRITERS, list_chunks, pointer_lines
+from flicker.golden.long_lists import region_bytes
 from flicker.params import TILE, CatMode, Form
 from flicker.scene import packed as packed_module
 from flicker.scene.camera import Camera, orbit_camera
@@ -373,7 +374,7 @@ def test_sizes(lib: ctypes.CDLL) -> None:
         cols, rows = (-(-n // TILE) for n in (width, height))
         chunks = list_chunks(width, height, entries)
         assert 1 <= chunks <= MAX_CHUNKS and lib.flk_list_chunks(width, height, entries) == chunks
-        assert lib.flk_list_bytes(chunks) == chunks * WRITERS * CHUNK_LINES * LINE_BYTES
+        assert lib.flk_list_bytes(chunks) == chunks * WRITERS * CHUNK_LINES * LINE_BYTES + region_bytes()
         assert lib.flk_pointer_bytes(width, height) == pointer_lines(cols, rows) * LINE_BYTES
         for form in PixelFormat:
             stride = least_stride(width, form)

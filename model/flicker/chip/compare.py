@@ -99,7 +99,8 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
             front = by_oriented_boxes(front) if key[1] else front
             image = front_memory(front)
-            fronts[key] = preprocessing.estimate(front, image, dram, sizes), TileLists.of(front, image, None if key[2] else sizes.sorted_entries)
+            tables = TileLists.of(front, image, None if key[2] else sizes.sorted_entries, sizes.merge_lines)
+            fronts[key] = preprocessing.estimate(front, image, dram, sizes), tables
         first, tables = fronts[key]
         frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
         facts[name] = {

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..golden.lists import CHUNK_LINES, ENTRY_BITS, KEY_BITS, LINE_ENTRIES, MASK_BITS, RECORD_BITS
 from ..golden.long_lists import RUNS, sort_long
-from ..golden.sorting import CAPACITY, sort_list
+from ..golden.sorting import CAPACITY
 from ..perf.long_lists import BEGIN, LINES, MEMORY, merge_cycles
-from ..perf.sorting import latency, reading_cycles, unit_cycles
+from ..perf.sorting import latency, unit_cycles
 
 CLUMP = 300  # entries of a clump that follow each other
 LINE_BITS = LINE_ENTRIES * ENTRY_BITS + 4
@@ -93,6 +93,25 @@ def _fits(n: int) -> Cost:
     return Cost(unit_cycles(n), 2 * int(lines_of(n)))
 
 
+def _readings(key: np.ndarray, capacity: int) -> list[tuple[int, int]]:
+    """Entries that each reading of a list delivers, and its cuts: when an entry more passes than fits, the nearer half stays and is the limit."""
+    found, bound = [], -1
+    while True:
+        at, cuts, kept, limit = 0, 0, np.zeros(0, np.int64), np.int64(1) << 60
+        while True:
+            places = at + np.flatnonzero((key[at:] > bound) & (key[at:] <= limit))
+            room = capacity - len(kept)
+            if len(places) <= room:
+                found.append((len(kept) + len(places), cuts))
+                break
+            at = int(places[room])
+            kept = np.sort(np.concatenate([kept, key[places[:room]]]))[: capacity // 2]
+            limit, cuts = kept[-1], cuts + 1
+        if not cuts:
+            return found
+        bound = int(limit)
+
+
 def read_again(entries: np.ndarray, wanted: int, capacity: int = CAPACITY) -> Cost:
     """As it was: the whole list for each part that the unit holds."""
     n = len(entries)
@@ -101,11 +120,12 @@ def read_again(entries: np.ndarray, wanted: int, capacity: int = CAPACITY) -> Co
     if n <= capacity:
         return Cost(unit_cycles(n, stages=(capacity // 16).bit_length() - 1), 2 * int(lines_of(n)))
     readings, given = 0, 0
-    found = sort_list(entries, capacity).readings
+    found = _readings((entries >> np.uint64(MASK_BITS)).astype(np.int64), capacity)
     while given < wanted:
-        given += len(found[readings].gathered)
+        given += found[readings][0]
         readings += 1
-    cycles = reading_cycles(n, readings, sum(len(r.limits) for r in found[:readings]), capacity)
+    # A cut stops the reading until what is in the unit has been counted and moved.
+    cycles = readings * n + sum(cuts for _, cuts in found[:readings]) * (3 * capacity // 2 + 38) + min(capacity, capacity // 2 + n // readings)
     # A reading that has begun runs out, but nobody waits for what it has found.
     return Cost(cycles, int(lines_of(n)) * (1 + min(readings + 1, len(found))))
 

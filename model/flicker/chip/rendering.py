@@ -3,7 +3,7 @@
 One pass over the records in the order in which delivery looks them up, each with the times at which it goes on: sorted by its unit, looked up, found (two a
 cycle each, when all queues have places), taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies
 are those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are
-left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its last reading; lines
+left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its end; lines
 of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
 
 Left out: conflicts of banks in the cache; in the memory, that records wait for anything but each other (their lines go to channels and banks, lists have the
@@ -26,8 +26,9 @@ from ..golden.masked import render_masked
 from ..golden.render import stream_order
 from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
+from ..perf.long_lists import BEGIN
 from ..perf.render_stage import finish_events
-from ..perf.sorting import cut_cycles, held_entries, latency
+from ..perf.sorting import held_entries, latency
 from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import DramConfig, Refresh, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
@@ -116,36 +117,36 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 
 @numba.njit(cache=True)
 def _frame(
-    tile_start, record, mask, lines_start, chunk_entries, sort_delay, reading_start, reading_size, reading_cuts, element_start, element_mask, element_cycles,
-    finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token, depth, blend,
-    out_delay, per_vru, base, memory, sizes, missed,
+    tile_start, record, mask, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
+    element_cycles, finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token,
+    depth, blend, out_delay, per_vru, base, memory, sizes, missed,
 ):
-    """Cycles of a frame; lines of records; readings of each list (T,); records given to each core of each tile (T, 4). missed: takes the lines of records in
-    the order in which they are read.
+    """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
+    of records in the order in which they are read.
 
-    Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), readings of their lists, and the
+    Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), batches of their lists, and the
     elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
-    first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a sorting unit's steps, cycles of a cut there, chunks in a
-    list reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
+    first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a sorting unit's steps, cycles from the end of a list that it
+    does not hold to the first request for its runs, chunks in a list reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
     """
     tiles = len(tile_start) - 1
     ring = 256
-    sorted_held, cut, slots, buffer, held_pairs = sizes
+    sorted_held, back, slots, buffer, held_pairs = sizes
     # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
     gate_end = np.zeros(tiles, np.int64)
     out_end = np.zeros(tiles, np.int64)
     chunk_free = np.zeros((4, 64), np.int64)
     chunk_count = np.zeros(4, np.int64)
-    readings = np.zeros(tiles, np.int64)
+    batches = np.zeros(tiles, np.int64)
     given = np.zeros((tiles, 4), np.int64)
     # Delivery
     tile, at = 0, np.int64(0)  # at: entry
     looked, looked_before = np.int64(0), np.int64(0)  # the last lookup, and the one before
     begun = False
     ready = np.int64(0)  # what is left of the list's present chunk is sorted from here on
-    part = 0  # chunk of a list that is read more than once
+    part = 0  # batch of a list that comes in several
     part_end = np.int64(0)  # its last entry
-    part_gate = np.zeros((reading_start[1:] - reading_start[:-1]).max() + 1, np.int64)  # end of each reading
+    part_gate = np.zeros((batch_start[1:] - batch_start[:-1]).max() + 1, np.int64)  # when all of each has been given
     # Buffers: when the unit gave its last entry, and when entries were taken
     emitted = np.zeros(4, np.int64)
     removed, removals = np.zeros((4, buffer), np.int64), np.zeros(4, np.int64)
@@ -309,17 +310,18 @@ def _frame(
                 gate = max(gate, out_end[before + 4])
             gate += 1
             gate_end[t_c] = gate
-            readings[t_c] = 1
+            batches[t_c] = 1
             part = 0
-            r = reading_start[t_c]
-            parts = reading_start[t_c + 1] - r
+            r = batch_start[t_c]
+            parts = batch_start[t_c + 1] - r
             part_end = at + n
             ready = gate - n + sort_delay[t_c] - 1
             if parts > 1:
-                part_gate[0] = gate + reading_cuts[r] * cut
-                part_end = at + reading_size[r]
-                ready = part_gate[0] + sort_delay[t_c]
-                part_gate[1] = part_gate[0] + FIRST + read_latency + n + reading_cuts[r + 1] * cut
+                gate_end[t_c] = NEVER  # until it has been given
+                part_gate[0] = gate + back + batch_given[r]
+                part_end = at + batch_size[r]
+                ready = part_gate[0] + batch_delay[r]
+                part_gate[1] = part_gate[0] + batch_given[r + 1] - batch_given[r]
             if t_c >= 4:
                 ready = max(ready, out_end[t_c - 4] + 1)
         is_end = at == tile_start[t_c + 1]
@@ -337,17 +339,17 @@ def _frame(
                 over |= 1 << k
         if not is_end:
             kept &= ~over
-            parts = reading_start[t_c + 1] - reading_start[t_c]
+            parts = batch_start[t_c + 1] - batch_start[t_c]
             if over == 15:
-                # The list is dropped: what is in the buffer is taken, two a cycle. A reading that has begun runs out.
+                # The list is dropped: what is in the buffer is taken, two a cycle. A batch that has begun is not given to its end.
                 rest = tile_start[t_c + 1] - at
                 inside = min(rest, max(t - give, 0))
                 if parts > 1:
                     r = 1
                     while r < parts and r <= part + 1 and part_gate[r - 1] < t + DROPPED - TOLD:
                         r += 1
-                    readings[t_c] = r
-                    gate_end[t_c] = max(t, part_gate[r - 1])
+                    batches[t_c] = r
+                    gate_end[t_c] = t + DROPPED
                 at = tile_start[t_c + 1]
                 part_end = at + 1
                 emitted[u] = max(give, t) + (DROPPED if inside < rest else 0)
@@ -404,24 +406,24 @@ def _frame(
         if is_end:
             out_end[t_c] = give
             if not listed[t_c]:
-                readings[t_c] = 0
+                batches[t_c] = 0
             tile += 1
             begun = False
             continue
         at += 1
         if at == part_end and at < tile_start[t_c + 1]:
-            # The next chunk of a list that is read again.
-            parts = reading_start[t_c + 1] - reading_start[t_c]
+            # The next batch.
+            parts = batch_start[t_c + 1] - batch_start[t_c]
             part += 1
-            r = reading_start[t_c] + part
-            n = tile_start[t_c + 1] - tile_start[t_c]
-            part_end += reading_size[r]
-            ready = max(ready, part_gate[part] + sort_delay[t_c])
-            readings[t_c] = part + 1
-            gate_end[t_c] = part_gate[part]
+            r = batch_start[t_c] + part
+            part_end += batch_size[r]
+            ready = max(ready, part_gate[part] + batch_delay[r])
+            batches[t_c] = part + 1
             if part + 1 < parts:
-                part_gate[part + 1] = max(part_gate[part], t) + FIRST + read_latency + n + reading_cuts[r + 1] * cut
-    return writer, misses, readings, given
+                part_gate[part + 1] = max(part_gate[part], t) + batch_given[r + 1] - batch_given[r]
+            else:
+                gate_end[t_c] = part_gate[part]
+    return writer, misses, batches, given
 
 
 @dataclass(frozen=True, eq=False)
@@ -501,12 +503,14 @@ def estimate(
     listed = (tables.x < -(-lists.width // TILE)).astype(np.bool_)
     sizes = config.chip_memories
     lengths, chunk_entries, held = np.diff(tables.start), tables.chunk_entries, held_entries(sizes.sorted_entries, sizes.sort_ways)
+    ways = dict(stages=sizes.sort_stages, ways=sizes.sort_ways)
+    batch_delay = np.array([latency(int(n), **ways) - n if n <= sizes.sorted_entries else 0 for n in tables.batch_size])
     if tables.capacity is None:  # a list is sorted when its last line is there
         delay, chunk_entries, held = lengths + 1, np.zeros_like(chunk_entries), int(NEVER)
-    elif tables.capacity == sizes.sorted_entries:
-        delay = np.array([latency(min(int(n), sizes.sorted_entries), stages=sizes.sort_stages, ways=sizes.sort_ways) for n in lengths])
+    elif (tables.capacity, tables.merge_lines) == (sizes.sorted_entries, sizes.merge_lines):
+        delay = np.array([latency(min(int(n), sizes.sorted_entries), **ways) for n in lengths])
     else:
-        raise ValueError(f"lists are read for a capacity of {tables.capacity}, the configuration's is {sizes.sorted_entries}")
+        raise ValueError(f"lists are read for sizes {tables.capacity}, {tables.merge_lines}, not {sizes.sorted_entries}, {sizes.merge_lines}")
     # Rows stay open: a line of a list finds another one than its own.
     each = CLOCK_HZ / (dram.rate // 2) if dram else 0.0
     list_latency = latency_cycles + (dram.idle_cycles(BEAT) + math.ceil(dram.trp * each) if dram else 0)
@@ -520,25 +524,25 @@ def estimate(
         refresh = (dram.trefi * CLOCK_HZ // (dram.rate // 2), dram.trfc * CLOCK_HZ // (dram.rate // 2))
     early = config.by_lanes or config.cat != CatMode.AUTO or config.mask_generator != "ctu"
     missed = np.empty(len(tables.record), np.int64)
-    clock, misses, readings, given = _frame(
-        tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.reading_start, tables.reading_size,
-        tables.reading_cuts, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
+    clock, misses, batches, given = _frame(
+        tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.batch_start, tables.batch_size,
+        tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
         RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
         cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
         tables.regions.records // RECORD_LINE, memory,
-        (held, cut_cycles(sizes.sorted_entries, sizes.sort_ways), sizes.list_chunks,
+        (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
          sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
     )
     stride = stride or least_stride(lists.width, format_)
     moved = {
-        "lists": BEAT * int((readings * tables.lines).sum()), "pointers": LINE_BYTES * len(tables.lines), "records": RECORD_LINE * int(misses),
-        "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
+        "lists": BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum()), "pointers": LINE_BYTES * len(tables.lines),
+        "records": RECORD_LINE * int(misses), "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
     }
     total = max(int(clock), cores.alone) + END + latency_cycles
     traffic: list[Stream] = []
     if dram:
         total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
-        traffic = tables.traffic(readings, missed[:misses], format_, stride)
+        traffic = tables.traffic(batches, missed[:misses], format_, stride)
     grid = np.zeros((2 * tables.rows, 2 * tables.cols), np.int64)
     for k in range(CORES):
         grid[2 * tables.y + k // 2, 2 * tables.x + k % 2] = given[:, k]

@@ -19,9 +19,10 @@ import numpy as np
 
 from ..errors import FlickerError
 from .lists import ENTRY_BITS, HEADER_AT, LINE_BYTES, LINE_ENTRIES, MASK_BITS
-from .sorting import CAPACITY
+from .sorting import CAPACITY, ordered
 
 RUNS = 64  # that a list may have
+UNITS = 4
 SHARES = 3  # batches of few chains are smaller, down to capacity >> SHARES, and leave the unit earlier
 FEW = 4  # chains of the smallest batches; twice as many, and they have twice as many lines
 WORDS = LINE_BYTES // 8
@@ -76,6 +77,11 @@ def run_lines(capacity: int = CAPACITY) -> int:
     return -(-capacity // LINE_ENTRIES)
 
 
+def region_bytes(capacity: int = CAPACITY, most: int = RUNS) -> int:
+    """Bytes of the runs of four units, unit by unit, behind the lists."""
+    return UNITS * most * run_lines(capacity) * LINE_BYTES
+
+
 def batch_lines(chains: int, capacity: int = CAPACITY) -> int:
     """Lines of a batch, at most."""
     doublings = min((-(-chains // FEW) - 1).bit_length(), SHARES)
@@ -98,10 +104,6 @@ def pack_lines(entries: np.ndarray) -> np.ndarray:
     used = np.minimum(len(entries) - np.arange(count) * LINE_ENTRIES, LINE_ENTRIES).astype(np.uint64)
     lines[:, -1] |= used << np.uint64(HEADER_AT & 63)
     return lines
-
-
-def _ordered(entries: np.ndarray) -> np.ndarray:
-    return entries[np.argsort(entries >> np.uint64(MASK_BITS), kind="stable")]
 
 
 def chain_runs(runs: list[np.ndarray]) -> list[list[int]]:
@@ -147,7 +149,7 @@ def merge_batches(runs: list[np.ndarray], chains: list[list[int]], capacity: int
             fed += [Fed(*places[c][at[c]], False) for c in range(len(chains)) if at[c] < len(places[c])]
         given = np.concatenate([runs[f.run][LINE_ENTRIES * f.line : LINE_ENTRIES * (f.line + 1)] for f in fed])
         key = (given >> np.uint64(MASK_BITS)).astype(np.int64)
-        batches.append(Batch(bound, limit, fed, _ordered(given[(key > bound) & ((key <= limit) | (limit < 0))])))
+        batches.append(Batch(bound, limit, fed, ordered(given[(key > bound) & ((key <= limit) | (limit < 0))])))
         bound = limit
     return batches
 
@@ -162,7 +164,7 @@ def sort_long(entries: np.ndarray, capacity: int = CAPACITY, most: int = RUNS) -
         raise FlickerError(f"long lists: {len(entries)} entries, more than {most} runs of {capacity}")
     if int(entries.max()) >> ENTRY_BITS:
         raise FlickerError("long lists: an entry of more than 52 bits")
-    runs = [_ordered(entries[i : i + capacity]) for i in range(0, len(entries), capacity)]
+    runs = [ordered(entries[i : i + capacity]) for i in range(0, len(entries), capacity)]
     chains = chain_runs(runs)
     if len(chains) + 1 > batch_lines(len(chains), capacity):
         raise FlickerError(f"long lists: {len(chains)} chains for a unit of {capacity}")

@@ -10,7 +10,7 @@ left out. A list of more than half of what fits then waits for the one before it
 
 from __future__ import annotations
 
-from ..golden.sorting import CELLS, STAGES, SortedList
+from ..golden.sorting import CELLS, STAGES
 
 PIPELINE = 22  # registers and memories from the line to the output, one after the other, with two ways
 STEP = 3  # of these a step's
@@ -61,21 +61,6 @@ def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES, w
     return sum(list_cycles(n, ways) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0] + waits
 
 
-def long_cycles(golden: SortedList, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
-    """Estimate for a list that does not fit, within some per cent: each reading takes an entry a cycle, each cut stops it until the cut is made."""
-    return reading_cycles(len(golden.order), len(golden.readings), sum(len(r.limits) for r in golden.readings), cells << stages, ways)
-
-
 def held_entries(capacity: int, ways: int = 2) -> int:
     """Entries in all steps, those of the last one and of the smaller ones before it."""
     return capacity + 2 * capacity // ways
-
-
-def cut_cycles(capacity: int, ways: int = 2) -> int:
-    """Cycles that a reading stops for when what fits has been gathered: the steps before the last one run out, half of it is counted off and moves."""
-    return capacity + capacity // ways + 38
-
-
-def reading_cycles(n: int, readings: int, cuts: int, capacity: int, ways: int = 2) -> int:
-    """The same by the numbers of its readings and cuts."""
-    return readings * n + cuts * cut_cycles(capacity, ways) + min(capacity, capacity // ways + n // readings)

@@ -18,6 +18,7 @@ from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
+from ..golden.long_lists import region_bytes
 from ..params import TILE
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
@@ -66,7 +67,7 @@ class Regions:
         records = image + step(len(packed.image()))
         slots = -(-(int(packed.first[-1]) + int(packed.counts[-1])) // SLOTS_PER_STEP) * SLOTS_PER_STEP
         lists = records + step(slots * kind.bytes)
-        pointers = lists + step(max(chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES)
+        pointers = lists + step(max(chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES + region_bytes())
         return Regions(image, records, slots * kind.bytes, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.front.memory import FrontImage
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS
+from ..golden.long_lists import region_bytes
 from ..golden.walk import tile_walk
 from ..params import CORES, TILE, RenderConfig
 from ..scene.camera import Camera
@@ -83,7 +84,7 @@ def rendering_rtl(
     base = regions(image, stride * rows * TILE)
     with Half("rendering", build(config, parameters), PORTS, memory or MemoryOptions(), seed) as sim:
         for purpose, (name, data) in enumerate(zip(PURPOSES, parts)):
-            size = stride * rows * TILE if name == "frame" else max(len(data), BEAT)
+            size = stride * rows * TILE if name == "frame" else len(data) + region_bytes() if name == "lists" else max(len(data), BEAT)
             sim.load(base[name], -(-size // BEAT) * BEAT, data, purpose)
         counters, errors = sim.run((
             (int(config.cat), 3), (int(format_), 1), (background[0] | background[1] << 8 | background[2] << 16, 24), (pairs, 8), (rows, 9),
@@ -101,7 +102,7 @@ def rendering_rtl(
 def regions(image: FrontImage, frame_bytes: int) -> dict[str, int]:
     """Where what is read and written lies, by purpose."""
     at, out = 1 << 28, {}
-    for name, size in zip(PURPOSES, (image.lists.memory.nbytes, image.lists.pointers.nbytes, image.records.nbytes, frame_bytes)):
+    for name, size in zip(PURPOSES, (image.lists.memory.nbytes + region_bytes(), image.lists.pointers.nbytes, image.records.nbytes, frame_bytes)):
         out[name] = at
         at += -(-max(size, 1) // PAGE) * PAGE
     return out

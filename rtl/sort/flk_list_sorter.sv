@@ -1,0 +1,234 @@
+// A tile's list in order, of any length up to Runs times what the sorting unit holds (docs/long_lists.md).
+//
+// Lists of up to Capacity = Cells << Stages entries go through flk_sorting_unit once. Of longer ones it makes runs, which
+// flk_run_writer packs into lines from line base_i on; when all are in memory flk_run_merge reads them
+// and the unit takes them again. in_*, out_*, finish_i and the counters: flk_sorting_unit.
+// write_*: lines, with the address of each; written_i, while waits_o: what was taken is in memory and will be read
+// as written (low in the cycle after a line was taken, until then). base_i stays while idle_o is low.
+// error_o, until start_i: the list has more runs than fit, of which the far ones of the reading are left out, or what
+// was read of them is wrong; what there is leaves all the same. start_i while idle_o.
+module flk_list_sorter #(
+  parameter  int unsigned Cells       = 16,
+  parameter  int unsigned Stages      = 7,
+  parameter  int unsigned Ways        = 8,
+  parameter  int unsigned Lists       = 8,
+  parameter  int unsigned Runs        = 64,   // of a list
+  parameter  int unsigned MergeLines  = 128,  // in the memory of flk_run_merge
+  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned EntryBits   = 52,
+  parameter  int unsigned MaskBits    = 4,
+  parameter  int unsigned OutBits     = 28,
+  parameter  int unsigned AddressBits = 34,   // of a line
+  parameter  int unsigned Width       = 512,
+  parameter  int unsigned IdBits      = 4,
+  parameter  int unsigned Id          = 0,
+  localparam int unsigned CountBits   = $clog2(LineEntries + 1),
+  localparam int unsigned AddrBits    = AddressBits + $clog2(Width / 8)
+) (
+  input  logic                                  clk_i,
+  input  logic                                  rst_ni,
+  // Frame
+  input  logic                                  start_i,
+  output logic                                  idle_o,
+  output logic                                  error_o,
+  input  logic [AddressBits-1:0]                base_i,
+  output logic [31:0]                           entries_o,
+  output logic [31:0]                           readings_o,
+  output logic [31:0]                           dropped_o,
+  // Lines
+  input  logic                                  in_valid_i,
+  output logic                                  in_ready_o,
+  input  logic [LineEntries-1:0][EntryBits-1:0] in_entries_i,
+  input  logic [CountBits-1:0]                  in_count_i,
+  input  logic                                  in_last_i,
+  // Sorted entries
+  output logic                                  out_valid_o,
+  input  logic                                  out_ready_i,
+  output logic                                  out_end_o,
+  output logic [OutBits-1:0]                    out_entry_o,
+  input  logic                                  finish_i,
+  // Lines of runs to memory
+  output logic                                  write_valid_o,
+  input  logic                                  write_ready_i,
+  output logic [AddressBits-1:0]                write_beat_o,
+  output logic [Width-1:0]                      write_data_o,
+  output logic                                  waits_o,
+  input  logic                                  written_i,
+  // AXI4
+  output logic                                  ar_valid_o,
+  input  logic                                  ar_ready_i,
+  output logic [IdBits-1:0]                     ar_id_o,
+  output logic [AddrBits-1:0]                   ar_addr_o,
+  output logic [7:0]                            ar_len_o,
+  output logic [2:0]                            ar_size_o,
+  output logic [1:0]                            ar_burst_o,
+  input  logic                                  r_valid_i,
+  output logic                                  r_ready_o,
+  input  logic [IdBits-1:0]                     r_id_i,
+  input  logic [Width-1:0]                      r_data_i,
+  input  logic [1:0]                            r_resp_i,
+  input  logic                                  r_last_i
+);
+
+  localparam int unsigned KeyBits    = EntryBits - MaskBits;
+  localparam int unsigned Capacity   = Cells << Stages;
+  localparam int unsigned RunLines   = (Capacity + LineEntries - 1) / LineEntries;
+  localparam int unsigned RunBits    = $clog2(RunLines + 1);
+  localparam int unsigned NumberBits = $clog2(Runs * RunLines + 1);
+
+  logic                                  unit_idle, merge_idle;
+  logic                                  run_valid, run_ready, run_end, merging, stop;
+  logic [EntryBits-1:0]                  run_entry;
+  logic                                  again_valid, again_ready, limited, last, is_final;
+  logic [LineEntries-1:0][EntryBits-1:0] again_entries;
+  logic [3:0]                            again_count;
+  logic [KeyBits-1:0]                    limit;
+  logic                                  pack_ready, begin_merge, merge_done, full, fault;
+  logic                                  built_valid, built_ready;
+  logic [KeyBits-1:0]                    built_first, built_last;
+  logic [RunBits-1:0]                    built_lines;
+  logic [NumberBits-1:0]                 number;
+  logic                                  begun_q, error_q;
+
+  flk_sorting_unit #(
+    .Cells      (Cells),
+    .Stages     (Stages),
+    .Ways       (Ways),
+    .Lists      (Lists),
+    .LineEntries(LineEntries),
+    .EntryBits  (EntryBits),
+    .MaskBits   (MaskBits),
+    .OutBits    (OutBits)
+  ) i_unit (
+    .clk_i,
+    .rst_ni,
+    .clear_i        (1'b0),
+    .start_i,
+    .idle_o         (unit_idle),
+    .entries_o,
+    .readings_o,
+    .dropped_o,
+    .in_valid_i,
+    .in_ready_o,
+    .in_entries_i,
+    .in_count_i,
+    .in_last_i,
+    .run_valid_o    (run_valid),
+    .run_ready_i    (run_ready),
+    .run_end_o      (run_end),
+    .run_entry_o    (run_entry),
+    .merging_o      (merging),
+    .merge_stop_o   (stop),
+    .merge_valid_i  (again_valid),
+    .merge_ready_o  (again_ready),
+    .merge_entries_i(again_entries),
+    .merge_count_i  (CountBits'(again_count)),
+    .merge_limited_i(limited),
+    .merge_limit_i  (limit),
+    .merge_last_i   (last),
+    .merge_final_i  (is_final),
+    .out_valid_o,
+    .out_ready_i,
+    .out_end_o,
+    .out_entry_o,
+    .finish_i
+  );
+
+  // Runs of the next list wait until the last one has left the memory.
+  assign run_ready = pack_ready && !begun_q;
+
+  flk_run_writer #(
+    .LineEntries(LineEntries),
+    .EntryBits  (EntryBits),
+    .MaskBits   (MaskBits),
+    .NumberBits (NumberBits),
+    .RunBits    (RunBits),
+    .Width      (Width)
+  ) i_writer (
+    .clk_i,
+    .rst_ni,
+    .clear_i     (1'b0),
+    .start_i     (merge_done),
+    .drop_i      (full),
+    .in_valid_i  (run_valid && !begun_q),
+    .in_ready_o  (pack_ready),
+    .in_end_i    (run_end),
+    .in_entry_i  (run_entry),
+    .out_valid_o (write_valid_o),
+    .out_ready_i (write_ready_i),
+    .out_number_o(number),
+    .out_data_o  (write_data_o),
+    .run_valid_o (built_valid),
+    .run_ready_i (built_ready),
+    .run_first_o (built_first),
+    .run_last_o  (built_last),
+    .run_lines_o (built_lines)
+  );
+
+  assign write_beat_o = base_i + AddressBits'(number);
+  assign waits_o      = merging && !begun_q;
+  assign begin_merge  = waits_o && written_i;
+
+  flk_run_merge #(
+    .Runs       (Runs),
+    .Lines      (MergeLines),
+    .Capacity   (Capacity),
+    .LineEntries(LineEntries),
+    .EntryBits  (EntryBits),
+    .MaskBits   (MaskBits),
+    .AddressBits(AddressBits),
+    .Width      (Width),
+    .IdBits     (IdBits),
+    .Id         (Id)
+  ) i_merge (
+    .clk_i,
+    .rst_ni,
+    .base_i,
+    .idle_o       (merge_idle),
+    .full_o       (full),
+    .fault_o      (fault),
+    .run_valid_i  (built_valid),
+    .run_ready_o  (built_ready),
+    .run_first_i  (built_first),
+    .run_last_i   (built_last),
+    .run_lines_i  (built_lines),
+    .begin_i      (begin_merge),
+    .stop_i       (stop),
+    .done_o       (merge_done),
+    .out_valid_o  (again_valid),
+    .out_ready_i  (again_ready),
+    .out_entries_o(again_entries),
+    .out_count_o  (again_count),
+    .out_limited_o(limited),
+    .out_limit_o  (limit),
+    .out_last_o   (last),
+    .out_final_o  (is_final),
+    .ar_valid_o,
+    .ar_ready_i,
+    .ar_id_o,
+    .ar_addr_o,
+    .ar_len_o,
+    .ar_size_o,
+    .ar_burst_o,
+    .r_valid_i,
+    .r_ready_o,
+    .r_id_i,
+    .r_data_i,
+    .r_resp_i,
+    .r_last_i
+  );
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      begun_q <= 1'b0;
+      error_q <= 1'b0;
+    end else begin
+      begun_q <= begun_q ? merging || !merge_idle : begin_merge;
+      error_q <= (error_q && !start_i) || fault || (full && run_valid && !begun_q);
+    end
+  end
+
+  assign error_o = error_q;
+  assign idle_o  = unit_idle && merge_idle && !begun_q;
+
+endmodule
