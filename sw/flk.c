@@ -48,7 +48,6 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
-    [FLK_FRAME_FEATURE] = "frame: the chip draws no antialiased scene and no principal point off the middle",
     [FLK_DEVICE_ID] = "chip: not found",
     [FLK_DEVICE_VERSION] = "chip: registers of another version",
     [FLK_BUSY] = "chip: not ready",
@@ -452,8 +451,6 @@ flk_status_t flk_ready(flk_device_t *device)
   return GET(FLK_STATUS_READY, status) != 0 ? FLK_OK : FLK_BUSY;
 }
 
-enum { FEATURES_MINOR = 3 }; /* minor version with frame.antialiased and frame.off_centre */
-
 flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, const flk_frame_t *other)
 {
   const flk_scene_t *const scene = frame->scene;
@@ -462,8 +459,6 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   flk_status_t status = flk_frame_check(frame, other, device->form, device->lists);
   if (status == FLK_OK)
     status = flk_camera_registers(&camera, &frame->camera);
-  if (status == FLK_OK && device->minor < FEATURES_MINOR && (scene->antialiased != 0 || camera.off_centre != 0))
-    status = FLK_FRAME_FEATURE;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)

@@ -47,7 +47,6 @@ typedef enum {
   FLK_FRAME_STRIDE,  /* stride too small, too large or no multiple of 32 */
   FLK_FRAME_OVERLAP, /* regions that overlap */
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
-  FLK_FRAME_FEATURE, /* antialiased scene or principal point off the middle, of which the chip's registers (version below 2.3) know nothing */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
