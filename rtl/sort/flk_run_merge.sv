@@ -151,7 +151,7 @@ module flk_run_merge #(
   logic [RB:0]         at_q;              // chain or node that is looked at
   logic [LB-1:0]       levels, levels_q;
   logic [RB:0]         leaves;            // 1 << levels
-  leaf_t               winner_d, winner_q;  // the chain whose line is next, or that goes up the tree
+  leaf_t               winner_d, winner_q;  // whose line is next, or who goes up the tree
 
   // ---- chains ---------------------------------------------------------------------------------------
 
