@@ -225,7 +225,7 @@ async def rate(dut):
     for n, order in ((CAPACITY + 1, "random"), (3 * CAPACITY, "walls"), (5 * CAPACITY, "clumps"), (7 * CAPACITY, "backwards"), (12 * CAPACITY, "random")):
         job = make_job(test.draw, n, order)
         await test.run([job], full=True)
-        want, got = perf.merge_cycles(job.golden, MERGE_LINES, 110).total, job.ended - job.first
+        want, got = perf.merge_cycles(job.golden, MERGE_LINES, 110, WAYS).total, job.ended - job.first
         dut._log.info("%d entries, %s: %d cycles, %d by the model (%+.1f%%), %.2f an entry", n, order, got, want, 100 * (want / got - 1), got / n)
         if CAPACITY == 2048:
             assert got <= 3 * n + 2000 and abs(want - got) <= 0.08 * got, (n, order, got, want)
