@@ -165,7 +165,18 @@ module flk_list_sorter #(
     .run_lines_o (built_lines)
   );
 
-  assign write_beat_o = base_i + AddressBits'(number);
+  // Of the next line: base_i + number, without an adder on the way out. There are cycles enough between two lists.
+  logic [AddressBits-1:0] beat_q;
+
+  always_ff @(posedge clk_i) begin
+    if (write_valid_o && write_ready_i) begin
+      beat_q <= beat_q + 1'b1;
+    end else if (number == '0) begin
+      beat_q <= base_i;
+    end
+  end
+
+  assign write_beat_o = beat_q;
   assign waits_o      = merging && !begun_q;
   assign begin_merge  = waits_o && written_i;
 
@@ -230,5 +241,11 @@ module flk_list_sorter #(
 
   assign error_o = error_q;
   assign idle_o  = unit_idle && merge_idle && !begun_q;
+
+`ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      write_valid_o |-> write_beat_o == base_i + AddressBits'(number))
+  else $error("flk_list_sorter: a line to another address than its number's");
+`endif
 
 endmodule
