@@ -423,7 +423,7 @@
 #define FLK_COUNTER_LIVE_COLOUR_BEATS 68  /* beats read: colours */
 #define FLK_COUNTER_LIVE_GEOMETRY_BEATS 69  /* beats read: headers and geometry */
 #define FLK_COUNTER_LIVE_TABLE_BEATS 70  /* beats read: cluster table */
-#define FLK_COUNTER_LIVE_FRAME_WRITTEN 71  /* beats written: frame buffer */
+#define FLK_COUNTER_LIVE_FRAME_WRITTEN 71  /* beats written: frame buffer, runs of long lists */
 #define FLK_COUNTER_LIVE_POINTER_WRITTEN 72  /* beats written: list pointers that made room for others */
 #define FLK_COUNTER_LIVE_FRONT_WRITTEN 73  /* beats written: records, lists, pointers */
 #define FLK_COUNTER_LIVE_RECORD_WAITS 74  /* cycles in which an address waits: records */

@@ -142,7 +142,7 @@ class ChipCounter(IntEnum):
     LIVE_COLOUR_BEATS = 68  # beats read: colours
     LIVE_GEOMETRY_BEATS = 69  # beats read: headers and geometry
     LIVE_TABLE_BEATS = 70  # beats read: cluster table
-    LIVE_FRAME_WRITTEN = 71  # beats written: frame buffer
+    LIVE_FRAME_WRITTEN = 71  # beats written: frame buffer, runs of long lists
     LIVE_POINTER_WRITTEN = 72  # beats written: list pointers that made room for others
     LIVE_FRONT_WRITTEN = 73  # beats written: records, lists, pointers
     LIVE_RECORD_WAITS = 74  # cycles in which an address waits: records

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,7 +22,6 @@ from flicker.params import RenderConfig
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.pipeline import packed_scene
 from flicker.report.figures import Figure
-from flicker.scene.gaussians import Scene
 from flicker.scene.grow import grown
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS, RealView
@@ -30,9 +29,8 @@ from flicker.scene.real import REAL_VIEWS, RealView
 from .common import SIZE, Say, folder_of_scenes, save_charts
 
 FOLDERS = ("flowers", "playbot")
-TIMES = (1, 2, 4, 8)
+TIMES = (1, 2, 4)
 SIZES = ((320, 178), (640, 360), SIZE, (1920, 1080))
-DEGREES = (0, 1, 2, 3)
 CONFIG = RenderConfig(stage="lanes")
 PEAK_SHARE = 0.8  # of the memory's peak rate, in the bound
 
@@ -71,19 +69,13 @@ def point(name: str, view: View) -> Point:
     )
 
 
-def _degree(scene: Scene, degree: int) -> Scene:
-    return replace(scene, sh=scene.sh[:, : (degree + 1) ** 2])
-
-
 def _views(real: RealView) -> Iterator[tuple[str, View]]:
-    """Larger scenes, larger pictures, harmonics of all degrees."""
+    """Larger scenes, larger pictures."""
     view = load_view(real.path(folder_of_scenes()), real.number, SIZE)
     for times in TIMES:
         yield "scene", View(view.camera, grown(view.scene, times), f"{real.folder} x {times}")
     for size in SIZES:
         yield "picture", View(view.camera.resized(*size), view.scene, real.folder)
-    for degree in DEGREES[: view.scene.sh_degree + 1]:
-        yield "harmonics", View(view.camera, _degree(view.scene, degree), real.folder)
 
 
 def _row(p: Point) -> tuple[str, ...]:
@@ -125,7 +117,7 @@ def _chart(points: list[Point]) -> Figure:
 
 
 def tables(say: Say) -> dict[str, str]:
-    found: dict[str, list[Point]] = {"scene": [], "picture": [], "harmonics": []}
+    found: dict[str, list[Point]] = {"scene": [], "picture": []}
     for real in REAL_VIEWS:
         if real.folder not in FOLDERS:
             continue

@@ -16,10 +16,12 @@ from flicker.cli.main import app
 from flicker.errors import FlickerError
 from flicker.front.projection import project
 from flicker.front.reference import render_reference
+from flicker.pipeline import packing_of
 from flicker.scene.camera import Camera
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.gaussians import Scene
 from flicker.scene.grow import MOST, grown, joined
+from flicker.scene.memory import encode_chunks, save_chunks
 from flicker.scene.metrics import psnr
 
 CAMERA = Camera(200, 120, 160, 160, np.array([0, 0, -6.0]), np.eye(3))
@@ -50,6 +52,15 @@ def test_halves_are_the_whole() -> None:
     assert np.array_equal(a.scales, b.scales) and np.array_equal(a.quats, scene.quats) and np.array_equal(b.sh, scene.sh)
     middle = 1 - (1 - a.opacities * np.exp(-0.25 / (2 * 0.75))) ** 2
     assert np.allclose(middle, 0.9775 * scene.opacities, atol=1e-3) and (a.opacities < scene.opacities).all()
+
+
+def test_of_no_file(tmp_path: Path) -> None:
+    """A grown scene is packed as it is, not as the file that it came from has its chunks."""
+    save_chunks(encode_chunks(random_scene(seed(), 300, 0)), tmp_path / "a.compressed.ply")
+    scene = load_scene(tmp_path / "a.compressed.ply")
+    assert len(packing_of(scene, None).packed) == 300
+    for more in (grown(scene, 2), joined([scene, scene])):
+        assert more.path is None and len(packing_of(more, None).packed) == 600
 
 
 def test_picture() -> None:

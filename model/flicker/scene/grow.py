@@ -3,7 +3,7 @@
 `grown` splits Gaussians along their longest axis. The halves of one lie `SHIFT` standard deviations to both sides and are narrower by sqrt(1 - SHIFT^2):
 mean and covariance of both together are those of the whole. An opacity a of each half makes what a beam through the middle sees, 1 - (1 - a g)^2 with
 g = exp(-SHIFT^2 / (2 (1 - SHIFT^2))), as opaque as `_MIDDLE` times the whole: with `_MIDDLE` the halves of a faint Gaussian hold together as much as it did.
-`joined` puts scenes side by side.
+`joined` puts scenes side by side. What they return is of no file (`Scene.path`), so that nobody takes a file's own chunks for it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _split(scene: Scene, chosen: np.ndarray) -> Scene:
     means[chosen] = part.means - step
     both = lambda values, more: np.concatenate([values, more])  # noqa: E731
     return replace(
-        scene, means=both(means, part.means + step), scales=both(scales, scales[chosen]), quats=both(scene.quats, part.quats),
+        scene, path=None, means=both(means, part.means + step), scales=both(scales, scales[chosen]), quats=both(scene.quats, part.quats),
         opacities=both(opacities, opacities[chosen]), sh=both(scene.sh, part.sh),
     )
 
@@ -90,6 +90,6 @@ def joined(scenes: Sequence[Scene]) -> Scene:
         sh[at : at + len(scene), : scene.sh.shape[1]] = scene.sh
         at += len(scene)
     return replace(
-        first, means=np.concatenate(means), scales=np.concatenate(scales), quats=np.concatenate([s.quats for s in scenes]),
+        first, path=None, means=np.concatenate(means), scales=np.concatenate(scales), quats=np.concatenate([s.quats for s in scenes]),
         opacities=np.concatenate([s.opacities for s in scenes]), sh=sh,
     )
