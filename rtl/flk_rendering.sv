@@ -4,7 +4,7 @@
 // delivery fetches records and gives them to four cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
 // puts finished pixels together. The walk goes in pairs of tiles (flk_tile_walk); a tile that the picture lacks has an empty list.
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
-// error_o, until the next start: bit 0 lists could not be read or break their layout, bit 1 records could not be read, bit 2 a write
+// error_o, until the next start: bit 0 lists could not be read, break their layout or are longer than is sorted, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
 // lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/long_lists.md).
@@ -172,6 +172,10 @@ module flk_rendering
   // Runs: lines to memory, and whether those of a unit are there.
   localparam int unsigned Runs     = MergeLines / 2;
   localparam int unsigned RunLines = ((16 << SortStages) + 8) / 9;
+
+  if (Runs * RunLines > 64 * 228) begin : gen_check_runs
+    $error("flk_rendering: SortStages, MergeLines: drivers leave room for 64 runs of 228 lines a unit");
+  end
 
   logic [3:0]               run_valid, run_ready, run_waits, run_open_q;
   logic [3:0][BeatBits-1:0] run_beat, run_base_q;

@@ -354,7 +354,7 @@
 #define FLK_ERROR_FRONT_WRITE 1  /* a write of the front end failed (records, lists, pointers) */
 #define FLK_ERROR_RECORD_REGION 2  /* records beyond their region */
 #define FLK_ERROR_LIST_MEMORY 3  /* out of list memory */
-#define FLK_ERROR_LIST_READ 4  /* lists unreadable */
+#define FLK_ERROR_LIST_READ 4  /* lists unreadable, or one longer than is sorted */
 #define FLK_ERROR_RECORD_READ 5  /* records unreadable */
 #define FLK_ERROR_FRAME_WRITE 6  /* a write of the frame buffer failed */
 #define FLK_ERROR_DESCRIPTOR 7  /* descriptor refused */
@@ -367,7 +367,7 @@
   [1] = "a write of the front end failed (records, lists, pointers)", \
   [2] = "records beyond their region", \
   [3] = "out of list memory", \
-  [4] = "lists unreadable", \
+  [4] = "lists unreadable, or one longer than is sorted", \
   [5] = "records unreadable", \
   [6] = "a write of the frame buffer failed", \
   [7] = "descriptor refused", \

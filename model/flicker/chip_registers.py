@@ -84,7 +84,7 @@ class ResultError(IntEnum):
     FRONT_WRITE = 1  # a write of the front end failed (records, lists, pointers)
     RECORD_REGION = 2  # records beyond their region
     LIST_MEMORY = 3  # out of list memory
-    LIST_READ = 4  # lists unreadable
+    LIST_READ = 4  # lists unreadable, or one longer than is sorted
     RECORD_READ = 5  # records unreadable
     FRAME_WRITE = 6  # a write of the frame buffer failed
     DESCRIPTOR = 7  # descriptor refused

@@ -180,8 +180,13 @@ class ChipMemories:
 
     @property
     def sort_runs(self) -> int:
-        """Runs of a list, at most: it has so many times `sorted_entries`."""
+        """Runs of a list, at most."""
         return self.merge_lines // 2
+
+    @property
+    def longest_list(self) -> int:
+        """Entries of the longest list that is sorted; a longer one ends the frame with an error."""
+        return self.sort_runs * self.sorted_entries
 
     def rendering_parameters(self) -> dict[str, int]:
         """Of `flk_rendering` and `flk_top`; none where all sizes are the default ones."""

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flicker_tb.runner import seed
+from flicker_tb.runner import build, refused, seed
 
 from flicker.chip.dram import DramConfig
 from flicker.front.view import DEMO, load_view
@@ -256,3 +256,10 @@ def test_demo_scene_larger() -> None:
     for k in range(5):
         shares = {"AR": 0.1 * k, "R": 0.1 * k, "AW": 0.3, "W": 0.1 * k, "B": 0.3}
         check((320, 180), scene="demo", memory=MemoryOptions(None, paused(shares, 10 * k)))
+
+
+@pytest.mark.parametrize("parameters", [{"SortStages": 8}, pytest.param({"MergeLines": 256}, marks=pytest.mark.slow)], ids=str)
+def test_runs_beyond_their_region(parameters: dict[str, int]) -> None:
+    """A chip that would write more runs than drivers leave room for is not built."""
+    with refused("drivers leave room for 64 runs of 228 lines"):
+        build("flk_rendering", parameters=parameters)

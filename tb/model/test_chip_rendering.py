@@ -13,7 +13,9 @@ from flicker.chip import preprocessing
 from flicker.chip import rendering as model
 from flicker.chip.dram import DramConfig
 from flicker.chip.rendering import Rendering, estimate
+from flicker.chip.run import render_on_chip
 from flicker.chip.tile_lists import TileLists, tile_lists
+from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
@@ -23,7 +25,7 @@ from flicker.golden.long_lists import RUNS
 from flicker.golden.walk import tile_walk
 from flicker.params import CHIP_MEMORIES, CatMode, ChipMemories, RenderConfig
 from flicker.perf.long_lists import LINES
-from flicker.pipeline import packed_scene
+from flicker.pipeline import Engine, packed_scene
 from flicker.scene.packed import PackedFormat
 from flicker.sim.chip import PORT
 from flicker.toolchain import ROOT
@@ -95,6 +97,21 @@ def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:
     half, small, default = (modelled(RenderConfig(memories=name)) for name in ("half", "small", "default"))
     assert half.bytes["lists"] > default.bytes["lists"]  # of lists of 1,025 to 2,048 entries
     assert default.bytes["lists"] < small.bytes["lists"] <= half.bytes["lists"]  # fewer lines are read ahead
+
+
+def test_lists_longer_than_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The chip's golden model refuses a picture that the chip ends with an error; one entry fewer is drawn."""
+    view = load_view(DEMO, 0, SIZE)
+    longest = int(np.bincount(frame()[0].entry_tile).max())
+    for room, drawn in ((longest, True), (longest - 1, False)):
+        monkeypatch.setattr(ChipMemories, "longest_list", room)
+        if drawn:
+            assert render_on_chip(view, Engine.CHIP_GOLDEN).image.shape == (SIZE[1], SIZE[0], 3)
+        else:
+            with pytest.raises(FlickerError, match=f"a tile's list has {longest:,} entries, the chip sorts up to {room:,}"):
+                render_on_chip(view, Engine.CHIP_GOLDEN)
+    monkeypatch.undo()
+    assert [CHIP_MEMORIES[name].longest_list for name in ("default", "small")] == [131_072, 32_768]  # docs/programming.md
 
 
 def test_ideal_sorter() -> None:

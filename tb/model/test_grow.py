@@ -90,8 +90,13 @@ def test_command(tmp_path: Path) -> None:
 
     save_ply(random_scene(seed(), 50, 0), tmp_path / "a.ply")
     done = flicker("grow", tmp_path / "a.ply", tmp_path / "a.ply", "--times", 3, "-o", tmp_path / "b.ply")
-    assert done.exit_code == 0 and "of 100" in done.output and "dB" in done.output and "seed" in done.output
+    assert done.exit_code == 0 and "of 300" in done.output and "dB" in done.output and "seed" in done.output
     assert len(load_scene(tmp_path / "b.ply")) == 300
+    faint = random_scene(seed(), 50, 1)
+    faint.opacities[:20] = 0.003
+    save_ply(faint, tmp_path / "faint.ply")
+    done = flicker("grow", tmp_path / "faint.ply", "--times", 2, "-o", tmp_path / "c.splat")
+    assert done.exit_code == 0 and "60" in done.output and "of 100" in done.output and "opacity below 1/510" in done.output and "lost" in done.output
     done = flicker("grow", tmp_path / "a.ply", "-o", tmp_path / "a.ply")
     assert isinstance(done.exception, FlickerError) and "a.ply is the scene itself" in str(done.exception)
 

@@ -205,18 +205,19 @@ def test_reset_in_a_frame() -> None:
     check(unit.frame(what), packed, setup)
 
 
-@pytest.mark.parametrize("latency", [1, 100, 180])
-def test_rate(latency: int) -> None:
-    """A cluster every four cycles, whatever the latency."""
+@pytest.mark.parametrize(("latency", "perfect"), [(1, True), (100, True), (200, True), (100, False)])
+def test_rate(latency: int, perfect: bool) -> None:
+    """A cluster every four cycles, whatever the latency. perfect: a memory without DRAM. The figures of docs/cluster_cull.md."""
     packed, setup = demo()
     n = len(packed.table)
     unit = bench()
-    unit.open({BASE: packed.sections()["table"]}, latency=latency)
+    unit.open({BASE: packed.sections()["table"]}, perfect, latency=latency)
+    dram = 0 if perfect else 50  # an access to a closed row
     outcome = unit.frame(registers(setup, BASE // BEAT, n))
     want = check(outcome, packed, setup)
     print(f"latency {latency}: {n} clusters in {outcome.cycles} cycles, first kept cluster in cycle {outcome.when[0]}, last element in {outcome.when[-1]}")
-    assert outcome.cycles <= 4 * n + latency + 100
-    assert outcome.when[0] - 4 * int(np.flatnonzero(want)[0]) <= latency + 70
+    assert outcome.cycles <= 4 * n + latency + dram + 100
+    assert outcome.when[0] - 4 * int(np.flatnonzero(want)[0]) <= latency + dram + 70
 
 
 @pytest.mark.parametrize("perfect", [True, False])

@@ -2,7 +2,7 @@
 
 State space: lists empty, short, around whole runs, of as many runs as fit; keys random, sorted, backwards, equal, in walls and clumps; idle and back-pressure
 patterns on lines, writes, reads and output; answers of writes early and late; lists finished at any place. Parameter space: a small unit with 16 runs, last
-steps of two and four runs; the unit as it is with SLOW=1, with 100,000 entries in the worst orders.
+steps of eight runs, as it is, of two and four; the unit as it is with SLOW=1, with 100,000 entries in the worst orders.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ SMALL = {"Cells": 16, "Stages": 5, "Runs": 16, "MergeLines": 32}
 SETTINGS = {"cells": 16, "stages": 5, "runs": 16, "merge_lines": 32}
 
 
-@pytest.mark.parametrize("ways", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ways", [8, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 4))])
 def test_small(ways: int) -> None:
     build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={**SMALL, "Ways": ways}, config={**SETTINGS, "ways": ways},
                    tests=["lists", "longest", "finished", "too_long"], opt="-O1")

@@ -198,7 +198,7 @@ def partition(entries: np.ndarray, wanted: int) -> Cost:
 
 
 def binned(entries: np.ndarray, wanted: int, bins: int = 4) -> Cost:
-    """Four lists for each tile, by quarters of an octave's doubling: bins of the key's range over all that a scene may show. Each is sorted as it was."""
+    """Four lists for each tile, by quarters of an octave's doubling: bins of the key's range over all that a scene may show. Each is sorted by reading again."""
     tag = entries >> np.uint64(MASK_BITS)
     edges = code(2.0 * 2.0 ** (4 * np.arange(1, bins) / bins))
     which = np.searchsorted(edges, (tag >> np.uint64(RECORD_BITS)).astype(np.int64), side="right")
@@ -222,7 +222,7 @@ _PACKER = 8 * ENTRY_BITS * FLOP + CONTROL
 _NODE = 48 + 6
 
 WAYS = (
-    Way("read again (as it was)", read_again),
+    Way("read again", read_again),
     Way("read again, a unit of 8,192", _many, 3 * 216_320, 2 * 3_200.0),
     Way("four bins at writing", binned, 0, CONTROL, 3 * (4 * 2048 * 28 + 36 * 256 * 52)),
     Way("parted by a histogram", partition, BINS * 17 + PARTS * (LINE_BITS + 24), LINE_BITS * FLOP + 2 * CONTROL),

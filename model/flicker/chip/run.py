@@ -56,6 +56,9 @@ def _picture(
     if engine is Engine.CHIP_GOLDEN:
         front, packing = bit_true_front(view, config, Front.GOLDEN, options, steps)
         lists, stats = lane_lists(front, steps) if config.by_lanes else golden_lists(front, steps)
+        longest, most = int(np.bincount(front.entry_tile, minlength=1).max()), config.chip_memories.longest_list
+        if longest > most:
+            raise FlickerError(f"a tile's list has {longest:,} entries, the chip sorts up to {most:,}: its frame ends with an error (list_read)")
         with steps.step("rendering with the chip's golden model"):
             golden = render_chip(lists, config, background=(red, green, blue))
         stats |= packing | {"tile_pairs": lists.tile_pairs, "subtile_pairs": len(lists.entry)}

@@ -33,6 +33,23 @@ def _box(text: str | None) -> tuple[float, ...] | None:
     return box
 
 
+def told(title: str, out: Path, done: Written, count: int, left_out: dict[str, int], notes: list[str]) -> Table:
+    """What has been written of `count` Gaussians, and what was lost on the way: before, by reason and in words, and in the file."""
+    table = Table(show_header=False, title=title)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column()
+    table.add_row("Gaussians", f"{done.count:,}", f"of {count:,}")
+    table.add_row("file", f"{out.stat().st_size:,}", "bytes")
+    for name, (largest, mean) in done.losses.items():
+        table.add_row(f"{name}: change", f"{largest:.2g}", f"at most; {mean:.2g} in the mean")
+    for reason, number in {**left_out, **done.left_out}.items():
+        table.add_row(Text(reason, "yellow"), f"{number:,}", "left out")
+    for note in (*notes, *done.notes):
+        table.add_row(Text("lost", "yellow"), "", note)
+    return table
+
+
 def convert(
     scene: Annotated[Path, typer.Argument(help="scene as for flicker render, or demo")],
     out: Annotated[Path, typer.Argument(help="file to write: .ply, .compressed.ply, .spz, .sog, .splat, .flk")],
@@ -61,19 +78,5 @@ def convert(
     with steps.step(f"writing {out.name}"):
         write_atomically(out, lambda path: written.append(write_scene(chosen, path, suffix)))
     done = written[0]
-    table = Table(show_header=False, title=f"{title} in {out.name}")
-    table.add_column(style="bold")
-    table.add_column(justify="right")
-    table.add_column()
-    table.add_row("Gaussians", f"{done.count:,}", f"of {len(loaded) + sum(loaded.rejected.values()):,}")
-    table.add_row("file", f"{out.stat().st_size:,}", "bytes")
-    for name, (largest, mean) in done.losses.items():
-        table.add_row(f"{name}: change", f"{largest:.2g}", f"at most; {mean:.2g} in the mean")
-    for reason, count in {**loaded.rejected, **left_out, **done.left_out}.items():
-        table.add_row(Text(reason, "yellow"), f"{count:,}", "left out")
-    notes = list(done.notes)
-    if chosen.sh_degree < loaded.sh_degree:
-        notes.insert(0, f"harmonics of degree {loaded.sh_degree} are cut to {chosen.sh_degree}")
-    for note in notes:
-        table.add_row(Text("lost", "yellow"), "", note)
-    console.print(table)
+    cut = [f"harmonics of degree {loaded.sh_degree} are cut to {chosen.sh_degree}"] if chosen.sh_degree < loaded.sh_degree else []
+    console.print(told(f"{title} in {out.name}", out, done, len(loaded) + sum(loaded.rejected.values()), loaded.rejected | left_out, cut))

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
+from .convert import told
 from .options import RichSteps, check_apart, check_scene, console, writable, write_atomically
 
 SIZE = (640, 360)  # of the picture that is compared
@@ -51,12 +51,12 @@ def grow(
     with steps.step("comparing pictures"):
         camera = views[0].camera
         pictures = [render_reference(project(scene, camera), camera) for scene in (before, after)]
-    table = Table(show_header=False, title=f"{' '.join(map(str, scenes))} in {out.name}")
-    table.add_column(style="bold")
-    table.add_column(justify="right")
-    table.add_column()
-    table.add_row("Gaussians", f"{written[0].count:,}", f"of {len(before):,}")
-    table.add_row("seed", str(seed))
+    rejected: dict[str, int] = {}
+    for view in views:
+        for reason, count in view.scene.rejected.items():
+            rejected[reason] = rejected.get(reason, 0) + count
+    table = told(f"{' '.join(map(str, scenes))} in {out.name}", out, written[0], len(after), rejected, [])
+    table.add_row("grown from", f"{len(before):,}", f"Gaussians, seed {seed}")
     if after is not before:
         table.add_row("picture", f"{psnr(*pictures):.1f} dB", f"of view 0 at {SIZE[0]}x{SIZE[1]}, against what it was")
     console.print(table)
