@@ -198,7 +198,7 @@ def partition(entries: np.ndarray, wanted: int) -> Cost:
 
 
 def binned(entries: np.ndarray, wanted: int, bins: int = 4) -> Cost:
-    """Four lists for each tile, by quarters of an octave's doubling: bins of the key's range over all that a scene may show. Each is sorted by reading again."""
+    """Four lists for each tile, by quarters of an octave's doubling: bins of the key's range over all of a scene. Each is sorted by reading again."""
     tag = entries >> np.uint64(MASK_BITS)
     edges = code(2.0 * 2.0 ** (4 * np.arange(1, bins) / bins))
     which = np.searchsorted(edges, (tag >> np.uint64(RECORD_BITS)).astype(np.int64), side="right")
