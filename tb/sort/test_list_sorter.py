@@ -21,14 +21,16 @@ def test_small(ways: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ways", [2, 8])
+@pytest.mark.parametrize("ways", [2, 4, 8])
 def test_list_sorter(ways: int) -> None:
     build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={"Ways": ways}, config={"ways": ways}, tests=["lists", "finished", "rate"], opt="-O1")
 
 
 @pytest.mark.slow
-def test_100000() -> None:
-    build_and_test("flk_list_sorter", "cocotb_list_sorter", config={"orders": ["random", "backwards", "equal"]}, tests=["a_long_one"], opt="-O1")
+@pytest.mark.parametrize("ways", [2, 4, 8])
+def test_100000(ways: int) -> None:
+    build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={"Ways": ways}, config={"ways": ways, "orders": ["random", "backwards", "equal"]},
+                   tests=["a_long_one"], opt="-O1")
 
 
 def test_illegal_parameters() -> None:
