@@ -174,7 +174,7 @@ module flk_rendering
   localparam int unsigned RunLines = ((16 << SortStages) + 8) / 9;
 
   if (Runs * RunLines > 64 * 228) begin : gen_check_runs
-    $error("flk_rendering: SortStages, MergeLines: drivers leave room for 64 runs of 228 lines a unit");
+    $error("flk_rendering: SortStages, MergeLines: drivers hold 64 runs of 228 lines a unit");
   end
 
   logic [3:0]               run_valid, run_ready, run_waits, run_open_q;
