@@ -261,5 +261,5 @@ def test_demo_scene_larger() -> None:
 @pytest.mark.parametrize("parameters", [{"SortStages": 8}, pytest.param({"MergeLines": 256}, marks=pytest.mark.slow)], ids=str)
 def test_runs_beyond_their_region(parameters: dict[str, int]) -> None:
     """A chip that would write more runs than drivers leave room for is not built."""
-    with refused("drivers leave room for 64 runs of 228 lines"):
+    with refused("drivers hold 64 runs of 228 lines"):
         build("flk_rendering", parameters=parameters)
