@@ -25,7 +25,8 @@
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,
   parameter  int unsigned Stages      = 7,
-  parameter  int unsigned Ways        = 2,  // runs that the last step merges
+  parameter  int unsigned Ways        = 8,  // runs that the last step merges
+  parameter  int unsigned Block       = 32,  // of its memory, at most a run
   parameter  int unsigned Lists       = 8,  // whole lists waiting in a step, at most
   parameter  int unsigned LineEntries = 9,
   parameter  int unsigned EntryBits   = 52,
@@ -290,6 +291,7 @@ module flk_sorting_unit #(
       flk_sort_select #(
         .Run        (Run),
         .Ways       (Ways),
+        .Block      (Block < Run ? Block : Run),
         .KeyBits    (KeyBits),
         .PayloadBits(MaskBits),
         .Lists      (Lists)

@@ -14,7 +14,7 @@ from flicker_tb.bench import Bench, config, rounds
 from flicker.golden.sorting import SortedList, sort_list
 from flicker.perf import sorting as perf
 
-CELLS, STAGES, WAYS = config().get("cells", 16), config().get("stages", 7), config().get("ways", 2)
+CELLS, STAGES, WAYS = config().get("cells", 16), config().get("stages", 7), config().get("ways", 8)
 CAPACITY = CELLS << STAGES
 MERGE = ("valid", "entries", "count", "limited", "limit", "last", "final")  # its lines again
 LINE, ENTRY, OUT = 9, 52, (1 << 28) - 1

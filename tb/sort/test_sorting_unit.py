@@ -14,13 +14,14 @@ from flicker_tb.runner import build_and_test, refused
 SMALL = ["lists", "many", "finished", "clear_in_the_middle"]
 
 
-@pytest.mark.parametrize(("cells", "stages", "ways"), [(4, 3, 2), (2, 1, 2), pytest.param(4, 3, 4, marks=pytest.mark.slow), (2, 3, 8)])
-def test_small(cells: int, stages: int, ways: int) -> None:
-    build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": cells, "Stages": stages, "Ways": ways, "Lists": 2 if stages == 1 else 4},
+@pytest.mark.parametrize(("cells", "stages", "ways", "block"), [(4, 3, 2, 4), (2, 1, 2, 2), pytest.param(4, 3, 4, 2, marks=pytest.mark.slow), (2, 3, 8, 2)])
+def test_small(cells: int, stages: int, ways: int, block: int) -> None:
+    build_and_test("flk_sorting_unit", "cocotb_sorting_unit",
+                   parameters={"Cells": cells, "Stages": stages, "Ways": ways, "Block": block, "Lists": 2 if stages == 1 else 4},
                    config={"cells": cells, "stages": stages, "ways": ways}, tests=SMALL, opt="-O1")
 
 
-@pytest.mark.parametrize("ways", [2, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ways", [8, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tests", [["lists", "finish_is_quick"], pytest.param([*SMALL[1:], "rate"], marks=pytest.mark.slow)], ids=["lists", "more"])
 def test_sorting_unit(tests: list[str], ways: int) -> None:
     build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Ways": ways}, config={"ways": ways}, tests=tests, opt="-O1")
