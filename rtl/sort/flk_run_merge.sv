@@ -80,6 +80,7 @@ module flk_run_merge #(
   localparam int unsigned OB = $clog2(Runs * RunLines);  // a line from base_i on
   localparam int unsigned FB = $clog2(Capacity / LineEntries + Runs + 1);
   localparam int unsigned EntriesBits = LineEntries * EntryBits;
+  localparam int unsigned RestBits    = EntriesBits - KeyBits;  // without the last key
 
   if (Runs < 2 || Runs != 1 << RB || Lines != 1 << SB || Lines < 2 * Runs) begin : gen_check
     $error("flk_run_merge: Runs and Lines must be powers of two, Lines at least twice Runs");
@@ -443,20 +444,22 @@ module flk_run_merge #(
 
   logic                     line_read, key_read;
   logic [SB-1:0]            line_at, key_at;
-  logic [EntriesBits+3:0]   line;
   key_t                     key;
+  logic [3:0]               line_count;
+  logic [RestBits-1:0]      line_rest;
 
+  // All of a line but its last key.
   flk_sram #(
-    .Width(EntriesBits + 4),
+    .Width(4 + RestBits),
     .Depth(Lines)
   ) i_lines (
     .clk_i,
     .wr_en_i  (beat_valid),
     .wr_addr_i(beat_place),
-    .wr_data_i({wrong ? 4'd1 : beat_data[EntriesBits+:4], beat_data[EntriesBits-1:0]}),
+    .wr_data_i({wrong ? 4'd1 : beat_data[EntriesBits+:4], beat_data[RestBits-1:0]}),
     .rd_en_i  (line_read),
     .rd_addr_i(line_at),
-    .rd_data_o(line)
+    .rd_data_o({line_count, line_rest})
   );
 
   flk_sram #(
@@ -545,8 +548,8 @@ module flk_run_merge #(
                       ? place_of(winner_q.chain, SB'(read_state.used + 1'b1), levels_q, slot_mask_q)
                       : next_place_q;
   assign next_valid = valid_q[next_place];
-  assign key_at     = next_place;
-  assign key_read   = (give || state_q == WAIT) && next_valid;
+  assign key_at     = peek ? line_at : next_place;
+  assign key_read   = peek || ((give || state_q == WAIT) && next_valid);
 
   // ---- steps ----------------------------------------------------------------------------------------
 
@@ -857,8 +860,9 @@ module flk_run_merge #(
   end
 
   assign out_valid_o   = out_valid_q;
-  assign out_entries_o = line[EntriesBits-1:0];
-  assign out_count_o   = out_none_q ? '0 : line[EntriesBits+:4];
+  // The last key of a line given is the limit, that of one with a limit has just been read.
+  assign out_entries_o = {out_limited_q ? key : limit_q, line_rest};
+  assign out_count_o   = out_none_q ? '0 : line_count;
   assign out_limited_o = out_limited_q;
   assign out_limit_o   = limit_q;
   assign out_last_o    = out_last_q;

@@ -19,7 +19,6 @@ LINES = 128  # of the line memory of the merge
 MEMORY = 120  # cycles from a request to its line
 RATE = 1.25  # cycles of a line at the memory's peak, 64 bytes of 51.2
 CHOOSE = 10  # from a line to its chain's place in the tree
-WAITS = 0.85  # share of a whole run that waits for the one before
 BEGIN = 40  # from the last entry written back to the first request, beside the memory's answer
 
 
@@ -75,17 +74,10 @@ def _give(chain, entries, whole, chains, slots, memory, rate, choose):
     return done
 
 
-def run_waits(n: int, capacity: int, ways: int) -> int:
-    """Cycles by which whole runs hold up the ones behind them in a last step of more than two ways, which has less beside it: by measurement."""
-    last = n % capacity or capacity
-    pairs = [capacity] * (-(-n // capacity) - 2) + [last]
-    return int(sum(WAITS * size * (1 - 2 / ways) for size in pairs))
-
-
-def merge_cycles(golden: LongList, lines: int = LINES, memory: int = MEMORY, ways: int = 2) -> LongCycles:
-    """Estimate for one list alone. lines: of the line memory. ways: of the sorting unit's last step."""
+def merge_cycles(golden: LongList, lines: int = LINES, memory: int = MEMORY) -> LongCycles:
+    """Estimate for one list alone. lines: of the line memory."""
     n, capacity = len(golden.order), golden.capacity
-    runs = n + len(golden.runs) + max(latency(capacity), latency(len(golden.runs[-1]))) + BEGIN + memory + run_waits(n, capacity, ways)
+    runs = n + len(golden.runs) + max(latency(capacity), latency(len(golden.runs[-1]))) + BEGIN + memory
     owner = {r: c for c, chain in enumerate(golden.chains) for r in chain}
     fed = [f for b in golden.batches for f in b.fed]
     chain = np.array([owner[f.run] for f in fed])

@@ -4,18 +4,19 @@ The steps merge while their runs arrive, so lists follow each other at an entry 
 Step k waits for its first run, Cells << k entries; the step behind the last one that has two runs of the list waits for its end. A step whose first memory
 is full when the next run comes holds it up for up to three cycles, by the order of the entries: never in ascending lists, seldom in others.
 
-`ways`: runs of a list that the last step merges (`flk_sort_select`): its memories hold as much as with two, and the steps that it takes the place of are
-left out. A list of more than half of what fits then waits for the one before it.
+`ways`: runs of a list that the last step merges (`flk_sort_select`); the steps that it takes the place of are left out. Its memory, in blocks, holds as much as
+with two: a list comes in as the one before it leaves.
 """
 
 from __future__ import annotations
 
 from ..golden.sorting import CELLS, STAGES
 
-PIPELINE = 22  # registers and memories from the line to the output, one after the other, with two ways
+PIPELINE = 25  # registers and memories from the line to the output, one after the other, with two ways
 STEP = 3  # of these a step's
 LEVEL = 1  # and a level's of the last step's tree
-AHEAD = 2  # cycles by which the tree's reading ahead moves a list, at most
+AHEAD = 3  # cycles by which reading ahead of the tree moves a list, at most
+NEXT = 4  # from a list's last entry to the next one's first
 ORDER = 32  # of a list's entries, at most one cycle for so many is lost by their order
 
 
@@ -24,11 +25,11 @@ def _saved(ways: int) -> int:
     return ways.bit_length() - 2
 
 
-def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
+def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 8) -> int:
     """Cycles of a list of n <= cells << stages entries alone beside an entry a cycle, from its first line to its end."""
     pipeline = PIPELINE - (STEP - LEVEL) * _saved(ways)
     if n == 0:
-        return 11 - _saved(ways)
+        return 12 - _saved(ways)
     if n < cells:
         return pipeline + 3 + n
     capacity = cells << stages
@@ -42,25 +43,22 @@ def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> 
     return pipeline + runs + n
 
 
-def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
-    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly in ascending order with two ways; else n / ORDER more at most, and
-    AHEAD more or less with more ways."""
+def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 8) -> int:
+    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly or up to AHEAD less in ascending order; else n / ORDER more at most."""
     return n + latency(n, cells, stages, ways)
 
 
-def list_cycles(n: int, ways: int = 2) -> int:
+def list_cycles(n: int) -> int:
     """Cycles from the end of one list to that of the next, of n entries, where latency is hidden."""
-    return n + 1 + LEVEL * _saved(ways)
+    return n + NEXT
 
 
-def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES, ways: int = 2) -> int:
-    """Cycles from the end of the first list to that of the last, at most, for few lists: a longer latency than the lists' before shows once, and with more
-    ways than two what does not fit beside the list before."""
+def back_to_back(lengths: list[int], cells: int = CELLS, stages: int = STAGES, ways: int = 8) -> int:
+    """Cycles from the end of the first list to that of the last, at most, for few lists: a longer latency than the lists' before shows once."""
     delays = [latency(n, cells, stages, ways) for n in lengths]
-    waits = sum(max(a + b - (cells << stages), 0) for a, b in zip(lengths, lengths[1:])) if ways > 2 else 0
-    return sum(list_cycles(n, ways) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0] + waits
+    return sum(list_cycles(n) for n in lengths[1:]) + sum(lengths) // ORDER + max(delays) - delays[0]
 
 
-def held_entries(capacity: int, ways: int = 2) -> int:
+def held_entries(capacity: int, ways: int = 8) -> int:
     """Entries in all steps, those of the last one and of the smaller ones before it."""
     return capacity + 2 * capacity // ways
