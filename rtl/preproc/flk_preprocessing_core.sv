@@ -105,12 +105,24 @@ module flk_preprocessing_core
   survivor_t       survivor_in, survivor;
   colour_t [2:0]   direction_in, direction;
   logic            far;  // the mean was saturated
+  logic            chunked_q;     // registers near what they reach
+  logic            projected_q;   // the projection's, behind the other
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      chunked_q   <= 1'b0;
+      projected_q <= 1'b0;
+    end else begin
+      chunked_q   <= setup_i.chunked;
+      projected_q <= chunked_q;
+    end
+  end
 
   flk_geometry_decode i_decode (
     .clk_i,
     .en_i          (front_en_i),
     .phase_i       (front_phase_i),
-    .chunked_i     (setup_i.chunked),
+    .chunked_i     (chunked_q),
     .word_0_i      (words_i[0]),
     .word_1_i      (words_i[1]),
     .word_2_i      (words_i[2]),
@@ -187,7 +199,7 @@ module flk_preprocessing_core
       .middle_1_i   ($signed(setup_i.middle[1])),
       .width_i      (setup_i.width),
       .height_i     (setup_i.height),
-      .chunked_i    (setup_i.chunked),
+      .chunked_i    (projected_q),
       .antialiased_i(setup_i.antialiased),
       .near_o,
       .outside_o,
@@ -262,7 +274,7 @@ module flk_preprocessing_core
       .middle_1_i   ($signed(setup_i.middle[1])),
       .width_i      (setup_i.width),
       .height_i     (setup_i.height),
-      .chunked_i    (setup_i.chunked),
+      .chunked_i    (projected_q),
       .antialiased_i(setup_i.antialiased),
       .near_o,
       .outside_o,
@@ -455,7 +467,7 @@ module flk_preprocessing_core
   flk_colour_group i_group (
     .clk_i,
     .en_i      (colour_en),
-    .chunked_i (setup_i.chunked),
+    .chunked_i (chunked_q),
     .basis_0_i (part_basis[0]),
     .basis_1_i (part_basis[1]),
     .basis_2_i (part_basis[2]),
@@ -488,7 +500,7 @@ module flk_preprocessing_core
   flk_colour_constant i_constant (
     .clk_i,
     .en_i        (colour_en),
-    .chunked_i   (setup_i.chunked),
+    .chunked_i   (chunked_q),
     .dc_0_i      (part_q.dc[0]),
     .dc_1_i      (part_q.dc[1]),
     .dc_2_i      (part_q.dc[2]),
@@ -619,7 +631,7 @@ module flk_preprocessing_core
     flk_colour_term i_term (
       .clk_i,
       .en_i     (colour_en),
-      .chunked_i(setup_i.chunked),
+      .chunked_i(chunked_q),
       .sum_i    ($signed(sum_q[c])),
       .step_i   (sum_step[c]),
       .term_o   (term)
@@ -1055,7 +1067,7 @@ module flk_preprocessing_core
       );
     end
 
-    assign fields_in.shape[63:48] = setup_i.chunked ? opacity : opacity_q;
+    assign fields_in.shape[63:48] = chunked_q ? opacity : opacity_q;
     assign fields_in.x            = recorded_q.x;
     assign fields_in.y            = recorded_q.y;
 

@@ -542,13 +542,13 @@ module flk_run_merge #(
                               read_state.used[SB-1:0], levels_q, slot_mask_q);
   assign line_read = give || peek;
 
-  // The chain's next line.
+  // The chain's next line; of one that is looked at the line that is given, too.
   logic [SB-1:0] next_place;
   assign next_place = state_q == GIVE
                       ? place_of(winner_q.chain, SB'(read_state.used + 1'b1), levels_q, slot_mask_q)
                       : next_place_q;
   assign next_valid = valid_q[next_place];
-  assign key_at     = peek ? line_at : next_place;
+  assign key_at     = next_place;
   assign key_read   = peek || ((give || state_q == WAIT) && next_valid);
 
   // ---- steps ----------------------------------------------------------------------------------------
@@ -818,6 +818,7 @@ module flk_run_merge #(
         next_place_q <= next_place;
       end
       PEEKED: begin
+        next_place_q <= line_at;
         if (peeked) begin
           at_q <= at_q + 1'b1;
         end

@@ -13,10 +13,10 @@
 // One entry a cycle is read for all runs; in front of the tree each run has three registers. A run
 // that has been read goes on to the next list's.
 //
-// Throughput: an entry a cycle, a list of n entries in n + $clog2(Ways) cycles. Latency: an entry is at
+// Throughput: an entry a cycle, a list of n entries in n + 4 cycles. Latency: an entry is at
 // the root $clog2(Ways) + 5 cycles after it was taken, if it is the first of its block. Handshakes:
 // in_ready_o comes from registers; out_valid_o from registers, drop_i and closed_i; out_ready_i reaches
-// the registers of the tree and below. clear_i (synchronous) empties it.
+// the registers below the root. clear_i (synchronous) empties it.
 // drop_i: what there is of the list that leaves is left out, a block a cycle, its end leaves; drop_o: what
 // arrives at the input belongs to this list too, and is not kept. empty_o: no entry and no end inside.
 module flk_sort_select #(
@@ -495,19 +495,36 @@ module flk_sort_select #(
         assign load = can && ready && !drop;
         assign done = !valid && done_below == '1;
 
-        flk_pipe_reg #(
-          .Width(EntryBits)
-        ) i_node (
-          .clk_i,
-          .rst_ni,
-          .clear_i    (clear_i || drop),
-          .in_valid_i (can),
-          .in_ready_o (ready),
-          .in_data_i  (entry_below[prefer_b]),
-          .out_valid_o(valid),
-          .out_ready_i(take_it),
-          .out_data_o (entry)
-        );
+        // Below the root a buffer that cuts the way of out_ready_i.
+        if (n < 4) begin : gen_cut
+          flk_skid_buffer #(
+            .Width(EntryBits)
+          ) i_node (
+            .clk_i,
+            .rst_ni,
+            .clear_i    (clear_i || drop),
+            .in_valid_i (can),
+            .in_ready_o (ready),
+            .in_data_i  (entry_below[prefer_b]),
+            .out_valid_o(valid),
+            .out_ready_i(take_it),
+            .out_data_o (entry)
+          );
+        end else begin : gen_register
+          flk_pipe_reg #(
+            .Width(EntryBits)
+          ) i_node (
+            .clk_i,
+            .rst_ni,
+            .clear_i    (clear_i || drop),
+            .in_valid_i (can),
+            .in_ready_o (ready),
+            .in_data_i  (entry_below[prefer_b]),
+            .out_valid_o(valid),
+            .out_ready_i(take_it),
+            .out_data_o (entry)
+          );
+        end
       end
     end else begin : gen_side
       localparam int unsigned W = n - Ways;

@@ -366,57 +366,68 @@ module flk_sorting_unit #(
 
   // ---- output -------------------------------------------------------------------------------------
 
-  logic   out_valid_q, out_end_q, finish_q, end_sent, end_left, out_runs;
+  logic   out_valid_q, out_end_q, finish_q, end_sent, end_left;
+  logic   out_runs_q;  // what is at the output is of a run
   entry_t out_q;
 
   // Ends that are inside, and those of them that belong to lists before the one that leaves as runs.
-  logic [EndsBits-1:0] inside_q, before_q;
+  logic [EndsBits-1:0] inside_q, before_d, before_q;
+  mode_e               mode_d;
 
   // An end that is followed by another batch of the list is none.
-  assign out_runs  = (mode_q == RUNS || mode_q == LEAVE) && before_q == '0;
-  assign out_free  = !out_valid_q || (out_runs ? run_ready_i : out_ready_i);
-  assign end_sent  = out_valid_q && out_end_q && out_ready_i && !out_runs;
+  assign out_free  = !out_valid_q || (out_runs_q ? run_ready_i : out_ready_i);
+  assign end_sent  = out_valid_q && out_end_q && out_ready_i && !out_runs_q;
   assign end_left  = (out_valid_q && out_end_q && out_free) ||
                      (out_free && final_valid && final_end && final_flag);
-  assign out_drop  = finish_q && !(out_valid_q && out_end_q) && !out_runs;
+  assign out_drop  = finish_q && !(out_valid_q && out_end_q) && !out_runs_q;
+
+  always_comb begin
+    before_d = before_q - EndsBits'(end_left && before_q != '0);
+    if (mode_q == LIST) begin
+      before_d = inside_q - EndsBits'(end_left);
+    end
+  end
+
+  always_comb begin
+    mode_d = mode_q;
+    unique case (mode_q)
+      LIST: begin
+        if (whole && runs_ready) begin
+          mode_d = RUNS;
+        end
+      end
+      RUNS: begin
+        if (x_ends) begin
+          mode_d = LEAVE;
+        end
+      end
+      LEAVE: begin
+        if (inside_q == '0) begin
+          mode_d = MERGE;
+        end
+      end
+      default: begin
+        if (x_ends && x_final_q) begin
+          mode_d = LIST;
+        end
+      end
+    endcase
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       mode_q      <= LIST;
       inside_q    <= '0;
       before_q    <= '0;
+      out_runs_q  <= 1'b0;
       out_valid_q <= 1'b0;
       out_end_q   <= 1'b0;
       finish_q    <= 1'b0;
     end else begin
-      inside_q <= inside_q + EndsBits'(gate_ends) - EndsBits'(end_left);
-      if (mode_q == LIST) begin
-        before_q <= inside_q - EndsBits'(end_left);
-      end else if (before_q != '0) begin
-        before_q <= before_q - EndsBits'(end_left);
-      end
-      unique case (mode_q)
-        LIST: begin
-          if (whole && runs_ready) begin
-            mode_q <= RUNS;
-          end
-        end
-        RUNS: begin
-          if (x_ends) begin
-            mode_q <= LEAVE;
-          end
-        end
-        LEAVE: begin
-          if (inside_q == '0) begin
-            mode_q <= MERGE;
-          end
-        end
-        default: begin
-          if (x_ends && x_final_q) begin
-            mode_q <= LIST;
-          end
-        end
-      endcase
+      inside_q   <= inside_q + EndsBits'(gate_ends) - EndsBits'(end_left);
+      mode_q     <= mode_d;
+      before_q   <= before_d;
+      out_runs_q <= (mode_d == RUNS || mode_d == LEAVE) && before_d == '0;
       if (out_free) begin
         out_valid_q <= final_valid && !(final_end && final_flag);
         out_end_q   <= final_end;
@@ -426,6 +437,7 @@ module flk_sorting_unit #(
         mode_q      <= LIST;
         inside_q    <= '0;
         before_q    <= '0;
+        out_runs_q  <= 1'b0;
         out_valid_q <= 1'b0;
         finish_q    <= 1'b0;
       end
@@ -438,10 +450,10 @@ module flk_sorting_unit #(
     end
   end
 
-  assign out_valid_o  = out_valid_q && !out_runs;
+  assign out_valid_o  = out_valid_q && !out_runs_q;
   assign out_end_o    = out_end_q;
   assign out_entry_o  = out_q[OutBits-1:0];
-  assign run_valid_o  = out_valid_q && out_runs;
+  assign run_valid_o  = out_valid_q && out_runs_q;
   assign run_end_o    = out_end_q;
   assign run_entry_o  = out_q;
   assign merging_o    = again;

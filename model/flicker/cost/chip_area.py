@@ -19,10 +19,10 @@ PAPER_MM2 = {PREPROCESSING: 0.76, SORTING: 0.16, TEST: 0.09, CORES: 0.96, OTHERS
 # By chip: the units that components are, four of each. Others are what else the whole chip (`top`) has.
 CHIPS: dict[str, dict[str, Unit]] = {
     "faithful": {
-        PREPROCESSING: ("preprocessing_core", "conic"), SORTING: ("sorting_unit", "default"), TEST: ("ctu", "faithful"), CORES: ("rendering_core", "conic"),
+        PREPROCESSING: ("preprocessing_core", "conic"), SORTING: ("list_sorter", "default"), TEST: ("ctu", "faithful"), CORES: ("rendering_core", "conic"),
     },
     "default": {
-        PREPROCESSING: ("preprocessing_core", "default"), SORTING: ("sorting_unit", "default"), TEST: ("ctu", "factored fixed"),
+        PREPROCESSING: ("preprocessing_core", "default"), SORTING: ("list_sorter", "default"), TEST: ("ctu", "factored fixed"),
         CORES: ("rendering_core", "factored"),
     },
 }

@@ -337,7 +337,7 @@ def _front() -> list[Unit]:
         unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_memory", "512 x 52", Depth=512),
         unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),
         *(unit("flk_sort_select", f"{ways} runs of {2048 // ways}", Run=2048 // ways, Ways=ways) for ways in (2, 8)),
-        unit("flk_sorting_unit"), unit("flk_sorting_unit", "8 runs in the last step", Ways=8), unit("flk_run_writer"), unit("flk_run_merge"),
+        unit("flk_sorting_unit"), unit("flk_sorting_unit", "2 runs in the last step", Ways=2), unit("flk_run_writer"), unit("flk_run_merge"),
         unit("flk_list_sorter"), unit("flk_list_sorter", "16 runs", MergeLines=32, Runs=16),
         unit("flk_shape_to_fp16"), *(unit("flk_record_to_splat", form, Form=f) for form, f in FORMS.items()),
         unit("flk_splat_input"), unit("flk_pixel_out"), unit("flk_frame_writer"), unit("flk_frame_writer", "32 lanes", Lanes=LANE_COUNTS[0]),
