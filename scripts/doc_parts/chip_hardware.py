@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import time
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
@@ -18,13 +19,14 @@ from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.run import FRONT_WAITS, RENDERING_WAITS
 from flicker.chip.tile_lists import TileLists
-from flicker.chip.whole import whole_frame
+from flicker.chip.whole import WholeFrame, whole_frame
 from flicker.errors import FlickerError
-from flicker.front.view import DEMO, load_view
+from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.front.frame import ListKind, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
+from flicker.golden.lanes.lists import front_lists
 from flicker.markdown import table
 from flicker.params import FAITHFUL, RenderConfig
 from flicker.pipeline import packed_scene
@@ -84,60 +86,98 @@ def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, s
     ]
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A view in the verilated chip and in the model. alone, done: a frame alone and four back to back; simulated: cycles of the first, seconds: of the
+    processor; moved: bytes of the DRAM by purpose."""
+
+    model: WholeFrame
+    lists: TileLists
+    alone: ChipFrame
+    done: list[ChipFrame]
+    moved: dict[str, int]
+    simulated: int
+    seconds: float
+
+    @property
+    def halves(self) -> tuple[int, int]:
+        """Cycles of the front end and of the rendering half of the frame alone."""
+        stamps = self.alone.stamps
+        return stamps["front_done"] - stamps["taken"], stamps["rendering_done"] - stamps["rendering_start"]
+
+    @property
+    def cycles(self) -> int:
+        """Of the frame alone."""
+        return self.alone.stamps["rendering_done"] - self.alone.stamps["taken"]
+
+    @property
+    def interval(self) -> int:
+        """Cycles from frame to frame, as in a longer row: from the second to the third."""
+        return self.done[2].stamps["rendering_done"] - self.done[1].stamps["rendering_done"]
+
+    @property
+    def off(self) -> list[float]:
+        """By how much the model is off: front end, rendering, frame, interval."""
+        model = (self.model.front.cycles, self.model.back.cycles, self.model.latency, self.model.interval)
+        return [ours / rtl - 1 for ours, rtl in zip(model, (*self.halves, self.cycles, self.interval))]
+
+
+def measure(say: Say, title: str, view: View, config: RenderConfig, format_: PackedFormat, lists: ListKind, chunks: int, dram: DramConfig) -> Measured:
+    """Raises FlickerError where a picture differs from the golden model's or the model's cycles of a frame or its bytes are more than `LIMIT` off."""
+    camera = view.camera
+    say(f"{title}: building the simulator")
+    build(config)
+    packed = packed_scene(view, format_)
+    front = run_front(packed, camera, lists, RecordKind.of(config.form))
+    image = front_memory(front)
+    golden = render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config)
+    sizes = config.chip_memories
+    lists_there = TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines)
+    second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
+    # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
+    loose = {"records"} | ({"lists"} if lists_there.run_lines.any() else set())
+    model = whole_frame(preprocessing.estimate(front, image, dram, sizes), second, dram)
+    say(f"{title}: alone")
+    with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
+        begin = time.process_time()
+        alone = chip.render(camera, lists=lists)
+        seconds = time.process_time() - begin
+        simulated = chip.usage().live["cycles"]
+    assert alone.usage is not None
+    moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
+    for purpose, due in model.bytes.items():
+        if abs(due / moved[purpose] - 1) > (LIMIT if purpose in loose else 0.0):
+            raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
+    say(f"{title}: four frames back to back")
+    with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
+        done = back_to_back(chip, camera, chunks, lists)
+    for frame in (alone, *done):
+        if frame.error or not np.array_equal(frame.buffer, golden.buffer):
+            raise FlickerError(f"{title}: the picture differs from the golden model's")
+    found = Measured(model, lists_there, alone, done, moved, simulated, seconds)
+    if abs(found.off[2]) > LIMIT:
+        raise FlickerError(f"{title}: the chip model's cycles are {found.off[2]:+.1%} off")
+    return found
+
+
 def tables(say: Say) -> dict[str, str]:
     rows, traffic = [], []
     waits: dict[str, list[str]] = {}
     for place, path, number, size, chunks, name, refresh in _places():
         config, format_, lists = BUILDS[name]
-        dram = DramConfig(refresh=refresh)
         title = f"{place}, {name}" + ("" if refresh == Refresh.ALL_BANKS else f", refresh {refresh}")
-        view = load_view(path, number, size)
-        camera = view.camera
-        say(f"{title}: building the simulator")
-        build(config)
-        packed = packed_scene(view, format_)
-        front = run_front(packed, camera, lists, RecordKind.of(config.form))
-        image = front_memory(front)
-        golden = render_chip(front.subtile_lists(), config)
-        sizes = config.chip_memories
-        lists_there = TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines)
-        second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
-        # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
-        loose = {"records"} | ({"lists"} if lists_there.run_lines.any() else set())
-        model = whole_frame(preprocessing.estimate(front, image, dram, sizes), second, dram)
-        say(f"{title}: alone")
-        with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
-            begin = time.process_time()
-            alone = chip.render(camera, lists=lists)
-            seconds = time.process_time() - begin
-            simulated = chip.usage().live["cycles"]
-        assert alone.usage is not None
-        moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
-        for purpose, due in model.bytes.items():
-            if abs(due / moved[purpose] - 1) > (LIMIT if purpose in loose else 0.0):
-                raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
-        say(f"{title}: four frames back to back")
-        with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
-            done = back_to_back(chip, camera, chunks, lists)
-        for frame in (alone, *done):
-            if frame.error or not np.array_equal(frame.buffer, golden.buffer):
-                raise FlickerError(f"{title}: the picture differs from the golden model's")
-        halves = (alone.stamps["front_done"] - alone.stamps["taken"], alone.stamps["rendering_done"] - alone.stamps["rendering_start"])
-        cycles = alone.stamps["rendering_done"] - alone.stamps["taken"]
-        interval = done[2].stamps["rendering_done"] - done[1].stamps["rendering_done"]
-        off = [ours / rtl - 1 for ours, rtl in zip((model.front.cycles, model.back.cycles, model.latency, model.interval), (*halves, cycles, interval))]
-        if abs(off[2]) > LIMIT:
-            raise FlickerError(f"{title}: the chip model's cycles are {off[2]:+.1%} off")
+        found = measure(say, title, load_view(path, number, size), config, format_, lists, chunks, DramConfig(refresh=refresh))
+        alone, halves, off, moved = found.alone, found.halves, found.off, found.moved
         rows.append((
-            title, f"{halves[0]:,}", f"{off[0]:+.1%}", f"{halves[1]:,}", f"{off[1]:+.1%}", f"{cycles:,}", f"{off[2]:+.1%}", f"{interval:,}", f"{off[3]:+.1%}",
-            f"{interval / max(halves):.2f}", model.bottleneck, f"{simulated / seconds:,.0f}",
+            title, f"{halves[0]:,}", f"{off[0]:+.1%}", f"{halves[1]:,}", f"{off[1]:+.1%}", f"{found.cycles:,}", f"{off[2]:+.1%}", f"{found.interval:,}",
+            f"{off[3]:+.1%}", f"{found.interval / max(halves):.2f}", found.model.bottleneck, f"{found.simulated / found.seconds:,.0f}",
         ))
         waits[title] = [
             f"{int(counters[counter]) / (half * (UNITS if (side, counter) in OF_ALL else 1)):.1%}"
             for side, texts, counters, half in (("front", FRONT_WAITS, alone.front, halves[0]), ("rendering", RENDERING_WAITS, alone.rendering, halves[1]))
             for counter in texts
         ]
-        lines = model.bytes["records"] / moved["records"] - 1
+        lines = found.model.bytes["records"] / moved["records"] - 1
         traffic.append((title, *(f"{moved[name] / 1e6:.2f}" for name in PURPOSES), f"{sum(moved.values()) / 1e6:.2f}", f"{lines:+.1%}"))
     return {
         "cycles": table(

@@ -19,7 +19,7 @@ from flicker.golden.long_lists import LongList, run_lines, sort_long
 from flicker.perf import long_lists as perf
 from flicker.sim.memory import Memory, PortConfig
 
-CELLS, STAGES, WAYS = config().get("cells", 16), config().get("stages", 7), config().get("ways", 2)
+CELLS, STAGES, WAYS = config().get("cells", 16), config().get("stages", 7), config().get("ways", 8)
 RUNS, MERGE_LINES = config().get("runs", 64), config().get("merge_lines", 128)
 CAPACITY = CELLS << STAGES
 OUT = (1 << 28) - 1
