@@ -257,10 +257,32 @@ def test_what_a_frame_tells() -> None:
     """Shares of the DRAM's rate and bytes of the halves add up to those of the frame."""
     dram = DramConfig(refresh=Refresh.PER_BANK)
     with session(memory=MemoryOptions(dram.timing)) as chip:
-        stats = chip_stats(chip, chip.render(camera()), CONFIG, dram)
+        stats = chip_stats(chip, chip.render(camera()), camera(), CONFIG, dram)
     assert sum(stats["phases"][name] * stats["busy"][name]["DRAM"] for name in stats["phases"]) == pytest.approx(stats["dram_efficiency"] * stats["cycles"])
     assert all(0 < share <= 1 for part in stats["busy"].values() for share in part.values())
     assert stats["bottleneck"].startswith(max(stats["phases"], key=lambda name: stats["phases"][name])) and stats["refresh"] == "per-bank"
+
+
+def specks(count: int, size: float, spread: float) -> PackedScene:
+    """Faint Gaussians of one size, about 1 before the camera, up to spread to its sides."""
+    rng = np.random.default_rng(seed())
+    return pack(Scene(
+        means=np.stack([*rng.uniform(-spread, spread, (2, count)), rng.uniform(0.99, 1.01, count)], axis=1), scales=np.full((count, 3), size),
+        quats=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), opacities=np.full(count, 0.02), sh=np.zeros((count, 1, 3)),
+    ), PackedFormat.CHUNK).packed
+
+
+@pytest.mark.parametrize(("part", "count", "size", "width", "channels"), [
+    ("rendering: sorting units", 5000, 0.001, 16, 64), ("rendering: delivery", 6000, 0.006, 64, 64), ("rendering: lanes", 400, 0.2, 64, 64),
+    ("front end: DRAM", 3000, 0.001, 64, 1),
+])
+def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, channels: int) -> None:
+    """A list that is sorted twice in one tile, many short ones, large splats, a slow memory."""
+    dram = DramConfig(channels=channels)
+    view = Camera(width, width, 80.0, 80.0, np.zeros(3), np.eye(3))
+    with session(specks(count, size, width / 170), memory=MemoryOptions(dram.timing)) as chip:
+        stats = chip_stats(chip, check(chip, view), view, CONFIG, dram)
+    assert stats["bottleneck"].startswith(part), (stats["bottleneck"], stats["phases"], stats["busy"])
 
 
 def test_opaque_layers() -> None:

@@ -12,9 +12,12 @@ from .. import params
 from ..errors import FlickerError
 from ..front.view import View
 from ..golden.chip import render_chip
+from ..golden.delivery import UNITS
+from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
 from ..golden.lanes.render import LaneFrame
+from ..golden.lists import LINE_ENTRIES
 from ..params import CHANNELS, CORES, Coords, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_for_picture
 from ..progress import Steps
@@ -23,6 +26,7 @@ from ..sim.chip import ChipFrame, ChipSession, build
 from ..sim.half import MemoryOptions
 from .constants import CLOCK_HZ
 from .dram import DramConfig
+from .rendering import frame_beats
 
 SCENE = ("table", "headers", "geometry", "colour")  # what the front end reads
 
@@ -76,7 +80,7 @@ def _picture(
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
         seconds = time.process_time() - began
-        stats = packing | chip_stats(chip, frame, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
+        stats = packing | chip_stats(chip, frame, camera, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
     return _frame_image(frame.buffer, camera), stats
 
 
@@ -111,10 +115,10 @@ def stalled(cause: str, cycles: int) -> str:
     return f"{cycles:,} cycle{'s' * (cycles != 1)}" + (f", sum over {SUMMED[cause]}" if cause in SUMMED else "")
 
 
-def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
+def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
     """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.
 
-    dram: the memory of the session.
+    camera: of the frame. dram: the memory of the session.
     """
     assert frame.usage is not None
     front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, frame.usage.live
@@ -131,14 +135,18 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     moved = {"front end": first, "rendering": sum(map(sum, traffic.values())) - first}
     peak = {name: moved[name] * CLOCK_HZ / (phases[name] * dram.bytes_per_second) for name in phases}
     tested = chip.scene.gaussians - count("culled_gaussians")
-    # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each.
+    # Lines of lists that the sorting units do not hold, which they sort a second time.
+    again = live["frame_written"] - frame_beats(camera.width, camera.height, PixelFormat.RGB8, frame.buffer.shape[1])
+    # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each,
+    # in delivery two.
     busy = {
         "front end": {
             "lanes": tested / (2 * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
-            "sorting units": int(np.max(rendering["entries"])) / phases["rendering"], "record cache's port": int(rendering["lines"]) / phases["rendering"],
+            "sorting units": (int(np.max(rendering["entries"])) + LINE_ENTRIES * again / UNITS) / phases["rendering"],
+            "delivery": int(np.sum(rendering["entries"])) / (2 * phases["rendering"]), "record cache's port": int(rendering["lines"]) / phases["rendering"],
             "DRAM": peak["rendering"],
             **stage.pop("busy"),
         },
