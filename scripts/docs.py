@@ -131,7 +131,7 @@ PARTS = (
     Part("lane_stage", "the lanes' RTL: cycles and areas; cycles of cores that take more", ("cycles", "feeds", "area"), lane_stage.tables, scenes_missing),
     Part("lists", "layouts of tile lists in DRAM", ("entries", "layouts", "flight"), lists.tables, scenes_missing),
     Part("long_lists", "ways to sort lists longer than a sorting unit", ("sizes", "early", "real", "means"), long_lists.tables, scenes_missing),
-    Part("scale", "how a frame grows with the scene and the picture, with the chart", ("scene", "picture"), scale.tables, scenes_missing),
+    Part("scale", "how a frame grows with the scene and the picture, with the chart", ("scene", "degree", "picture"), scale.tables, scenes_missing),
     Part("scale_hardware", "long lists and grown scenes in the whole chip's RTL; half an hour", ("",), scale_hardware.tables, scenes_missing),
     Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
     Part("view", "the viewer in a headless browser: its picture, how fast it is", ("",), view.tables, view.missing, before=view.draw),

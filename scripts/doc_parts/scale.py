@@ -22,14 +22,15 @@ from flicker.params import RenderConfig
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.pipeline import packed_scene
 from flicker.report.figures import Figure
-from flicker.scene.grow import grown
+from flicker.scene.grow import grown, with_degree
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS, RealView
 
 from .common import SIZE, Say, folder_of_scenes, save_charts
 
 FOLDERS = ("flowers", "playbot")
-TIMES = (1, 2, 4)
+TIMES = (1, 2, 4, 8)
+DEGREES = (0, 1, 2, 3)
 SIZES = ((320, 178), (640, 360), SIZE, (1920, 1080))
 CONFIG = RenderConfig(stage="lanes")
 PEAK_SHARE = 0.8  # of the memory's peak rate, in the bound
@@ -70,10 +71,12 @@ def point(name: str, view: View) -> Point:
 
 
 def _views(real: RealView) -> Iterator[tuple[str, View]]:
-    """Larger scenes, larger pictures."""
+    """Larger scenes, other degrees of harmonics, larger pictures."""
     view = load_view(real.path(folder_of_scenes()), real.number, SIZE)
     for times in TIMES:
         yield "scene", View(view.camera, grown(view.scene, times), f"{real.folder} x {times}")
+    for degree in DEGREES:
+        yield "degree", View(view.camera, with_degree(view.scene, degree), real.folder)
     for size in SIZES:
         yield "picture", View(view.camera.resized(*size), view.scene, real.folder)
 
@@ -117,7 +120,7 @@ def _chart(points: list[Point]) -> Figure:
 
 
 def tables(say: Say) -> dict[str, str]:
-    found: dict[str, list[Point]] = {"scene": [], "picture": []}
+    found: dict[str, list[Point]] = {"scene": [], "degree": [], "picture": []}
     for real in REAL_VIEWS:
         if real.folder not in FOLDERS:
             continue

@@ -20,7 +20,7 @@ from flicker.pipeline import packing_of
 from flicker.scene.camera import Camera
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.gaussians import Scene
-from flicker.scene.grow import MOST, grown, joined
+from flicker.scene.grow import MOST, grown, joined, with_degree
 from flicker.scene.memory import encode_chunks, save_chunks
 from flicker.scene.metrics import psnr
 
@@ -71,6 +71,19 @@ def test_picture() -> None:
     assert loss[0] > 30 and loss[0] > loss[1] > 22
 
 
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_degrees(degree: int) -> None:
+    """What is there stays or is cut; an image has colours of that degree, and the picture hardly changes where harmonics are added."""
+    scene = random_scene(seed(), 1024, 1)
+    other = with_degree(scene, degree, seed())
+    same = min(scene.sh.shape[1], other.sh.shape[1])
+    assert other.sh.shape[1] == (degree + 1) ** 2 and np.array_equal(other.sh[:, :same], scene.sh[:, :same])
+    assert (packing_of(other, None).packed.degrees == degree).mean() > 0.75  # but of clusters of few Gaussians
+    if degree > 1:
+        assert other.path is None and np.array_equal(other.sh, with_degree(scene, degree, seed()).sh)
+        assert psnr(*(render_reference(project(s, CAMERA), CAMERA) for s in (scene, other))) > 40
+
+
 def test_side_by_side() -> None:
     first, second = random_scene(seed(), 400, 0), random_scene(seed() + 1, 300, 2)
     second = replace(second, means=100 * second.means + 7, scales=100 * second.scales)
@@ -97,6 +110,7 @@ def test_command(tmp_path: Path) -> None:
     save_ply(faint, tmp_path / "faint.ply")
     done = flicker("grow", tmp_path / "faint.ply", "--times", 2, "-o", tmp_path / "c.splat")
     assert done.exit_code == 0 and "60" in done.output and "of 100" in done.output and "opacity below 1/510" in done.output and "lost" in done.output
+    assert flicker("grow", tmp_path / "a.ply", "--degree", 2, "-o", tmp_path / "d.ply").exit_code == 0 and load_scene(tmp_path / "d.ply").sh_degree == 2
     done = flicker("grow", tmp_path / "a.ply", "-o", tmp_path / "a.ply")
     assert isinstance(done.exception, FlickerError) and "a.ply is the scene itself" in str(done.exception)
 
@@ -106,6 +120,8 @@ def test_refusals() -> None:
     for times in (0.5, 0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(FlickerError, match="expected 1 or more, not"):
             grown(scene, times)
+    with pytest.raises(FlickerError, match="expected 0 to 3, not 4"):
+        with_degree(scene, 4)
     with pytest.raises(FlickerError, match=f"makes 20,000,000 Gaussians, at most {MOST:,}"):
         grown(scene, 4e5)
     many = replace(scene, means=np.zeros((MOST // 2 + 1, 3)))  # of which but the means are counted

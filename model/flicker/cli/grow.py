@@ -17,7 +17,8 @@ def grow(
     scenes: Annotated[list[Path], typer.Argument(help="scene as for flicker render, or demo; several are put side by side")],
     out: Annotated[Path, typer.Option("--out", "-o", help="file to write, as for flicker convert")],
     times: Annotated[float, typer.Option(help="Gaussians for each of the scenes, split along their longest axis")] = 1.0,
-    seed: Annotated[int, typer.Option(min=0, help="which Gaussians are split once more where TIMES is no power of two")] = 0,
+    degree: Annotated[int | None, typer.Option(min=0, max=3, help="spherical harmonics: cut, or small ones added", show_default="as in the scene")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="which Gaussians are split once more where TIMES is no power of two, or get harmonics")] = 0,
 ) -> None:
     """Make a scene of more Gaussians, to measure how a frame grows with them; says how much the picture changed."""
     for scene in scenes:
@@ -28,7 +29,7 @@ def grow(
         from ..front.projection import project
         from ..front.reference import render_reference
         from ..front.view import load_view
-        from ..scene.grow import grown, joined
+        from ..scene.grow import grown, joined, with_degree
         from ..scene.metrics import psnr
         from ..scene.write import Written, write_scene, writer_of
     suffix = writer_of(out)
@@ -45,6 +46,8 @@ def grow(
             after = grown(before, times, seed)
         except FlickerError as error:
             raise FlickerError(f"--times: {error}") from error
+        if degree is not None:
+            after = with_degree(after, degree, seed)
     written: list[Written] = []
     with steps.step(f"writing {out.name}"):
         write_atomically(out, lambda path: written.append(write_scene(after, path, suffix)))

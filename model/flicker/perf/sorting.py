@@ -44,7 +44,7 @@ def latency(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 8) -> 
 
 
 def unit_cycles(n: int, cells: int = CELLS, stages: int = STAGES, ways: int = 8) -> int:
-    """Cycles of a list of n <= cells << stages entries alone, first line to end: exactly or up to AHEAD less in ascending order; else n / ORDER more at most."""
+    """Cycles of a list of n <= cells << stages entries alone, first line to end: in ascending order, or up to AHEAD less; else n / ORDER more at most."""
     return n + latency(n, cells, stages, ways)
 
 

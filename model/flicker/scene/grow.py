@@ -3,7 +3,7 @@
 `grown` splits Gaussians along their longest axis. The halves of one lie `SHIFT` standard deviations to both sides and are narrower by sqrt(1 - SHIFT^2):
 mean and covariance of both together are those of the whole. An opacity a of each half makes what a beam through the middle sees, 1 - (1 - a g)^2 with
 g = exp(-SHIFT^2 / (2 (1 - SHIFT^2))), as opaque as `_MIDDLE` times the whole: with `_MIDDLE` the halves of a faint Gaussian hold together as much as it did.
-`joined` puts scenes side by side. What they return is of no file (`Scene.path`), so that nobody takes a file's own chunks for it.
+`joined` puts scenes side by side, `with_degree` gives a scene harmonics up to a degree. What they return is of no file (`Scene.path`), so that nobody takes a file's own chunks for it.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ SHIFT = 0.5
 _NARROW = math.sqrt(1.0 - SHIFT**2)
 _EDGE = math.exp(-(SHIFT**2) / (2.0 * (1.0 - SHIFT**2)))
 _MIDDLE = _EDGE / _NARROW
+_HARMONIC = 1.0 / 16  # of a coefficient that is added: two of the steps of 8 bits
+_SHARE = 1.0 / 32  # of the Gaussians that have one: nearly every cluster of 256 has such a Gaussian, so its colours take the bytes of the degree
 _OUTER = 0.05  # share of the Gaussians at each end of an axis that do not count for a scene's width
 
 
@@ -70,6 +72,23 @@ def grown(scene: Scene, times: float, seed: int = 0) -> Scene:
         n = len(scene)
         scene = _split(scene, np.arange(n) if more >= n else np.sort(rng.permutation(n)[:more]))
     return scene
+
+
+def with_degree(scene: Scene, degree: int, seed: int = 0) -> Scene:
+    """The scene with spherical harmonics up to a degree, 0 to 3: cut, or with small ones that a few Gaussians, chosen at random, get. An image stores as much
+    of each cluster as one of its Gaussians needs, so the colours then take as many bytes as those of a scene that was trained with that degree."""
+    if not 0 <= degree <= 3:
+        raise FlickerError(f"expected 0 to 3, not {degree}")
+    if degree == scene.sh_degree:
+        return scene
+    count = (degree + 1) ** 2
+    sh = scene.sh[:, :count].copy()
+    if (more := count - sh.shape[1]) > 0:
+        rng = np.random.default_rng(seed)
+        chosen, size = rng.random(len(scene)) < _SHARE, (len(scene), more, 3)
+        added = np.where(chosen[:, None, None], _HARMONIC * rng.choice((-1.0, 1.0), size), 0.0)
+        sh = np.concatenate([sh, added.astype(sh.dtype)], axis=1)
+    return replace(scene, path=None, sh=sh)
 
 
 def joined(scenes: Sequence[Scene]) -> Scene:
