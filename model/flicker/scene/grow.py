@@ -3,7 +3,8 @@
 `grown` splits Gaussians along their longest axis. The halves of one lie `SHIFT` standard deviations to both sides and are narrower by sqrt(1 - SHIFT^2):
 mean and covariance of both together are those of the whole. An opacity a of each half makes what a beam through the middle sees, 1 - (1 - a g)^2 with
 g = exp(-SHIFT^2 / (2 (1 - SHIFT^2))), as opaque as `_MIDDLE` times the whole: with `_MIDDLE` the halves of a faint Gaussian hold together as much as it did.
-`joined` puts scenes side by side, `with_degree` gives a scene harmonics up to a degree. What they return is of no file (`Scene.path`), so that nobody takes a file's own chunks for it.
+`joined` puts scenes side by side, `with_degree` gives a scene harmonics up to a degree. What they return is of no file (`Scene.path`), so that nobody takes a
+file's own chunks for it.
 """
 
 from __future__ import annotations
