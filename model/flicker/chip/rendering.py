@@ -28,7 +28,7 @@ from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMo
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.long_lists import BEGIN
 from ..perf.render_stage import finish_events
-from ..perf.sorting import held_entries, latency
+from ..perf.sorting import NEXT, held_entries, latency
 from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import DramConfig, Refresh, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
@@ -134,7 +134,7 @@ def _frame(
     sorted_held, back, slots, buffer, held_pairs = sizes
     # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
     gate_end = np.zeros(tiles, np.int64)
-    out_end = np.zeros(tiles, np.int64)
+    out_begin, out_end = np.zeros((2, tiles), np.int64)
     chunk_free = np.zeros((4, 64), np.int64)
     chunk_count = np.zeros(4, np.int64)
     batches = np.zeros(tiles, np.int64)
@@ -146,7 +146,8 @@ def _frame(
     ready = np.int64(0)  # what is left of the list's present chunk is sorted from here on
     part = 0  # batch of a list that comes in several
     part_end = np.int64(0)  # its last entry
-    part_gate = np.zeros((batch_start[1:] - batch_start[:-1]).max() + 1, np.int64)  # when all of each has been given
+    part_gate = np.int64(0)  # when all of the batch has been given
+    gave = np.zeros((tile_start[1:] - tile_start[:-1]).max() + 1, np.int64)  # of a list with batches: when so many entries have left the unit
     # Buffers: when the unit gave its last entry, and when entries were taken
     emitted = np.zeros(4, np.int64)
     removed, removals = np.zeros((4, buffer), np.int64), np.zeros(4, np.int64)
@@ -300,14 +301,15 @@ def _frame(
                 gate = max(gate, came) + chunk_entries[j]
                 chunk_free[u, chunk_count[u] % slots] = gate
                 chunk_count[u] += 1
-            # What lies as many entries before as it holds has left.
+            # What lies as many entries before as it holds has left, of the list there as many as make room for this one.
             total = n
             before = t_c - 4
             while before >= 0 and total <= sorted_held:
                 total += tile_start[before + 1] - tile_start[before]
                 before -= 4
-            if before >= 0 and total > sorted_held:
-                gate = max(gate, out_end[before + 4])
+            b = before + 4
+            if b < t_c and total > sorted_held:
+                gate = max(gate, out_begin[b] + (out_end[b] - out_begin[b]) * (total - sorted_held) // (tile_start[b + 1] - tile_start[b]))
             gate += 1
             gate_end[t_c] = gate
             batches[t_c] = 1
@@ -318,12 +320,12 @@ def _frame(
             ready = gate - n + sort_delay[t_c] - 1
             if parts > 1:
                 gate_end[t_c] = NEVER  # until it has been given
-                part_gate[0] = gate + back + batch_given[r]
+                part_gate = gate + back + batch_given[r]
                 part_end = at + batch_size[r]
-                ready = part_gate[0] + batch_delay[r]
-                part_gate[1] = part_gate[0] + batch_given[r + 1] - batch_given[r]
+                ready = part_gate + batch_delay[r]
             if t_c >= 4:
-                ready = max(ready, out_end[t_c - 4] + 1)
+                ready = max(ready, out_end[t_c - 4] + NEXT)
+            out_begin[t_c] = ready
         is_end = at == tile_start[t_c + 1]
         # The unit gives an entry a cycle, while its buffer has a place; two a cycle are looked up.
         give = max(emitted[u] + 1, ready)
@@ -345,8 +347,15 @@ def _frame(
                 rest = tile_start[t_c + 1] - at
                 inside = min(rest, max(t - give, 0))
                 if parts > 1:
-                    r = 1
-                    while r < parts and r <= part + 1 and part_gate[r - 1] < t + DROPPED - TOLD:
+                    r, inside_end = part + 1, part_end - tile_start[t_c]
+                    while r < parts:
+                        inside_end += batch_size[batch_start[t_c] + r]
+                        if inside_end - sorted_held > at - tile_start[t_c]:
+                            break
+                        part_gate = max(part_gate, gave[max(inside_end - sorted_held, 0)])
+                        if part_gate >= t + DROPPED - TOLD:
+                            break
+                        part_gate += batch_given[batch_start[t_c] + r] - batch_given[batch_start[t_c] + r - 1]
                         r += 1
                     batches[t_c] = r
                     gate_end[t_c] = t + DROPPED
@@ -411,18 +420,18 @@ def _frame(
             begun = False
             continue
         at += 1
+        if parts > 1:
+            gave[at - tile_start[t_c]] = give
         if at == part_end and at < tile_start[t_c + 1]:
-            # The next batch.
-            parts = batch_start[t_c + 1] - batch_start[t_c]
+            # The next batch: its lines are given when all of it has room in the unit.
             part += 1
             r = batch_start[t_c] + part
             part_end += batch_size[r]
-            ready = max(ready, part_gate[part] + batch_delay[r])
+            part_gate = max(part_gate, gave[max(part_end - tile_start[t_c] - sorted_held, 0)]) + batch_given[r] - batch_given[r - 1]
+            ready = max(ready, part_gate + batch_delay[r])
             batches[t_c] = part + 1
-            if part + 1 < parts:
-                part_gate[part + 1] = max(part_gate[part], t) + batch_given[r + 1] - batch_given[r]
-            else:
-                gate_end[t_c] = part_gate[part]
+            if part + 1 == parts:
+                gate_end[t_c] = part_gate
     return writer, misses, batches, given
 
 
