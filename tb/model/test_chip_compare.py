@@ -129,7 +129,7 @@ def test_traffic(conic: FrontFrame) -> None:
 
 
 def test_lanes(view: View) -> None:
-    """Many small splats come too slowly for lanes, by lists and memory; few large ones are visited as slowly as in the stage alone."""
+    """Many small splats come too slowly for lanes, by lists and memory; few large ones are visited nearly as slowly as in the stage alone."""
     config, dense = RenderConfig(stage="lanes", lanes=32), run_front(packed_scene(view, FRONTS[Form.FACTORED][0]), view.camera)
     scene = random_scene(1, 60)
     large = View(view.camera, replace(scene, scales=np.full_like(scene.scales, 0.7), opacities=np.full_like(scene.opacities, 0.03)))
@@ -140,4 +140,4 @@ def test_lanes(view: View) -> None:
         alone = simulate_lanes(lane_work(front_lists(front)), config.with_(in_width=1), leave=True).cycles
         cycles.append((alone, *(rendering.estimate(tables, config, dram).cycles for dram in (None, DramConfig()))))
     assert cycles[0][0] < cycles[0][1] < cycles[0][2]
-    assert cycles[1][0] < cycles[1][1] < cycles[1][0] + 200
+    assert cycles[1][0] < cycles[1][1] < 1.15 * cycles[1][0]

@@ -6,8 +6,11 @@ are those of the RTL; masks and finishing records those of the golden model, and
 left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its end; lines
 of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
 
-Left out: conflicts of banks in the cache; in the memory, that records wait for anything but each other (their lines go to channels and banks, lists have the
-latency of a lone access, and all together the peak rate); the order of entries within a merge, arbitration between list readers.
+Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenly to the elements that it takes.
+
+Left out: conflicts of banks in the cache; in the memory, when records wait for anything but each other (their lines go to channels and banks, what else moves
+takes its share of the rate, lists have the latency of a lone access, and all together the peak rate); the order of entries within a merge, arbitration between
+list readers.
 """
 
 from __future__ import annotations
@@ -53,6 +56,10 @@ ELASTIC = 4  # registers between a queue and the stage: latency and places
 TOLD = 4  # from a sub-tile's last finished pixel to delivery
 DROPPED = 8  # from there to the end of a list that all cores have finished
 PAIR_CYCLES, PAIR_GAP = 128, 4  # of tiles in the frame writer
+ROUNDS = 3  # of a frame, each with the share of the memory's time that the one before gives what is not records
+EFFICIENCY = 0.8  # of the memory's peak rate, for that
+MOST_BUSY = 0.9
+LOADED = 300  # cycles by which a line of records comes later where what else moves takes half of the memory's time: by measurement, docs/scaling.md
 END = 60  # from the last line of a picture to its answer, beside the memory's latency
 
 NEVER = np.int64(1) << 60
@@ -119,15 +126,16 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 def _frame(
     tile_start, record, mask, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
     element_cycles, finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token,
-    depth, blend, out_delay, per_vru, base, memory, sizes, missed,
+    depth, blend, out_delay, served, needed, base, memory, sizes, missed,
 ):
     """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
     of records in the order in which they are read.
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), batches of their lists, and the
-    elements of the cores' streams (`element_start` (T, 4)). refresh: (period, length) of the memory's, cycles, or zeros. base: line of the
-    first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a sorting unit's steps, cycles from the end of a list that it
-    does not hold to the first request for its runs, chunks in a list reader, entries that wait behind a sorting unit, pairs of tiles in the frame writer.
+    elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many elements of a tile. refresh: (period,
+    length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a
+    sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
+    behind a sorting unit, pairs of tiles in the frame writer.
     """
     tiles = len(tile_start) - 1
     ring = 256
@@ -244,6 +252,9 @@ def _frame(
                     last_left[k] = x
                 count[k] += 1
                 # Channels
+                cost = np.int64(1)
+                if not is_end and element < needed[t_now, k]:
+                    cost = (element + 1) * served[t_now, k] // needed[t_now, k] - element * served[t_now, k] // needed[t_now, k]
                 for c2 in range(4):
                     if not sent >> c2 & 1:
                         continue
@@ -256,7 +267,7 @@ def _frame(
                     elif done[k, c2] <= start:
                         pop = start
                     else:
-                        pop = min(start + per_vru - 1, done[k, c2])
+                        pop = min(start + cost - 1, done[k, c2])
                         if element == finish[t_now, k, c2]:
                             done[k, c2] = start + finish_op[t_now, k, c2] + blend + 1
                     vru[k, c2] = pop + 1
@@ -457,8 +468,8 @@ def frame_beats(width: int, height: int, format_: PixelFormat, stride: int) -> i
 @dataclass(frozen=True, eq=False)
 class _Cores:
     """What `_frame` needs of a rendering stage. mask, cycles: int64 (E,), mini-tiles of an element's channels, cycles of its test; finish: int (S, 64) position
-    of the element that finishes a pixel. pace: cycles that a channel takes for an element. alone: cycles of the stage if a core got a record in every cycle it
-    wants one, 0 where the pass over the frame has them."""
+    of the element that finishes a pixel. pace: cycles that a channel takes for an element. served, needed: int64 (S,), cycles that a core has for a sub-tile
+    and the elements that it takes of its list in them: of lanes those of the stage alone, which gets a record in every cycle it wants one."""
 
     mask: np.ndarray
     cycles: np.ndarray
@@ -469,15 +480,25 @@ class _Cores:
     one_token: bool
     finished_after: int
     leaves_after: int
-    alone: int = 0
+    depth: int
+    served: np.ndarray
+    needed: np.ndarray
 
     @staticmethod
     def of(tables: TileLists, config: RenderConfig) -> _Cores:
         if config.by_lanes:
             work = lane_work(whole_pairs(front_lists(tables.frame)))
             ones = np.ones(int(work.start[-1]), np.int64)
-            alone = simulate_lanes(work, config.with_(in_width=config.delivered), leave=True).cycles
-            return _Cores(15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, alone)
+            end = simulate_lanes(work, config.with_(in_width=config.delivered), leave=True).subtile_end
+            order, core_start = stream_order(work, True)
+            served = np.zeros_like(end)
+            for k in range(CORES):
+                own = order[core_start[k] : core_start[k + 1]]
+                served[own] = np.maximum(np.diff(end[own], prepend=0), 0)
+            needed = np.minimum(np.diff(work.start), work.finish.max(axis=1) + 1)
+            return _Cores(
+                15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, config.slots, served, needed,
+            )
         lists = tables.lists
         order, core_start = stream_order(lists, walk=chip_walk(lists))
         mask, cycles, _ = cat_masks(lists, config, order, core_start)
@@ -487,7 +508,7 @@ class _Cores:
         blend, last = vru_stages(config.form)
         return _Cores(
             mask.astype(np.int64), cycles.astype(np.int64), finish, config.pixels_per_vru, config.generator.latency(config), config.ctu_fifo_depth,
-            config.generator.one_token, blend, last + 1,
+            config.generator.one_token, blend, last + 1, config.fifo_depth, config.pixels_per_vru * np.diff(lists.start), np.diff(lists.start),
         )
 
 
@@ -501,8 +522,7 @@ def estimate(
 
     Lists of an ideal sorting unit (`TileLists.capacity`) are sorted in no time once their last line is there, any number of entries at once.
 
-    Lanes take a record a cycle each core here, whatever `config.delivered`, and the frame as long as they need alone at least: their queues and what they wait
-    for are not followed.
+    Lanes take a record a cycle each core here, whatever `config.delivered`.
     """
     lists = tables.lists
     cores = _Cores.of(tables, config)
@@ -533,21 +553,26 @@ def estimate(
         refresh = (dram.trefi * CLOCK_HZ // (dram.rate // 2), dram.trfc * CLOCK_HZ // (dram.rate // 2))
     early = config.by_lanes or config.cat != CatMode.AUTO or config.mask_generator != "ctu"
     missed = np.empty(len(tables.record), np.int64)
-    clock, misses, batches, given = _frame(
-        tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.batch_start, tables.batch_size,
-        tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op), listed,
-        RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency, refresh, reads, early, cores.generator_latency,
-        cores.generator_fifo, cores.one_token, config.fifo_depth, cores.finished_after, cores.leaves_after, cores.pace,
-        tables.regions.records // RECORD_LINE, memory,
-        (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
-         sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
-    )
     stride = stride or least_stride(lists.width, format_)
-    moved = {
-        "lists": BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum()), "pointers": LINE_BYTES * len(tables.lines),
-        "records": RECORD_LINE * int(misses), "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride),
-    }
-    total = max(int(clock), cores.alone) + END + latency_cycles
+    others = {"pointers": LINE_BYTES * len(tables.lines), "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride)}
+    busy = 0.0  # share of the memory's time that is not the records'
+    for _ in range(ROUNDS if dram else 1):
+        # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits.
+        rate, later = (*memory[:-1], memory[-1] / (1.0 - busy)), round(LOADED * busy / (1.0 - busy))
+        clock, misses, batches, given = _frame(
+            tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.batch_start, tables.batch_size,
+            tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op),
+            listed, RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency + later, refresh, reads, early,
+            cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
+            tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate,
+            (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
+             sizes.sorted_ahead + OUTPUTS, sizes.pairs), missed,
+        )
+        others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
+        total = int(clock) + END + latency_cycles
+        if dram:
+            busy = min(sum(others.values()) * CLOCK_HZ / (EFFICIENCY * dram.bytes_per_second * total), MOST_BUSY)
+    moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * int(misses), "frame": others["frame"]}
     traffic: list[Stream] = []
     if dram:
         total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
