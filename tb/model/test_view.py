@@ -23,6 +23,7 @@ from flicker_tb.runner import seed
 from PIL import Image
 
 from flicker.errors import FlickerError
+from flicker.front.ahead import common_up, target
 from flicker.front.lists import subtile_lists
 from flicker.front.view import View
 from flicker.params import CHANNELS, CORES, FAITHFUL, RECOMMENDED, CatMode, Form, RenderConfig
@@ -35,7 +36,7 @@ from flicker.view import server
 from flicker.view.frames import Choice, Renderer, Shot, composed, largest
 from flicker.view.overlays import OVERLAYS, by_tile, imbalance_map, tile_cycles, tile_entries, visited_map
 from flicker.view.pace import COARSEST, Pace
-from flicker.view.pose import Pose, close, common_up, target, upright
+from flicker.view.pose import Pose, close, upright
 from flicker.view.stills import save
 
 SIZE = (160, 96)  # whole tiles

@@ -20,6 +20,7 @@ from PIL import Image
 
 from .. import markdown
 from ..errors import FlickerError
+from ..front.ahead import common_up, target
 from ..front.view import View
 from ..params import LANE_COUNTS, RECOMMENDED, CatMode, Form, Precision, RenderConfig
 from ..pipeline import Engine
@@ -27,7 +28,7 @@ from ..scene.camera import Camera
 from .frames import OPACITY, SIMULATED, Choice, Frame, Renderer, camera_key, composed
 from .overlays import OVERLAYS
 from .pace import Pace
-from .pose import Pose, close, common_up, target, upright
+from .pose import Pose, close, upright
 from .simulate import Simulation
 from .stills import save
 
