@@ -24,16 +24,17 @@ from ..golden.front.frame import FrontFrame, ListKind, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import MEAN_FRACTION
-from ..params import CHIP_MEMORIES, TILE, Form, RenderConfig
+from ..params import CHIP_MEMORIES, TILE, Coords, Form, RenderConfig
 from ..perf.render_stage import StageCycles
-from ..pipeline import packed_scene
+from ..pipeline import Engine, Front, FrontOptions, golden_front, packed_scene
 from ..scene.packed import PackedFormat
 from . import preprocessing, rendering
+from .drawing import Drawing
 from .dram import DramConfig
 from .execute import SchemeResult
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate
 from .tile_lists import TileLists
-from .whole import whole_frame
+from .whole import WholeFrame, whole_frame
 
 # The front end by form of the stage: what the scene is packed in, and how splats are listed (the command line's defaults with and without --faithful).
 FRONTS = {Form.FACTORED: (PackedFormat.CHUNK, ListKind.ELLIPSE), Form.CONIC: (PackedFormat.FP16, ListKind.BOX)}
@@ -73,6 +74,34 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     )
     kept = mask != 0
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
+
+
+def built_frame(front: FrontFrame, config: RenderConfig, dram: DramConfig, sorter: bool = True) -> WholeFrame:
+    """A frame of the chip that exists as RTL, by the models that are held to it, with this rendering stage. sorter: False: an ideal one, which costs the bytes of
+    one reading and no time."""
+    sizes, image = config.chip_memories, front_memory(front)
+    tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
+    return whole_frame(preprocessing.estimate(front, image, dram, sizes), rendering.estimate(tables, config, dram), dram)
+
+
+def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
+    """What a frame takes on the chip around the stage of a drawing: `cycles` from frame to frame while the front end works on the next one, `latency_cycles` of a
+    frame alone, `front_cycles`, `render_cycles`, and bytes by purpose, `bytes_geometry` and so on. The front end is the drawing's, of one in float64 that of
+    `FRONTS`. FlickerError for what no chip can have."""
+    config = drawing.config
+    if config.coords is Coords.ABSOLUTE:
+        raise FlickerError("coords absolute: the chip has no such records, so no cycles")
+    if drawing.engine is Engine.REFERENCE:
+        raise FlickerError("engine reference: is no machine, so it has no cycles")
+    options = drawing.options
+    if not drawing.engine.whole and drawing.front is Front.FLOAT:
+        options = FrontOptions(*FRONTS[config.form])
+    packed = packed_scene(view, options.format, options.rechunk)
+    found = built_frame(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, drawing.dram)
+    return {
+        "cycles": found.interval, "latency_cycles": found.latency, "front_cycles": found.front.cycles, "render_cycles": found.back.cycles,
+        **{f"bytes_{purpose}": count for purpose, count in found.bytes.items()},
+    }
 
 
 def own_sorter(configuration: Configuration) -> bool:

@@ -87,8 +87,8 @@ class Chosen:
 
     def drawing(self) -> Drawing:
         """What renders a view so. Imports the engines."""
-        from ..chip.drawing import Drawing
         from ..chip.dram import DramConfig, Refresh
+        from ..chip.drawing import Drawing
         from ..golden.front.frame import ListKind
         from ..pipeline import Engine, Front, FrontOptions
         from ..scene.packed import PackedFormat

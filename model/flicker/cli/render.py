@@ -33,7 +33,6 @@ from .options import (
 from .pictures import Files, check_distinct, write_pictures
 from .tables import decibels
 
-
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
