@@ -10,6 +10,7 @@ from rich.table import Table
 
 from ..errors import FlickerError, FlickerWarning, Interrupted
 from ..output import write_text
+from ..params import Coords
 from .engine import Chosen, EngineChoice, parse_engine, takes_engine
 from .kept import command_line, printed
 from .options import (
@@ -28,8 +29,8 @@ from .options import (
 from .tables import decibels
 
 if TYPE_CHECKING:
-    from ..scene.camera import Camera
-    from ..scene.sources import Source
+    from ..motion.keep import Kept
+    from ..motion.record import Recording
 
 VIDEOS = (".mp4", ".webm", ".gif", ".webp")  # flicker.motion.video
 REFERENCE = "reference"
@@ -88,6 +89,8 @@ def path(
         raise FlickerError("--amplify: for --side-by-side only")
     if cycles and chosen.engine is EngineChoice.REFERENCE:
         raise FlickerError("--cycles: not with --engine reference, which is no machine")
+    if cycles and chosen.config.coords is Coords.ABSOLUTE:
+        raise FlickerError("--cycles: not with --coords absolute, of which no chip has records")
     second = None if side_by_side in (None, REFERENCE) else parse_engine(side_by_side, "--side-by-side")  # type: ignore[arg-type]
     video = out.suffix.lower() in VIDEOS
     if not video and out.suffix and not out.is_dir():
@@ -108,6 +111,7 @@ def path(
         from ..motion import keep, record
         from ..motion.chart import write_chart
         from ..motion.frames import Wanted
+        from ..motion.paths import Asked, path_of
         from ..motion.video import CODECS, ffmpeg, write_video
         from ..scene.camera import cameras_text
         from ..scene.files import scene_title
@@ -118,8 +122,9 @@ def path(
         drawing = chosen.drawing()
     with steps.step(f"loading {scene_title(scene)}"):
         source = open_scene(scene, cameras, up)
-        along, what = _cameras(source, view, wanted_size, keyframes, pan, orbit, dolly, walk, shake, speed or 1.4, ahead or 3.0, 1 if seed is None else seed, frames,
-                               fps)
+        kind = "keyframes" if keyframes else made[0].removeprefix("--") if made else None
+        given = {name: value for name, value in (("speed", speed), ("ahead", ahead), ("seed", seed)) if value is not None}
+        along, what = path_of(source, Asked(kind, pan or orbit or 0.0, view, wanted_size, frames, fps, **given))  # type: ignore[arg-type]
     judged = stats is not None or chart is not None or warping
     wanted = Wanted(
         drawing, None if second is None else second.drawing(), judged or side_by_side == REFERENCE, judged, warping, cycles, behind,
@@ -137,29 +142,33 @@ def path(
     printed(f"{source.file or scene}: {what}, {len(along)} frames of {along[0].width}x{along[0].height} at {fps:g} frames a second")
     count = workers or (1 if len(along) - len(kept.rows) < MANY else _cores())
 
-    def results() -> None:
-        if stats is not None:
-            record.write_stats(stats, kept.rows)
-        if chart is not None:
-            write_chart(chart, kept.rows, f"{source.name}, {what}, {recording.title}", recording.slot, fps)
+    def finish() -> None:
+        with steps.step(f"writing {out}"):
+            if video:
+                write_video(out, kept.pictures, fps)
+            if stats is not None:
+                record.write_stats(stats, kept.rows)
+            if chart is not None:
+                write_chart(chart, kept.rows, f"{source.name}, {what}, {recording.title}", recording.slot, fps)
 
     before = len(kept.rows)
     try:
         seconds = _recorded(recording, kept, count)
     except KeyboardInterrupt:
         if not kept.rows:
+            kept.forget()
             raise
-        with steps.step(f"writing {out}"):
-            if video:
-                write_video(out, kept.pictures, fps)
-            results()
+        finish()
         raise Interrupted(f"{len(kept.rows)} of {len(along)} frames are in {out}; to go on: {command_line('--resume')}") from None
     except FlickerError as error:
-        raise FlickerError(f"{error}" + (f"; {len(kept.rows)} frames are kept in {folder}, --resume goes on" if kept.rows else "")) from None
-    with steps.step(f"writing {out}"):
-        if video:
-            write_video(out, kept.pictures, fps)
-        results()
+        if not kept.rows:
+            kept.forget()
+            raise
+        raise FlickerError(f"{error}; {len(kept.rows)} frames are kept in {folder}, --resume goes on") from None
+    try:
+        finish()
+    except FlickerError as error:
+        raise FlickerError(f"{error}; {len(kept.rows)} frames are kept in {folder}, --resume writes it") from None
     kept.finish()
     _show(recording, kept.rows, out, seconds / max(len(kept.rows) - before, 1))
 
@@ -188,41 +197,7 @@ def _short(chosen: Chosen) -> str:
     return f"{engine}, {config.form.name.lower()}, cat {config.cat.name.lower()}, {config.precision.name.lower()}{front}"
 
 
-def _cameras(
-    source: Source, view: int, size: tuple[int, int] | None, keyframes: bool, pan: float | None, orbit: float | None, dolly: bool, walk: bool, shake: bool,
-    speed: float, ahead: float, seed: int, frames: int | None, fps: float,
-) -> tuple[list[Camera], str]:
-    """The cameras of the path, and what it is, for people."""
-    from ..front.ahead import common_up, distance_ahead
-    from ..front.projection import project
-    from ..scene import motion
-    from ..scene.camera import select_view
-    from ..scene.trajectory import check_path, joined, times_of
-
-    given = [camera if size is None else camera.resized(*size) for camera in source.cameras]
-    if pan is None and orbit is None and not (dolly or walk or shake):
-        check_path(given, source.cameras_from)
-        if not keyframes:
-            return given[:frames], f"cameras of {source.cameras_from}"
-        times = times_of(given)
-        seconds = len(given) - 1 if times is None else float(times[-1])
-        return joined(given, frames or round(seconds * fps) + 1), f"{len(given)} keyframes of {source.cameras_from}"
-    start, count = select_view(given, view), frames or max(round(fps), 2)
-    said = f"from camera {view} of {source.cameras_from}"
-    if pan is not None:
-        return motion.panned(start, pan, count), f"pan of {pan:g} pixels a frame {said}"
-    distance, upward = distance_ahead(start, project(source.scene, start)), common_up(source.cameras)
-    unit = distance / ahead
-    if orbit is not None:
-        return motion.orbited(start, start.position + distance * start.rotation[:, 2], upward, orbit, count), f"orbit of {orbit:g} degrees {said}"
-    if dolly:
-        return motion.dollied(start, speed * unit, fps, count), f"dolly at {speed:g} m/s {said}"
-    if walk:
-        return motion.walked(start, upward, unit, fps, count, speed), f"walk at {speed:g} m/s {said}"
-    return motion.shaken(start, unit, fps, count, seed), f"shake (seed {seed}) {said}"
-
-
-def _recorded(recording: Any, kept: Any, workers: int) -> float:
+def _recorded(recording: Recording, kept: Kept, workers: int) -> float:
     """Make the frames, with a bar; seconds that it took."""
     import time
     import warnings
@@ -246,7 +221,7 @@ def _recorded(recording: Any, kept: Any, workers: int) -> float:
     return time.monotonic() - began
 
 
-def _show(recording: Any, rows: list[dict], out: Path, seconds: float) -> None:
+def _show(recording: Recording, rows: list[dict], out: Path, seconds: float) -> None:
     """What a run prints at its end."""
     from ..motion.record import mean_of, summary_of, timing_of
     from ..scene.motion import speeds

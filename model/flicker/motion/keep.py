@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,13 @@ class Kept:
         with writing(self.folder / ROWS), (self.folder / ROWS).open("a") as file:
             file.write(json.dumps(row) + "\n")
         self.rows.append(row)
+
+    def forget(self) -> None:
+        """No frame is there: nor is anything else, then, but what a folder had before."""
+        for path in (self.folder / ABOUT, self.folder / ROWS):
+            path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self.folder.rmdir()
 
     def finish(self) -> None:
         """The result is written: frames that are no result go."""
