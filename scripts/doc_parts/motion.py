@@ -36,7 +36,7 @@ from flicker.toolchain import BUILD
 
 from .common import IMAGES, Say, folder_of_scenes, save_charts, significant
 
-SIZE, FRAMES, FPS = (640, 360), 9, 90.0
+SIZE, FRAMES, FPS = (480, 270), 6, 90.0
 MOTIONS = {
     "pan": ("pan of 0.25 pixels a frame", Asked("pan", 0.25, size=SIZE, frames=FRAMES, fps=FPS)),
     "shake": ("head shake", Asked("shake", size=SIZE, frames=FRAMES, fps=FPS)),

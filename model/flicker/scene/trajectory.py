@@ -19,7 +19,7 @@ def check_path(cameras: Sequence[Camera], where: str, what: str = "camera") -> N
     """FlickerError, naming `where` they come from, the camera and the field, unless these cameras can be a path: two at least, of one size and one lens, and with
     times that rise where there are times."""
     if len(cameras) < 2:
-        raise FlickerError(f"{where}: one {what}: a path needs two at least, or a motion (--pan, --orbit, --dolly, --walk, --shake)")
+        raise FlickerError(f"{where}: {'one' if cameras else 'no'} {what}: a path needs two at least, or a motion (--pan, --orbit, --dolly, --walk, --shake)")
     first = cameras[0]
     for n, camera in enumerate(cameras[1:], 1):
         for key in ("width", "height"):
