@@ -31,7 +31,7 @@ from flicker.report.figures import Figure
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS, RealView
 from flicker.scene.sources import Source, open_scene
-from flicker.scene.temporal import Change, TemporalError, TemporalSummary, decibels, summarise
+from flicker.scene.temporal import Change, TemporalError, TemporalSummary, summarise
 from flicker.toolchain import BUILD
 
 from .common import IMAGES, Say, folder_of_scenes, save_charts, significant
@@ -47,6 +47,7 @@ CHIPS = {
     "chip, `chunk`": Drawing(Engine.CHIP_GOLDEN, RECOMMENDED, options=FrontOptions(PackedFormat.CHUNK)),
     "chip, `fp16-local`": Drawing(Engine.CHIP_GOLDEN, RECOMMENDED, options=FrontOptions(PackedFormat.FP16_LOCAL)),
 }
+TIMED = "pan"
 HEADSETS = (72.0, 90.0, 120.0)  # Hz
 CLOCK = 1e9
 STRIP, CROP, ENLARGED = 6, 40, 3  # frames of the strip, pixels of a side, times
@@ -59,12 +60,12 @@ def _plain(summary: TemporalSummary, cycles: Sequence[int]) -> dict:
 
 def _sequence(source: Source, asked: Asked, names: Sequence[str], say: Say, title: str) -> dict[str, dict]:
     """Figures of configurations and chips along a path, by name; cycles of the stage, of a chip from frame to frame, of the first
-    and the last frame."""
+    and the last frame of the motion `TIMED`; they hardly depend on the motion."""
     cameras, _ = path_of(source, asked)
     errors = {name: TemporalError() for name in (*names, *CHIPS)}
     changes: dict[str, list[Change]] = {name: [] for name in errors}
     cycles: dict[str, list[int]] = {name: [] for name in errors}
-    counted = (0, len(cameras) - 1)
+    counted = (0, len(cameras) - 1) if asked.kind == TIMED else ()
     for n, camera in enumerate(cameras):
         say(f"{title}: frame {n + 1} of {len(cameras)}")
         view = View(camera, source.scene)
@@ -129,11 +130,11 @@ def stability(found: dict[str, dict[str, dict]]) -> str:
 
 
 def cycles(everything: Results) -> str:
-    """Million cycles a frame, the mean over the first and the last frames of all motions, by view."""
-    first = next(iter(everything.values()))
+    """Million cycles a frame, the mean over the first and the last frame of the pan, by view."""
+    first = everything[TIMED]
     rows = []
     for name in next(iter(first.values())):
-        cells = [significant(np.mean([np.mean(views[title][name]["cycles"]) for views in everything.values()]) / 1e6, 3) for title in first]
+        cells = [significant(float(np.mean(found[name]["cycles"])) / 1e6, 3) for found in first.values()]
         rows.append([f"`{name}`" if name not in CHIPS else name, *cells])
     return markdown.table(["configuration", *first], rows)
 
@@ -148,7 +149,8 @@ def _chart(everything: Results) -> Figure:
     rows = []
     for column, (motion, views) in enumerate(everything.items()):
         for k, name in enumerate(names):
-            points = [(np.mean(row[name]["cycles"]) / 1e6, row[name]["temporal_psnr_db"], 100 * row[name]["jumps"]) for row in views.values()]
+            counts = [float(np.mean(found[name]["cycles"])) / 1e6 for found in everything[TIMED].values()]
+            points = [(count, row[name]["temporal_psnr_db"], 100 * row[name]["jumps"]) for count, row in zip(counts, views.values())]
             style = {"marker": "o^sDvP*Xd<>"[k % 11], "linestyle": "none", "label": name, "color": f"C{k % 10}", "markersize": 5}
             axes[0, column].plot([p[0] for p in points], [p[1] for p in points], **style)
             axes[1, column].plot([p[0] for p in points], [p[2] for p in points], **style)

@@ -94,7 +94,8 @@ def test_frames_are_those_of_render() -> None:
             image = np.asarray(a) / 255.0
         view = load_view("scene.ply", n, None, "along.json", background=(0.2, 0.0, 0.4))
         assert (int(row["frame"]), int(row["visible"]), int(row["subtile_entries"])) == (n, stats["visible"], stats["subtile_pairs"])
-        assert float(row["ssim"]) == pytest.approx(ssim(image, view.reference), abs=2e-3) and float(row["flip"]) == pytest.approx(flip(image, view.reference), abs=0.01)
+        assert float(row["ssim"]) == pytest.approx(ssim(image, view.reference), abs=2e-3)
+        assert float(row["flip"]) == pytest.approx(flip(image, view.reference), abs=0.01)
         assert float(row["psnr_db"]) == pytest.approx(psnr(image, view.reference), abs=0.3)
         errors.append(image - np.clip(view.reference, 0, 1))
         if n:
@@ -391,6 +392,8 @@ def test_engine_options_of_a_text() -> None:
     chosen = parse_engine("--engine chip-golden --format fp16-local --lanes 64", "--x")
     assert (chosen.engine.value, chosen.memory.value, chosen.config.lanes, chosen.config.stage) == ("chip-golden", "fp16-local", 64, "lanes")
     assert parse_engine("", "--x").config.by_lanes and replace(parse_engine("--faithful", "--x")).faithful
-    for text, said in (("--cat", "--x: "), ("'", "--x: ''': No closing quotation"), ("a", "--x: "), ("--engine reference --lanes 32", "--x: --stage lanes: not for")):
+    for text, said in (
+        ("--cat", "--x: "), ("'", "--x: ''': No closing quotation"), ("a", "--x: "), ("--engine reference --lanes 32", "--x: --stage lanes: not for"),
+    ):
         with pytest.raises(FlickerError, match=re.escape(said)):
             parse_engine(text, "--x")

@@ -94,7 +94,8 @@ class Chosen:
         from ..scene.packed import PackedFormat
 
         options = FrontOptions(PackedFormat.FP16, ListKind.BOX, self.rechunk) if self.faithful else FrontOptions(
-            None if self.memory is None else PackedFormat(self.memory.value), ListKind.ELLIPSE if self.lists is None else ListKind(self.lists.value), self.rechunk,
+            None if self.memory is None else PackedFormat(self.memory.value), ListKind.ELLIPSE if self.lists is None else ListKind(self.lists.value),
+            self.rechunk,
         )
         dram = DramConfig() if self.refresh is None else DramConfig(refresh=Refresh(self.refresh.value))
         return Drawing(Engine(self.engine.value), self.config, Front((self.front or FrontChoice.FLOAT).value), options, dram)

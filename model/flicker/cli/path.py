@@ -52,7 +52,7 @@ def path(
     walk: Annotated[bool, typer.Option("--walk", help="forward on level ground, with a walker's head")] = False,
     shake: Annotated[bool, typer.Option("--shake", help="a head that is never still: 6 degrees of freedom, at random")] = False,
     speed: Annotated[float | None, typer.Option(help="of --dolly and --walk, m/s [default: 1.4]")] = None,
-    ahead: Annotated[float | None, typer.Option(help="metres from the first camera to what it looks at: the scale of --dolly, --walk, --shake [default: 3]")] = None,
+    ahead: Annotated[float | None, typer.Option(help="metres from the first camera to what it looks at, for --dolly, --walk, --shake [default: 3]")] = None,
     seed: Annotated[int | None, typer.Option(help="of --shake [default: 1]")] = None,
     frames: Annotated[int | None, typer.Option(help="number of frames [default: all cameras; a second; a second from keyframe to keyframe]", min=1)] = None,
     fps: Annotated[float, typer.Option(help="frames a second")] = 90.0,
@@ -73,7 +73,8 @@ def path(
     resume: Annotated[bool, typer.Option("--resume", help="go on with the frames that are there")] = False,
 ) -> None:
     """Render a camera path to a video, with figures of every frame and over time."""
-    made = [name for name, given in (("--pan", pan is not None), ("--orbit", orbit is not None), ("--dolly", dolly), ("--walk", walk), ("--shake", shake)) if given]
+    motions = {"--pan": pan is not None, "--orbit": orbit is not None, "--dolly": dolly, "--walk": walk, "--shake": shake}
+    made = [name for name, given in motions.items() if given]
     if len(made) > 1:
         raise FlickerError(f"{', '.join(made)}: one motion makes a path")
     if made and keyframes:
@@ -136,7 +137,9 @@ def path(
 
         write_text(save_cameras, cameras_text([replace(camera, timestamp=n / fps) for n, camera in enumerate(along)]))
     kept = keep.Kept(folder, not video)
-    settings = {"drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles]}
+    settings = {
+        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles],
+    }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
         printed(said)
     printed(f"{source.file or scene}: {what}, {len(along)} frames of {along[0].width}x{along[0].height} at {fps:g} frames a second")

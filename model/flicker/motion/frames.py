@@ -33,8 +33,8 @@ AHEAD = 2  # frames that wait for their turn, for each process
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference. cycles:
-    what the frame costs on the chip, by its models."""
+    """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference.
+    cycles: what the frame costs on the chip, by its models."""
 
     drawing: Drawing
     beside: Drawing | None = None
@@ -101,7 +101,7 @@ def _begin(scene: str | Path, wanted: Wanted, threads: int) -> None:
 
     global _SCENE, _WANTED
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, numba.get_num_threads()))
     warnings.simplefilter("ignore")  # said where the scene was opened first
     _SCENE, _WANTED = read_scene(scene), wanted
 

@@ -54,8 +54,8 @@ class Kept:
         return [self.picture(n) for n in range(len(self.rows))]
 
     def begin(self, told: dict[str, Any], resume: bool) -> str | None:
-        """Take up what is there, or begin anew; a line for people where frames of an earlier run are there. FlickerError where they are of something else, or nothing
-        can be written."""
+        """Take up what is there, or begin anew; a line for people where frames of an earlier run are there. FlickerError where they are of something else, or
+        nothing can be written."""
         there = self.folder / ABOUT
         before = sorted(self.folder.glob(f"{STEM}*.png")) if self.folder.is_dir() else []
         if before and not there.is_file():

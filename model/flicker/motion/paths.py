@@ -16,9 +16,10 @@ AHEAD_M = 3.0  # from the first camera to what it looks at, where nobody says
 
 @dataclass(frozen=True)
 class Asked:
-    """A path. kind: None: the cameras one after the other; `keyframes`, or a motion: `pan`, `orbit`, `dolly`, `walk`, `shake`. amount: pixels a frame of a pan, degrees
-    of an orbit. view: camera that a motion begins at. size: (width, height); None: as the cameras have it. frames: None: all cameras, a second from keyframe to
-    keyframe (or what their times say), a second of a motion. speed: m/s; ahead: metres to what the first camera looks at, which gives a scene its scale."""
+    """A path. kind: None: the cameras one after the other; `keyframes`, or a motion: `pan`, `orbit`, `dolly`, `walk`, `shake`. amount: pixels a frame of a
+    pan, degrees of an orbit. view: camera that a motion begins at. size: (width, height); None: as the cameras have it. frames: None: all cameras, a second
+    from keyframe to keyframe (or what their times say), a second of a motion. speed: m/s; ahead: metres to what the first camera looks at, which gives a
+    scene its scale."""
 
     kind: str | None = None
     amount: float = 0.0
@@ -32,7 +33,8 @@ class Asked:
 
 
 def path_of(source: Source, asked: Asked) -> tuple[list[Camera], str]:
-    """The cameras of a path in a scene, one of a frame, and what it is, for people. FlickerError, naming file, camera and field, for cameras that are no path."""
+    """The cameras of a path in a scene, one of a frame, and what it is, for people. FlickerError, naming file, camera and field, for cameras that are no
+    path."""
     given = [camera if asked.size is None else camera.resized(*asked.size) for camera in source.cameras]
     if asked.kind in (None, "keyframes"):
         check_path(given, source.cameras_from)

@@ -35,8 +35,8 @@ class Beside:
 
 @dataclass(frozen=True)
 class Recording:
-    """What is recorded. file: of the scene. fps: frames a second; clock: of the chip, Hz: a frame is late where it takes more cycles than clock / fps. temporal:
-    figures against the reference; title: of the first picture."""
+    """What is recorded. file: of the scene. fps: frames a second; clock: of the chip, Hz: a frame is late where it takes more cycles than clock / fps.
+    temporal: figures against the reference; title: of the first picture."""
 
     scene: Scene
     file: str | Path

@@ -1,4 +1,5 @@
-"""Videos of pictures in files, by the suffix of their name: MP4 (H.264) and WebM (VP9) with the ffmpeg that `imageio-ffmpeg` brings, GIF and WebP with Pillow."""
+"""Videos of pictures in files, by the suffix of their name: MP4 (H.264) and WebM (VP9) with the ffmpeg that `imageio-ffmpeg` brings, GIF and WebP with
+Pillow."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
@@ -48,7 +50,7 @@ def _with_pillow(out: Path, pictures: Sequence[Path], fps: float) -> None:
     suffix = out.suffix.lower()
     step = STEPS[suffix]
     first, rest = next(_opened(pictures)), _opened(pictures[1:])
-    options = {"quality": 92, "method": 2} if suffix == ".webp" else {"disposal": 1}
+    options: dict[str, Any] = {"quality": 92, "method": 2} if suffix == ".webp" else {"disposal": 1}
     # GIF's own writer joins equal frames, and then wants one duration.
     first.save(out, save_all=True, append_images=rest, duration=durations(len(pictures), fps, step), loop=0, **options)
 
@@ -72,8 +74,8 @@ def _with_ffmpeg(out: Path, pictures: Sequence[Path], fps: float) -> None:
 
 
 def write_video(out: Path, pictures: Sequence[Path], fps: float) -> None:
-    """A video of pictures of one size, one at least, put in place whole. FlickerError, naming the file, where it cannot be written; FlickerWarning where its format
-    cannot show so many frames a second."""
+    """A video of pictures of one size, one at least, put in place whole. FlickerError, naming the file, where it cannot be written; FlickerWarning where its
+    format cannot show so many frames a second."""
     suffix = out.suffix.lower()
     if suffix in STEPS and fps > 1 / STEPS[suffix]:
         say(out, f"holds a frame for {STEPS[suffix]:g} s at least: it plays at {1 / STEPS[suffix]:g} frames a second, not {fps:g}")

@@ -44,7 +44,8 @@ def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
 
 
 def cameras_text(cameras: Sequence[Camera]) -> str:
-    """The text of the file; cx, cy of cameras whose principal point is not the middle, timestamp of those that have one. A camera without photograph goes by its name."""
+    """The text of the file; cx, cy of cameras whose principal point is not the middle, timestamp of those that have one. A camera without photograph goes by
+    its name."""
     return json.dumps([
         {"id": k, "img_name": c.img_name or c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
          "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy,

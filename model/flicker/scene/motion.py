@@ -1,4 +1,5 @@
-"""Cameras of motions that are made: a pan, an orbit, a dolly, a walk, a head that shakes. Every path begins at the camera it is made of, with its lens and size.
+"""Cameras of motions that are made: a pan, an orbit, a dolly, a walk, a head that shakes. Every path begins at the camera it is made of, with its lens and
+size.
 
 Scenes have no scale. unit: what a metre is in the scene's units; the command line takes it from the distance of what the first camera looks at.
 """
@@ -52,10 +53,10 @@ def dollied(camera: Camera, speed: float, fps: float, frames: int) -> list[Camer
 
 
 def walked(camera: Camera, up: np.ndarray, unit: float, fps: float, frames: int, speed: float = WALKING) -> list[Camera]:
-    """Forward on level ground at `speed` metres a second, with the head of a walker: it bobs once a step and sways once a stride, and turns against both about a
-    point `FIXATION_M` ahead, as Hirasaki, Moore, Raphan, Cohen: "Effects of walking velocity on vertical head and body movements during locomotion", Exp Brain Res
-    127 (1999) find it. Pitch has twice the frequency of yaw (Grossman, Leigh, Abel, Lanska, Thurston: "Frequency and velocity of rotational head
-    perturbations during locomotion", Exp Brain Res 70 (1988)). Sizes of bob and sway, `BOB_M` and `SWAY_M`, are round numbers of this project.
+    """Forward on level ground at `speed` metres a second, with the head of a walker: it bobs once a step and sways once a stride, and turns against both
+    about a point `FIXATION_M` ahead, as Hirasaki, Moore, Raphan, Cohen: "Effects of walking velocity on vertical head and body movements during locomotion",
+    Exp Brain Res 127 (1999) find it. Pitch has twice the frequency of yaw (Grossman, Leigh, Abel, Lanska, Thurston: "Frequency and velocity of rotational
+    head perturbations during locomotion", Exp Brain Res 70 (1988)). Sizes of bob and sway, `BOB_M` and `SWAY_M`, are round numbers of this project.
     """
     up = np.asarray(up, np.float64) / np.linalg.norm(up)
     right, ahead = camera.rotation[:, 0], camera.rotation[:, 2]

@@ -23,8 +23,8 @@ JUMP = 8.0 / 255.0  # change of an error in one frame that counts as a jump
 
 @dataclass(frozen=True)
 class Change:
-    """A frame. mse: of the error, over pixels and channels of pictures clamped to [0, 1]. change: mean square of the error's change since the frame before; None
-    of the first frame. jumps: share of pixels of which a channel's error has changed by more than `JUMP`; None of the first frame."""
+    """A frame. mse: of the error, over pixels and channels of pictures clamped to [0, 1]. change: mean square of the error's change since the frame before;
+    None of the first frame. jumps: share of pixels of which a channel's error has changed by more than `JUMP`; None of the first frame."""
 
     mse: float
     change: float | None = None
@@ -43,8 +43,8 @@ class Change:
 
 @dataclass(frozen=True)
 class TemporalSummary:
-    """A sequence. psnr_db, temporal_psnr_db: of the mean squares over all frames, all changes. jumps: mean share of pixels. worst_frame: number of the frame whose
-    error has changed most. worst_second: number of the first of the frames of a second in which it has. None where there is no second frame."""
+    """A sequence. psnr_db, temporal_psnr_db: of the mean squares over all frames, all changes. jumps: mean share of pixels. worst_frame: number of the frame
+    whose error has changed most. worst_second: number of the first of the frames of a second in which it has. None where there is no second frame."""
 
     frames: int
     psnr_db: float

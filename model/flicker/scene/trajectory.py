@@ -16,8 +16,8 @@ _SAME = 1e-6  # relative difference of numbers of a lens that is none
 
 
 def check_path(cameras: Sequence[Camera], where: str, what: str = "camera") -> None:
-    """FlickerError, naming `where` they come from, the camera and the field, unless these cameras can be a path: two at least, of one size and one lens, and with
-    times that rise where there are times."""
+    """FlickerError, naming `where` they come from, the camera and the field, unless these cameras can be a path: two at least, of one size and one lens, and
+    with times that rise where there are times."""
     if len(cameras) < 2:
         raise FlickerError(f"{where}: {'one' if cameras else 'no'} {what}: a path needs two at least, or a motion (--pan, --orbit, --dolly, --walk, --shake)")
     first = cameras[0]
@@ -48,8 +48,8 @@ def times_of(cameras: Sequence[Camera]) -> np.ndarray | None:
 def joined(keyframes: Sequence[Camera], frames: int) -> list[Camera]:
     """Cameras of a path through keyframes, two at least: at their times, else evenly in time; the first frame is the first keyframe, the last one the last.
 
-    Positions go along natural cubic splines, rotations along quaternion splines with continuous angular rate and acceleration (`scipy`'s `RotationSpline`: Schaub,
-    Junkins, "Analytical Mechanics of Space Systems"; its rotation vectors are cubic in time between keyframes). The lens is the first one's: `check_path` first.
+    Positions go along natural cubic splines, rotations along quaternion splines with continuous angular rate and acceleration (`scipy`'s
+    `RotationSpline`: rotation vectors that are cubic in time between keyframes). The lens is the first one's: `check_path` first.
     """
     if frames < 1:
         raise FlickerError(f"frames: {frames}: one at least")

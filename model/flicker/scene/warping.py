@@ -1,5 +1,5 @@
-"""The warping error of Lai, Huang, Wang, Shechtman, Yumer, Yang: "Learning Blind Video Temporal Consistency", ECCV 2018, Sec. 4.2: a frame against the next one,
-warped back along the flow, over pixels that both see. A published witness beside `scene.temporal`, which needs no reference of the same pose.
+"""The warping error of Lai, Huang, Wang, Shechtman, Yumer, Yang: "Learning Blind Video Temporal Consistency", ECCV 2018, Sec. 4.2: a frame against the next
+one, warped back along the flow, over pixels that both see. A published witness beside `scene.temporal`, which needs no reference of the same pose.
 
 The flow is not estimated: it follows from the depth of the reference and the two cameras. A pixel counts where flow and flow back agree and no edge of a motion
 lies (Ruder, Dosovitskiy, Brox: "Artistic Style Transfer for Videos", GCPR 2016, equations 5 and 6, which Lai et al. take).
@@ -14,8 +14,8 @@ from .pinhole import Camera
 
 
 def flow(depth: np.ndarray, camera: Camera, other: Camera) -> np.ndarray:
-    """float64 (2, H, W): how far, in pixels right and down, what `camera` sees at each pixel lies from it in the picture of `other`. depth: float64 (H, W), z along
-    the axis of `camera`. NaN where there is no depth, or the point lies behind `other`."""
+    """float64 (2, H, W): how far, in pixels right and down, what `camera` sees at each pixel lies from it in the picture of `other`. depth: float64 (H, W), z
+    along the axis of `camera`. NaN where there is no depth, or the point lies behind `other`."""
     y, x = np.mgrid[: camera.height, : camera.width].astype(np.float64)
     ray = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)])
     turn = other.rotation.T @ camera.rotation
@@ -32,7 +32,8 @@ def _sampled(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def seen_by_both(there: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """bool (H, W): pixels of the first frame that the second one sees, too. there, back: flows from the first to the second and from the second to the first."""
+    """bool (H, W): pixels of the first frame that the second one sees, too. there, back: flows from the first to the second and from the second to the
+    first."""
     y, x = np.mgrid[: there.shape[1], : there.shape[2]].astype(np.float64)
     at = np.stack([x, y]) + there
     returned = np.stack([_sampled(part, at) for part in back])
@@ -44,8 +45,8 @@ def seen_by_both(there: np.ndarray, back: np.ndarray) -> np.ndarray:
 
 
 def warping_error(image: np.ndarray, following: np.ndarray, there: np.ndarray, counted: np.ndarray) -> float | None:
-    """Mean square of the difference between a picture (H, W, 3) and the one that follows, warped back along the flow `there`, over the pixels `counted` (H, W) and
-    all channels; clamped to [0, 1]. None where no pixel counts."""
+    """Mean square of the difference between a picture (H, W, 3) and the one that follows, warped back along the flow `there`, over the pixels `counted` (H,
+    W) and all channels; clamped to [0, 1]. None where no pixel counts."""
     y, x = np.mgrid[: there.shape[1], : there.shape[2]].astype(np.float64)
     at = (np.stack([x, y]) + there)[:, counted]
     if not at.size:

@@ -29,7 +29,8 @@ class Keyframes:
             self.cameras.pop()
 
     def save(self, folder: Path) -> Path:
-        """Write them as `path.json`, in the layout of `cameras.json` with times. FlickerError where they are no path, such as after a zoom that changed the lens."""
+        """Write them as `path.json`, in the layout of `cameras.json` with times. FlickerError where they are no path, such as after a zoom that changed the
+        lens."""
         path = folder / FILE
         check_path(self.cameras, path.name, "keyframe")
         try:
