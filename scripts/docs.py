@@ -105,6 +105,7 @@ PARTS = (
          scenes_missing),
     Part("stability", "where configurations break", ("",), stability.tables),
     Part("stability_front", "where front ends break: records of 16 and 32 bytes, number formats", ("records", "formats"), stability.front_tables),
+    Part("stability_moving", "what flickers at which speed of the camera", ("",), stability.moving_tables),
     Part("subnormals", "subnormal numbers flushed to zero", ("",), subnormals.tables, scenes_missing),
     Part("pictures", "pictures, work and misses of mask generators", ("work", "slots"), pictures.tables, scenes_missing),
     Part("quality", "every mode, format and form of the RTL", ("factored", "conic", "coordinates"), quality.tables, scenes_missing),
