@@ -6,6 +6,7 @@ a sequence at most. Pictures in the pages are of the demo scene.
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -109,7 +110,7 @@ def results(say: Say) -> Results:
 
 
 def _decibels(value: float | None) -> str:
-    return "equal" if value is None else f"{value:.1f}"
+    return "equal" if value is None or math.isinf(value) else f"{value:.1f}"
 
 
 def _jumps(share: float) -> str:
