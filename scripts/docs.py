@@ -137,7 +137,6 @@ PARTS = (
     Part("scale_hardware", "long lists and grown scenes in the whole chip's RTL; half an hour", ("",), scale_hardware.tables, scenes_missing),
     Part("motion", "speed against stability: what pictures do from frame to frame, with chart, strip and clip; half an hour, can be interrupted",
          ("cycles", "pan", "shake", "walk"), motion.tables, scenes_missing, before=motion.draw),
-    Part("late", "cycles of whole frames along a walk, and headsets' slots", ("",), motion.late_tables, scenes_missing),
     Part("speed", "engines timed on one frame", ("engines", "rtl", "model"), speed.tables, scenes_missing),
     Part("view", "the viewer in a headless browser: its picture, how fast it is", ("",), view.tables, view.missing, before=view.draw),
     Part("exploration", "all configurations of the report on real views, with the chart", ("explored", "halves"), exploration.tables, scenes_missing,

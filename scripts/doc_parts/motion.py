@@ -49,8 +49,6 @@ CHIPS = {
     "chip, `fp16-local`": Drawing(Engine.CHIP_GOLDEN, RECOMMENDED, options=FrontOptions(PackedFormat.FP16_LOCAL)),
 }
 TIMED = "pan"
-HEADSETS = (72.0, 90.0, 120.0)  # Hz
-CLOCK = 1e9
 STRIP, CROP, ENLARGED = 6, 40, 3  # frames of the strip, pixels of a side, times
 CLIP = (320, 180)
 
@@ -241,30 +239,3 @@ def tables(say: Say) -> dict[str, str]:
                 if row["frames"] != FRAMES:
                     raise FlickerError("motion: a stored sequence has another number of frames")
     return {"cycles": cycles(everything), **{motion: stability(found) for motion, found in everything.items()}}
-
-
-# ---- late frames --------------------------------------------------------------------------------
-
-LATE_SIZE, LATE_FRAMES = (1280, 720), 24
-
-
-def late_tables(say: Say) -> dict[str, str]:
-    """Cycles of whole frames along a walk, and the share that misses a headset's slot."""
-    from flicker.motion.record import Timing
-
-    rows = []
-    for view in REAL_VIEWS:
-        source = open_scene(view.path(folder_of_scenes()))
-        cameras, _ = path_of(source, Asked("walk", view=view.number, size=LATE_SIZE, frames=LATE_FRAMES, fps=LATE_FRAMES))
-        counts = []
-        for n, camera in enumerate(cameras):
-            say(f"{view.title}: frame {n + 1} of {len(cameras)}")
-            counts.append(frame_cost(View(camera, source.scene), CHIPS["chip, `chunk`"])["cycles"])
-        timings = {hertz: Timing.of(counts, CLOCK / hertz) for hertz in HEADSETS}
-        first = timings[HEADSETS[0]]
-        rows.append([
-            view.title, *(significant(value / 1e6, 3) for value in (first.p50, first.p99, first.worst)), *(f"{100 * t.late:.0f}" for t in timings.values()),
-            *(f"{CLOCK / hertz / first.worst:.1f}" for hertz in HEADSETS[-1:]),
-        ])
-    heads = ["view", "p50, M cycles", "p99", "worst", *(f"late at {hertz:g} Hz, %" for hertz in HEADSETS), f"slot at {HEADSETS[-1]:g} Hz / worst"]
-    return {"": markdown.table(heads, rows)}
