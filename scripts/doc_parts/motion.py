@@ -158,9 +158,9 @@ def _chart(everything: Results) -> Figure:
         axes[1, column].set_xlabel("million cycles a frame")
         axes[1, column].set_xscale("log")
         axes[1, column].set_yscale("symlog", linthresh=1e-3)
-        axes[1, column].set_ylim(bottom=0)
         for row in range(2):
             axes[row, column].grid(alpha=0.3)
+    axes[1, 0].set_ylim(0.0, 30.0)
     axes[0, 0].set_ylabel("temporal PSNR, dB")
     axes[1, 0].set_ylabel("jumps, % of the pixels a frame")
     plot.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
