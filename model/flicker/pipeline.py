@@ -162,6 +162,11 @@ def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, 
     return packed, {"position_steps": found.as_dict()}
 
 
+def golden_front(view: View, packed: PackedScene, lists: ListKind, kind: RecordKind) -> FrontFrame:
+    """`run_front` of a view and its packed scene, kept by the view: the picture and what it costs need the same."""
+    return view.keep(("front", packed.format, lists, kind), lambda: run_front(packed, view.camera, lists, kind))
+
+
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
     """Records and lists of a view by the golden model of the front end or by its RTL, and statistics of packing and of the RTL; 16-byte records for the
     factored form, 32-byte ones for the conic."""
@@ -172,7 +177,7 @@ def bit_true_front(view: View, config: RenderConfig, front: Front, options: Fron
         packed, stats = packed_for_picture(view, options)
     if front is Front.GOLDEN:
         with steps.step("preprocessing with the golden model"):
-            return run_front(packed, view.camera, options.lists, kind), stats
+            return golden_front(view, packed, options.lists, kind), stats
     with steps.step("building the front end's simulator (once for each form)"):
         build_front(kind=kind)
     with steps.step("preprocessing with the RTL"):

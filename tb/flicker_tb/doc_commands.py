@@ -63,7 +63,7 @@ def words_of(command: str) -> list[str]:
     words = []
     for word in shlex.split(command):
         name, equals, value = word.partition("=")
-        if word in PLACEHOLDERS:
+        if word in PLACEHOLDERS and not (len(words) == 1 and words[0].endswith("flicker")):  # `flicker path` is a command
             if (word := PLACEHOLDERS[word]) is None:
                 continue
         elif equals and value in PLACEHOLDERS:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from flicker_tb.command import flicker
 from PIL import Image
 
@@ -226,10 +227,10 @@ def test_demo_is_a_scene_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_out_is_o_everywhere() -> None:
     """Every option --out; of `convert` it is an argument."""
-    found = [command.name or command.callback.__name__ for command in app.registered_commands if "out" in command.callback.__annotations__]
-    for command in app.registered_commands:
-        if "typer.Option" in (kind := command.callback.__annotations__.get("out", "")):
-            assert '"-o"' in kind or "'-o'" in kind, command.callback.__name__
+    commands = typer.main.get_command(app).commands
+    found = {name: next(p for p in command.params if p.name == "out") for name, command in commands.items() if any(p.name == "out" for p in command.params)}
+    for name, parameter in found.items():
+        assert parameter.param_type_name == "argument" or "-o" in parameter.opts, name
     assert {"render", "chip", "cost", "report", "stability", "sweep", "budget", "fit", "pack", "undistort"} <= set(found)
 
 

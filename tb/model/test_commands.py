@@ -53,6 +53,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"(?:\.venv/bin/)?flicker render .*--engine (?:rtl|chip)\b(?!-).*", "slow"),
     (r"flicker (?:chip .* --.*|cost .* --size .*)", "slow"),
     (r"(?:\.venv/bin/)?flicker render .*", "run"),
+    (r"(?:\.venv/bin/)?flicker path .*", "run"),
     (r"flicker (?:chip|convert|cost|grow|pack) .*|\.venv/bin/flicker pack .*", "run"),
     (r"flicker (?:(?:report|stability) --list|--version)", "run"),
     (r"(?:\.venv/bin/)?flicker (?:fit|budget|undistort|report|stability|sweep|view)( .*)?", "slow"),
@@ -175,6 +176,7 @@ def sandbox(tmp_path_factory) -> Path:
     (here / "build" / "view").mkdir(parents=True)
     for folder in (here, here / "build" / "view"):
         (folder / "cameras.json").write_text(cameras_text(small_cameras()))
+    (here / "build" / "view" / "path.json").write_text(cameras_text(small_cameras()[:3]))
     for name in ("Makefile", "pyproject.toml", "requirements.lock", "scripts"):
         (here / name).symlink_to(ROOT / name)
     programs = here / ".venv" / "bin"
@@ -192,6 +194,7 @@ def run_in(sandbox: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> subp
     """A `flicker` command in the sandbox, in this process; the demo scene is a small one."""
     monkeypatch.chdir(sandbox)
     monkeypatch.setattr("flicker.scene.demo.generate", lambda seed=1: small_scene())
+    monkeypatch.setattr("flicker.cli.path._cores", lambda: 1)  # processes take longer to start than small pictures to make
     printed: list[object] = []
     usual = Terminal.print
 

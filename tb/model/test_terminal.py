@@ -48,6 +48,7 @@ LIGHT = (
 # These look at what is there.
 NO_FILE = (
     ["render", "none.ply"], ["cost", "none.ply"], ["chip", "none.ply"], ["view", "none.ply"], ["pack", "none.ply", "-o", "x.flk"],
+    ["path", "none.ply", "-o", "x.mp4", "--walk"],
     ["convert", "none.ply", "x.ply"], ["report", "none.ply:3"],
     ["budget", "none.ply", "-o", "x.ply", "--keep", "0.4"], ["sweep", "none.yaml"], ["stability", "--out", "/proc/none"],
 )

@@ -10,10 +10,12 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 import socket
 import threading
 import time
 from dataclasses import replace
+from unittest.mock import MagicMock
 
 import browser
 import numpy as np
@@ -23,6 +25,7 @@ from flicker_tb.runner import seed
 from PIL import Image
 
 from flicker.errors import FlickerError
+from flicker.front.ahead import common_up, target
 from flicker.front.lists import subtile_lists
 from flicker.front.view import View
 from flicker.params import CHANNELS, CORES, FAITHFUL, RECOMMENDED, CatMode, Form, RenderConfig
@@ -31,11 +34,12 @@ from flicker.scene.camera import Camera, load_cameras, orbit_camera
 from flicker.scene.files import Scene, save_ply
 from flicker.scene.image import save_png
 from flicker.scene.metrics import flip
+from flicker.scene.trajectory import check_path, joined
 from flicker.view import server
 from flicker.view.frames import Choice, Renderer, Shot, composed, largest
 from flicker.view.overlays import OVERLAYS, by_tile, imbalance_map, tile_cycles, tile_entries, visited_map
 from flicker.view.pace import COARSEST, Pace
-from flicker.view.pose import Pose, close, common_up, target, upright
+from flicker.view.pose import Pose, close, upright
 from flicker.view.stills import save
 
 SIZE = (160, 96)  # whole tiles
@@ -268,6 +272,54 @@ def test_stills(view, cameras, tmp_path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FlickerError, match="file"):
         save(tmp_path / "file", Image.new("RGB", SIZE), view.camera)
+
+
+class Controls:
+    """The controls of a browser without a browser: buttons that can be pressed, everything else is there and does nothing."""
+
+    def __init__(self) -> None:
+        self.client = MagicMock()
+        self.buttons: dict[str, list] = {}
+        self.client.gui.add_button.side_effect = self._button
+        self.client.gui.add_number.side_effect = lambda label, value, **_: MagicMock(value=value)
+        self.client.gui.add_checkbox.side_effect = lambda label, value, **_: MagicMock(value=value)
+        self.client.gui.add_dropdown.side_effect = lambda label, options, initial_value=None, **_: MagicMock(value=initial_value or options[0])
+
+    def _button(self, label: str) -> MagicMock:
+        button = MagicMock()
+        button.on_click.side_effect = self.buttons.setdefault(label, []).append
+        return button
+
+    def press(self, label: str) -> None:
+        for callback in self.buttons[label]:
+            callback(None)
+
+
+def test_keyframes(view, cameras, tmp_path) -> None:
+    """Recorded, one taken back, saved as a path that `flicker path` joins; a changed lens and a single keyframe are no path."""
+    viewer = server.Viewer(view, cameras, tmp_path / "new", port=0)
+    try:
+        page = Controls()
+        session = server.Session(viewer, page.client)
+        page.press("save path")
+        assert session.path_said.content.startswith("**path.json: no keyframe: a path needs two at least")
+        for k, (camera, seconds) in enumerate(zip((*cameras, cameras[0]), (1.0, 2.5, 0.5, 9.0))):
+            session.camera, session.seconds.value = camera.resized(64, 48), seconds
+            page.press("add keyframe")
+            if k == 2:
+                page.press("remove last keyframe")
+        page.press("save path")
+    finally:
+        viewer.stop()
+    file = tmp_path / "new" / "path.json"
+    assert session.path_said.content == f"3 keyframes, 11.5 s, saved as {file}"
+    found = load_cameras(file)
+    assert [c.timestamp for c in found] == [0.0, 2.5, 11.5] and np.allclose(found[1].position, cameras[1].position)
+    check_path(found, "path.json")
+    assert np.allclose(joined(found, 24)[5].position, cameras[1].position)
+    session.keyframe(session.keyframes.add, replace(found[0], fx=1.1 * found[0].fx), 1.0)
+    session.save_path()
+    assert re.match(r"\*\*path.json: keyframe 3: fx: .* a path has one lens\*\*", session.path_said.content)
 
 
 def test_boxed() -> None:

@@ -24,12 +24,13 @@ from ..golden.front.frame import FrontFrame, ListKind, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import MEAN_FRACTION
-from ..params import CHIP_MEMORIES, TILE, Form, RenderConfig
+from ..params import CHIP_MEMORIES, TILE, ChipMemories, Coords, Form, RenderConfig
 from ..perf.render_stage import StageCycles
-from ..pipeline import packed_scene
+from ..pipeline import Engine, Front, FrontOptions, golden_front, packed_scene
 from ..scene.packed import PackedFormat
 from . import preprocessing, rendering
 from .dram import DramConfig
+from .drawing import Drawing
 from .execute import SchemeResult
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate
 from .tile_lists import TileLists
@@ -75,6 +76,34 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
+def _first_half(front: FrontFrame, sizes: ChipMemories, dram: DramConfig, sorter: bool = True) -> tuple[preprocessing.Preprocessing, TileLists]:
+    """Preprocessing of a frame, and the lists that it leaves. sorter: False: for an ideal one, which costs the bytes of one reading and no time."""
+    image = front_memory(front)
+    tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
+    return preprocessing.estimate(front, image, dram, sizes), tables
+
+
+def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
+    """What a frame takes on the chip around the stage of a drawing: `cycles` from frame to frame while the front end works on the next one, `latency_cycles`
+    of a frame alone, `front_cycles`, `render_cycles`, and bytes by purpose, `bytes_geometry` and so on. The front end is the drawing's, of one in float64
+    that of `FRONTS`. FlickerError for what no chip can have."""
+    config = drawing.config
+    if config.coords is Coords.ABSOLUTE:
+        raise FlickerError("coords absolute: the chip has no such records, so no cycles")
+    if drawing.engine is Engine.REFERENCE:
+        raise FlickerError("engine reference: is no machine, so it has no cycles")
+    options = drawing.options
+    if not drawing.engine.whole and drawing.front is Front.FLOAT:
+        options = FrontOptions(*FRONTS[config.form])
+    packed = packed_scene(view, options.format, options.rechunk)
+    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config.chip_memories, drawing.dram)
+    found = whole_frame(first, rendering.estimate(tables, config, drawing.dram), drawing.dram)
+    return {
+        "cycles": found.interval, "latency_cycles": found.latency, "front_cycles": found.front.cycles, "render_cycles": found.back.cycles,
+        **{f"bytes_{purpose}": count for purpose, count in found.bytes.items()},
+    }
+
+
 def own_sorter(configuration: Configuration) -> bool:
     """Whether a configuration is a rival, whose lists an ideal sorter sorts: GSCore, and stages of channels without a contribution test."""
     stage = chip_stage(configuration)
@@ -98,9 +127,7 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
             format_, lists = FRONTS[configuration.form]
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
             front = by_oriented_boxes(front) if key[1] else front
-            image = front_memory(front)
-            tables = TileLists.of(front, image, None if key[2] else sizes.sorted_entries, sizes.merge_lines)
-            fronts[key] = preprocessing.estimate(front, image, dram, sizes), tables
+            fronts[key] = _first_half(front, sizes, dram, not key[2])
         first, tables = fronts[key]
         frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
         facts[name] = {

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from ..errors import FlickerError
 from ..output import json_text, write_text
+from .engine import FormatChoice
 from .kept import Checkpoint, checkpoint_path, measuring
 from .options import RichSteps, check_apart, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
-from .render import FormatChoice
 from .tables import decibels
 
 ScoreChoice = Enum("ScoreChoice", {"CHANGE": "change", "WEIGHT": "weight", "PEAK": "peak"}, type=str)

@@ -9,8 +9,8 @@ import typer
 from rich.table import Table
 
 from ..output import json_text, write_text
+from .engine import FormatChoice
 from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
-from .render import FormatChoice
 
 
 def _picture(cost, number: int, out: Path) -> None:

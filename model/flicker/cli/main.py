@@ -17,6 +17,7 @@ from .cost import cost
 from .fit import fit
 from .grow import grow
 from .pack import pack
+from .path import path
 from .render import demo, render
 from .report import report
 from .stability import stability
@@ -26,7 +27,7 @@ from .view import view
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Render 3D Gaussian Splatting scenes with the FLICKER hardware, its golden model or the float64 reference.")
-for command in (render, demo, view, convert, grow, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
+for command in (render, path, demo, view, convert, grow, pack, chip, cost, fit, undistort, budget, report, stability, sweep):
     app.command()(command)
 
 

@@ -12,21 +12,9 @@ from rich.text import Text
 
 from ..errors import FlickerError, Interrupted
 from ..output import folder_atomically, json_text, write_text
-from ..params import (
-    CHIP_MEMORIES,
-    FAITHFUL,
-    LANE_COUNTS,
-    MAX_FIFO_DEPTH,
-    MAX_LANE_ENTRIES,
-    RECOMMENDED,
-    STAGES,
-    CatMode,
-    Coords,
-    Form,
-    Precision,
-    RenderConfig,
-)
+from ..params import RECOMMENDED
 from ..progress import Steps
+from .engine import Chosen, takes_engine
 from .options import (
     BACKGROUND_HELP,
     CAMERAS_HELP,
@@ -45,37 +33,6 @@ from .options import (
 from .pictures import Files, check_distinct, write_pictures
 from .tables import decibels
 
-
-def _choices(enum: type) -> type[Enum]:
-    """Lower-case string choices of an integer enum."""
-    return Enum(enum.__name__ + "Choice", {m.name: m.name.lower() for m in enum}, type=str)  # type: ignore[return-value]
-
-
-def _word(value: object) -> str:
-    """A configuration's value as the command line writes it."""
-    return value.name.lower() if isinstance(value, Enum) else str(value)
-
-
-def _default(field: str) -> str:
-    return _word(getattr(RenderConfig(), field))
-
-
-def _faithful() -> str:
-    words = [_word(getattr(FAITHFUL, name)) for name in ("form", "precision", "cat")]
-    return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
-
-
-CatChoice = _choices(CatMode)
-FormChoice = _choices(Form)
-PrecisionChoice = _choices(Precision)
-CoordsChoice = _choices(Coords)
-EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl", "CHIP_GOLDEN": "chip-golden", "CHIP": "chip"}, type=str)
-FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
-FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
-ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
-StageChoice = Enum("StageChoice", {name.upper(): name for name in STAGES}, type=str)  # type: ignore[misc]
-MemoriesChoice = Enum("MemoriesChoice", {name.upper(): name for name in CHIP_MEMORIES}, type=str)  # type: ignore[misc]
-RefreshChoice = Enum("RefreshChoice", {"ALL_BANKS": "all-banks", "PER_BANK": "per-bank"}, type=str)
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
 
 
@@ -145,54 +102,18 @@ def summary(stats: dict, picture: Path | None) -> Table:
     return table
 
 
-def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str, object]) -> str:
-    """The stage that the options mean; raises where they contradict each other. given: options by name, None: not given."""
-    of_channels = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
-    if given["form"] is FormChoice["CONIC"]:
-        of_channels.append("--form conic")
-    if stage is None:
-        stage = StageChoice.CHANNELS if lanes is None and (of_channels or engine is EngineChoice.REFERENCE) else StageChoice(RECOMMENDED.stage)
-    if stage is not StageChoice.LANES:
-        if lanes is not None:
-            raise FlickerError("--lanes: for --stage lanes only")
-    elif engine is EngineChoice.REFERENCE:
-        raise FlickerError("--stage lanes: not for --engine reference, which has no stage")
-    elif of_channels:
-        raise FlickerError(f"--stage lanes: takes records of 16 bytes and has no contribution test, so it cannot be combined with {', '.join(of_channels)}")
-    return stage.value
-
-
+@takes_engine
 def render(
     scene: Annotated[Path, typer.Argument(
         help=".ply, .spz, .sog, .zip, .glb, .gltf, .ksplat, .splat, .flk; a SOG folder or its meta.json; a trainer's output folder; demo",
     )],
+    *,
     cameras: Annotated[Path | None, typer.Option(help=CAMERAS_HELP)] = None,
     view: Annotated[str, typer.Option(help="number of the camera, or all: --out and others are folders then, or names with %03d; --stats is a list")] = "0",
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
-    engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
-    front: Annotated[FrontChoice | None, typer.Option(
-        help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
-    )] = None,
-    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
-    rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own, not for --front float")] = False,
-    lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
-    stage: Annotated[StageChoice | None, typer.Option(
-        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
-             f"[default: {RECOMMENDED.stage}, but channels with an option that only they have]",
-    )] = None,
-    lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
-    cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
-    precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
-    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU, and of the chip's records [default: {_default('form')}]")] = None,
-    fifo_depth: Annotated[int | None, typer.Option(
-        help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
-    )] = None,
-    memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
-    refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
-    coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
-    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
+    chosen: Chosen,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture (.png)")] = None,
     depth: Annotated[Path | None, typer.Option(
@@ -202,59 +123,23 @@ def render(
     stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
 ) -> None:
     """Render one view of a scene, or all."""
-    given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
-    chosen: dict[str, object] = {"format": memory, "lists": lists, "rechunk": rechunk or None}
-    whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
-    if whole and front is not None:
-        raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
-    if engine is not EngineChoice.CHIP:
-        for option, value in (("--memories", memories), ("--refresh", refresh)):
-            if value is not None:
-                raise FlickerError(f"{option}: for --engine chip only")
-    if not whole and front in (None, FrontChoice.FLOAT):
-        if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
-            raise FlickerError(f"{names}: for --front golden and rtl only")
-    else:
-        given |= {k: v for k, v in chosen.items() if k != "rechunk"}
-    if faithful and any(v is not None for v in given.values()):
-        names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
-        raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
-    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
-    base = FAITHFUL if faithful else RenderConfig()
-    config = base.with_(
-        cat=CatMode[cat.name] if cat else base.cat,
-        precision=Precision[precision.name] if precision else base.precision,
-        form=Form[form.name] if form else base.form,
-        fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
-        coords=Coords[coords.name],
-        stage=_stage(stage, engine, lanes, of_stage),
-        lanes=base.lanes if lanes is None else lanes,
-        memories=base.memories if memories is None else memories.value,
-    )
     number = parse_view(view)
     results = [Files(option, path, number is None) for option, path in (("--out", out), ("--depth", depth), ("--alpha", alpha))]
     check_distinct(results)
     writable(stats, "--stats")
-    if alpha is not None and whole:
-        raise FlickerError(f"--alpha: not with --engine {engine.value}, whose frame buffer has none; --engine golden has that of the same stage")
+    if alpha is not None and chosen.whole:
+        raise FlickerError(f"--alpha: not with --engine {chosen.engine.value}, whose frame buffer has none; --engine golden has that of the same stage")
     wanted, behind = parse_size(size), background_of(background)
     check_scene(scene)
     check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
-        from ..chip.dram import DramConfig, Refresh
-        from ..chip.run import render_on_chip
         from ..front.unseen import advice, unseen
         from ..front.view import view_of
-        from ..golden.front.frame import ListKind
-        from ..pipeline import Engine, Front, FrontOptions, render_view
         from ..scene.camera import select_view
         from ..scene.files import scene_title
-        from ..scene.packed import PackedFormat
         from ..scene.sources import open_scene
-    options = FrontOptions(PackedFormat.FP16, ListKind.BOX, rechunk) if faithful else FrontOptions(
-        None if memory is None else PackedFormat(memory.value), ListKind.ELLIPSE if lists is None else ListKind(lists.value), rechunk,
-    )
+        drawing = chosen.drawing()
     with steps.step(f"loading {scene_title(scene)}"):
         source = open_scene(scene, cameras, up)
         select_view(source.cameras, number or 0)
@@ -262,14 +147,7 @@ def render(
     def one(k: int, told: Steps) -> dict:
         """Render and write a view: its statistics."""
         loaded = view_of(source, k, wanted, behind)
-        if whole:
-            dram = DramConfig() if refresh is None else DramConfig(refresh=Refresh(refresh.value))
-            result = render_on_chip(loaded, Engine(engine.value), config=config, options=options, dram=dram, compare=compare is not None, steps=told)
-        else:
-            result = render_view(
-                loaded, engine=Engine(engine.value), config=config, front=Front((front or FrontChoice.FLOAT).value), options=options,
-                compare=compare is not None, alpha=alpha is not None, steps=told,
-            )
+        result = drawing.render(loaded, compare=compare is not None, alpha=alpha is not None, steps=told)
         found = result.stats | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
         empty = unseen(loaded, result.image, found.get("visible"))
         return found if empty is None else found | {"unseen": empty, "advice": advice(empty, source.cameras_from, len(source.cameras))}

@@ -68,6 +68,11 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "vanilla*", "no-ctu-32*", "gscore*", "seele*", "faithful", "flicker", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*",
         "rows", "rows-f*", "rows-ellipse-acc*", "log-lanes", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
     ),
+    # docs/motion.md: every mode of FLICKER, GSCore's test, none, lanes
+    "stability in time": (
+        "gscore", "no-ctu-32", "faithful", "flicker", "flicker-dense-fixed-factored", "flicker-sparse-fixed-factored", "flicker-spiky-fixed-factored",
+        "flicker-auto-fixed-factored", "flicker-dense-fp16-factored", "log-lanes", "log-lanes-128",
+    ),
     "stability, quick": (
         "vanilla", "no-ctu-32", "no-ctu-32-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-e4m3", "exact",
         "exact-fp16-conic-bound", "rows", "rows-f6a6", "oracle",

@@ -1,7 +1,7 @@
-"""`cameras.json` of the INRIA code: a list of objects with img_name, width, height, position, rotation, fx, fy; here also cx, cy.
+"""`cameras.json` of the INRIA code: a list of objects with img_name, width, height, position, rotation, fx, fy; here also cx, cy, timestamp.
 
 `position` is the camera's centre in the world, `rotation` camera to world, rows of a matrix with columns right, down, forward. `cx`, `cy`: the principal
-point in pixels from the picture's corner, as COLMAP counts; without them the middle.
+point in pixels from the picture's corner, as COLMAP counts; without them the middle. `timestamp`: seconds, of cameras of a path.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FlickerError, say
-from .fields import numbers
+from .fields import numbers, timestamp_of
 from .lens import foreign_note, said_fault
 from .pinhole import Camera
 
@@ -34,7 +34,8 @@ def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
             if (fault := said_fault(entry)) is not None:
                 raise FlickerError(fault)
             centre: dict[str, Any] = {key: float(numbers(entry[key], key, ())) - 0.5 for key in ("cx", "cy") if entry.get(key) is not None}
-            cameras.append(Camera(**{key: entry[key] for key in _KEYS}, name=img_name or str(i), img_name=img_name, **centre))
+            own = {key: entry[key] for key in _KEYS} | {"timestamp": timestamp_of(entry)}
+            cameras.append(Camera(**own, name=img_name or str(i), img_name=img_name, **centre))
         except FlickerError as error:
             raise FlickerError(f"{where}: {error}") from None
     for note in dict.fromkeys(note for entry in entries if (note := foreign_note(entry)) is not None):
@@ -43,10 +44,11 @@ def cameras_of(path: Path, entries: list[Any]) -> list[Camera]:
 
 
 def cameras_text(cameras: Sequence[Camera]) -> str:
-    """The text of the file; cx, cy of cameras whose principal point is not the middle. A camera without photograph goes by its name."""
+    """The text of the file; cx, cy of cameras whose principal point is not the middle, timestamp of those that have one. A camera without photograph goes by
+    its name."""
     return json.dumps([
         {"id": k, "img_name": c.img_name or c.name, "width": c.width, "height": c.height, "position": c.position.tolist(),
          "rotation": c.rotation.tolist(), "fx": c.fx, "fy": c.fy,
-         **({} if c.centred else {"cx": c.cx + 0.5, "cy": c.cy + 0.5})}
+         **({} if c.centred else {"cx": c.cx + 0.5, "cy": c.cy + 0.5}), **({} if c.timestamp is None else {"timestamp": c.timestamp})}
         for k, c in enumerate(cameras)
     ], indent=1) + "\n"

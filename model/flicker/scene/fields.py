@@ -42,6 +42,12 @@ def numbers(value: Any, key: str, shape: tuple[int, ...]) -> np.ndarray:
     return array
 
 
+def timestamp_of(entry: Mapping[str, Any]) -> float | None:
+    """`timestamp` of a camera, seconds; None where it has none, or one that is no number, such as a date. FlickerError for a number that is not finite."""
+    value = entry.get("timestamp")
+    return float(numbers(value, "timestamp", ())) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
+
+
 def truth(data: Mapping[str, Any], key: str) -> bool:
     """Whether a key of a JSON object is true; "false" and the like are not, as texts too. FlickerError for what is neither."""
     value = data.get(key)

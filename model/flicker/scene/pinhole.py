@@ -25,6 +25,7 @@ class Camera:
     rotation: float64 (3, 3), camera to world, columns right, down, forward.
     name: for people. img_name: name of its photograph; None: it has none.
     cx, cy: principal point in pixels, pixel centres on integers; None: the middle of the picture.
+    timestamp: seconds, of a camera that stands somewhere in time; None: nobody says.
     Raises FlickerError, naming the field, when a value makes no camera.
     """
 
@@ -38,6 +39,7 @@ class Camera:
     img_name: str | None = None
     cx: float = None  # type: ignore[assignment]  # None becomes the middle
     cy: float = None  # type: ignore[assignment]
+    timestamp: float | None = None
 
     def __post_init__(self) -> None:
         for key in ("width", "height"):
@@ -53,6 +55,8 @@ class Camera:
         for key, side in (("cx", self.width), ("cy", self.height)):
             given = getattr(self, key)
             object.__setattr__(self, key, 0.5 * (side - 1) if given is None else float(numbers(given, key, ())))
+        if self.timestamp is not None:
+            object.__setattr__(self, "timestamp", float(numbers(self.timestamp, "timestamp", ())))
         object.__setattr__(self, "position", numbers(self.position, "position", (3,)))
         rotation = numbers(self.rotation, "rotation", (3, 3))
         if np.abs(rotation).max() > 2 or np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:

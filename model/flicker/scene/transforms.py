@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FlickerError, FlickerWarning, one_line, say
-from .fields import numbers, read_json, renamed
+from .fields import numbers, read_json, renamed, timestamp_of
 from .image import picture_size
 from .lens import COEFFICIENTS, foreign_note, said_fault
 from .photos import SUFFIXES
@@ -184,6 +184,7 @@ def cameras_of(path: Path, data: Any) -> list[Camera]:
             name = photo_name(frame.name) if frame.name else None
             found.append(Camera(
                 w, h, fx, fy, position, rotation, PurePosixPath(name).stem if name else str(n), name or None, cx=cx, cy=cy,  # type: ignore[arg-type]
+                timestamp=timestamp_of(frame.data),
             ))
         except FlickerError as error:
             raise FlickerError(f"{frame.where}: {renamed(error, _NAMES)}") from None

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..front.projection import Projected
 from ..scene.camera import Camera
 
 
@@ -43,23 +41,8 @@ def close(a: Camera, b: Camera) -> bool:
     )
 
 
-def common_up(cameras: Sequence[Camera]) -> np.ndarray:
-    """float64 (3,): the direction in the world that cameras hold upright, their mean; the first one's own where they cancel."""
-    mean = -np.mean([c.rotation[:, 1] for c in cameras], axis=0)
-    length = float(np.linalg.norm(mean))
-    return mean / length if length > 1e-3 else -cameras[0].rotation[:, 1]
-
-
 def upright(camera: Camera, up: np.ndarray) -> np.ndarray:
     """float64 (3,): the direction nearest to `up` under which a camera that looks where this one does has its rotation, roll included."""
     right, own = camera.rotation[:, 0], -camera.rotation[:, 1]
     flat = up - (up @ right) * right
     return flat / np.linalg.norm(flat) if flat @ own > 0.05 else own
-
-
-def target(camera: Camera, projected: Projected) -> np.ndarray:
-    """float64 (3,): the point ahead that is orbited, as far as the middle one of the Gaussians about the principal point."""
-    size = np.array([camera.width, camera.height])
-    middle = (np.abs(projected.mean - (camera.cx, camera.cy)) < size / 4).all(axis=1) & (projected.opacity > 0.5)
-    depth = projected.depth[middle] if middle.any() else projected.depth
-    return camera.position + camera.rotation[:, 2] * (float(np.median(depth)) if len(depth) else 1.0)

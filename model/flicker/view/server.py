@@ -20,14 +20,16 @@ from PIL import Image
 
 from .. import markdown
 from ..errors import FlickerError
+from ..front.ahead import common_up, target
 from ..front.view import View
 from ..params import LANE_COUNTS, RECOMMENDED, CatMode, Form, Precision, RenderConfig
 from ..pipeline import Engine
 from ..scene.camera import Camera
 from .frames import OPACITY, SIMULATED, Choice, Frame, Renderer, camera_key, composed
+from .keyframes import Keyframes
 from .overlays import OVERLAYS
 from .pace import Pace
-from .pose import Pose, close, common_up, target, upright
+from .pose import Pose, close, upright
 from .simulate import Simulation
 from .stills import save
 
@@ -113,6 +115,7 @@ class Session:
         self.more: Iterator[None] | None = None
         self.more_at = 0.0
         self.tasks: list[Callable[[], None]] = []
+        self.keyframes = Keyframes()
         self.corner, self.whole = (0, 0), viewer.size
         self.sent: list[tuple[float, int]] = []
         self._controls()
@@ -136,6 +139,12 @@ class Session:
             go = gui.add_button("go to view")
             still = gui.add_button("save picture and camera")
             self.saved = gui.add_markdown("")
+        with gui.add_folder("camera path", expand_by_default=False):
+            self.seconds = gui.add_number("seconds from the last keyframe", 1.0, min=0.1, max=600.0, step=0.1)
+            add = gui.add_button("add keyframe")
+            remove = gui.add_button("remove last keyframe")
+            keep = gui.add_button("save path")
+            self.path_said = gui.add_markdown(str(self.keyframes))
         with gui.add_folder("simulate this view", expand_by_default=False):
             simulate = {engine: gui.add_button(name) for engine, name in SIMULATED.items()}
             stop = gui.add_button("stop")
@@ -147,6 +156,9 @@ class Session:
         self.number.on_update(lambda _: self.go(viewer.cameras[int(self.number.value)]))
         go.on_click(lambda _: self.go(viewer.cameras[int(self.number.value)]))
         still.on_click(lambda _: self.later(self.save))
+        add.on_click(lambda _: self.keyframe(self.keyframes.add, self.camera, float(self.seconds.value)))
+        remove.on_click(lambda _: self.keyframe(self.keyframes.remove))
+        keep.on_click(lambda _: self.save_path())
         for engine, button in simulate.items():
             button.on_click(partial(self.simulate, engine))
         stop.on_click(lambda _: viewer.stop_simulation())
@@ -205,6 +217,18 @@ class Session:
             at.position = camera.position
             at.look_at = target(camera, projected)
             at.up_direction = upright(camera, self.viewer.up)
+
+    def keyframe(self, change: Callable[..., None], *of: Any) -> None:
+        """Add or remove a keyframe, and say how many there are."""
+        change(*of)
+        self.path_said.content = str(self.keyframes)
+
+    def save_path(self) -> None:
+        try:
+            path = self.keyframes.save(self.viewer.folder)
+            self.path_said.content = f"{self.keyframes}, saved as {path}"
+        except FlickerError as error:
+            self.path_said.content = f"**{error}**"
 
     def simulate(self, engine: Engine, _: Any) -> None:
         self.viewer.simulate(engine, self.camera, self.a.choice.config)

@@ -1,0 +1,209 @@
+"""The options that say what draws: engine, front end, stage, configuration. One place for every command that renders.
+
+A command takes them all with `takes_engine` in the place of a parameter `chosen`; `parse_engine` reads the same options from one text.
+"""
+
+from __future__ import annotations
+
+import inspect
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import wraps
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import FlickerError
+from ..params import (
+    CHIP_MEMORIES,
+    FAITHFUL,
+    LANE_COUNTS,
+    MAX_FIFO_DEPTH,
+    MAX_LANE_ENTRIES,
+    RECOMMENDED,
+    STAGES,
+    CatMode,
+    Coords,
+    Form,
+    Precision,
+    RenderConfig,
+)
+
+if TYPE_CHECKING:
+    from ..chip.drawing import Drawing
+
+
+def _choices(enum: type) -> type[Enum]:
+    """Lower-case string choices of an integer enum."""
+    return Enum(enum.__name__ + "Choice", {m.name: m.name.lower() for m in enum}, type=str)  # type: ignore[return-value]
+
+
+def _word(value: object) -> str:
+    """A configuration's value as the command line writes it."""
+    return value.name.lower() if isinstance(value, Enum) else str(value)
+
+
+def _default(field: str) -> str:
+    return _word(getattr(RenderConfig(), field))
+
+
+def _faithful() -> str:
+    words = [_word(getattr(FAITHFUL, name)) for name in ("form", "precision", "cat")]
+    return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
+
+
+CatChoice = _choices(CatMode)
+FormChoice = _choices(Form)
+PrecisionChoice = _choices(Precision)
+CoordsChoice = _choices(Coords)
+EngineChoice = Enum("EngineChoice", {"REFERENCE": "reference", "GOLDEN": "golden", "RTL": "rtl", "CHIP_GOLDEN": "chip-golden", "CHIP": "chip"}, type=str)
+FrontChoice = Enum("FrontChoice", {"FLOAT": "float", "GOLDEN": "golden", "RTL": "rtl"}, type=str)
+FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
+ListsChoice = Enum("ListsChoice", {"ELLIPSE": "ellipse", "BOX": "box"}, type=str)
+StageChoice = Enum("StageChoice", {name.upper(): name for name in STAGES}, type=str)  # type: ignore[misc]
+MemoriesChoice = Enum("MemoriesChoice", {name.upper(): name for name in CHIP_MEMORIES}, type=str)  # type: ignore[misc]
+RefreshChoice = Enum("RefreshChoice", {"ALL_BANKS": "all-banks", "PER_BANK": "per-bank"}, type=str)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What the options mean, before anything heavy is imported; values of options as they are given, None: not given."""
+
+    engine: EngineChoice
+    config: RenderConfig
+    front: FrontChoice | None = None
+    memory: FormatChoice | None = None
+    lists: ListsChoice | None = None
+    rechunk: bool = False
+    refresh: RefreshChoice | None = None
+    faithful: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """The engine is a whole chip."""
+        return self.engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
+
+    def drawing(self) -> Drawing:
+        """What renders a view so. Imports the engines."""
+        from ..chip.dram import DramConfig, Refresh
+        from ..chip.drawing import Drawing
+        from ..golden.front.frame import ListKind
+        from ..pipeline import Engine, Front, FrontOptions
+        from ..scene.packed import PackedFormat
+
+        options = FrontOptions(PackedFormat.FP16, ListKind.BOX, self.rechunk) if self.faithful else FrontOptions(
+            None if self.memory is None else PackedFormat(self.memory.value), ListKind.ELLIPSE if self.lists is None else ListKind(self.lists.value),
+            self.rechunk,
+        )
+        dram = DramConfig() if self.refresh is None else DramConfig(refresh=Refresh(self.refresh.value))
+        return Drawing(Engine(self.engine.value), self.config, Front((self.front or FrontChoice.FLOAT).value), options, dram)
+
+
+def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str, object]) -> str:
+    """The stage that the options mean; raises where they contradict each other. given: options by name, None: not given."""
+    of_channels = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
+    if given["form"] is FormChoice["CONIC"]:
+        of_channels.append("--form conic")
+    if stage is None:
+        stage = StageChoice.CHANNELS if lanes is None and (of_channels or engine is EngineChoice.REFERENCE) else StageChoice(RECOMMENDED.stage)
+    if stage is not StageChoice.LANES:
+        if lanes is not None:
+            raise FlickerError("--lanes: for --stage lanes only")
+    elif engine is EngineChoice.REFERENCE:
+        raise FlickerError("--stage lanes: not for --engine reference, which has no stage")
+    elif of_channels:
+        raise FlickerError(f"--stage lanes: takes records of 16 bytes and has no contribution test, so it cannot be combined with {', '.join(of_channels)}")
+    return stage.value
+
+
+def engine_options(
+    engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
+    front: Annotated[FrontChoice | None, typer.Option(
+        help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
+    )] = None,
+    memory: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory, not for --front float [default: chunk or as packed]")] = None,
+    rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own, not for --front float")] = False,
+    lists: Annotated[ListsChoice | None, typer.Option(help="what lists a splat in a tile, not with --front float [default: ellipse]")] = None,
+    stage: Annotated[StageChoice | None, typer.Option(
+        help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
+             f"[default: {RECOMMENDED.stage}, but channels with an option that only they have]",
+    )] = None,
+    lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
+    cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
+    precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
+    form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU, and of the chip's records [default: {_default('form')}]")] = None,
+    fifo_depth: Annotated[int | None, typer.Option(
+        help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
+    )] = None,
+    memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
+    refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
+    coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
+    faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
+) -> Chosen:
+    """The options themselves. FlickerError where they contradict each other."""
+    given: dict[str, object] = {"cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth}
+    chosen: dict[str, object] = {"format": memory, "lists": lists, "rechunk": rechunk or None}
+    whole = engine in (EngineChoice.CHIP, EngineChoice.CHIP_GOLDEN)
+    if whole and front is not None:
+        raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
+    if engine is not EngineChoice.CHIP:
+        for option, value in (("--memories", memories), ("--refresh", refresh)):
+            if value is not None:
+                raise FlickerError(f"{option}: for --engine chip only")
+    if not whole and front in (None, FrontChoice.FLOAT):
+        if names := ", ".join(f"--{k}" for k, v in chosen.items() if v is not None):
+            raise FlickerError(f"{names}: for --front golden and rtl only")
+    else:
+        given |= {k: v for k, v in chosen.items() if k != "rechunk"}
+    if faithful and any(v is not None for v in given.values()):
+        names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
+        raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
+    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
+    base = FAITHFUL if faithful else RenderConfig()
+    config = base.with_(
+        cat=CatMode[cat.name] if cat else base.cat,
+        precision=Precision[precision.name] if precision else base.precision,
+        form=Form[form.name] if form else base.form,
+        fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
+        coords=Coords[coords.name],
+        stage=_stage(stage, engine, lanes, of_stage),
+        lanes=base.lanes if lanes is None else lanes,
+        memories=base.memories if memories is None else memories.value,
+    )
+    return Chosen(engine, config, front, memory, lists, rechunk, refresh, faithful)
+
+
+_OPTIONS = inspect.signature(engine_options, eval_str=True).parameters
+
+
+def takes_engine(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command with the options of `engine_options` in the place of its parameter `chosen`, which gets what they mean."""
+    own = inspect.signature(command, eval_str=True)
+
+    @wraps(command)
+    def run(**values: Any) -> Any:
+        return command(chosen=engine_options(**{name: values.pop(name) for name in _OPTIONS}), **values)
+
+    given: list[inspect.Parameter] = []
+    for name, parameter in own.parameters.items():
+        given += _OPTIONS.values() if name == "chosen" else [parameter]
+    run.__signature__ = own.replace(parameters=[p.replace(kind=p.KEYWORD_ONLY) for p in given])  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in given}
+    return run
+
+
+def parse_engine(text: str, option: str) -> Chosen:
+    """What a text such as `--stage channels --cat sparse` means. FlickerError, naming `option`, where it means nothing."""
+    app = typer.Typer(add_completion=False)
+    app.command(add_help_option=False)(engine_options)
+    try:
+        with typer.main.get_command(app).make_context(option, shlex.split(text)) as context:
+            return context.command.invoke(context)
+    except ValueError as error:
+        raise FlickerError(f"{option}: '{text}': {error}") from None
+    except typer.exceptions.TyperException as error:
+        raise FlickerError(f"{option}: {error.format_message()}") from None
+    except FlickerError as error:
+        raise FlickerError(f"{option}: {error}") from None

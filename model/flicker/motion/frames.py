@@ -1,0 +1,140 @@
+"""Frames of a path in their order, made here or by processes beside each other."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+import warnings
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..chip.compare import frame_cost
+from ..chip.drawing import Drawing
+from ..errors import FlickerError, FlickerWarning
+from ..front.reference import expected_depth
+from ..front.view import View
+from ..pipeline import Engine
+from ..scene import Scene
+from ..scene.camera import Camera
+from ..scene.metrics import flip, ssim
+from ..scene.sources import read_scene
+
+AHEAD = 2  # frames that wait for their turn, for each process
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference.
+    cycles: what the frame costs on the chip, by its models."""
+
+    drawing: Drawing
+    beside: Drawing | None = None
+    reference: bool = False
+    quality: bool = False
+    depth: bool = False
+    cycles: bool = False
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class Made:
+    """A frame. image, beside: float (H, W, 3), unquantised. reference: float64 (H, W, 3). depth: float64 (H, W). facts: numbers by column. notes: warnings."""
+
+    number: int
+    image: np.ndarray
+    beside: np.ndarray | None
+    reference: np.ndarray | None
+    depth: np.ndarray | None
+    facts: dict[str, Any]
+    notes: list[str] = field(default_factory=list)
+
+
+def _counts(stats: dict[str, Any]) -> dict[str, Any]:
+    """Columns that follow from an engine's statistics: what is seen and listed; of a simulation its cycles, and of the chip its bytes."""
+    found = {"visible": stats.get("visible"), "tile_entries": stats.get("list_entries", stats.get("tile_pairs")), "subtile_entries": stats.get("subtile_pairs")}
+    if "phases" in stats:
+        front, rendering = stats["phases"]["front end"], stats["phases"]["rendering"]
+        found |= {"cycles": max(front, rendering), "latency_cycles": stats["cycles"], "front_cycles": front, "render_cycles": rendering}
+        found |= {f"bytes_{purpose}": sum(moved) for purpose, moved in stats["dram_bytes"].items()}
+    elif "cycles" in stats:
+        found["stage_cycles"] = stats["cycles"]
+    return found
+
+
+def make(scene: Scene, wanted: Wanted, number: int, camera: Camera) -> Made:
+    """Frame `number` of a path."""
+    began = time.perf_counter()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FlickerWarning)
+        view = View(camera, scene, number=number, background=wanted.background)
+        rendered = wanted.drawing.render(view)
+        facts = _counts(rendered.stats)
+        beside = None if wanted.beside is None else wanted.beside.render(view).image
+        reference = view.reference if wanted.reference else None
+        if wanted.quality:
+            facts |= {"ssim": ssim(rendered.image, view.reference), "flip": flip(rendered.image, view.reference)}
+        depth = expected_depth(view.projected, camera) if wanted.depth else None
+        if wanted.cycles and wanted.drawing.engine is not Engine.CHIP:
+            facts |= frame_cost(view, wanted.drawing)
+    facts["made_s"] = time.perf_counter() - began
+    return Made(number, rendered.image, beside, reference, depth, facts, [str(w.message) for w in caught if issubclass(w.category, FlickerWarning)])
+
+
+# ---- processes ----------------------------------------------------------------------------------
+
+_SCENE: Scene | None = None
+_WANTED: Wanted | None = None
+
+
+def _begin(scene: str | Path, wanted: Wanted, threads: int) -> None:
+    """A process of its own: the scene is loaded once. Ctrl-C is for who started it."""
+    import numba
+
+    global _SCENE, _WANTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    numba.set_num_threads(min(threads, numba.get_num_threads()))
+    warnings.simplefilter("ignore")  # said where the scene was opened first
+    _SCENE, _WANTED = read_scene(scene), wanted
+
+
+def _make(number: int, camera: Camera) -> Made:
+    assert _SCENE is not None and _WANTED is not None
+    return make(_SCENE, _WANTED, number, camera)
+
+
+def frames(scene: Scene, file: str | Path, cameras: Sequence[Camera], wanted: Wanted, first: int = 0, workers: int = 1) -> Iterator[Made]:
+    """Frames `first` to the last one of a path, in order. file: of the scene, for the processes; workers: of them, 1: none, all is made here."""
+    if workers == 1:
+        for number in range(first, len(cameras)):
+            yield make(scene, wanted, number, cameras[number])
+        return
+    before = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(
+        workers, multiprocessing.get_context("spawn"), _begin, (file, wanted, max((os.cpu_count() or 1) // workers, 1)),
+    )
+    waiting: deque[Future[Made]] = deque()
+    done = False
+    try:
+        for number in range(first, len(cameras)):
+            waiting.append(pool.submit(_make, number, cameras[number]))
+            if len(waiting) >= AHEAD * workers:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+        done = True
+    except BrokenProcessPool:
+        raise FlickerError("a process that made frames has ended, perhaps for want of memory: --workers 1 takes less") from None
+    finally:
+        if not done:  # what is under way is of no use
+            for child in set(multiprocessing.active_children()) - before:
+                child.terminate()
+        pool.shutdown(wait=done, cancel_futures=True)
