@@ -49,10 +49,13 @@ def make_job(rng: np.random.Generator, n: int, order: str, finish: int | None = 
     return Job(entries, long, (np.sort(entries) & np.uint64(OUT)).tolist(), finish)
 
 
-def lines_of(entries: np.ndarray, rng, full: bool) -> list[tuple[int, int, int]]:
+def lines_of(entries: np.ndarray, rng, full: bool, cut: bool = False) -> list[tuple[int, int, int]]:
+    """Lines (entries, count, last). cut: one ends with what the unit holds."""
     lines, at, values = [], 0, entries.tolist()
     while True:
         count = min(LINE_ENTRIES if full or rng.random() < 0.8 else rng.randrange(1, LINE_ENTRIES + 1), len(values) - at)
+        if cut and at < CAPACITY:
+            count = min(count, CAPACITY - at)
         word = rng.getrandbits(LINE_ENTRIES * ENTRY_BITS) >> count * ENTRY_BITS << count * ENTRY_BITS
         for i in range(count):
             word |= values[at + i] << i * ENTRY_BITS
@@ -83,16 +86,18 @@ class Sorter:
         self.read: Counter[int] = Counter()
         self.written_after = (1, 40)
 
-    async def run(self, jobs: list[Job], patterns: tuple[str, str, str] = ("never",) * 3, full: bool = False) -> int:
-        """The lists one after the other; patterns of lines, writes and output. Cycles."""
+    async def run(self, jobs: list[Job], patterns: tuple[str, str, str] = ("never",) * 3, full: bool = False, pause: int = 0) -> int:
+        """The lists one after the other; patterns of lines, writes and output. pause: cycles between what the unit holds of a list and its next line.
+        Cycles."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         idle, wait, stall = (stalls.make(p, rng) for p in patterns)
-        source: deque[tuple[int, int, int, int]] = deque((k, *line) for k, job in enumerate(jobs) for line in lines_of(job.entries, rng, full))
+        source: deque[tuple[int, int, int, int]] = deque((k, *line) for k, job in enumerate(jobs) for line in lines_of(job.entries, rng, full, pause > 0))
+        came, not_before = 0, 0  # entries of the list, cycle
         offered, out, cycle, written_at, held = False, 0, 0, 0, None
         limit = 20_000 + 60 * sum(len(j.entries) for j in jobs)
         pending: deque[tuple[int, int, int]] = deque()
         while out < len(jobs):
-            offered = offered or (bool(source) and not next(idle))
+            offered = offered or (bool(source) and cycle >= not_before and not next(idle))
             which, word, count, last = source[0] if offered else (0, rng.getrandbits(LINE_ENTRIES * ENTRY_BITS), rng.randrange(16), rng.randrange(2))
             job = jobs[out]
             finish = int(job.finish is not None and len(job.out) >= job.finish)
@@ -110,6 +115,9 @@ class Sorter:
                     jobs[which].first = cycle
                 source.popleft()
                 offered = False
+                came = 0 if last else came + count
+                if pause and came == CAPACITY:
+                    not_before = cycle + pause
             if int(dut.ar_valid_o.value) and int(dut.ar_ready_i.value):
                 at = int(dut.ar_addr_o.value) // LINE
                 self.read.update(range(at, at + int(dut.ar_len_o.value) + 1))
@@ -186,6 +194,14 @@ async def lists(dut, which):
         test.rng.shuffle(jobs)
         await test.run(jobs, tuple(patterns))
     assert int(dut.error_o.value) == 0
+
+
+@cocotb.test()
+async def late(dut):
+    """Whether a list fits is known late: nothing of it may have left."""
+    test = Sorter(dut)
+    await test.bench.reset()
+    await test.run([make_job(test.draw, n, "random") for n in (CAPACITY + 1, 3, CAPACITY, CAPACITY + 9)], pause=2 * CAPACITY)
 
 
 @cocotb.test()

@@ -17,7 +17,7 @@ SETTINGS = {"cells": 16, "stages": 5, "runs": 16, "merge_lines": 32}
 @pytest.mark.parametrize("ways", [8, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 4))])
 def test_small(ways: int) -> None:
     build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={**SMALL, "Ways": ways}, config={**SETTINGS, "ways": ways},
-                   tests=["lists", "longest", "finished", "too_long"], opt="-O1")
+                   tests=["lists", "late", "longest", "finished", "too_long"], opt="-O1")
 
 
 @pytest.mark.slow
