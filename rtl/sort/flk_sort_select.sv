@@ -74,7 +74,8 @@ module flk_sort_select #(
 
   typedef logic [EntryBits-1:0] entry_t;
   typedef logic [BlockBits-1:0] block_t;  // where it lies
-  typedef logic [RingBits:0] number_t;    // of a block, in the order of taking, with a bit that says how often it has gone round
+  // Of a block in the order of taking, with a bit that says how often it has gone round.
+  typedef logic [RingBits:0] number_t;
   typedef logic [AtBits:0] length_t;
   typedef logic [RunBits:0] run_t;        // 0 to Run
   typedef logic [1:0] held_t;             // 0 to Held
@@ -92,6 +93,7 @@ module flk_sort_select #(
   list_t   coming;                // the list that arrives, so far
   length_t length_q;
   number_t first_q, next_q;       // its first block, the next one to be taken
+  number_t oldest;                // block that may still be read
   block_t  block_q;               // its last one
   logic    only_q;                // it has no other run
   logic    take, take_end, store, begins, begin_block;
@@ -120,8 +122,8 @@ module flk_sort_select #(
   assign begin_block = store && begins;
   assign free_ready  = begin_block && unused_q[BlockBits];
   assign to          = begins ? block : block_q;
-  assign ring_full   = next_q == {~(front_valid_q ? front_q.first[RingBits] : first_q[RingBits]),
-                                  front_valid_q ? front_q.first[RingBits-1:0] : first_q[RingBits-1:0]};
+  assign oldest      = front_valid_q ? front_q.first : first_q;
+  assign ring_full   = next_q == {~oldest[RingBits], oldest[RingBits-1:0]};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -232,18 +234,21 @@ module flk_sort_select #(
   block_t [Ways-1:0] run_block_q, run_later_q;
   held_t  [Ways-1:0] held_q, held_ahead_q, here_q;
 
-  list_t             leaving, following;
+  number_t           leaving_first, following_first;
+  length_t           leaving_length, following_length;
   logic   [Ways-1:0] unread, known, last, fetches, skips, looks, fetch, skip, look, ends, over, pop;
   run_t   [Ways-1:0] look_at;
-  logic              any_fetch, any_skip, any_look;
+  logic              any_fetch, any_look;
 
-  assign leaving   = front_valid_q ? front_q : coming;
-  assign following = behind_valid_q ? behind_q : coming;
+  assign leaving_first    = oldest;
+  assign leaving_length   = front_valid_q ? front_q.length : length_q;
+  assign following_first  = behind_valid_q ? behind_q.first : first_q;
+  assign following_length = behind_valid_q ? behind_q.length : length_q;
 
   always_comb begin
     for (int unsigned w = 0; w < Ways; w++) begin
       length_t length;
-      length   = ahead_q[w] ? following.length : leaving.length;
+      length   = ahead_q[w] ? following_length : leaving_length;
       known[w] = ahead_q[w] ? behind_valid_q : front_valid_q;
       // Entries of the run that have come and not been read; blocks of it that have no place here.
       unread[w]  = !at_q[w][RunBits] && {1'b0, WayBits'(w), at_q[w][RunBits-1:0]} < length;
@@ -267,7 +272,6 @@ module flk_sort_select #(
   endfunction
 
   assign any_fetch = fetches != '0;
-  assign any_skip  = skips != '0 && !any_fetch;
   assign any_look  = looks != '0;
   assign fetch     = first(fetches);
   assign skip      = any_fetch ? '0 : first(skips);
@@ -287,15 +291,13 @@ module flk_sort_select #(
     from_at     = '0;
     look_number = '0;
     for (int unsigned w = 0; w < Ways; w++) begin
-      logic [AtBits-1:0] at;
-      at = {WayBits'(w), look_at[w][RunBits-1:0]};
       if (fetch[w] || skip[w]) begin
         from    |= run_block_q[w];
         from_at |= at_q[w][OffBits-1:0];
       end
       if (look[w]) begin
-        look_number |= (ahead_q[w] ? following.first : leaving.first) +
-                       number_t'(at[AtBits-1:OffBits]);
+        look_number |= (ahead_q[w] ? following_first : leaving_first) +
+                       number_t'(32'({WayBits'(w), look_at[w][RunBits-1:0]}) >> OffBits);
       end
     end
   end
@@ -326,7 +328,7 @@ module flk_sort_select #(
     .rd_data_o(looked)
   );
 
-  logic   free_in_ready, unused_free_empty, freed_q;
+  logic   unused_free_ready, unused_free_empty, freed_q;
   block_t freed_block_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -349,7 +351,7 @@ module flk_sort_select #(
     .rst_ni,
     .clear_i,
     .in_valid_i (freed_q),
-    .in_ready_o (free_in_ready),
+    .in_ready_o (unused_free_ready),
     .in_data_i  (freed_block_q),
     .out_valid_o(free_valid),
     .out_ready_i(free_ready),
@@ -572,12 +574,13 @@ module flk_sort_select #(
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) store |-> !length_q[AtBits])
   else $error("flk_sort_select: more entries than fit");
-  assert property (@(posedge clk_i) disable iff (!rst_ni) freed_q |-> free_in_ready)
+  assert property (@(posedge clk_i) disable iff (!rst_ni) freed_q |-> unused_free_ready)
   else $error("flk_sort_select: more blocks free than there are");
   for (genvar w = 0; w < Ways; w++) begin : gen_checks
     assert property (@(posedge clk_i) disable iff (!rst_ni) pop[w] |-> here_q[w] != '0)
     else $error("flk_sort_select: an entry taken that is not there");
-    assert property (@(posedge clk_i) disable iff (!rst_ni) finish_pop |-> ahead_q[w] && held_q[w] == held_ahead_q[w])
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        finish_pop |-> ahead_q[w] && held_q[w] == held_ahead_q[w])
     else $error("flk_sort_select: a list ends before all of it is read");
   end
 `endif
