@@ -294,19 +294,32 @@ async def interrupts(dut: Any) -> None:
     assert await chip.read("interrupt") == FRONT_DONE | FRAME_DONE | ERROR and await chip.result() == (2, 1 << ResultError.FRONT_READ)
     await chip.write("interrupt", ALL)
     chip.failing = False
+    await chip.start(5, 2, 40)
+    await chip.until(FRONT_DONE)
+    chip.failing = True
+    await chip.until(FRAME_DONE)
+    assert await chip.read("interrupt") == FRONT_DONE | FRAME_DONE | ERROR and await chip.result() == (5, 1 << ResultError.LIST_READ)
+    await chip.write("interrupt", ALL)
+    chip.failing = False
     # The front end and the registers are taken: a third start is refused, and so is one while frames are forgotten.
     chip.latency = 100
     await chip.start(3)
     await chip.start(4)
     assert not await chip.field("status", "ready")
     await chip.write("control", START)
-    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 4
+    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 5
     await chip.write("interrupt", REFUSED)
     await chip.write_all(("control", ABORT), ("control", START))
     assert await chip.read("interrupt") == REFUSED and not await chip.field("status", "ready") and await chip.field("status", "aborting")
     await chip.write("interrupt", REFUSED)
+    for _ in range(400):  # no longer than the abort lasts, no shorter
+        status = await chip.read("status")
+        low = {name: REGISTERS["status"].fields[name][0] for name in ("aborting", "ready")}
+        assert (status >> low["aborting"] & 1) != (status >> low["ready"] & 1)
+        if status >> low["ready"] & 1:
+            break
     await chip.until(ABORTED)
-    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 4
+    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 5
     assert (await chip.result())[1] == 1 << ResultError.ABORTED
 
 
