@@ -258,6 +258,10 @@ def test_what_a_frame_tells() -> None:
     dram = DramConfig(refresh=Refresh.PER_BANK)
     with session(memory=MemoryOptions(dram.timing)) as chip:
         stats = chip_stats(chip, chip.render(camera()), camera(), CONFIG, dram)
+    live, moved = stats["counters"]["live"], stats["dram_bytes"]
+    assert [64 * live[f"{name}_beats"] for name in ("table", "geometry", "colour")] == [
+        moved["table"][0], moved["headers"][0] + moved["geometry"][0], moved["colour"][0],
+    ]
     assert sum(stats["phases"][name] * stats["busy"][name]["DRAM"] for name in stats["phases"]) == pytest.approx(stats["dram_efficiency"] * stats["cycles"])
     assert all(0 < share <= 1 for part in stats["busy"].values() for share in part.values())
     assert stats["bottleneck"].startswith(max(stats["phases"], key=lambda name: stats["phases"][name])) and stats["refresh"] == "per-bank"
