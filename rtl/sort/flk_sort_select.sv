@@ -4,7 +4,7 @@
 // in_end_i (no entry; in_flag_i goes with it and leaves as out_flag_o). The smallest head of all runs leaves, by the
 // upper KeyBits (unsigned), through a tree of comparisons with registers between its levels. Nothing of a list
 // leaves before closed_i (its end is on the way) or its end. in_flag_i with an entry: the list has no other
-// run. Behind the list that leaves up to Lists whole lists and the one that arrives wait.
+// run. Behind the list that leaves up to Lists - 1 whole lists, two at least, and the one that arrives wait.
 //
 // All entries lie in one memory of Ways Run places, in blocks of Block. A list takes a block for each Block entries, as
 // they come; a block whose entries have been read is free for the next list, so that a list comes in as

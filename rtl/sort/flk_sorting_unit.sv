@@ -20,7 +20,7 @@
 // (flk_sort_merge), each while its runs arrive, so that an entry a cycle goes through all of them,
 // whatever the lengths of the lists. The last step (flk_sort_select) merges Ways runs and takes the place of
 // $clog2(Ways) steps; it holds Capacity = Cells << Stages entries.
-// Throughput: a list of n <= Capacity entries in n + 1 cycles, back to back. Latency: docs/sorting_unit.md.
+// Throughput: a list of n <= Capacity entries in n + 4 cycles, back to back. Latency: docs/sorting_unit.md.
 // Combinational paths: none from an input to a handshake output; outputs of out_* and run_* are registers.
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,

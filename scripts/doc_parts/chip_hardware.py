@@ -123,9 +123,9 @@ class Measured:
 
 
 def measure(
-    say: Say, title: str, view: View, config: RenderConfig, format_: PackedFormat, lists: ListKind, chunks: int, dram: DramConfig, limit: float = LIMIT,
+    say: Say, title: str, view: View, config: RenderConfig, format_: PackedFormat, lists: ListKind, chunks: int, dram: DramConfig,
 ) -> Measured:
-    """Raises FlickerError where a picture differs from the golden model's or the model's cycles of a frame or its bytes are more than the limit off."""
+    """Raises FlickerError where a picture differs from the golden model's or the model's cycles of a frame or its bytes are more than `LIMIT` off."""
     camera = view.camera
     say(f"{title}: building the simulator")
     build(config)
@@ -148,7 +148,7 @@ def measure(
     assert alone.usage is not None
     moved = {name: sum(both) for name, both in alone.usage.traffic.items()}
     for purpose, due in model.bytes.items():
-        if abs(due / moved[purpose] - 1) > (limit if purpose in loose else 0.0):
+        if abs(due / moved[purpose] - 1) > (LIMIT if purpose in loose else 0.0):
             raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
     say(f"{title}: four frames back to back")
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
@@ -157,7 +157,7 @@ def measure(
         if frame.error or not np.array_equal(frame.buffer, golden.buffer):
             raise FlickerError(f"{title}: the picture differs from the golden model's")
     found = Measured(model, lists_there, alone, done, moved, simulated, seconds)
-    if abs(found.off[2]) > limit:
+    if abs(found.off[2]) > LIMIT:
         raise FlickerError(f"{title}: the chip model's cycles are {found.off[2]:+.1%} off")
     return found
 

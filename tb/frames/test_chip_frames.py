@@ -20,8 +20,10 @@ from flicker_tb.bench import rounds
 from flicker_tb.runner import seed
 
 from flicker import params
+from flicker.chip import rendering
 from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.run import chip_stats
+from flicker.chip.tile_lists import TileLists
 from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, View, load_view
@@ -286,7 +288,15 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     view = Camera(width, width, 80.0, 80.0, np.zeros(3), np.eye(3))
     with session(specks(count, size, width / 170), memory=MemoryOptions(dram.timing)) as chip:
         stats = chip_stats(chip, check(chip, view), view, CONFIG, dram)
+        front = run_front(chip.packed, view)
     assert stats["bottleneck"].startswith(part), (stats["bottleneck"], stats["phases"], stats["busy"])
+    # The model of the rendering half is that of this chip.
+    tables, cycles = TileLists.of(front, front_memory(front)), stats["phases"]["rendering"]
+    assert rendering.estimate(tables, CONFIG, dram).cycles == pytest.approx(cycles, rel=0.15)
+    # Entries of lists that are sorted twice count twice.
+    entries = np.diff(tables.start)
+    work = np.where(entries > CONFIG.chip_memories.sorted_entries, 2, 1) * entries
+    assert stats["busy"]["rendering"]["sorting units"] * cycles == pytest.approx(max(work[k::4].sum() for k in range(4)), rel=0.01)
 
 
 def test_opaque_layers() -> None:

@@ -56,10 +56,13 @@ ELASTIC = 4  # registers between a queue and the stage: latency and places
 TOLD = 4  # from a sub-tile's last finished pixel to delivery
 DROPPED = 8  # from there to the end of a list that all cores have finished
 PAIR_CYCLES, PAIR_GAP = 128, 4  # of tiles in the frame writer
-ROUNDS = 3  # of a frame, each with the share of the memory's time that the one before gives what is not records
+ROUNDS = 12  # of a frame, at most: each with the share of the memory's time that what is not records has by those before, until it is the same
+SETTLED = 0.005
 EFFICIENCY = 0.8  # of the memory's peak rate, for that
 MOST_BUSY = 0.9
-LOADED = 300  # cycles by which a line of records comes later where what else moves takes half of the memory's time: by measurement, docs/scaling.md
+# Cycles by which a line of records comes later at the chip's port where what else moves takes half of the memory's time: fitted to its frames with 32 lanes
+# (`make docs PART=scale_hardware`).
+LOADED = 200
 END = 60  # from the last line of a picture to its answer, beside the memory's latency
 
 NEVER = np.int64(1) << 60
@@ -571,7 +574,10 @@ def estimate(
         others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
         total = int(clock) + END + latency_cycles
         if dram:
-            busy = min(sum(others.values()) * CLOCK_HZ / (EFFICIENCY * dram.bytes_per_second * total), MOST_BUSY)
+            now = min(sum(others.values()) * CLOCK_HZ / (EFFICIENCY * dram.bytes_per_second * total), MOST_BUSY)
+            if abs(now - busy) < SETTLED:
+                break
+            busy = (busy + now) / 2
     moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * int(misses), "frame": others["frame"]}
     traffic: list[Stream] = []
     if dram:

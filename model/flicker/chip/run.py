@@ -12,7 +12,6 @@ from .. import params
 from ..errors import FlickerError
 from ..front.view import View
 from ..golden.chip import render_chip
-from ..golden.delivery import UNITS
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
@@ -135,7 +134,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     moved = {"front end": first, "rendering": sum(map(sum, traffic.values())) - first}
     peak = {name: moved[name] * CLOCK_HZ / (phases[name] * dram.bytes_per_second) for name in phases}
     tested = chip.scene.gaussians - count("culled_gaussians")
-    # Lines of lists that the sorting units do not hold, which they sort a second time.
+    # Entries of all sorting units, and lines of those that they do not hold and sort a second time: of the one with most the same share.
+    given = int(np.sum(rendering["entries"]))
     again = live["frame_written"] - frame_beats(camera.width, camera.height, PixelFormat.RGB8, frame.buffer.shape[1])
     # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each,
     # in delivery two.
@@ -145,8 +145,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
-            "sorting units": (int(np.max(rendering["entries"])) + LINE_ENTRIES * again / UNITS) / phases["rendering"],
-            "delivery": int(np.sum(rendering["entries"])) / (2 * phases["rendering"]), "record cache's port": int(rendering["lines"]) / phases["rendering"],
+            "sorting units": int(np.max(rendering["entries"])) * (1.0 + LINE_ENTRIES * again / max(given, 1)) / phases["rendering"],
+            "delivery": given / (2 * phases["rendering"]), "record cache's port": int(rendering["lines"]) / phases["rendering"],
             "DRAM": peak["rendering"],
             **stage.pop("busy"),
         },

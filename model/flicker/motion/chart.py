@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..output import write_atomically
-from ..scene.temporal import decibels
+from ..scene.metrics import decibels
 
 _TOP = 100.0  # dB: where equal pictures are drawn
 

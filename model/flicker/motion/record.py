@@ -14,7 +14,8 @@ from PIL import Image, ImageDraw
 from ..output import write_records
 from ..scene import Scene
 from ..scene.camera import Camera
-from ..scene.temporal import Change, TemporalError, TemporalSummary, decibels, summarise
+from ..scene.metrics import decibels
+from ..scene.temporal import Change, TemporalError, TemporalSummary, summarise
 from ..scene.warping import flow, seen_by_both, warping_error
 from .frames import Made, Wanted, frames
 from .keep import Kept

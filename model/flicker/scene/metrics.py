@@ -39,17 +39,22 @@ def _remembered(keep: int):
     return decorate
 
 
-def _pair(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def clamped_pair(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two pictures of one shape as float64, clamped to [0, 1]. ValueError where they differ in shape."""
     if a.shape != b.shape:
         raise ValueError(f"pictures differ in shape: {a.shape} and {b.shape}")
     return np.clip(np.asarray(a, np.float64), 0.0, 1.0), np.clip(np.asarray(b, np.float64), 0.0, 1.0)
 
 
+def decibels(mean_square: float) -> float:
+    """PSNR of a mean square error against a peak of 1, dB; inf for 0."""
+    return math.inf if mean_square == 0.0 else -10.0 * math.log10(mean_square)
+
+
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
     """Peak signal-to-noise ratio in dB of two unquantised pictures, clamped to [0, 1]; inf when they are equal."""
-    a, b = _pair(a, b)
-    error = float(np.mean((a - b) ** 2))
-    return math.inf if error == 0.0 else -10.0 * math.log10(error)
+    a, b = clamped_pair(a, b)
+    return decibels(float(np.mean((a - b) ** 2)))
 
 
 @_remembered(256)
@@ -59,7 +64,7 @@ def ssim(a: np.ndarray, b: np.ndarray, counted: np.ndarray | None = None) -> flo
     Wang et al. (2004): Gaussian window of sigma 1.5, population covariance; mean over pixels and channels, but for the five at each border.
     counted: bool (H, W), pixels that count; the others are black in both pictures, and no part of the mean. NaN where none counts.
     """
-    a, b = _pair(a, b)
+    a, b = clamped_pair(a, b)
     kind = {"data_range": 1.0, "channel_axis": 2, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
     if counted is None:
         return float(structural_similarity(a, b, **kind))
@@ -173,7 +178,7 @@ _seen_reference = _remembered(2)(_seen)
 
 def flip_map(image: np.ndarray, reference: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> np.ndarray:
     """LDR-FLIP at every pixel, (H, W) in [0, 1], of two sRGB pictures (H, W, 3), clamped to [0, 1] (Andersson et al. 2020)."""
-    image, reference = _pair(image, reference)
+    image, reference = clamped_pair(image, reference)
     colours_a, edges_a, points_a = _seen(image, pixels_per_degree)
     colours_b, edges_b, points_b = _seen_reference(reference, pixels_per_degree)
     colour = _hyab(colours_a, colours_b) ** _QC

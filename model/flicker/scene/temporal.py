@@ -10,13 +10,12 @@ cancels: what is left of the change is the renderer's own.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .metrics import _pair
+from .metrics import clamped_pair, decibels
 
 JUMP = 8.0 / 255.0  # change of an error in one frame that counts as a jump
 
@@ -56,11 +55,6 @@ class TemporalSummary:
     worst_second_db: float | None = None
 
 
-def decibels(mean_square: float) -> float:
-    """PSNR of a mean square error against a peak of 1, dB; inf for 0."""
-    return math.inf if mean_square == 0.0 else -10.0 * math.log10(mean_square)
-
-
 class TemporalError:
     """Takes frames one after the other and keeps the error of the last one."""
 
@@ -69,7 +63,7 @@ class TemporalError:
 
     def add(self, image: np.ndarray, reference: np.ndarray) -> Change:
         """The next frame: float (H, W, 3) both, unquantised, clamped to [0, 1] here. ValueError where the shape is not that of the frames before."""
-        image, reference = _pair(image, reference)
+        image, reference = clamped_pair(image, reference)
         error = image - reference
         mse = float(np.mean(np.square(error)))
         before, self._error = self._error, error
