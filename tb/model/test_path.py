@@ -343,6 +343,7 @@ def test_full_disk_behind_frames() -> None:
     (("-o", "a.mp4", "--walk", "--coords", "absolute", "--cycles"), "--cycles: not with --coords absolute, of which no chip has records"),
     (("-o", "a.mp4", "--walk", "--faithful", "--cat", "dense"), "--faithful: fixes the configuration"),
     (("-o", "a.mp4", "--walk", "--frames", 0), "--frames"),
+    (("-o", "a.mp4", "--frames", 9), "cameras.json: 4 cameras, not 9, each a frame; as keyframes they make any number"),
 ])
 def test_refused_in_one_line(words: tuple, said: str) -> None:
     done = path(*words, code=2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import FlickerError
 from ..front.ahead import common_up, distance_ahead
 from ..front.projection import project
 from ..scene import motion
@@ -39,6 +40,8 @@ def path_of(source: Source, asked: Asked) -> tuple[list[Camera], str]:
     if asked.kind in (None, "keyframes"):
         check_path(given, source.cameras_from)
         if asked.kind is None:
+            if asked.frames is not None and asked.frames > len(given):
+                raise FlickerError(f"{source.cameras_from}: {len(given)} cameras, not {asked.frames}, each a frame; as keyframes they make any number")
             return given[: asked.frames], f"cameras of {source.cameras_from}"
         times = times_of(given)
         seconds = len(given) - 1 if times is None else float(times[-1])
