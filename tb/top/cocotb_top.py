@@ -274,10 +274,36 @@ async def frames(dut: Any) -> None:
 
 
 @cocotb.test()
+async def beats_that_run_on(dut: Any) -> None:
+    """A beat counts when it comes, not when its address goes."""
+    chip = Chip(dut)
+    await chip.begin()
+    chip.latency = 500
+    await chip.start(0, 1, 1)
+    for half, beats in enumerate((ChipCounter.LIVE_TABLE_BEATS, ChipCounter.LIVE_LIST_BEATS)):
+        while chip.taken["ar"] == half:
+            await chip.cycles(1)
+        assert await chip.counter(beats) == 0, beats
+        chip.latency = 3
+        while not await chip.counter(beats):
+            await chip.cycles(1)
+        chip.latency = 500
+    chip.latency = 3
+    await chip.ended(0, 0, 1, 1)
+
+
+@cocotb.test()
 async def interrupts(dut: Any) -> None:
     """Each event sets its bit, and the output follows the enables."""
     chip = Chip(dut)
     await chip.begin()
+    await chip.start(0)
+    await chip.until(FRAME_DONE)
+    for enabled in (0, FRONT_DONE, ABORTED, FRONT_DONE | ABORTED):
+        await chip.write("interrupt_enable", enabled)
+        await chip.cycles(2)
+        assert chip.value("irq_o") == (enabled & FRONT_DONE != 0), f"{enabled:05b}"
+    await chip.write("interrupt", ALL)
     await chip.write("interrupt_enable", FRAME_DONE)
     await chip.start(1)
     await chip.until(FRONT_DONE)
@@ -307,7 +333,7 @@ async def interrupts(dut: Any) -> None:
     await chip.start(4)
     assert not await chip.field("status", "ready")
     await chip.write("control", START)
-    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 5
+    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 6
     await chip.write("interrupt", REFUSED)
     await chip.write_all(("control", ABORT), ("control", START))
     assert await chip.read("interrupt") == REFUSED and not await chip.field("status", "ready") and await chip.field("status", "aborting")
@@ -319,7 +345,7 @@ async def interrupts(dut: Any) -> None:
         if status >> low["ready"] & 1:
             break
     await chip.until(ABORTED)
-    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 5
+    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 6
     assert (await chip.result())[1] == 1 << ResultError.ABORTED
 
 
