@@ -1,6 +1,6 @@
-// The chip: from a packed scene in memory to a frame buffer in memory (docs/chip.md).
+// The chip: from a packed scene in memory to a frame buffer in memory (docs/reference/chip.md).
 //
-// A host writes a frame's descriptor through AXI4-Lite (docs/registers.md) and starts it; flk_preprocessing makes records and tile
+// A host writes a frame's descriptor through AXI4-Lite (docs/reference/registers.md) and starts it; flk_preprocessing makes records and tile
 // lists of the scene, flk_rendering makes the picture of them. Both halves work at the same time, on frames that follow
 // each other (flk_frame_control). One AXI4 port for all memory: 512 bits of data, records read as narrow beats of 256 bits;
 // who waits for whom is stated in flk_axi_arbiter and flk_top_pkg.

@@ -1,4 +1,4 @@
-/* Driver of FLICKER: flk.h says what, docs/programming.md how to use it. */
+/* Driver of FLICKER: flk.h says what, docs/guide/programming.md how to use it. */
 #include "flk.h"
 
 #include <float.h>

@@ -1,4 +1,4 @@
-/* Driver of FLICKER (docs/programming.md): scenes, descriptors of frames, the sequence of a frame.
+/* Driver of FLICKER (docs/guide/programming.md): scenes, descriptors of frames, the sequence of a frame.
  *
  * C99 with libc and libm only; no memory is allocated, no state is kept but in flk_device_t. Addresses are the chip's, in bytes. The arithmetic of cameras is that
  * of the golden model bit for bit: IEEE 754 double, compiled without contraction of a product and a sum (-ffp-contract=off). */
@@ -64,7 +64,7 @@ const char *flk_status_text(flk_status_t status);
 enum { FLK_FORMAT_CHUNK, FLK_FORMAT_FP16_LOCAL, FLK_FORMAT_FP16 };
 enum { FLK_TABLE, FLK_HEADERS, FLK_GEOMETRY, FLK_COLOUR, FLK_PARTS };
 
-/* A packed scene (docs/memory_image.md) in the chip's memory. */
+/* A packed scene (docs/reference/memory_image.md) in the chip's memory. */
 typedef struct {
   uint64_t address, bytes;     /* of the image */
   uint32_t format;             /* FLK_FORMAT_* */
@@ -104,7 +104,7 @@ typedef struct {
 
 flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_camera_t *camera);
 
-/* ff number nearest to a finite or infinite x, with 10 to 23 bits of mantissa (docs/ff.md): its bits. */
+/* ff number nearest to a finite or infinite x, with 10 to 23 bits of mantissa (docs/reference/ff.md): its bits. */
 uint32_t flk_ff_bits(double x, unsigned mantissa);
 
 /* ---- sizes of regions, in bytes ------------------------------------------------------------------------------------------------------------ */

@@ -1,4 +1,4 @@
-// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/frame_writer.md).
+// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/reference/frame_writer.md).
 //
 // Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Groups of its pixels go on by
 // themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any

@@ -5,7 +5,7 @@ package flk_top_pkg;
   localparam int unsigned TOP_ADDR_BITS = 40;
   typedef logic [TOP_ADDR_BITS-1:0] address_t;
 
-  // A frame, as the registers describe it (docs/registers.md).
+  // A frame, as the registers describe it (docs/reference/registers.md).
   typedef struct packed {
     logic [15:0]     tag;
     logic [2:0]      mode;         // of the contribution test, CAT_*

@@ -1,4 +1,4 @@
-"""The frame buffer as the chip leaves it in memory (docs/frame_writer.md): bytes of every pixel, and where they lie.
+"""The frame buffer as the chip leaves it in memory (docs/reference/frame_writer.md): bytes of every pixel, and where they lie.
 
 Pixels are FP16 bits (transmittance, red, green, blue), as in `golden.render.Frame.pixels`. Rows of the buffer are `stride` bytes apart and hold whole pairs of
 tiles, so columns beyond the picture's width and rows beyond its height are written too, up to multiples of 32 and 16.

@@ -1,4 +1,4 @@
-"""The verilated chip: a packed scene in memory, registers through the C driver, frames (docs/chip.md).
+"""The verilated chip: a packed scene in memory, registers through the C driver, frames (docs/reference/chip.md).
 
     with ChipSession(packed, config) as chip:
         frame = chip.render(camera)
@@ -25,7 +25,7 @@ from . import driver, half, preprocessing, rendering
 from .half import PAGE, Half, MemoryOptions
 from .memory import Order, PortConfig, PurposeCounts
 
-# The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/memory_port.md).
+# The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/reference/memory_port.md).
 PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False, order=Order.WHOLE, urgent=14)
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
 IMAGE = 1 << 28  # address of the scene

@@ -1,4 +1,4 @@
-"""The C driver (sw/flk.c) through ctypes, compiled with the machine's compiler (docs/programming.md)."""
+"""The C driver (sw/flk.c) through ctypes, compiled with the machine's compiler (docs/guide/programming.md)."""
 
 from __future__ import annotations
 
