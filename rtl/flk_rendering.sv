@@ -7,7 +7,7 @@
 // error_o, until the next start: bit 0 lists could not be read, break their layout or are longer than is sorted, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
-// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/decisions/long_lists.md).
+// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
 // Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3, of runs 4 to 7), records (read, 256 bits), frame buffer and runs (write, 512 bits).
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four cores of a tile say so the
 // sorting unit drops the list (not in the automatic mode, flk_render_stage).

@@ -161,7 +161,7 @@ class ChipMemories:
     sorted_entries: longest list that a sorting unit takes in one reading. list_chunks: in a list reader's memory. sorted_ahead: entries of a sorting unit that
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
-    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; they have half as many runs, at most (docs/decisions/long_lists.md).
+    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; half as many runs at most (docs/reference/list_sorter.md).
     """
 
     sorted_entries: int = 2048

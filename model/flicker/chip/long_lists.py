@@ -1,4 +1,4 @@
-"""Lists longer than a sorting unit holds: ways to sort them, by cycles, bytes and what they need on the chip (docs/decisions/long_lists.md).
+"""Lists longer than a sorting unit holds: ways to sort them, by cycles, bytes and what they need on the chip (docs/decisions/050-long-lists.md).
 
 Every way is executed on the list as far as its bytes and cycles depend on it, one list alone, memory at 51.2 GB/s that answers after `MEMORY` cycles. Bytes are
 of the list alone and in multiples of its one writing by the front end, which counts: a list that is written and read once has 2.

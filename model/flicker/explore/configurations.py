@@ -56,7 +56,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64", "log-lanes", "log-lanes-64",
         "log-lanes-128",
     ),
-    # docs/reference/configurations.md
+    # docs/results/mask_generators.md
     "pictures": (
         "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-fp16", "exact-fp16-bound", "exact-e5m6",
         "exact-e5m6-bound", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e4m3-scaled", "exact-e4m3-bound", "exact-e5m2", "exact-q8.8", "exact-fp16-conic",
