@@ -19,7 +19,7 @@ from ..perf.sorting import latency, unit_cycles
 
 CLUMP = 300  # entries of a clump that follow each other
 LINE_BITS = LINE_ENTRIES * ENTRY_BITS + 4
-# Gates of what is in registers and comparators, from the units that were synthesised (docs/results/synthesis.md).
+# Gates of what is in registers and comparators, from the units that were synthesised (docs/reference/synthesis.md).
 FLOP, COMPARE, CONTROL = 5.2, 260.0, 1500.0
 BINS = 1024  # of a histogram, ten bits of the key
 PARTS = 64  # of a partition, with an open line each
