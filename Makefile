@@ -49,7 +49,7 @@ test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the te
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
 
-lint: $(STAMP) ## Verilator on every module, Verible style, ruff, mypy, generated files
+lint: $(STAMP) ## Verilator on every module, Verible style, ruff, mypy, generated files, links of pages
 	@$(BIN)/python scripts/lint.py
 
 waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves UNIT=stream_cells
