@@ -14,7 +14,7 @@
 #define FLK_VERSION_MAJOR_RESET 0x3u
 #define FLK_VERSION_MINOR_MASK 0x0000ff00u
 #define FLK_VERSION_MINOR_SHIFT 8
-#define FLK_VERSION_MINOR_RESET 0x0u
+#define FLK_VERSION_MINOR_RESET 0x1u
 
 #define FLK_CAPABILITY_OFFSET 0x008u
 #define FLK_CAPABILITY_STAGE_MASK 0x0000000fu
@@ -117,6 +117,10 @@
 #define FLK_COUNTER_VALUE_VALUE_MASK 0xffffffffu
 #define FLK_COUNTER_VALUE_VALUE_SHIFT 0
 
+#define FLK_PROGRESS_OFFSET 0x030u
+#define FLK_PROGRESS_PAIRS_MASK 0x0000ffffu
+#define FLK_PROGRESS_PAIRS_SHIFT 0
+
 #define FLK_FRAME_OFFSET 0x100u
 #define FLK_FRAME_TAG_MASK 0x0000ffffu
 #define FLK_FRAME_TAG_SHIFT 0
@@ -178,6 +182,11 @@
 #define FLK_STRIDE_VALUE_MASK 0x0001ffffu
 #define FLK_STRIDE_VALUE_SHIFT 0
 #define FLK_STRIDE_VALUE_RESET 0x0u
+
+#define FLK_DEADLINE_OFFSET 0x11cu
+#define FLK_DEADLINE_CYCLES_MASK 0xffffffffu
+#define FLK_DEADLINE_CYCLES_SHIFT 0
+#define FLK_DEADLINE_CYCLES_RESET 0x0u
 
 #define FLK_TABLE_LOW_OFFSET 0x120u
 #define FLK_TABLE_LOW_VALUE_MASK 0xffffffffu
@@ -362,6 +371,7 @@
 #define FLK_ERROR_TIMED_OUT 9  /* time-out: neither half moved for so many cycles as timeout says */
 #define FLK_ERROR_BAD_TABLE 10  /* the scene is damaged: a float of the cluster table is not finite */
 #define FLK_ERROR_BAD_HEADER 11  /* the scene is damaged: a float of a cluster's header is not finite */
+#define FLK_ERROR_LATE 12  /* ended by its deadline; progress tells what of the picture is written */
 #define FLK_ERROR_TEXTS { \
   [0] = "a read of the front end failed (scene, pointers)", \
   [1] = "a write of the front end failed (records, lists, pointers)", \
@@ -375,6 +385,7 @@
   [9] = "time-out: neither half moved for so many cycles as timeout says", \
   [10] = "the scene is damaged: a float of the cluster table is not finite", \
   [11] = "the scene is damaged: a float of a cluster's header is not finite", \
+  [12] = "ended by its deadline; progress tells what of the picture is written", \
 }
 
 /* Performance counters (counter_select). */

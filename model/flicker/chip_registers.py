@@ -34,6 +34,7 @@ REGISTERS = {
     "frames": Register(0x024, 1, {"started": (0, 16), "finished": (16, 16)}),
     "counter_select": Register(0x028, 1, {"index": (0, 10)}),
     "counter_value": Register(0x02C, 1, {"value": (0, 32)}),
+    "progress": Register(0x030, 1, {"pairs": (0, 16)}),
     "frame": Register(
         0x100, 1, {
             "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1)
@@ -45,6 +46,7 @@ REGISTERS = {
     "record_beats": Register(0x110, 1, {"value": (0, 23)}),
     "chunks": Register(0x114, 1, {"value": (0, 25)}),
     "stride": Register(0x118, 1, {"value": (0, 17)}),
+    "deadline": Register(0x11C, 1, {"cycles": (0, 32)}),
     "table_low": Register(0x120, 1, {"value": (0, 32)}),
     "table_high": Register(0x124, 1, {"value": (0, 8)}),
     "headers_low": Register(0x128, 1, {"value": (0, 32)}),
@@ -92,6 +94,7 @@ class ResultError(IntEnum):
     TIMED_OUT = 9  # time-out: neither half moved for so many cycles as timeout says
     BAD_TABLE = 10  # the scene is damaged: a float of the cluster table is not finite
     BAD_HEADER = 11  # the scene is damaged: a float of a cluster's header is not finite
+    LATE = 12  # ended by its deadline; progress tells what of the picture is written
 
 
 class ChipCounter(IntEnum):

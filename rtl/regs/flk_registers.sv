@@ -240,6 +240,7 @@ module flk_registers (
         logic frames;
         logic counter_select;
         logic counter_value;
+        logic progress;
         logic frame;
         logic background;
         logic size;
@@ -247,6 +248,7 @@ module flk_registers (
         logic record_beats;
         logic chunks;
         logic stride;
+        logic deadline;
         logic table_low;
         logic table_high;
         logic headers_low;
@@ -314,6 +316,8 @@ module flk_registers (
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h28);
         decoded_reg_strb.counter_value = cpuif_req_masked & (cpuif_addr == 10'h2c) & !cpuif_req_is_wr;
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h2c);
+        decoded_reg_strb.progress = cpuif_req_masked & (cpuif_addr == 10'h30) & !cpuif_req_is_wr;
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h30);
         decoded_reg_strb.frame = cpuif_req_masked & (cpuif_addr == 10'h100);
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h100);
         decoded_reg_strb.background = cpuif_req_masked & (cpuif_addr == 10'h104);
@@ -328,6 +332,8 @@ module flk_registers (
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h114);
         decoded_reg_strb.stride = cpuif_req_masked & (cpuif_addr == 10'h118);
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h118);
+        decoded_reg_strb.deadline = cpuif_req_masked & (cpuif_addr == 10'h11c);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h11c);
         decoded_reg_strb.table_low = cpuif_req_masked & (cpuif_addr == 10'h120);
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h120);
         decoded_reg_strb.table_high = cpuif_req_masked & (cpuif_addr == 10'h124);
@@ -574,6 +580,12 @@ module flk_registers (
                 logic load_next;
             } value;
         } stride;
+        struct {
+            struct {
+                logic [31:0] next;
+                logic load_next;
+            } cycles;
+        } deadline;
         struct {
             struct {
                 logic [31:0] next;
@@ -869,6 +881,11 @@ module flk_registers (
                 logic [16:0] value;
             } value;
         } stride;
+        struct {
+            struct {
+                logic [31:0] value;
+            } cycles;
+        } deadline;
         struct {
             struct {
                 logic [31:0] value;
@@ -1754,6 +1771,29 @@ module flk_registers (
         end
     end
     assign hwif_out.stride.value.value = field_storage.stride.value.value;
+    // Field: flk_registers.deadline.cycles
+    always_comb begin
+        automatic logic [31:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.deadline.cycles.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.deadline && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.deadline.cycles.value & ~decoded_wr_biten[31:0]) | (decoded_wr_data[31:0] & decoded_wr_biten[31:0]);
+            load_next_c = '1;
+        end
+        field_combo.deadline.cycles.next = next_c;
+        field_combo.deadline.cycles.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.deadline.cycles.value <= 32'h0;
+        end else begin
+            if(field_combo.deadline.cycles.load_next) begin
+                field_storage.deadline.cycles.value <= field_combo.deadline.cycles.next;
+            end
+        end
+    end
+    assign hwif_out.deadline.cycles.value = field_storage.deadline.cycles.value;
     // Field: flk_registers.table_low.value
     always_comb begin
         automatic logic [31:0] next_c;
@@ -2473,7 +2513,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h0;
+            readback_data_var[15:8] = 8'h1;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2523,6 +2563,9 @@ module flk_registers (
         if(rd_mux_addr == 10'h2c) begin
             readback_data_var[31:0] = hwif_in.counter_value.value.next;
         end
+        if(rd_mux_addr == 10'h30) begin
+            readback_data_var[15:0] = hwif_in.progress.pairs.next;
+        end
         if(rd_mux_addr == 10'h100) begin
             readback_data_var[15:0] = field_storage.frame.tag.value;
             readback_data_var[18:16] = field_storage.frame.mode.value;
@@ -2552,6 +2595,9 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h118) begin
             readback_data_var[16:0] = field_storage.stride.value.value;
+        end
+        if(rd_mux_addr == 10'h11c) begin
+            readback_data_var[31:0] = field_storage.deadline.cycles.value;
         end
         if(rd_mux_addr == 10'h120) begin
             readback_data_var[31:0] = field_storage.table_low.value.value;

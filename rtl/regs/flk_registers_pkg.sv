@@ -145,6 +145,14 @@ package flk_registers_pkg;
     } flk_registers__counter_value__in_t;
 
     typedef struct packed {
+        logic [15:0] next;
+    } flk_registers__progress__pairs__in_t;
+
+    typedef struct packed {
+        flk_registers__progress__pairs__in_t pairs;
+    } flk_registers__progress__in_t;
+
+    typedef struct packed {
         logic descriptor_locked;
         flk_registers__capability__in_t capability;
         flk_registers__status__in_t status;
@@ -152,6 +160,7 @@ package flk_registers_pkg;
         flk_registers__result__in_t result;
         flk_registers__frames__in_t frames;
         flk_registers__counter_value__in_t counter_value;
+        flk_registers__progress__in_t progress;
     } flk_registers__in_t;
 
     typedef struct packed {
@@ -297,6 +306,14 @@ package flk_registers_pkg;
     typedef struct packed {
         flk_registers__stride__value__out_t value;
     } flk_registers__stride__out_t;
+
+    typedef struct packed {
+        logic [31:0] value;
+    } flk_registers__deadline__cycles__out_t;
+
+    typedef struct packed {
+        flk_registers__deadline__cycles__out_t cycles;
+    } flk_registers__deadline__out_t;
 
     typedef struct packed {
         logic [31:0] value;
@@ -542,6 +559,7 @@ package flk_registers_pkg;
         flk_registers__record_beats__out_t record_beats;
         flk_registers__chunks__out_t chunks;
         flk_registers__stride__out_t stride;
+        flk_registers__deadline__out_t deadline;
         flk_registers__table_low__out_t table_low;
         flk_registers__table_high__out_t table_high;
         flk_registers__headers_low__out_t headers_low;
