@@ -1,6 +1,6 @@
 """Machines in whole frames: the same chip around the rendering stage of each configuration.
 
-`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/reference/chip.md has
+`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/results/chip.md has
 them beside it).
 `estimate` is a frame of `ChipConfig`, with whatever stage, lists and memory.
 """

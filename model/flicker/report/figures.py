@@ -306,7 +306,7 @@ def whole_system(views: Sequence[ViewResult]) -> Figure | None:
           {GSCORE: 1, FAITHFUL: 2.6})
     a.legend(fontsize=6, ncols=2)
     return Figure(
-        "fig10_whole_system", "Whole system", "10", "The chip that exists as RTL, by the models of its halves that are held to it (docs/reference/chip.md), around each rendering "
+        "fig10_whole_system", "Whole system", "10", "The chip that exists as RTL, by the models of its halves that are held to it (docs/results/chip.md), around each rendering "
         "stage. Stages in conic form have the paper's front end (FP16 scene, 3-sigma boxes, 32-byte records; GSCore lists by its oriented boxes), the others the "
         "default one (chunks, ellipses, 16 bytes). Cycles between frames; energy of the rendering stage and of DRAM traffic (front end and sorting have no energy "
         "model). The paper's speed is its average, its energy its maximum. Jetson XNX: published only, 1/14.4 of FLICKER's speed on average.",
