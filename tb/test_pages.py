@@ -33,8 +33,8 @@ SECTIONS = ("Figure", "Stages", "Ports", "Parameters", "Limits", "Verification")
 
 # Words that no page has: those of a diary, and those of our own with what the field says (docs/glossary.md).
 DIARY = (
-    r"(?:was|were) tried", r"tried (?:once|beside|and stopped)", r"before it did", r"used to (?:be|have|do)", r"no longer(?! than)", r"measured once", r"once,? by",
-    r"previously", r"formerly", r"nowadays", r"so far,", r"has been changed",
+    r"(?:was|were) tried", r"tried (?:once|beside|and stopped)", r"before it did", r"used to (?:be|have|do)", r"no longer(?! than)", r"measured once",
+    r"once,? by", r"previously", r"formerly", r"nowadays", r"so far,", r"has been changed",
 )
 PRIVATE = {
     r"answer(?:s|ed|ing)?": "response, respond", r"ask(?:s|ed)? for": "request", r"patience": "starvation limit", r"(?:a|the|its) watch": "watchdog, time-out",
@@ -197,7 +197,8 @@ def missing_modules(text: str) -> list[str]:
 @cache
 def sources() -> str:
     """Everything that may define a name of the hardware, of its benches or of the driver."""
-    files = [path for folder in ("rtl", "sw", "formal", "tb/top") for path in sorted((ROOT / folder).rglob("*")) if path.suffix in (".sv", ".h", ".c", ".rdl")]
+    folders = (ROOT / "rtl", ROOT / "sw", ROOT / "formal", ROOT / "tb" / "top")
+    files = [path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix in (".sv", ".h", ".c", ".rdl")]
     return "\n".join(path.read_text() + path.stem for path in files)
 
 
@@ -258,7 +259,8 @@ def missing_commands(text: str) -> list[str]:
             if words[1] not in options():
                 found.append(f"flicker {words[1]}")
                 continue
-            found += [f"flicker {words[1]} {word}" for word in words[2:] if re.fullmatch(r"--[a-z]\S*", word) and word.partition("=")[0] not in options()[words[1]]]
+            given = [word.partition("=")[0] for word in words[2:] if re.fullmatch(r"--[a-z]\S*", word)]
+            found += [f"flicker {words[1]} {option}" for option in given if option not in options()[words[1]]]
     every = {option for there in options().values() for option in there} | OTHERS.keys()
     for code in code_of(text):
         found += [option for option in re.findall(r"(?<![\w-])--[A-Za-z][\w-]*", code) if re.match(r"--", code) and option not in every]
@@ -276,7 +278,8 @@ def test_what_a_page_names_exists(page: Path) -> None:
 
 def test_what_is_missing_is_found() -> None:
     assert missing_paths("`rtl/flk_none.sv` `rtl/flk_top.sv` `rtl/*/flk_ctu.sv` `tb/<unit>.py` `rtl/none*`") == ["rtl/flk_none.sv", "rtl/none*"]
-    text = "`flicker.params.RenderConfig` `flicker.none.x` `flicker.cli.none` `flicker_tb.bench.config()` `flicker.sweep`\n```python\nfrom flicker.params import Nothing\n```\n"
+    text = "`flicker.params.RenderConfig` `flicker.none.x` `flicker.cli.none` `flicker_tb.bench.config()` `flicker.sweep`\n"
+    text += "```python\nfrom flicker.params import Nothing\n```\n"
     assert missing_modules(text) == ["flicker.none.x", "flicker.cli.none", "flicker.sweep", "flicker.params.Nothing"]
     assert missing_hardware("`flk_top` `flk_none` `flk_probe` `flk_fp_*` `flk_zz_*`") == ["flk_none", "flk_zz_"]
     text = "`make none` `make demo` `flicker none x` `flicker render SCENE --nonesuch` `--lanes 32` `--notthere`\n```\nflicker view scene.ply --wrong 1\n```\n"

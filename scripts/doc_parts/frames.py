@@ -1,4 +1,4 @@
-"""`make docs PART=frames`: few configurations on the real views, in docs/results/frames.md, and the way from the default to lanes in docs/results/exploration.md."""
+"""`make docs PART=frames`: few configurations on the real views, in docs/results/frames.md; from the default to lanes, in docs/results/exploration.md."""
 
 from __future__ import annotations
 
