@@ -19,7 +19,7 @@ from flicker.toolchain import ROOT
 
 OUTSIDE = ("README.md", "CONTRIBUTING.md", "sw/README.md")  # pages that are not below docs/
 VIRTUAL = {"project.md": "README.md", "contributing.md": "CONTRIBUTING.md", "driver.md": "sw/README.md"}  # their names in the site (scripts/site_hooks.py)
-LINK = re.compile(r"!?\[[^\]\[]*(?:!\[[^\]]*\]\([^)]*\)[^\]\[]*)?\]\(([^)\s]+)\)")
+LINK = re.compile(r"!?\[(?:[^\]\[\n]|\n(?!\n))*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"#{1,6} +(.+?) *#*$")
 
 
@@ -39,10 +39,13 @@ def prose(text: str) -> Iterator[tuple[int, str]]:
 
 
 def links_of(text: str) -> Iterator[tuple[int, str]]:
-    """Line and target of every link and picture; what stands in code is no link."""
+    """Line and target of every link and picture, whose words may go over the end of a line; what stands in code is no link."""
+    lines = [""] * (text.count("\n") + 1)
     for number, line in prose(text):
-        for match in LINK.finditer(re.sub(r"`[^`]*`", "code", line)):
-            yield number, match[1]
+        lines[number - 1] = re.sub(r"`[^`]*`", "code", line)
+    whole = "\n".join(lines)
+    for match in LINK.finditer(whole):
+        yield whole.count("\n", 0, match.start(1)) + 1, match[1]
 
 
 def slug(heading: str) -> str:

@@ -27,7 +27,7 @@ KINDS = ("guide", "reference", "results", "decisions")
 LONGEST = {"guide": 200, "reference": 200, "decisions": 80}  # lines of a page
 WRITTEN = 5400  # lines of guide, reference and decisions together, without what commands write between marks: fewer, not more
 COLUMNS = 260  # of a line of prose; rows of tables are as long as they are
-GENERATED = re.compile(r"^<!-- make (?:docs|generate)\b.*?-->\n.*?^<!-- end -->$", re.M | re.S)
+GENERATED = re.compile(r"^<!-- make (?:docs|generate)\b.*?-->\n.*?^<!-- end(?: of \w+)? -->$", re.M | re.S)
 CODE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 SECTIONS = ("Figure", "Stages", "Ports", "Parameters", "Limits", "Verification")  # of reference pages, in this order where they are there
 
@@ -107,6 +107,7 @@ def test_links_of_a_right_tree(tmp_path: Path) -> None:
     ("broken_links", {"docs/a.md": "[x](none.md)\n"}, "docs/a.md:1: no file none.md"),
     ("broken_links", {"docs/a.md": "[x](b.md#three)\n"}, "docs/a.md:1: no heading for b.md#three"),
     ("broken_links", {"docs/a.md": "![x](d.png)\n"}, "docs/a.md:1: no file d.png"),
+    ("broken_links", {"docs/a.md": "a [two\nwords](none.md)\n"}, "docs/a.md:2: no file none.md"),
     ("unlisted", {"docs/d.md": "\n"}, "mkdocs.yml: nav lacks d.md"),
     ("unlisted", {"mkdocs.yml": "nav: [project.md, a.md, b.md, d.md]\n"}, "mkdocs.yml: nav names d.md, which is not there"),
     ("unreachable", {"docs/d.md": "[x](a.md)\n"}, "docs/d.md: no links lead here from README.md"),
@@ -254,7 +255,7 @@ def missing_commands(text: str) -> list[str]:
             words = command.split()
         name = Path(words[0]).name
         if name == "make":
-            found += [f"make {word}" for word in words[1:] if "=" not in word and not word.startswith("[") and word not in targets()]
+            found += [f"make {word}" for word in words[1:] if "=" not in word and word[0] != "[" and word not in targets()]
         elif name == "flicker" and len(words) > 1 and not words[1].startswith("-"):
             if words[1] not in options():
                 found.append(f"flicker {words[1]}")
@@ -297,7 +298,7 @@ def test_every_module_and_package_has_its_page() -> None:
     folders = {path.name for path in (ROOT / "rtl").iterdir() if path.is_dir()}
     assert folders == set(re.findall(r"`rtl/(\w+)/`", architecture))
     package = ROOT / "model" / "flicker"
-    packages = {path.stem for path in package.iterdir() if (path.is_dir() and (path / "__init__.py").exists()) or (path.suffix == ".py" and path.stem != "__init__")}
+    packages = {path.stem for path in package.iterdir() if (path / "__init__.py").exists() or (path.suffix == ".py" and path.stem != "__init__")}
     assert packages - set(re.findall(r"`flicker\.(\w+)", architecture)) == set()
     assert "flk_render_stage" in architecture and "flk_lane_stage" in architecture
 
