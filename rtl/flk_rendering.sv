@@ -608,14 +608,15 @@ module flk_rendering
 
   assign pixels_done = writer_idle;
 
-  // Lines of runs that come on the way are written, too.
+  // Lines of runs that come on the way are written, too. Before the frame writer begins it knows no pairs.
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       stop_q    <= 1'b0;
       stopped_q <= 1'b0;
     end else begin
       stop_q    <= stop_i;
-      stopped_q <= stop_q && (stopped_q || (pairs_stopped && lines_idle && !store_valid));
+      stopped_q <= stop_q && (stopped_q || (state_q == RUN && pairs_stopped && lines_idle &&
+                                            !store_valid));
     end
   end
 

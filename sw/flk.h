@@ -47,6 +47,7 @@ typedef enum {
   FLK_FRAME_STRIDE,  /* stride too small, too large or no multiple of 32 */
   FLK_FRAME_OVERLAP, /* regions that overlap */
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
+  FLK_FRAME_DEADLINE, /* a deadline, on a chip of version 3.0, which has none */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -143,6 +144,7 @@ typedef struct {
   unsigned mode;         /* of the contribution test, FLK_CAT_* */
   int box;               /* lists by boxes of 3 standard deviations; else by ellipses */
   uint16_t tag;          /* comes back in the result */
+  uint32_t deadline;     /* cycles from the start, after which the frame ends as it is, with FLK_ERROR_LATE; 0: none */
 } flk_frame_t;
 
 /* What would make a wrong picture or write beyond regions. other: frame that may be under way beside this one, whose region this one must not touch; or NULL.
@@ -173,7 +175,12 @@ typedef struct {
 typedef struct {
   uint16_t tag;   /* of the frame that ended last */
   uint16_t error; /* 1 << FLK_ERROR_*; 0: none */
+  uint16_t pairs; /* of tiles written, the first ones of the walk (docs/reference/rendering.md); all of them in a frame without an error */
 } flk_result_t;
+
+/* Fill the picture in a frame buffer, which the host sees at `buffer`, with the background (of FLK_RGBA16F: transparent black): what a late frame does not write
+ * shows it. Without that, the picture before shows through. Bytes behind the rows stay. */
+void flk_frame_fill(const flk_frame_t *frame, void *buffer);
 
 /* Called between polls; another value than 0 ends the wait. */
 typedef int (*flk_pause_t)(void *user);
