@@ -7,7 +7,7 @@
 // error_o, until the next start: bit 0 lists could not be read, break their layout or are longer than is sorted, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
-// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/decisions/long_lists.md).
+// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
 // Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3, of runs 4 to 7), records (read, 256 bits), frame buffer and runs (write, 512 bits).
 // stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
 // nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/results/mutants.md).
+"""Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/reference/mutants.md).
 
     scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--match TEXT] [--check]
 

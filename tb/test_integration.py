@@ -1,4 +1,4 @@
-"""What docs/guide/integration.md says of the sources: clocks, resets, cells to replace, figures in its prose; the wrapper's parameters.
+"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures in its prose; the wrapper's parameters.
 
 Not covered: its templates and tables, which tb/test_docs.py and tb/test_tooling.py hold; frames and pins: tb/top/test_top_axi.py.
 """
@@ -64,7 +64,7 @@ def test_cells_to_replace() -> None:
 
 def test_figures_of_the_page() -> None:
     """Widths, sizes and constants in the prose."""
-    page = (ROOT / "docs" / "guide" / "integration.md").read_text()
+    page = (ROOT / "docs" / "reference" / "chip_ports.md").read_text()
     said = {"narrow": 5, "whole": 6}
     table = managers()
     assert all(m.size == (said["narrow"] if m.note.startswith("always") else said["whole"]) for m in table)

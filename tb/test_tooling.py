@@ -205,7 +205,7 @@ YOSYS = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pa
 
 def test_slang_reads_everything_and_the_template_fits() -> None:
     """No errors in the sources; the instantiation template of the page elaborates and is that of the module's ports."""
-    page = (ROOT / "docs/guide/integration.md").read_text()
+    page = (ROOT / "docs/reference/template_stage.md").read_text()
     template = page.split("<!-- make docs PART=instance -->\n```systemverilog\n")[1].split("```")[0]
     sys.path.insert(0, str(ROOT / "scripts"))
     from doc_parts.instance import elaborate

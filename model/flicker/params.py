@@ -16,7 +16,7 @@ from .errors import FlickerError
 
 
 class Form(IntEnum):
-    """How the Gaussian weight E is written (docs/architecture.md, splat record)."""
+    """How the Gaussian weight E is written (docs/reference/number_formats.md)."""
 
     CONIC = 0
     FACTORED = 1
@@ -64,7 +64,7 @@ COUNTER_BITS = 32
 FIXED_INT_BITS = 9
 FIXED_FRAC_BITS = 8
 
-# Registers of the pipelined operators (= their latency), so that no path is longer than 60 FO4 (docs/results/synthesis.md).
+# Registers of the pipelined operators (= their latency), so that no path is longer than 60 FO4 (docs/reference/synthesis.md).
 # A sum is an addition that cannot cancel: both operands are squares or of one sign.
 FP16_ADD_STAGES = 3
 FP16_SUM_STAGES = 2
@@ -156,12 +156,12 @@ MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a la
 
 @dataclass(frozen=True)
 class ChipMemories:
-    """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/results/chip_memory.md).
+    """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/reference/chip_memory.md).
 
     sorted_entries: longest list that a sorting unit takes in one reading. list_chunks: in a list reader's memory. sorted_ahead: entries of a sorting unit that
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
-    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; they have half as many runs, at most (docs/decisions/long_lists.md).
+    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; half as many runs at most (docs/reference/list_sorter.md).
     """
 
     sorted_entries: int = 2048
@@ -442,6 +442,6 @@ STAGES: dict[str, Stage] = {
 # The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
 # the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
 FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
-# What `flicker render` and `flicker demo` take when nothing else is said: best in cycles times area and in pictures (docs/results/exploration.md).
+# What `flicker render` and `flicker demo` take when nothing else is said: best in cycles times area and in pictures (docs/decisions/010-lanes-by-default.md).
 RECOMMENDED = RenderConfig(stage="lanes")
 NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}

@@ -37,7 +37,7 @@ package flk_param_pkg;
   localparam int unsigned RENDER_STAGES = 2;
   localparam logic [1:0][7:0] STAGE_LANE_ORDER = {8'd1, 8'd0};  // pixels keep their order in each lane, else in each mini-tile
 
-  // Rendering rules, rounded to FP16 (docs/architecture.md)
+  // Rendering rules, rounded to FP16 (docs/reference/number_formats.md)
   localparam logic [15:0] FP16_ONE = 16'h3c00;  // 1.0
   localparam logic [15:0] ALPHA_MIN = 16'h1c05;  // 1/255, rounded up
   localparam logic [15:0] ALPHA_MAX = 16'h3bec;  // 0.99

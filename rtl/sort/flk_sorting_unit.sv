@@ -3,7 +3,7 @@
 // Entries are {key 24, record 24, mask 4}; order is that of the upper 48 bits, unsigned, which are
 // distinct within a list. Lines hold in_count_i entries, the lowest, in any order; 0 only in the one line
 // of an empty list. Out come {record, mask}, then an element with out_end_o that carries no entry.
-// A list of more than Capacity entries (docs/decisions/long_lists.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
+// A list of more than Capacity entries (docs/reference/list_sorter.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
 // then an element with run_end_o. merging_o says that all of them have left; from then on its lines
 // come a second time as merge_*, in batches of at most Capacity entries: the entries of a batch are those
 // above the limit of the one before and, of lines with merge_limited_i, not above merge_limit_i.

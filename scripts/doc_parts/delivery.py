@@ -1,5 +1,5 @@
 """`make docs PART=delivery`: sorting and delivery alone, each as fast as it goes, for whole lists and for what cores take of them, in
-docs/reference/delivery.md."""
+docs/results/delivery.md."""
 
 from __future__ import annotations
 

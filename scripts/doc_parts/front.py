@@ -1,5 +1,5 @@
 """`make docs PART=front`: what the bit-true front end does to pictures of the demo scene and the real ones, and its number formats, in
-docs/reference/front_end.md."""
+docs/results/front_end.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=front_hardware`: cycles and bytes of the front end's RTL, in docs/reference/front_end.md. Bytes that differ from the golden model's are
+"""`make docs PART=front_hardware`: cycles and bytes of the front end's RTL, in docs/results/front_end.md. Bytes that differ from the golden model's are
 an error."""
 
 from __future__ import annotations

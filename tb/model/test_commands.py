@@ -63,6 +63,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make report(?: .*)?", "slow"),
     (r"make (?:setup|test|lint)", "tb/test_tooling.py::test_copied_checkout_tests_itself"),
     (r"make test SLOW=1", "is what runs this"),
+    (r"make site", "tb/test_pages.py::test_site_is_built"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),
     (r"scripts/gen_\w+.py --check", "tb/common/test_arithmetic.py::test_generated_packages"),

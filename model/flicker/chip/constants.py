@@ -129,7 +129,7 @@ SOURCES = {
     "GEOMETRY_NUMBERS": "paper, Sec. IV-A: 10 geometric parameters (mean 3, scale 3, quaternion 4)",
     "RECORD_BYTES": "assumption: mean 2 float32, shape 3, colour 3 and opacity in FP16, depth key, spiky bit, padded to one burst",
     "BOX_BYTES": "assumption: depth key and sub-tile box (4 x 12 bits) of a Gaussian, for the second pass of the counting scheme",
-    "KEY_BITS": "docs/architecture.md: float32 bits of the depth; fewer are measured in docs/decisions/lists_and_sorting.md",
+    "KEY_BITS": "docs/reference/number_formats.md: float32 bits of the depth; fewer are measured in docs/results/list_schemes.md",
     "ID_BITS": "assumption: up to 16.7 million visible Gaussians a frame",
     "LINE_BYTES": "one DRAM burst",
     "CHUNK_BYTES": "assumption: linked chunks of two bursts",

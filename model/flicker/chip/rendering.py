@@ -4,7 +4,7 @@ One pass over the records in the order in which delivery looks them up, each wit
 cycle each, when all queues have places), taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies
 are those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are
 left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its end; lines
-of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/reference/rendering.md has the estimate beside
+of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/results/rendering.md has the estimate beside
 the RTL.
 
 Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenly to the elements that it takes.

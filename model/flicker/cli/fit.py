@@ -68,7 +68,7 @@ def fit(
     degree: Annotated[int, typer.Option(help="of the spherical harmonics; of --from, its own", min=0, max=3)] = 2,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     background: Annotated[str, typer.Option(help="black, white or r,g,b: behind the scene, and behind what is transparent in the pictures")] = "black",
-    engine: Annotated[str, typer.Option(help="what draws: numba, or gsplat on a GPU (docs/guide/fit.md), whose bits differ from run to run")] = "numba",
+    engine: Annotated[str, typer.Option(help="what draws: numba, or gsplat on a GPU (docs/reference/fit.md), whose bits differ from run to run")] = "numba",
     exposure: Annotated[bool, typer.Option("--exposure", help="an affine colour for each photograph")] = False,
     images: Annotated[str | None, typer.Option(help="folder of the photographs, in the data set or anywhere; default: where the data set has them")] = None,
     checkpoint: Annotated[Path | None, typer.Option(
