@@ -638,7 +638,8 @@ def test_fill(lib: ctypes.CDLL, chunk: PackedScene, form: PixelFormat) -> None:
     buffer = np.full((rows + 1) * frame.stride, 77, np.uint8)
     lib.flk_frame_fill(ctypes.byref(frame), ctypes.c_void_p(buffer.ctypes.data))
     got = buffer.reshape(rows + 1, frame.stride)
-    assert np.array_equal(got[:rows, :row], np.tile([0] if form is PixelFormat.RGBA16F else [10, 20, 30], (rows, row // (1 if form is PixelFormat.RGBA16F else 3))))
+    pixel = [0] if form is PixelFormat.RGBA16F else [10, 20, 30]
+    assert np.array_equal(got[:rows, :row], np.tile(pixel, (rows, row // len(pixel))))
     assert (got[:rows, row:] == 77).all() and (got[rows] == 77).all()
 
 

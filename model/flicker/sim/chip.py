@@ -77,7 +77,7 @@ class Usage:
 
 @dataclass(eq=False)
 class ChipFrame:
-    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are as before. error: bits of ResultError. pairs: of tiles written.
+    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write stay. error: bits of ResultError. pairs: of tiles written.
 
     front, rendering: counters of the halves by name, int or int64 (n,). stage: int64 (cores, 32). stamps: cycle in which the frame was taken, left the front
     end, entered and left the rendering half. usage: of a frame that had the chip to itself (`ChipSession.render`).
