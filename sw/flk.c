@@ -17,6 +17,7 @@
 #define ADDRESS_END ((uint64_t)1 << 40)
 #define TILE 16u
 #define PAIR (2u * TILE)
+#define MINOR_BY_DISTANCE 1u /* version from which frame.by_distance is there */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -459,6 +460,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   flk_status_t status = flk_frame_check(frame, other, device->form, device->lists);
   if (status == FLK_OK)
     status = flk_camera_registers(&camera, &frame->camera);
+  if (status == FLK_OK && frame->by_distance != 0 && device->minor < MINOR_BY_DISTANCE)
+    status = FLK_DEVICE_VERSION;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)
@@ -467,7 +470,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put(device, FLK_FRAME_OFFSET,
       FIELD(FLK_FRAME_TAG, frame->tag) | FIELD(FLK_FRAME_MODE, frame->mode) | FIELD(FLK_FRAME_RGBA, frame->pixel_format == FLK_RGBA16F) |
           FIELD(FLK_FRAME_BOX, frame->box != 0) | FIELD(FLK_FRAME_CHUNKED, scene->format == FLK_FORMAT_CHUNK) |
-          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0));
+          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0) |
+          FIELD(FLK_FRAME_BY_DISTANCE, frame->by_distance != 0));
   put(device, FLK_BACKGROUND_OFFSET,
       FIELD(FLK_BACKGROUND_RED, frame->background[0]) | FIELD(FLK_BACKGROUND_GREEN, frame->background[1]) |
           FIELD(FLK_BACKGROUND_BLUE, frame->background[2]));

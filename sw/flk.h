@@ -49,7 +49,7 @@ typedef enum {
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
-  FLK_DEVICE_VERSION, /* registers of another major version */
+  FLK_DEVICE_VERSION, /* registers of another major version, or of a minor one without what a frame asks for */
   FLK_BUSY,           /* not ready for a frame, or the frame has not ended */
   FLK_DEAD,           /* given up after a time-out: only flk_reset helps */
   FLK_WAITED,         /* the bound of flk_wait is reached */
@@ -142,6 +142,7 @@ typedef struct {
   uint8_t background[3]; /* red, green, blue, of FLK_RGB8 */
   unsigned mode;         /* of the contribution test, FLK_CAT_* */
   int box;               /* lists by boxes of 3 standard deviations; else by ellipses */
+  int by_distance;       /* sorted by distance to the camera; else by depth along its axis */
   uint16_t tag;          /* comes back in the result */
 } flk_frame_t;
 

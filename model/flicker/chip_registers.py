@@ -36,7 +36,8 @@ REGISTERS = {
     "counter_value": Register(0x02C, 1, {"value": (0, 32)}),
     "frame": Register(
         0x100, 1, {
-            "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1)
+            "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1), "by_distance":
+            (25, 1)
         },
     ),
     "background": Register(0x104, 1, {"red": (0, 8), "green": (8, 8), "blue": (16, 8)}),
