@@ -449,7 +449,7 @@ def good_frame(
     region.pointers = region.lists + lib.flk_list_bytes(chunks)
     frame = CFrame(
         ctypes.pointer(scene), c_camera(camera_of(width, height)), region, region.pointers + lib.flk_pointer_bytes(width, height),
-        lib.flk_least_stride(width, form), form, (u8 * 3)(10, 20, 30), int(CatMode.SMOOTH), 0, 0xBEEF,
+        lib.flk_least_stride(width, form), form, (u8 * 3)(10, 20, 30), int(CatMode.SMOOTH), 0, 0, 0xBEEF,
     )
     return frame, scene
 
