@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -15,8 +16,9 @@ import numba
 import numpy as np
 
 from ...arithmetic.ff import ff_bits, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_round, pick
+from ...front.pops import Seen
 from ...front.records import SubtileLists
-from ...params import SUBTILE, TILE, SortOrder
+from ...params import SUBTILE, TILE, Form, SortOrder
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .colour import (
@@ -335,6 +337,15 @@ class FrontFrame:
         by_rank = np.argsort(rank[self.entry_splat], kind="stable")
         tile_cols = -(-self.camera.width // TILE)
         return _subtiles(self.entry_splat[by_rank], self.entry_tile[by_rank], self.entry_mask[by_rank], tile_cols, cols, rows)
+
+    def seen(self) -> Seen:
+        """What pops are counted of (`flicker.front.pops`). Not of a frame of the RTL, whose records do not say whose they are."""
+        start, entry = self.sorted_subtiles()
+        splats, factored = self.splats(), self.kind.form is Form.FACTORED
+        s0, s1, s2 = splats.shape.T
+        energy = math.log(2.0) * np.stack([s0 * s0, 2.0 * s0 * s1, s1 * s1 + s2 * s2], axis=1) if factored else splats.shape
+        order = np.argsort(self.key, kind="stable")
+        return Seen.of(self.gaussian, order, splats.mean / (1 << MEAN_FRACTION), energy, splats.opacity, start, entry, self.camera)
 
     def subtile_lists(self) -> SubtileLists:
         """Lists and splats as the rendering stage takes them."""
