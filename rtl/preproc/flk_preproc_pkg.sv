@@ -1,4 +1,4 @@
-// Types of the preprocessing core: what its units hand to each other (docs/front_end.md).
+// Types of the preprocessing core: what its units hand to each other (docs/reference/front_end.md).
 package flk_preproc_pkg;
   import flk_front_pkg::*;
 

@@ -20,6 +20,7 @@ module flk_descriptor
   assign descriptor_o.record_beats = registers_i.record_beats.value.value;
   assign descriptor_o.chunks       = registers_i.chunks.value.value;
   assign descriptor_o.stride       = registers_i.stride.value.value;
+  assign descriptor_o.deadline     = registers_i.deadline.cycles.value;
 
   assign descriptor_o.scene_table  = {registers_i.table_high.value.value,
                                       registers_i.table_low.value.value};

@@ -30,7 +30,7 @@ from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import chip_walk, render_chip
 from flicker.golden.delivery import may_be_given
-from flicker.golden.frame_buffer import PixelFormat, least_stride
+from flicker.golden.frame_buffer import PixelFormat, late_frame_buffer, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
@@ -658,6 +658,53 @@ def test_time_out_before_a_release() -> None:
         revive(chip)
         assert chip.register("interrupt") == 0
         check(chip, view)
+
+
+OVERRUN = round(0.02 * 1e9 / 90)  # cycles: 2 % of a slot of 1/90 s at 1 GHz
+
+
+def test_deadlines() -> None:
+    """At random times, with pauses and DRAM, alone and beside a frame that has none: what is written are the first pairs of the walk, whole; the rest of the
+    buffer stays; the frame beside it and the next one are right. Ends within 2 % of a slot of 1/90 s at 1 GHz."""
+    rng = random.Random(f"{seed()} deadlines")
+    port = replace(PORT, stall={name: 0.2 for name in CHANNELS}, seed=seed())
+    view, other = camera(160, 90), camera(80, 40, x=0.5)
+    with session(port=port, memory=MemoryOptions(DramConfig().timing)) as chip:
+        frames = [chip.frame(v, chip.place(v), background=BLUE, tag=k) for k, v in enumerate((view, other))]
+        chip.start(frames[0])
+        whole = chip.finish(frames[0], LIMIT)
+        compare(chip, view, whole)
+        assert whole.pairs == 5 * 6
+        front = whole.stamps["front_done"] - whole.stamps["taken"]
+        all_ = whole.stamps["rendering_done"] - whole.stamps["taken"]
+        seen = set()
+        for turn in range(rounds(14, 60)):
+            frames[0].deadline = rng.choice([rng.randint(1, front), rng.randint(front, all_), rng.randint(front, all_)])
+            beside, first = turn % 2, rng.random() < 0.5
+            frames[0].frame_buffer = chip.allocate(whole.buffer.size, "frame")
+            before = chip.buffer(frames[0])
+            order = [0] if not beside else [0, 1] if first else [1, 0]
+            done = {}
+            chip.start(frames[order[0]])
+            for number in order[1:]:
+                while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
+                    chip.step(5)
+                chip.start(frames[number], frames[1 - number])
+            for number in order:
+                done[number] = chip.finish(frames[number], LIMIT)
+            late = done[0]
+            assert late.error in (0, 1 << ResultError.LATE) and (late.error == 0) == (late.pairs == whole.pairs), late.errors
+            assert np.array_equal(late.buffer, late_frame_buffer(before, whole.buffer, late.pairs, 10, 6, PixelFormat.RGB8)), late.pairs
+            seen.add((late.error > 0, late.pairs > 0))
+            if order[0] == 0:  # nothing before it
+                ended = late.stamps["rendering_done"] if late.pairs else late.stamps["front_done"]
+                assert ended - late.stamps["taken"] - frames[0].deadline < OVERRUN
+            if beside:
+                compare(chip, other, done[1])
+        assert {(True, True), (True, False)} <= seen
+        frames[0].deadline = 0
+        chip.start(frames[0])
+        compare(chip, view, chip.finish(frames[0], LIMIT))
 
 
 @pytest.mark.slow

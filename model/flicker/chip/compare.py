@@ -1,6 +1,7 @@
 """Machines in whole frames: the same chip around the rendering stage of each configuration.
 
-`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/chip.md has them beside it).
+`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/reference/chip.md has
+them beside it).
 `estimate` is a frame of `ChipConfig`, with whatever stage, lists and memory.
 """
 

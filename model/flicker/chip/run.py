@@ -1,4 +1,4 @@
-"""A view on the whole chip, verilated or its bit-true model: the picture of its frame buffer, and what the frame cost (docs/chip.md)."""
+"""A view on the whole chip, verilated or its bit-true model: the picture of its frame buffer, and what the frame cost (docs/reference/chip.md)."""
 
 from __future__ import annotations
 

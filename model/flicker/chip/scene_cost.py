@@ -1,4 +1,4 @@
-"""What a scene costs on the chip, view by view, and which of its Gaussians cost more than they give (docs/scene_cost.md).
+"""What a scene costs on the chip, view by view, and which of its Gaussians cost more than they give (docs/reference/scene_cost.md).
 
     cost = scene_cost(scene, cameras)
     cost.views[0].cycles, cost.findings(), cost.dearest(10)

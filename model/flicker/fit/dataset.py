@@ -1,4 +1,4 @@
-"""Posed photographs: `transforms.json` of NeRF and nerfstudio, NeRF's synthetic scenes, COLMAP models with their pictures (docs/fit.md)."""
+"""Posed photographs: `transforms.json` of NeRF and nerfstudio, NeRF's synthetic scenes, COLMAP models with their pictures (docs/guide/fit.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verilated front end: a packed scene in memory, a frame, and what it leaves there (docs/front_end.md).
+"""The verilated front end: a packed scene in memory, a frame, and what it leaves there (docs/reference/front_end.md).
 
     frame = front_rtl(packed, camera)
     frame.records, frame.pointers ...      # to be compared with golden.front.memory.front_memory
