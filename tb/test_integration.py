@@ -1,4 +1,4 @@
-"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures in its prose; the wrapper's parameters.
+"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures; the wrapper's parameters.
 
 Not covered: its templates and tables, which tb/test_docs.py and tb/test_tooling.py hold; frames and pins: tb/top/test_top_axi.py.
 """
