@@ -156,6 +156,7 @@ module flk_top
   logic                             units_rst_nq, aborted_q, abort_q, dead_q;
   logic                             front_rst_nq, front_rst_n, rendering_rst_nq, rendering_rst_n;
   logic                             drained, stuck, forget, hold;
+  logic                             front_reset, rendering_reset;  // of a half that is stopped
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -221,11 +222,11 @@ module flk_top
   logic [15:0]          tag, pairs, started, finished;
   frame_error_t         frame_error, failure;
   logic                 front_busy, rendering_busy;
-  logic                 front_start, front_idle, front_end, front_stop, front_stopped, front_reset;
+  logic                 front_start, front_idle, front_end, front_stop, front_stopped;
   logic [FRONT_ERRORS-1:0] front_error;
   front_registers_t     front;
   logic                 rendering_start, rendering_idle, rendering_end;
-  logic                 rendering_stop, pairs_stopped, rendering_drained, rendering_reset;
+  logic                 rendering_stop, pairs_stopped, rendering_drained;
   logic [15:0]          rendering_left;
   logic [2:0]           rendering_error;
   rendering_registers_t rendering;

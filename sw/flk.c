@@ -17,7 +17,8 @@
 #define ADDRESS_END ((uint64_t)1 << 40)
 #define TILE 16u
 #define PAIR (2u * TILE)
-#define MINOR_DEADLINE 1u /* of the version: since then there are deadlines */
+#define MINOR_DEADLINE 1u /* of the version: since then there are deadlines, */
+#define MINOR_BY_DISTANCE 2u /* and frames by distance */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -47,6 +48,7 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_RECORDS] = "frame: region of records too small, or more records than the chip counts",
     [FLK_FRAME_CHUNKS] = "frame: chunks not 1 to 2^24",
     [FLK_FRAME_DEADLINE] = "frame: the chip has no deadlines",
+    [FLK_FRAME_ORDER] = "frame: the chip does not sort by distance",
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
@@ -474,6 +476,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
     status = flk_camera_registers(&camera, &frame->camera);
   if (status == FLK_OK && frame->deadline != 0 && device->minor < MINOR_DEADLINE)
     status = FLK_FRAME_DEADLINE;
+  if (status == FLK_OK && frame->by_distance != 0 && device->minor < MINOR_BY_DISTANCE)
+    status = FLK_FRAME_ORDER;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)
@@ -482,7 +486,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put(device, FLK_FRAME_OFFSET,
       FIELD(FLK_FRAME_TAG, frame->tag) | FIELD(FLK_FRAME_MODE, frame->mode) | FIELD(FLK_FRAME_RGBA, frame->pixel_format == FLK_RGBA16F) |
           FIELD(FLK_FRAME_BOX, frame->box != 0) | FIELD(FLK_FRAME_CHUNKED, scene->format == FLK_FORMAT_CHUNK) |
-          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0));
+          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0) |
+          FIELD(FLK_FRAME_BY_DISTANCE, frame->by_distance != 0));
   put(device, FLK_BACKGROUND_OFFSET,
       FIELD(FLK_BACKGROUND_RED, frame->background[0]) | FIELD(FLK_BACKGROUND_GREEN, frame->background[1]) |
           FIELD(FLK_BACKGROUND_BLUE, frame->background[2]));

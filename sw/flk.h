@@ -48,6 +48,7 @@ typedef enum {
   FLK_FRAME_OVERLAP, /* regions that overlap */
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
   FLK_FRAME_DEADLINE, /* a deadline, on a chip of version 3.0, which has none */
+  FLK_FRAME_ORDER,    /* by distance, on a chip older than version 3.2, which sorts by depth alone */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -145,6 +146,7 @@ typedef struct {
   int box;               /* lists by boxes of 3 standard deviations; else by ellipses */
   uint16_t tag;          /* comes back in the result */
   uint32_t deadline;     /* cycles from the start, after which the frame ends as it is, with FLK_ERROR_LATE; 0: none */
+  int by_distance;       /* sorted by distance to the camera; else by depth along its axis */
 } flk_frame_t;
 
 /* What would make a wrong picture or write beyond regions. other: frame that may be under way beside this one, whose region this one must not touch; or NULL.

@@ -37,7 +37,8 @@ REGISTERS = {
     "progress": Register(0x030, 1, {"pairs": (0, 16)}),
     "frame": Register(
         0x100, 1, {
-            "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1)
+            "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1), "by_distance":
+            (25, 1)
         },
     ),
     "background": Register(0x104, 1, {"red": (0, 8), "green": (8, 8), "blue": (16, 8)}),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import IntEnum
+from enum import Enum, IntEnum
 
 from .errors import FlickerError
 
@@ -47,6 +47,13 @@ class Coords(IntEnum):
 
     LOCAL = 0  # relative to the sub-tile
     ABSOLUTE = 1  # screen coordinates in FP16, made local by an FP16 subtraction
+
+
+class SortOrder(str, Enum):
+    """What splats are sorted by, near to far (docs/decisions/order_of_depth.md)."""
+
+    DEPTH = "depth"  # along the camera's axis
+    DISTANCE = "distance"  # to the camera: stays while it turns on the spot
 
 
 TILE = 16

@@ -21,6 +21,7 @@ package flk_preproc_pkg;
     logic                      chunked;  // the image's format
     logic                      box;      // lists by boxes of 3 standard deviations
     logic                      antialiased;  // opacities have their factor
+    logic                      by_distance;  // keys of distances; else of depths
     logic [12:0]               width;    // pixels
     logic [12:0]               height;
     position_t [2:0][2:0]      view;

@@ -531,6 +531,10 @@ module flk_registers (
                 logic next;
                 logic load_next;
             } off_centre;
+            struct {
+                logic next;
+                logic load_next;
+            } by_distance;
         } frame;
         struct {
             struct {
@@ -841,6 +845,9 @@ module flk_registers (
             struct {
                 logic value;
             } off_centre;
+            struct {
+                logic value;
+            } by_distance;
         } frame;
         struct {
             struct {
@@ -1564,6 +1571,29 @@ module flk_registers (
         end
     end
     assign hwif_out.frame.off_centre.value = field_storage.frame.off_centre.value;
+    // Field: flk_registers.frame.by_distance
+    always_comb begin
+        automatic logic [0:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.frame.by_distance.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.frame && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.frame.by_distance.value & ~decoded_wr_biten[25:25]) | (decoded_wr_data[25:25] & decoded_wr_biten[25:25]);
+            load_next_c = '1;
+        end
+        field_combo.frame.by_distance.next = next_c;
+        field_combo.frame.by_distance.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.frame.by_distance.value <= 1'h0;
+        end else begin
+            if(field_combo.frame.by_distance.load_next) begin
+                field_storage.frame.by_distance.value <= field_combo.frame.by_distance.next;
+            end
+        end
+    end
+    assign hwif_out.frame.by_distance.value = field_storage.frame.by_distance.value;
     // Field: flk_registers.background.red
     always_comb begin
         automatic logic [7:0] next_c;
@@ -2513,7 +2543,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h1;
+            readback_data_var[15:8] = 8'h2;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2574,6 +2604,7 @@ module flk_registers (
             readback_data_var[22] = field_storage.frame.chunked.value;
             readback_data_var[23] = field_storage.frame.antialiased.value;
             readback_data_var[24] = field_storage.frame.off_centre.value;
+            readback_data_var[25] = field_storage.frame.by_distance.value;
         end
         if(rd_mux_addr == 10'h104) begin
             readback_data_var[7:0] = field_storage.background.red.value;

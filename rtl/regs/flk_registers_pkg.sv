@@ -235,6 +235,10 @@ package flk_registers_pkg;
     } flk_registers__frame__off_centre__out_t;
 
     typedef struct packed {
+        logic value;
+    } flk_registers__frame__by_distance__out_t;
+
+    typedef struct packed {
         flk_registers__frame__tag__out_t tag;
         flk_registers__frame__mode__out_t mode;
         flk_registers__frame__rgba__out_t rgba;
@@ -242,6 +246,7 @@ package flk_registers_pkg;
         flk_registers__frame__chunked__out_t chunked;
         flk_registers__frame__antialiased__out_t antialiased;
         flk_registers__frame__off_centre__out_t off_centre;
+        flk_registers__frame__by_distance__out_t by_distance;
     } flk_registers__frame__out_t;
 
     typedef struct packed {

@@ -42,6 +42,7 @@ module flk_descriptor
   assign descriptor_o.lane.chunked = registers_i.frame.chunked.value;
   assign descriptor_o.lane.box     = registers_i.frame.box.value;
   assign descriptor_o.lane.antialiased = registers_i.frame.antialiased.value;
+  assign descriptor_o.lane.by_distance = registers_i.frame.by_distance.value;
   assign descriptor_o.lane.width   = registers_i.size.width.value;
   assign descriptor_o.lane.height  = registers_i.size.height.value;
 

@@ -99,7 +99,7 @@ module flk_frame_control
   state_e       front_q, render_q;
   logic         pending_q, take, hand_over, unacknowledged_q, may_copy;
   logic         front_bank_q, render_bank_q;
-  logic         front_due_q, render_due_q;
+  logic         front_due_q, render_due_q, cut_q;
   logic [1:0]   check_q;
   descriptor_t  frame_q;
   frame_error_t front_error_q, render_error_q;
@@ -277,7 +277,7 @@ module flk_frame_control
 
   // ---- rendering half ---------------------------------------------------------------------------------
 
-  logic                 post, post_q, rendered_q, render_leaves, render, cut_q;
+  logic                 post, post_q, rendered_q, render_leaves, render;
   logic [1:0]           render_reset_q;
   logic [15:0]          tag_q, pairs_q;
   logic [3:0][31:0]     stamps_q;

@@ -14,7 +14,7 @@ from flicker.params import CatMode
 
 # Fields, most significant first, as in flk_top_pkg.descriptor_t, flk_preproc_pkg.front_registers_t and flk_rendering_pkg.rendering_registers_t.
 CULL = 32 * (3 + 15 + 5 + 5)
-LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 4) + 2 * 23))
+LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("by_distance", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 4) + 2 * 23))
 ADDRESSES = ("scene_table", "headers", "geometry", "colours", "records", "lists", "pointers", "frame_buffer")
 DESCRIPTOR = (
     ("tag", 16), ("mode", 3), ("rgba", 1), ("background", 24), ("cull", CULL), *LANE, *((name, 40) for name in ADDRESSES),

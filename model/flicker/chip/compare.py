@@ -126,7 +126,7 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
         key = configuration.form, configuration.lists == "obb", own_sorter(configuration)
         if key not in fronts:
             format_, lists = FRONTS[configuration.form]
-            front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
+            front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form), order=view.order)
             front = by_oriented_boxes(front) if key[1] else front
             fronts[key] = _first_half(front, sizes, dram, not key[2])
         first, tables = fronts[key]

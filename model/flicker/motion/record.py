@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
+from ..front.pops import pops
 from ..output import write_records
 from ..scene import Scene
 from ..scene.camera import Camera
@@ -22,7 +23,7 @@ from .keep import Kept
 
 COLUMNS = (
     "frame", "time_s", "visible", "tile_entries", "subtile_entries", "psnr_db", "temporal_psnr_db", "jumps", "ssim", "flip", "warping_error",
-    "warping_error_reference", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
+    "warping_error_reference", "pops", "popped", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
 )
 
 
@@ -94,6 +95,8 @@ class _Figures:
                 "warping_error": warping_error(before.image, made.image, there, both),
                 "warping_error_reference": warping_error(before.reference, made.reference, there, both),
             }
+        if made.seen is not None and before is not None and before.seen is not None:
+            found |= asdict(pops(before.seen, made.seen))
         return found
 
 
@@ -103,8 +106,8 @@ def record(path: Recording, kept: Kept, workers: int, told: Callable[[int], None
     first = len(kept.rows)
     if first == len(path.cameras):
         return
-    # The errors of the last frame that is there are those of a picture of more than 8 bits: it is made once more.
-    again = first > 0 and path.wanted.reference
+    # The errors of the last frame that is there are those of a picture of more than 8 bits, and its lists are not kept: it is made once more.
+    again = first > 0 and (path.wanted.reference or path.wanted.pops)
     for made in frames(path.scene, path.file, path.cameras, path.wanted, first - again, workers):
         row = {"frame": made.number, "time_s": made.number / path.fps, **figures.of(made), **made.facts}
         if "cycles" in row:

@@ -18,7 +18,7 @@ from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
-from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig
+from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
 from . import driver, half, preprocessing, rendering
@@ -77,7 +77,7 @@ class Usage:
 
 @dataclass(eq=False)
 class ChipFrame:
-    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are as before. error: bits of ResultError. pairs: of tiles written.
+    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write stay. error: bits of ResultError. pairs: of tiles written.
 
     front, rendering: counters of the halves by name, int or int64 (n,). stage: int64 (cores, 32). stamps: cycle in which the frame was taken, left the front
     end, entered and left the rendering half. usage: of a frame that had the chip to itself (`ChipSession.render`).
@@ -220,12 +220,12 @@ class ChipSession(Half):
 
     def frame(
         self, camera: Camera, place: Place, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0),
-        lists: ListKind = ListKind.ELLIPSE, tag: int = 0, deadline: int = 0,
+        lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH, tag: int = 0, deadline: int = 0,
     ) -> driver.CFrame:
         """The driver's description of a frame."""
         return driver.CFrame(
             ctypes.pointer(self.scene), driver.CCamera.of(camera), place.region, place.frame_buffer, place.stride, int(format_),
-            (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag, deadline,
+            (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag, deadline, order is SortOrder.DISTANCE,
         )
 
     def start(self, frame: driver.CFrame, other: driver.CFrame | None = None) -> int:
@@ -309,13 +309,13 @@ class ChipSession(Half):
 
     def render(
         self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE,
-        limit: int = LIMIT, progress: Callable[[int, int], None] | None = None,
+        order: SortOrder = SortOrder.DEPTH, limit: int = LIMIT, progress: Callable[[int, int], None] | None = None,
     ) -> ChipFrame:
         """A frame; list memory grows until it suffices. FlickerError for any other fault."""
         chunks: int | None = None
         while True:
             place = self.place(camera, format_, chunks=chunks)
-            frame = self.frame(camera, place, format_, background=background, lists=lists)
+            frame = self.frame(camera, place, format_, background=background, lists=lists, order=order)
             before = self.usage()
             self.start(frame)
             done = self.finish(frame, limit, progress)

@@ -54,7 +54,7 @@ class CRegion(ctypes.Structure):
 class CFrame(ctypes.Structure):
     _fields_ = [
         ("scene", ctypes.POINTER(CScene)), ("camera", CCamera), ("region", CRegion), ("frame_buffer", u64), ("stride", u32), ("pixel_format", ctypes.c_uint),
-        ("background", u8 * 3), ("mode", ctypes.c_uint), ("box", ctypes.c_int), ("tag", u16), ("deadline", u32),
+        ("background", u8 * 3), ("mode", ctypes.c_uint), ("box", ctypes.c_int), ("tag", u16), ("deadline", u32), ("by_distance", ctypes.c_int),
     ]
 
 
