@@ -1,4 +1,4 @@
-"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures in prose; the wrapper's parameters.
+"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures; the wrapper's parameters.
 
 Not covered: its templates and tables, which tb/test_docs.py and tb/test_tooling.py hold; frames and pins: tb/top/test_top_axi.py.
 """
@@ -38,7 +38,7 @@ def test_clocks_and_resets() -> None:
         assert events <= {f"posedge {clock}", f"posedge {clock} or negedge {reset}"}, path.name
         assert ("always_latch" in text) == (path.stem == "flk_clock_gate"), path.name
         connected = set(re.findall(r"\.rst_ni\s*\(\s*(.*?)\s*\)", text)) - {"rst_ni"}
-        assert connected <= {"flk_top": {"units_rst_n"}, "flk_top_axi": {"rst_n", "aresetn"}}.get(path.stem, set()), path.name
+        assert connected <= {"flk_top": {"front_rst_n", "rendering_rst_n"}, "flk_top_axi": {"rst_n", "aresetn"}}.get(path.stem, set()), path.name
         clocks = set(re.findall(r"\.clk_i\s*\(\s*(.*?)\s*\)", text)) - {"clk_i", "1'b0"}
         assert clocks <= {"flk_top": {"front_clk", "rendering_clk"}, "flk_top_axi": {"aclk"}}.get(path.stem, set()), path.name
         inside = re.findall(r"flk_clock_gate (\w+) \((.*?)\);", text, re.S)
@@ -46,7 +46,8 @@ def test_clocks_and_resets() -> None:
         assert all(re.search(r"\.test_en_i,", pins) for _, pins in inside)
         gates += len(inside)
     assert gates == 2
-    assert re.search(r"assign units_rst_n\s*= test_en_i \? rst_ni : units_rst_nq;", code(TOP))
+    for half in ("front", "rendering"):
+        assert re.search(rf"assign {half}_rst_n\s*= rst_ni && \(test_en_i \|\| {half}_rst_nq\);", code(TOP))
     assert re.search(r"assign rst_no\s*= test_en_i \? rst_ni : ", code(ROOT / "rtl" / "common" / "flk_reset_sync.sv"))
 
 
