@@ -90,6 +90,8 @@ def path(
         raise FlickerError("--amplify: for --side-by-side only")
     if cycles and chosen.engine is EngineChoice.REFERENCE:
         raise FlickerError("--cycles: not with --engine reference, which is no machine")
+    if workers is not None and chosen.engine is EngineChoice.CHIP:
+        raise FlickerError("--workers: not with --engine chip, whose frames go through one simulation")
     if cycles and chosen.config.coords is Coords.ABSOLUTE:
         raise FlickerError("--cycles: not with --coords absolute, of which no chip has records")
     second = None if side_by_side in (None, REFERENCE) else parse_engine(side_by_side, "--side-by-side")  # type: ignore[arg-type]
@@ -121,6 +123,12 @@ def path(
         if out.suffix.lower() in CODECS:
             ffmpeg()
         drawing = chosen.drawing()
+    simulator = {}
+    if chosen.engine is EngineChoice.CHIP:
+        from ..sim.chip import build
+
+        with steps.step("building the chip's simulator (once per configuration)"):
+            simulator = {"simulator": build(chosen.config).parent.name}  # its name is of the RTL
     with steps.step(f"loading {scene_title(scene)}"):
         source = open_scene(scene, cameras, up)
         kind = "keyframes" if keyframes else made[0].removeprefix("--") if made else None
@@ -138,7 +146,7 @@ def path(
         write_text(save_cameras, cameras_text([replace(camera, timestamp=n / fps) for n, camera in enumerate(along)]))
     kept = keep.Kept(folder, not video)
     settings = {
-        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles],
+        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles], **simulator,
     }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
         printed(said)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from ..output import write_records
+from ..pipeline import Engine
 from ..scene import Scene
 from ..scene.camera import Camera
 from ..scene.metrics import decibels
@@ -47,6 +48,11 @@ class Recording:
     wanted: Wanted
     title: str
     beside: Beside | None = None
+
+    @property
+    def on_chip(self) -> bool:
+        """Frames go through the verilated chip."""
+        return self.wanted.drawing.engine is Engine.CHIP
 
     @property
     def slot(self) -> float:
@@ -97,15 +103,23 @@ class _Figures:
         return found
 
 
+def _frames(path: Recording, first: int, workers: int) -> Iterator[Made]:
+    if path.on_chip:
+        from .on_chip import chip_frames
+
+        return chip_frames(path.scene, path.cameras, path.wanted, first)
+    return frames(path.scene, path.file, path.cameras, path.wanted, first, workers)
+
+
 def record(path: Recording, kept: Kept, workers: int, told: Callable[[int], None], noted: Callable[[str], None]) -> None:
     """Make what is missing of a path. told: called with the number of finished frames; noted: with warnings, each kind once."""
     figures, said = _Figures(path), set()
     first = len(kept.rows)
     if first == len(path.cameras):
         return
-    # The errors of the last frame that is there are those of a picture of more than 8 bits: it is made once more.
-    again = first > 0 and path.wanted.reference
-    for made in frames(path.scene, path.file, path.cameras, path.wanted, first - again, workers):
+    # The last frame that is there is made once more: its errors are those of a picture of more than 8 bits, and the chip has no interval without it.
+    again = first > 0 and (path.wanted.reference or path.on_chip)
+    for made in _frames(path, first - again, workers):
         row = {"frame": made.number, "time_s": made.number / path.fps, **figures.of(made), **made.facts}
         if "cycles" in row:
             row["late"] = int(row["cycles"] > path.slot)
