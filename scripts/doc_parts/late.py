@@ -16,12 +16,12 @@ from flicker.chip.drawing import Drawing
 from flicker.explore.digest import code_digest, file_digest, key
 from flicker.explore.store import Store
 from flicker.front.ahead import distance_ahead
+from flicker.front.paths import AHEAD_M, Asked, path_of
 from flicker.front.projection import project
 from flicker.front.view import View
 from flicker.markdown import table
-from flicker.motion.paths import AHEAD_M, Asked, path_of
-from flicker.motion.record import Timing
 from flicker.params import RECOMMENDED
+from flicker.perf.timing import Timing
 from flicker.pipeline import Engine
 from flicker.scene.camera import Camera
 from flicker.scene.gaussians import Scene

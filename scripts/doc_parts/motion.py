@@ -22,8 +22,8 @@ from flicker.errors import FlickerError
 from flicker.explore.configurations import get_configuration, group, run
 from flicker.explore.digest import code_digest, file_digest, key
 from flicker.explore.store import Store
+from flicker.front.paths import Asked, path_of
 from flicker.front.view import View
-from flicker.motion.paths import Asked, path_of
 from flicker.motion.record import composed, eight_bits
 from flicker.motion.video import write_video
 from flicker.params import RECOMMENDED, RenderConfig

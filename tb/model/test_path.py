@@ -27,8 +27,8 @@ from flicker.errors import FlickerError
 from flicker.front.view import load_view
 from flicker.motion import frames as motion_frames
 from flicker.motion.frames import Wanted, frames
-from flicker.motion.record import Timing
 from flicker.motion.video import durations, write_video
+from flicker.perf.timing import Timing
 from flicker.scene.camera import cameras_text, load_cameras, orbit_camera
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.metrics import flip, psnr, ssim

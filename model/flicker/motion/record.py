@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from ..output import write_records
+from ..perf.timing import Timing
 from ..pipeline import Engine
 from ..scene import Scene
 from ..scene.camera import Camera
@@ -162,22 +163,6 @@ def write_stats(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     """A CSV file of the frames; columns of `COLUMNS` that no frame has are left out."""
     records = [columns_of(row) for row in rows]
     write_records(path, [name for name in COLUMNS if any(name in record for record in records)], records)
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Cycles of the frames of a path: middle, 99th of a hundred, longest with its number; late: share of frames that take more than their slot."""
-
-    p50: float
-    p99: float
-    worst: int
-    worst_frame: int
-    late: float
-
-    @classmethod
-    def of(cls, cycles: Sequence[int], slot: float) -> Timing:
-        values = np.asarray(cycles)
-        return cls(float(np.percentile(values, 50)), float(np.percentile(values, 99)), int(values.max()), int(values.argmax()), float((values > slot).mean()))
 
 
 def timing_of(rows: Sequence[dict[str, Any]], slot: float) -> Timing | None:
