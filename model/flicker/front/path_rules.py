@@ -16,7 +16,7 @@ def kind_of(given: Mapping[str, Any], said: Callable[[str], str]) -> str | None:
     """The kind of a path (`paths.Asked`) from its options by name, of which None and False are not given. said: how people call an option.
     FlickerError for options that do not go together and numbers out of their range."""
     made = [name for name in MOTIONS if given[name] not in (None, False)]
-    if False:
+    if len(made) > 1:
         raise FlickerError(f"{', '.join(map(said, made))}: one motion makes a path")
     if made and given["keyframes"]:
         raise FlickerError(f"{said('keyframes')}: joins given cameras, so it cannot be combined with {said(made[0])}")
