@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 import scene_samples as samples
@@ -36,6 +37,15 @@ from flicker.scene.metrics import flip, psnr, ssim
 SIZE = (48, 32)
 COUNT = 6
 PAN = ("--pan", 0.5, "--frames", COUNT)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """The pictures are too small to share among threads, which wait for each other."""
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    yield
+    numba.set_num_threads(threads)
 
 
 @pytest.fixture(autouse=True)
