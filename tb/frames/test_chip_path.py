@@ -20,12 +20,11 @@ import numpy as np
 import pytest
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
-from test_chip_frames import BLUE, CONFIG, LIMIT, camera, golden, session, small
+from test_chip_frames import BLUE, LIMIT, camera, golden, session
 
 from flicker.chip.compare import frame_cost
 from flicker.chip.dram import DramConfig
 from flicker.chip.drawing import Drawing
-from flicker.chip_registers import ResultError
 from flicker.errors import FlickerError
 from flicker.front.view import View
 from flicker.params import RECOMMENDED
@@ -36,7 +35,6 @@ from flicker.scene.files import Scene, save_ply
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.scene.sources import open_scene
 from flicker.sim import chip as sim_chip
-from flicker.sim import row
 from flicker.sim.chip import OF_PLACE, ChipSession
 from flicker.sim.half import MemoryOptions
 from flicker.sim.row import back_to_back, differs
@@ -128,8 +126,11 @@ def rows(file: str = "a.csv") -> list[dict[str, str]]:
 def near_model(scene: str | Path, view: int, size: str, motion: tuple, frames: int, say: bool = False) -> None:
     """A path through the chip: no picture differs (an error of the command); of every frame what is listed is the golden front end's, bytes are within 10 %
     of the model's and the interval within 20 %."""
-    path(scene, "--view", view, "--size", size, *motion, "--frames", frames, "--engine", "chip", "-o", "out", "--stats", "a.csv", "--save-cameras", "along.json")
+    words = (scene, "--view", view, "--size", size, *motion, "--frames", frames, "--engine", "chip", "-o", "out")
+    done = path(*words, "--stats", "a.csv", "--chart", "a.png", "--save-cameras", "along.json")
     found, drawing = rows(), Drawing(Engine.CHIP_GOLDEN, RECOMMENDED)
+    longest = max(found[1:], key=lambda row_: int(row_["cycles"]))
+    assert f"frame {longest['frame']}: {int(longest['cycles']):,} cycles" in done.stdout and Path("a.png").is_file()
     source = open_scene(scene)
     assert len(found) == frames and found[0]["cycles"] == found[0]["late"] == ""
     for number, (row_, seen) in enumerate(zip(found, load_cameras("along.json"))):

@@ -96,7 +96,8 @@ def test_paths_are_those_of_flicker_path(folder, client, monkeypatch):
     monkeypatch.chdir(folder)
     words = (("--pan", 0.5, "--frames", 3), ("--shake", "--view", 1, "--frames", 2, "--seed", 4, "--fps", 1000), ("--frames", 2))
     for number, motion in enumerate(words, 1):
-        done = flicker("path", "tiny.ply", "--size", "64x48", *motion, "--stage", "channels", "--stats", "a.csv", "--save-cameras", "a.json", "-o", f"out{number}")
+        files = ("--stats", "a.csv", "--save-cameras", "a.json", "-o", f"out{number}")
+        done = flicker("path", "tiny.ply", "--size", "64x48", *motion, "--stage", "channels", *files)
         assert done.returncode == 0, done.stderr
         row, frames = result.rows[2 * number], list(csv.DictReader(Path("a.csv").open()))
         stills = [evaluate(load_view("tiny.ply", n, None, "a.json"), "flicker").row for n in range(len(frames))]

@@ -128,7 +128,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     camera: of the frame. dram: the memory of the session.
     """
     assert frame.usage is not None
-    front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, frame.usage.live
+    front, rendering, live = frame.front, frame.rendering, frame.usage.live
     count = lambda name: int(np.sum(front[name]))  # noqa: E731
     phases = frame.phases
     core = {name: frame.stage[:, k] for k, name in enumerate(params.STAGES[config.stage].counters)}
@@ -162,8 +162,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
-        **counted(frame, config), "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value, "clusters": chip.scene.clusters,
-        "clusters_kept": chip.scene.clusters - count("culled_clusters"),
+        **counted(frame, config), "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value,
+        "clusters": chip.scene.clusters, "clusters_kept": chip.scene.clusters - count("culled_clusters"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),
             OUTCOMES[Outcome.FAINT]: count("faint"), OUTCOMES[Outcome.MISSED]: count("unlisted") - count("faint"),

@@ -137,7 +137,8 @@ def path(
         write_text(save_cameras, cameras_text([replace(camera, timestamp=n / fps) for n, camera in enumerate(along)]))
     kept = keep.Kept(folder, not video)
     settings = {
-        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles], **simulator,
+        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles],
+        **simulator,
     }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
         printed(said)

@@ -92,8 +92,9 @@ def summary(rows: list[dict]) -> Table:
 
     for row in rows:
         table.add_row(
-            row["scene"], ", ".join(filter(None, (str(row["view"]), row.get("path")))), row["config"], text(row["cycles"], ",.0f"), decibels(row["psnr_db"], unit=""), text(row["ssim"], ".4f"),
-            text(row["flip"], ".4f"), "" if row["photo_psnr_db"] is None else decibels(row["photo_psnr_db"], unit=""),
+            row["scene"], ", ".join(filter(None, (str(row["view"]), row.get("path")))), row["config"], text(row["cycles"], ",.0f"),
+            decibels(row["psnr_db"], unit=""), text(row["ssim"], ".4f"), text(row["flip"], ".4f"),
+            "" if row["photo_psnr_db"] is None else decibels(row["photo_psnr_db"], unit=""),
             text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"), *(_moved(row) if moves else ()),
         )
     return table

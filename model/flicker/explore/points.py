@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -136,6 +136,11 @@ class Target:
         return f"{self.view}, {self.path_title}" if self.path else str(self.view)
 
     @property
+    def moved(self) -> dict[str, object]:
+        """What a path is, in full; of a still nothing."""
+        return {} if self.path is None else {"path": asdict(self.path), "clock_ghz": self.clock}
+
+    @property
     def path_title(self) -> str | None:
         """What the path is, in few words; None: a still."""
         if self.path is None:
@@ -164,8 +169,7 @@ class Target:
 
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""
-        moved = () if self.path is None else (self.path, self.clock)
-        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, self.looks, *moved, *parts)
+        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, self.looks, *self.moved.values(), *parts)
 
 
 @dataclass(frozen=True)

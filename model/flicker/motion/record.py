@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -166,9 +166,12 @@ def write_stats(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def timing_of(rows: Sequence[dict[str, Any]], slot: float) -> Timing | None:
-    """Of kept rows; None where no cycles are known."""
-    cycles = [row["cycles"] for row in rows if "cycles" in row]
-    return Timing.of(cycles, slot) if cycles else None
+    """Of kept rows that have cycles; None where no row has."""
+    timed = [row for row in rows if "cycles" in row]
+    if not timed:
+        return None
+    found = Timing.of([row["cycles"] for row in timed], slot)
+    return replace(found, worst_frame=timed[found.worst_frame]["frame"])
 
 
 def summary_of(rows: Sequence[dict[str, Any]], fps: float) -> TemporalSummary | None:

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from ..chip_registers import REGISTERS, ChipCounter, ResultError
-from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
 from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig

@@ -73,7 +73,8 @@ def back_to_back(
         row = [
             chip.frame(camera, places[k % 2], format_, background=background, lists=lists, tag=(first + k) % TAGS) for k, camera in enumerate(cameras[first:])
         ]
-        counted, ended = _Counted(chip, places), None
+        counted = _Counted(chip, places)
+        ended: int | None = None  # the frame before, in this cycle
         chip.start(row[0])
         for k, (frame, number) in enumerate(zip(row, range(first, len(cameras)))):
             following = row[k + 1] if k + 1 < len(row) else None
@@ -90,7 +91,8 @@ def back_to_back(
             if done.error:
                 raise FlickerError(f"{chip.name}: frame {number}: {', '.join(done.errors)} (seed {chip.seed})")
             end, moved = done.stamps["rendering_done"], counted.of(done, places[k % 2])
-            interval, ended = None if ended is None else (end - ended) % CYCLES, end
+            interval: int | None = None if ended is None else (end - ended) % CYCLES
+            ended = end
             if number == given:
                 given += 1
                 yield RowFrame(number, done, moved, interval)

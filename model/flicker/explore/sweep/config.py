@@ -45,7 +45,9 @@ class Sweep:
     def description(self) -> dict[str, Any]:
         """What the results stand for: scenes by content, views, sizes, configurations, and the code."""
         return {
-            "views": [{"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size), "looks": t.looks, "path": t.path_title} for t in self.targets],
+            "views": [
+                {"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size), "looks": t.looks, **t.moved} for t in self.targets
+            ],
             "configurations": list(self.configurations),
             "code": code_digest(),
         }
