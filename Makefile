@@ -16,7 +16,7 @@ LIBERTY ?=
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs clean FORCE
+.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -49,7 +49,7 @@ test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the te
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
 
-lint: $(STAMP) ## Verilator on every module, Verible style, ruff, mypy, generated files
+lint: $(STAMP) ## Verilator on every module, Verible style, ruff, mypy, generated files, links of pages
 	@$(BIN)/python scripts/lint.py
 
 waves: $(STAMP) ## simulate a unit and keep its traces for GTKWave: make waves UNIT=stream_cells
@@ -68,8 +68,12 @@ formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 report: $(STAMP) ## build/report/index.html: make report [SCENES="a.ply b.sog"]
 	@$(BIN)/flicker report $(SCENES)
 
-docs: $(STAMP) ## tables and charts of README.md and docs/: make docs [PART=areas]
+docs: $(STAMP) ## tables and charts of docs/: make docs [PART=areas]
 	@$(BIN)/python scripts/docs.py $(PART)
+
+site: $(STAMP) ## the pages as a site with search, strict: build/site/index.html
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo 'site: build/site/index.html'
 
 clean: ## remove build results (not .venv)
 	rm -rf build .pytest_cache

@@ -1,4 +1,4 @@
-// Rendering stage of lanes in the log domain (docs/lanes.md): four cores, together one 16x16 tile, with performance counters.
+// Rendering stage of lanes in the log domain (docs/reference/lanes.md): four cores, together one 16x16 tile, with performance counters.
 //
 // Stands where flk_render_stage stands and has its ports, but that it takes records as they lie in memory (record_elem_t), up to InWidth of
 // each core in a cycle: the older lower, all that are valid together. Lanes is of all cores: 32, 64 or 128; the picture is the same.

@@ -1,4 +1,4 @@
-// Rendering: from tile lists and records in memory to a frame buffer in memory (docs/rendering.md).
+// Rendering: from tile lists and records in memory to a frame buffer in memory (docs/reference/rendering.md).
 //
 // What flk_preprocessing leaves is read back list by list: four list readers and sorting units take the tiles of the walk in turn,
 // delivery fetches records and gives them to four cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
@@ -7,8 +7,10 @@
 // error_o, until the next start: bit 0 lists could not be read, break their layout or are longer than is sorted, bit 1 records could not be read, bit 2 a write
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
-// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/long_lists.md).
+// lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
 // Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3, of runs 4 to 7), records (read, 256 bits), frame buffer and runs (write, 512 bits).
+// stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
+// nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four cores of a tile say so the
 // sorting unit drops the list (not in the automatic mode, flk_render_stage).
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
@@ -46,6 +48,9 @@ module flk_rendering
   input  rendering_registers_t registers_i,
   output logic                 done_o,
   output logic [2:0]           error_o,
+  input  logic                 stop_i,
+  output logic                 stopped_o,
+  output logic [15:0]          left_o,
   output rendering_counters_t  counters_o,
   // The stage's counters of the last frame (flk_render_stage)
   input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
@@ -506,6 +511,7 @@ module flk_rendering
   // ---- frame buffer ---------------------------------------------------------------------------------
 
   logic                line_valid, line_ready, writer_idle, unused_empty, unused_done;
+  logic                stop_q, stopped_q, pairs_stopped;
   logic [BeatBits-1:0] line_beat;
   logic [3:0]          line_strobe;
   logic [511:0]        line_data;
@@ -588,6 +594,9 @@ module flk_rendering
     .pairs_i     (registers_i.all_pairs),
     .done_o      (unused_done),
     .freed_o     (pair_freed),
+    .stop_i      (stop_q),
+    .stopped_o   (pairs_stopped),
+    .left_o,
     .in_valid_i  (pixel_valid),
     .in_data_i   (pixel),
     .out_valid_o (line_valid),
@@ -599,6 +608,20 @@ module flk_rendering
 
   assign pixels_done = writer_idle;
 
+  // Lines of runs that come on the way are written, too. Before the frame writer begins it knows no pairs.
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      stop_q    <= 1'b0;
+      stopped_q <= 1'b0;
+    end else begin
+      stop_q    <= stop_i;
+      stopped_q <= stop_q && (stopped_q || (state_q == RUN && pairs_stopped && lines_idle &&
+                                            !store_valid));
+    end
+  end
+
+  assign stopped_o = stopped_q;
+
   flk_line_writer #(
     .Gather  (Gather),
     .Bursts  (Gather),
@@ -609,7 +632,7 @@ module flk_rendering
     .rst_ni,
     .empty_o    (unused_empty),
     .idle_o     (lines_idle),
-    .flush_i    (writer_idle || run_waits != '0),
+    .flush_i    (writer_idle || stop_q || run_waits != '0),
     .answered_o (answered),
     .failed_o   (write_failed),
     .in_valid_i (store_valid),

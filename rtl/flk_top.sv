@@ -1,6 +1,6 @@
-// The chip: from a packed scene in memory to a frame buffer in memory (docs/chip.md).
+// The chip: from a packed scene in memory to a frame buffer in memory (docs/reference/chip.md).
 //
-// A host writes a frame's descriptor through AXI4-Lite (docs/registers.md) and starts it; flk_preprocessing makes records and tile
+// A host writes a frame's descriptor through AXI4-Lite (docs/reference/registers.md) and starts it; flk_preprocessing makes records and tile
 // lists of the scene, flk_rendering makes the picture of them. Both halves work at the same time, on frames that follow
 // each other (flk_frame_control). One AXI4 port for all memory: 512 bits of data, records read as narrow beats of 256 bits;
 // who waits for whom is stated in flk_axi_arbiter and flk_top_pkg.
@@ -153,21 +153,27 @@ module flk_top
 
   state_e                           state_q;
   logic [$clog2(ResetCycles+1)-1:0] reset_q;
-  logic                             units_rst_nq, units_rst_n, aborted_q, abort_q, dead_q;
+  logic                             units_rst_nq, aborted_q, abort_q, dead_q;
+  logic                             front_rst_nq, front_rst_n, rendering_rst_nq, rendering_rst_n;
   logic                             drained, stuck, forget, hold;
+  logic                             front_reset, rendering_reset;  // of a half that is stopped
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q      <= RESET;
       reset_q      <= '0;
-      units_rst_nq <= 1'b0;
+      units_rst_nq     <= 1'b0;
+      front_rst_nq     <= 1'b0;
+      rendering_rst_nq <= 1'b0;
       aborted_q    <= 1'b0;
       abort_q      <= 1'b0;
       dead_q       <= 1'b0;
     end else begin
       aborted_q    <= 1'b0;
       dead_q       <= state_q == DEAD;
-      units_rst_nq <= state_q != RESET;
+      units_rst_nq     <= state_q != RESET;
+      front_rst_nq     <= state_q != RESET && !front_reset;
+      rendering_rst_nq <= state_q != RESET && !rendering_reset;
       reset_q      <= state_q == RESET ? reset_q + 1'b1 : '0;
       if (from_host.control.reset.value) begin
         state_q <= RESET;
@@ -204,7 +210,8 @@ module flk_top
     end
   end
 
-  assign units_rst_n = test_en_i ? rst_ni : units_rst_nq;
+  assign front_rst_n     = rst_ni && (test_en_i || front_rst_nq);
+  assign rendering_rst_n = rst_ni && (test_en_i || rendering_rst_nq);
 
   assign hold   = state_q != RUN;
   assign forget = state_q == RESET;
@@ -212,31 +219,37 @@ module flk_top
   // ---- frames -----------------------------------------------------------------------------------------
 
   logic                 start, locked, refused, front_done, post, bank, acknowledged;
-  logic [15:0]          tag, started, finished;
-  frame_error_t         frame_error;
+  logic [15:0]          tag, pairs, started, finished;
+  frame_error_t         frame_error, failure;
   logic                 front_busy, rendering_busy;
-  logic                 front_start, front_idle, front_end;
+  logic                 front_start, front_idle, front_end, front_stop, front_stopped;
   logic [FRONT_ERRORS-1:0] front_error;
   front_registers_t     front;
   logic                 rendering_start, rendering_idle, rendering_end;
+  logic                 rendering_stop, pairs_stopped, rendering_drained;
+  logic [15:0]          rendering_left;
   logic [2:0]           rendering_error;
   rendering_registers_t rendering;
   logic                 copy_front, copy_front_bank, copy_front_none, copy_front_done;
   logic                 copy_rendering, copy_rendering_bank, copy_rendering_none;
-  logic                 copy_rendering_done, told_q, timed_out_q;
+  logic                 copy_rendering_done, timed_out_q;
   logic [3:0][31:0]     stamps;
   logic [31:0]          now_q;
 
+  // frame_done is set in the cycle behind post, in which no acknowledgement counts.
+  always_comb begin
+    failure      = frame_error;
+    failure.late = 1'b0;
+  end
+
   assign start        = from_host.control.start.value && state_q == RUN;
-  assign acknowledged = told_q && !from_host.interrupt.frame_done.value;
+  assign acknowledged = !from_host.interrupt.frame_done.value;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      told_q      <= 1'b0;
       timed_out_q <= 1'b0;
       now_q       <= '0;
     end else begin
-      told_q      <= from_host.interrupt.frame_done.value;
       timed_out_q <= frame_error.timed_out;
       now_q       <= now_q + 1'b1;
     end
@@ -260,6 +273,7 @@ module flk_top
     .post_o               (post),
     .tag_o                (tag),
     .error_o              (frame_error),
+    .pairs_o              (pairs),
     .bank_o               (bank),
     .acknowledged_i       (acknowledged),
     .started_o            (started),
@@ -271,11 +285,18 @@ module flk_top
     .front_done_i         (front_end),
     .front_error_i        (front_error),
     .front_o              (front),
+    .front_stop_o         (front_stop),
+    .front_stopped_i      (front_stopped),
+    .front_reset_o        (front_reset),
     .rendering_start_o    (rendering_start),
     .rendering_idle_i     (rendering_idle),
     .rendering_done_i     (rendering_end),
     .rendering_error_i    (rendering_error),
     .rendering_o          (rendering),
+    .rendering_stop_o     (rendering_stop),
+    .rendering_stopped_i  (pairs_stopped && rendering_drained),
+    .rendering_reset_o    (rendering_reset),
+    .rendering_left_i     (rendering_left),
     .copy_front_o         (copy_front),
     .copy_front_bank_o    (copy_front_bank),
     .copy_front_none_o    (copy_front_none),
@@ -289,7 +310,8 @@ module flk_top
 
   // ---- memory port --------------------------------------------------------------------------------------
 
-  logic [READERS-1:0]               ar_valid, ar_ready, r_valid;
+  logic [READERS-1:0]               ar_valid, ar_ready, r_valid, read_ends;
+  logic [READERS-1:0]               port_ar_valid, port_ar_ready;
   logic [READERS-1:0][IdBits-1:0]   ar_id;
   logic [READERS-1:0][AddrBits-1:0] ar_addr;
   logic [READERS-1:0][7:0]          ar_len;
@@ -301,6 +323,7 @@ module flk_top
   logic [1:0]                       r_resp;
   logic                             r_last;
   logic [WRITERS-1:0]               aw_valid, aw_ready, w_valid, w_ready, b_valid, b_ready;
+  logic [WRITERS-1:0]               port_aw_valid, port_aw_ready;
   logic [WRITERS-1:0][IdBits-1:0]   aw_id;
   logic [WRITERS-1:0][AddrBits-1:0] aw_addr;
   logic [WRITERS-1:0][7:0]          aw_len;
@@ -328,8 +351,8 @@ module flk_top
     .clear_i   (forget),
     .timeout_i (from_host.timeout.cycles.value),
     .stuck_o   (stuck),
-    .ar_valid_i(ar_valid),
-    .ar_ready_o(ar_ready),
+    .ar_valid_i(port_ar_valid),
+    .ar_ready_o(port_ar_ready),
     .ar_id_i   (ar_id),
     .ar_addr_i (ar_addr),
     .ar_len_i  (ar_len),
@@ -339,8 +362,8 @@ module flk_top
     .r_data_o  (r_data),
     .r_resp_o  (r_resp),
     .r_last_o  (r_last),
-    .aw_valid_i(aw_valid),
-    .aw_ready_o(aw_ready),
+    .aw_valid_i(port_aw_valid),
+    .aw_ready_o(port_aw_ready),
     .aw_id_i   (aw_id),
     .aw_addr_i (aw_addr),
     .aw_len_i  (aw_len),
@@ -385,12 +408,59 @@ module flk_top
     .b_resp_i
   );
 
+  // A half that is stopped asks for nothing more. The rendering half goes on writing until the pairs of tiles that it has begun are there.
+  flk_axi_hold #(
+    .Readers(READERS - RENDERING_READERS),
+    .Writers(WRITERS - RENDERING_WRITERS)
+  ) i_front_hold (
+    .clk_i,
+    .rst_ni,
+    .clear_i      (forget),
+    .hold_reads_i (front_stop),
+    .hold_writes_i(front_stop),
+    .drained_o    (front_stopped),
+    .ar_valid_i   (ar_valid[READERS-1:RENDERING_READERS]),
+    .ar_ready_o   (ar_ready[READERS-1:RENDERING_READERS]),
+    .aw_valid_i   (aw_valid[WRITERS-1:RENDERING_WRITERS]),
+    .aw_ready_o   (aw_ready[WRITERS-1:RENDERING_WRITERS]),
+    .ar_valid_o   (port_ar_valid[READERS-1:RENDERING_READERS]),
+    .ar_ready_i   (port_ar_ready[READERS-1:RENDERING_READERS]),
+    .aw_valid_o   (port_aw_valid[WRITERS-1:RENDERING_WRITERS]),
+    .aw_ready_i   (port_aw_ready[WRITERS-1:RENDERING_WRITERS]),
+    .r_last_i     (read_ends[READERS-1:RENDERING_READERS]),
+    .b_valid_i    (b_valid[WRITERS-1:RENDERING_WRITERS])
+  );
+
+  flk_axi_hold #(
+    .Readers(RENDERING_READERS),
+    .Writers(RENDERING_WRITERS)
+  ) i_rendering_hold (
+    .clk_i,
+    .rst_ni,
+    .clear_i      (forget),
+    .hold_reads_i (rendering_stop),
+    .hold_writes_i(rendering_stop && pairs_stopped),
+    .drained_o    (rendering_drained),
+    .ar_valid_i   (ar_valid[RENDERING_READERS-1:0]),
+    .ar_ready_o   (ar_ready[RENDERING_READERS-1:0]),
+    .aw_valid_i   (aw_valid[RENDERING_WRITERS-1:0]),
+    .aw_ready_o   (aw_ready[RENDERING_WRITERS-1:0]),
+    .ar_valid_o   (port_ar_valid[RENDERING_READERS-1:0]),
+    .ar_ready_i   (port_ar_ready[RENDERING_READERS-1:0]),
+    .aw_valid_o   (port_aw_valid[RENDERING_WRITERS-1:0]),
+    .aw_ready_i   (port_aw_ready[RENDERING_WRITERS-1:0]),
+    .r_last_i     (read_ends[RENDERING_READERS-1:0]),
+    .b_valid_i    (b_valid[RENDERING_WRITERS-1:0])
+  );
+
+  assign read_ends = r_valid & {READERS{r_last}};
+
   flk_axi_lane #(
     .Width   (Width / 2),
     .AddrBits(AddrBits)
   ) i_records (
     .clk_i,
-    .rst_ni   (units_rst_n),
+    .rst_ni   (rendering_rst_n),
     .ar_move_i(ar_valid[READ_RECORDS] && ar_ready[READ_RECORDS]),
     .ar_addr_i(ar_addr[READ_RECORDS]),
     .r_valid_i(r_valid[READ_RECORDS]),
@@ -430,7 +500,7 @@ module flk_top
     .IdBits  (IdBits)
   ) i_front (
     .clk_i               (front_clk),
-    .rst_ni              (units_rst_n),
+    .rst_ni              (front_rst_n),
     .start_i             (front_start),
     .idle_o              (front_idle),
     .done_o              (front_end),
@@ -544,12 +614,15 @@ module flk_top
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),
-    .rst_ni             (units_rst_n),
+    .rst_ni             (rendering_rst_n),
     .start_i            (rendering_start),
     .idle_o             (rendering_idle),
     .registers_i        (rendering),
     .done_o             (rendering_end),
     .error_o            (rendering_error),
+    .stop_i             (rendering_stop),
+    .stopped_o          (pairs_stopped),
+    .left_o             (rendering_left),
     .counters_o         (rendering_counters),
     .counter_addr_i     (stage_addr),
     .counter_data_o     (stage_data),
@@ -713,13 +786,14 @@ module flk_top
   assign to_host.interrupt.front_done.next   = front_done;
   assign to_host.interrupt.frame_done.next   = post;
   assign to_host.interrupt.frame_done.hwclr  = from_host.control.reset.value;
-  // A time-out is told at once; and when result shows it, which may be later, when a frame has been released.
-  assign to_host.interrupt.error.next        = (post && frame_error != '0) ||
+  // A late frame is no surprise. A time-out is told at once; and when result shows it, which may be later, when a frame has been released.
+  assign to_host.interrupt.error.next        = (post && failure != '0) ||
                                                (state_q == DEAD && !dead_q) ||
                                                (frame_error.timed_out && !timed_out_q);
   assign to_host.interrupt.aborted.next      = aborted_q;
   assign to_host.interrupt.refused.next      = refused || (from_host.control.start.value && !start);
   assign to_host.result.tag.next             = tag;
+  assign to_host.progress.pairs.next         = pairs;
   assign to_host.result.error.next           = 16'(frame_error);
   assign to_host.frames.started.next         = started;
   assign to_host.frames.finished.next        = finished;

@@ -1,5 +1,5 @@
 // The chip with the pins of AMBA: flk_top between an AXI4-Lite subordinate (s_axil_*) and an AXI4 manager (m_axi_*), all side
-// signals included, as tools infer interfaces from (docs/integration.md).
+// signals included, as tools infer interfaces from (docs/reference/chip_ports.md).
 //
 // No logic but the reset: latency and combinational paths are those of flk_top. One clock for both interfaces. Identifiers have the chip's
 // bits in the low ones of IdWidth, zeros above; answers must bring them back so. Constant: LOCK 0 (no exclusive access), CACHE and PROT

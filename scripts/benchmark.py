@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Time every engine on one frame in one run, and print tables; `make docs PART=speed` puts them into docs/speed.md.
+"""Time every engine on one frame in one run, and print tables; `make docs PART=speed` puts them into docs/results/speed.md.
 
     scripts/benchmark.py [SCENE [--cameras FILE] [--view N]] [--size WxH]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Proofs of the hardware with SymbiYosys and z3 (docs/formal.md); formal/proofs.toml lists them.
+"""Proofs of the hardware with SymbiYosys and z3 (docs/reference/formal.md); formal/proofs.toml lists them.
 
 Each proof is three kinds of tasks: the proof itself for every set of parameters, its covers (it is
 not vacuous), and its mutants, sources with one piece of text replaced, with which it must fail: by

@@ -4,7 +4,7 @@
 rtl/regs/flk_registers.sv, flk_registers_pkg.sv   by PeakRDL-regblock, as AXI4-Lite subordinate with flat pins
 sw/flk_registers.h                                offsets, masks, reset values, numbers of bits, counters and modes for the driver
 model/flicker/chip_registers.py                   the same for Python
-docs/registers.md                                 the table between its marks
+docs/reference/registers.md                                 the table between its marks
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def hardware() -> dict[str, str]:
     package = re.sub(r"^(\s+\w+_t) (\w+)\[(\d+)\];", lambda m: f"{m[1]} [{int(m[3]) - 1}:0] {m[2]};", package, flags=re.M)
     # Registers named as words of C++, which is what Verilator writes.
     package = f"// verilator lint_off SYMRSVDWORD\n{package.rstrip()}\n// verilator lint_on SYMRSVDWORD\n"
-    header = f"// Registers of the chip (docs/registers.md), an AXI4-Lite subordinate.\n// {NOTE}\n"
+    header = f"// Registers of the chip (docs/reference/registers.md), an AXI4-Lite subordinate.\n// {NOTE}\n"
     return {
         f"rtl/regs/flk_registers{suffix}.sv": header + re.sub(r"[ \t]+$", "", text, flags=re.M)
         for suffix, text in (("", module), ("_pkg", package))
@@ -90,7 +90,7 @@ def hardware() -> dict[str, str]:
 
 def c_header(top: AddrmapNode, enums: dict[str, Any]) -> str:
     lines = [
-        f"/* Registers of the chip: byte offsets, and of each field mask, lowest bit and reset value. docs/registers.md.\n * {NOTE} */",
+        f"/* Registers of the chip: byte offsets, and of each field mask, lowest bit and reset value. docs/reference/registers.md.\n * {NOTE} */",
         "#ifndef FLK_REGISTERS_H", "#define FLK_REGISTERS_H", "",
     ]
 
@@ -129,7 +129,7 @@ def c_header(top: AddrmapNode, enums: dict[str, Any]) -> str:
 
 def python_module(top: AddrmapNode, enums: dict[str, Any]) -> str:
     lines = [
-        '"""Registers of the chip (docs/registers.md).', "", NOTE, '"""', "",
+        '"""Registers of the chip (docs/reference/registers.md).', "", NOTE, '"""', "",
         "from dataclasses import dataclass", "from enum import IntEnum", "", "",
         "@dataclass(frozen=True)", "class Register:",
         '    """offset: bytes. count: elements of an array, 4 bytes apart; 1 for what is none. fields: lowest bit and bits, by name."""', "",
@@ -186,7 +186,7 @@ def markdown(top: AddrmapNode, enums: dict[str, Any]) -> str:
 
 
 def page(top: AddrmapNode, enums: dict[str, Any]) -> str:
-    text = (ROOT / "docs" / "registers.md").read_text()
+    text = (ROOT / "docs" / "reference" / "registers.md").read_text()
     before, rest = text.split(BEGIN)
     return f"{before}{BEGIN}{markdown(top, enums)}{END}{rest.split(END)[1]}"
 
@@ -196,7 +196,7 @@ def main() -> int:
     top, enums = compiled()
     generated = {
         **hardware(), "sw/flk_registers.h": c_header(top, enums), "model/flicker/chip_registers.py": python_module(top, enums),
-        "docs/registers.md": page(top, enums),
+        "docs/reference/registers.md": page(top, enums),
     }
     wrong = 0
     for name, text in generated.items():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws docs/images/lanes.png: a splat in the log domain, step by step, with the numbers of the golden model (docs/lanes.md).
+"""Draws docs/images/lanes.png: a splat in the log domain, step by step, with the numbers of the golden model (docs/reference/lanes.md).
 
     scripts/lane_picture.py [FILE]
 

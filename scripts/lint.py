@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lint: Verilator on every module, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files.
+"""Lint: Verilator on every module, Verible style rules; ruff, mypy and the order of rooms on the Python; generated files; links of the pages.
 
 Exits 1 on any warning, and if a generated source is not current (`make generate`). A shape is a module with its default parameters (or SMALLER ones)
 or with those of VARIANTS. All shapes are instances of one generated top, in which Verilator elaborates each once, wherever it stands. Two steps:
@@ -107,6 +107,7 @@ CHECKS: list[list[object]] = [
     [sys.executable, "scripts/gen_params.py", "--check"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
     [sys.executable, "scripts/mutants.py", "--check"],
+    [sys.executable, "scripts/check_pages.py"],
     [Path(sys.executable).parent / "lint-imports"],
     [sys.executable, "-m", "ruff", "check", "--output-format", "concise"],
 ]

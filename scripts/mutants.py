@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/mutants.md).
+"""Mutants of the hardware: every one must die in the tests of its own unit (tb/mutants/*.toml; docs/reference/mutants.md).
 
     scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--match TEXT] [--check]
 
@@ -7,7 +7,7 @@ Each mutant is a source with one piece of text replaced, in a copy of the checko
 survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
 Prints a table, writes tb/mutants/results.csv, which is kept with the sources (finished mutants are not run again while what their unit's tests use stays
 as it is); exits 1 when fewer than KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table
-into docs/mutants.md, with the mutants that were run on sources or tests that have changed since, and says how many these are.
+into docs/results/mutants.md, with the mutants that were run on sources or tests that have changed since, and says how many these are.
 """
 
 from __future__ import annotations

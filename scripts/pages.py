@@ -23,7 +23,7 @@ Place = tuple[str, str]  # part, place
 
 def all_pages(root: Path = ROOT) -> list[Path]:
     """Where marks may stand."""
-    return [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
 
 
 def mark(place: Place) -> str:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Area and timing of every unit, from a Yosys netlist (docs/synthesis.md).
+"""Area and timing of every unit, from a Yosys netlist (docs/reference/synthesis.md).
 
 Prints tables and writes area.csv, report.md, area.png and area.svg to build/synth, or with another cell library to build/synth/<library>;
 `make docs` takes its tables from these.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measure the viewer in a headless browser and draw its picture for docs/view.md; `make docs PART=view` does both.
+"""Measure the viewer in a headless browser and draw its picture for docs/guide/view.md; `make docs PART=view` does both.
 
     scripts/view_page.py [--picture FILE]
 

@@ -1,4 +1,4 @@
-/* Driver of FLICKER: flk.h says what, docs/programming.md how to use it. */
+/* Driver of FLICKER: flk.h says what, docs/guide/programming.md how to use it. */
 #include "flk.h"
 
 #include <float.h>
@@ -17,6 +17,8 @@
 #define ADDRESS_END ((uint64_t)1 << 40)
 #define TILE 16u
 #define PAIR (2u * TILE)
+#define MINOR_DEADLINE 1u /* of the version: since then there are deadlines, */
+#define MINOR_BY_DISTANCE 2u /* and frames by distance */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -45,6 +47,8 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_RANGE] = "frame: a region ends beyond 40 bits",
     [FLK_FRAME_RECORDS] = "frame: region of records too small, or more records than the chip counts",
     [FLK_FRAME_CHUNKS] = "frame: chunks not 1 to 2^24",
+    [FLK_FRAME_DEADLINE] = "frame: the chip has no deadlines",
+    [FLK_FRAME_ORDER] = "frame: the chip does not sort by distance",
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
@@ -332,6 +336,17 @@ uint64_t flk_frame_bytes(uint32_t height, uint32_t stride)
   return (uint64_t)blocks(height, TILE) * TILE * stride;
 }
 
+void flk_frame_fill(const flk_frame_t *frame, void *buffer)
+{
+  const uint32_t bytes = flk_least_stride(frame->camera.width, frame->pixel_format);
+  const uint32_t rows = blocks(frame->camera.height, TILE) * TILE;
+  for (uint32_t y = 0; y < rows; y++) {
+    uint8_t *const row = (uint8_t *)buffer + (size_t)y * frame->stride;
+    for (uint32_t i = 0; i < bytes; i++)
+      row[i] = frame->pixel_format == FLK_RGBA16F ? 0 : frame->background[i % 3];
+  }
+}
+
 /* ---- frame ------------------------------------------------------------------------------------------------------------------------------ */
 
 typedef struct {
@@ -459,6 +474,10 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   flk_status_t status = flk_frame_check(frame, other, device->form, device->lists);
   if (status == FLK_OK)
     status = flk_camera_registers(&camera, &frame->camera);
+  if (status == FLK_OK && frame->deadline != 0 && device->minor < MINOR_DEADLINE)
+    status = FLK_FRAME_DEADLINE;
+  if (status == FLK_OK && frame->by_distance != 0 && device->minor < MINOR_BY_DISTANCE)
+    status = FLK_FRAME_ORDER;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)
@@ -467,7 +486,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put(device, FLK_FRAME_OFFSET,
       FIELD(FLK_FRAME_TAG, frame->tag) | FIELD(FLK_FRAME_MODE, frame->mode) | FIELD(FLK_FRAME_RGBA, frame->pixel_format == FLK_RGBA16F) |
           FIELD(FLK_FRAME_BOX, frame->box != 0) | FIELD(FLK_FRAME_CHUNKED, scene->format == FLK_FORMAT_CHUNK) |
-          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0));
+          FIELD(FLK_FRAME_ANTIALIASED, scene->antialiased != 0) | FIELD(FLK_FRAME_OFF_CENTRE, camera.off_centre != 0) |
+          FIELD(FLK_FRAME_BY_DISTANCE, frame->by_distance != 0));
   put(device, FLK_BACKGROUND_OFFSET,
       FIELD(FLK_BACKGROUND_RED, frame->background[0]) | FIELD(FLK_BACKGROUND_GREEN, frame->background[1]) |
           FIELD(FLK_BACKGROUND_BLUE, frame->background[2]));
@@ -486,6 +506,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put(device, FLK_RECORD_BEATS_OFFSET, record_beats < FLK_RECORD_BEATS_VALUE_MASK ? (uint32_t)record_beats : FLK_RECORD_BEATS_VALUE_MASK);
   put(device, FLK_CHUNKS_OFFSET, region->chunks);
   put(device, FLK_STRIDE_OFFSET, frame->stride);
+  if (device->minor >= MINOR_DEADLINE)
+    put(device, FLK_DEADLINE_OFFSET, frame->deadline);
   put_all(device, FLK_POSITION_OFFSET, camera.position, FLK_POSITION_COUNT);
   put_all(device, FLK_NORMAL_OFFSET, camera.normal, FLK_NORMAL_COUNT);
   put_all(device, FLK_OFFSET_OFFSET, camera.offset, FLK_OFFSET_COUNT);
@@ -546,7 +568,8 @@ flk_status_t flk_wait(flk_device_t *device, uint16_t number, uint32_t polls, flk
 flk_result_t flk_result(flk_device_t *device)
 {
   const uint32_t word = get(device, FLK_RESULT_OFFSET);
-  return (flk_result_t){(uint16_t)GET(FLK_RESULT_TAG, word), (uint16_t)GET(FLK_RESULT_ERROR, word)};
+  const uint32_t pairs = device->minor >= MINOR_DEADLINE ? get(device, FLK_PROGRESS_OFFSET) : 0;
+  return (flk_result_t){(uint16_t)GET(FLK_RESULT_TAG, word), (uint16_t)GET(FLK_RESULT_ERROR, word), (uint16_t)GET(FLK_PROGRESS_PAIRS, pairs)};
 }
 
 void flk_release(flk_device_t *device)

@@ -1,4 +1,4 @@
-/* Driver of FLICKER (docs/programming.md): scenes, descriptors of frames, the sequence of a frame.
+/* Driver of FLICKER (docs/guide/programming.md): scenes, descriptors of frames, the sequence of a frame.
  *
  * C99 with libc and libm only; no memory is allocated, no state is kept but in flk_device_t. Addresses are the chip's, in bytes. The arithmetic of cameras is that
  * of the golden model bit for bit: IEEE 754 double, compiled without contraction of a product and a sum (-ffp-contract=off). */
@@ -47,6 +47,8 @@ typedef enum {
   FLK_FRAME_STRIDE,  /* stride too small, too large or no multiple of 32 */
   FLK_FRAME_OVERLAP, /* regions that overlap */
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
+  FLK_FRAME_DEADLINE, /* a deadline, on a chip of version 3.0, which has none */
+  FLK_FRAME_ORDER,    /* by distance, on a chip older than version 3.2, which sorts by depth alone */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -64,7 +66,7 @@ const char *flk_status_text(flk_status_t status);
 enum { FLK_FORMAT_CHUNK, FLK_FORMAT_FP16_LOCAL, FLK_FORMAT_FP16 };
 enum { FLK_TABLE, FLK_HEADERS, FLK_GEOMETRY, FLK_COLOUR, FLK_PARTS };
 
-/* A packed scene (docs/memory_image.md) in the chip's memory. */
+/* A packed scene (docs/reference/memory_image.md) in the chip's memory. */
 typedef struct {
   uint64_t address, bytes;     /* of the image */
   uint32_t format;             /* FLK_FORMAT_* */
@@ -104,7 +106,7 @@ typedef struct {
 
 flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_camera_t *camera);
 
-/* ff number nearest to a finite or infinite x, with 10 to 23 bits of mantissa (docs/ff.md): its bits. */
+/* ff number nearest to a finite or infinite x, with 10 to 23 bits of mantissa (docs/reference/ff.md): its bits. */
 uint32_t flk_ff_bits(double x, unsigned mantissa);
 
 /* ---- sizes of regions, in bytes ------------------------------------------------------------------------------------------------------------ */
@@ -143,6 +145,8 @@ typedef struct {
   unsigned mode;         /* of the contribution test, FLK_CAT_* */
   int box;               /* lists by boxes of 3 standard deviations; else by ellipses */
   uint16_t tag;          /* comes back in the result */
+  uint32_t deadline;     /* cycles from the start, after which the frame ends as it is, with FLK_ERROR_LATE; 0: none */
+  int by_distance;       /* sorted by distance to the camera; else by depth along its axis */
 } flk_frame_t;
 
 /* What would make a wrong picture or write beyond regions. other: frame that may be under way beside this one, whose region this one must not touch; or NULL.
@@ -173,7 +177,12 @@ typedef struct {
 typedef struct {
   uint16_t tag;   /* of the frame that ended last */
   uint16_t error; /* 1 << FLK_ERROR_*; 0: none */
+  uint16_t pairs; /* of tiles written, the first ones of the walk (docs/reference/rendering.md); all of them in a frame without an error */
 } flk_result_t;
+
+/* Fill the picture in a frame buffer, which the host sees at `buffer`, with the background (of FLK_RGBA16F: transparent black): what a late frame does not write
+ * shows it. Without that, the picture before shows through. Bytes behind the rows stay. */
+void flk_frame_fill(const flk_frame_t *frame, void *buffer);
 
 /* Called between polls; another value than 0 ends the wait. */
 typedef int (*flk_pause_t)(void *user);

@@ -180,7 +180,7 @@ def test_table_of_another_library_says_of_which_rtl() -> None:
 
 
 def test_areas_and_tables_of_synthesis_agree() -> None:
-    """areas.csv and the table of units in docs/synthesis.md are of one synthesis."""
+    """areas.csv and the table of units in docs/results/synthesis.md are of one synthesis."""
     text = pages.get(("synthesis", "units"))
     rows = [line.strip("| ").split(" | ") for line in text[text.index("### Units") :].splitlines() if line.startswith("| ")]
     listed = {(row[0], row[1]): float(row[2].replace(",", "")) for row in rows if len(row) == 10 and row[2][:1].isdigit()}

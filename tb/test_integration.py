@@ -1,4 +1,4 @@
-"""What docs/integration.md says of the sources: clocks, resets, cells to replace, figures in its prose; the wrapper's parameters.
+"""What docs/guide/integration.md and docs/reference/chip_ports.md say of the sources: clocks, resets, cells to replace, figures in prose; the wrapper's parameters.
 
 Not covered: its templates and tables, which tb/test_docs.py and tb/test_tooling.py hold; frames and pins: tb/top/test_top_axi.py.
 """
@@ -52,7 +52,7 @@ def test_clocks_and_resets() -> None:
 
 def test_cells_to_replace() -> None:
     """Those of the page are all that hold memories, gate a clock or synchronise; the stages alone have none of them."""
-    page = (ROOT / "docs" / "integration.md").read_text()
+    page = (ROOT / "docs" / "guide" / "integration.md").read_text()
     listed = re.findall(r"^\| `(\w+)` \| `(rtl/[\w/]+\.sv)` \|", page, re.M)
     assert len(listed) == 4 and all((ROOT / file).stem == name for name, file in listed)
     cells = {name for name, _ in listed}
@@ -64,7 +64,7 @@ def test_cells_to_replace() -> None:
 
 def test_figures_of_the_page() -> None:
     """Widths, sizes and constants in the prose."""
-    page = (ROOT / "docs" / "integration.md").read_text()
+    page = (ROOT / "docs" / "reference" / "chip_ports.md").read_text()
     said = {"narrow": 5, "whole": 6}
     table = managers()
     assert all(m.size == (said["narrow"] if m.note.startswith("always") else said["whole"]) for m in table)

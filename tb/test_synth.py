@@ -98,7 +98,7 @@ def test_delays_by_hand(library: Library) -> None:
 
 
 def test_page_example_by_hand(library: Library) -> None:
-    """The netlist that docs/synthesis.md works out: two registers, NAND2, inverter, XOR2, two registers."""
+    """The netlist that docs/reference/synthesis.md works out: two registers, NAND2, inverter, XOR2, two registers."""
     cells = {
         "a": ("DFF", {"D": 10, "CK": 19, "Q": 1}), "b": ("DFF", {"D": 11, "CK": 19, "Q": 2}),
         "g": ("NAND2_X1", {"A": 1, "B": 2, "Y": 3}), "i": ("INV_X1", {"A": 3, "Y": 4}), "h": ("XOR2_X1", {"A": 1, "B": 4, "Y": 5}),
@@ -107,7 +107,7 @@ def test_page_example_by_hand(library: Library) -> None:
     timing = Timing(module(cells, {"ck": ("input", 19)}), library, {})
     found = {path.target: (path.source, path.delay) for path in timing.paths() if not path.port}
     assert found == {"n7": ("n1", pytest.approx(298.33, abs=0.01)), "n6": ("n1", pytest.approx(193.33, abs=0.01))}
-    page = (ROOT / "docs/synthesis.md").read_text()
+    page = (ROOT / "docs/reference/synthesis.md").read_text()
     assert all(f"| {number} |" in page for number in ("103.33", "143.33", "183.33", "248.33", "298.33"))
 
 

@@ -198,14 +198,14 @@ def test_vcd_is_written() -> None:
     assert set(signal_view.signals(trace, "flk_skid_buffer")) <= set(shown)
 
 
-# ---- front ends, as docs/integration.md says ----------------------------------------------------
+# ---- front ends, as docs/guide/integration.md says ----------------------------------------------------
 
 YOSYS = "import sys; from pyosys import libyosys as y; d = y.Design(); [y.run_pass(c, d) for c in sys.argv[1:]]"
 
 
 def test_slang_reads_everything_and_the_template_fits() -> None:
     """No errors in the sources; the instantiation template of the page elaborates and is that of the module's ports."""
-    page = (ROOT / "docs/integration.md").read_text()
+    page = (ROOT / "docs/reference/template_stage.md").read_text()
     template = page.split("<!-- make docs PART=instance -->\n```systemverilog\n")[1].split("```")[0]
     sys.path.insert(0, str(ROOT / "scripts"))
     from doc_parts.instance import elaborate
@@ -223,7 +223,7 @@ def test_verible_parses_everything() -> None:
 
 def test_what_yosys_reads(tmp_path: Path) -> None:
     """`read_slang` reads the structs; `read_verilog -sv` refuses our sources, and builds a wrong netlist of the page's example without a warning."""
-    page = (ROOT / "docs/integration.md").read_text()
+    page = (ROOT / "docs/guide/integration.md").read_text()
     source = tmp_path / "wrong.sv"
     source.write_text(page.split("holds this text against Yosys -->\n```systemverilog\n")[1].split("```")[0])
     shown = {}

@@ -10,13 +10,13 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import IntEnum
+from enum import Enum, IntEnum
 
 from .errors import FlickerError
 
 
 class Form(IntEnum):
-    """How the Gaussian weight E is written (docs/architecture.md, splat record)."""
+    """How the Gaussian weight E is written (docs/reference/number_formats.md)."""
 
     CONIC = 0
     FACTORED = 1
@@ -49,6 +49,13 @@ class Coords(IntEnum):
     ABSOLUTE = 1  # screen coordinates in FP16, made local by an FP16 subtraction
 
 
+class SortOrder(str, Enum):
+    """What splats are sorted by, near to far (docs/decisions/order_of_depth.md)."""
+
+    DEPTH = "depth"  # along the camera's axis
+    DISTANCE = "distance"  # to the camera: stays while it turns on the spot
+
+
 TILE = 16
 SUBTILE = 8
 MINITILE = 4
@@ -64,7 +71,7 @@ COUNTER_BITS = 32
 FIXED_INT_BITS = 9
 FIXED_FRAC_BITS = 8
 
-# Registers of the pipelined operators (= their latency), so that no path is longer than 60 FO4 (docs/synthesis.md).
+# Registers of the pipelined operators (= their latency), so that no path is longer than 60 FO4 (docs/reference/synthesis.md).
 # A sum is an addition that cannot cancel: both operands are squares or of one sign.
 FP16_ADD_STAGES = 3
 FP16_SUM_STAGES = 2
@@ -118,7 +125,7 @@ ALPHA_MIN = 1.0 / 255.0
 ALPHA_MAX = 0.99
 TRANSMITTANCE_MIN = 1e-4
 
-# Automatic fall to Uniform-Sparse (docs/ctu.md): widths of the per-sub-tile counts, weight of history.
+# Automatic fall to Uniform-Sparse (docs/reference/ctu.md): widths of the per-sub-tile counts, weight of history.
 AUTO_TEST_BITS = 16
 AUTO_SENT_BITS = 13
 AUTO_DECAY_SHIFT = 2
@@ -156,12 +163,12 @@ MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a la
 
 @dataclass(frozen=True)
 class ChipMemories:
-    """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/chip_memory.md).
+    """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/reference/chip_memory.md).
 
     sorted_entries: longest list that a sorting unit takes in one reading. list_chunks: in a list reader's memory. sorted_ahead: entries of a sorting unit that
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
-    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; they have half as many runs, at most (docs/long_lists.md).
+    merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; half as many runs at most (docs/reference/list_sorter.md).
     """
 
     sorted_entries: int = 2048
@@ -307,7 +314,7 @@ class RenderConfig:
 
 
 
-# ---- plug points (docs/mask_generators.md) -----------------------------------------------------
+# ---- plug points (docs/reference/mask_generators.md) -----------------------------------------------------
 
 SUBTILE_PIXELS = SUBTILE * SUBTILE
 
@@ -338,7 +345,7 @@ GENERATOR_PARAMETERS = {
 MASK_GENERATORS: dict[str, MaskGenerator] = {
     "ctu": MaskGenerator(
         "flk_ctu", CHANNELS, {name: name for name in GENERATOR_PARAMETERS}, lambda config: prtu_latency(config.form, config.precision),
-        one_token=True, tests=True, note="contribution-aware test (docs/ctu.md)",
+        one_token=True, tests=True, note="contribution-aware test (docs/reference/ctu.md)",
     ),
     "all": MaskGenerator(
         "flk_mask_all", CHANNELS, {"MaskBits": str(CHANNELS)}, lambda config: 1,
@@ -349,7 +356,7 @@ MASK_GENERATORS: dict[str, MaskGenerator] = {
 
 @dataclass(frozen=True)
 class Stage:
-    """A rendering stage: a module with the ports that docs/render_stage.md lists.
+    """A rendering stage: a module with the ports that docs/reference/render_stage.md lists.
 
     element, pixel: records (flicker.layout) that it takes and gives, on one stream per core. A token of `element` is its bit `eos`, with the
     sub-tile's place in the lowest bits; RECORD_ELEMENT: records as they lie in memory. `pixel` names sub-tile, mini-tile, index and pixel.
@@ -435,13 +442,13 @@ STAGES: dict[str, Stage] = {
     ),
     "lanes": Stage(
         "flk_lane_stage", RECORD_ELEMENT, "core_pixel", ("Lanes", "InWidth", "Slots", "Depth"), tuple(name for name, _ in LANE_COUNTERS),
-        "lanes in the log domain (docs/lanes.md)", lane_order=True,
+        "lanes in the log domain (docs/reference/lanes.md)", lane_order=True,
     ),
 }
 
 # The paper's configuration: conic form in CTU and VRU, Smooth-Focused, E4M3 mixed precision, FIFO depth 16, an output FIFO in
 # the CTU for what is in flight at a stall (its depth is ours: enough for one splat per cycle).
 FAITHFUL = RenderConfig(form=Form.CONIC, precision=Precision.MIXED, cat=CatMode.SMOOTH, ctu_fifo_depth=16)
-# What `flicker render` and `flicker demo` take when nothing else is said: best in cycles times area and in pictures (docs/exploration.md).
+# What `flicker render` and `flicker demo` take when nothing else is said: best in cycles times area and in pictures (docs/decisions/010-lanes-by-default.md).
 RECOMMENDED = RenderConfig(stage="lanes")
 NAMED_CONFIGS = {"faithful": FAITHFUL, "default": RenderConfig()}

@@ -164,7 +164,7 @@ def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, 
 
 def golden_front(view: View, packed: PackedScene, lists: ListKind, kind: RecordKind) -> FrontFrame:
     """`run_front` of a view and its packed scene, kept by the view: the picture and what it costs need the same."""
-    return view.keep(("front", packed.format, lists, kind), lambda: run_front(packed, view.camera, lists, kind))
+    return view.keep(("front", packed.format, lists, kind), lambda: run_front(packed, view.camera, lists, kind, order=view.order))
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:
@@ -181,7 +181,7 @@ def bit_true_front(view: View, config: RenderConfig, front: Front, options: Fron
     with steps.step("building the front end's simulator (once for each form)"):
         build_front(kind=kind)
     with steps.step("preprocessing with the RTL"):
-        frame, rtl = front_frame(packed, view.camera, options.lists, kind)
+        frame, rtl = front_frame(packed, view.camera, options.lists, kind, view.order)
     return frame, stats | {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 
@@ -232,6 +232,7 @@ def basic_stats(view: View, engine: Engine, front: Front, config: RenderConfig) 
             "precision": config.precision.name.lower(), "cat": config.cat.name.lower(), "fifo_depth": config.fifo_depth,
         }),
         "coords": config.coords.name.lower(),
+        "order": view.order.value,
         "gaussians": len(view.scene.means),
         "gaussians_left_out": dict(view.scene.rejected),
     }

@@ -1,4 +1,4 @@
-// Exponential of a negated FP16 number, pipelined: g = 2^-E or e^-E, FP16 (docs/arithmetic.md).
+// Exponential of a negated FP16 number, pipelined: g = 2^-E or e^-E, FP16 (docs/reference/arithmetic.md).
 //
 // Fixed point, one table with linear interpolation, one rounding; error below 0.73 ulp, monotone, exactly 1 for E = 0.
 // Results below the smallest normal number are +0; so is the result of a set sign bit or a NaN.

@@ -1,4 +1,4 @@
-// Adder of ff numbers, pipelined: round to nearest even, no subnormals, saturating (docs/ff.md).
+// Adder of ff numbers, pipelined: round to nearest even, no subnormals, saturating (docs/reference/ff.md).
 //
 // A difference is a sum with the sign bit of b_i inverted by the user; an inverted zero (sign bit alone) is taken as zero.
 // Single path: order by magnitude, align with guard, round and sticky bit | add or subtract, count leading zeros | normalise, round.

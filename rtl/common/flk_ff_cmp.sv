@@ -1,4 +1,4 @@
-// Comparison of ff numbers (docs/ff.md). Combinational.
+// Comparison of ff numbers (docs/reference/ff.md). Combinational.
 module flk_ff_cmp #(
   parameter  int unsigned ManBits = 19,
   localparam int unsigned Width   = 9 + ManBits

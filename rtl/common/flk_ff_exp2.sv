@@ -1,4 +1,4 @@
-// Power of two of a fixed-point number to an ff number, pipelined (docs/ff.md).
+// Power of two of a fixed-point number to an ff number, pipelined (docs/reference/ff.md).
 //
 // l_i is in two's complement with FracBits fraction bits. Too large a result is the largest number, one below 2^-126 is 0.
 // Exponent beside flk_ff_poly; pack.

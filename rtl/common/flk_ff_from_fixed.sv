@@ -1,4 +1,4 @@
-// Fixed point (two's complement) to an ff number, pipelined: round to nearest even (docs/ff.md).
+// Fixed point (two's complement) to an ff number, pipelined: round to nearest even (docs/reference/ff.md).
 //
 // Magnitude, count leading zeros | normalise, round.
 //

@@ -1,4 +1,4 @@
-// Finite FP16 number to an ff number, exact (docs/ff.md). Combinational.
+// Finite FP16 number to an ff number, exact (docs/reference/ff.md). Combinational.
 module flk_ff_from_fp16 #(
   parameter  int unsigned ManBits = 19,
   localparam int unsigned Width   = 9 + ManBits

@@ -1,4 +1,4 @@
-// Ff number times 2^shift_i, saturating; a result below 2^-126 is 0 (docs/ff.md). Combinational.
+// Ff number times 2^shift_i, saturating; a result below 2^-126 is 0 (docs/reference/ff.md). Combinational.
 module flk_ff_ldexp #(
   parameter  int unsigned ManBits   = 19,
   parameter  int unsigned ShiftBits = 10,  // with the sign

@@ -1,4 +1,4 @@
-// Multiplier of ff numbers, pipelined: round to nearest even, no subnormals, saturating (docs/ff.md).
+// Multiplier of ff numbers, pipelined: round to nearest even, no subnormals, saturating (docs/reference/ff.md).
 //
 // Multiply by each part of b | add pairs of products | add the products | round.
 //

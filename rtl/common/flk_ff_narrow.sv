@@ -1,4 +1,4 @@
-// Ff number to a shorter mantissa: round to nearest even, saturating (docs/ff.md). Combinational.
+// Ff number to a shorter mantissa: round to nearest even, saturating (docs/reference/ff.md). Combinational.
 module flk_ff_narrow #(
   parameter  int unsigned FromBits = 23,
   parameter  int unsigned ManBits  = 13

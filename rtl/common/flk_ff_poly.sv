@@ -1,4 +1,4 @@
-// Piecewise quadratic function of a mantissa: the common part of flk_ff_recip, flk_ff_rsqrt, flk_ff_sqrt and flk_ff_exp2 (docs/ff.md).
+// Piecewise quadratic function of a mantissa: the common part of flk_ff_recip, flk_ff_rsqrt, flk_ff_sqrt and flk_ff_exp2 (docs/reference/ff.md).
 //
 // Look up slope and curvature, square the distance from the segment's middle | multiply; look up the middle's value | add, round. With 4
 // stages the multiplication takes two: look up, square | multiply by halves | add them; look up the middle's value | add, round.

@@ -1,4 +1,4 @@
-// Reciprocal of ff numbers, pipelined (docs/ff.md).
+// Reciprocal of ff numbers, pipelined (docs/reference/ff.md).
 //
 // 1 / 0 is the largest number; a result below 2^-126 is 0.
 // Exponent and sign beside flk_ff_poly; pack.

@@ -1,4 +1,4 @@
-// Reciprocal square root of ff numbers, pipelined (docs/ff.md).
+// Reciprocal square root of ff numbers, pipelined (docs/reference/ff.md).
 //
 // Of 0 the largest number, of a negative number 0.
 // Exponent and sign beside flk_ff_poly; pack.

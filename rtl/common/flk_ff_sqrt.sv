@@ -1,4 +1,4 @@
-// Square root of ff numbers, pipelined (docs/ff.md).
+// Square root of ff numbers, pipelined (docs/reference/ff.md).
 //
 // Of 0 and of a negative number 0.
 // Exponent and sign beside flk_ff_poly; pack.

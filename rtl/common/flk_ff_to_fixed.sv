@@ -1,4 +1,4 @@
-// Ff number to fixed point (two's complement), pipelined (docs/ff.md).
+// Ff number to fixed point (two's complement), pipelined (docs/reference/ff.md).
 //
 // Round 0: floor; 1: to nearest, ties upwards. What is too large becomes the largest number of its sign.
 // Align | round, negate, saturate.

@@ -1,4 +1,4 @@
-// Ff number to FP16: round to nearest even, subnormal numbers included, at most +-65504 (docs/ff.md).
+// Ff number to FP16: round to nearest even, subnormal numbers included, at most +-65504 (docs/reference/ff.md).
 // Combinational. What is too small becomes a zero of its sign.
 module flk_ff_to_fp16 #(
   parameter  int unsigned ManBits = 19,

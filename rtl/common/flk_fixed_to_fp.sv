@@ -1,4 +1,4 @@
-// Fixed point (sign and magnitude) to a floating-point format, round to nearest even (docs/arithmetic.md).
+// Fixed point (sign and magnitude) to a floating-point format, round to nearest even (docs/reference/arithmetic.md).
 //
 // Combinational. mag_i has FracBits fraction bits. Fn: no infinity, NaN is all ones (E4M3). Saturate: what is too large becomes the
 // largest finite number, else infinity. Zero is +0 whatever the sign.

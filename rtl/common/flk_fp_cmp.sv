@@ -1,4 +1,4 @@
-// Floating-point less-than (docs/arithmetic.md).
+// Floating-point less-than (docs/reference/arithmetic.md).
 //
 // Combinational. lt_o is a_i < b_i; -0 equals +0, and a NaN is neither less nor greater.
 module flk_fp_cmp #(

@@ -1,4 +1,4 @@
-// Conversion between floating-point formats, round to nearest even (docs/arithmetic.md).
+// Conversion between floating-point formats, round to nearest even (docs/reference/arithmetic.md).
 //
 // Combinational. Any format to any format; only the shifts that the pair needs are built.
 module flk_fp_convert #(

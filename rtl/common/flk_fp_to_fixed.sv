@@ -1,4 +1,4 @@
-// FP16 to fixed point: sign and magnitude with IntBits.FracBits, round to nearest even (docs/arithmetic.md).
+// FP16 to fixed point: sign and magnitude with IntBits.FracBits, round to nearest even (docs/reference/arithmetic.md).
 //
 // Combinational. What is too large, infinity and NaN included, becomes the largest magnitude. The sign of zero is kept.
 module flk_fp_to_fixed #(

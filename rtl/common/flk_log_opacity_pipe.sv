@@ -1,5 +1,5 @@
 // Threshold of the contribution test, pipelined: log2(255 o) or ln(255 o) of an FP16 opacity, rounded toward +infinity to any
-// format (docs/arithmetic.md).
+// format (docs/reference/arithmetic.md).
 //
 // Fixed point, one table with linear interpolation, all of it upper bounds: the result is never below the exact value.
 // A subnormal opacity (0 included) counts as 2^-14, 2 and more as [1, 2); the sign is ignored.

@@ -1,4 +1,4 @@
-// Opacity code / 255 to FP16, nearest (docs/record_to_splat.md). Combinational.
+// Opacity code / 255 to FP16, nearest (docs/reference/record_to_splat.md). Combinational.
 //
 // The quotient is the eight bits of the code, repeated without end behind the point. What follows the rounding bit is
 // never 0, so that bit alone decides.

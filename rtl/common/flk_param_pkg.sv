@@ -25,19 +25,19 @@ package flk_param_pkg;
   localparam logic [2:0] CAT_SPIKY = 3'h4;  // run-time mode
   localparam logic [2:0] CAT_AUTO = 3'h5;  // run-time mode
 
-  // Mask generators (docs/mask_generators.md)
-  localparam int unsigned MASK_GENERATOR_CTU = 0;  // contribution-aware test (docs/ctu.md)
+  // Mask generators (docs/reference/mask_generators.md)
+  localparam int unsigned MASK_GENERATOR_CTU = 0;  // contribution-aware test (docs/reference/ctu.md)
   localparam int unsigned MASK_GENERATOR_ALL = 1;  // no test: every splat to all four mini-tiles
   localparam int unsigned MASK_GENERATORS = 2;
   localparam logic [1:0][7:0] MASK_BITS = {8'd4, 8'd4};  // by mask generator
 
-  // Rendering stages (docs/render_stage.md)
+  // Rendering stages (docs/reference/render_stage.md)
   localparam int unsigned STAGE_CHANNELS = 0;  // mask generators and volume rendering units
-  localparam int unsigned STAGE_LANES = 1;  // lanes in the log domain (docs/lanes.md)
+  localparam int unsigned STAGE_LANES = 1;  // lanes in the log domain (docs/reference/lanes.md)
   localparam int unsigned RENDER_STAGES = 2;
   localparam logic [1:0][7:0] STAGE_LANE_ORDER = {8'd1, 8'd0};  // pixels keep their order in each lane, else in each mini-tile
 
-  // Rendering rules, rounded to FP16 (docs/architecture.md)
+  // Rendering rules, rounded to FP16 (docs/reference/number_formats.md)
   localparam logic [15:0] FP16_ONE = 16'h3c00;  // 1.0
   localparam logic [15:0] ALPHA_MIN = 16'h1c05;  // 1/255, rounded up
   localparam logic [15:0] ALPHA_MAX = 16'h3bec;  // 0.99
@@ -62,7 +62,7 @@ package flk_param_pkg;
   localparam logic [3:0][7:0] PRTU_SHAPE_DELAY = {8'd3, 8'd3, 8'd5, 8'd4};  // by precision
   localparam logic [1:0][3:0][7:0] PRTU_LATENCY = {{8'd9, 8'd9, 8'd11, 8'd14}, {8'd10, 8'd10, 8'd12, 8'd15}};  // by form and precision
 
-  // Automatic fall to Uniform-Sparse (docs/ctu.md)
+  // Automatic fall to Uniform-Sparse (docs/reference/ctu.md)
   localparam int unsigned AUTO_TEST_BITS = 16;
   localparam int unsigned AUTO_SENT_BITS = 13;
   localparam int unsigned AUTO_DECAY_SHIFT = 2;

@@ -1,4 +1,4 @@
-// Operand of a unit in which results take turns (docs/datapath.md): y_o is a_i in the cycles of phase 0, else b_i.
+// Operand of a unit in which results take turns (docs/reference/datapath.md): y_o is a_i in the cycles of phase 0, else b_i.
 //
 // odd_i is the phase of the next cycle. The choice stands in a register of its own, so that few gates load it.
 module flk_phase_mux #(

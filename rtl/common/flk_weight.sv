@@ -7,7 +7,7 @@
 // | conic: shape a/2, b, c/2 | xx = dx dx, sx = xx (a/2) | yy = dy dy, sy = yy (c/2) | h = sx + sy, t = (dx dy) b, E = h + t |
 // | factored: shape l0, l1, l2 | p = l0 dx | q = l1 dy, v = l2 dy, vv = v v | u = p + q, uu = u u, E = uu + vv |
 //
-// Each operation is rounded to the format (ExpBits, ManBits, Fn, Saturate; docs/arithmetic.md), in the order printed. Formats of up to
+// Each operation is rounded to the format (ExpBits, ManBits, Fn, Saturate; docs/reference/arithmetic.md), in the order printed. Formats of up to
 // 8 bits have fewer registers in their operators than longer ones (`Wide`).
 // weight_o comes WEIGHT_LATENCY[Form][Wide] cycles after dx_i and dy_i; shape_i is taken WEIGHT_SHAPE_DELAY[Form][Wide] cycles after them.
 // Throughput one set of pixels per cycle. All registers load while en_i is high; none is reset. No handshake, no combinational path.

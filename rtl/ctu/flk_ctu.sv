@@ -14,7 +14,7 @@
 // FIFO, on out_ready_i; out_valid_o, out_data_o and idle_o do not depend on inputs.
 // clear_i forgets everything, the sums of the automatic mode too: in the next cycle the unit is as after reset.
 //
-// One of the mask generators of flk_mask_generator, whose ports these are (docs/mask_generators.md).
+// One of the mask generators of flk_mask_generator, whose ports these are (docs/reference/mask_generators.md).
 module flk_ctu
   import flk_pkg::*;
   import flk_param_pkg::*;

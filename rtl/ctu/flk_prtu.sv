@@ -1,5 +1,5 @@
 // Pixel-rectangle test unit (PRTU): the Gaussian weights of the leader pixels in Cols columns and Rows rows, and their comparison with
-// the splat's threshold (paper, Algorithm 1: two columns, two rows; factored form: docs/prtu.md). With one column and one row it is the
+// the splat's threshold (paper, Algorithm 1: two columns, two rows; factored form: docs/reference/prtu.md). With one column and one row it is the
 // plain test unit of a single pixel.
 //
 // Leader i lies in column i % Cols, row i / Cols: with two of each, 0 is top left, 1 top right, 2 bottom left, 3 bottom right.

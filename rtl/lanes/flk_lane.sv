@@ -1,4 +1,4 @@
-// Lane: visits one pixel of a sub-tile in every cycle, in the log domain (docs/lanes.md).
+// Lane: visits one pixel of a sub-tile in every cycle, in the log domain (docs/reference/lanes.md).
 //
 // in  a visit (visit_valid_i): pixel and shape of a splat, only pixels of its mask (flk_row_mask); or with visit_eos_i the end of the list,
 //     when bank_free_o is high, with the sub-tile in the shape's low bits. The splat's colours are asked for in cycle 6: colour_slot_o is
@@ -24,7 +24,7 @@
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
 // clear_i does. All outputs come from registers, out_data_o by a multiplexer.
-// Source: docs/lanes.md; the rules of 3D Gaussian Splatting's rasterizer in logarithms.
+// Source: docs/reference/lanes.md; the rules of 3D Gaussian Splatting's rasterizer in logarithms.
 module flk_lane
   import flk_pkg::*;
   import flk_lane_pkg::*;

@@ -1,4 +1,4 @@
-// Core of the lanes: one 8x8 sub-tile after another, from records to finished pixels (docs/lanes.md).
+// Core of the lanes: one 8x8 sub-tile after another, from records to finished pixels (docs/reference/lanes.md).
 //
 // in  up to InWidth elements in a cycle, the older lower; all that are valid are taken together. An element is a record of 16 bytes and the
 //     sub-tile whose list it is in, or the end of that list (eos).

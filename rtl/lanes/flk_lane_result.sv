@@ -1,4 +1,4 @@
-// Result of a pixel in FP16: transmittance T = 2^-S and colours (docs/lanes.md).
+// Result of a pixel in FP16: transmittance T = 2^-S and colours (docs/reference/lanes.md).
 //
 // S comes with one place more than the table's address, for rounding, ties upwards; S = 0 gives exactly 1, and T is always a normal number.
 // Colours are rounded to the nearest, ties to even; the least, 2^-ACCUMULATOR, is a normal number.

@@ -1,4 +1,4 @@
-// Mask of the pixels of a sub-tile in which a splat can pass the lane's test (docs/lanes.md, Masks): what
+// Mask of the pixels of a sub-tile in which a splat can pass the lane's test (docs/reference/lanes.md, Masks): what
 // flicker.golden.lanes.mask.row_mask says. Bit 16 m + i of mask_o is pixel i of mini-tile m.
 //
 // Sums of all rows, cut | rest below the bound, shifted for the table | root, ends, comparisons.
@@ -47,7 +47,7 @@ module flk_row_mask
   end
   if (SIZE != 8 || DROP < 1 || A_BITS != 10 || REST_BITS != 15 || V_BITS + 2 > A_BITS
       || 2 * ROOT_PLACES + ROOT_BITS < REST_BITS) begin : gen_check_formats
-    $error("flk_row_mask: made for the formats of docs/lanes.md");
+    $error("flk_row_mask: made for the formats of docs/reference/lanes.md");
   end
 
   // ---- Stage 1: sums -----------------------------------------------------------------------------------

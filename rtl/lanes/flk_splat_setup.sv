@@ -1,7 +1,7 @@
-// A record and a sub-tile to the numbers that masks and lanes share (docs/lanes.md): what
+// A record and a sub-tile to the numbers that masks and lanes share (docs/reference/lanes.md): what
 // flicker.golden.lanes.setup.splat_setup says, for every pattern of bits.
 //
-// in  16 bytes as they lie in memory (docs/front_end.md), and the sub-tile whose list they are in.
+// in  16 bytes as they lie in memory (docs/reference/front_end.md), and the sub-tile whose list they are in.
 // out lane_splat_t: u and v in the middle of the sub-tile, saturated, their half slopes, unit 2^-PLACE;
 //     -log2 of the opacity, colours.
 // Mean to middle | two parts of each product, half slopes | whole, shifted | sum, saturate; opacity.
@@ -46,7 +46,7 @@ module flk_splat_setup
   if (MEAN_FRACTION != 2 * EVEN_MAX + 1 || flk_param_pkg::SUBTILE != 8
       || SHAPE_BIAS + SHAPE_MANTISSA + MEAN_FRACTION != PLACE + 2 ** EXP_BITS
       || FULL_BITS != SLOPE_BITS + 1) begin : gen_check_formats
-    $error("flk_splat_setup: made for the formats of docs/lanes.md");
+    $error("flk_splat_setup: made for the formats of docs/reference/lanes.md");
   end
 
   // Fields that go along until they are needed.

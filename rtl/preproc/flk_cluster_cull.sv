@@ -1,5 +1,5 @@
-// Cluster cull: reads the cluster table (docs/memory_image.md) and hands the clusters on that can
-// hold a visible Gaussian, in the order of the table (docs/front_end.md).
+// Cluster cull: reads the cluster table (docs/reference/memory_image.md) and hands the clusters on that can
+// hold a visible Gaussian, in the order of the table (docs/reference/front_end.md).
 //
 // A frame: start_i while idle_o; setup_i, table_i (beat of the table) and clusters_i stay until
 // done_o, which is high for a cycle when the last element has been taken. The last element has

@@ -1,4 +1,4 @@
-// Colour fetch: colours of survivors from memory to the lanes (docs/memory_image.md, docs/front_end.md).
+// Colour fetch: colours of survivors from memory to the lanes (docs/reference/memory_image.md, docs/reference/front_end.md).
 //
 // Survivors of a group of four come in the order of the scene; of their colours those beats are read
 // that hold any, each once. All lanes see one beat at a time; a lane keeps the two that its Gaussians

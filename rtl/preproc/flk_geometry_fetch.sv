@@ -1,5 +1,5 @@
-// Geometry fetch: headers and geometry of kept clusters from memory (docs/memory_image.md), as
-// groups of four Gaussians with what the lanes take of the header (docs/front_end.md).
+// Geometry fetch: headers and geometry of kept clusters from memory (docs/reference/memory_image.md), as
+// groups of four Gaussians with what the lanes take of the header (docs/reference/front_end.md).
 //
 // A frame: start_i while idle_o; then kept clusters and an element with in_end_i, which carries
 // none; the groups come in order, then an element with out_end_o. done_o is high for a cycle when

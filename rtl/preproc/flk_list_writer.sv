@@ -1,4 +1,4 @@
-// List writer: entries of the tiles of one parity into lists in DRAM (docs/list_layout.md).
+// List writer: entries of the tiles of one parity into lists in DRAM (docs/reference/list_writer.md).
 //
 // A frame: start_i with the configuration while idle_o; entries; an element with in_end_i, which
 // carries no entry; then the lines still open are written, then the pointers; done_o for one cycle,

@@ -1,5 +1,5 @@
 // Mean of a record: 20 bits m in two's complement below 3 bits e, m 4^e for the smallest e that holds
-// it, rounded to nearest, ties upwards (docs/front_end.md). Combinational.
+// it, rounded to nearest, ties upwards (docs/reference/front_end.md). Combinational.
 module flk_mean_field #(
   parameter int unsigned Bits = 31  // of a mean in 1/128 pixel, with the sign; at most 33
 ) (

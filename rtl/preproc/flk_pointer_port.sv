@@ -1,4 +1,4 @@
-// Lines of list pointers between the list writers and their table in memory (docs/list_layout.md).
+// Lines of list pointers between the list writers and their table in memory (docs/reference/list_writer.md).
 //
 // A writer's request is taken in turn and is done before the next one: the line that goes (put) is
 // read from the writer, written, and answered by the memory; then the line that comes (get) is read,

@@ -1,4 +1,4 @@
-// Types of the preprocessing core: what its units hand to each other (docs/front_end.md).
+// Types of the preprocessing core: what its units hand to each other (docs/reference/front_end.md).
 package flk_preproc_pkg;
   import flk_front_pkg::*;
 
@@ -21,6 +21,7 @@ package flk_preproc_pkg;
     logic                      chunked;  // the image's format
     logic                      box;      // lists by boxes of 3 standard deviations
     logic                      antialiased;  // opacities have their factor
+    logic                      by_distance;  // keys of distances; else of depths
     logic [12:0]               width;    // pixels
     logic [12:0]               height;
     position_t [2:0][2:0]      view;

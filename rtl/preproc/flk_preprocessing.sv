@@ -1,4 +1,4 @@
-// Preprocessing: from a packed scene in memory to records and tile lists (docs/front_end.md).
+// Preprocessing: from a packed scene in memory to records and tile lists (docs/reference/front_end.md).
 //
 // Four cores behind three AXI4 read ports (cluster table, geometry, colours), one write port and one
 // of both kinds, for list pointers of pictures with more lists than Pointers a writer. A frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high

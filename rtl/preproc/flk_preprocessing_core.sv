@@ -1,4 +1,4 @@
-// Preprocessing core: one of the four lanes of the front end (docs/front_end.md).
+// Preprocessing core: one of the four lanes of the front end (docs/reference/front_end.md).
 //
 // Front: a Gaussian as it lies in memory goes through decoding and projection. All lanes move
 // together: front_en_i, front_phase_i and the cluster's numbers come from outside, low_i and step_i
@@ -201,6 +201,7 @@ module flk_preprocessing_core
       .height_i     (setup_i.height),
       .chunked_i    (projected_q),
       .antialiased_i(setup_i.antialiased),
+      .by_distance_i(setup_i.by_distance),
       .near_o,
       .outside_o,
       .far_o        (far),
@@ -276,6 +277,7 @@ module flk_preprocessing_core
       .height_i     (setup_i.height),
       .chunked_i    (projected_q),
       .antialiased_i(setup_i.antialiased),
+      .by_distance_i(setup_i.by_distance),
       .near_o,
       .outside_o,
       .far_o        (far),

@@ -1,5 +1,5 @@
 // Shape number of a record: 5 bits of exponent (bias 30) above 9 of mantissa, rounded to nearest even
-// from the magnitude of an ff number; too small is 0, too large the largest (docs/front_end.md).
+// from the magnitude of an ff number; too small is 0, too large the largest (docs/reference/front_end.md).
 // Combinational.
 module flk_shape_field #(
   parameter int unsigned ManBits = 11

@@ -1,4 +1,4 @@
-// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/frame_writer.md).
+// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/reference/frame_writer.md).
 //
 // Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Groups of its pixels go on by
 // themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any
@@ -11,6 +11,7 @@
 // Frame: start_i while idle_o; rgba_i, background_i, base_i (in beats of 64 bytes), stride_i (of a row of pixels, in 32 bytes) and
 // pairs_i (of the frame, at least 1) stay until done_o, high for the cycle after the last line has left. clear_i aborts: as after
 // reset in the next cycle, a line that is offered may be withdrawn.
+// stop_i (a level): no further pair leaves; stopped_o: nor is one on its way out. left_o: pairs of the frame that have not left.
 // Lines: a beat of memory, out_strobe_o a bit for each 16 bytes; the others hold anything. Throughput: a pixel a cycle and core in, always;
 // four pixels a cycle out, 128 cycles a pair and 4 between pairs; done_o 141 cycles after the last pixel.
 // out_ready_i goes to register enables and the memories' read enables.
@@ -36,6 +37,9 @@ module flk_frame_writer
   input  logic [15:0]             pairs_i,
   output logic                    done_o,
   output logic                    freed_o,
+  input  logic                    stop_i,
+  output logic                    stopped_o,
+  output logic [15:0]             left_o,
   // Pixels
   input  logic        [CORES-1:0] in_valid_i,
   input  core_pixel_t [CORES-1:0] in_data_i,
@@ -206,7 +210,7 @@ module flk_frame_writer
     end else if (en) begin
       unique case (state_q)
         WAIT: begin
-          if (&complete) begin
+          if ((&complete) && !stop_i) begin
             state_q <= ROWS;
           end
         end
@@ -430,8 +434,10 @@ module flk_frame_writer
     end
   end
 
-  assign idle_o = !running_q;
-  assign done_o = done_q;
+  assign idle_o    = !running_q;
+  assign done_o    = done_q;
+  assign stopped_o = stop_i && state_q == WAIT && !flow;
+  assign left_o    = left_q;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

@@ -5,7 +5,7 @@
 // Latency 1, throughput 1 per cycle: one register slice. `stall_i` (a feature FIFO is full) stops acceptance, not the output.
 // in_ready_o depends combinationally on stall_i and out_ready_i; out_valid_o, out_data_o and idle_o come from registers.
 //
-// One of the mask generators of flk_mask_generator, whose ports these are (docs/mask_generators.md); it knows one mode, CAT_OFF.
+// One of the mask generators of flk_mask_generator, whose ports these are (docs/reference/mask_generators.md); it knows one mode, CAT_OFF.
 module flk_mask_all
   import flk_pkg::*;
   import flk_param_pkg::*;

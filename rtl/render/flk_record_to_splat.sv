@@ -1,6 +1,6 @@
-// A record and a sub-tile to the splat that the rendering stage takes (docs/record_to_splat.md).
+// A record and a sub-tile to the splat that the rendering stage takes (docs/reference/record_to_splat.md).
 //
-// in  a record as it lies in memory (docs/front_end.md), 16 bytes or with Form conic 32, and the sub-tile
+// in  a record as it lies in memory (docs/reference/front_end.md), 16 bytes or with Form conic 32, and the sub-tile
 //     whose list it is in; or with in_eos_i the end of that list, and no record.
 // out splat_elem_t: FP16, the mean relative to the sub-tile, nearest and at most +-65504; or the end of
 //     the list with the sub-tile in its low bits.

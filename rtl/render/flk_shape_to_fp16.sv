@@ -1,5 +1,5 @@
 // Shape number of a record to FP16: 5 bits of exponent (bias 30) above 9 of mantissa, 0 for exponent 0
-// (docs/front_end.md). Exact from 2^-15 on; below it FP16 has fewer bits, and the nearest number is
+// (docs/reference/front_end.md). Exact from 2^-15 on; below it FP16 has fewer bits, and the nearest number is
 // taken, ties to even. Exponent 0 needs no case of its own: shifted that far, any mantissa is 0.
 // Combinational.
 module flk_shape_to_fp16

@@ -1,5 +1,5 @@
 // Input of a rendering stage that takes splats: records of four cores to splats, and what the stage says back to who gives records
-// (docs/record_to_splat.md).
+// (docs/reference/record_to_splat.md).
 //
 // in_*: records as they lie in memory, or the end of a list, with the sub-tile whose list it is. finished_i is about the sub-tile of the
 // element that the stage takes; finished_o about the sub-tile of in_*: the same when no end lies between.

@@ -1,4 +1,4 @@
-// Delivery: sorted entries of four sorting units to records at four cores (docs/delivery.md).
+// Delivery: sorted entries of four sorting units to records at four cores (docs/reference/delivery.md).
 //
 // Tile i of the walk comes from unit i mod 4. Tiles go one after the other, two entries a cycle (pairs of
 // flk_entry_buffer, never beyond the end of a list). An entry's record is looked up in the cache

@@ -1,4 +1,4 @@
-// Buffer of a sorting unit's entries: one a cycle in, two a cycle out (docs/delivery.md).
+// Buffer of a sorting unit's entries: one a cycle in, two a cycle out (docs/reference/delivery.md).
 //
 // While delivery is at other units' tiles the unit fills it, and its tile then goes at two entries a cycle. The two oldest of what
 // flk_pair_fifo holds, entries and ends, are at both outputs. out_valid_o[1] implies out_valid_o[0], and out_end_o[0] is low with

@@ -1,5 +1,5 @@
 // List reader: the lines of tiles' lists from DRAM, list by list in the order of the tiles
-// (docs/list_layout.md, docs/list_reader.md).
+// (docs/reference/list_layout.md, docs/reference/list_reader.md).
 //
 // Tiles come as columns and rows of the picture. Of each the lines of its list are given: the newest
 // chunk first, lines of a chunk in ascending order, entries as they lie there; the last line is

@@ -1,4 +1,4 @@
-// A tile's list in order, of any length up to Runs times what the sorting unit holds (docs/long_lists.md).
+// A tile's list in order, of any length up to Runs times what the sorting unit holds (docs/reference/list_sorter.md).
 //
 // Lists of up to Capacity = Cells << Stages entries go through flk_sorting_unit once. Of longer ones it makes runs, which
 // flk_run_writer packs into lines from line base_i on; when all are in memory flk_run_merge reads them

@@ -1,4 +1,4 @@
-// Record cache: records from DRAM by their numbers, in order, two a cycle (docs/delivery.md).
+// Record cache: records from DRAM by their numbers, in order, two a cycle (docs/reference/delivery.md).
 //
 // Tags are looked up first, data come later: a lookup decides at once whether its line has to be read
 // and which line goes; then it waits in a queue, in the order of the lookups, input 0 before input 1, and

@@ -1,5 +1,5 @@
 // Sorted runs in memory, their lines in the order of their last entries: what a sorting unit takes a second time
-// (docs/long_lists.md).
+// (docs/reference/list_sorter.md).
 //
 // Runs come as first and last key, number after number, when their lines are on their way to memory; run r
 // lies from line RunLines r of base_i on. A run joins the first chain that it lies behind or before, else it

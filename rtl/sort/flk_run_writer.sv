@@ -1,4 +1,4 @@
-// Sorted runs to lines of memory: a list's entries that a sorting unit does not hold (docs/long_lists.md).
+// Sorted runs to lines of memory: a list's entries that a sorting unit does not hold (docs/reference/list_sorter.md).
 //
 // A run is entries, in order, then an element with in_end_i (no entry). Nine of them and their number are a
 // line; in a run's last line the last entry fills the places that are left. Lines have numbers from 0 on,

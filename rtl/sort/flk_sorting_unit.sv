@@ -1,9 +1,9 @@
-// Sorting unit: the lines of a tile's list in, its entries in order out (docs/sorting_unit.md).
+// Sorting unit: the lines of a tile's list in, its entries in order out (docs/reference/sorting_unit.md).
 //
 // Entries are {key 24, record 24, mask 4}; order is that of the upper 48 bits, unsigned, which are
 // distinct within a list. Lines hold in_count_i entries, the lowest, in any order; 0 only in the one line
 // of an empty list. Out come {record, mask}, then an element with out_end_o that carries no entry.
-// A list of more than Capacity entries (docs/long_lists.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
+// A list of more than Capacity entries (docs/reference/list_sorter.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
 // then an element with run_end_o. merging_o says that all of them have left; from then on its lines
 // come a second time as merge_*, in batches of at most Capacity entries: the entries of a batch are those
 // above the limit of the one before and, of lines with merge_limited_i, not above merge_limit_i.
@@ -20,7 +20,7 @@
 // (flk_sort_merge), each while its runs arrive, so that an entry a cycle goes through all of them,
 // whatever the lengths of the lists. The last step (flk_sort_select) merges Ways runs and takes the place of
 // $clog2(Ways) steps; it holds Capacity = Cells << Stages entries.
-// Throughput: a list of n <= Capacity entries in n + 4 cycles, back to back. Latency: docs/sorting_unit.md.
+// Throughput: a list of n <= Capacity entries in n + 4 cycles, back to back. Latency: docs/reference/sorting_unit.md.
 // Combinational paths: none from an input to a handshake output; outputs of out_* and run_* are registers.
 module flk_sorting_unit #(
   parameter  int unsigned Cells       = 16,

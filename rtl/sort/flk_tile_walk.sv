@@ -1,4 +1,4 @@
-// Walk over the tiles of a picture, near each other in time what is near in the picture (docs/rendering.md; golden/walk.py).
+// Walk over the tiles of a picture, near each other in time what is near in the picture (docs/reference/rendering.md; golden/walk.py).
 //
 // Bands of eight rows, from the left and from the right in turn; in a band columns of pairs of tiles (an even column and the one right
 // of it), the first one downward, then upward and downward in turn; in a column pairs with the left or the right tile first in turn,

@@ -20,6 +20,7 @@ module flk_descriptor
   assign descriptor_o.record_beats = registers_i.record_beats.value.value;
   assign descriptor_o.chunks       = registers_i.chunks.value.value;
   assign descriptor_o.stride       = registers_i.stride.value.value;
+  assign descriptor_o.deadline     = registers_i.deadline.cycles.value;
 
   assign descriptor_o.scene_table  = {registers_i.table_high.value.value,
                                       registers_i.table_low.value.value};
@@ -41,6 +42,7 @@ module flk_descriptor
   assign descriptor_o.lane.chunked = registers_i.frame.chunked.value;
   assign descriptor_o.lane.box     = registers_i.frame.box.value;
   assign descriptor_o.lane.antialiased = registers_i.frame.antialiased.value;
+  assign descriptor_o.lane.by_distance = registers_i.frame.by_distance.value;
   assign descriptor_o.lane.width   = registers_i.size.width.value;
   assign descriptor_o.lane.height  = registers_i.size.height.value;
 

@@ -5,9 +5,12 @@
 // rendering half's place, as soon as that is free, with all that it needs. Frames are posted in the order of their starts:
 // a frame whose descriptor was refused, or whose front end met an error, passes the rendering half by, and its
 // frame buffer is not touched.
-// post_o is high for a cycle when a frame has ended; tag_o, error_o and bank_o are its until the next one, which is posted only
+// A frame whose deadline has passed, so many cycles behind its start, ends as it is, with error_o.late. A half that works on it is stopped: *_stop_o until
+// *_stopped_i, which says that nothing of it is under way at the memory; its counters are kept, and *_reset_o resets it for four cycles. The other half goes on.
+// A late frame passes by the halves that it has not reached. The rendering half that has written all pairs of tiles by then is not late.
+// post_o is high for a cycle when a frame has ended; tag_o, error_o, pairs_o (of tiles written) and bank_o are its until the next one, which is posted only
 // after acknowledged_i, a pulse behind that cycle: what comes before or with post_o is of an earlier frame. Before the first
-// post, and after reset_i, all three are 0.
+// post, and after reset_i, all four are 0.
 // copy_front_o and copy_rendering_o are high until their done: the frame's counters are to be kept in bank *_bank_o, of
 // which there are two; a bank is not written again before its frame was posted and acknowledged. copy_*_none_o: that half
 // has not run, its counters are 0.
@@ -45,6 +48,7 @@ module flk_frame_control
   output logic                 post_o,
   output logic [15:0]          tag_o,
   output frame_error_t         error_o,
+  output logic [15:0]          pairs_o,       // of tiles written, of the posted frame
   output logic                 bank_o,        // of the posted frame
   input  logic                 acknowledged_i,
   output logic [15:0]          started_o,
@@ -57,12 +61,19 @@ module flk_frame_control
   input  logic                 front_done_i,
   input  logic [FRONT_ERRORS-1:0] front_error_i,
   output front_registers_t     front_o,
+  output logic                 front_stop_o,
+  input  logic                 front_stopped_i,
+  output logic                 front_reset_o,
   // Rendering half
   output logic                 rendering_start_o,
   input  logic                 rendering_idle_i,
   input  logic                 rendering_done_i,
   input  logic [2:0]           rendering_error_i,
   output rendering_registers_t rendering_o,
+  output logic                 rendering_stop_o,
+  input  logic                 rendering_stopped_i,
+  output logic                 rendering_reset_o,
+  input  logic [15:0]          rendering_left_i,  // pairs of tiles that are not written
   // Counters
   output logic                 copy_front_o,
   output logic                 copy_front_bank_o,
@@ -81,13 +92,14 @@ module flk_frame_control
     return BEAT_BITS'(address >> BeatShift);
   endfunction
 
-  typedef enum logic [2:0] {FREE, CHECK, START, RUN, COPY, POST} state_e;
+  typedef enum logic [2:0] {FREE, CHECK, START, RUN, STOP, COPY, RESET, POST} state_e;
 
   // ---- front end --------------------------------------------------------------------------------------
 
   state_e       front_q, render_q;
   logic         pending_q, take, hand_over, unacknowledged_q, may_copy;
   logic         front_bank_q, render_bank_q;
+  logic         front_due_q, render_due_q, cut_q;
   logic [1:0]   check_q;
   descriptor_t  frame_q;
   frame_error_t front_error_q, render_error_q;
@@ -127,7 +139,7 @@ module flk_frame_control
       check_q   <= '0;
     end else begin
       pending_q <= (pending_q || start_i) && !take;
-      check_q   <= front_q == CHECK ? check_q + 1'b1 : '0;
+      check_q   <= (front_q == CHECK || front_q == RESET) ? check_q + 1'b1 : '0;
       unique case (front_q)
         FREE: begin
           if (pending_q) begin
@@ -147,10 +159,22 @@ module flk_frame_control
         RUN: begin
           if (front_done_i) begin
             front_q <= COPY;
+          end else if (front_due_q) begin
+            front_q <= STOP;
+          end
+        end
+        STOP: begin
+          if (front_done_i || front_stopped_i) begin
+            front_q <= COPY;
           end
         end
         COPY: begin
           if (may_copy && copy_front_done_i) begin
+            front_q <= front_due_q ? RESET : POST;
+          end
+        end
+        RESET: begin
+          if (check_q == 2'd3) begin
             front_q <= POST;
           end
         end
@@ -164,6 +188,8 @@ module flk_frame_control
   end
 
   assign front_start_o = front_q == START && front_idle_i;
+  assign front_stop_o  = front_q == STOP || (front_due_q && front_q == COPY) || front_q == RESET;
+  assign front_reset_o = front_q == RESET;
 
   always_ff @(posedge clk_i) begin
     if (take) begin
@@ -185,7 +211,7 @@ module flk_frame_control
     end else if (front_q == CHECK && check_q == 2'd2) begin
       front_error_q.descriptor <= misaligned_q || unfit_q || 32'(lists_q) > Lists ||
                                   frame_q.stride < row_bytes;
-    end else if (front_q == RUN && front_done_i) begin
+    end else if ((front_q == RUN || front_q == STOP) && front_done_i) begin
       front_error_q.front_read    <= front_error_i[FRONT_ERROR_READ];
       front_error_q.front_write   <= front_error_i[FRONT_ERROR_WRITE];
       front_error_q.record_region <= front_error_i[FRONT_ERROR_RECORDS];
@@ -210,10 +236,50 @@ module flk_frame_control
   assign front_o.pointer_lines = pointer_lines;
   assign front_o.list_columns  = pairs;
 
+  // ---- deadlines --------------------------------------------------------------------------------------
+
+  // A frame is due when it is as old as its deadline, which is known two cycles later. Its age is right from the check on, and from
+  // the first cycle in which the rendering half runs; it stays due, however old it becomes.
+  logic [31:0] begun_q, front_begun_q, render_begun_q;  // when the host started it
+  logic [31:0] front_age_q, render_age_q, render_deadline_q;
+
+  always_ff @(posedge clk_i) begin
+    if (start_i && !pending_q) begin
+      begun_q <= now_i;
+    end
+    if (take) begin
+      front_begun_q <= begun_q;
+    end
+    if (hand_over) begin
+      render_begun_q    <= front_begun_q;
+      render_deadline_q <= frame_q.deadline;
+    end
+    front_age_q  <= now_i - front_begun_q;
+    render_age_q <= now_i - render_begun_q;
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      front_due_q  <= 1'b0;
+      render_due_q <= 1'b0;
+      cut_q        <= 1'b0;
+    end else begin
+      cut_q        <= render_q != POST && (cut_q || (render_q == STOP && rendering_stopped_i &&
+                                                      !rendering_done_i));
+      front_due_q  <= front_q != FREE && front_q != CHECK && !clear_i &&
+                      !front_error_q.descriptor &&
+                      (front_due_q || (frame_q.deadline != '0 && front_age_q >= frame_q.deadline));
+      render_due_q <= render_q == RUN && !clear_i &&
+                      (render_due_q ||
+                       (render_deadline_q != '0 && render_age_q >= render_deadline_q));
+    end
+  end
+
   // ---- rendering half ---------------------------------------------------------------------------------
 
-  logic                 post, post_q, rendered_q;
-  logic [15:0]          tag_q;
+  logic                 post, post_q, rendered_q, render_leaves, render;
+  logic [1:0]           render_reset_q;
+  logic [15:0]          tag_q, pairs_q;
   logic [3:0][31:0]     stamps_q;
   logic [1:0][31:0]     front_stamps_q;
   rendering_registers_t rendering_q;
@@ -230,14 +296,17 @@ module flk_frame_control
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      render_q <= FREE;
+      render_q       <= FREE;
+      render_reset_q <= '0;
     end else if (clear_i) begin
-      render_q <= FREE;
+      render_q       <= FREE;
+      render_reset_q <= '0;
     end else begin
+      render_reset_q <= render_q == RESET ? render_reset_q + 1'b1 : '0;
       unique case (render_q)
         FREE: begin
           if (front_q == POST) begin
-            render_q <= front_error_q == '0 ? START : COPY;
+            render_q <= render ? START : COPY;
           end
         end
         START: begin
@@ -248,10 +317,22 @@ module flk_frame_control
         RUN: begin
           if (rendering_done_i) begin
             render_q <= COPY;
+          end else if (render_due_q) begin
+            render_q <= STOP;
+          end
+        end
+        STOP: begin
+          if (rendering_done_i || rendering_stopped_i) begin
+            render_q <= COPY;
           end
         end
         COPY: begin
           if (copy_rendering_done_i) begin
+            render_q <= cut_q ? RESET : POST;
+          end
+        end
+        RESET: begin
+          if (&render_reset_q) begin
             render_q <= POST;
           end
         end
@@ -264,7 +345,11 @@ module flk_frame_control
     end
   end
 
+  assign render            = front_error_q == '0 && !front_due_q;
+  assign render_leaves     = (render_q == RUN || render_q == STOP) && rendering_done_i;
   assign rendering_start_o = render_q == START && rendering_idle_i;
+  assign rendering_stop_o  = render_q == STOP || (render_q == COPY && cut_q) || render_q == RESET;
+  assign rendering_reset_o = render_q == RESET;
   assign copy_rendering_o  = render_q == COPY;
   assign post              = render_q == POST && !unacknowledged_q && !clear_i && !reset_i;
   assign rendering_o       = rendering_q;
@@ -272,8 +357,10 @@ module flk_frame_control
   always_ff @(posedge clk_i) begin
     if (hand_over) begin
       tag_q                     <= frame_q.tag;
-      rendered_q                <= front_error_q == '0;
+      rendered_q                <= render;
+      pairs_q                   <= '0;
       render_error_q            <= front_error_q;
+      render_error_q.late       <= front_due_q;
       rendering_q.mode          <= frame_q.mode;
       rendering_q.rgba          <= frame_q.rgba;
       rendering_q.background    <= frame_q.background;
@@ -286,7 +373,9 @@ module flk_frame_control
       rendering_q.records_beat  <= beat(frame_q.records);
       rendering_q.frame_beat    <= beat(frame_q.frame_buffer);
       rendering_q.stride        <= frame_q.stride[16:5];
-    end else if (render_q == RUN && rendering_done_i) begin
+    end else if (render_leaves || (render_q == STOP && rendering_stopped_i)) begin
+      pairs_q                    <= rendering_q.all_pairs - rendering_left_i;
+      render_error_q.late        <= rendering_left_i != '0;
       render_error_q.list_read   <= rendering_error_i[0];
       render_error_q.record_read <= rendering_error_i[1];
       render_error_q.frame_write <= rendering_error_i[2];
@@ -295,7 +384,7 @@ module flk_frame_control
 
   // ---- banks, numbers -----------------------------------------------------------------------------------
 
-  logic [15:0]  started_q, finished_q, posted_tag_q;
+  logic [15:0]  started_q, finished_q, posted_tag_q, posted_pairs_q;
   frame_error_t posted_error_q;
   logic         posted_bank_q;
   logic         aborted, timed_out, aborted_q, timed_out_q;
@@ -337,12 +426,14 @@ module flk_frame_control
     if (!rst_ni) begin
       posted_tag_q   <= '0;
       posted_error_q <= '0;
+      posted_pairs_q <= '0;
       posted_bank_q  <= 1'b0;
       aborted_q      <= 1'b0;
       timed_out_q    <= 1'b0;
     end else if (reset_i) begin
       posted_tag_q   <= '0;
       posted_error_q <= '0;
+      posted_pairs_q <= '0;
       posted_bank_q  <= 1'b0;
       aborted_q      <= 1'b0;
       timed_out_q    <= 1'b0;
@@ -352,9 +443,11 @@ module flk_frame_control
       if (post) begin
         posted_tag_q   <= tag_q;
         posted_error_q <= render_error_q;
+        posted_pairs_q <= pairs_q;
         posted_bank_q  <= render_bank_q;
       end else if ((aborted || timed_out) && !unacknowledged_q) begin
         posted_error_q           <= '0;
+        posted_pairs_q           <= '0;
         posted_error_q.aborted   <= aborted;
         posted_error_q.timed_out <= timed_out;
       end else if (aborted_i) begin
@@ -367,7 +460,7 @@ module flk_frame_control
     if (take) begin
       front_stamps_q[0] <= now_i;
     end
-    if (front_q == RUN) begin
+    if (front_q == RUN || front_q == STOP) begin
       front_stamps_q[1] <= now_i;
     end
     if (hand_over) begin
@@ -376,7 +469,7 @@ module flk_frame_control
     if (render_q == START) begin
       stamps_q[2] <= now_i;
     end
-    if (render_q == START || render_q == RUN) begin
+    if (render_q == START || render_q == RUN || render_q == STOP) begin
       stamps_q[3] <= now_i;
     end
   end
@@ -384,6 +477,7 @@ module flk_frame_control
   assign post_o                = post_q && !reset_i;
   assign tag_o                 = posted_tag_q;
   assign error_o               = posted_error_q;
+  assign pairs_o               = posted_pairs_q;
   assign bank_o                = posted_bank_q;
   assign stamps_o              = stamps_q;
   assign copy_front_bank_o     = front_bank_q;
@@ -394,14 +488,15 @@ module flk_frame_control
   assign finished_o            = finished_q;
   assign front_busy_o          = front_q != FREE;
   assign rendering_busy_o      = render_q != FREE;
-  assign front_done_o          = copy_front_o && copy_front_done_i && !copy_front_none_o;
+  assign front_done_o          = copy_front_o && copy_front_done_i && !copy_front_none_o &&
+                                 !front_due_q;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      front_done_i && !clear_i |-> front_q == RUN)
+      front_done_i && !clear_i |-> front_q == RUN || front_q == STOP)
   else $error("flk_frame_control: the front end ends a frame that it was not given");
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      rendering_done_i && !clear_i |-> render_q == RUN)
+      rendering_done_i && !clear_i |-> render_q == RUN || render_q == STOP)
   else $error("flk_frame_control: the rendering half ends a frame that it was not given");
 `endif
 

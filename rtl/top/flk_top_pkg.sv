@@ -5,7 +5,7 @@ package flk_top_pkg;
   localparam int unsigned TOP_ADDR_BITS = 40;
   typedef logic [TOP_ADDR_BITS-1:0] address_t;
 
-  // A frame, as the registers describe it (docs/registers.md).
+  // A frame, as the registers describe it (docs/reference/registers.md).
   typedef struct packed {
     logic [15:0]     tag;
     logic [2:0]      mode;         // of the contribution test, CAT_*
@@ -25,10 +25,12 @@ package flk_top_pkg;
     logic [22:0]     record_beats;
     logic [24:0]     chunks;       // of a list writer
     logic [16:0]     stride;       // bytes
+    logic [31:0]     deadline;     // cycles from the start; 0: none
   } descriptor_t;
 
   // Bits of a frame's error, in the order of the enumeration error_e of rtl/regs/flk_registers.rdl.
   typedef struct packed {
+    logic late;
     logic bad_header;
     logic bad_table;
     logic timed_out;
@@ -54,7 +56,9 @@ package flk_top_pkg;
   localparam int unsigned RENDERING_WORDS = 27;
   localparam int unsigned LIVE_WORDS = 20;
 
-  // Managers of the memory port; the first reader and the first writer go first.
+  // Managers of the memory port; the first reader and the first writer go first. The rendering half's come before the front end's.
+  localparam int unsigned RENDERING_READERS = 2;
+  localparam int unsigned RENDERING_WRITERS = 1;
   localparam int unsigned READERS = 6;
   localparam int unsigned READ_RECORDS = 0;
   localparam int unsigned READ_LISTS = 1;

@@ -1,4 +1,5 @@
-"""`make docs PART=areas`: model/flicker/cost/areas.csv from the results of `make synth`, and the tables of docs/energy.md that follow from it.
+"""`make docs PART=areas`: model/flicker/cost/areas.csv from the results of `make synth`, and the tables that follow from it in docs/results/energy.md and
+docs/reference/energy.md.
 
 areas.csv has area and switched load of every synthesised unit, for `flicker.cost.area` and `flicker.cost.energy`. Units come from the cached results of
 `make synth` (build/synth) of the RTL as it is; the operators of mask generators that have no RTL (integer products, tables, shifters;

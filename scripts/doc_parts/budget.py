@@ -1,4 +1,4 @@
-"""`make docs PART=budget`: real scenes to budgets, step by step, in docs/budget.md. Half an hour; goes on where it was interrupted (build/budget)."""
+"""`make docs PART=budget`: real scenes to budgets, step by step, in docs/results/budget.md. Half an hour; goes on where it was interrupted (build/budget)."""
 
 from __future__ import annotations
 

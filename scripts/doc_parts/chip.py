@@ -1,4 +1,5 @@
-"""`make docs PART=chip`, `PART=constants` and `PART=dram`: tables of docs/chip_model.md, docs/lists_and_sorting.md and docs/memory_formats.md.
+"""`make docs PART=chip`, `PART=constants` and `PART=dram`: tables of docs/results/chip_model.md, docs/results/list_schemes.md and
+docs/results/memory_formats.md.
 
 `chip`: the demo scene and the real ones, one view each. The others need no view.
 """

@@ -1,4 +1,4 @@
-"""`make docs PART=chip_hardware`: frames of the verilated chip beside the chip model's halves, in docs/chip.md.
+"""`make docs PART=chip_hardware`: frames of the verilated chip beside the chip model's halves, in docs/results/chip.md.
 
 With SLOW=1 flowers at 1280x720 too, with both kinds of refresh. An error: a frame buffer that differs from the golden model's; cycles of a
 frame that are more than 10 % off.

@@ -1,4 +1,4 @@
-"""`make docs PART=chip_lanes` and `PART=chip_queues`: frames of the verilated chip with lanes, in docs/chip.md: what the lanes wait for.
+"""`make docs PART=chip_lanes` and `PART=chip_queues`: frames of the verilated chip with lanes, in docs/results/chip.md: what the lanes wait for.
 
 An error: a frame buffer that differs from the golden model's.
 """

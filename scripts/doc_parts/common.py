@@ -39,7 +39,7 @@ def scenes_missing() -> str | None:
     """Why the real views cannot be rendered; None where they can."""
     folder = real_scenes()
     if folder is None:
-        return f"{VARIABLE} is not set; it names the folder of the real scenes (docs/scenes.md)"
+        return f"{VARIABLE} is not set; it names the folder of the real scenes (docs/reference/scenes.md)"
     missing = [view.path(folder) for view in REAL_VIEWS if not view.path(folder).is_file()]
     return f"{VARIABLE}: {missing[0]}: no such file" if missing else None
 

@@ -1,4 +1,4 @@
-"""`make docs PART=configurations`: the list of configurations and the groups that tables take, in docs/configurations.md."""
+"""`make docs PART=configurations`: the list of configurations and the groups that tables take, in docs/reference/configurations.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=cuts`: where the lists of lanes end, and the pixels that jump for it, in docs/motion.md.
+"""`make docs PART=cuts`: where the lists of lanes end, and the pixels that jump for it, in docs/results/motion.md.
 
 A splat's Gaussian goes on beyond 3 standard deviations, where its alpha is up to 2.8/255. The float64 reference, as the INRIA code, cuts it off at squares of
 whole tiles; lists of sub-tiles at boxes of 3 standard deviations.

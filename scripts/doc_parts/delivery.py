@@ -1,4 +1,5 @@
-"""`make docs PART=delivery`: sorting and delivery alone, each as fast as it goes, for whole lists and for what cores take of them, in docs/delivery.md."""
+"""`make docs PART=delivery`: sorting and delivery alone, each as fast as it goes, for whole lists and for what cores take of them, in
+docs/results/delivery.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=energy`: energy of a frame by part, in docs/energy.md."""
+"""`make docs PART=energy`: energy of a frame by part, in docs/results/energy.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=formal`: table of docs/formal.md from the results of `make formal`."""
+"""`make docs PART=formal`: table of docs/results/formal.md from the results of `make formal`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=frames`: few configurations on the real views, for README.md, and the way from the default to lanes in docs/exploration.md."""
+"""`make docs PART=frames`: few configurations on the real views, in docs/results/frames.md; from the default to lanes, in docs/results/exploration.md."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def assumed(configuration: Configuration) -> list[str]:
     else:
         words.append(
             "no RTL: the cycle model has nothing to be held against; area of the mask generator by a rule whose error is "
-            f"{model_error()} on those with RTL ([energy and area](docs/energy.md))"
+            f"{model_error()} on those with RTL ([energy and area](../reference/energy.md))"
         )
     words += [f"lists by {LISTS[configuration.lists]}", *configuration.stage.assumed]
     return words + ["a finished sub-tile's list is left at once (early exit)"] * configuration.stop

@@ -1,4 +1,5 @@
-"""`make docs PART=front`: what the bit-true front end does to pictures of the demo scene and the real ones, and its number formats, in docs/front_end.md."""
+"""`make docs PART=front`: what the bit-true front end does to pictures of the demo scene and the real ones, and its number formats, in
+docs/results/front_end.md."""
 
 from __future__ import annotations
 

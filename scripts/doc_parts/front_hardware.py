@@ -1,4 +1,5 @@
-"""`make docs PART=front_hardware`: cycles and bytes of the front end's RTL, in docs/front_end.md. Bytes that differ from the golden model's are an error."""
+"""`make docs PART=front_hardware`: cycles and bytes of the front end's RTL, in docs/results/front_end.md. Bytes that differ from the golden model's are
+an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=lane_stage`: cycles and areas of the lanes' RTL, and cycles of cores that take more than it does, in docs/lane_stage.md."""
+"""`make docs PART=lane_stage`: cycles and areas of the lanes' RTL, and cycles of cores that take more than it does, in docs/results/lane_stage.md."""
 
 from __future__ import annotations
 

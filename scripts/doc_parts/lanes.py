@@ -1,4 +1,4 @@
-"""`make docs PART=lanes`: lanes in the log domain, in docs/lanes.md: where the dB go, number formats and what a lane of them costs, masks, counts,
+"""`make docs PART=lanes`: lanes in the log domain, in docs/results/lanes.md: where the dB go, number formats and what a lane of them costs, masks, counts,
 hard inputs."""
 
 from __future__ import annotations

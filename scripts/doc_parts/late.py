@@ -1,4 +1,5 @@
-"""`make docs PART=late`: how long frames of a path take, and which of them miss their slot; what enormous Gaussians near the camera do. In docs/motion.md.
+"""`make docs PART=late`: how long frames of a path take, and which of them miss their slot; what enormous Gaussians near the camera do.
+In docs/results/motion.md.
 
 The real views at 1280x720, 90 Hz, the chip with lanes by the models that are held to its RTL. Results are kept in build/late, so that Ctrl-C loses a sequence
 at most.

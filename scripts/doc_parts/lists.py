@@ -1,4 +1,4 @@
-"""`make docs PART=lists`: tables of docs/list_layout.md. The demo scene and the real ones, one view each."""
+"""`make docs PART=lists`: tables of docs/results/lists.md. The demo scene and the real ones, one view each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`make docs PART=long_lists`: tables of docs/long_lists.md. Made lists of every order; `real`: the longest lists of a real view in a small picture."""
+"""`make docs PART=long_lists`: tables of docs/results/long_lists.md. Made lists of every order; `real`: the longest lists of a real view in a small
+picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=motion`: speed against stability. Cycles of rendering stages beside what their pictures do from frame to frame, in docs/motion.md.
+"""`make docs PART=motion`: speed against stability. Cycles of rendering stages beside what their pictures do from frame to frame, in docs/results/motion.md.
 
 The real views, three motions at 90 Hz, every picture against the float64 reference of the same frame. Results are kept in build/motion, so that Ctrl-C loses
 a sequence at most. Pictures in the pages are of the demo scene.

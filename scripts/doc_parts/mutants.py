@@ -1,4 +1,4 @@
-"""Who kills the mutants of the hardware: docs/mutants.md."""
+"""Who kills the mutants of the hardware: docs/results/mutants.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`make docs PART=packing`: memory images of the demo scene and the real ones, and what choices in making chunks are worth, in docs/memory_image.md."""
+"""`make docs PART=packing`: memory images of the demo scene and the real ones, and what choices in making chunks are worth, in
+docs/results/memory_formats.md."""
 
 from __future__ import annotations
 

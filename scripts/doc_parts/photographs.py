@@ -1,4 +1,4 @@
-"""`make docs PART=photographs`: Table 1 against photographs, in docs/report.md: scenes fitted, pruned and fine-tuned, also through the contribution test.
+"""`make docs PART=photographs`: Table 1 against photographs, in docs/results/photographs.md: scenes fitted, pruned, fine-tuned, also through the test.
 
 An hour on two cores; what is fitted stays in build/photographs under a digest of the options, and an interrupted run goes on from there. Delete the folder
 when the optimisation itself has changed.

@@ -1,4 +1,4 @@
-"""`make docs PART=pictures`: picture, work and misses of mask generators on the real views, in docs/configurations.md."""
+"""`make docs PART=pictures`: picture, work and misses of mask generators on the real views, in docs/results/mask_generators.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=quality`: PSNR and mini-tiles sent for every mode, precision and form of the RTL, in docs/quality.md.
+"""`make docs PART=quality`: PSNR and mini-tiles sent for every mode, precision and form of the RTL, in docs/results/quality.md.
 
 Golden model against the float64 reference, one view of each scene.
 """

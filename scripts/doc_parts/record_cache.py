@@ -1,4 +1,5 @@
-"""`make docs PART=record_cache`: lines that the record cache reads for whole lists, by its size and by the order of the tiles, in docs/delivery.md."""
+"""`make docs PART=record_cache`: lines that the record cache reads for whole lists, by its size and by the order of the tiles, in
+docs/results/delivery.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=rendering_hardware`: cycles and bytes of the rendering half's RTL beside the chip model's, in docs/rendering.md.
+"""`make docs PART=rendering_hardware`: cycles and bytes of the rendering half's RTL beside the chip model's, in docs/results/rendering.md.
 
 An error: a frame buffer that differs from the golden model's; bytes of lists, pointers or frame buffer that differ, or more than 2 % of the records' lines,
 whose number rests on the timing; cycles that are more than 10 % off.

@@ -1,4 +1,4 @@
-"""`make docs PART=scale`: how a frame grows with the scene and with the picture, by the models held to the RTL, in docs/scaling.md."""
+"""`make docs PART=scale`: how a frame grows with the scene and with the picture, by the models held to the RTL, in docs/results/scaling.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=scale_hardware`: frames with long lists and of grown scenes in the verilated chip with 32 lanes, in docs/scaling.md.
+"""`make docs PART=scale_hardware`: frames with long lists and of grown scenes in the verilated chip with 32 lanes, in docs/results/scaling.md.
 
 An error: a frame buffer that differs from the golden model's; cycles of a frame or bytes that are more than 10 % off.
 """

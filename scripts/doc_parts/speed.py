@@ -1,4 +1,4 @@
-"""`make docs PART=speed`: engines timed on one frame (scripts/benchmark.py), in docs/speed.md."""
+"""`make docs PART=speed`: engines timed on one frame (scripts/benchmark.py), in docs/results/speed.md."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""`make docs PART=stability`: where chosen configurations break, in docs/stability.md; `PART=stability_front`: where front ends do, there and in
-docs/front_end.md; `PART=stability_moving`: what flickers at which speed."""
+"""`make docs PART=stability`: where chosen configurations break, in docs/results/stability.md; `PART=stability_front`: where front ends do, there and in
+docs/results/front_end.md; `PART=stability_moving`: what flickers at which speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=subnormals`: what flushing subnormal numbers to zero would cost in PSNR, per format (docs/arithmetic.md).
+"""`make docs PART=subnormals`: what flushing subnormal numbers to zero would cost in PSNR, per format (docs/results/subnormals.md).
 
 The model's rounding constants are replaced before anything is compiled: results below the smallest normal number become 0, and so do operands in
 the splat records. So this file runs itself, one process per variant, each with a cache of its own. The chip's numbers keep subnormals.

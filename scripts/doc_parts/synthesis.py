@@ -1,4 +1,4 @@
-"""`make docs PART=synthesis` and `PART=library`: tables of docs/synthesis.md and README.md from the results of `make synth`.
+"""`make docs PART=synthesis` and `PART=library`: tables of docs/results/synthesis.md from the results of `make synth`.
 
 Nothing is synthesised here: what build/synth lacks is named.
 """
@@ -32,7 +32,7 @@ def stamp() -> str:
 
 
 def tables(say: Say) -> dict[str, str]:
-    """`units`: all tables of docs/synthesis.md, those of units last. `summary`: for README.md."""
+    """`units`: all tables of docs/results/synthesis.md, those of units last. `summary`: the first one there."""
     runner = Runner(LIBERTY)
     results = runner.run(all_units())  # of the cache
     comparison = report.Comparison(runner, results)

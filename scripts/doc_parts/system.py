@@ -1,4 +1,4 @@
-"""`make docs PART=system`: rendering stages in whole chips on the real views, by the models held to the RTL, in docs/chip.md."""
+"""`make docs PART=system`: rendering stages in whole chips on the real views, by the models held to the RTL, in docs/results/chip.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`make docs PART=through`: speed against accuracy of every mode before and after fine-tuning through its contribution test, in docs/fit.md.
+"""`make docs PART=through`: speed against accuracy of every mode before and after fine-tuning through its contribution test, in docs/results/fit.md.
 
 An hour on one core; what is tuned stays in build/photographs, and an interrupted run goes on from there. Delete the folder when the optimisation itself
 has changed.

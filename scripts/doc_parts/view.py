@@ -1,4 +1,4 @@
-"""`make docs PART=view`: the viewer in a headless browser (scripts/view_page.py), in docs/view.md, with its picture."""
+"""`make docs PART=view`: the viewer in a headless browser (scripts/view_page.py), in docs/results/view.md, with the picture of docs/guide/view.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arithmetic units and the model of their formats and functions (docs/arithmetic.md).
+"""Arithmetic units and the model of their formats and functions (docs/reference/arithmetic.md).
 
 Units (`arith_harness.sv`, against `flicker.arithmetic.formats` and `flicker.arithmetic.functions`, bit for bit):
   every pair of operands of all formats but FP16; FP16 by special, structured and random pairs
@@ -356,7 +356,7 @@ def test_carrier_functions(base2: bool) -> None:
         assert_same(f"log_opacity_f32 to {fmt.name}", FP16, (bits,), got.view(np.uint32), want.view(np.uint32))
 
 
-# ---- error bounds of the functions (docs/arithmetic.md) ----------------------------------------
+# ---- error bounds of the functions (docs/reference/arithmetic.md) ----------------------------------------
 
 EXP_ULP = {False: 0.73, True: 0.73}
 LOG_ERROR = {False: 1.4e-3, True: 1.2e-3}

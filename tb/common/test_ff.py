@@ -1,4 +1,4 @@
-"""ff numbers (docs/ff.md): the model against numpy's float32 and exact rationals, error bounds of the functions, units against the model.
+"""ff numbers (docs/reference/ff.md): the model against numpy's float32 and exact rationals, error bounds of the functions, units against the model.
 `flk_ff_poly` and the tables behind it, `flk_ff_rom`, run inside the units of functions (recip, rsqrt, sqrt, exp2).
 
 Not covered: mantissas other than those named in the tests; the units have no case of their own for them.
@@ -253,7 +253,7 @@ def test_function_bounds(function: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("function", range(4), ids=tables.NAMES)
 def test_function_bounds_all(function: int) -> None:
-    """Every mantissa; prints what docs/ff.md has in its table."""
+    """Every mantissa; prints what docs/reference/ff.md has in its table."""
     worst = [float(error_ulp(function, M, np.arange(1 << M)).max()) for M in MAN_BITS]
     print(tables.NAMES[function], " ".join(f"{M}: {error:.3f}" for M, error in zip(MAN_BITS, worst)))
     assert max(worst) <= ff.FF_MAX_ULP[function]

@@ -1,6 +1,7 @@
-"""AXI4 subordinates for cocotb benches: the memory of `flicker.sim.memory` (docs/memory_model.md), which checks the design's side, and that of cocotbext-axi.
+"""AXI4 subordinates for cocotb benches: the memory of `flicker.sim.memory` (docs/reference/memory_model.md), which checks the design's side, and that of
+cocotbext-axi.
 
-Ports are named as in docs/memory_model.md: ``<prefix>ar_valid_o``, ``<prefix>r_data_i``, ...
+Ports are named as in docs/reference/memory_model.md: ``<prefix>ar_valid_o``, ``<prefix>r_data_i``, ...
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ PLACEHOLDERS = {
 
 def pages() -> list[Path]:
     """Where commands are looked for."""
-    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "sw" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "sw" / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def _texts(page: str) -> Iterator[str]:

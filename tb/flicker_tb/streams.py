@@ -1,4 +1,4 @@
-"""Stream source, sink and monitor for the valid/ready contract of docs/architecture.md.
+"""Stream source, sink and monitor for the valid/ready contract of docs/reference/streams.md.
 
 A stream is a prefix of ports: ``Stream(dut, "in")`` finds ``in_valid_i`` and ``in_ready_o``, with
 ``_i`` and ``_o`` either way, and a data port per field (default ``in_data``). An item is an

@@ -22,7 +22,7 @@ from flicker_tb.runner import seed
 from flicker import params
 from flicker.chip import rendering
 from flicker.chip.dram import DramConfig, Refresh
-from flicker.chip.run import chip_stats
+from flicker.chip.run import chip_stats, render_on_chip
 from flicker.chip.tile_lists import TileLists
 from flicker.chip_registers import ChipCounter, ResultError
 from flicker.errors import FlickerError
@@ -30,16 +30,16 @@ from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
 from flicker.golden.chip import chip_walk, render_chip
 from flicker.golden.delivery import may_be_given
-from flicker.golden.frame_buffer import PixelFormat, least_stride
+from flicker.golden.frame_buffer import PixelFormat, late_frame_buffer, least_stride
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
-from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig
-from flicker.pipeline import packed_scene
+from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig, SortOrder
+from flicker.pipeline import Engine, FrontOptions, packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
-from flicker.scene.packed import PackedFormat, PackedScene
+from flicker.scene.packed import PackedFormat, PackedScene, decode
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.chip import PORT, ChipFrame, ChipSession
@@ -75,8 +75,9 @@ def small(count: int = 500) -> PackedScene:
 
 def golden(
     packed: PackedScene, view: Camera, config: RenderConfig = CONFIG, format_: PixelFormat = PixelFormat.RGB8, lists: ListKind = ListKind.ELLIPSE,
+    order: SortOrder = SortOrder.DEPTH,
 ) -> tuple[FrontFrame, GoldenFrame]:
-    front = run_front(packed, view, lists, RecordKind.of(config.form))
+    front = run_front(packed, view, lists, RecordKind.of(config.form), order=order)
     return front, render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config, format_, BLUE)
 
 
@@ -86,10 +87,11 @@ def session(packed: PackedScene | None = None, **options) -> ChipSession:
 
 def check(
     chip: ChipSession, view: Camera, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG, lists: ListKind = ListKind.ELLIPSE,
+    order: SortOrder = SortOrder.DEPTH,
 ) -> ChipFrame:
     """A frame by itself, with its front end's counters."""
-    done = chip.render(view, format_, background=BLUE, lists=lists, limit=LIMIT)
-    compare(chip, view, done, format_, config, lists)
+    done = chip.render(view, format_, background=BLUE, lists=lists, order=order, limit=LIMIT)
+    compare(chip, view, done, format_, config, lists, order)
     return done
 
 
@@ -101,9 +103,9 @@ def of_cores(values: np.ndarray, cols: int) -> np.ndarray:
 
 def compare(
     chip: ChipSession, view: Camera, done: ChipFrame, format_: PixelFormat = PixelFormat.RGB8, config: RenderConfig = CONFIG,
-    lists: ListKind = ListKind.ELLIPSE,
+    lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH,
 ) -> None:
-    front, want = golden(chip.packed, view, config, format_, lists)
+    front, want = golden(chip.packed, view, config, format_, lists, order)
     assert done.error == 0
     assert np.array_equal(done.buffer, want.buffer)
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
@@ -235,12 +237,27 @@ def any_port(rng: random.Random, number: int) -> PortConfig:
 @pytest.mark.parametrize("number", range(5))
 def test_memories(number: int) -> None:
     """Five seeds of pauses on every channel; answers in every order; both formats; DRAM in one. In two of an antialiased scene, where the first frame's
-    principal point is off the middle."""
+    principal point is off the middle. Each has a frame by depth and one by distance."""
     port, features = any_port(random.Random(f"{seed()} {number}"), number), number in (1, 2)
     packed, first = replace(small(), antialiased=features), replace(camera(), cx=20.3, cy=31.0 + number) if features else camera()
     with session(packed, port=port, memory=MemoryOptions(DramConfig().timing if number == 4 else None)) as chip:
-        check(chip, first, list(PixelFormat)[number % 2])
-        check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2])
+        check(chip, first, list(PixelFormat)[number % 2], order=list(SortOrder)[number % 2])
+        check(chip, camera(80, 40, x=0.5), list(PixelFormat)[(number + 1) % 2], order=list(SortOrder)[(number + 1) % 2])
+
+
+def test_order_by_distance() -> None:
+    """Frames of one session by depth and by distance while the camera turns on the spot: their pictures differ, and each is the golden model's."""
+    with session() as chip:
+        for degrees in (0.0, 4.0):
+            c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+            view = replace(camera(), rotation=np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+            by_depth, by_distance = (check(chip, view, order=order) for order in SortOrder)
+            assert not np.array_equal(by_depth.buffer, by_distance.buffer)
+    seen = View(view, decode(small()), order=SortOrder.DISTANCE)
+    done, want = (render_on_chip(seen, engine, config=CONFIG, options=FrontOptions(rechunk=True)) for engine in (Engine.CHIP, Engine.CHIP_GOLDEN))
+    assert np.array_equal(done.image, want.image) and done.stats["order"] == "distance"
+    plain = render_on_chip(View(view, decode(small())), Engine.CHIP_GOLDEN, config=CONFIG, options=FrontOptions(rechunk=True))
+    assert not np.array_equal(done.image, plain.image)
 
 
 @pytest.mark.slow
@@ -313,11 +330,11 @@ def test_opaque_layers() -> None:
 
 @pytest.mark.parametrize("overlap", [True, False])
 def test_back_to_back(overlap: bool) -> None:
-    """Four frames with cameras of their own on two regions: the front end works on the next one while one is rendered."""
-    views = [camera(x=0.3 * k) for k in range(4)]
+    """Four frames with cameras of their own on two regions: the front end works on the next one, of the other order, while one is rendered."""
+    views, orders = [camera(x=0.3 * k) for k in range(4)], [*SortOrder, *SortOrder]
     with session() as chip:
         places = [chip.place(views[0]) for _ in range(2)]
-        frames = [chip.frame(view, places[k % 2], background=BLUE, tag=7 + k) for k, view in enumerate(views)]
+        frames = [chip.frame(view, places[k % 2], background=BLUE, order=orders[k], tag=7 + k) for k, view in enumerate(views)]
         done: list[ChipFrame] = []
         if not overlap:
             for frame in frames:
@@ -331,8 +348,8 @@ def test_back_to_back(overlap: bool) -> None:
                         chip.step(20)
                     chip.start(frames[k + 1])
                 done.append(chip.finish(frame, LIMIT))
-        for view, frame in zip(views, done):
-            compare(chip, view, frame)
+        for view, frame, order in zip(views, done, orders):
+            compare(chip, view, frame, order=order)
         ahead = [b.stamps["taken"] < a.stamps["rendering_done"] for a, b in zip(done, done[1:])]
         assert all(ahead) if overlap else not any(ahead)
         assert chip.field("frames", "started") == chip.field("frames", "finished") == 4
@@ -641,6 +658,53 @@ def test_time_out_before_a_release() -> None:
         revive(chip)
         assert chip.register("interrupt") == 0
         check(chip, view)
+
+
+OVERRUN = round(0.02 * 1e9 / 90)  # cycles: 2 % of a slot of 1/90 s at 1 GHz
+
+
+def test_deadlines() -> None:
+    """At random times, with pauses and DRAM, alone and beside a frame that has none: what is written are the first pairs of the walk, whole; the rest of the
+    buffer stays; the frame beside it and the next one are right. Ends within 2 % of a slot of 1/90 s at 1 GHz."""
+    rng = random.Random(f"{seed()} deadlines")
+    port = replace(PORT, stall={name: 0.2 for name in CHANNELS}, seed=seed())
+    view, other = camera(160, 90), camera(80, 40, x=0.5)
+    with session(port=port, memory=MemoryOptions(DramConfig().timing)) as chip:
+        frames = [chip.frame(v, chip.place(v), background=BLUE, tag=k) for k, v in enumerate((view, other))]
+        chip.start(frames[0])
+        whole = chip.finish(frames[0], LIMIT)
+        compare(chip, view, whole)
+        assert whole.pairs == 5 * 6
+        front = whole.stamps["front_done"] - whole.stamps["taken"]
+        all_ = whole.stamps["rendering_done"] - whole.stamps["taken"]
+        seen = set()
+        for turn in range(rounds(14, 60)):
+            frames[0].deadline = rng.choice([rng.randint(1, front), rng.randint(front, all_), rng.randint(front, all_)])
+            beside, first = turn % 2, rng.random() < 0.5
+            frames[0].frame_buffer = chip.allocate(whole.buffer.size, "frame")
+            before = chip.buffer(frames[0])
+            order = [0] if not beside else [0, 1] if first else [1, 0]
+            done = {}
+            chip.start(frames[order[0]])
+            for number in order[1:]:
+                while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
+                    chip.step(5)
+                chip.start(frames[number], frames[1 - number])
+            for number in order:
+                done[number] = chip.finish(frames[number], LIMIT)
+            late = done[0]
+            assert late.error in (0, 1 << ResultError.LATE) and (late.error == 0) == (late.pairs == whole.pairs), late.errors
+            assert np.array_equal(late.buffer, late_frame_buffer(before, whole.buffer, late.pairs, 10, 6, PixelFormat.RGB8)), late.pairs
+            seen.add((late.error > 0, late.pairs > 0))
+            if order[0] == 0:  # nothing before it
+                ended = late.stamps["rendering_done"] if late.pairs else late.stamps["front_done"]
+                assert ended - late.stamps["taken"] - frames[0].deadline < OVERRUN
+            if beside:
+                compare(chip, other, done[1])
+        assert {(True, True), (True, False)} <= seen
+        frames[0].deadline = 0
+        chip.start(frames[0])
+        compare(chip, view, chip.finish(frames[0], LIMIT))
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-// Runs axi_traffic against a memory port; test_memory_port.py. The loop is the one of docs/memory_model.md.
+// Runs axi_traffic against a memory port; test_memory_port.py. The loop is the one of docs/reference/memory_model.md.
 #include <cstring>
 #include <string>
 

@@ -1,4 +1,5 @@
-"""A memory port on the pins of a verilated design: a traffic generator writes and reads back, in the loop that docs/memory_model.md shows to harnesses.
+"""A memory port on the pins of a verilated design: a traffic generator writes and reads back, in the loop that docs/reference/memory_model.md shows to
+harnesses.
 
 Covered: wide and narrow data buses (arrays of words, integers), pauses, every order, LPDDR4 and perfect memory, an answer with an error, a broken rule,
 a memory that does not answer. The port itself: tb/model/test_memory.py.

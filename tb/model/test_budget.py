@@ -2,7 +2,7 @@
 
 Scores and losses are compared with pictures drawn without a Gaussian or a degree; the matrix of a view with the renderer and with its own transpose; a run that
 is interrupted anywhere with one that is not, bit for bit; a poisoned scene with the scene without the poison. Not covered: how much of a real scene can go
-(docs/budget.md has figures).
+(docs/results/budget.md has figures).
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def test_sorting_unit_sorts_stably(lanes, ways, capacity):
 
 
 def test_sorting_unit_cycles():
-    assert [network_latency(n) for n in (2, 4, 8, 16, 32)] == [1, 3, 6, 10, 15]  # docs/bitonic_sorter.md
+    assert [network_latency(n) for n in (2, 4, 8, 16, 32)] == [1, 3, 6, 10, 15]  # docs/reference/bitonic_sorter.md
     assert [network_latency(n, 3) for n in (2, 4, 8, 16, 32)] == [1, 1, 2, 4, 5]
     # One pass up to 16 x 16 entries, two beyond; four levels of the tree drain after each.
     assert [unit_cycles(n, 16, 16) for n in (0, 1, 16, 256, 257)] == [0, 5, 20, 260, 2 * 261]

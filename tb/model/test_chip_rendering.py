@@ -111,7 +111,7 @@ def test_lists_longer_than_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
             with pytest.raises(FlickerError, match=f"a tile's list has {longest:,} entries, the chip sorts up to {room:,}"):
                 render_on_chip(view, Engine.CHIP_GOLDEN)
     monkeypatch.undo()
-    assert [CHIP_MEMORIES[name].longest_list for name in ("default", "small")] == [131_072, 32_768]  # docs/programming.md
+    assert [CHIP_MEMORIES[name].longest_list for name in ("default", "small")] == [131_072, 32_768]  # docs/guide/programming.md
 
 
 def test_ideal_sorter() -> None:

@@ -46,7 +46,7 @@ from flicker.toolchain import ROOT
 SHOTS, WIDTH, HEIGHT = 17, 48, 36
 SIZE = 64, 48  # of the pictures of reports and sweeps that name none
 ITERATIONS, GAUSSIANS = 60, 3000  # of a fit in the sandbox, at most
-OWN = {"nearest": "vanilla", "nearest,flicker": "vanilla,flicker"}  # the reader's own configuration (docs/extending.md)
+OWN = {"nearest": "vanilla", "nearest,flicker": "vanilla,flicker"}  # the reader's own configuration (docs/guide/extending.md)
 
 # Who runs a command: "run" and "slow" are this file, in the sandbox; else the test that does the same, or why nothing does. The first pattern that fits.
 ACCOUNTS: tuple[tuple[str, str], ...] = (
@@ -63,6 +63,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make report(?: .*)?", "slow"),
     (r"make (?:setup|test|lint)", "tb/test_tooling.py::test_copied_checkout_tests_itself"),
     (r"make test SLOW=1", "is what runs this"),
+    (r"make site", "tb/test_pages.py::test_site_is_built"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),
     (r"scripts/gen_\w+.py --check", "tb/common/test_arithmetic.py::test_generated_packages"),

@@ -3,7 +3,7 @@
 The picture is compared with the reference renderer, with the masks of a contribution test with the bit-true machine; derivatives with central differences in
 float64, of every parameter, on scenes in which alpha meets the clamp, the skip and the end of a pixel. Data sets are made of renderings of a small scene. Not
 covered: how good fits of real photographs become
-(docs/fit.md has figures of lego).
+(docs/decisions/017-fit-few-long-steps.md has figures of lego).
 """
 
 from __future__ import annotations

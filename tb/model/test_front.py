@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scene_samples import random_scene
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from flicker.cli.main import app
@@ -18,11 +19,11 @@ from flicker.golden.front import colour
 from flicker.golden.front.blend import blend_records
 from flicker.golden.front.cull import cull
 from flicker.golden.front.fields import Fields, splats_of
-from flicker.golden.front.frame import FrontFrame, ListKind, depth_key, run_front
+from flicker.golden.front.frame import FrontFrame, ListKind, depth_key, run_front, sort_key
 from flicker.golden.front.record import MEAN_FIELD, RecordKind, decode_mean, decode_shape, encode_mean, encode_shape
 from flicker.golden.front.setup import FORMATS, FrameSetup, FrontFormats, rounded
 from flicker.golden.render import render_golden
-from flicker.params import SUBTILE, TILE, CatMode, Form, RenderConfig
+from flicker.params import SUBTILE, TILE, CatMode, Form, RenderConfig, SortOrder
 from flicker.pipeline import Engine, Front, FrontOptions, render_view
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -162,6 +163,43 @@ def test_keys_of_depths() -> None:
     assert (np.diff(keys)[np.diff(depths) > 0] > 0).all()
     assert [depth_key(depth, 19, 16) for depth in depths.tolist()] == (keys >> 8).tolist()
     assert [depth_key(depth, 19, 26) for depth in depths.tolist()] == (keys << 2).tolist()
+
+
+def test_keys_of_distances() -> None:
+    """Of a square the code without its last bit, less that of 2^-5: order kept, a step of 2^-19 of the distance at most, the ends saturated; fewer or more bits
+    as of depths."""
+    key = lambda square, bits=24: sort_key(True, -7.0, square, 19, bits)  # noqa: E731
+    least, last = float(rounded(0.04, 19)), (2.0 - 2.0**-18) * 2.0**58
+    expected = {2.0**-5: 0, least: round(0.28 * 2**18), 0.0625: 1 << 18, 1.0: 5 << 18, 1.0 + 2.0**-19: 5 << 18, 1.0 + 2.0**-18: (5 << 18) + 1, last: (1 << 24) - 1}
+    assert {square: key(square) for square in expected} == expected
+    assert [key(square) for square in (0.0, 1e-30, 0.0312)] == [0] * 3 and [key(square) for square in (2.0**59, 1e38)] == [(1 << 24) - 1] * 2
+    away = np.sort(np.exp(np.random.default_rng(7).uniform(np.log(0.2), np.log(5e8), 1000)))
+    keys = np.array([key(square) for square in rounded(away**2, 19).tolist()])
+    assert (np.diff(keys) >= 0).all() and (np.diff(keys)[np.diff(away) > 2.0**-17 * away[1:]] > 0).all()
+    assert [key(square, 16) for square in rounded(away**2, 19).tolist()] == (keys >> 8).tolist()
+    assert [key(square, 26) for square in rounded(away**2, 19).tolist()] == (keys << 2).tolist()
+
+
+@pytest.mark.parametrize("form", list(PackedFormat))
+def test_order_by_distance(form: PackedFormat) -> None:
+    """Only keys change; they are in the order of float64's distances, and the same bits for every turn of the camera on the spot, where depths' are not."""
+    packed, camera = pack(random_scene(3, 3000), form).packed, turned(1)
+    plain, frame = run_front(packed, camera), run_front(packed, camera, order=SortOrder.DISTANCE)
+    for name in ("gaussian", "number", "records", "entry_splat", "entry_tile", "entry_mask"):
+        assert np.array_equal(getattr(plain, name), getattr(frame, name)), name
+    exact = project(decode(packed), camera, SortOrder.DISTANCE)
+    away = np.linalg.norm(decode(packed).means - camera.position, axis=1)
+    assert (np.diff(away[exact.index]) > -1e-6).all() and (np.diff(exact.depth) < 0).any()
+    assert (np.diff(away[frame.gaussian[np.argsort(frame.key, kind="stable")]]) > -2e-5 * 6).all()
+    for about in ([0.0, 0.3, 0.0], [0.1, 0.0, 0.05]):
+        other = dataclasses.replace(camera, rotation=camera.rotation @ Rotation.from_rotvec(about).as_matrix())
+        after, by_depth = run_front(packed, other, order=SortOrder.DISTANCE), run_front(packed, other)
+        _, before, now = np.intersect1d(frame.gaussian, after.gaussian, return_indices=True)
+        assert len(now) > 500 and np.array_equal(frame.key[before], after.key[now])
+        assert (plain.key[before] != by_depth.key[now]).mean() > 0.9
+        again = project(decode(packed), other, SortOrder.DISTANCE)
+        seen = np.isin(again.index, exact.index)
+        assert np.array_equal(again.index[seen], exact.index[np.isin(exact.index, again.index)])
 
 
 # ---- lists -------------------------------------------------------------------------------------------

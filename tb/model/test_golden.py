@@ -140,7 +140,7 @@ def test_records():
 
 
 def test_automatic_mode():
-    """Decisions follow the rule of docs/ctu.md, restated; the picture of a sub-tile is that of the mode in force."""
+    """Decisions follow the rule of docs/reference/ctu.md, restated; the picture of a sub-tile is that of the mode in force."""
     config = RenderConfig(cat=CatMode.AUTO)
     rng = np.random.default_rng(seed())
     p = projected(rng, 1500, 160, 96)

@@ -320,7 +320,7 @@ def pairs_beyond(t):
 
 @by_width
 def test_radius_holds_every_pair(formats):
-    """Steps (i) to (iii) of the proof that masks miss nothing (docs/lanes.md), gone through whole: all opacities, all v, the largest u of each."""
+    """Steps (i) to (iii) of the proof that masks miss nothing (docs/reference/lanes.md), gone through whole: all opacities, all v, the largest u of each."""
     t = tables(formats)
     pairs, beyond = pairs_beyond(t)
     assert pairs > 1000 << formats.uv and beyond == 0

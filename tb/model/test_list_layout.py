@@ -126,7 +126,7 @@ def test_each_chunk_belongs_to_one_list(name):
 
 
 def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[list[int]], dict[int, int]]:
-    """The writers of docs/list_layout.md said once more: lines by number, lines of each writer in order, pointers by place."""
+    """The writers of docs/reference/list_layout.md said once more: lines by number, lines of each writer in order, pointers by place."""
     memory: dict[int, bytes] = {}
     writes: list[list[int]] = [[], [], [], []]
     pointers: dict[int, int] = {}

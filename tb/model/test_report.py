@@ -1,7 +1,7 @@
 """Report: a small one on the demo scene, resumed from its store; FLIP and SSIM; verdicts; bad input.
 
 FLIP is compared with a second implementation by two-dimensional convolutions and with values that follow from its publication: 0 for equal
-pictures, 1 for plain green against plain blue, the largest distance of colours 41.2761. The report on real scenes is run by hand (docs/report.md).
+pictures, 1 for plain green against plain blue, the largest distance of colours 41.2761. The report on real scenes is run by hand (docs/reference/report.md).
 """
 
 from __future__ import annotations

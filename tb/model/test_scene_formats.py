@@ -636,6 +636,18 @@ def test_gltf_transforms(name: str, tmp_path: Path) -> None:
     same_gaussians(quiet(path), wanted)
 
 
+@pytest.mark.parametrize(("sorting", "note"), [
+    (None, ""), ("zDepth", ""), ("cameraDistance", "--order distance does so"), ("other", "sortingMethod 'other' is not known"),
+])
+def test_gltf_says_how_it_is_sorted(sorting: str | None, note: str, tmp_path: Path) -> None:
+    """What is not the default here is told, with the option that honours it."""
+    document, buffer = formats.gltf(formats.gltf_attributes(linear(base(0), TO_GLTF)))
+    if sorting is not None:
+        document["meshes"][0]["primitives"][0]["extensions"][formats.SPLATS]["sortingMethod"] = sorting
+    got, notes = told(written(tmp_path / "a.glb", formats.glb(document, buffer)))
+    assert len(got) == N and len(notes) == (note != "") and all(note in text for text in notes)
+
+
 def test_gltf_of_several_parts(tmp_path: Path) -> None:
     """A mesh that two nodes show, one that none shows, a primitive without Gaussians, SPZ inside; colours that are not sRGB are told."""
     scene = linear(base(1), TO_GLTF)

@@ -68,7 +68,7 @@ def fronts() -> Stability:
 
 
 def test_records_of_16_bytes_break_no_earlier(fronts):
-    """Than those of 32 bytes, but where docs/stability.md says so: opacity between two codes, colours above 2."""
+    """Than those of 32 bytes, but where docs/reference/stability.md says so: opacity between two codes, colours above 2."""
     earlier = set()
     for family in FAMILIES:
         for image in (PackedFormat.CHUNK, PackedFormat.FP16_LOCAL):
@@ -138,7 +138,7 @@ def test_truth_of_a_front_end():
 
 
 def test_known_failures(quick):
-    """What docs/stability.md says fails, fails here: the suite sees what it is there for."""
+    """What docs/reference/stability.md says fails, fails here: the suite sees what it is there for."""
     worst = {(f, m): min(p.psnr_db for p in quick.sweep(f, m)) for f in quick.families for m in quick.configurations}
     assert worst["thin", "no-ctu-32-conic"] < 30 and worst["thin", "no-ctu-32"] > worst["thin", "no-ctu-32-conic"] + 10
     assert worst["far_mean", "no-ctu-32-conic"] < 30 and worst["far_mean", "no-ctu-32"] > 50

@@ -28,7 +28,7 @@ from flicker.errors import FlickerError
 from flicker.front.ahead import common_up, target
 from flicker.front.lists import subtile_lists
 from flicker.front.view import View
-from flicker.params import CHANNELS, CORES, FAITHFUL, RECOMMENDED, CatMode, Form, RenderConfig
+from flicker.params import CHANNELS, CORES, FAITHFUL, RECOMMENDED, CatMode, Form, RenderConfig, SortOrder
 from flicker.pipeline import Engine, render_view
 from flicker.scene.camera import Camera, load_cameras, orbit_camera
 from flicker.scene.files import Scene, save_ply
@@ -137,6 +137,17 @@ def test_pictures_of_the_engines(view, renderer) -> None:
     few = largest(view.scene, 4)
     size = np.sort(view.scene.scales, axis=1)[:, 1:].prod(axis=1) * view.scene.opacities
     assert len(few) == -(-len(view.scene) // 4) and sorted(size)[-len(few)] <= min(np.sort(few.scales, axis=1)[:, 1:].prod(axis=1) * few.opacities) * 1.0001
+
+
+def test_order_of_the_view(view) -> None:
+    """Full and coarse frames, and the cost, by distance where the view is."""
+    by = View(view.camera, view.scene, name="cloud", order=SortOrder.DISTANCE)
+    renderer = Renderer(by)
+    assert np.array_equal(renderer.frame(view.camera, Choice()).image, render_view(by, config=RECOMMENDED).image)
+    assert not np.array_equal(by.reference, view.reference)
+    few = View(view.camera, largest(view.scene, 2), order=SortOrder.DISTANCE)
+    assert np.array_equal(renderer.view(view.camera, 2).projected.index, few.projected.index)
+    assert not np.array_equal(renderer.cost(view.camera).views[0].seen, Renderer(view).cost(view.camera).views[0].seen)
 
 
 def test_numbers(view, renderer) -> None:

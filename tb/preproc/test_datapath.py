@@ -21,7 +21,7 @@ from flicker.front.view import DEMO, load_view
 from flicker.golden.front import colour, cull, frame, reach, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
-from flicker.params import Form
+from flicker.params import Form, SortOrder
 from flicker.scene.packed import PackedFormat, PackedScene
 from flicker.scene.packing import pack
 
@@ -152,8 +152,8 @@ FIELDS = splat.Projection._fields
 
 @numba.njit
 def _projected(
-    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, width, height, const, inverse, M, N, C, out,
-    places, conic,
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, by_distance, width, height, const, inverse, M, N,
+    C, out, places, conic,
 ):
     for j in range(len(q)):
         p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, least,
@@ -163,7 +163,7 @@ def _projected(
         y0, y1 = splat.pixels(p.y, p.radius_y, height)
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4] = p.near, x0 > x1 or y0 > y1, p.x, p.y, p.spiky
         places[j, 6] = p.far
-        places[j, 5] = frame.depth_key(p.t2, M)
+        places[j, 5] = frame.sort_key(by_distance, p.t2, p.square, M)
         out[j, 0], out[j, 1], out[j, 2], out[j, 3], out[j, 4] = p.sx, p.sy, p.l0, p.l1, p.l2
         out[j, 5], out[j, 6], out[j, 7] = steady.i0, steady.kappa, steady.lean
         out[j, 11] = p.scale
@@ -171,11 +171,11 @@ def _projected(
         conic[j, 0], conic[j, 1], conic[j, 2] = splat.conic_one(p, N)
 
 
-def projected(s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, antialiased=False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def projected(s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, antialiased=False, by_distance=False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
     out, places, conic = np.zeros((len(q), 12)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
-    _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.least, t.limit, t.middle, share, antialiased, t.width,
-               t.height, splat.constants(FORMATS), inverse, P, S, C, out, places, conic)
+    _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.least, t.limit, t.middle, share, antialiased,
+               by_distance, t.width, t.height, splat.constants(FORMATS), inverse, P, S, C, out, places, conic)
     return out, places, conic
 
 
@@ -185,10 +185,12 @@ def projection_inputs(s: Sample) -> tuple[np.ndarray, ...]:
             np.stack([g[f"q{k}"] for k in "wxyz"], 1))
 
 
+@pytest.mark.parametrize("order", list(SortOrder), ids=lambda order: order.value)
 @pytest.mark.parametrize("features", [False, True], ids=["plain", "features"])
 @pytest.mark.parametrize("form", list(Form), ids=lambda form: form.name.lower())
-def test_projection(form: Form, features: bool) -> None:
+def test_projection(form: Form, features: bool, order: SortOrder) -> None:
     """features: of an antialiased scene, with the principal point at some place."""
+    by_distance = order is SortOrder.DISTANCE
     s, rng = demo(PackedFormat.CHUNK), random(3)
     chunked = form is Form.CONIC or not features
     if features:
@@ -202,13 +204,13 @@ def test_projection(form: Form, features: bool) -> None:
     far = [triple(P, 1, 254), triple(P, 1, 254), triple(P, 1, 254), np.abs(triple(S, 1, 254)), np.stack([wild(rng, n, S) for _ in range(4)], 1)]
     inputs = [np.concatenate(parts) for parts in zip(real, odd, far)]
     share = frame.CHUNK_SHARE if chunked else frame.FP16_SHARE
-    out, places, conic = projected(s, *inputs, share, features)
+    out, places, conic = projected(s, *inputs, share, features, by_distance)
     t = s.setup
     registers = {f"view_{i}{j}": t.view[i, j] for i in range(3) for j in range(3)} | {f"focal_{k}": t.focal[k] for k in range(2)}
     for name in ("row_x", "row_x_z", "row_y", "row_y_z"):
         registers |= {f"{name}_{k}": getattr(t, name)[k] for k in range(3)}
     registers |= {f"{name}_{k}": getattr(t, name)[k] for name in ("least", "limit", "middle") for k in range(2)}
-    registers |= {"chunked": chunked, "antialiased": features}
+    registers |= {"chunked": chunked, "antialiased": features, "by_distance": by_distance}
     registers |= {"width": t.width, "height": t.height}
     low, step, q, scales, quat = inputs
     got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic")(
@@ -223,6 +225,8 @@ def test_projection(form: Form, features: bool) -> None:
         want |= of("conic", conic)
     near = places[:, 0] == 1
     assert near.any() and not near.all() and places[~near, 1].any() and not places[~near, 1].all()
+    key = places[~near, 5]
+    assert key.min() < 1 << 21 and (key == (1 << 24) - 1).any() and len(np.unique(key)) > n // 2
     assert (out[:, 11] <= 1.01 * share).all() and (out[:, 11] < 0.9 * share).any() == features
     same(got, want)
 

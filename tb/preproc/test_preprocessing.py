@@ -23,11 +23,12 @@ from flicker.golden.front.frame import FrontFrame, ListKind, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lists import ListError
+from flicker.params import SortOrder
 from flicker.pipeline import packed_scene
 from flicker.scene import packing
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
-from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene
+from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene, decode
 from flicker.scene.packing import pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.half import MemoryOptions
@@ -54,12 +55,12 @@ def demo() -> View:
 
 def check(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1,
-    kind: RecordKind = RecordKind.FACTORED16,
+    kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH,
 ) -> tuple[FrontFrame, RtlFront]:
     """A frame of both, compared."""
-    golden = run_front(packed, camera, lists, kind)
+    golden = run_front(packed, camera, lists, kind, order=order)
     image = front_memory(golden)
-    rtl = front_rtl(packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed())
+    rtl = front_rtl(packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed(), order=order)
     assert rtl.error == 0 and "value beyond FP16 clamped" not in golden.adjusted
     assert rtl.waits == {name: rtl.counters[name] for name in rtl.waits}
     written = image.written
@@ -125,6 +126,28 @@ def some(count: int, **changes) -> Scene:
 
 def plain_camera(width: int = 200, height: int = 120) -> Camera:
     return Camera(width, height, 150.0, 150.0, np.zeros(3), np.eye(3))
+
+
+def turned(camera: Camera, degrees: float) -> Camera:
+    """On the spot, about its vertical axis."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return dataclasses.replace(camera, rotation=camera.rotation @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16])
+def test_order_by_distance(form: PackedFormat, kind: RecordKind) -> None:
+    """Lists by distance with pauses of the memory, and their keys: other than those of depths, in the order of float64's distances, and the same bits where the
+    camera turns on the spot."""
+    packed = pack(some(1500), form).packed
+    golden, _ = check(packed, plain_camera(), memory=lpddr4(), kind=kind, order=SortOrder.DISTANCE)
+    by_depth = run_front(packed, plain_camera(), kind=kind)
+    assert np.array_equal(golden.records, by_depth.records) and (golden.key != by_depth.key).mean() > 0.9
+    away = np.linalg.norm(decode(packed).means[golden.gaussian], axis=1)
+    assert (np.diff(away[np.argsort(golden.key, kind="stable")]) > -1e-4).all()
+    after, _ = check(packed, turned(plain_camera(), 7.0), memory=lpddr4(), kind=kind, order=SortOrder.DISTANCE)
+    both, before, now = np.intersect1d(golden.gaussian, after.gaussian, return_indices=True)
+    assert len(both) > 700 and np.array_equal(golden.key[before], after.key[now])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -28,7 +28,7 @@ class Writer:
         self.dut, self.bench = dut, Bench(dut)
         self.rng = self.bench.rng
         self.numbers = np.random.default_rng(self.rng.getrandbits(32))
-        for name in ("clear", "start", "rgba", "background", "base", "stride", "pairs", "in_valid", "in_data", "out_ready"):
+        for name in ("clear", "start", "rgba", "background", "base", "stride", "pairs", "in_valid", "in_data", "out_ready", "stop"):
             getattr(dut, f"{name}_i").value = 0
 
     def pixels(self, cols: int, rows: int) -> np.ndarray:
@@ -39,9 +39,10 @@ class Writer:
         out[..., 0] = np.where(out[..., 0] > 0x3C00, 0x3C00, out[..., 0])  # transmittance is never above 1, nor negative
         return out
 
-    async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0,
+    async def frame(self, cols: int, rows: int, form: PixelFormat, idle: list[str], stall: str, gap: int = 0, walk: str = "rows", stop: int = 0, late: int = 0,
                     order: str = "any", at: tuple[int, int] = (0, 0), stride: int = 0, top: bool = False) -> int:
         """A frame of cols x rows sub-tiles; cycles from its first pixel to done. gap: bursts between rows. stop: abort in that cycle.
+        late: stop_i from that cycle on; the pairs that have left, checked when it says that it has stopped, if it does before the frame ends.
         at: pair of tiles where it begins in a larger picture with that stride, in bytes. top: its last row is the last of the address space.
         order: of a core's groups of pixels, any, ahead (as far apart as they may be) or pairs (one pair after the other)."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
@@ -96,6 +97,7 @@ class Writer:
             first = cycle + 1 if first < 0 and valid else first
             ready = not next(stalled)
             dut.in_valid_i.value, dut.in_data_i.value, dut.out_ready_i.value = valid, data, int(ready)
+            dut.stop_i.value = int(0 < late <= cycle)
             await edge
             cycle += 1
             freed += int(dut.freed_o.value)
@@ -122,17 +124,25 @@ class Writer:
                 await edge
                 assert int(dut.idle_o.value) == 1 and int(dut.out_valid_o.value) == 0
                 return cycle
-            if int(dut.done_o.value):
+            left = int(dut.left_o.value)
+            if int(dut.done_o.value) or (int(dut.stopped_o.value) and left):
                 break
+            assert stall != "never" or not 0 < late < cycle - 142, "not stopped behind the pair that leaves"
             assert cycle < 2000 + 3000 * len(pairs), f"stands still after {freed} of {len(pairs)} pairs"
         dut.in_valid_i.value = 0
-        assert freed == len(pairs) and not any(any(w) for w in work) and int(dut.idle_o.value) == 1
-        row = least_stride(width, form)
+        assert freed == len(pairs) - left and (left or not any(any(w) for w in work)) and int(dut.idle_o.value) == (left == 0)
+        row = least_stride(PAIR, form)
         mask = np.zeros(expected.shape, np.bool_)
-        mask[:, :row] = True
+        for x, y in pairs[:freed]:
+            mask[TILE * y : TILE * (y + 1), row * x : row * (x + 1)] = True
+        if left:
+            dut.clear_i.value = 1
+            await edge
+            dut.clear_i.value = dut.stop_i.value = 0
+            await edge
         assert np.array_equal(written[: expected.size], mask.ravel()) and not written[expected.size :].any()
         assert np.array_equal(memory[: expected.size][mask.ravel()], expected.ravel()[mask.ravel()])
-        return cycle - first
+        return left if late else cycle - first
 
 
 @cocotb.test()
@@ -191,3 +201,16 @@ async def abort(dut):
         form = test.rng.choice(list(PixelFormat))
         await test.frame(24, 2, form, ["half"] * CORES, "half", stop=test.rng.randrange(1, 700))
         await test.frame(4, 2, form, ["never"] * CORES, "half")
+
+
+@cocotb.test()
+async def late(dut):
+    """stop_i at any time: pairs that are on their way are whole, no other is touched; a picture that is whole ends. The next frame is right."""
+    test = Writer(dut)
+    await test.bench.reset()
+    lefts = set()
+    for _ in range(rounds(12, 30)):
+        form, stall = test.rng.choice(list(PixelFormat)), test.rng.choice(("never", "half"))
+        lefts.add(await test.frame(24, 2, form, ["never"] * CORES, stall, late=test.rng.randrange(1, 1200), walk="any"))
+        await test.frame(4, 2, form, ["never"] * CORES, "half")
+    assert 0 in lefts and 6 in lefts and len(lefts) > 3, lefts

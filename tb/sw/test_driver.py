@@ -394,7 +394,7 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3)
+        self.set("version", 3 | 2 << 8)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
@@ -449,7 +449,7 @@ def good_frame(
     region.pointers = region.lists + lib.flk_list_bytes(chunks)
     frame = CFrame(
         ctypes.pointer(scene), c_camera(camera_of(width, height)), region, region.pointers + lib.flk_pointer_bytes(width, height),
-        lib.flk_least_stride(width, form), form, (u8 * 3)(10, 20, 30), int(CatMode.SMOOTH), 0, 0xBEEF,
+        lib.flk_least_stride(width, form), form, (u8 * 3)(10, 20, 30), int(CatMode.SMOOTH), 0, 0xBEEF, 123_456, 0,
     )
     return frame, scene
 
@@ -472,6 +472,7 @@ def test_each_fault_of_a_frame(lib: ctypes.CDLL, chunk: PackedScene) -> None:
 
     region = frame.region
     assert status() == status(mode=5) == status(stride=frame.stride + 32 * 100, frame_buffer=1 << 38) == "OK"
+    assert status(deadline=(1 << 32) - 1) == "OK"
     assert status(mode=6) == status(pixel_format=2) == "FRAME_MODE"
     assert {status(frame.camera, **{side: n}) for side in ("width", "height") for n in (0, 4097)} == {"CAMERA_SIZE"}
     assert status(region, chunks=0) == status(region, chunks=MAX_CHUNKS + 1) == "FRAME_CHUNKS"
@@ -552,7 +553,7 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
     """Every register of the descriptor is written, once, and none else; what they hold follows from the model."""
     width, height = 333, 250
     frame, scene = good_frame(lib, packed, width, height, int(form))
-    frame.box = 7
+    frame.box, frame.by_distance = 7, -1
     assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "OK"
     centred = {REGISTERS[name].offset + 4 * i for name in ("middle", "least") for i in range(2)}  # of a principal point off the middle
     descriptor = {offset for offset in chip.value if offset >= 0x100 and offset not in centred}
@@ -563,7 +564,7 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
 
     assert fields("frame") == {
         "tag": 0xBEEF, "mode": 3, "rgba": int(form is PixelFormat.RGBA16F), "box": 1, "chunked": int(packed.format is PackedFormat.CHUNK), "antialiased": 0,
-        "off_centre": 0,
+        "off_centre": 0, "by_distance": 1,
     }
     assert fields("background") == {"red": 10, "green": 20, "blue": 30} and fields("size") == {"width": width, "height": height}
     at = scene.address + HEADER_BYTES
@@ -575,6 +576,7 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
         assert chip.get(f"{name}_low") | chip.get(f"{name}_high") << 32 == address
     assert chip.get("clusters") == len(packed.table) and chip.get("record_beats") * 64 == len(packed.geometry) * RecordKind.FACTORED16.bytes
     assert chip.get("chunks") == list_chunks(width, height, 2 * len(packed)) and chip.get("stride") == least_stride(width, form)
+    assert chip.get("deadline") == 123_456
     for name, numbers in expected_numbers(camera_of(width, height)).items():
         if name not in ("middle", "least"):
             assert [chip.get(name, i) for i in range(REGISTERS[name].count)] == numbers, name
@@ -590,8 +592,8 @@ def test_descriptor_with_all_features(lib: ctypes.CDLL, chunk: PackedScene, chip
     assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "OK"
     written = {offset for offset, _ in chip.writes}
     assert written == {offset for offset in chip.value if offset >= 0x100} and len(written) == len(chip.writes)
-    flags = [REGISTERS["frame"].fields[name][0] for name in ("antialiased", "off_centre")]
-    assert all(chip.get("frame") >> bit & 1 for bit in flags)
+    flags = [REGISTERS["frame"].fields[name][0] for name in ("antialiased", "off_centre", "by_distance")]
+    assert [chip.get("frame") >> bit & 1 for bit in flags] == [1, 1, 0]
     for name, numbers in expected_numbers(camera).items():
         assert [chip.get(name, i) for i in range(REGISTERS[name].count)] == numbers, name
     assert [chip.get("middle", i) for i in range(2)] == [int(200.125 * 128), (1 << 23) - int(7.75 * 128)]
@@ -611,9 +613,36 @@ def test_descriptor_is_not_written(lib: ctypes.CDLL, chunk: PackedScene, chip: C
     frame.camera.fx = 0.0
     assert write() == "CAMERA_FOCAL"
     frame.camera.fx = 1.0
+    frame.by_distance, chip.device.minor = 1, 1
+    assert write() == "FRAME_ORDER"
     chip.device.lists = 8
     assert write() == "FRAME_LISTS"
     assert not chip.writes
+
+
+def test_a_chip_without_deadlines(lib: ctypes.CDLL, chunk: PackedScene, chip: Chip) -> None:
+    """Of version 3.0: its registers of deadlines are not touched, and a frame with one is refused."""
+    frame, scene = good_frame(lib, chunk)
+    chip.device.minor = 0
+    chip.set("progress", 5)
+    assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "FRAME_DEADLINE" and not chip.writes
+    frame.deadline = 0
+    assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "OK"
+    assert REGISTERS["deadline"].offset not in dict(chip.writes) and lib.flk_result(ctypes.byref(chip.device)).pairs == 0
+
+
+@pytest.mark.parametrize("form", list(PixelFormat))
+def test_fill(lib: ctypes.CDLL, chunk: PackedScene, form: PixelFormat) -> None:
+    """All that a frame can write, and nothing behind its rows."""
+    frame, scene = good_frame(lib, chunk, 40, 20, form)
+    frame.stride += 64
+    rows, row = 2 * TILE, least_stride(40, form)
+    buffer = np.full((rows + 1) * frame.stride, 77, np.uint8)
+    lib.flk_frame_fill(ctypes.byref(frame), ctypes.c_void_p(buffer.ctypes.data))
+    got = buffer.reshape(rows + 1, frame.stride)
+    pixel = [0] if form is PixelFormat.RGBA16F else [10, 20, 30]
+    assert np.array_equal(got[:rows, :row], np.tile(pixel, (rows, row // len(pixel))))
+    assert (got[:rows, row:] == 77).all() and (got[rows] == 77).all()
 
 
 def test_a_large_region_of_records(lib: ctypes.CDLL, chunk: PackedScene, chip: Chip) -> None:
@@ -628,7 +657,7 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (0, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (2, 1, 1, 2, 2, 3, 32)
     assert (device.lists, device.beat) == (16384, 64)
     assert device.started == 0xFFFF and not chip.writes
     chip.set("version", 2)
@@ -704,6 +733,8 @@ def test_the_rest(lib: ctypes.CDLL, chip: Chip) -> None:
     device = ctypes.byref(chip.device)
     chip.field("result", tag=0xBEEF, error=1 << ResultError.LIST_MEMORY | 1 << ResultError.TIMED_OUT)
     result = lib.flk_result(device)
+    chip.set("progress", 0xABCD)
+    assert lib.flk_result(device).pairs == 0xABCD
     assert result.tag == 0xBEEF and [k for k in range(16) if result.error >> k & 1] == [ResultError.LIST_MEMORY, ResultError.TIMED_OUT]
     assert lib.flk_error_text(int(ResultError.LIST_MEMORY)) == b"out of list memory"
     chip.set("counter_value", 0xFEDCBA98)

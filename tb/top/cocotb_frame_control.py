@@ -14,11 +14,11 @@ from flicker.params import CatMode
 
 # Fields, most significant first, as in flk_top_pkg.descriptor_t, flk_preproc_pkg.front_registers_t and flk_rendering_pkg.rendering_registers_t.
 CULL = 32 * (3 + 15 + 5 + 5)
-LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 4) + 2 * 23))
+LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("by_distance", 1), ("width", 13), ("height", 13), ("view", 28 * (9 + 2) + 20 * (12 + 4) + 2 * 23))
 ADDRESSES = ("scene_table", "headers", "geometry", "colours", "records", "lists", "pointers", "frame_buffer")
 DESCRIPTOR = (
     ("tag", 16), ("mode", 3), ("rgba", 1), ("background", 24), ("cull", CULL), *LANE, *((name, 40) for name in ADDRESSES),
-    ("clusters", 24), ("record_beats", 23), ("chunks", 25), ("stride", 17),
+    ("clusters", 24), ("record_beats", 23), ("chunks", 25), ("stride", 17), ("deadline", 32),
 )
 FRONT = (
     ("cull", CULL), *LANE, ("scene_table", 34), ("headers", 34), ("geometry", 34), ("colours", 34), ("clusters", 24), ("records", 34), ("record_beats", 23),
@@ -29,7 +29,8 @@ RENDERING = (
     ("records", 34), ("frame_buffer", 34), ("stride", 12),
 )
 # Bits of a frame's error, from bit 0: registers.md.
-RENDERING_BITS, DESCRIPTOR_ERROR, ABORTED, TIMED_OUT, BAD_TABLE = 4, 1 << 7, 1 << 8, 1 << 9, 10
+RENDERING_BITS, DESCRIPTOR_ERROR, ABORTED, TIMED_OUT, BAD_TABLE, LATE = 4, 1 << 7, 1 << 8, 1 << 9, 10, 1 << 12
+RESET = 4  # cycles
 
 
 def pack(fields, values) -> int:
@@ -84,7 +85,9 @@ def rendering_registers(d) -> dict[str, int]:
 
 @dataclass
 class Frame:
-    """d: descriptor. front_error, rendering_error: what the halves will answer. stamps: when it was taken, left the front end, entered rendering, left it."""
+    """d: descriptor. front_error, rendering_error: what the halves will say at their ends. stamps: when it was taken, left the front end, entered rendering,
+    left it. begun: when the host started it. ended: the front end, by itself. late; skipped: the rendering half, for that. left: pairs of tiles that
+    rendering has not written where it is stopped."""
 
     number: int
     d: dict[str, int]
@@ -93,16 +96,31 @@ class Frame:
     legal: bool
     bank: int | None = None
     stamps: list[int] = field(default_factory=lambda: [-1] * 4)
+    begun: int = 0
+    ended: bool = False
+    late: bool = False
+    skipped: bool = False
+    left: int = 0
+    cut: bool = False
 
     @property
     def error(self) -> int:
         if not self.legal:
             return DESCRIPTOR_ERROR
-        return self.front_error & 15 | self.front_error >> 4 << BAD_TABLE or self.rendering_error << RENDERING_BITS
+        front = self.ended * (self.front_error & 15 | self.front_error >> 4 << BAD_TABLE)
+        return front | self.rendered * self.rendering_error << RENDERING_BITS | self.late * LATE
 
     @property
     def rendered(self) -> bool:
-        return self.legal and not self.front_error
+        return self.legal and not self.skipped and not (self.ended and self.front_error)
+
+    @property
+    def pairs(self) -> int:
+        return self.rendered * (rendering_registers(self.d)["all_pairs"] - self.left * self.cut)
+
+    def due(self, now: int) -> bool:
+        """As the design knows it in the cycle `now`: two behind the deadline."""
+        return self.d["deadline"] > 0 and (now - self.begun) % (1 << 32) - 2 >= self.d["deadline"]
 
 
 class Half:
@@ -115,18 +133,30 @@ class Half:
     def reset(self) -> None:
         self.left: int | None = None
         self.pause = 0
+        self.stopping: int | None = None
+        self.stopped = False  # until a reset
 
     @property
     def idle(self) -> bool:
-        return self.left is None and self.pause == 0
+        return self.left is None and self.pause == 0 and self.stopping is None and not self.stopped
+
+    def stop(self, latency: int) -> None:
+        """Has nothing under way so many cycles later, unless it ends before."""
+        self.stopping = latency
 
     def step(self, start: bool) -> bool:
         """A cycle; whether it is done in the next."""
         done = False
+        if self.stopping is not None:
+            self.stopping -= 1
+            if self.stopping == 0 and self.left != 1:
+                self.left = self.stopping = None
+                self.stopped = True
         if self.left is not None:
             self.left -= 1
             if self.left == 0:
                 self.left, self.pause, done = None, self.rest(), True
+                self.stopping = None
         elif self.pause:
             self.pause -= 1
         if start:
@@ -138,7 +168,7 @@ class Half:
 class ControlTest:
     """Agents and checks, cycle by cycle. speeds: mean latencies of front end, rendering half, copies, acknowledgement and host."""
 
-    def __init__(self, dut, speeds, share_illegal=0.3, share_error=0.3):
+    def __init__(self, dut, speeds, share_illegal=0.3, share_error=0.3, deadline=0):
         self.dut, self.bench = dut, Bench(dut)
         self.rng = self.bench.rng
         self.lists = int(dut.Lists.value)
@@ -147,15 +177,16 @@ class ControlTest:
         front, rendering, copy, self.acknowledge, self.host = (self.draw(mean) for mean in speeds)
         self.front, self.rendering = Half(front, self.draw(2)), Half(rendering, self.draw(2))
         self.copies = {"front": Half(copy, lambda: 0), "rendering": Half(copy, lambda: 0)}
-        self.share_illegal, self.share_error = share_illegal, share_error
+        self.share_illegal, self.share_error, self.deadline = share_illegal, share_error, deadline
+        self.stop_latency = self.draw(4)
         self.now = self.rng.getrandbits(32)
         self.wanted: list[dict[str, int]] = []  # descriptors to start, before random ones
         self.left = 0                           # frames to start
         self.posted: list[Frame] = []
-        self.refused = self.both = 0
+        self.refused = self.both = self.stops = 0
         self.number = 0
         self.started = self.finished = 0
-        self.shown = (0, 0, 0)                  # expected tag, error and bank
+        self.shown = (0, 0, 0, 0)               # expected tag, error, pairs and bank
         self.late = 0                           # error that is shown when the posted frame has been acknowledged
         self.unacknowledged: Frame | None = None
         self.ack_in = 0
@@ -164,7 +195,8 @@ class ControlTest:
         self.command = 0                        # of the host, in the next cycle: clear, aborted, timed_out, reset as bits
         self.given = self.before = 0
         for name in ("clear", "aborted", "timed_out", "reset", "start", "acknowledged", "front_idle", "front_done", "rendering_idle", "rendering_done",
-                     "copy_front_done", "copy_rendering_done", "now", "descriptor", "front_error", "rendering_error"):
+                     "copy_front_done", "copy_rendering_done", "now", "descriptor", "front_error", "rendering_error", "front_stopped", "rendering_stopped",
+                     "rendering_left"):
             getattr(dut, f"{name}_i").value = 0
 
     def draw(self, mean):
@@ -176,6 +208,7 @@ class ControlTest:
         self.in_rendering: Frame | None = None
         self.front_stage = self.rendering_stage = None  # what the half does with its frame: "run", "copy", then it is "over"
         self.pins = dict.fromkeys(("start", "acknowledged", "front_done", "rendering_done", "copy_front_done", "copy_rendering_done"), 0)
+        self.resets = {"front": 0, "rendering": 0}  # cycles of a reset that have been seen
         self.wait = self.host()
         self.next = None
         for half in (self.front, self.rendering, *self.copies.values()):
@@ -192,6 +225,8 @@ class ControlTest:
             limit = rng.choice([40, 700, 4096])
             d |= {"width": rng.choice([rng.randint(1, limit), 16 * rng.randint(1, limit // 16)]), "height": rng.choice([rng.randint(1, limit), limit])}
             d |= {"mode": rng.randint(0, max(CatMode)), "clusters": rng.choice([1, 1 << 23, rng.randint(1, (1 << 24) - 1)])}
+            if self.deadline:
+                d["deadline"] = rng.choice([0, rng.randint(1, self.deadline), rng.randint(1, 2 * self.deadline), (1 << 32) - 1])
             least = stride_of(d)
             d["stride"] = rng.choice([least, least + 32, rng.randint(least // 32, 4095) * 32])
             if legal(d, self.lists):
@@ -249,7 +284,7 @@ class ControlTest:
         # Data that nobody asks for are noise.
         noise = self.rng.getrandbits
         front_error = self.in_front.front_error if pins["front_done"] and self.in_front else noise(6)
-        rendering_error = self.in_rendering.rendering_error if pins["rendering_done"] and self.in_rendering else noise(3)
+        rendering_error = self.in_rendering.rendering_error if (pins["rendering_done"] or self.rendering.stopped) and self.in_rendering else noise(3)
         if self.pending:
             descriptor = pack(DESCRIPTOR, self.pending.d)
         elif self.next:
@@ -259,6 +294,8 @@ class ControlTest:
         for name, value in (
             *pins.items(), ("now", self.now), ("front_idle", int(self.front.idle)), ("rendering_idle", int(self.rendering.idle)),
             ("front_error", front_error), ("rendering_error", rendering_error), ("descriptor", descriptor),
+            ("front_stopped", int(self.front.stopped)), ("rendering_stopped", int(self.rendering.stopped)),
+            ("rendering_left", self.in_rendering.left if self.rendering.stopped and self.in_rendering else 0 if pins["rendering_done"] else noise(16)),
             *((name, self.given >> k & 1) for k, name in enumerate(("clear", "aborted", "timed_out", "reset"))),
         ):
             getattr(dut, f"{name}_i").value = value
@@ -290,6 +327,11 @@ class ControlTest:
         if self.in_rendering is None and self.in_front and self.front_stage == "over" and (start_r or self.value("copy_rendering_o")):
             self.in_rendering, self.in_front = self.in_front, None
             self.rendering_stage = None
+            r = self.in_rendering
+            r.late |= r.legal and r.due(now - 1)
+            r.skipped = r.late
+            assert not start_r or not r.late, "a late frame is rendered"
+            r.left = rng.choice([0, rng.randint(0, rendering_registers(r.d)["all_pairs"])])
         elif start_r or self.value("copy_rendering_o"):
             assert self.in_rendering, "the rendering half is given nothing"
         r = self.in_rendering
@@ -299,12 +341,20 @@ class ControlTest:
         if r and (start_r or self.rendering_stage in ("run", "copy")) and r.rendered:
             want = rendering_registers(r.d)
             assert unpack(RENDERING, self.value("rendering_o")) == {name: want[name] for name, _ in RENDERING}
-        if pins["rendering_done"]:
+        if pins["rendering_done"] or (self.rendering_stage == "stop" and self.rendering.stopped):
             r.stamps[3] = now
+            r.cut = not pins["rendering_done"]
+            r.late |= r.cut and r.left > 0
             self.rendering_stage = "copy"
+        elif self.rendering_stage == "run" and self.value("rendering_stop_o"):
+            self.rendering_stage = "stop"
+            self.stops += 1
+            assert r.due(now - 1), "stopped before its deadline"
+            self.rendering.stop(self.stop_latency())
+        self.check_stop("rendering", r, self.rendering, self.rendering_stage)
         copying = self.value("copy_rendering_o")
         if copying:
-            assert self.rendering_stage == "copy" or (self.rendering_stage is None and not r.rendered)
+            assert self.rendering_stage in ("copy", "reset") or (self.rendering_stage is None and not r.rendered)
             self.rendering_stage = "copy"
             assert self.value("copy_rendering_bank_o") == r.bank and self.value("copy_rendering_none_o") == (not r.rendered)
             if r.rendered:
@@ -319,9 +369,16 @@ class ControlTest:
         if f and f.legal and (start_f or self.front_stage in ("run", "copy")):
             want = front_registers(f.d)
             assert unpack(FRONT, self.value("front_o")) == {name: want[name] for name, _ in FRONT}
-        if pins["front_done"]:
+        if pins["front_done"] or (self.front_stage == "stop" and self.front.stopped):
             f.stamps[1] = now
+            f.ended = bool(pins["front_done"])
             self.front_stage = "copy"
+        elif self.front_stage == "run" and self.value("front_stop_o"):
+            self.front_stage = "stop"
+            self.stops += 1
+            assert f.due(now - 1), "stopped before its deadline"
+            self.front.stop(self.stop_latency())
+        self.check_stop("front", f, self.front, self.front_stage)
         copying_front = self.value("copy_front_o")
         if copying_front:
             assert f and (self.front_stage == "copy" or not f.legal)
@@ -333,7 +390,7 @@ class ControlTest:
             assert self.value("copy_front_bank_o") == f.bank and self.value("copy_front_none_o") == (not f.legal)
         else:
             assert self.copies["front"].left is None, "the copy is withdrawn"
-        assert self.value("front_done_o") == (pins["copy_front_done"] and f.legal)
+        assert self.value("front_done_o") == (pins["copy_front_done"] and f.legal and not f.due(now))
         assert self.value("front_busy_o") == (f is not None) or self.front_stage == "over"
         assert not (r and self.rendering_stage != "over") or self.value("rendering_busy_o")
         self.both += self.front.left is not None and self.rendering.left is not None
@@ -341,6 +398,7 @@ class ControlTest:
         accepted = pins["start"] and not refused
         if accepted:
             self.pending, self.next = self.next, None
+            self.pending.begun = now
             self.started += 1
             self.left -= 1
         if pins["copy_front_done"]:
@@ -367,24 +425,41 @@ class ControlTest:
                 self.next = self.next or self.new_frame()
                 pins["start"], self.wait = 1, self.host()
 
+    def check_stop(self, name, frame, half, stage):
+        """Not later than its deadline asks for; until the reset, which comes when nothing is under way and the counters are kept."""
+        stop, reset = self.value(f"{name}_stop_o"), self.value(f"{name}_reset_o")
+        if stage == "run" and not self.pins[f"{name}_done"]:
+            assert not frame.due(self.now - 2) or (self.now - frame.stamps[2 if name == "rendering" else 0]) % (1 << 32) < 9, "not stopped at its deadline"
+        if stage == "stop":
+            assert stop
+        if reset:
+            assert stop and stage in ("over", "reset") and half.left is None and frame is not None
+            self.resets[name] += 1
+            half.reset()
+        else:
+            assert self.resets[name] in (0, RESET)
+            self.resets[name] = 0
+        if stage == "copy" and half.stopped:
+            assert stop
+
     def check_posted(self):
         """A post, and what is shown of the frame posted last."""
         if self.value("post_o"):
             frame, self.in_rendering = self.in_rendering, None
             assert frame is not None and self.rendering_stage == "over", "a post of nothing"
             assert self.unacknowledged is None, "posted before the last one was acknowledged"
-            self.shown = (frame.d["tag"], frame.error, frame.bank)
+            self.shown = (frame.d["tag"], frame.error, frame.pairs, frame.bank)
             self.finished += 1
             self.posted.append(frame)
             assert [f.number for f in self.posted] == sorted(f.number for f in self.posted)
             self.unacknowledged = frame
             self.ack_in = self.acknowledge()
-        assert (self.value("tag_o"), self.value("error_o"), self.value("bank_o")) == self.shown
+        assert (self.value("tag_o"), self.value("error_o"), self.value("pairs_o"), self.value("bank_o")) == self.shown
 
     def show(self, acknowledged):
         """What is shown in the next cycle: an abort or a time-out once no posted frame waits."""
         if self.late and not self.unacknowledged:
-            self.shown = (self.shown[0], self.late, self.shown[2])
+            self.shown = (self.shown[0], self.late, 0, self.shown[3])
             self.late = 0
         if acknowledged:
             self.unacknowledged = None
@@ -402,13 +477,13 @@ class ControlTest:
         acknowledged = self.pins["acknowledged"] and self.unacknowledged
         if reset:
             assert not self.value("post_o")
-            self.unacknowledged, self.late, self.shown = None, 0, (0, 0, 0)
+            self.unacknowledged, self.late, self.shown = None, 0, (0, 0, 0, 0)
             self.started = self.finished = 0
         else:
             self.check_posted()
             self.late = TIMED_OUT if timed_out else (self.late or aborted * ABORTED)
             if aborted and self.unacknowledged:
-                self.shown = (self.shown[0], self.shown[1] | ABORTED, self.shown[2])
+                self.shown = (self.shown[0], self.shown[1] | ABORTED, *self.shown[2:])
             self.show(acknowledged)
         if clear:
             self.finished = self.started
@@ -430,6 +505,23 @@ async def frames(dut, speeds):
     assert test.stray > 60
     if max(speeds) > 1 and speeds[4] == 1:
         assert test.both > 0 and test.refused > 0
+
+
+@cocotb.test()
+@cocotb.parametrize(speeds=[(20, 20, 5, 10, 1), (5, 60, 5, 1, 1), (60, 5, 5, 5, 1), (8, 8, 30, 60, 1), (10, 10, 5, 5, 80)])
+async def deadlines(dut, speeds):
+    """Random ones, about as long as a frame takes: each half is stopped at its time and reset, the other goes on; what has not been reached is passed by."""
+    test = ControlTest(dut, speeds, share_illegal=0.1, share_error=0.1, deadline=sum(speeds[:4]))
+    await test.bench.reset()
+    await test.run(150)
+    assert len(test.posted) == 150 and test.stops > 10
+    kinds = {(f.late, f.ended, f.skipped, f.cut) for f in test.posted if f.legal}
+    wanted = {(False, True, False, False), (True, True, True, False)}
+    if speeds[0] >= 10:
+        wanted.add((True, False, True, False))
+    if speeds[1] >= 20:
+        wanted |= {(True, True, False, True), (False, True, False, True)}  # a picture that is whole when it is stopped is not late
+    assert wanted <= kinds, wanted - kinds
 
 
 @cocotb.test(skip=netlist() or four_state())  # it sets registers

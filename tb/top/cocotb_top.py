@@ -7,7 +7,7 @@ from typing import Any
 
 import cocotb
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, config, four_state
+from flicker_tb.bench import Bench, config, four_state, rounds
 
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
 
@@ -15,6 +15,7 @@ SETTINGS = config()
 START, ABORT, RESET = 1, 2, 4
 FRONT_DONE, FRAME_DONE, ERROR, ABORTED, REFUSED = (1 << REGISTERS["interrupt"].fields[name][0] for name in (
     "front_done", "frame_done", "error", "aborted", "refused"))
+LATE = 1 << ResultError.LATE
 ALL = FRONT_DONE | FRAME_DONE | ERROR | ABORTED | REFUSED
 # Numbers of counters that a frame leaves; 30 and 31 have none.
 PLACES = {*range(30), *range(32, ChipCounter.FRAME_WAITS + 1), *range(ChipCounter.FRONT_CLUSTER_WAITS, ChipCounter.FRONT_BEAT_WAITS + 1),
@@ -30,6 +31,7 @@ class Chip:
         self.silent = self.away = False  # no channel moves; the memory's side is in reset
         self.failing = False             # reads are answered with an error
         self.latency = 3
+        self.now = 0                     # cycles
         self.reads: deque[tuple[int, int]] = deque()
         self.writes: deque[tuple[int, int]] = deque()
         self.places: deque[int] = deque()
@@ -69,20 +71,20 @@ class Chip:
                     assert port.value.is_resolvable, port._name
 
     async def memory(self) -> None:
-        dut, edge, now = self.dut, RisingEdge(self.dut.clk_i), 0
+        dut, edge = self.dut, RisingEdge(self.dut.clk_i)
         while True:
             ready = not (self.silent or self.away)
             for name in ("ar", "aw", "w"):
                 getattr(dut, f"{name}_ready_i").value = int(ready)
             answers = {}
             for channel, queue, resp in (("r", self.reads, 2 * self.failing), ("b", self.writes, 0)):
-                answers[channel] = bool(ready and queue and queue[0][1] <= now)
+                answers[channel] = bool(ready and queue and queue[0][1] <= self.now)
                 getattr(dut, f"{channel}_valid_i").value = int(answers[channel])
                 if answers[channel]:
                     getattr(dut, f"{channel}_id_i").value = queue[0][0]
                     getattr(dut, f"{channel}_resp_i").value = resp
             await edge
-            now += 1
+            self.now += 1
             if self.away:
                 self.reads.clear(), self.writes.clear(), self.places.clear()
                 continue
@@ -92,13 +94,13 @@ class Chip:
             if ready and self.value("ar_valid_o"):
                 assert self.value("ar_len_o") == 0
                 self.taken["ar"] += 1
-                self.reads.append((self.value("ar_id_o"), now + self.latency))
+                self.reads.append((self.value("ar_id_o"), self.now + self.latency))
             if ready and self.value("aw_valid_o"):
                 self.taken["aw"] += 1
                 self.places.append(self.value("aw_id_o"))
             if ready and self.value("w_valid_o"):
                 self.taken["w"] += 1
-                self.writes.append((self.places.popleft(), now + self.latency))
+                self.writes.append((self.places.popleft(), self.now + self.latency))
 
     # ---- registers ----
 
@@ -148,20 +150,21 @@ class Chip:
         """Tag and error."""
         return await self.field("result", "tag"), await self.field("result", "error")
 
-    async def describe(self, tag: int, front: int = 2, rendering: int = 3) -> None:
+    async def describe(self, tag: int, front: int = 2, rendering: int = 3, deadline: int = 0) -> None:
         """A frame with so many turns in its halves."""
         await self.write("frame", tag)
+        await self.write("deadline", deadline)
         for name, value in (("size", 16 << 16 | 16), ("clusters", front), ("chunks", rendering), ("stride", 96), ("table_low", 1 << 12),
                             ("lists_low", 1 << 13), ("records_low", 1 << 14), ("frame_buffer_low", 1 << 15)):
             await self.write(name, value)
 
-    async def start(self, tag: int, front: int = 2, rendering: int = 3) -> None:
+    async def start(self, tag: int, front: int = 2, rendering: int = 3, deadline: int = 0) -> None:
         for _ in range(400):
             if await self.field("status", "ready"):
                 break
         else:
             raise AssertionError("not ready")
-        await self.describe(tag, front, rendering)
+        await self.describe(tag, front, rendering, deadline)
         await self.write("control", START)
 
     async def until(self, bits: int, limit: int = 2000) -> None:
@@ -274,10 +277,36 @@ async def frames(dut: Any) -> None:
 
 
 @cocotb.test()
+async def beats_that_run_on(dut: Any) -> None:
+    """A beat counts when it comes, not when its address goes."""
+    chip = Chip(dut)
+    await chip.begin()
+    chip.latency = 500
+    await chip.start(0, 1, 1)
+    for half, beats in enumerate((ChipCounter.LIVE_TABLE_BEATS, ChipCounter.LIVE_LIST_BEATS)):
+        while chip.taken["ar"] == half:
+            await chip.cycles(1)
+        assert await chip.counter(beats) == 0, beats
+        chip.latency = 3
+        while not await chip.counter(beats):
+            await chip.cycles(1)
+        chip.latency = 500
+    chip.latency = 3
+    await chip.ended(0, 0, 1, 1)
+
+
+@cocotb.test()
 async def interrupts(dut: Any) -> None:
     """Each event sets its bit, and the output follows the enables."""
     chip = Chip(dut)
     await chip.begin()
+    await chip.start(0)
+    await chip.until(FRAME_DONE)
+    for enabled in (0, FRONT_DONE, ABORTED, FRONT_DONE | ABORTED):
+        await chip.write("interrupt_enable", enabled)
+        await chip.cycles(2)
+        assert chip.value("irq_o") == (enabled & FRONT_DONE != 0), f"{enabled:05b}"
+    await chip.write("interrupt", ALL)
     await chip.write("interrupt_enable", FRAME_DONE)
     await chip.start(1)
     await chip.until(FRONT_DONE)
@@ -307,7 +336,7 @@ async def interrupts(dut: Any) -> None:
     await chip.start(4)
     assert not await chip.field("status", "ready")
     await chip.write("control", START)
-    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 5
+    assert await chip.read("interrupt") == REFUSED and await chip.field("frames", "started") == 6
     await chip.write("interrupt", REFUSED)
     await chip.write_all(("control", ABORT), ("control", START))
     assert await chip.read("interrupt") == REFUSED and not await chip.field("status", "ready") and await chip.field("status", "aborting")
@@ -319,8 +348,41 @@ async def interrupts(dut: Any) -> None:
         if status >> low["ready"] & 1:
             break
     await chip.until(ABORTED)
-    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 5
+    assert await chip.read("interrupt") == ABORTED and await chip.field("frames", "started") == await chip.field("frames", "finished") == 6
     assert (await chip.result())[1] == 1 << ResultError.ABORTED
+
+
+@cocotb.test()
+async def deadlines(dut: Any) -> None:
+    """A late frame ends at its time, in either half or before them; the frame in the other half is whole, and so are those that follow."""
+    chip = Chip(dut)
+    await chip.begin()
+    rng, ends = chip.rng, set()
+    for _ in range(rounds(24, 60)):
+        chip.latency = rng.choice([3, 30])
+        deadline = rng.choice([1, rng.randint(1, 40), rng.randint(40, 6000)])
+        first = rng.random() < 0.7  # the late one comes before the other
+        for late in (first, not first):
+            await (chip.start(1, 30, 40, deadline) if late else chip.start(2, 4, 5))
+            if late:
+                begun = chip.now
+        for late in (first, not first):
+            await chip.until(FRAME_DONE)
+            pairs = await chip.field("progress", "pairs")
+            if not late:
+                assert pairs == 1
+                await chip.ended(2, 0, 4, 5)
+                continue
+            tag, error = await chip.result()
+            assert (tag, error, pairs) in ((1, LATE, 0), (1, 0, 1))
+            assert chip.now - begun < deadline + 700 or not first, "ends too late"
+            assert chip.now - begun >= deadline or not error, "ends too soon"
+            assert not await chip.read("interrupt") & ERROR
+            ends.add((error > 0, await chip.counter(ChipCounter.RENDERING_CYCLES) > 0))
+            await chip.write("interrupt", FRAME_DONE)
+    assert {(True, False), (True, True), (False, True)} == ends, ends
+    await chip.cycles(100)
+    assert not chip.reads and not chip.writes and await chip.field("status", "ready")
 
 
 @cocotb.test()

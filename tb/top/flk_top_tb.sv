@@ -1,4 +1,4 @@
-// Smoke test of flk_top_axi: FuseSoC's target sim (docs/integration.md), for any simulator with timing and assertions.
+// Smoke test of flk_top_axi: FuseSoC's target sim (docs/guide/integration.md), for any simulator with timing and assertions.
 //
 // Reset; who the chip is; a register that is not there; a frame with an empty descriptor, which is refused: posted with its tag and its error, an interrupt
 // until it is cleared, and not one access of memory. Ends with "flk_top_tb: passed", or with $fatal and what is wrong.
@@ -9,7 +9,7 @@ module flk_top_tb #(
   parameter int unsigned ResetStages = 2
 );
 
-  // Byte addresses and bits of docs/registers.md.
+  // Byte addresses and bits of docs/reference/registers.md.
   localparam logic [9:0] ID = 10'h000;
   localparam logic [9:0] CAPABILITY = 10'h008;
   localparam logic [9:0] CONTROL = 10'h00C;

@@ -1,7 +1,7 @@
 """Stand-ins for the chip's halves: what flk_top does itself is seen without the minutes that the halves take to build.
 
 Each has the ports of its module and makes `turns` turns of a read and a write of one beat, the low byte of a register; its counters are that byte, repeated,
-but for the last one, which counts the edges of its clock since reset.
+but for the last one, which counts the edges of its clock since reset. The rendering half stops between two turns; its picture is whole after the last one.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ HALVES = {
     counter_q <= $bits(counter_q)'({counter_q, COUNTER_BITS'(counter_addr_i) + COUNTER_BITS'(turns)});
   end
   assign counter_data_o = counter_q[COUNTER_LATENCY-1];
+  assign stopped_o = stop_i && (state_q == READ || state_q == IDLE);
+  assign left_o = 16'(turn_q != '0);
 """,
     ),
 }
@@ -108,7 +110,7 @@ def sources() -> list[Path]:
         assert header is not None
         outputs = re.findall(r"^\s*output\s.*?(\w+)\s*(?:,|$)", re.sub(r"//.*", "", header[0]), re.M)
         body = BODY.format(turns=turns, port=port, read=read, write=write, error=error, further=further, ready="", zero="")
-        left = [name for name in outputs if f"assign {name} " not in body]
+        left = [name for name in outputs if f"assign {name} " not in body + further]
         ready = "".join(f"  assign {name} = 1'b1;\n" for name in left if re.search(r"[rb]_ready_o$", name))
         zero = "".join(f"  assign {name} = '0;\n" for name in left if not re.search(r"[rb]_ready_o$", name))
         text = header[0] + BODY.format(turns=turns, port=port, read=read, write=write, error=error, further=further, ready=ready, zero=zero)

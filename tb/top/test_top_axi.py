@@ -2,7 +2,7 @@
 
 State space: every pin of both sides with random values, resets with and without the synchroniser, test enable; what is refused. With SLOW=1 the whole chip
 between cocotbext-axi's AXI4-Lite manager and its AXI4 memory, which knows narrow reads: a frame byte for byte as the golden model has it, and every access
-of that frame against the table of docs/integration.md.
+of that frame against the table of docs/reference/chip_ports.md.
 Parameter space: identifiers as wide as the chip's and wider; with SLOW=1 a chip of 32 lanes with small memories. Frames of flk_top: tb/frames.
 """
 

@@ -1,4 +1,4 @@
-"""ff: the floating-point numbers of the preprocessing core, bit for bit (docs/ff.md).
+"""ff: the floating-point numbers of the preprocessing core, bit for bit (docs/reference/ff.md).
 
 Sign, 8-bit exponent (bias 127), M mantissa bits. Round to nearest, ties to even. No subnormal numbers: a rounded result below 2^-126 is zero.
 No infinity and no NaN: what is too large becomes the largest number of its sign. There is one zero, +0. Exponent code 255 is not used.

@@ -1,4 +1,4 @@
-"""Registers of the ff units (their latency) with which no path is longer than 60 FO4 (docs/ff.md), by mantissa bits of the tables' groups."""
+"""Registers of the ff units (their latency) with which no path is longer than 60 FO4 (docs/reference/ff.md), by mantissa bits of the tables' groups."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of reciprocal, square roots and power of two of ff numbers: piecewise quadratic, in integers (docs/ff.md).
+"""Tables of reciprocal, square roots and power of two of ff numbers: piecewise quadratic, in integers (docs/reference/ff.md).
 
 A function of the mantissa m in [0, 1) is cut into segments of equal width. With `dc` the distance from a segment's middle, in 2^-arg_bits:
 

@@ -1,4 +1,4 @@
-"""Small binary floating-point formats and their arithmetic, bit for bit (docs/architecture.md, number formats).
+"""Small binary floating-point formats and their arithmetic, bit for bit (docs/reference/number_formats.md).
 
 Numbers travel as bit patterns in unsigned arrays. Every operation is one float64 operation and one rounding.
 That is exact rounding for every format accepted here (exponent up to 5, mantissa up to 10 bits): a product has at

@@ -5,7 +5,7 @@
 
 Each has a vectorised version on bit patterns and a numba scalar on float32 that holds values of the formats.
 Numba's cache does not see a change of the tables in kernels of other modules: clear it then.
-`scripts/gen_tables.py` writes the tables into `flk_table_pkg.sv`. Errors and derivation: docs/arithmetic.md.
+`scripts/gen_tables.py` writes the tables into `flk_table_pkg.sv`. Errors and derivation: docs/reference/arithmetic.md.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def thresholds(form: Form) -> np.ndarray:
 def radii(form: Form) -> np.ndarray:
     """float64 (65536,): rho(o), which bounds sqrt(u^2 + v^2) of every pair that passes the VRU's alpha test, roundings included.
 
-    u before its rounding, v of the exact difference (docs/configurations.md, what the VRU passes). 0 where the threshold is negative: no pair passes.
+    u before its rounding, v of the exact difference (docs/reference/mask_bounds.md, what the VRU passes). 0 where the threshold is negative: no pair passes.
     """
     t = thresholds(form)
     return np.where(t > 0, np.sqrt(np.maximum(t, 0)) * (1 + 3.1 * EPSILON) + 2.0**-11, 0.0)

@@ -1,4 +1,4 @@
-"""Reduction of a scene to a budget (docs/budget.md).
+"""Reduction of a scene to a budget (docs/reference/budget.md).
 
     clean, broken = sound(scene, cameras)
     reducer = Reducer(clean, fitted, held, Options(Goal(Kind.KEEP, 0.4)))

@@ -1,6 +1,7 @@
 """Machines in whole frames: the same chip around the rendering stage of each configuration.
 
-`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/chip.md has them beside it).
+`chip_estimates` is the chip that exists as RTL: both halves by the models that are held to it (`preprocessing`, `rendering`; docs/results/chip.md has
+them beside it).
 `estimate` is a frame of `ChipConfig`, with whatever stage, lists and memory.
 """
 
@@ -62,7 +63,7 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     """The same frame with GSCore's lists: only sub-tiles that a splat's oriented box meets; entries of none are left out."""
     splats = frame.splats()
     s0, s1, s2 = splats.shape.T
-    # Inverse of the covariance: E = dx^2 a / 2 + b dx dy + dy^2 c / 2, or u^2 + v^2 = E log2(e) (docs/architecture.md).
+    # Inverse of the covariance: E = dx^2 a / 2 + b dx dy + dy^2 c / 2, or u^2 + v^2 = E log2(e) (docs/reference/number_formats.md).
     a, b, c = (2.0 * s0, s1, 2.0 * s2) if frame.kind is RecordKind.CONIC32 else 2.0 / LOG2E * np.stack([s0 * s0, s0 * s1, s1 * s1 + s2 * s2])
     over = a * c - b * b
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -125,7 +126,7 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
         key = configuration.form, configuration.lists == "obb", own_sorter(configuration)
         if key not in fronts:
             format_, lists = FRONTS[configuration.form]
-            front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form))
+            front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form), order=view.order)
             front = by_oriented_boxes(front) if key[1] else front
             fronts[key] = _first_half(front, sizes, dram, not key[2])
         first, tables = fronts[key]

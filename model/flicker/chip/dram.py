@@ -1,7 +1,8 @@
 """LPDDR4 at the level of commands: how long a sequence of bursts takes.
 
 Rules and times of the DRAM are those of sim/dram.hpp (open page, queues of `window` reads and `write_places` writes a channel, row hits first, refresh),
-compiled once, which also stand behind the AXI ports of simulations: docs/memory_model.md. Numbers come from constants.py. Left out: the command bus, latency of
+compiled once, which also stand behind the AXI ports of simulations: docs/reference/memory_model.md. Numbers come from constants.py. Left out: the command
+bus, latency of
 the controller, dependences between bursts (the streams of a phase touch different arrays).
 """
 

@@ -2,7 +2,7 @@
 
 Four writers, one for each parity of tile column and row, take an entry a cycle each, collect entries in a combiner of 64-byte lines (nine entries of 52 bits
 and a header of 44) and write every line once, to a pool of their own. A list is a chain of chunks of `lines` lines; the header of a chunk's first line has
-the link, so it is known when that line has arrived. docs/list_layout.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
+the link, so it is known when that line has arrived. docs/results/lists.md has the results; `flicker.golden.lists` is the layout chosen, bit for bit.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Lists longer than a sorting unit holds: ways to sort them, by cycles, bytes and what they need on the chip (docs/long_lists.md).
+"""Lists longer than a sorting unit holds: ways to sort them, by cycles, bytes and what they need on the chip (docs/decisions/050-long-lists.md).
 
 Every way is executed on the list as far as its bytes and cycles depend on it, one list alone, memory at 51.2 GB/s that answers after `MEMORY` cycles. Bytes are
 of the list alone and in multiples of its one writing by the front end, which counts: a list that is written and read once has 2.
@@ -19,7 +19,7 @@ from ..perf.sorting import latency, unit_cycles
 
 CLUMP = 300  # entries of a clump that follow each other
 LINE_BITS = LINE_ENTRIES * ENTRY_BITS + 4
-# Gates of what is in registers and comparators, from the units that were synthesised (docs/synthesis.md).
+# Gates of what is in registers and comparators, from the units that were synthesised (docs/reference/synthesis.md).
 FLOP, COMPARE, CONTROL = 5.2, 260.0, 1500.0
 BINS = 1024  # of a histogram, ten bits of the key
 PARTS = 64  # of a partition, with an open line each

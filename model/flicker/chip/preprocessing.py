@@ -2,7 +2,8 @@
 
 Traffic follows from the golden front end alone. The units are simulated cycle by cycle from a group of Gaussians at the front to an entry at a list writer
 (`unit_cycles`), the DRAM with all streams in the order in which they come (`simulate`). One waits for the other by phases: between the points at which one more
-queue of survivors (`WAITING` a lane) has left the front, a frame takes the longer of both (`phases`). docs/front_end.md has the estimate beside the RTL.
+queue of survivors (`WAITING` a lane) has left the front, a frame takes the longer of both (`phases`). docs/results/front_end.md has the estimate beside
+the RTL.
 """
 
 from __future__ import annotations

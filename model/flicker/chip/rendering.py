@@ -4,7 +4,8 @@ One pass over the records in the order in which delivery looks them up, each wit
 cycle each, when all queues have places), taken by a core, tested, dispatched, blended. A time is the latest of what it waits for. Places, queues and latencies
 are those of the RTL; masks and finishing records those of the golden model, and from them follows when a core is finished with a sub-tile and its records are
 left out. Pointers and frame buffer are moved to the byte as in the RTL, lists too unless one of more than 2,048 entries is left before its end; lines
-of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/rendering.md has the estimate beside the RTL.
+of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/results/rendering.md has the estimate beside
+the RTL.
 
 Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenly to the elements that it takes.
 
@@ -41,7 +42,7 @@ UNITS = 4
 # Of the RTL, times in cycles.
 CLEAR = 68  # of the record cache, at the beginning of a frame
 READ = 4  # registers from a request to the port and behind it
-CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/list_reader.md)
+CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/reference/list_reader.md)
 FIRST = 17  # a tile's first line beside two accesses
 CONTEXTS = 4  # lists under way in a list reader
 SORTED_LISTS = 8  # that a sorting unit holds, as far as its memories reach

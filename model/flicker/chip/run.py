@@ -1,4 +1,4 @@
-"""A view on the whole chip, verilated or its bit-true model: the picture of its frame buffer, and what the frame cost (docs/chip.md)."""
+"""A view on the whole chip, verilated or its bit-true model: the picture of its frame buffer, and what the frame cost (docs/reference/chip.md)."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _picture(
         build(config)
     with steps.bar("simulating the chip") as report, ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         began = time.process_time()
-        frame = chip.render(camera, background=(red, green, blue), lists=options.lists, progress=report)
+        frame = chip.render(camera, background=(red, green, blue), lists=options.lists, order=view.order, progress=report)
         seconds = time.process_time() - began
         stats = packing | chip_stats(chip, frame, camera, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
     return frame_image(frame.buffer, camera), stats

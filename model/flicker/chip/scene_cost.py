@@ -1,4 +1,4 @@
-"""What a scene costs on the chip, view by view, and which of its Gaussians cost more than they give (docs/scene_cost.md).
+"""What a scene costs on the chip, view by view, and which of its Gaussians cost more than they give (docs/reference/scene_cost.md).
 
     cost = scene_cost(scene, cameras)
     cost.views[0].cycles, cost.findings(), cost.dearest(10)
@@ -25,7 +25,7 @@ from ..golden.front.frame import FrontFrame, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.setup import MEAN_FRACTION, FrameSetup
 from ..golden.render import stream_order
-from ..params import ALPHA_MIN, CORES, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig
+from ..params import ALPHA_MIN, CORES, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig, SortOrder
 from ..pipeline import packing_of
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -266,10 +266,11 @@ def frame_cost(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dic
     return {"front end": first.cycles, "rendering": second.cycles}, bytes_
 
 
-def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None) -> ViewCost:
-    """One view of a packed scene of so many Gaussians in its file. dram: None: without cycles and bytes of the halves, which take most of the time."""
+def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None, order: SortOrder = SortOrder.DEPTH) -> ViewCost:
+    """One view of a packed scene of so many Gaussians in its file. dram: None: without cycles and bytes of the halves, which take most of the time. order: of
+    the lists."""
     packed = packing.packed
-    front = run_front(packed, camera)
+    front = run_front(packed, camera, order=order)
     cycles, bytes_ = frame_cost(front, dram) if dram else ({}, {})
     weight, peak, visits, visited, entry = _entries(front)
     lists = front.subtile_lists()

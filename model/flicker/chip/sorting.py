@@ -19,7 +19,7 @@ from . import constants as c
 
 
 def network_stages(lanes: int) -> int:
-    """Compare-exchange stages of the bitonic network (docs/bitonic_sorter.md)."""
+    """Compare-exchange stages of the bitonic network (docs/reference/bitonic_sorter.md)."""
     n = lanes.bit_length() - 1
     return n * (n + 1) // 2
 

@@ -1,4 +1,4 @@
-"""A frame of the chip that exists as RTL: both of its halves, by models that are held to it, and the memory that they share (docs/chip.md)."""
+"""A frame of the chip that exists as RTL: both of its halves, by models that are held to it, and the memory that they share (docs/reference/chip.md)."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def chip(
     if render_cycles is None and scheme == RECOMMENDED and memory == FRONTS[configuration.form][0] and chip_stage(configuration) is not None:
         built = chip_estimates(loaded, [config], dram=setting.dram)[config]
         _show_built(built)
-        console.print("by the parametric model, which no RTL holds (docs/chip_model.md)")
+        console.print("by the parametric model, which no RTL holds (docs/reference/chip_model.md)")
     _show_frame(frame)
     if schemes:
         table = _table("schemes", *scheme_rows(None)[0])

@@ -57,7 +57,7 @@ def fit(
         help="steps longer than the INRIA code's by this factor, twice as much those of sizes and colours; default: by --iterations; with --from: its own",
         min=0.01, max=100.0,
     )] = None,
-    through: Annotated[str | None, typer.Option(help="configuration whose contribution test the pictures are drawn with (docs/configurations.md)")] = None,
+    through: Annotated[str | None, typer.Option(help="draw through the contribution test of this configuration (docs/reference/configurations.md)")] = None,
     least: Annotated[float, typer.Option(help="standard deviation in pixels of the nearest photograph that no Gaussian falls below", min=0.0, max=100.0)] = 0.0,
     squared: Annotated[float | None, typer.Option(
         help="share of the iterations, at the end, in which squared errors are minimised; default: 1/2; with --from: 0", min=0.0, max=1.0,
@@ -68,7 +68,7 @@ def fit(
     degree: Annotated[int, typer.Option(help="of the spherical harmonics; of --from, its own", min=0, max=3)] = 2,
     seed: Annotated[int, typer.Option(help="of everything random", min=0)] = 1,
     background: Annotated[str, typer.Option(help="black, white or r,g,b: behind the scene, and behind what is transparent in the pictures")] = "black",
-    engine: Annotated[str, typer.Option(help="what draws the pictures: numba, or gsplat on a GPU (docs/fit.md), whose bits differ from run to run")] = "numba",
+    engine: Annotated[str, typer.Option(help="what draws: numba, or gsplat on a GPU (docs/reference/fit.md), whose bits differ from run to run")] = "numba",
     exposure: Annotated[bool, typer.Option("--exposure", help="an affine colour for each photograph")] = False,
     images: Annotated[str | None, typer.Option(help="folder of the photographs, in the data set or anywhere; default: where the data set has them")] = None,
     checkpoint: Annotated[Path | None, typer.Option(

@@ -69,6 +69,7 @@ CAMERAS_HELP = (
 )
 SIZE_HELP = "WxH; the vertical field of view stays, and the shape of the pixels: sideways the picture is cropped or extended"
 BACKGROUND_HELP = "black, white or r,g,b from 0 to 1: behind the scene"
+ORDER_HELP = "what splats are sorted by: depth along the camera's axis, or distance to the camera, which stays while it turns on the spot"
 
 
 def parse_view(text: str) -> int | None:

@@ -11,12 +11,13 @@ from rich.table import Table
 from ..errors import FlickerError, FlickerWarning, Interrupted
 from ..front.path_rules import kind_of
 from ..output import write_text
-from ..params import Coords
+from ..params import Coords, SortOrder
 from .engine import Chosen, EngineChoice, parse_engine, takes_engine
 from .kept import command_line, printed
 from .options import (
     BACKGROUND_HELP,
     CAMERAS_HELP,
+    ORDER_HELP,
     SIZE_HELP,
     RichSteps,
     background_of,
@@ -59,6 +60,7 @@ def path(
     fps: Annotated[float, typer.Option(help="frames a second")] = 90.0,
     size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
+    order: Annotated[SortOrder, typer.Option(help=ORDER_HELP)] = SortOrder.DEPTH,
     chosen: Chosen,
     side_by_side: Annotated[str | None, typer.Option(
         "--side-by-side", help="reference, or options of a second configuration such as '--stage channels --cat sparse': it and the error stand beside",
@@ -127,7 +129,7 @@ def path(
         along, what = path_of(source, Asked(kind, pan or orbit or 0.0, view, wanted_size, frames, fps, **given))  # type: ignore[arg-type]
     judged = stats is not None or chart is not None or warping
     wanted = Wanted(
-        drawing, None if second is None else second.drawing(), judged or side_by_side == REFERENCE, judged, warping, cycles, behind,
+        drawing, None if second is None else second.drawing(), judged or side_by_side == REFERENCE, judged, warping, cycles, behind, order, judged,
     )
     beside = None if side_by_side is None else record.Beside("reference" if second is None else _short(second), 8.0 if amplify is None else amplify)
     recording = record.Recording(source.scene, source.file or str(scene), along, fps, clock * 1e9, wanted, _short(chosen), beside)
@@ -137,7 +139,8 @@ def path(
         write_text(save_cameras, cameras_text([replace(camera, timestamp=n / fps) for n, camera in enumerate(along)]))
     kept = keep.Kept(folder, not video)
     settings = {
-        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "figures": [judged, warping, cycles],
+        "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "order": order.value,
+        "figures": [judged, warping, cycles],
         **simulator,
     }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
@@ -241,6 +244,8 @@ def _show(recording: Recording, rows: list[dict], out: Path, seconds: float) -> 
                               ("warping_error_reference", "warping error of the reference", ".3e")):
         if (value := mean_of(rows, name)) is not None:
             table.add_row(label, format(value, form))
+    if (value := mean_of(rows, "pops")) is not None:
+        table.add_row("pops a frame", f"{value:,.1f} pairs, {mean_of(rows, 'popped') or 0.0:.4%} of the pixels")
     timing = timing_of(rows, recording.slot)
     if timing is not None:
         table.add_row("cycles a frame, p50, p99", f"{timing.p50:,.0f}, {timing.p99:,.0f}")

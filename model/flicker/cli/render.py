@@ -12,12 +12,13 @@ from rich.text import Text
 
 from ..errors import FlickerError, Interrupted
 from ..output import folder_atomically, json_text, write_text
-from ..params import RECOMMENDED
+from ..params import RECOMMENDED, SortOrder
 from ..progress import Steps
 from .engine import Chosen, takes_engine
 from .options import (
     BACKGROUND_HELP,
     CAMERAS_HELP,
+    ORDER_HELP,
     SIZE_HELP,
     RichSteps,
     Within,
@@ -113,6 +114,7 @@ def render(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
+    order: Annotated[SortOrder, typer.Option(help=ORDER_HELP)] = SortOrder.DEPTH,
     chosen: Chosen,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture (.png)")] = None,
@@ -146,7 +148,7 @@ def render(
 
     def one(k: int, told: Steps) -> dict:
         """Render and write a view: its statistics."""
-        loaded = view_of(source, k, wanted, behind)
+        loaded = view_of(source, k, wanted, behind, order=order)
         result = drawing.render(loaded, compare=compare is not None, alpha=alpha is not None, steps=told)
         found = result.stats | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
         empty = unseen(loaded, result.image, found.get("visible"))

@@ -13,7 +13,8 @@ from rich.text import Text
 
 from ..errors import FlickerError, Interrupted
 from ..output import check_folder, write_text
-from .options import console
+from ..params import SortOrder
+from .options import ORDER_HELP, console
 
 
 def stability(
@@ -21,6 +22,7 @@ def stability(
     config: Annotated[list[str] | None, typer.Option(help="configuration, repeatable [default: the suite]")] = None,
     front: Annotated[bool, typer.Option("--front", help="the packed front ends: records of 16 against 32 bytes, number formats")] = False,
     moving: Annotated[bool, typer.Option("--moving", help="families that move: what flickers at which speed of the camera")] = False,
+    order: Annotated[SortOrder | None, typer.Option(help=f"with --moving: {ORDER_HELP} [default: depth]")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="three steps of each family, chosen configurations; two speeds")] = False,
     seed: Annotated[int, typer.Option(min=0, help="seed of the random inputs")] = 1,
     out: Annotated[Path, typer.Option("--out", "-o", help="folder for stability.csv, stability.md and the pictures")] = Path("build/stability"),
@@ -29,10 +31,12 @@ def stability(
     """Run families of hard inputs through every configuration and front end: error against float64, and where each breaks."""
     if moving and front:
         raise FlickerError("--moving: has front ends of its own, so it cannot be combined with --front")
+    if order is not None and not moving:
+        raise FlickerError("--order: for --moving only")
     if not show:
         check_folder(out)
     if moving:
-        _moving(family, config, quick, seed, out, show)
+        _moving(family, config, order or SortOrder.DEPTH, quick, seed, out, show)
         return
     with console.status("starting"):
         from ..explore.stability.families import FAMILIES
@@ -74,7 +78,7 @@ def _bar(out: Path) -> Iterator[Callable[[int, int], None]]:
             raise Interrupted(f"nothing was written to {out}; the same command begins anew, --quick and --family make it shorter") from None
 
 
-def _moving(family: list[str] | None, config: list[str] | None, quick: bool, seed: int, out: Path, show: bool) -> None:
+def _moving(family: list[str] | None, config: list[str] | None, order: SortOrder, quick: bool, seed: int, out: Path, show: bool) -> None:
     """Families that move."""
     with console.status("starting"):
         from ..explore.stability.moving import MACHINES, MOVING, SPEEDS, moving_rows, run_moving, write_moving
@@ -85,7 +89,7 @@ def _moving(family: list[str] | None, config: list[str] | None, quick: bool, see
             console.print(name, highlight=False)
         return
     with _bar(out) as progress:
-        points = run_moving(family, config, SPEEDS[2:5:2] if quick else SPEEDS, seed=seed, progress=progress)
+        points = run_moving(family, config, SPEEDS[2:5:2] if quick else SPEEDS, seed=seed, order=order, progress=progress)
     write_moving(points, out)
     heads, rows = moving_rows(points)
     table = Table(title="first speed, pixels a frame, at which a configuration flickers (lowest temporal PSNR, dB, most jumps, %)", title_justify="left")

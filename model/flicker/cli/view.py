@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from ..errors import FlickerError
+from ..params import SortOrder
 from .options import (
     BACKGROUND_HELP,
     CAMERAS_HELP,
+    ORDER_HELP,
     SIZE_HELP,
     RichSteps,
     background_of,
@@ -32,6 +34,7 @@ def view(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str, typer.Option(help=SIZE_HELP)] = "640x360",
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
+    order: Annotated[SortOrder, typer.Option(help=ORDER_HELP)] = SortOrder.DEPTH,
     folder: Annotated[Path, typer.Option("--dir", help="where still pictures and their cameras.json go")] = Path("build/view"),
     host: Annotated[str, typer.Option(help="address to listen on; 0.0.0.0: all of this machine's")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="port to listen on; 0: any that is free", min=0, max=65535)] = 8080,
@@ -53,7 +56,7 @@ def view(
     port_free(host, port)  # before the scene is loaded
     with steps.step("loading the scene"):
         source = open_scene(scene, cameras, up)
-        loaded = view_of(source, number, wanted, behind)
+        loaded = view_of(source, number, wanted, behind, order=order)
     with steps.step("rendering the first frame (compiling on the first run)"):
         viewer = Viewer(loaded, source.cameras, folder, host, port)
         viewer.prepare()

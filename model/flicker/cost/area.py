@@ -1,4 +1,4 @@
-"""Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/synthesis.md).
+"""Area of a rendering stage, put together from synthesised parts, in gate equivalents (NAND2 = 1; docs/reference/synthesis.md).
 
     stage_parts("factored", ctu_area("factored", "fixed"))            # the RTL: 4 CTUs, 16 FIFOs, 32 VRUs
     stage_parts("factored", vrus=64)                                  # no contribution test, 64 VRUs of 4 pixels

@@ -1,4 +1,4 @@
-"""Square millimetres of the chip by component, beside the paper's Table 2a: estimates from synthesised gates and bits of memory (docs/synthesis.md)."""
+"""Square millimetres of the chip by component, beside the paper's Table 2a: estimates from synthesised gates and memory (docs/reference/synthesis.md)."""
 
 from __future__ import annotations
 

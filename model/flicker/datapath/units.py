@@ -146,7 +146,7 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
     least, limit = (g.inputs(n, Ff(S), (2,), register=True) for n in ("least", "limit"))
     middle = g.inputs("middle", middle_range(formats), (2,), register=True)
     width, height = (g.input(n, Int(1, MAX_PICTURE), register=True) for n in ("width", "height"))
-    chunked, antialiased = (g.input(n, BOOL, register=True) for n in ("chunked", "antialiased"))
+    chunked, antialiased, by_distance = (g.input(n, BOOL, register=True) for n in ("chunked", "antialiased", "by_distance"))
     share = g.pick(chunked, g.number(frame.CHUNK_SHARE, S), g.number(frame.FP16_SHARE, S))
     const = splat.constants(formats).tolist()
     p = retrace(splat.project_one)(low, step, q, s, *quat, view, focal, *rows, least, limit, middle, share, antialiased, const, P, S, formats.mean)
@@ -165,7 +165,7 @@ def projection(formats: FrontFormats, form: Form = Form.FACTORED) -> Graph:
             g.output(f"conic_{k}", value)
     for name, value in steady._asdict().items():
         g.output(name, value)
-    g.output("key", retrace(frame.depth_key)(p.t2, P, formats.key))
+    g.output("key", retrace(frame.sort_key)(by_distance, p.t2, p.square, P, formats.key))
     for k, value in enumerate((p.d0, p.d1, p.d2)):
         g.output(f"direction_{k}", g.ff_round(value, formats.colour))
     return g
@@ -299,10 +299,10 @@ PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
     Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
-    Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, depth key, what its bounds need."),
+    Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, key, what its bounds need."),
     Pipeline(
         "flk_projection_conic", 2, projection_conic,
-        "Projection of a Gaussian for records in conic form: mean, a / 2, b, c / 2, depth key, what its bounds need.",
+        "Projection of a Gaussian for records in conic form: mean, a / 2, b, c / 2, key, what its bounds need.",
     ),
     Pipeline("flk_splat_bounds", 2, bounds, "Opacity code and bounds of a splat."),
     Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),

@@ -1,4 +1,4 @@
-"""Configurations along a camera path: what `evaluate` tells of stills, and what changes from frame to frame (docs/motion.md)."""
+"""Configurations along a camera path: what `evaluate` tells of stills, and what changes from frame to frame (docs/reference/motion.md)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def evaluate_along(target: Target, names: Sequence[str]) -> Iterator[tuple[str, 
         rows: dict[str, list[dict[str, Any]]] = {name: [] for name in some}
         changes: dict[str, list[Change]] = {name: [] for name in some}
         for number, camera in enumerate(cameras):
-            view = View(camera, scene, name=target.scene.name, number=number, background=target.scene.background)
+            view = View(camera, scene, name=target.scene.name, number=number, background=target.scene.background, order=target.scene.order)
             for name in some:
                 found = evaluate(view, name)
                 rows[name].append(found.row)

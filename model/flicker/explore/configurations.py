@@ -1,7 +1,7 @@
 """The table of configurations, and the groups that reports, tables and suites are made of.
 
 Every module of `GENERATORS` says which configurations its mask generator has part in. A new generator or stage is a module and one entry here
-(docs/extending.md).
+(docs/guide/extending.md).
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "log-lanes-128", "oracle", "oracle-lanes",
         "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic",
     ),
-    # README, in few rows
+    # docs/results/frames.md, in few rows
     "summary": ("gscore", "faithful", "flicker", "log-lanes", "log-lanes-64", "log-lanes-128"),
-    # docs/exploration.md, by theme
+    # docs/results/exploration.md, by theme
     "rivals and the RTL": ("gscore", "seele", "no-ctu-32", "faithful", "flicker"),
     "barriers, finished sub-tiles, FIFOs, VRUs": ("flicker-barrier", "flicker-stop", "flicker-fifo-64", "flicker-16", "flicker-64"),
     "exact rectangle, by format": ("exact", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e5m2", "exact-q8.8"),
@@ -51,12 +51,12 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "deeper FIFOs": ("lanes", "lanes-fifo-40", "lanes-fifo-40-window-3", "lanes-deep"),
     # whole-frame estimates, figure 10: stages that the chip's RTL has, and GSCore's
     "chip": ("no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "flicker", "log-lanes", "log-lanes-64", "log-lanes-128"),
-    # docs/energy.md
+    # docs/results/energy.md
     "energy": (
         "gscore", "vanilla", "no-ctu-32", "no-ctu-64", "faithful", "flicker", "exact", "rows", "lanes", "lanes-deep", "lanes-64", "log-lanes", "log-lanes-64",
         "log-lanes-128",
     ),
-    # docs/configurations.md
+    # docs/results/mask_generators.md
     "pictures": (
         "vanilla", "no-ctu-32", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-fp16", "exact-fp16-bound", "exact-e5m6",
         "exact-e5m6-bound", "exact-e4m4", "exact-e5m3", "exact-e4m3", "exact-e4m3-scaled", "exact-e4m3-bound", "exact-e5m2", "exact-q8.8", "exact-fp16-conic",
@@ -68,7 +68,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "vanilla*", "no-ctu-32*", "gscore*", "seele*", "faithful", "flicker", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*",
         "rows", "rows-f*", "rows-ellipse-acc*", "log-lanes", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
     ),
-    # docs/motion.md: every mode of FLICKER, GSCore's test, none, lanes
+    # docs/results/motion.md: every mode of FLICKER, GSCore's test, none, lanes
     "stability in time": (
         "gscore", "no-ctu-32", "faithful", "flicker", "flicker-dense-fixed-factored", "flicker-sparse-fixed-factored", "flicker-spiky-fixed-factored",
         "flicker-auto-fixed-factored", "flicker-dense-fp16-factored", "log-lanes", "log-lanes-128",

@@ -5,7 +5,7 @@ A configuration streams lists (`flicker.front.lists`), asks its generator for ma
     result = run(get_configuration("flicker"), view)      # bit-true picture and work
     cycles, counters = result.configuration.simulate(result.work)
 
-How to add a generator or a stage: docs/extending.md.
+How to add a generator or a stage: docs/guide/extending.md.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ class Masks:
 class MaskGenerator(ABC):
     """Says which mini-tiles, or which pixels of them, a splat is sent to. Subclasses are frozen dataclasses: equal fields, equal masks.
 
-    pixels: the masks name single pixels. exact: never leaves out a pixel that the VRU would have blended, proved in docs/configurations.md. free: masks
+    pixels: the masks name single pixels. exact: never leaves out a pixel that the VRU would have blended, proved in docs/reference/mask_bounds.md.
+    free: masks
     for nothing, a bound and no design. precision: formats, for tables. operations: hardware operations per element.
     """
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import FlickerError
 from ..front.paths import Asked, given_cameras, path_of
 from ..front.view import DEMO, View, load_view
+from ..params import SortOrder
 from ..scene import Scene
 from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, no_such_view, of_colmap, photos_root, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
@@ -23,13 +24,15 @@ SIZE = (1280, 720)  # of views without a photograph when none is asked for
 @dataclass(frozen=True)
 class SceneFile:
     """A scene, its cameras, its photographs. path: a file, a folder, or `demo`. cameras: a file or folder; None: what `find_cameras` finds. up: of the orbit.
-    photos: a folder with the photograph of every camera; None: those found beside the cameras; `none`: none. background: RGB in [0, 1]."""
+    photos: a folder with the photograph of every camera; None: those found beside the cameras; `none`: none. background: RGB in [0, 1].
+    order: what splats are sorted by."""
 
     path: str
     cameras: str | None = None
     up: str | None = None
     photos: str | None = None
     background: tuple[float, float, float] = BLACK
+    order: SortOrder = SortOrder.DEPTH
 
     @property
     def file(self) -> str:
@@ -155,11 +158,13 @@ class Target:
 
     @cached_property
     def looks(self) -> str:
-        """Background and content of the photograph: what results depend on beside scene, cameras, size."""
-        return f"{self.scene.background} {'' if self.photo is None else file_digest(self.photo)}"
+        """Background, order, content of the photograph: what results depend on beside scene, cameras, size."""
+        by = "" if self.scene.order is SortOrder.DEPTH else f" {self.scene.order.value}"
+        return f"{self.scene.background}{by} {'' if self.photo is None else file_digest(self.photo)}"
 
     def load(self) -> View:
-        return load_view(self.scene.path, self.view, self.size, self.scene.cameras, self.scene.up, self.scene.background, self.photo, self.scene.stored)
+        scene = self.scene
+        return load_view(scene.path, self.view, self.size, scene.cameras, scene.up, scene.background, self.photo, scene.stored, scene.order)
 
     def cameras(self) -> tuple[Scene, list[Camera]]:
         """The scene and the cameras of the path. FlickerError for cameras that are none."""

@@ -1,1 +1,1 @@
-"""Scenes from photographs, and gradients of a picture in all parameters of a scene (docs/fit.md)."""
+"""Scenes from photographs, and gradients of a picture in all parameters of a scene (docs/reference/fit.md)."""

@@ -1,4 +1,4 @@
-"""Posed photographs: `transforms.json` of NeRF and nerfstudio, NeRF's synthetic scenes, COLMAP models with their pictures (docs/fit.md)."""
+"""Posed photographs: `transforms.json` of NeRF and nerfstudio, NeRF's synthetic scenes, COLMAP models with their pictures (docs/reference/datasets.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What blends the splats of a picture and finds the way back from its slope: numba on the processor, or gsplat's kernels on a GPU (docs/fit.md).
+"""What blends the splats of a picture and finds the way back from its slope: numba on the processor, or gsplat's kernels on a GPU (docs/reference/fit.md).
 
 Projection, colours, lists of tiles and the way from splats to parameters are `render`'s with every engine; so is the choice of what is not finite.
 """
@@ -53,7 +53,7 @@ class Gsplat:
             self._torch = importlib.import_module("torch")
             self._rasterize = rasterize or importlib.import_module("gsplat").rasterize_to_pixels
         except ImportError as error:
-            raise FlickerError(f"--engine: gsplat: {one_line(error)}; install the package's extra 'gpu' (docs/fit.md)") from None
+            raise FlickerError(f"--engine: gsplat: {one_line(error)}; install the package's extra 'gpu' (docs/reference/fit.md)") from None
         if device == "cuda" and not self._torch.cuda.is_available():
             raise FlickerError("--engine: gsplat: PyTorch finds no GPU")
         self._device = device

@@ -1,7 +1,7 @@
 """Gaussians of a least size on the screen: a lower bound on their standard deviations, from the photograph that sees them largest.
 
-A test that samples leader pixels (docs/fit.md) misses Gaussians that fit between these; larger ones it finds. After the smoothing filter of Mip-Splatting
-(Yu et al. 2024), which bounds sizes from below by a camera's sampling rate.
+A test that samples leader pixels (docs/reference/fit.md) misses Gaussians that fit between these; larger ones it finds. After the smoothing filter of
+Mip-Splatting (Yu et al. 2024), which bounds sizes from below by a camera's sampling rate.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Masks of a machine's contribution test in the lists of a fit: pictures are then optimised as the chip draws them (docs/fit.md).
+"""Masks of a machine's contribution test in the lists of a fit: pictures are then optimised as the chip draws them (docs/reference/fit.md).
 
 The masks are the machine's own, bit for bit: records in its formats, its lists, its mask generator (`explore.machine`). They count as constants: what they
 leave out has no part in the derivatives.

@@ -1,4 +1,4 @@
-"""Optimisation of a scene on photographs (docs/fit.md).
+"""Optimisation of a scene on photographs (docs/reference/fit.md).
 
     trainer = Trainer(load_dataset(path, 400), Options(iterations=4000))
     trainer.run()
@@ -62,7 +62,8 @@ class Options:
     tune: of a scene that is there: none of its Gaussians is split or removed, and the learning rates are those of a fit from its share `begin` on.
     through: name of the configuration whose masks the pictures are drawn with; None: all pixels are visited. least: standard deviation in pixels that no
     Gaussian falls below (`LeastSize`). squared: share of the iterations, the last ones, in which the squared error is minimised (`log_error_slope`), with
-    moments that begin anew; None: half of a fit from nothing, none of one that tunes. longer: factor of the steps of means, others follow (docs/fit.md); None:
+    moments that begin anew; None: half of a fit from nothing, none of one that tunes. longer: factor of the steps of means, others follow
+    (docs/reference/fit.md); None:
     by the number of iterations, or the INRIA code's own steps where a scene is tuned. engine: of `engines`, what draws the photographs' views; PSNR is numba's.
     """
 

@@ -1,4 +1,4 @@
-"""Photographs of a `transforms.json` without their lenses (`fit.lens`), the principal point in the middle (`flicker undistort`; docs/fit.md)."""
+"""Photographs of a `transforms.json` without their lenses (`fit.lens`), the principal point in the middle (`flicker undistort`; docs/reference/datasets.md)."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def _reach_keep(gauss, rho, start, entry, mean, box_only, keep):
             l2 = np.float64(fp16_value(gauss[i, 4]))
             x0, y0 = -np.float64(fp16_value(mean[n, 0])), -np.float64(fp16_value(mean[n, 1]))
             x1, y1 = x0 + last, y0 + last
-            # What the VRU's roundings of u can come to (docs/configurations.md), at the farthest corner.
+            # What the VRU's roundings of u can come to (docs/reference/mask_bounds.md), at the farthest corner.
             r += 2.1 * EPSILON * (l0 * max(-x0, x1) + abs(l1) * max(-y0, y1)) + 2.0**-20
             if r <= 2.0**-20 or not l0 > 0.0 or not l2 > 0.0:
                 keep[n] = r > 2.0**-20

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..params import SPIKY_AXIS_RATIO, TILE
+from ..params import SPIKY_AXIS_RATIO, TILE, SortOrder
 from ..scene.camera import Camera
 from ..scene.files import Scene
 
@@ -43,10 +43,10 @@ _C3 = (
 class Projected:
     """Gaussians in front of the camera whose box touches the picture, near to far (M of them).
 
-    Sorted by depth; equal depths keep scene order.
+    Sorted by depth, or by distance to the camera (`project`), both in float32; equal ones keep scene order.
 
     mean: float64 (M, 2), x and y in pixels. cov2d: float64 (M, 3), xx, xy, yy in px^2, dilated.
-    conic: float64 (M, 3), a, b, c: the inverse of cov2d, [[a, b], [b, c]]. depth: float32 (M,), camera-space z, the sort key.
+    conic: float64 (M, 3), a, b, c: the inverse of cov2d, [[a, b], [b, c]]. depth: float32 (M,), camera-space z.
     opacity: float64 (M,), of antialiased scenes with its factor. rgb: float64 (M, 3), max(0, 0.5 + SH). spiky: bool (M,), axis ratio >= 3 after dilation.
     index: int64 (M,), position in the scene. radii: float64 (M, 2), 3 standard deviations along x and y.
     circle: float64 (M,), the radius of the INRIA rasterizer: 3 standard deviations along the long axis, rounded up.
@@ -221,14 +221,21 @@ def colours(means, sh, index, position, rgb):
             rgb[i, c] = max(0.0, v)
 
 
-def project(scene: Scene, camera: Camera) -> Projected:
-    """Project a scene into a camera and sort it near to far."""
+def distances(means: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """float32 (N,): of means (N, 3) to a camera's position (3,). From differences in world axes, in float64, so that no turn of the camera changes a bit."""
+    x, y, z = (means - position).T
+    return np.sqrt(x * x + y * y + z * z).astype(np.float32)
+
+
+def project(scene: Scene, camera: Camera, order: SortOrder = SortOrder.DEPTH) -> Projected:
+    """Project a scene into a camera and sort it near to far: by depth along the axis, or by distance."""
     count = len(scene.means)
     table = np.empty((count, COLUMNS))
     depth = np.empty(count, np.float32)
     geometry(scene.means, scene.scales, scene.quats, camera, table, depth)
     index = np.flatnonzero(depth)
-    index = index[np.argsort(depth[index], kind="stable")]
+    by = depth[index] if order is SortOrder.DEPTH else distances(scene.means[index], camera.position)
+    index = index[np.argsort(by, kind="stable")]
     rgb = np.empty((len(index), 3))
     colours(scene.means, scene.sh, index, camera.position, rgb)
     projected = Projected.of(table, depth, scene.opacities, rgb, index)

@@ -3,7 +3,7 @@
 Per 16x16 tile, near to far, Gaussians whose circle of 3 standard deviations (long axis, rounded up to pixels) has a bounding
 square that touches the tile. At pixel p with d = p - mean: E = (a dx^2 + c dy^2) / 2 + b dx dy, alpha = min(0.99, o exp(-E)).
 A pair with E < 0 or alpha < 1/255 is skipped. The first Gaussian that would take the transmittance below 1e-4 is not blended
-and finishes the pixel. docs/reference.md says how this was checked.
+and finishes the pixel. docs/reference/reference_renderer.md says how this was checked.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Golden model of the rendering stage, bit for bit.
+"""Golden model of the hardware, bit for bit (docs/reference/golden_model.md).
 
-`fp`      rounding in float32 carriers: the arithmetic of the units
-`weight`  the Gaussian weight E in both forms; PRTU and VRU share it
+`weight`  the Gaussian weight E in both forms; PRTU and VRU share it (rounding: `flicker.arithmetic.fp`)
 `cat`     contribution test: PRTU, MMU, modes
 `vru`     one pixel-Gaussian pair, with every intermediate value
-`records` projected splats to hardware records and sub-tile lists
-`render`  whole frames
+`render`  whole frames of the stage of channels (records and lists: `flicker.front.records`)
+`lanes`   the stage of lanes
+`front`   front end
+`chip`    the chip's picture
 """

@@ -1,4 +1,5 @@
-"""Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads (docs/delivery.md).
+"""Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads
+(docs/reference/delivery.md).
 
 An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order
 of the list, tile by tile, and behind them the end of the list. Of a finished sub-tile, whose pixels take no more, records may be missing at the end of its

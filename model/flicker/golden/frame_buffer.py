@@ -1,4 +1,4 @@
-"""The frame buffer as the chip leaves it in memory (docs/frame_writer.md): bytes of every pixel, and where they lie.
+"""The frame buffer as the chip leaves it in memory (docs/reference/frame_writer.md): bytes of every pixel, and where they lie.
 
 Pixels are FP16 bits (transmittance, red, green, blue), as in `golden.render.Frame.pixels`. Rows of the buffer are `stride` bytes apart and hold whole pairs of
 tiles, so columns beyond the picture's width and rows beyond its height are written too, up to multiples of 32 and 16.
@@ -11,6 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from ..params import SUBTILE, TILE
+from .walk import tile_walk
 
 PAIR = 2 * TILE  # columns of pixels that are written together
 BURST = 32  # bytes; a pair's row is a whole number of them
@@ -68,4 +69,17 @@ def frame_buffer(pixels: np.ndarray, cols: int, rows: int, width: int, height: i
     data = rgb8(picture, np.asarray(background)) if format_ is PixelFormat.RGB8 else rgba16f(picture).view(np.uint8)
     out = np.zeros((high, stride), np.uint8)
     out[:, : wide * format_.bytes] = data.reshape(high, -1)
+    return out
+
+
+def late_frame_buffer(before: np.ndarray, whole: np.ndarray, pairs: int, cols: int, rows: int, format_: PixelFormat) -> np.ndarray:
+    """uint8 (rows of pixels, stride): what a frame leaves that its deadline ends after so many pairs of tiles, the first ones of the walk.
+
+    before: what the buffer held. whole: the frame's `frame_buffer`. cols, rows: of tiles, whole pairs.
+    """
+    x, y = tile_walk(cols // 2, rows)
+    out, bytes_ = before.copy(), PAIR * format_.bytes
+    for column, row in zip(x[::2][:pairs] // 2, y[::2][:pairs]):
+        part = slice(TILE * row, TILE * (row + 1)), slice(bytes_ * column, bytes_ * (column + 1))
+        out[part] = whole[part]
     return out

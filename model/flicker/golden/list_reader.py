@@ -1,4 +1,4 @@
-"""Reading of tile lists, bit for bit: what `flk_list_reader` gives for a tile, and the bytes it reads for it (docs/list_reader.md).
+"""Reading of tile lists, bit for bit: what `flk_list_reader` gives for a tile, and the bytes it reads for it (docs/reference/list_reader.md).
 
 A list is read from its newest chunk to its oldest, the lines of a chunk in ascending order; each line is an element with its entries as they lie there.
 The last element is marked; an empty list is one element without entries. A list that breaks the layout ends before the line with the fault.

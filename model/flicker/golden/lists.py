@@ -1,4 +1,4 @@
-"""Tile lists in DRAM, bit for bit: what the four list writers leave in memory, and how it is read back (docs/list_layout.md).
+"""Tile lists in DRAM, bit for bit: what the four list writers leave in memory, and how it is read back (docs/reference/list_layout.md).
 
 Writer b serves the tiles with (column & 1) | (row & 1) << 1 == b; its tile (u, v) is column 2 u + (b & 1), row 2 v + (b >> 1) of the picture. It takes entries
 in the order of the scene and collects them in a combiner of 64 sets (3 low bits of u and v) and 4 ways of one line each. A line is written when it has nine

@@ -1,4 +1,4 @@
-"""Lists that a sorting unit does not hold, bit for bit: runs, chains, batches (docs/long_lists.md).
+"""Lists that a sorting unit does not hold, bit for bit: runs, chains, batches (docs/reference/list_sorter.md).
 
 A list of more than `capacity` entries is read once. Each `capacity` entries of it, in the order of reading, are sorted and written back as a run: lines of
 nine entries in the layout of `flicker.golden.lists` (count in the header, no link), the runs one after the other, each but the last of the same number of

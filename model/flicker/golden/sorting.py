@@ -1,4 +1,4 @@
-"""Sorting unit: a list that it holds in order, with the runs that it makes on the way (rtl/sort/flk_sorting_unit.sv, docs/sorting_unit.md).
+"""Sorting unit: a list that it holds in order, with the runs that it makes on the way (rtl/sort/flk_sorting_unit.sv, docs/reference/sorting_unit.md).
 
 Entries are those of flicker.golden.lists: 52 bits, compared by the upper 48 (key, record), which are distinct within a list. Longer lists:
 flicker.golden.long_lists. The simple statement: `order` is np.sort of the upper 48 bits.

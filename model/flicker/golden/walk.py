@@ -1,5 +1,5 @@
-"""The order in which the chip renders tiles (rtl/sort/flk_tile_walk.sv, docs/rendering.md): near each other in time what is near in the picture, so that
-records are still in the cache."""
+"""The order in which the chip renders tiles (rtl/sort/flk_tile_walk.sv, docs/reference/rendering.md): near each other in time what is near in the
+picture, so that records are still in the cache."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Gaussian weight E, in conic and in factored form (docs/architecture.md).
+"""The Gaussian weight E, in conic and in factored form (docs/reference/number_formats.md).
 
 PRTU and VRU evaluate the same expressions: terms of a pixel column, terms of a pixel row, and what joins them. Written
 once here, each operation rounded to the format `r` (constants of `fp.rounding`), in the order of the hardware:

@@ -20,8 +20,12 @@ import numpy as np
 from ..chip.compare import frame_cost
 from ..chip.drawing import Drawing
 from ..errors import FlickerError, FlickerWarning
+from ..front.pops import Seen, seen_in
 from ..front.reference import expected_depth
 from ..front.view import View
+from ..golden.front.record import RecordKind
+from ..params import SortOrder
+from ..pipeline import Front, golden_front, packed_scene
 from ..scene import Scene
 from ..scene.camera import Camera
 from ..scene.metrics import flip, ssim
@@ -33,7 +37,7 @@ AHEAD = 2  # frames that wait for their turn, for each process
 @dataclass(frozen=True)
 class Wanted:
     """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference.
-    cycles: what the frame costs on the chip, by its models."""
+    cycles: what the frame costs on the chip, by its models. order: what splats are sorted by. pops: what is needed to count them."""
 
     drawing: Drawing
     beside: Drawing | None = None
@@ -42,11 +46,14 @@ class Wanted:
     depth: bool = False
     cycles: bool = False
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    order: SortOrder = SortOrder.DEPTH
+    pops: bool = False
 
 
 @dataclass
 class Made:
-    """A frame. image, beside: float (H, W, 3), unquantised. reference: float64 (H, W, 3). depth: float64 (H, W). facts: numbers by column. notes: warnings."""
+    """A frame. image, beside: float (H, W, 3), unquantised. reference: float64 (H, W, 3). depth: float64 (H, W). facts: numbers by column. notes: warnings.
+    seen: lists of the drawing's front end, for pops."""
 
     number: int
     image: np.ndarray
@@ -55,6 +62,7 @@ class Made:
     depth: np.ndarray | None
     facts: dict[str, Any]
     notes: list[str] = field(default_factory=list)
+    seen: Seen | None = None
 
 
 def _counts(stats: dict[str, Any]) -> dict[str, Any]:
@@ -65,12 +73,21 @@ def _counts(stats: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
+def seen_by(view: View, drawing: Drawing) -> Seen:
+    """What a drawing of a view blends, in its order: of a bit-true front end, whoever computes it, by its golden model."""
+    if not drawing.engine.whole and drawing.front is Front.FLOAT:
+        return seen_in(view.projected, view.camera)
+    options = drawing.options
+    packed = packed_scene(view, options.format, options.rechunk)
+    return golden_front(view, packed, options.lists, RecordKind.of(drawing.config.form)).seen()
+
+
 def make(scene: Scene, wanted: Wanted, number: int, camera: Camera) -> Made:
     """Frame `number` of a path."""
     began = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FlickerWarning)
-        view = View(camera, scene, number=number, background=wanted.background)
+        view = View(camera, scene, number=number, background=wanted.background, order=wanted.order)
         rendered = wanted.drawing.render(view)
         facts = _counts(rendered.stats)
         beside = None if wanted.beside is None else wanted.beside.render(view).image
@@ -80,8 +97,10 @@ def make(scene: Scene, wanted: Wanted, number: int, camera: Camera) -> Made:
         depth = expected_depth(view.projected, camera) if wanted.depth else None
         if wanted.cycles:
             facts |= frame_cost(view, wanted.drawing)
+        seen = seen_by(view, wanted.drawing) if wanted.pops else None
     facts["made_s"] = time.perf_counter() - began
-    return Made(number, rendered.image, beside, reference, depth, facts, [str(w.message) for w in caught if issubclass(w.category, FlickerWarning)])
+    notes = [str(w.message) for w in caught if issubclass(w.category, FlickerWarning)]
+    return Made(number, rendered.image, beside, reference, depth, facts, notes, seen)
 
 
 # ---- processes ----------------------------------------------------------------------------------

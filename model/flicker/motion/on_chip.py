@@ -39,7 +39,7 @@ def chip_frames(scene: Scene, cameras: Sequence[Camera], wanted: Wanted, first: 
     packed = packed_scene(View(cameras[first], scene), drawing.options.format, drawing.options.rechunk)
     with ChipSession(packed, drawing.config, memory=MemoryOptions(drawing.dram.timing)) as chip:
         background = [round(255 * float(v)) for v in wanted.background]
-        row = back_to_back(chip, cameras[first:], background=background, lists=drawing.options.lists)
+        row = back_to_back(chip, cameras[first:], background=background, lists=drawing.options.lists, order=wanted.order)
         for number in range(first, len(cameras)):
             made = make(scene, golden, number, cameras[number])
             began = time.perf_counter()

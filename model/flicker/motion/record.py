@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
+from ..front.pops import pops
 from ..output import write_records
 from ..perf.timing import Timing
 from ..pipeline import Engine
@@ -24,7 +25,7 @@ from .keep import Kept
 
 COLUMNS = (
     "frame", "time_s", "visible", "tile_entries", "subtile_entries", "psnr_db", "temporal_psnr_db", "jumps", "ssim", "flip", "warping_error",
-    "warping_error_reference", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
+    "warping_error_reference", "pops", "popped", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
 )
 
 
@@ -101,6 +102,8 @@ class _Figures:
                 "warping_error": warping_error(before.image, made.image, there, both),
                 "warping_error_reference": warping_error(before.reference, made.reference, there, both),
             }
+        if made.seen is not None and before is not None and before.seen is not None:
+            found |= asdict(pops(before.seen, made.seen))
         return found
 
 
@@ -118,8 +121,9 @@ def record(path: Recording, kept: Kept, workers: int, told: Callable[[int], None
     first = len(kept.rows)
     if first == len(path.cameras):
         return
-    # The last frame that is there is made once more: its errors are those of a picture of more than 8 bits, and the chip has no interval without it.
-    again = first > 0 and (path.wanted.reference or path.on_chip)
+    # The last frame that is there is made once more: its errors are those of a picture of more than 8 bits, its lists are not kept, and without it the chip has
+    # no interval.
+    again = first > 0 and (path.wanted.reference or path.wanted.pops or path.on_chip)
     for made in _frames(path, first - again, workers):
         row = {"frame": made.number, "time_s": made.number / path.fps, **figures.of(made), **made.facts}
         if "cycles" in row:

@@ -1,4 +1,4 @@
-"""Cycle model of the lanes in the log domain, equal to the RTL in cycles and in every counter (rtl/flk_lane_stage.sv; docs/lanes.md).
+"""Cycle model of the lanes in the log domain, equal to the RTL in cycles and in every counter (rtl/flk_lane_stage.sv; docs/reference/lanes.md).
 
 A core takes `in_width` elements a cycle through setup and masks, which move together. Dispatch gives one splat a cycle a slot of the store and each lane
 with pixels in its mask an entry in its queue; what is empty or finished is dropped beside it. Every lane visits a pixel a cycle, in the order of the list. A

@@ -1,4 +1,4 @@
-"""Cycles of a list that a sorting unit does not hold: runs written back, chains merged in batches (flicker.golden.long_lists, docs/long_lists.md).
+"""Cycles of a list that a sorting unit does not hold: runs written back, chains merged in batches (flicker.golden.long_lists, docs/reference/list_sorter.md).
 
 First reading: an entry a cycle, runs leave behind it. Then lines come in the order of the merge, nine cycles each; of every chain as many are read ahead as its
 part of the line memory holds. The chain whose line was used up must have its next one before another line is chosen.

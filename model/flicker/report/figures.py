@@ -306,7 +306,7 @@ def whole_system(views: Sequence[ViewResult]) -> Figure | None:
           {GSCORE: 1, FAITHFUL: 2.6})
     a.legend(fontsize=6, ncols=2)
     return Figure(
-        "fig10_whole_system", "Whole system", "10", "The chip that exists as RTL, by the models of its halves that are held to it (docs/chip.md), around each rendering "
+        "fig10_whole_system", "Whole system", "10", "The chip that exists as RTL, by the models of its halves that are held to it (docs/results/chip.md), around each rendering "
         "stage. Stages in conic form have the paper's front end (FP16 scene, 3-sigma boxes, 32-byte records; GSCore lists by its oriented boxes), the others the "
         "default one (chunks, ellipses, 16 bytes). Cycles between frames; energy of the rendering stage and of DRAM traffic (front end and sorting have no energy "
         "model). The paper's speed is its average, its energy its maximum. Jetson XNX: published only, 1/14.4 of FLICKER's speed on average.",
@@ -338,7 +338,7 @@ def contribution_test(views: Sequence[ViewResult]) -> Figure | None:
 def area(areas: dict[tuple[str, str], float]) -> Figure:
     """Table 2."""
     note = (
-        f"Square millimetres here: {UM2_PER_GE} um2 per GE and {UM2_PER_BIT:.3f} um2 per bit of SRAM, estimates without wires (docs/synthesis.md). "
+        f"Square millimetres here: {UM2_PER_GE} um2 per GE and {UM2_PER_BIT:.3f} um2 per bit of SRAM, estimates without wires (docs/reference/synthesis.md). "
         "Feature buffer and others: all of the chip but the units above."
     )
     chips = {chip: components(chip, in_table) for chip in CHIPS} if areas else {}
@@ -364,7 +364,7 @@ def stability_table(result: Stability) -> Figure:
             rows.append([family, name, None if point is None else point.value, None if point is None else point.psnr_db,
                          None if point is None else point.max_error, lowest])
     return Figure(
-        "stability", "Where configurations fail", "", "Quick stability suite: first, middle and last step of each family (docs/stability.md). First step with a PSNR below 40 dB, an error above "
+        "stability", "Where configurations fail", "", "Quick stability suite: first, middle and last step of each family (docs/reference/stability.md). First step with a PSNR below 40 dB, an error above "
         "0.25 or a NaN, PSNR there in brackets; `-`: never broken, lowest PSNR of the sweep.",
         ["family", "config", "breaks_at", "psnr_db", "max_error", "lowest_psnr_db"], rows,
     )

@@ -225,6 +225,10 @@ class _File:
         notes: tuple[str, ...] = ()
         if space != "srgb_rec709_display":
             notes = (f"colour space {one_line(space)}: colours are drawn as if they were sRGB",)
+        if (sorting := extension.get("sortingMethod", "zDepth")) != "zDepth":
+            known = sorting == "cameraDistance"
+            notes += ("is to be sorted by distance to the camera: --order distance does so, the default is depth along its axis" if known else
+                      f"sortingMethod '{one_line(sorting)}' is not known: splats are sorted by depth along the camera's axis",)
         for name, more in extension.get("extensions", {}).items():
             if name not in _SPZ:
                 raise FlickerError(f"{self.path}: {where}: {one_line(name)}, which is not read; export without it")

@@ -1,4 +1,4 @@
-"""The memory image of a scene (`.flk`): what lies in the chip's memory, bit for bit, its reader and its meaning (docs/memory_image.md).
+"""The memory image of a scene (`.flk`): what lies in the chip's memory, bit for bit, its reader and its meaning (docs/reference/memory_image.md).
 
 Five parts, each beginning at a multiple of 64 bytes (a beat): image header, cluster table (32 bytes a cluster), cluster headers (128 bytes, or 64
 for FP16), geometry array, colour array. All numbers little endian. Offsets count beats from the image's first byte, which lies at a multiple of 4096.

@@ -1,4 +1,4 @@
-"""Photographs of views: how they are found, and how they are made comparable with a rendered picture (docs/report.md, "Photographs").
+"""Photographs of views: how they are found, and how they are made comparable with a rendered picture (docs/reference/report.md, "Photographs").
 
 A photograph has the name `img_name` of its camera, with or without the suffix. It is turned upright as EXIF says (`scene.image`), composed over the background
 where it is transparent, then averaged over the area of each pixel of the rendered picture.

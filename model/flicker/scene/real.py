@@ -1,4 +1,4 @@
-"""The real scenes that tables, tests and benchmarks use: files in the folder that FLICKER_SCENES names (docs/scenes.md), one view each."""
+"""The real scenes that tables, tests and benchmarks use: files in the folder that FLICKER_SCENES names (docs/reference/scenes.md), one view each."""
 
 from __future__ import annotations
 

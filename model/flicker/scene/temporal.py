@@ -1,4 +1,4 @@
-"""Errors over time: how much the error of a picture changes from frame to frame (docs/motion.md).
+"""Errors over time: how much the error of a picture changes from frame to frame (docs/reference/motion.md).
 
 The error of a frame is its picture minus the float64 reference of the same frame. Both are of the same pose, so what moves in the scene moves in both and
 cancels: what is left of the change is the renderer's own.

@@ -1,4 +1,4 @@
-"""The verilated chip: a packed scene in memory, registers through the C driver, frames (docs/chip.md).
+"""The verilated chip: a packed scene in memory, registers through the C driver, frames (docs/reference/chip.md).
 
     with ChipSession(packed, config) as chip:
         frame = chip.render(camera)
@@ -17,14 +17,14 @@ import numpy as np
 from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
-from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig
+from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
 from . import driver, half, preprocessing, rendering
 from .half import PAGE, Half, MemoryOptions
 from .memory import Order, PortConfig, PurposeCounts
 
-# The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/memory_port.md).
+# The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/reference/memory_port.md).
 PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False, order=Order.WHOLE, urgent=14)
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
 OF_PLACE = ("records", "lists", "pointers", "frame")  # in the order of a `Place`
@@ -78,7 +78,7 @@ class Usage:
 
 @dataclass(eq=False)
 class ChipFrame:
-    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. error: bits of ResultError.
+    """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write stay. error: bits of ResultError. pairs: of tiles written.
 
     front, rendering: counters of the halves by name, int or int64 (n,). stage: int64 (cores, 32). stamps: cycle in which the frame was taken, left the front
     end, entered and left the rendering half. usage: of a frame that had the chip to itself (`ChipSession.render`).
@@ -91,6 +91,7 @@ class ChipFrame:
     rendering: dict[str, int | np.ndarray]
     stage: np.ndarray
     stamps: dict[str, int]
+    pairs: int
     usage: Usage | None = None
 
     @property
@@ -239,12 +240,12 @@ class ChipSession(Half):
 
     def frame(
         self, camera: Camera, place: Place, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0),
-        lists: ListKind = ListKind.ELLIPSE, tag: int = 0,
+        lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH, tag: int = 0, deadline: int = 0,
     ) -> driver.CFrame:
         """The driver's description of a frame."""
         return driver.CFrame(
             ctypes.pointer(self.scene), driver.CCamera.of(camera), place.region, place.frame_buffer, place.stride, int(format_),
-            (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag,
+            (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag, deadline, order is SortOrder.DISTANCE,
         )
 
     def start(self, frame: driver.CFrame, other: driver.CFrame | None = None) -> int:
@@ -322,7 +323,7 @@ class ChipSession(Half):
         self._raise()
         if result.tag != frame.tag:
             raise self._failure(f"frame {result.tag} has ended, not {frame.tag}")
-        return ChipFrame(result.tag, result.error, buffer, front, rendering_, stage, stamps)
+        return ChipFrame(result.tag, result.error, buffer, front, rendering_, stage, stamps, result.pairs)
 
     def buffer(self, frame: driver.CFrame) -> np.ndarray:
         """uint8 (rows of pixels, stride)."""
@@ -331,13 +332,13 @@ class ChipSession(Half):
 
     def render(
         self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE,
-        limit: int = LIMIT, progress: Callable[[int, int], None] | None = None,
+        order: SortOrder = SortOrder.DEPTH, limit: int = LIMIT, progress: Callable[[int, int], None] | None = None,
     ) -> ChipFrame:
         """A frame; list memory grows until it suffices. FlickerError for any other fault."""
         chunks: int | None = None
         while True:
             place = self.place(camera, format_, chunks=chunks)
-            frame = self.frame(camera, place, format_, background=background, lists=lists)
+            frame = self.frame(camera, place, format_, background=background, lists=lists, order=order)
             before = self.usage()
             self.start(frame)
             done = self.finish(frame, limit, progress)

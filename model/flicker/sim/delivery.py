@@ -1,4 +1,4 @@
-"""flk_delivery alone, verilated: cycles for the lists of a frame, units always with an entry, cores with a record a cycle (docs/delivery.md)."""
+"""flk_delivery alone, verilated: cycles for the lists of a frame, units always with an entry, cores with a record a cycle (docs/reference/delivery.md)."""
 
 from __future__ import annotations
 

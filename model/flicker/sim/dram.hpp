@@ -12,7 +12,7 @@
 //
 // Times are clocks of the command bus. Two ways to use it: `run` takes a list of bursts that all wait from clock 0 on and enter the queues in this order; `Engine` takes them as they come
 // (`push`, in order of time) and decides no column command before `advance` has reached its clock, so that whatever comes earlier can still go first.
-// Numbers come from flicker/chip/constants.py through chip/dram.py; docs/memory_model.md.
+// Numbers come from flicker/chip/constants.py through chip/dram.py; docs/reference/memory_model.md.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-"""The C driver (sw/flk.c) through ctypes, compiled with the machine's compiler (docs/programming.md)."""
+"""The C driver (sw/flk.c) through ctypes, compiled with the machine's compiler (docs/guide/programming.md)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class CRegion(ctypes.Structure):
 class CFrame(ctypes.Structure):
     _fields_ = [
         ("scene", ctypes.POINTER(CScene)), ("camera", CCamera), ("region", CRegion), ("frame_buffer", u64), ("stride", u32), ("pixel_format", ctypes.c_uint),
-        ("background", u8 * 3), ("mode", ctypes.c_uint), ("box", ctypes.c_int), ("tag", u16),
+        ("background", u8 * 3), ("mode", ctypes.c_uint), ("box", ctypes.c_int), ("tag", u16), ("deadline", u32), ("by_distance", ctypes.c_int),
     ]
 
 
@@ -70,7 +70,7 @@ class CDevice(ctypes.Structure):
 
 
 class CResult(ctypes.Structure):
-    _fields_ = [("tag", u16), ("error", u16)]
+    _fields_ = [("tag", u16), ("error", u16), ("pairs", u16)]
 
 
 def statuses() -> list[str]:

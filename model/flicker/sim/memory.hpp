@@ -1,6 +1,6 @@
 // Memory behind AXI4 ports, for harnesses of verilated designs and for tests: contents (`Store`), time (`dram::Engine`), ports (`AxiPort`).
 //
-// Nothing here needs Verilator; the macros at the end connect a port to the pins of a model. docs/memory_model.md has the options, what is checked and how
+// Nothing here needs Verilator; the macros at the end connect a port to the pins of a model. docs/reference/memory_model.md has the options, what is checked and how
 // a harness calls it. A cycle n of the chip's clock:
 //
 //   top.clk_i = 0; FLK_AXI_DRIVE(port.reply(), top, prefix); top.eval();   // the design sees the replies of cycle n and settles

@@ -1,4 +1,4 @@
-"""Memory for simulations: LPDDR4 timing, contents and AXI4 ports of `dram.hpp` and `memory.hpp` (docs/memory_model.md).
+"""Memory for simulations: LPDDR4 timing, contents and AXI4 ports of `dram.hpp` and `memory.hpp` (docs/reference/memory_model.md).
 
 Harnesses in C++ use the headers; here they are for Python: the chip model counts its DRAM cycles with `run_bursts`, tests drive
 ports cycle by cycle. Times of the DRAM are clocks of its command bus, times of ports cycles of the chip's clock.

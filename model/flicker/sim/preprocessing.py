@@ -1,4 +1,4 @@
-"""The verilated front end: a packed scene in memory, a frame, and what it leaves there (docs/front_end.md).
+"""The verilated front end: a packed scene in memory, a frame, and what it leaves there (docs/reference/front_end.md).
 
     frame = front_rtl(packed, camera)
     frame.records, frame.pointers ...      # to be compared with golden.front.memory.front_memory
@@ -19,7 +19,7 @@ from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..golden.long_lists import region_bytes
-from ..params import TILE
+from ..params import TILE, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
 from . import half
@@ -71,7 +71,7 @@ class Regions:
         return Regions(image, records, slots * kind.bytes, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 
-def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int) -> Fields:
+def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int, order: SortOrder = SortOrder.DEPTH) -> Fields:
     """The fields of front_registers_t."""
     setup = FrameSetup.of(camera)
     f = setup.formats
@@ -85,7 +85,8 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
     for values in (setup.position, setup.normal, setup.offset, setup.reach):
         numbers(values, CLUSTER_M)
     bits += [
-        (packed.format is PackedFormat.CHUNK, 1), (lists is ListKind.BOX, 1), (packed.antialiased, 1), (camera.width, 13), (camera.height, 13),
+        (packed.format is PackedFormat.CHUNK, 1), (lists is ListKind.BOX, 1), (packed.antialiased, 1), (order is SortOrder.DISTANCE, 1),
+        (camera.width, 13), (camera.height, 13),
     ]
     numbers(setup.view, f.position)
     numbers(setup.focal, f.position)
@@ -157,11 +158,12 @@ def front_rtl(
     frames: int = 1,
     seed: int = 1,
     limit: int = 20_000_000,
+    order: SortOrder = SortOrder.DEPTH,
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
     kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
-    many times; what the last leaves counts.
+    many times; what the last leaves counts. order: of the keys.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails, a rule of AXI is broken or the scene is no longer what it was.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
@@ -182,7 +184,7 @@ def front_rtl(
         ):
             sim.load(base, size, b"", purpose)
         before = _records(sim, regions, kind), _lines(sim, regions)
-        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks), COUNTERS, frames, limit)
+        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks, order), COUNTERS, frames, limit)
         if any(sim.read(base, len(part)).tobytes() != part for base, part in scene):
             raise FlickerError(f"front end: it has written over the scene (seed {seed})")
         return RtlFront(
@@ -193,12 +195,12 @@ def front_rtl(
 
 
 def front_frame(
-    packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16,
+    packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH,
 ) -> tuple[FrontFrame, RtlFront]:
     """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices."""
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     chunks = list_chunks(camera.width, camera.height, 2 * len(packed))
-    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks)).error >> LIST_ERROR & 1:
+    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks, order=order)).error >> LIST_ERROR & 1:
         chunks *= 4
     if rtl.error:
         raise FlickerError("front end: " + ", ".join(text for k, text in enumerate(ERRORS) if rtl.error >> k & 1))

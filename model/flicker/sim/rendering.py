@@ -1,4 +1,4 @@
-"""The verilated rendering half: records and lists in memory, a frame, and the frame buffer that it leaves (docs/rendering.md).
+"""The verilated rendering half: records and lists in memory, a frame, and the frame buffer that it leaves (docs/reference/rendering.md).
 
     frame = rendering_rtl(front_memory(front), camera, config)
     frame.buffer  # to be compared with golden.chip.render_chip

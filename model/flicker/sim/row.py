@@ -17,6 +17,7 @@ from ..chip_registers import ResultError
 from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
+from ..params import SortOrder
 from ..scene.camera import Camera
 from .chip import LIMIT, OF_PLACE, ChipFrame, ChipSession, Place
 from .half import BEAT
@@ -58,7 +59,7 @@ class _Counted:
 
 def back_to_back(
     chip: ChipSession, cameras: Sequence[Camera], format_: PixelFormat = PixelFormat.RGB8, *, chunks: int | None = None,
-    background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE, limit: int = LIMIT,
+    background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH, limit: int = LIMIT,
 ) -> Iterator[RowFrame]:
     """A frame for each camera, all of one size, each started as soon as the chip takes it: while one is rendered, the front end works on the next.
 
@@ -71,7 +72,8 @@ def back_to_back(
         first = max(given - 1, 0)
         places = [chip.place(cameras[0], format_, chunks=chunks, number=1 + k) for k in range(2)]
         row = [
-            chip.frame(camera, places[k % 2], format_, background=background, lists=lists, tag=(first + k) % TAGS) for k, camera in enumerate(cameras[first:])
+            chip.frame(camera, places[k % 2], format_, background=background, lists=lists, order=order, tag=(first + k) % TAGS)
+            for k, camera in enumerate(cameras[first:])
         ]
         counted = _Counted(chip, places)
         ended: int | None = None  # the frame before, in this cycle

@@ -1,1 +1,1 @@
-"""The viewer: frames of the engines in a browser (docs/view.md)."""
+"""The viewer: frames of the engines in a browser (docs/reference/viewer.md)."""

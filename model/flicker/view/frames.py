@@ -103,7 +103,7 @@ class Renderer:
     """Frames of one scene. shots: the last simulated frames. Not to be used by two threads at once: the engines' kernels share theirs."""
 
     def __init__(self, view: View) -> None:
-        self.scene, self.name, self.background = view.scene, view.name, view.background
+        self.scene, self.name, self.background, self.order = view.scene, view.name, view.background, view.order
         self.shots: dict[Engine, Shot] = {}
         self._views: dict[tuple, View] = {}
         self._parts: dict[int, Scene] = {}
@@ -114,7 +114,7 @@ class Renderer:
         if coarse > 1:
             if coarse not in self._parts:
                 self._parts[coarse] = largest(self.scene, coarse)
-            return View(camera, self._parts[coarse], name=self.name, background=self.background)
+            return View(camera, self._parts[coarse], name=self.name, background=self.background, order=self.order)
         key = camera_key(camera)
         found = self._views.pop(key, None) or self.fresh(camera)
         self._views[key] = found
@@ -124,7 +124,7 @@ class Renderer:
 
     def fresh(self, camera: Camera) -> View:
         """The view of a camera with nothing made yet."""
-        return View(camera, self.scene, name=self.name, background=self.background)
+        return View(camera, self.scene, name=self.name, background=self.background, order=self.order)
 
     def drawn(self, view: View, config: RenderConfig) -> Result:
         """Picture, masks and work of a configuration, bit for bit."""
@@ -141,7 +141,7 @@ class Renderer:
         if self._packed is None:
             self._packed = packed_for_cost(self.scene)
         scene, packing = self._packed
-        return self.view(camera).keep("cost", lambda: SceneCost(scene, packing, [view_cost(packing, len(scene), camera, None)]))
+        return self.view(camera).keep("cost", lambda: SceneCost(scene, packing, [view_cost(packing, len(scene), camera, None, self.order)]))
 
     def frame(self, camera: Camera, choice: Choice, coarse: int = 1) -> Frame:
         """A frame. coarse: divisor of width, height and number of Gaussians; a simulated frame is shown as it is."""

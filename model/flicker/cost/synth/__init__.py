@@ -1,1 +1,1 @@
-"""Area and timing of the hardware, as estimated from a Yosys netlist (docs/synthesis.md)."""
+"""Area and timing of the hardware, as estimated from a Yosys netlist (docs/reference/synthesis.md)."""

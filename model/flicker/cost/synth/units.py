@@ -282,7 +282,7 @@ def _cells() -> list[Unit]:
         unit("flk_axi_read", "512 bit"),
         unit("flk_axi_write", "512 bit"),
         unit("flk_registers"),
-        # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/list_layout.md.
+        # Memories become flip-flops here: a small writer, for its logic; what the memories of a real one hold is in docs/reference/list_writer.md.
         unit("flk_sram", "64 x 52 bit, flip-flops", Width=52, Depth=64),
         unit("flk_sram_single", "64 x 52 bit, flip-flops", Width=52, Depth=64),
         unit("flk_list_writer", "4 sets, 16 pointers, flip-flops", SetBitsU=1, SetBitsV=1, Pointers=16, Lists=16, CoordBits=3),

@@ -45,7 +45,7 @@ def _saturated(x: int, bits: int) -> int:
 def _fallen(
     order: np.ndarray, core_start: np.ndarray, base_test: np.ndarray, sent: np.ndarray, sent_sparse: np.ndarray, per_vru: int,
 ) -> np.ndarray:
-    """Sub-tiles in which the automatic mode has fallen (docs/ctu.md). base_test (S,), sent and sent_sparse (S, 4) per sub-tile; per_vru:
+    """Sub-tiles in which the automatic mode has fallen (docs/reference/ctu.md). base_test (S,), sent and sent_sparse (S, 4) per sub-tile; per_vru:
     pixels of a VRU."""
     fallen = np.zeros(len(base_test), bool)
     for core in range(CORES):

@@ -5,7 +5,7 @@ edge where the mean is beside the rectangle, on the nearest horizontal edge wher
 both hold. On an edge the minimum is at the line's optimum clamped to the edge; the slopes of the optimum come from preprocessing.
 
 `bound` makes it safe: margins that cover every rounding of test and VRU, so that no pixel that the VRU would blend is lost. The
-proof, and where the constants come from, is in docs/configurations.md.
+proof, and where the constants come from, is in docs/reference/mask_bounds.md.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..stages.channels import Channels
 
 
 def margins(form: Form, system: Numbers) -> tuple[float, float]:
-    """(kappa, absolute) of the margin M = kappa S + absolute (D + 4) (docs/configurations.md, exact rectangle).
+    """(kappa, absolute) of the margin M = kappa S + absolute (D + 4) (docs/reference/mask_bounds.md, exact rectangle).
 
     factored: S = |l0 dx| + (|l1| + |l2|) |dy|, D = |dx| + |dy|. conic: S = |s0| dx^2 + |s2| dy^2 + |s1 dx dy|, D = dx^2 + dy^2 + |dx dy|. Both at the
     farthest corner of the mini-tile. kappa is rounded up to a sum of two powers of two.

@@ -1,4 +1,4 @@
-"""Masks of the lanes in the log domain, from the lanes' own sums: `flk_splat_setup` and `flk_row_mask` (docs/lanes.md has widths and proof)."""
+"""Masks of the lanes in the log domain, from the lanes' own sums: `flk_splat_setup` and `flk_row_mask` (docs/reference/lanes.md has widths and proof)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LogRows(MaskGenerator):
 
     @property
     def exact(self) -> bool:
-        """Of what the lanes would have blended (docs/lanes.md), whose rounding is not that of the VRU."""
+        """Of what the lanes would have blended (docs/reference/lanes.md), whose rounding is not that of the VRU."""
         return True
 
     @property

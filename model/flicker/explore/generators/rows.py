@@ -3,7 +3,7 @@
 In the factored form a splat contributes where u^2 + v^2 <= rho^2, with u = l0 dx + l1 dy and v = l2 dy. Divided by rho(o) this is the unit
 disc, whatever the splat's size, shape and opacity, so a uniform absolute error d enlarges every splat's area by the same 2 d or so: fixed
 point is the right number system, and few bits do. In a row v is constant, so the pixels of a row are those with
--r - s <= (i - 3.5) a <= r - s, r = sqrt(1 - v^2) from a table of one argument. Steps (docs/configurations.md has the widths and the proof):
+-r - s <= (i - 3.5) a <= r - s, r = sqrt(1 - v^2) from a table of one argument. Steps (docs/reference/mask_bounds.md has the widths and the proof):
 
     k = 1 / rho(o) from a table                          a, b, c = k (l0, l1, l2)
     X = 3.5 - mean_x, Y = 3.5 - mean_y                   P = a X, Q = b Y, z = c Y

@@ -1,4 +1,4 @@
-"""Stability suite: named families of hard inputs, swept from harmless to extreme, for every configuration (docs/stability.md)."""
+"""Stability suite: named families of hard inputs, swept from harmless to extreme, for every configuration (docs/reference/stability.md)."""
 
 from .families import FAMILIES, Case, Family, get_family
 from .front_ends import FRONT_ENDS, FrontEnd

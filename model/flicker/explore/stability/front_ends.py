@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...front.pops import Seen, seen_in
 from ...front.projection import Projected, project
 from ...front.reference import render_reference
 from ...golden.front.blend import blend_records
 from ...golden.front.frame import FrontFrame, run_front
 from ...golden.front.record import RecordKind
 from ...golden.front.setup import FORMATS, MAX_PICTURE, MEAN_FRACTION, FrontFormats
-from ...params import SUBTILE
+from ...params import SUBTILE, SortOrder
 from ...scene.clusters import reorder
 from ...scene.gaussians import Scene
 from ...scene.packed import PackedFormat, decode
@@ -59,22 +60,23 @@ def drawable(case: Case) -> bool:
     return max(case.screen.width, case.screen.height) <= MAX_PICTURE
 
 
-def in_float64(case: Case, scene: Scene) -> np.ndarray:
-    """float64 picture of the case's window, sorted by float64 depth; equal depths keep the order of the scene."""
+def in_float64(case: Case, scene: Scene, order: SortOrder = SortOrder.DEPTH) -> np.ndarray:
+    """float64 picture of the case's window, sorted by float64 depth or distance; equal ones keep the order of the scene."""
     projected = project(scene, case.screen)
-    z = ((scene.means - case.screen.position) @ case.screen.rotation)[projected.index, 2]
-    order = np.lexsort((projected.index, z))
-    projected = Projected(**{name: values[order] for name, values in vars(projected).items()})
+    away = (scene.means - case.screen.position)[projected.index]
+    by = (away @ case.screen.rotation)[:, 2] if order is SortOrder.DEPTH else np.linalg.norm(away, axis=1)
+    places = np.lexsort((projected.index, by))
+    projected = Projected(**{name: values[places] for name, values in vars(projected).items()})
     if case.screen is not case.camera:
         projected, _ = crop(projected, case.screen, *case.origin)
     return render_reference(projected, case.camera)
 
 
-def truth(case: Case, packing: Packing) -> np.ndarray:
-    """The case's scene as given, drawn in float64. Equal depths have the order of the packed scene, which is as right as any."""
+def truth(case: Case, packing: Packing, order: SortOrder = SortOrder.DEPTH) -> np.ndarray:
+    """The case's scene as given, drawn in float64. Equal depths or distances have the order of the packed scene, which is as right as any."""
     scene = case.meant or case.scene
     rest = np.setdiff1d(np.arange(len(scene)), packing.order)
-    return in_float64(case, reorder(scene, np.concatenate([packing.order, rest])))
+    return in_float64(case, reorder(scene, np.concatenate([packing.order, rest])), order)
 
 
 def draw(case: Case, frame: FrontFrame) -> np.ndarray:
@@ -93,18 +95,26 @@ def draw(case: Case, frame: FrontFrame) -> np.ndarray:
 
 
 class Drawer:
-    """Pictures of one case by every front end, with what they share made once."""
+    """Pictures of one case by every front end, with what they share made once. order: what splats are sorted by, in the truth, too."""
 
-    def __init__(self, case: Case) -> None:
-        self.case = case
+    def __init__(self, case: Case, order: SortOrder = SortOrder.DEPTH) -> None:
+        self.case, self.order = case, order
         self._kept: dict[PackedFormat, tuple[Packing, np.ndarray]] = {}
+        self._frames: dict[FrontEnd, FrontFrame] = {}
 
     def __call__(self, front: FrontEnd) -> tuple[np.ndarray, np.ndarray]:
         """The front end's picture and the truth."""
         if front.image not in self._kept:
             packing = pack(self.case.scene, front.image)
-            self._kept[front.image] = packing, truth(self.case, packing)
+            self._kept[front.image] = packing, truth(self.case, packing, self.order)
         packing, reference = self._kept[front.image]
         if front.record is None:
-            return in_float64(self.case, decode(packing.packed)), reference
-        return draw(self.case, run_front(packing.packed, self.case.screen, kind=front.record, formats=front.formats)), reference
+            return in_float64(self.case, decode(packing.packed), self.order), reference
+        self._frames[front] = run_front(packing.packed, self.case.screen, kind=front.record, formats=front.formats, order=self.order)
+        return draw(self.case, self._frames[front]), reference
+
+    def seen(self, front: FrontEnd) -> Seen:
+        """What a front end that has drawn lists on the screen."""
+        if front.record is None:
+            return seen_in(project(decode(self._kept[front.image][0].packed), self.case.screen, self.order), self.case.screen)
+        return self._frames[front].seen()

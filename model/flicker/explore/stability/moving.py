@@ -16,10 +16,12 @@ import numba
 import numpy as np
 
 from ...errors import FlickerError
+from ...front.pops import Seen, pops, seen_in
 from ...front.projection import project
 from ...front.view import View
 from ...markdown import table
 from ...output import write_records, write_text
+from ...params import SortOrder
 from ...scene.camera import Camera
 from ...scene.gaussians import Scene
 from ...scene.motion import dollied, panned
@@ -51,7 +53,8 @@ class MovingFamily:
 
 @dataclass(frozen=True)
 class MovingPoint:
-    """A configuration, or front end, in a family at a speed. Fields as of `TemporalSummary`; inf: equal."""
+    """A configuration, or front end, in a family at a speed. Fields as of `TemporalSummary`; inf: equal. pops: pairs that overlap in a pixel and
+    change their order, mean of the frames behind the first (`flicker.front.pops`)."""
 
     family: str
     speed: float
@@ -59,6 +62,7 @@ class MovingPoint:
     psnr_db: float
     temporal_psnr_db: float
     jumps: float
+    pops: float = 0.0
 
     @property
     def broken(self) -> bool:
@@ -158,11 +162,16 @@ def _drawn(name: str, view: View, by_front: Drawer) -> tuple[np.ndarray, np.ndar
         return run(get_configuration(name), view).image, view.reference
 
 
+def _seen(name: str, view: View, by_front: Drawer) -> Seen:
+    """What a configuration or front end that has drawn lists."""
+    return by_front.seen(FRONT_ENDS[name]) if name in FRONT_ENDS else view.keep("seen", lambda: seen_in(view.projected, view.camera))
+
+
 def run_moving(
     families: Sequence[str] | None = None, names: Sequence[str] | None = None, speeds: Sequence[float] = SPEEDS, *, seed: int = 1,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    order: SortOrder = SortOrder.DEPTH, progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[MovingPoint]:
-    """Points of families (all) at speeds, in the order of families, speeds and names. progress: called with (sequences done, in all). FlickerError, before any
+    """Points of families (all) at speeds, in the order of families, speeds and names. order: what splats are sorted by. progress: called with (sequences done, in all). FlickerError, before any
     work, for an unknown family or configuration."""
     for name in families or ():
         if name not in MOVING:
@@ -182,15 +191,21 @@ def run_moving(
             scene = family.scene(np.random.default_rng([seed, crc32(family.name.encode())]), middle)
             errors = {name: TemporalError() for name in names}
             changes: dict[str, list[Change]] = {name: [] for name in names}
+            before: dict[str, Seen] = {}
+            popped = dict.fromkeys(names, 0)
             for camera in family.path(middle, speed, FRAMES):
-                projected = project(scene, camera)
-                view, by_front = View(camera, projected=projected), Drawer(Case(projected, camera, scene, camera))
+                projected = project(scene, camera, order)
+                view, by_front = View(camera, projected=projected, order=order), Drawer(Case(projected, camera, scene, camera), order)
                 for name in names:
                     changes[name].append(errors[name].add(*_drawn(name, view, by_front)))
+                    seen = _seen(name, view, by_front)
+                    if name in before:
+                        popped[name] += pops(before[name], seen).pops
+                    before[name] = seen
             for name in names:
                 summary = summarise(changes[name], FRAMES)
                 assert summary.temporal_psnr_db is not None and summary.jumps is not None
-                found.append(MovingPoint(family.name, speed, name, summary.psnr_db, summary.temporal_psnr_db, summary.jumps))
+                found.append(MovingPoint(family.name, speed, name, summary.psnr_db, summary.temporal_psnr_db, summary.jumps, popped[name] / (FRAMES - 1)))
     finally:
         numba.set_num_threads(threads)
     progress(len(steps), len(steps))

@@ -1,4 +1,4 @@
-"""Lanes in the log domain: `flk_lane_stage` (docs/lane_stage.md)."""
+"""Lanes in the log domain: `flk_lane_stage` (docs/reference/lane_stage.md)."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from ...errors import FlickerError
 from ...front.path_rules import kind_of
 from ...front.paths import Asked
 from ...front.view import DEMO
+from ...params import SortOrder
 from ...scene.camera import MAX_SIZE
 from ...scene.files import scene_kind
 from ...scene.photos import NONE, parse_background
@@ -139,6 +140,7 @@ class SceneSection(_Section):
     up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
     photos: Annotated[StrictStr | None, Field(min_length=1, description="folder of photographs instead of those beside the cameras, or none")] = None
     background: Annotated[StrictStr, Field(description="black, white or r,g,b from 0 to 1")] = "black"
+    order: Annotated[SortOrder, Field(description="depth or distance")] = SortOrder.DEPTH
 
     @model_validator(mode="before")
     @classmethod
@@ -264,13 +266,13 @@ def _scene(base: Path, section: SceneSection, where: str) -> SceneFile:
     if section.path == DEMO:
         if section.up is not None:
             raise FlickerError(f"{base}: {where}: up: {section.up}: only orbit cameras can be turned, and the demo scene has its own")
-        return SceneFile(DEMO, cameras, None, photos, background)
+        return SceneFile(DEMO, cameras, None, photos, background, section.order)
     path = Path(scene_path(_path(base, section.path, where)))
     try:
         scene_kind(path)
     except FlickerError as error:
         raise FlickerError(f"{base}: {where}: {error}") from None
-    return SceneFile(str(path), cameras, section.up, photos, background)
+    return SceneFile(str(path), cameras, section.up, photos, background, section.order)
 
 
 def load_sweep(path: str | Path) -> Sweep:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -15,8 +16,9 @@ import numba
 import numpy as np
 
 from ...arithmetic.ff import ff_bits, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_round, pick
+from ...front.pops import Seen
 from ...front.records import SubtileLists
-from ...params import SUBTILE, TILE
+from ...params import SUBTILE, TILE, Form, SortOrder
 from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .colour import (
@@ -43,6 +45,7 @@ SCALE_STEP_BITS = 17  # of the step, saturated, not negative: up to 1/8
 SCALE_FRACTION = 12  # of a log2 scale
 SCALE_BITS = 20  # of a log2 scale, saturated
 KEY_FIRST_EXPONENT = 124  # code of the least depth's exponent: 0.2 is 1.6 times 2^-3
+SQUARE_FIRST_EXPONENT = 122  # of the least distance's square: 0.04 is 1.28 times 2^-5
 KEY_EXPONENT_BITS = 5  # up to 2^29
 OPACITY_LIMIT = 255
 FP16_SHARE, CHUNK_SHARE = 255.0, 2.0**24  # what makes a code of an opacity, by format
@@ -165,12 +168,24 @@ def project_lane(
 
 
 @numba.njit
-def depth_key(depth, M, bits=KEY_BITS):
-    """Key of a depth, `bits` bits: its ff number's code less that of 2^-3, saturated, first bits first. Codes keep the order; a step is 2^-19 of a depth with
-    24 bits, depths from 2^29 on share the last key."""
+def sort_key(by_distance, depth, square, M, bits=KEY_BITS):
+    """Key of a splat, `bits` bits: of its depth, or of its distance to the camera, given as the square.
+
+    The code of the depth's ff number less that of 2^-3, saturated, first bits first. Codes keep the order; a step is 2^-19 of a depth with 24 bits, depths
+    from 2^29 on share the last key. Of the square the code without its last bit, less that of 2^-5: an exponent of a square is twice the distance's, so that
+    a step is 2^-19 of a distance at most, and distances from 2^29.5 on share the last key.
+    """
     drop = KEY_EXPONENT_BITS + M - bits
-    code = min(max(ff_bits(max(depth, 0.0), M) - (KEY_FIRST_EXPONENT << M), 0), (1 << (KEY_EXPONENT_BITS + M)) - 1)
+    number = pick(by_distance, ff_bits(square, M) >> 1, ff_bits(max(depth, 0.0), M))
+    first = pick(by_distance, SQUARE_FIRST_EXPONENT << (M - 1), KEY_FIRST_EXPONENT << M)
+    code = min(max(number - first, 0), (1 << (KEY_EXPONENT_BITS + M)) - 1)
     return code >> drop if drop > 0 else code << -drop
+
+
+@numba.njit
+def depth_key(depth, M, bits=KEY_BITS):
+    """`sort_key` of a depth."""
+    return sort_key(False, depth, 0.0, M, bits)
 
 
 @numba.njit
@@ -217,8 +232,8 @@ def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
 
 @numba.njit(parallel=True, cache=True)
 def _splats(
-    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, factor, logs, sigmas, cut,
-    inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
+    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, by_distance, factor, logs, sigmas,
+    cut, inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
@@ -242,7 +257,7 @@ def _splats(
         entries[j] = count
         places[j, 0], places[j, 1], places[j, 2], places[j, 3], places[j, 4], places[j, 5], places[j, 6] = p.x, p.y, r.x0, r.x1, r.y0, r.y1, r.right
         numbers[j, 0], numbers[j, 1], numbers[j, 2], numbers[j, 3] = p.l2, r.i0, r.kappa, r.limit
-        key[j] = depth_key(p.t2, P, w.key)
+        key[j] = sort_key(by_distance, p.t2, p.square, P, w.key)
         flags[j, 0] = p.far
         rgb = np.empty(3, np.int64)
         colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
@@ -285,7 +300,7 @@ class FrontFrame:
     gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed.
     number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
     records: uint8 (R, bytes).
-    key: uint32 (R,), depth keys. entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
+    key: uint32 (R,), of depths or distances (`sort_key`). entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
     row + column of the sub-tiles.
     clusters_kept: of the cluster test. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
     unrounded: float64 (R, 7), what shape (3), opacity and colour (3) of the records are rounded from; None where the RTL made the frame.
@@ -323,6 +338,15 @@ class FrontFrame:
         tile_cols = -(-self.camera.width // TILE)
         return _subtiles(self.entry_splat[by_rank], self.entry_tile[by_rank], self.entry_mask[by_rank], tile_cols, cols, rows)
 
+    def seen(self) -> Seen:
+        """What pops are counted of (`flicker.front.pops`). Not of a frame of the RTL, whose records do not say whose they are."""
+        start, entry = self.sorted_subtiles()
+        splats, factored = self.splats(), self.kind.form is Form.FACTORED
+        s0, s1, s2 = splats.shape.T
+        energy = math.log(2.0) * np.stack([s0 * s0, 2.0 * s0 * s1, s1 * s1 + s2 * s2], axis=1) if factored else splats.shape
+        order = np.argsort(self.key, kind="stable")
+        return Seen.of(self.gaussian, order, splats.mean / (1 << MEAN_FRACTION), energy, splats.opacity, start, entry, self.camera)
+
     def subtile_lists(self) -> SubtileLists:
         """Lists and splats as the rendering stage takes them."""
         start, entry = self.sorted_subtiles()
@@ -356,8 +380,9 @@ def _subtiles(splat, tile, mask, tile_cols, cols, rows):
 
 def run_front(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, formats: FrontFormats = FORMATS,
+    order: SortOrder = SortOrder.DEPTH,
 ) -> FrontFrame:
-    """Cull, project, colour, record and list a packed scene. FlickerError for pictures beyond 4096x4096."""
+    """Cull, project, colour, record and list a packed scene; order: what keys are of. FlickerError for pictures beyond 4096x4096."""
     setup = FrameSetup.of(camera, formats)
     keep = cull(packed, setup)
     lanes, values = lanes_of(packed), cluster_values(packed, setup)
@@ -369,7 +394,7 @@ def run_front(
     places, numbers = np.zeros((n, 7), np.int64), np.zeros((n, 4))
     registers = (
         setup.view, setup.focal, setup.row_x, setup.row_x_z, setup.row_y, setup.row_y_z, setup.least, setup.limit, setup.middle, packed.antialiased,
-        constants(formats), setup.width, setup.height,
+        constants(formats), setup.width, setup.height, order is SortOrder.DISTANCE,
     )
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour

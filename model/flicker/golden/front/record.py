@@ -1,4 +1,4 @@
-"""Records, bit for bit: 16 bytes with the factored shape, 32 bytes with the conic one (docs/front_end.md has the tables), and the splats that the
+"""Records, bit for bit: 16 bytes with the factored shape, 32 bytes with the conic one (docs/reference/front_end.md has the tables), and the splats that the
 stage makes of them."""
 
 from __future__ import annotations

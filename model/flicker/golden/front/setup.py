@@ -136,7 +136,7 @@ def _half_spaces(camera: Camera, limit: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Normals (5, 3) in world axes, offsets (5,), factors of sigma (5,): normal . (mean - position) + offset + factor sigma > 0 for every visible Gaussian.
 
     limit: (2,), of the magnitude of slopes. As `chip.cull.planes`, with a pixel and a part in 2^14 to spare, which is more than ff numbers of 23 bits lose
-    (docs/front_end.md).
+    (docs/reference/front_end.md).
     """
     reach = 3.0 * max(camera.fx, camera.fy) * np.sqrt(1.0 + (limit**2).sum())
     normals = [(0.0, 0.0, 1.0)]

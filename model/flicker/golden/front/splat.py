@@ -64,13 +64,13 @@ def place_largest(number, most, a, b, d):
     return w, x, y, pick(number < 3, d, most)
 
 
-# d: mean less the camera's position, world axes. t: the same in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
+# d: mean less the camera's position, world axes. square: of the distance, from d alone. t: d in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
 # u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
 # scale: of an opacity's number, which makes its code. xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel.
 # rxx, ryy, rdet: reciprocal square roots. far: the mean on the screen is saturated.
 Projection = namedtuple(
     "Projection",
-    "d0 d1 d2 t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
+    "d0 d1 d2 square t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
     "xx xy yy det trace spiky rxx ryy rdet scale m l0 l1 l2 sx sy radius_x radius_y near far",
 )
 
@@ -87,6 +87,7 @@ def project_one(
     d0 = ff_add(d0c[0], ff_mul(stepc[0], q[0], P), P)
     d1 = ff_add(d0c[1], ff_mul(stepc[1], q[1], P), P)
     d2 = ff_add(d0c[2], ff_mul(stepc[2], q[2], P), P)
+    square = _dot3(d0, d1, d2, d0, d1, d2, P)
     t0 = _dot3(view[0, 0], view[0, 1], view[0, 2], d0, d1, d2, P)
     t1 = _dot3(view[1, 0], view[1, 1], view[1, 2], d0, d1, d2, P)
     t2 = _dot3(view[2, 0], view[2, 1], view[2, 2], d0, d1, d2, P)
@@ -147,8 +148,8 @@ def project_one(
     radius_x = ff_to_fixed_round(ff_mul(3.0, sx, S), fraction, bits)
     radius_y = ff_to_fixed_round(ff_mul(3.0, sy, S), fraction, bits)
     return Projection(
-        d0, d1, d2, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21, r22,
-        s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, scale, m, l0, l1, l2, sx, sy,
+        d0, d1, d2, square, t0, t1, t2, iz, tx, ty, screen_x, screen_y, ax, ay, u0, u1, u2, v0, v1, v2, norm, n, r00, r01, r02, r10, r11, r12, r20, r21,
+        r22, s0, s1, s2, gu0, gu1, gu2, gv0, gv1, gv2, cross0, cross1, cross2, xx, xy, yy, det, trace, spiky, rxx, ryy, rdet, scale, m, l0, l1, l2, sx, sy,
         radius_x, radius_y, near, far,
     )
 

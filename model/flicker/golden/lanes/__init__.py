@@ -1,4 +1,4 @@
-"""Rendering stage whose lanes work in the log domain, bit for bit: raw records of 16 bytes and sub-tile lists to finished pixels (docs/lanes.md).
+"""Rendering stage whose lanes work in the log domain, bit for bit: raw records of 16 bytes and sub-tile lists to finished pixels (docs/reference/lanes.md).
 
 `formats` number formats, constants and tables
 `setup`   per splat and sub-tile: record to u, v at the middle and their slopes

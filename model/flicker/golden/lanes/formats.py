@@ -1,4 +1,4 @@
-"""Number formats of the lanes, and the constants and tables that follow from them (docs/lanes.md).
+"""Number formats of the lanes, and the constants and tables that follow from them (docs/reference/lanes.md).
 
 All numbers are integers. "Unit 2^-n" means that the integer k stands for k 2^-n. Logarithms have base 2.
 """
@@ -66,7 +66,7 @@ class LaneFormats:
         return f"{self.uv} / {self.log} / {self.sum}, {h}; {self.mantissa}; {self.accumulator}"
 
 
-FORMATS = LaneFormats()  # the default; docs/lanes.md says why
+FORMATS = LaneFormats()  # the default; docs/decisions/059-number-formats-of-the-lanes.md says why
 
 # ints: uv, guard, place, log, sum, mantissa, accumulator, limit, clamp, x_max, h_max, s_max, top, drop, root_bits, root_shift. Arrays, int64: lo, bound,
 # mask_bound (by opacity code), h (by La), exp2 (by the top bits of a fraction), root (by significant bits), result (by fraction of S).

@@ -7,7 +7,7 @@ downwards, so that each row is an interval of small integers:
     V_j = y_j or, of a negative one, -y_j - 1      radius_j at least isqrt(mask_bound - 1 - V_j^2), from a table
     pixel (i, j) is in the mask where -radius_j - 2 <= s_j + c_i <= radius_j
 
-Floors are monotonic, so no pixel is left out that the lane blends, whatever roundings made u and v (docs/lanes.md).
+Floors are monotonic, so no pixel is left out that the lane blends, whatever roundings made u and v (docs/reference/lanes.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The demo scene: a still life, made by rules from a seed (docs/demo_scene.md)."""
+"""The demo scene: a still life, made by rules from a seed (docs/reference/demo_scene.md)."""
 
 from __future__ import annotations
 
