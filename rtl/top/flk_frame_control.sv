@@ -238,24 +238,26 @@ module flk_frame_control
 
   // ---- deadlines --------------------------------------------------------------------------------------
 
-  // A frame is due when it is as old as its deadline, which is known two cycles later. Its age is right from the check on, and from
-  // the first cycle in which the rendering half runs; it stays due, however old it becomes.
-  logic [31:0] begun_q, front_begun_q, render_begun_q;  // when the host started it
-  logic [31:0] front_age_q, render_age_q, render_deadline_q;
+  // Cycles since the host started a frame, wherever it is. A frame is due when it is as old as its deadline, which is known a cycle
+  // later: in the front end from its start on, in the rendering half while that runs; it stays due, however old it becomes.
+  logic [31:0] pending_age_q, front_age_q, render_age_q, render_deadline_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      pending_age_q <= '0;
+      front_age_q   <= '0;
+      render_age_q  <= '0;
+    end else begin
+      pending_age_q <= start_i && !pending_q ? '0 : pending_age_q + 1'b1;
+      front_age_q   <= (take ? pending_age_q : front_age_q) + 1'b1;
+      render_age_q  <= (hand_over ? front_age_q : render_age_q) + 1'b1;
+    end
+  end
 
   always_ff @(posedge clk_i) begin
-    if (start_i && !pending_q) begin
-      begun_q <= now_i;
-    end
-    if (take) begin
-      front_begun_q <= begun_q;
-    end
     if (hand_over) begin
-      render_begun_q    <= front_begun_q;
       render_deadline_q <= frame_q.deadline;
     end
-    front_age_q  <= now_i - front_begun_q;
-    render_age_q <= now_i - render_begun_q;
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin

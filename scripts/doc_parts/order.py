@@ -1,4 +1,4 @@
-"""`make docs PART=order`: what turning on the spot does to the order of splats, by depth and by distance, in docs/guide/motion.md.
+"""`make docs PART=order`: what turning on the spot does to the order of splats, by depth and by distance, in docs/results/motion.md.
 
 The demo scene and the real views at two speeds. Pops are those of the chip's front end (`flicker.front.pops`). A temporal PSNR against the reference of the
 same order does not see them, since both pictures change their order; that of float64 by depth against float64 by distance does.

@@ -170,7 +170,8 @@ def test_keys_of_distances() -> None:
     as of depths."""
     key = lambda square, bits=24: sort_key(True, -7.0, square, 19, bits)  # noqa: E731
     least, last = float(rounded(0.04, 19)), (2.0 - 2.0**-18) * 2.0**58
-    expected = {2.0**-5: 0, least: round(0.28 * 2**18), 0.0625: 1 << 18, 1.0: 5 << 18, 1.0 + 2.0**-19: 5 << 18, 1.0 + 2.0**-18: (5 << 18) + 1, last: (1 << 24) - 1}
+    expected = {2.0**-5: 0, least: round(0.28 * 2**18), 0.0625: 1 << 18, 1.0: 5 << 18, 1.0 + 2.0**-19: 5 << 18, 1.0 + 2.0**-18: (5 << 18) + 1}
+    expected[last] = (1 << 24) - 1
     assert {square: key(square) for square in expected} == expected
     assert [key(square) for square in (0.0, 1e-30, 0.0312)] == [0] * 3 and [key(square) for square in (2.0**59, 1e38)] == [(1 << 24) - 1] * 2
     away = np.sort(np.exp(np.random.default_rng(7).uniform(np.log(0.2), np.log(5e8), 1000)))

@@ -152,8 +152,8 @@ FIELDS = splat.Projection._fields
 
 @numba.njit
 def _projected(
-    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, by_distance, width, height, const, inverse, M, N,
-    C, out, places, conic,
+    low, step, q, s, quat, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, share, antialiased, by_distance, width, height, const, inverse,
+    M, N, C, out, places, conic,
 ):
     for j in range(len(q)):
         p = splat.project_one(low[j], step[j], q[j], s[j], quat[j, 0], quat[j, 1], quat[j, 2], quat[j, 3], view, focal, row_x, row_x_z, row_y, row_y_z, least,
@@ -171,7 +171,9 @@ def _projected(
         conic[j, 0], conic[j, 1], conic[j, 2] = splat.conic_one(p, N)
 
 
-def projected(s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, antialiased=False, by_distance=False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def projected(
+    s: Sample, low, step, q, scales, quat, share=frame.CHUNK_SHARE, antialiased=False, by_distance=False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t, inverse = s.setup, reach.reach_tables(FORMATS)[3]
     out, places, conic = np.zeros((len(q), 12)), np.zeros((len(q), 7), np.int64), np.zeros((len(q), 3))
     _projected(low, step, q, scales, quat, t.view, t.focal, t.row_x, t.row_x_z, t.row_y, t.row_y_z, t.least, t.limit, t.middle, share, antialiased,

@@ -136,6 +136,10 @@ class Writer:
         for x, y in pairs[:freed]:
             mask[TILE * y : TILE * (y + 1), row * x : row * (x + 1)] = True
         if left:
+            dut.out_ready_i.value = 1
+            for _ in range(20):  # it stays stopped
+                await edge
+                assert int(dut.out_valid_o.value) == 0 and int(dut.stopped_o.value) == 1 and int(dut.left_o.value) == left
             dut.clear_i.value = 1
             await edge
             dut.clear_i.value = dut.stop_i.value = 0
@@ -214,3 +218,6 @@ async def late(dut):
         lefts.add(await test.frame(24, 2, form, ["never"] * CORES, stall, late=test.rng.randrange(1, 1200), walk="any"))
         await test.frame(4, 2, form, ["never"] * CORES, "half")
     assert 0 in lefts and 6 in lefts and len(lefts) > 3, lefts
+    # In each cycle of the four between a pair that is there and its first row, before that and behind.
+    ends = [await test.frame(8, 2, PixelFormat.RGB8, ["never"] * CORES, "never", late=cycle, order="pairs") for cycle in range(120, 140)]
+    assert ends == sorted(ends, reverse=True) and set(ends) == {1, 2}, ends

@@ -27,8 +27,8 @@ AT_ONCE = 1 << 25  # pairs in sub-tiles that are kept at a time: 256 MB
 class Seen:
     """A frame: what is blended, in which order, where (M Gaussians, S sub-tiles row by row, E list entries).
 
-    gaussian: int64 (M,), numbers in the scene, near to far. start: int64 (S + 1,), entry: int32 (E,), places in `gaussian`, rising in every list. pixels: uint64
-    (E,), bit 8 y + x: the pixels of the sub-tile where the entry has an alpha of at least 1/255. size: width and height of the picture.
+    gaussian: int64 (M,), numbers in the scene, near to far. start: int64 (S + 1,), entry: int32 (E,), places in `gaussian`, rising in every list. pixels:
+    uint64 (E,), bit 8 y + x: the pixels of the sub-tile where the entry has an alpha of at least 1/255. size: width and height of the picture.
     """
 
     gaussian: np.ndarray
@@ -39,7 +39,8 @@ class Seen:
 
     @classmethod
     def of(
-        cls, gaussian: np.ndarray, order: np.ndarray, mean: np.ndarray, energy: np.ndarray, opacity: np.ndarray, start: np.ndarray, entry: np.ndarray, camera: Camera,
+        cls, gaussian: np.ndarray, order: np.ndarray, mean: np.ndarray, energy: np.ndarray, opacity: np.ndarray, start: np.ndarray, entry: np.ndarray,
+        camera: Camera,
     ) -> Seen:
         """From splats of a frame: number in the scene, mean float64 (M, 2) in pixels, energy float64 (M, 3) with alpha = opacity exp(-(e0 dx^2 + e1 dx dy +
         e2 dy^2)), opacity. order: int64 (M,), splats near to far. start, entry: lists of splats, each near to far."""

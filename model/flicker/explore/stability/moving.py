@@ -171,8 +171,8 @@ def run_moving(
     families: Sequence[str] | None = None, names: Sequence[str] | None = None, speeds: Sequence[float] = SPEEDS, *, seed: int = 1,
     order: SortOrder = SortOrder.DEPTH, progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[MovingPoint]:
-    """Points of families (all) at speeds, in the order of families, speeds and names. order: what splats are sorted by. progress: called with (sequences done, in all). FlickerError, before any
-    work, for an unknown family or configuration."""
+    """Points of families (all) at speeds, in the order of families, speeds and names. order: what splats are sorted by.
+    progress: called with (sequences done, in all). FlickerError, before any work, for an unknown family or configuration."""
     for name in families or ():
         if name not in MOVING:
             raise FlickerError(f"unknown family '{name}'; known are {', '.join(MOVING)}")

@@ -232,8 +232,8 @@ def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
 
 @numba.njit(parallel=True, cache=True)
 def _splats(
-    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, by_distance, factor, logs, sigmas,
-    cut, inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
+    index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, by_distance, factor, logs,
+    sigmas, cut, inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
     """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
     cols = (width + TILE - 1) // TILE
@@ -300,8 +300,8 @@ class FrontFrame:
     gaussian: int64 (R,), Gaussians of the packed scene that have a record; not all of them are listed.
     number: int64 (R,), record numbers: record i lies at `number[i]` times the record's size.
     records: uint8 (R, bytes).
-    key: uint32 (R,), of depths or distances (`sort_key`). entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8 (E,), bits 2
-    row + column of the sub-tiles.
+    key: uint32 (R,), of depths or distances (`sort_key`). entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8
+    (E,), bits 2 row + column of the sub-tiles.
     clusters_kept: of the cluster test. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
     unrounded: float64 (R, 7), what shape (3), opacity and colour (3) of the records are rounded from; None where the RTL made the frame.
     """

@@ -64,14 +64,14 @@ def place_largest(number, most, a, b, d):
     return w, x, y, pick(number < 3, d, most)
 
 
-# d: mean less the camera's position, world axes. square: of the distance, from d alone. t: d in camera axes. x, y: mean on the screen in 1/128 pixel. ax, ay: clamped slopes.
-# u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
+# d: mean less the camera's position, world axes. square: of the distance, from d alone. t: d in camera axes. x, y: mean on the screen in 1/128 pixel.
+# ax, ay: clamped slopes. u, v: rows of the Jacobian times the view. r: rotation, row by row. s: scales over depth. gu, gv: rows of J W R S. cross: of the two.
 # scale: of an opacity's number, which makes its code. xx, xy, yy: covariance, dilated. radius_x, radius_y: 3 standard deviations in 1/128 pixel.
 # rxx, ryy, rdet: reciprocal square roots. far: the mean on the screen is saturated.
 Projection = namedtuple(
     "Projection",
-    "d0 d1 d2 square t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 cross0 cross1 cross2 "
-    "xx xy yy det trace spiky rxx ryy rdet scale m l0 l1 l2 sx sy radius_x radius_y near far",
+    "d0 d1 d2 square t0 t1 t2 iz tx ty x y ax ay u0 u1 u2 v0 v1 v2 norm n r00 r01 r02 r10 r11 r12 r20 r21 r22 s0 s1 s2 gu0 gu1 gu2 gv0 gv1 gv2 "
+    "cross0 cross1 cross2 xx xy yy det trace spiky rxx ryy rdet scale m l0 l1 l2 sx sy radius_x radius_y near far",
 )
 
 
