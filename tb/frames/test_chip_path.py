@@ -247,6 +247,18 @@ def test_wrong_picture_is_an_error(place: Path) -> None:
     assert done.stderr.endswith("1 pixels differ; 2 frames are kept in a.gif.frames, --resume goes on\n")
 
 
+def test_order_of_splats_reaches_the_chip(place: Path) -> None:
+    """By distance the golden model's picture is another one, and the chip's with it; the pops that the path counts are those of its golden front end."""
+    words = ("scene.ply", "--pan", 8, "--frames", 2, "--stats", "a.csv", "--order", "distance")
+    path(*words, "--engine", "chip", "-o", "distance")
+    found = rows()
+    path(*words, "--engine", "chip-golden", "-o", "golden")
+    assert [row_["pops"] for row_ in found] == [row_["pops"] for row_ in rows()] == ["", "0"]
+    path(*words[:-1], "depth", "--engine", "chip-golden", "-o", "depth")
+    read = lambda folder: Path(folder, "frame_00001.png").read_bytes()  # noqa: E731
+    assert read("distance") == read("golden") != read("depth")
+
+
 def test_other_hardware_is_another_path(place: Path) -> None:
     """Frames of another simulator are not gone on with; --workers has no meaning."""
     with patched(ChipSession, "wait", stops(2)):
