@@ -6,7 +6,6 @@ frame that are more than 10 % off.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import time
 from dataclasses import dataclass
@@ -35,6 +34,7 @@ from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
 from flicker.sim.chip import PORT, ChipFrame, ChipSession, build
 from flicker.sim.half import MemoryOptions
+from flicker.sim.row import back_to_back
 
 from .common import Say, folder_of_scenes
 
@@ -57,22 +57,9 @@ OF_ALL = {
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
 
-def back_to_back(
-    chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE,
-) -> list[ChipFrame]:
-    """Four frames of one view, each started as soon as the chip takes it: while the last but one is rendered the front end works on the last, as in a longer
-    row of frames. chunks: of a list writer."""
-    places = [chip.place(camera, chunks=chunks) for _ in range(2)]
-    row = [chip.frame(camera, places[k % 2], lists=lists, tag=k + 1) for k in range(4)]
-    chip.start(row[0])
-    done = []
-    for k, frame in enumerate(row):
-        if k + 1 < len(row):
-            while chip.call("flk_ready", ctypes.byref(chip.device)) == "BUSY":
-                chip.step(500)
-            chip.start(row[k + 1])
-        done.append(chip.finish(frame))
-    return done
+def four_frames(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE) -> list[ChipFrame]:
+    """Of one view, back to back: while the last but one is rendered the front end works on the last, as in a longer row of frames. chunks: of a list writer."""
+    return [done.frame for done in back_to_back(chip, [camera] * 4, chunks=chunks, lists=lists)]
 
 
 def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, str, Refresh]]:
@@ -152,7 +139,7 @@ def measure(
             raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
     say(f"{title}: four frames back to back")
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
-        done = back_to_back(chip, camera, chunks, lists)
+        done = four_frames(chip, camera, chunks, lists)
     for frame in (alone, *done):
         if frame.error or not np.array_equal(frame.buffer, golden.buffer):
             raise FlickerError(f"{title}: the picture differs from the golden model's")

@@ -26,7 +26,7 @@ from flicker.sim.chip import ChipFrame, ChipSession
 from flicker.sim.half import MemoryOptions
 from flicker.sim.rendering import rendering_rtl
 
-from .chip_hardware import back_to_back
+from .chip_hardware import four_frames
 from .common import Say, load
 
 VIEW = "flowers"
@@ -48,7 +48,7 @@ def tables(say: Say) -> dict[str, str]:
         for memory, dram in MEMORIES.items():
             say(f"{real.title}: {lanes} lanes, memory of {memory}, four frames back to back")
             with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
-                done = back_to_back(chip, view.camera, CHUNKS)
+                done = four_frames(chip, view.camera, CHUNKS)
             if any(frame.error or not np.array_equal(frame.buffer, golden) for frame in done):
                 raise FlickerError(f"{real.title}: the picture differs from the golden model's")
             rows.append((str(lanes), memory, *_row(done, config, stage)))

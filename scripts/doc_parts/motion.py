@@ -22,8 +22,8 @@ from flicker.errors import FlickerError
 from flicker.explore.configurations import get_configuration, group, run
 from flicker.explore.digest import code_digest, file_digest, key
 from flicker.explore.store import Store
+from flicker.front.paths import Asked, path_of
 from flicker.front.view import View
-from flicker.motion.paths import Asked, path_of
 from flicker.motion.record import composed, eight_bits
 from flicker.motion.video import write_video
 from flicker.params import RECOMMENDED, RenderConfig
@@ -117,13 +117,20 @@ def _jumps(share: float) -> str:
     return "0" if share == 0 else "< 0.001" if percent < 0.001 else f"{percent:.3f}" if percent < 0.1 else f"{percent:.2f}"
 
 
+def figures(summary: TemporalSummary) -> str:
+    """A cell: PSNR of the stills / temporal PSNR / jumps in per cent."""
+    return _cell(asdict(summary))
+
+
+def _cell(row: dict) -> str:
+    return f"{_decibels(row['psnr_db'])} / {_decibels(row['temporal_psnr_db'])} / {_jumps(row['jumps'])}"
+
+
 def stability(found: dict[str, dict[str, dict]]) -> str:
     """A row a configuration: PSNR of the stills / temporal PSNR / jumps in per cent, by view."""
     names = list(next(iter(found.values())))
     rows = [
-        [f"`{name}`" if name not in CHIPS else name, *(
-            f"{_decibels(rows[name]['psnr_db'])} / {_decibels(rows[name]['temporal_psnr_db'])} / {_jumps(rows[name]['jumps'])}" for rows in found.values()
-        )] for name in names
+        [f"`{name}`" if name not in CHIPS else name, *(_cell(rows[name]) for rows in found.values())] for name in names
     ]
     return markdown.table(["configuration", *found], rows)
 

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 import scene_samples as samples
@@ -27,8 +28,8 @@ from flicker.errors import FlickerError
 from flicker.front.view import load_view
 from flicker.motion import frames as motion_frames
 from flicker.motion.frames import Wanted, frames
-from flicker.motion.record import Timing
 from flicker.motion.video import durations, write_video
+from flicker.perf.timing import Timing
 from flicker.scene.camera import cameras_text, load_cameras, orbit_camera
 from flicker.scene.files import load_scene, save_ply
 from flicker.scene.metrics import flip, psnr, ssim
@@ -36,6 +37,15 @@ from flicker.scene.metrics import flip, psnr, ssim
 SIZE = (48, 32)
 COUNT = 6
 PAN = ("--pan", 0.5, "--frames", COUNT)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """The pictures are too small to share among threads, which wait for each other."""
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    yield
+    numba.set_num_threads(threads)
 
 
 @pytest.fixture(autouse=True)

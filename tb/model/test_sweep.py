@@ -5,6 +5,7 @@ Two local worker processes on a scene of 300 Gaussians at 64x48. Not covered: cl
 
 from __future__ import annotations
 
+import csv
 import os
 import signal
 from collections import Counter
@@ -14,8 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flicker_tb.command import flicker
+from flicker_tb.screen import on_screen
 from scene_samples import random_scene
 
+from flicker.cli.sweep import summary
 from flicker.errors import FlickerError
 from flicker.explore.evaluate import evaluate
 from flicker.explore.store import plain
@@ -77,6 +80,56 @@ def test_rows_equal_evaluate_and_are_resumed(folder, client):
     assert (sweep.folder / "results.parquet").read_bytes() == before
     part = run_sweep(load_sweep(write(folder, configurations=["gscore", "oracle"])))  # another sweep finds the points
     assert (part.computed, part.resumed) == (0, 4)
+
+
+PATHS = [0, {"pan": 0.5, "frames": 3}, {"shake": True, "view": 1, "frames": 2, "seed": 4, "fps": 1000, "clock": 1e-3}, {"frames": 2}]
+
+
+def test_paths_are_those_of_flicker_path(folder, client, monkeypatch):
+    """Temporal figures are those of the same path by `flicker path`, still figures the means of `evaluate`; cycles and late frames those of the frames;
+    kept and resumed as stills are."""
+    sweep = load_sweep(write(folder, views=PATHS, configurations=["flicker", "log-lanes"]))
+    assert [t.title for t in sweep.targets] == ["tiny 0", "tiny 0, pan 0.5", "tiny 1, shake", "tiny 0, cameras in order"]
+    result = run_sweep(sweep, client=client)
+    assert (result.computed, result.resumed) == (8, 0) and len({row[KEY] for row in result.rows}) == 8
+    assert [row.get("path") for row in result.rows[::2]] == [None, "pan 0.5", "shake", "cameras in order"] and "jumps" not in result.rows[0]
+    monkeypatch.chdir(folder)
+    words = (("--pan", 0.5, "--frames", 3), ("--shake", "--view", 1, "--frames", 2, "--seed", 4, "--fps", 1000), ("--frames", 2))
+    for number, motion in enumerate(words, 1):
+        files = ("--stats", "a.csv", "--save-cameras", "a.json", "-o", f"out{number}")
+        done = flicker("path", "tiny.ply", "--size", "64x48", *motion, "--stage", "channels", *files)
+        assert done.returncode == 0, done.stderr
+        row, frames = result.rows[2 * number], list(csv.DictReader(Path("a.csv").open()))
+        stills = [evaluate(load_view("tiny.ply", n, None, "a.json"), "flicker").row for n in range(len(frames))]
+        assert (row["config"], row["frames"], row["view"]) == ("flicker", len(frames), motion[2] if "--view" in motion else 0)
+        changes = [10 ** (-float(frame["temporal_psnr_db"]) / 10) for frame in frames[1:]]
+        assert row["temporal_psnr_db"] == pytest.approx(-10 * np.log10(np.mean(changes)), abs=1e-3)
+        assert row["jumps"] == pytest.approx(np.mean([float(frame["jumps"]) for frame in frames[1:]]), abs=1e-9)
+        assert row["worst_frame"] == 1 + int(np.argmax(changes))
+        assert row["ssim"] == pytest.approx(np.mean([still["ssim"] for still in stills])) and row["energy_uj"] == pytest.approx(
+            np.mean([still["energy_uj"] for still in stills]))
+        cycles = [still["cycles"] for still in stills]
+        assert (row["cycles"], row["cycles_p50"], row["cycles_worst"]) == (pytest.approx(np.mean(cycles)), np.median(cycles), max(cycles))
+        assert cycles[row["cycles_worst_frame"]] == max(cycles) >= row["cycles_p99"] >= row["cycles_p50"]
+        slot = 1000 if "--shake" in motion else 1e9 / 90
+        assert row["late"] == np.mean([count > slot for count in cycles]) and row["psnr_db"] == pytest.approx(
+            -10 * np.log10(np.mean([10 ** (-float(frame["psnr_db"]) / 10) for frame in frames])), abs=1e-3)
+    again = run_sweep(sweep)
+    assert (again.computed, again.resumed) == (0, 8) and again.rows == result.rows
+    assert [{name: value for name, value in row.items() if name in kept} for row, kept in zip(load_results(sweep.folder), result.rows)] == result.rows
+    shown, stills = on_screen(summary(result.rows), 300), on_screen(summary(result.rows[:2]), 300)
+    assert "temporal dB" in shown and "1, shake" in shown and "100.0%" in shown and "temporal dB" not in stills
+    other = load_sweep(write(folder, views=[{"pan": 0.5, "frames": 3, "clock": 0.5}, {"pan": 0.25, "frames": 3}], configurations=["flicker", "log-lanes"]))
+    assert not {p.key for p in other.points} & {p.key for p in sweep.points} and other.hash != sweep.hash
+
+
+def test_path_that_fails_keeps_the_others(folder, client):
+    """Cameras that are known only with the scene: an orbit is a path; a scene that cannot be read names its path."""
+    (folder / "broken.ply").write_bytes((folder / "tiny.ply").read_bytes()[:2000])
+    sweep = load_sweep(write(folder, scenes=["broken.ply", "tiny.ply"], views=[{"pan": 1, "frames": 2}], configurations=["gscore"]))
+    with pytest.raises(FlickerError, match="1 of 2 views failed; .*broken.ply view 0, pan 1: "):
+        run_sweep(sweep, client=client)
+    assert len(list(sweep.store.glob("*.json"))) == 1
 
 
 def test_interrupted_sweep_continues(folder, client):
@@ -155,6 +208,19 @@ def test_demo_with_other_cameras(folder, monkeypatch):
     ({"scenes": []}, "scenes: expected a list"),
     ({"views": [8]}, "view 8: there are 8 cameras"),
     ({"views": [-1]}, "views: expected camera numbers"),
+    ({"views": [{"pan": 1, "walk": True}]}, "views: entry 0: pan, walk: one motion makes a path"),
+    ({"views": [0, {"pan": 1, "sped": 2}]}, "views: entry 1: unknown key 'sped'; did you mean 'speed'"),
+    ({"views": [{"pan": "fast"}]}, "views: entry 0: pan: input should be a valid number, not 'fast'"),
+    ({"views": [{"pan": float("nan")}]}, "views: entry 0: pan: nan is not from"),
+    ({"views": [{"seed": 1}]}, "views: entry 0: seed: for shake only"),
+    ({"views": [{"walk": True, "frames": 0}]}, "views: entry 0: frames: input should be greater than or equal to 1, not '0'"),
+    ({"views": [{"walk": True, "fps": 0}]}, "views: entry 0: fps: 0 is not from"),
+    ({"views": [{"walk": True, "view": 8}]}, r"scenes\[0\]: view 8: there are 8 cameras"),
+    ({"views": [{"walk": True, "view": -1}]}, "views: entry 0: view: input should be greater than or equal to 0"),
+    ({"views": [{"keyframes": True}], "scenes": [{"path": "tiny.ply", "cameras": "one.json"}]}, r"scenes\[0\]: .*one.json: one camera: a path needs two"),
+    ({"views": [{"frames": 9}], "scenes": [{"path": "demo"}]}, r"scenes\[0\]: .* cameras, not 9, each a frame"),
+    ({"scenes": ["tiny.ply", "tiny.ply"], "views": [{"walk": True}]}, "view 0, walk of .* is there twice"),
+    ({"views": ["walk"]}, "views: expected camera numbers from 0 on, or paths, not 'walk'"),
     ({"size": "64"}, "size: expected WxH"),
     ({"size": "0x48"}, "size: width and height must be 1 to"),
     ({"configuration": ["gscore"]}, "unknown key 'configuration'; did you mean 'configurations'"),
@@ -166,6 +232,7 @@ def test_demo_with_other_cameras(folder, monkeypatch):
 ])
 def test_bad_configuration(folder, changes, message):
     path = write(folder, **changes)
+    (folder / "one.json").write_text(cameras_text([Camera(48, 32, 40.0, 40.0, np.array([0.0, 0.0, -5.0]), np.eye(3))]))
     with pytest.raises(FlickerError, match=message) as raised:
         load_sweep(path)
     assert str(path) in str(raised.value) and "\n" not in str(raised.value)

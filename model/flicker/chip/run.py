@@ -30,7 +30,7 @@ from .rendering import frame_beats
 SCENE = ("table", "headers", "geometry", "colour")  # what the front end reads
 
 
-def _frame_image(buffer: np.ndarray, camera: Camera) -> np.ndarray:
+def frame_image(buffer: np.ndarray, camera: Camera) -> np.ndarray:
     """float64 (H, W, 3) of an RGB8 frame buffer."""
     return buffer[: camera.height, : 3 * camera.width].reshape(camera.height, camera.width, 3) / 255.0
 
@@ -70,7 +70,7 @@ def _picture(
         else:
             sent = golden.frame.total("minitiles_sent")
             stats |= {"minitiles_sent": sent, "pixel_pairs": 16 * sent}
-        return _frame_image(golden.buffer, camera), stats
+        return frame_image(golden.buffer, camera), stats
     with steps.step("packing the scene"):
         packed, packing = packed_for_picture(view, options)
     with steps.step("building the chip's simulator (once per configuration)"):
@@ -80,7 +80,7 @@ def _picture(
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, order=view.order, progress=report)
         seconds = time.process_time() - began
         stats = packing | chip_stats(chip, frame, camera, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
-    return _frame_image(frame.buffer, camera), stats
+    return frame_image(frame.buffer, camera), stats
 
 
 # Counters of waits of both halves: what is stalled.
@@ -114,19 +114,27 @@ def stalled(cause: str, cycles: int) -> str:
     return f"{cycles:,} cycle{'s' * (cycles != 1)}" + (f", sum over {SUMMED[cause]}" if cause in SUMMED else "")
 
 
+def counted(frame: ChipFrame, config: RenderConfig) -> dict[str, int]:
+    """What a frame of the chip listed: splats that are seen, entries of tiles, records that its cores took."""
+    return {
+        "visible": int(np.sum(frame.front["survivors"]) - np.sum(frame.front["unlisted"])), "list_entries": int(np.sum(frame.front["entries"])),
+        "subtile_pairs": int(frame.stage[:, params.STAGES[config.stage].counters.index("gaussians_in")].sum()),
+    }
+
+
 def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
     """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.
 
     camera: of the frame. dram: the memory of the session.
     """
     assert frame.usage is not None
-    front, rendering, stamps, live = frame.front, frame.rendering, frame.stamps, frame.usage.live
+    front, rendering, live = frame.front, frame.rendering, frame.usage.live
     count = lambda name: int(np.sum(front[name]))  # noqa: E731
-    phases = {"front end": stamps["front_done"] - stamps["taken"], "rendering": stamps["rendering_done"] - stamps["rendering_start"]}
+    phases = frame.phases
     core = {name: frame.stage[:, k] for k, name in enumerate(params.STAGES[config.stage].counters)}
     stage = (_lane_chip_stats if config.by_lanes else _channel_chip_stats)(core, config, phases["rendering"])
     traffic = {name: moved for name, moved in frame.usage.traffic.items() if any(moved)}
-    cycles = stamps["rendering_done"] - stamps["taken"]
+    cycles = frame.cycles
     efficiency = sum(map(sum, traffic.values())) * CLOCK_HZ / (cycles * dram.bytes_per_second)
     # Bytes of each half: the front end reads the scene, writes records and lists; rendering reads these (pointers that the front end reads back
     # are counted there too) and writes the frame.
@@ -154,15 +162,14 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
-        "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value, "clusters": chip.scene.clusters,
-        "clusters_kept": chip.scene.clusters - count("culled_clusters"), "visible": count("survivors") - count("unlisted"), "list_entries": count("entries"),
+        **counted(frame, config), "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value,
+        "clusters": chip.scene.clusters, "clusters_kept": chip.scene.clusters - count("culled_clusters"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),
             OUTCOMES[Outcome.FAINT]: count("faint"), OUTCOMES[Outcome.MISSED]: count("unlisted") - count("faint"),
             OUTCOMES[Outcome.LISTED]: count("survivors") - count("unlisted"),
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
-        "subtile_pairs": int(core["gaussians_in"].sum()),
         "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
         "stalls": {
             **stage.pop("stalls"),

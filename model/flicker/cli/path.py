@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from ..errors import FlickerError, FlickerWarning, Interrupted
+from ..front.path_rules import kind_of
 from ..output import write_text
 from ..params import Coords, SortOrder
 from .engine import Chosen, EngineChoice, parse_engine, takes_engine
@@ -75,23 +76,16 @@ def path(
     resume: Annotated[bool, typer.Option("--resume", help="go on with the frames that are there")] = False,
 ) -> None:
     """Render a camera path to a video, with figures of every frame and over time."""
-    motions = {"--pan": pan is not None, "--orbit": orbit is not None, "--dolly": dolly, "--walk": walk, "--shake": shake}
-    made = [name for name, given in motions.items() if given]
-    if len(made) > 1:
-        raise FlickerError(f"{', '.join(made)}: one motion makes a path")
-    if made and keyframes:
-        raise FlickerError(f"--keyframes: joins given cameras, so it cannot be combined with {made[0]}")
-    _only(made, {"--seed": (seed, ("--shake",)), "--speed": (speed, ("--dolly", "--walk")), "--ahead": (ahead, ("--dolly", "--walk", "--shake"))})
-    for option, value in (("--fps", fps), ("--clock", clock), ("--ahead", ahead), ("--speed", speed)):
-        if value is not None and not 1e-3 <= value <= 1e5:
-            raise FlickerError(f"{option}: {value:g} is not from 0.001 to 100,000")
-    for option, value in (("--pan", pan), ("--orbit", orbit)):
-        if value is not None and not abs(value) <= 1e5:
-            raise FlickerError(f"{option}: {value:g} is not from -100,000 to 100,000")
+    kind = kind_of(
+        {"pan": pan, "orbit": orbit, "dolly": dolly, "walk": walk, "shake": shake, "keyframes": keyframes, "speed": speed, "ahead": ahead, "seed": seed,
+         "fps": fps, "clock": clock}, lambda option: f"--{option}",
+    )
     if amplify is not None and side_by_side is None:
         raise FlickerError("--amplify: for --side-by-side only")
     if cycles and chosen.engine is EngineChoice.REFERENCE:
         raise FlickerError("--cycles: not with --engine reference, which is no machine")
+    if workers is not None and chosen.engine is EngineChoice.CHIP:
+        raise FlickerError("--workers: not with --engine chip, whose frames go through one simulation")
     if cycles and chosen.config.coords is Coords.ABSOLUTE:
         raise FlickerError("--cycles: not with --coords absolute, of which no chip has records")
     second = None if side_by_side in (None, REFERENCE) else parse_engine(side_by_side, "--side-by-side")  # type: ignore[arg-type]
@@ -111,10 +105,10 @@ def path(
     check_there(cameras)
     steps = RichSteps()
     with steps.step("starting"):
+        from ..front.paths import Asked, path_of
         from ..motion import keep, record
         from ..motion.chart import write_chart
         from ..motion.frames import Wanted
-        from ..motion.paths import Asked, path_of
         from ..motion.video import CODECS, ffmpeg, write_video
         from ..scene.camera import cameras_text
         from ..scene.files import scene_title
@@ -123,9 +117,14 @@ def path(
         if out.suffix.lower() in CODECS:
             ffmpeg()
         drawing = chosen.drawing()
+    simulator = {}
+    if chosen.engine is EngineChoice.CHIP:
+        from ..sim.chip import build
+
+        with steps.step("building the chip's simulator (once per configuration)"):
+            simulator = {"simulator": build(chosen.config).parent.name}  # its name is of the RTL
     with steps.step(f"loading {scene_title(scene)}"):
         source = open_scene(scene, cameras, up)
-        kind = "keyframes" if keyframes else made[0].removeprefix("--") if made else None
         given = {name: value for name, value in (("speed", speed), ("ahead", ahead), ("seed", seed)) if value is not None}
         along, what = path_of(source, Asked(kind, pan or orbit or 0.0, view, wanted_size, frames, fps, **given))  # type: ignore[arg-type]
     judged = stats is not None or chart is not None or warping
@@ -142,6 +141,7 @@ def path(
     settings = {
         "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "order": order.value,
         "figures": [judged, warping, cycles],
+        **simulator,
     }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
         printed(said)
@@ -177,13 +177,6 @@ def path(
         raise FlickerError(f"{error}; {len(kept.rows)} frames are kept in {folder}, --resume writes it") from None
     kept.finish()
     _show(recording, kept.rows, out, seconds / max(len(kept.rows) - before, 1))
-
-
-def _only(made: list[str], options: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
-    """FlickerError for an option of another motion."""
-    for option, (value, motions) in options.items():
-        if value is not None and not set(made) & set(motions):
-            raise FlickerError(f"{option}: for {', '.join(motions)} only")
 
 
 def _cores() -> int:

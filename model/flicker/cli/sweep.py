@@ -62,14 +62,29 @@ def sweep(
                   soft_wrap=True)
 
 
+Columns = tuple[tuple[str, Literal["left", "right"]], ...]
+MOVED: Columns = (("temporal dB", "right"), ("jumps %", "right"), ("worst frame", "right"), ("cycles p50, p99, worst", "right"), ("late", "right"))
+
+
+def _moved(row: dict) -> tuple[str, ...]:
+    """Cells of a path; of a still none."""
+    if not row.get("path"):
+        return ("",) * len(MOVED)
+    temporal = ("", "", "") if row["temporal_psnr_db"] is None else (
+        decibels(row["temporal_psnr_db"], unit=""), f"{100 * row['jumps']:.3f}", f"{row['worst_frame']}: {decibels(row['worst_frame_db'], unit='')}",
+    )
+    return *temporal, f"{row['cycles_p50']:,.0f}, {row['cycles_p99']:,.0f}, {row['cycles_worst']:,}", f"{row['late']:.1%}"
+
+
 def summary(rows: list[dict]) -> Table:
-    """One row per point."""
+    """One row per point; with columns of paths where there are some."""
     table = Table()
-    columns: tuple[tuple[str, Literal["left", "right"]], ...] = (
+    columns: Columns = (
         ("scene", "left"), ("view", "right"), ("configuration", "left"), ("cycles", "right"), ("PSNR dB", "right"), ("SSIM", "right"), ("FLIP", "right"),
         ("photo dB", "right"), ("GE", "right"), ("uJ", "right"),
     )
-    for name, justify in columns:
+    moves = any(row.get("path") for row in rows)
+    for name, justify in (*columns, *(MOVED if moves else ())):
         table.add_column(name, justify=justify)
 
     def text(value, form: str) -> str:
@@ -77,8 +92,9 @@ def summary(rows: list[dict]) -> Table:
 
     for row in rows:
         table.add_row(
-            row["scene"], str(row["view"]), row["config"], text(row["cycles"], ","), decibels(row["psnr_db"], unit=""), text(row["ssim"], ".4f"),
-            text(row["flip"], ".4f"), "" if row["photo_psnr_db"] is None else decibels(row["photo_psnr_db"], unit=""),
-            text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"),
+            row["scene"], ", ".join(filter(None, (str(row["view"]), row.get("path")))), row["config"], text(row["cycles"], ",.0f"),
+            decibels(row["psnr_db"], unit=""), text(row["ssim"], ".4f"), text(row["flip"], ".4f"),
+            "" if row["photo_psnr_db"] is None else decibels(row["photo_psnr_db"], unit=""),
+            text(row["area_ge"], ",.0f"), text(row["energy_uj"], ".1f"), *(_moved(row) if moves else ()),
         )
     return table

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from ..errors import FlickerError
+from ..front.paths import Asked, given_cameras, path_of
 from ..front.view import DEMO, View, load_view
 from ..params import SortOrder
+from ..scene import Scene
 from ..scene.camera import ORBIT_VIEWS, Camera, camera_files, cameras_beside, cameras_said, no_such_view, of_colmap, photos_root, stored_cameras
 from ..scene.files import scene_digest, scene_name, scene_title
 from ..scene.photos import BLACK, NONE, check_photo, photo_beside, photo_in
+from ..scene.sources import open_scene
 from .configurations import get_configuration
 from .digest import code_digest, file_digest, key
 
@@ -97,6 +100,15 @@ class SceneFile:
         check_photo(photo, size, self.stored)
         return Target(self, view, size)
 
+    def path_target(self, asked: Asked, size: tuple[int, int] | None = None, clock: float = 1.0) -> Target:
+        """A path in the scene, its cameras checked as far as they are known without the scene. size: None: `SIZE`. FlickerError."""
+        asked = replace(asked, size=size or SIZE)
+        if self._cameras is not None:
+            given_cameras(self._cameras, self.cameras_from, asked)
+        elif asked.view >= (count := self.views()):
+            raise no_such_view(asked.view, count)
+        return Target(self, asked.view, size or SIZE, asked, clock)
+
     @cached_property
     def digest(self) -> str:
         """Of the contents of scene and cameras; the demo scene and its own cameras are code."""
@@ -109,20 +121,40 @@ class SceneFile:
 
 @dataclass(frozen=True)
 class Target:
-    """One view of a scene at a size."""
+    """One view of a scene at a size, or a path that begins there. clock: of the machine, GHz: a frame of a path is late that takes longer than it has."""
 
     scene: SceneFile
     view: int
     size: tuple[int, int]
+    path: Asked | None = None
+    clock: float = 1.0
 
     @property
     def title(self) -> str:
-        return f"{self.scene.name} {self.view}"
+        return f"{self.scene.name} {self.number}"
+
+    @property
+    def number(self) -> str:
+        """Number of the view, and what the path is."""
+        return f"{self.view}, {self.path_title}" if self.path else str(self.view)
+
+    @property
+    def moved(self) -> dict[str, object]:
+        """What a path is, in full; of a still nothing."""
+        return {} if self.path is None else {"path": asdict(self.path), "clock_ghz": self.clock}
+
+    @property
+    def path_title(self) -> str | None:
+        """What the path is, in few words; None: a still."""
+        if self.path is None:
+            return None
+        words = [self.path.kind or "cameras in order", *([f"{self.path.amount:g}"] if self.path.kind in ("pan", "orbit") else [])]
+        return " ".join(words)
 
     @cached_property
     def photo(self) -> Path | None:
-        """Its photograph."""
-        return self.scene.photo(self.view)
+        """Its photograph; a path has none."""
+        return None if self.path else self.scene.photo(self.view)
 
     @cached_property
     def looks(self) -> str:
@@ -134,9 +166,15 @@ class Target:
         scene = self.scene
         return load_view(scene.path, self.view, self.size, scene.cameras, scene.up, scene.background, self.photo, scene.stored, scene.order)
 
+    def cameras(self) -> tuple[Scene, list[Camera]]:
+        """The scene and the cameras of the path. FlickerError for cameras that are none."""
+        assert self.path is not None
+        source = open_scene(self.scene.path, self.scene.cameras, self.scene.up)
+        return source.scene, path_of(source, self.path)[0]
+
     def key(self, *parts: object) -> str:
         """Name of a result of this view: of contents, not of places."""
-        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, self.looks, *parts)
+        return key(code_digest(), self.scene.file, self.scene.digest, self.view, *self.size, self.looks, *self.moved.values(), *parts)
 
 
 @dataclass(frozen=True)

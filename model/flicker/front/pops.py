@@ -1,4 +1,4 @@
-"""Pops: pairs of Gaussians that overlap in a pixel and change their order from one frame to the next (docs/motion.md).
+"""Pops: pairs of Gaussians that overlap in a pixel and change their order from one frame to the next (docs/reference/motion.md).
 
     before, after = seen_in(projected, camera), seen_in(next_projected, next_camera)
     pops(before, after).pops

@@ -1,4 +1,4 @@
-"""Frames of a path in their order, made here or by processes beside each other."""
+"""Frames of a path in their order, made here or by processes beside each other; those of the verilated chip: `on_chip`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..front.reference import expected_depth
 from ..front.view import View
 from ..golden.front.record import RecordKind
 from ..params import SortOrder
-from ..pipeline import Engine, Front, golden_front, packed_scene
+from ..pipeline import Front, golden_front, packed_scene
 from ..scene import Scene
 from ..scene.camera import Camera
 from ..scene.metrics import flip, ssim
@@ -66,13 +66,9 @@ class Made:
 
 
 def _counts(stats: dict[str, Any]) -> dict[str, Any]:
-    """Columns that follow from an engine's statistics: what is seen and listed; of a simulation its cycles, and of the chip its bytes."""
+    """Columns that follow from an engine's statistics: what is seen and listed; of a stage that is simulated its cycles."""
     found = {"visible": stats.get("visible"), "tile_entries": stats.get("list_entries", stats.get("tile_pairs")), "subtile_entries": stats.get("subtile_pairs")}
-    if "phases" in stats:
-        front, rendering = stats["phases"]["front end"], stats["phases"]["rendering"]
-        found |= {"cycles": max(front, rendering), "latency_cycles": stats["cycles"], "front_cycles": front, "render_cycles": rendering}
-        found |= {f"bytes_{purpose}": sum(moved) for purpose, moved in stats["dram_bytes"].items()}
-    elif "cycles" in stats:
+    if "cycles" in stats:
         found["stage_cycles"] = stats["cycles"]
     return found
 
@@ -99,7 +95,7 @@ def make(scene: Scene, wanted: Wanted, number: int, camera: Camera) -> Made:
         if wanted.quality:
             facts |= {"ssim": ssim(rendered.image, view.reference), "flip": flip(rendered.image, view.reference)}
         depth = expected_depth(view.projected, camera) if wanted.depth else None
-        if wanted.cycles and wanted.drawing.engine is not Engine.CHIP:
+        if wanted.cycles:
             facts |= frame_cost(view, wanted.drawing)
         seen = seen_by(view, wanted.drawing) if wanted.pops else None
     facts["made_s"] = time.perf_counter() - began

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from PIL import Image, ImageDraw
 
 from ..front.pops import pops
 from ..output import write_records
+from ..perf.timing import Timing
+from ..pipeline import Engine
 from ..scene import Scene
 from ..scene.camera import Camera
 from ..scene.metrics import decibels
@@ -48,6 +50,11 @@ class Recording:
     wanted: Wanted
     title: str
     beside: Beside | None = None
+
+    @property
+    def on_chip(self) -> bool:
+        """Frames go through the verilated chip."""
+        return self.wanted.drawing.engine is Engine.CHIP
 
     @property
     def slot(self) -> float:
@@ -100,15 +107,24 @@ class _Figures:
         return found
 
 
+def _frames(path: Recording, first: int, workers: int) -> Iterator[Made]:
+    if path.on_chip:
+        from .on_chip import chip_frames
+
+        return chip_frames(path.scene, path.cameras, path.wanted, first)
+    return frames(path.scene, path.file, path.cameras, path.wanted, first, workers)
+
+
 def record(path: Recording, kept: Kept, workers: int, told: Callable[[int], None], noted: Callable[[str], None]) -> None:
     """Make what is missing of a path. told: called with the number of finished frames; noted: with warnings, each kind once."""
     figures, said = _Figures(path), set()
     first = len(kept.rows)
     if first == len(path.cameras):
         return
-    # The errors of the last frame that is there are those of a picture of more than 8 bits, and its lists are not kept: it is made once more.
-    again = first > 0 and (path.wanted.reference or path.wanted.pops)
-    for made in frames(path.scene, path.file, path.cameras, path.wanted, first - again, workers):
+    # The last frame that is there is made once more: its errors are those of a picture of more than 8 bits, its lists are not kept, and without it the chip has
+    # no interval.
+    again = first > 0 and (path.wanted.reference or path.wanted.pops or path.on_chip)
+    for made in _frames(path, first - again, workers):
         row = {"frame": made.number, "time_s": made.number / path.fps, **figures.of(made), **made.facts}
         if "cycles" in row:
             row["late"] = int(row["cycles"] > path.slot)
@@ -153,26 +169,13 @@ def write_stats(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     write_records(path, [name for name in COLUMNS if any(name in record for record in records)], records)
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Cycles of the frames of a path: middle, 99th of a hundred, longest with its number; late: share of frames that take more than their slot."""
-
-    p50: float
-    p99: float
-    worst: int
-    worst_frame: int
-    late: float
-
-    @classmethod
-    def of(cls, cycles: Sequence[int], slot: float) -> Timing:
-        values = np.asarray(cycles)
-        return cls(float(np.percentile(values, 50)), float(np.percentile(values, 99)), int(values.max()), int(values.argmax()), float((values > slot).mean()))
-
-
 def timing_of(rows: Sequence[dict[str, Any]], slot: float) -> Timing | None:
-    """Of kept rows; None where no cycles are known."""
-    cycles = [row["cycles"] for row in rows if "cycles" in row]
-    return Timing.of(cycles, slot) if cycles else None
+    """Of kept rows that have cycles; None where no row has."""
+    timed = [row for row in rows if "cycles" in row]
+    if not timed:
+        return None
+    found = Timing.of([row["cycles"] for row in timed], slot)
+    return replace(found, worst_frame=timed[found.worst_frame]["frame"])
 
 
 def summary_of(rows: Sequence[dict[str, Any]], fps: float) -> TemporalSummary | None:

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from ..chip_registers import REGISTERS, ChipCounter, ResultError
-from ..errors import FlickerError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
 from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig, SortOrder
@@ -28,6 +27,7 @@ from .memory import Order, PortConfig, PurposeCounts
 # The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/reference/memory_port.md).
 PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False, order=Order.WHOLE, urgent=14)
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
+OF_PLACE = ("records", "lists", "pointers", "frame")  # in the order of a `Place`
 IMAGE = 1 << 28  # address of the scene
 ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more
 LIMIT = 100_000_000  # cycles of a frame
@@ -54,11 +54,12 @@ def build(config: RenderConfig) -> Path:
 
 @dataclass(frozen=True)
 class Place:
-    """Addresses of what a frame writes, and how much there is, as the driver takes them. stride: bytes."""
+    """Addresses of what a frame writes, and how much there is, as the driver takes them. stride: bytes. number: of those whose traffic is counted apart."""
 
     region: driver.CRegion
     frame_buffer: int
     stride: int
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,19 @@ class ChipFrame:
     usage: Usage | None = None
 
     @property
+    def phases(self) -> dict[str, int]:
+        """Cycles of the halves."""
+        return {"front end": self._between("taken", "front_done"), "rendering": self._between("rendering_start", "rendering_done")}
+
+    @property
+    def cycles(self) -> int:
+        """From the frame's being taken to its end."""
+        return self._between("taken", "rendering_done")
+
+    def _between(self, first: str, second: str) -> int:
+        return (self.stamps[second] - self.stamps[first]) % 2**32
+
+    @property
     def errors(self) -> list[str]:
         """Texts of the error's bits."""
         return [driver.library().flk_error_text(int(bit)).decode() for bit in ResultError if self.error >> bit & 1]
@@ -115,7 +129,7 @@ class ChipSession(Half):
         lib.flk_chip_quiet.argtypes = [ctypes.c_void_p]
         self.config, self.packed = config, packed
         self.driver = driver.library()
-        self._error: FlickerError | None = None
+        self._error: BaseException | None = None
         self._calls = driver.READ(self._read), driver.WRITE(self._write)  # kept alive
         self.device, self.scene = driver.CDevice(), driver.CScene()
         data = packed.image() if image is None else image
@@ -127,11 +141,14 @@ class ChipSession(Half):
     # ---- registers ------------------------------------------------------------------------------------------------------------------
 
     def _access(self, offset: int, write: bool, value: int = 0) -> int:
-        """What a callback of the driver raises would be lost; it is kept for `_raise`."""
+        """What a callback of the driver raises, Ctrl-C too, would be lost; it is kept for `_raise`."""
         word = ctypes.c_uint32(value)
-        done = self._lib.flk_chip_register(self._sim, offset, write, ctypes.byref(word))
-        if done != 1:
-            self._error = self._error or self._failure("" if done == -1 else f"register {offset:#x} answers with an error")
+        try:
+            done = self._lib.flk_chip_register(self._sim, offset, write, ctypes.byref(word))
+            if done != 1:
+                self._error = self._error or self._failure("" if done == -1 else f"register {offset:#x} answers with an error")
+        except BaseException as error:
+            self._error = error
         return word.value
 
     def _read(self, _user: int, offset: int) -> int:
@@ -180,24 +197,27 @@ class ChipSession(Half):
             self.load(at, size, data[offset : offset + size], purpose)
             at += size
 
-    def allocate(self, size: int, purpose: str, data: bytes = b"") -> int:
-        """Address of new memory: the data, and noise behind them."""
+    def allocate(self, size: int, purpose: str, data: bytes = b"", number: int = 0) -> int:
+        """Address of new memory: the data, and noise behind them. number: traffic of the same purpose is counted apart by it."""
         at = self._next
-        self.load(at, -(-max(size, 1) // 64) * 64, data, PURPOSES.index(purpose))
+        self.load(at, -(-max(size, 1) // 64) * 64, data, number * len(PURPOSES) + PURPOSES.index(purpose))
         self._next += -(-max(size, 1) // PAGE) * PAGE
         return at
 
-    def place(self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, chunks: int | None = None, stride: int | None = None) -> Place:
+    def place(
+        self, camera: Camera, format_: PixelFormat = PixelFormat.RGB8, *, chunks: int | None = None, stride: int | None = None, number: int = 0,
+    ) -> Place:
         """Memory for a frame of a camera's size."""
         lib, width, height = self.driver, camera.width, camera.height
         chunks = lib.flk_list_chunks(width, height, ENTRIES * self.scene.gaussians) if chunks is None else chunks
         stride = stride or lib.flk_least_stride(width, int(format_))
         record_bytes = lib.flk_record_bytes(ctypes.byref(self.scene), self.device.form)
-        region = driver.CRegion(
-            self.allocate(record_bytes, "records"), record_bytes, self.allocate(lib.flk_list_bytes(chunks), "lists"), chunks,
-            self.allocate(lib.flk_pointer_bytes(width, height), "pointers"),
+        records, lists, pointers, picture = (
+            self.allocate(size, purpose, number=number) for purpose, size in zip(OF_PLACE, (
+                record_bytes, lib.flk_list_bytes(chunks), lib.flk_pointer_bytes(width, height), lib.flk_frame_bytes(height, stride),
+            ))
         )
-        return Place(region, self.allocate(lib.flk_frame_bytes(height, stride), "frame"), stride)
+        return Place(driver.CRegion(records, record_bytes, lists, chunks, pointers), picture, stride, number)
 
     def fail(self, base: int, size: int, writes: bool = True) -> None:
         """Bursts that touch a range, or reads alone, are answered with an error from now on."""
@@ -241,12 +261,15 @@ class ChipSession(Half):
             raise self._failure()
 
     def wait(self, limit: int = LIMIT) -> None:
-        """Until an enabled interrupt waits. FlickerError after `limit` cycles."""
-        cycles = self._lib.flk_chip_wait(self._sim, limit, 1)
-        if cycles < 0:
-            raise self._failure()
-        if cycles == limit:
-            raise self._failure(f"no interrupt within {limit} cycles")
+        """Until an enabled interrupt waits; Ctrl-C is seen meanwhile. FlickerError after `limit` cycles."""
+        for begin in range(0, limit, SLICE):
+            most = min(SLICE, limit - begin)
+            cycles = self._lib.flk_chip_wait(self._sim, most, 1)
+            if cycles < 0:
+                raise self._failure()
+            if cycles < most:
+                return
+        raise self._failure(f"no interrupt within {limit} cycles")
 
     def _wait_with(self, progress: Callable[[int, int], None], frame: driver.CFrame, limit: int) -> None:
         """Progress by what has been read of the geometry and written of the frame buffer."""
@@ -326,6 +349,7 @@ class ChipSession(Half):
             raise self._failure(", ".join(done.errors))
         return replace(done, usage=self.usage().since(before))
 
-    def purposes(self) -> dict[str, PurposeCounts]:
-        """Traffic of all frames, by what lies there."""
-        return self.traffic(PURPOSES)
+    def purposes(self, number: int = 0) -> dict[str, PurposeCounts]:
+        """Traffic of all frames, by what lies there: the scene, and the places with this number."""
+        own = self.traffic(PURPOSES, number * len(PURPOSES))
+        return self.traffic(PURPOSES) | {name: own[name] for name in OF_PLACE}

@@ -145,10 +145,10 @@ class Half:
             errors.append(error.value)
         return _counters(out, counters), errors
 
-    def traffic(self, purposes: Sequence[str]) -> dict[str, PurposeCounts]:
-        """By the purposes that `load` numbered, of all frames."""
+    def traffic(self, purposes: Sequence[str], first: int = 0) -> dict[str, PurposeCounts]:
+        """By the purposes that `load` numbered, from `first` on, of all frames."""
         out = {}
-        for number, name in enumerate(purposes):
+        for number, name in enumerate(purposes, first):
             counts = PurposeCounts()
             self._lib.flk_half_counts(self._sim, number, ctypes.byref(counts))
             out[name] = counts

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictInt, StrictStr, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, StrictInt, StrictStr, ValidationError, field_validator, model_validator
 
 from ...errors import FlickerError
+from ...front.path_rules import kind_of
+from ...front.paths import Asked
 from ...front.view import DEMO
 from ...params import SortOrder
 from ...scene.camera import MAX_SIZE
@@ -44,7 +46,9 @@ class Sweep:
     def description(self) -> dict[str, Any]:
         """What the results stand for: scenes by content, views, sizes, configurations, and the code."""
         return {
-            "views": [{"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size), "looks": t.looks} for t in self.targets],
+            "views": [
+                {"scene": t.scene.file, "digest": t.scene.digest, "view": t.view, "size": list(t.size), "looks": t.looks, **t.moved} for t in self.targets
+            ],
             "configurations": list(self.configurations),
             "code": code_digest(),
         }
@@ -68,18 +72,63 @@ class Sweep:
 # ---- the file -----------------------------------------------------------------------------------
 
 
-def _views(value: Any) -> Any:
-    for view in value if isinstance(value, list) else []:
-        if isinstance(view, bool) or not isinstance(view, int) or view < 0:
-            raise ValueError(f"expected camera numbers from 0 on, not '{view}'")
-    return value
-
-
-Views = Annotated[list[StrictInt], BeforeValidator(_views), Field(min_length=1)]
-
-
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid")
+
+
+Number = Annotated[float, Field(strict=True)]
+
+
+class PathSection(_Section):
+    """A path instead of a still: the options of `flicker path`, a motion or none: the cameras in order."""
+
+    pan: Annotated[Number | None, Field(description="pixels a frame")] = None
+    orbit: Annotated[Number | None, Field(description="degrees of the whole path")] = None
+    dolly: StrictBool = False
+    walk: StrictBool = False
+    shake: StrictBool = False
+    keyframes: StrictBool = False
+    speed: Number | None = None
+    ahead: Number | None = None
+    seed: StrictInt | None = None
+    frames: Annotated[StrictInt | None, Field(ge=1)] = None
+    fps: Number = 90.0
+    clock: Annotated[Number, Field(description="GHz")] = 1.0
+    view: Annotated[StrictInt, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _rules(self) -> PathSection:
+        self.kind()
+        return self
+
+    def kind(self) -> str | None:
+        try:
+            return kind_of(self.model_dump(), str)
+        except FlickerError as error:
+            raise ValueError(str(error)) from None
+
+    def asked(self) -> Asked:
+        """The path that is asked for."""
+        given = {name: value for name in ("speed", "ahead", "seed") if (value := getattr(self, name)) is not None}
+        return Asked(self.kind(), self.pan or self.orbit or 0.0, self.view, None, self.frames, self.fps, **given)
+
+
+def _views(value: Any) -> Any:
+    found: list[Any] = []
+    for n, view in enumerate(value if isinstance(value, list) else []):
+        if isinstance(view, dict):
+            try:
+                found.append(PathSection.model_validate(view))
+            except ValidationError as error:
+                raise ValueError(f"entry {n}: {_wrong(error, PathSection)}") from None
+        elif isinstance(view, bool) or not isinstance(view, int) or view < 0:
+            raise ValueError(f"expected camera numbers from 0 on, or paths, not '{view}'")
+        else:
+            found.append(view)
+    return found if isinstance(value, list) else value
+
+
+Views = Annotated[list[Any], BeforeValidator(_views), Field(min_length=1)]
 
 
 class SceneSection(_Section):
@@ -87,7 +136,7 @@ class SceneSection(_Section):
 
     path: Annotated[StrictStr, Field(min_length=1, description="scene file, relative to the YAML file, or demo")]
     cameras: Annotated[StrictStr | None, Field(min_length=1, description="cameras instead of those beside the scene")] = None
-    views: Annotated[Views | None, Field(description="camera numbers of this scene")] = None
+    views: Annotated[Views | None, Field(description="camera numbers of this scene, or paths")] = None
     up: Annotated[StrictStr | None, Field(description="axis of the scene that points up, for the orbit")] = None
     photos: Annotated[StrictStr | None, Field(min_length=1, description="folder of photographs instead of those beside the cameras, or none")] = None
     background: Annotated[StrictStr, Field(description="black, white or r,g,b from 0 to 1")] = "black"
@@ -126,7 +175,7 @@ class SweepFile(_Section):
     configurations: Annotated[
         list[StrictStr] | Literal["all"], Field(description="list of names or patterns (flicker report --list), or all: those of the report"),
     ]
-    views: Annotated[Views, Field(description="camera numbers of every scene without its own")] = [0]
+    views: Annotated[Views, Field(description="camera numbers of every scene without its own, or paths")] = [0]
     size: Annotated[StrictStr | None, Field(description="WxH")] = None
     cluster: Annotated[ClusterSection | None, Field(description="workers, or address")] = None
     out: Annotated[StrictStr | None, Field(min_length=1, description="folder, relative to the current one")] = None
@@ -153,24 +202,29 @@ def _place(location: tuple) -> str:
 
 def _first(path: Path, error: ValidationError) -> FlickerError:
     """The first thing wrong, as one line that names file and key."""
+    return FlickerError(f"{path}: {_wrong(error, SweepFile)}")
+
+
+def _wrong(error: ValidationError, whole: type[_Section]) -> str:
+    """The first thing wrong with a section."""
     found = error.errors()[0]
     location = tuple(part for part in found["loc"] if not (isinstance(part, str) and ("[" in part or part == "list")))
     if found["type"] == "extra_forbidden":
         sections: dict[str, type[_Section]] = {"scenes": SceneSection, "cluster": ClusterSection}
-        section = sections.get(str(location[0]) if len(location) > 1 else "", SweepFile)
+        section = sections.get(str(location[0]) if len(location) > 1 else "", whole)
         close = difflib.get_close_matches(str(location[-1]), section.model_fields, 1)
         hint = f"did you mean '{close[0]}'?" if close else f"known are {', '.join(section.model_fields)}"
         where = _place(location[:-1])
-        return FlickerError(f"{path}: {where + ': ' if where else ''}unknown key '{location[-1]}'; {hint}")
+        return f"{where + ': ' if where else ''}unknown key '{location[-1]}'; {hint}"
     if found["type"] == "missing":
         field_ = SweepFile.model_fields.get(str(location[-1])) or SceneSection.model_fields[str(location[-1])]
-        return FlickerError(f"{path}: {_place(location[:-1]) + ': ' if len(location) > 1 else ''}key '{location[-1]}' is missing: {field_.description}")
+        return f"{_place(location[:-1]) + ': ' if len(location) > 1 else ''}key '{location[-1]}' is missing: {field_.description}"
     message = str(found["msg"]).removeprefix("Value error, ")
     if found["type"] in ("too_short", "list_type"):
         message = "expected a list with at least one entry"
     elif found["type"] != "value_error":
         message = f"{message[0].lower()}{message[1:]}, not '{found['input']}'"
-    return FlickerError(f"{path}: {_place(location)}: {message}")
+    return f"{_place(location)}: {message}" if location else message
 
 
 def _parse(path: Path) -> SweepFile:
@@ -234,18 +288,21 @@ def load_sweep(path: str | Path) -> Sweep:
     if not names:
         raise FlickerError(f"{path}: configurations: expected a list with at least one entry")
     targets: list[Target] = []
-    seen: set[tuple] = set()
+    first_of: dict[tuple, int] = {}  # section in which a target comes first
     for i, section in enumerate(given.scenes):
         where = f"scenes[{i}]"
         scene = _scene(path, section, where)
-        for view in dict.fromkeys(section.views if section.views is not None else given.views):
+        for view in section.views if section.views is not None else given.views:
             try:
-                target = scene.target(view, size)
+                moved = isinstance(view, PathSection)
+                target = scene.path_target(view.asked(), size, view.clock) if moved else scene.target(view, size)
             except FlickerError as error:
                 raise FlickerError(f"{path}: {where}: {error}") from None
-            if (same := (scene.file, scene.digest, view)) in seen:
-                raise FlickerError(f"{path}: scenes: view {view} of {scene.path} is there twice")
-            seen.add(same)
+            if (same := (scene.file, scene.digest, target.view, target.path, target.clock)) in first_of:
+                if i == first_of[same]:
+                    continue
+                raise FlickerError(f"{path}: scenes: view {target.number} of {scene.path} is there twice")
+            first_of[same] = i
             targets.append(target)
     cluster = given.cluster or ClusterSection()
     out = Path(given.out).expanduser() if given.out else BUILD / "sweep"

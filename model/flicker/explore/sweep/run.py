@@ -44,16 +44,21 @@ def _compute(points: list[Point], topic: str, share: int) -> list[tuple[str, dic
     import numba
     from distributed import get_worker
 
+    from ..along import evaluate_along
     from ..evaluate import evaluate
 
     numba.set_num_threads(max(1, numba.config.NUMBA_NUM_THREADS // share))  # type: ignore[attr-defined]
     worker = get_worker()
-    view = points[0].target.load()
-    rows = []
-    for point in points:
-        row = {name: plain(value) if hasattr(value, "dtype") else value for name, value in evaluate(view, point.configuration).row.items()}
-        worker.log_event(topic, {"key": point.key, "row": row, "pid": os.getpid()})
-        rows.append((point.key, row))
+    target, keys, rows = points[0].target, {point.configuration: point.key for point in points}, []
+    if target.path is not None:
+        found = evaluate_along(target, list(keys))
+    else:
+        view = target.load()
+        found = ((name, evaluate(view, name).row) for name in keys)
+    for name, values in found:
+        row = {column: plain(value) if hasattr(value, "dtype") else value for column, value in values.items()}
+        worker.log_event(topic, {"key": keys[name], "row": row, "pid": os.getpid()})
+        rows.append((keys[name], row))
     return rows
 
 
@@ -201,15 +206,15 @@ def _run(client, sweep: Sweep, store: Rows, report: Callable[[dict[str, Any]], N
                 lost += 1
                 _drain(events, keep)
                 if attempts[view][1] >= MAX_LOST:
-                    failures.append(f"{view.scene.path} view {view.view}: lost {MAX_LOST + 1} workers without finishing a point")
+                    failures.append(f"{view.scene.path} view {view.number}: lost {MAX_LOST + 1} workers without finishing a point")
                 elif any(p.key not in store.rows for p in groups[view]):
                     submit(view)
             except FlickerError as error:
-                failures.append(f"{view.scene.path} view {view.view}: {error}")
+                failures.append(f"{view.scene.path} view {view.number}: {error}")
             except Exception as error:  # one view's failure must not take the others' results
                 if client.status != "running":
                     raise FlickerError(f"cluster {sweep.address or 'of this machine'}: connection lost") from None
-                failures.append(f"{view.scene.path} view {view.view}: {type(error).__name__}: {error}")
+                failures.append(f"{view.scene.path} view {view.number}: {type(error).__name__}: {error}")
     finally:
         with contextlib.suppress(Exception):
             client.cancel([future for future, _ in futures.values()], force=True)

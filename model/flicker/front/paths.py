@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import FlickerError
-from ..front.ahead import common_up, distance_ahead
-from ..front.projection import project
 from ..scene import motion
 from ..scene.camera import Camera, select_view
 from ..scene.sources import Source
 from ..scene.trajectory import check_path, joined, times_of
+from .ahead import common_up, distance_ahead
+from .projection import project
 
 AHEAD_M = 3.0  # from the first camera to what it looks at, where nobody says
 
@@ -33,15 +34,25 @@ class Asked:
     seed: int = 1
 
 
+def given_cameras(cameras: Sequence[Camera], cameras_from: str, asked: Asked) -> list[Camera]:
+    """The cameras at the size of a path. FlickerError, naming where they come from, camera and field, where they should be a path and are none, or lack the
+    one that a motion begins at."""
+    given = [camera if asked.size is None else camera.resized(*asked.size) for camera in cameras]
+    if asked.kind not in (None, "keyframes"):
+        select_view(given, asked.view)
+        return given
+    check_path(given, cameras_from)
+    if asked.kind is None and asked.frames is not None and asked.frames > len(given):
+        raise FlickerError(f"{cameras_from}: {len(given)} cameras, not {asked.frames}, each a frame; as keyframes they make any number")
+    return given
+
+
 def path_of(source: Source, asked: Asked) -> tuple[list[Camera], str]:
     """The cameras of a path in a scene, one of a frame, and what it is, for people. FlickerError, naming file, camera and field, for cameras that are no
     path."""
-    given = [camera if asked.size is None else camera.resized(*asked.size) for camera in source.cameras]
+    given = given_cameras(source.cameras, source.cameras_from, asked)
     if asked.kind in (None, "keyframes"):
-        check_path(given, source.cameras_from)
         if asked.kind is None:
-            if asked.frames is not None and asked.frames > len(given):
-                raise FlickerError(f"{source.cameras_from}: {len(given)} cameras, not {asked.frames}, each a frame; as keyframes they make any number")
             return given[: asked.frames], f"cameras of {source.cameras_from}"
         times = times_of(given)
         seconds = len(given) - 1 if times is None else float(times[-1])
