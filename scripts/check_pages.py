@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the pages: every link and anchor leads somewhere, every page of docs/ is in `nav` of mkdocs.yml, and links lead to every page from README.md.
+"""Checks the pages: every link and anchor leads somewhere, every page of docs/ is in `nav` of mkdocs.yml, links lead to every page from README.md, and pages
+that comments of sources name are there.
 
 Pages are README.md, CONTRIBUTING.md, sw/README.md and docs/**.md. Anchors are those of headings as GitHub and the site make them. Addresses of other
 machines are not looked at. Part of `make lint`; the site itself is built by `make site`.
@@ -20,6 +21,8 @@ from flicker.toolchain import ROOT
 OUTSIDE = ("README.md", "CONTRIBUTING.md", "sw/README.md")  # pages that are not below docs/
 VIRTUAL = {"project.md": "README.md", "contributing.md": "CONTRIBUTING.md", "driver.md": "sw/README.md"}  # their names in the site (scripts/site_hooks.py)
 LINK = re.compile(r"!?\[(?:[^\]\[\n]|\n(?!\n))*\]\(([^)\s]+)\)")
+SOURCES = {"rtl": ".sv .rdl", "model": ".py .cpp .hpp .vlt", "scripts": ".py", "tb": ".py .sv .toml", "formal": ".sv .toml", "sw": ".c .h", "lint": ".toml"}
+NAMED = re.compile(r"(?<![\w/])docs/[\w/-]+\.md\b")
 HEADING = re.compile(r"#{1,6} +(.+?) *#*$")
 
 
@@ -130,8 +133,20 @@ def unreachable(root: Path = ROOT) -> list[str]:
     return [f"{page.relative_to(root)}: no links lead here from README.md" for page in pages(root) if page.resolve() not in far]
 
 
+def misnamed(root: Path = ROOT) -> list[str]:
+    """Pages that sources name and that are not there; tests of these checks have pages of their own."""
+    found = []
+    for folder, suffixes in SOURCES.items():
+        for source in sorted((root / folder).rglob("*")):
+            if source.suffix in suffixes.split() and source.name not in ("test_pages.py", "test_docs.py"):
+                for number, line in enumerate(source.read_text().splitlines(), 1):
+                    missing = [name for name in NAMED.findall(line) if not (root / name).exists()]
+                    found += [f"{source.relative_to(root)}:{number}: no page {name}" for name in missing]
+    return found
+
+
 def main() -> int:
-    findings = [*broken_links(), *unlisted(), *unreachable()]
+    findings = [*broken_links(), *unlisted(), *unreachable(), *misnamed()]
     for finding in findings:
         print(finding)
     return 1 if findings else 0

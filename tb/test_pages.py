@@ -83,6 +83,7 @@ def test_links_lead_somewhere() -> None:
     assert check_pages.broken_links() == []
     assert check_pages.unlisted() == []
     assert check_pages.unreachable() == []
+    assert check_pages.misnamed() == []
 
 
 TREE = {
@@ -111,6 +112,7 @@ def test_links_of_a_right_tree(tmp_path: Path) -> None:
     ("unlisted", {"docs/d.md": "\n"}, "mkdocs.yml: nav lacks d.md"),
     ("unlisted", {"mkdocs.yml": "nav: [project.md, a.md, b.md, d.md]\n"}, "mkdocs.yml: nav names d.md, which is not there"),
     ("unreachable", {"docs/d.md": "[x](a.md)\n"}, "docs/d.md: no links lead here from README.md"),
+    ("misnamed", {"rtl/x.sv": "// docs/a.md\n// (docs/d.md)\n"}, "rtl/x.sv:2: no page docs/d.md"),
 ])
 def test_broken_links_are_found(check: str, changes: dict[str, str], finding: str, tmp_path: Path) -> None:
     assert getattr(check_pages, check)(tree(tmp_path, changes)) == [finding]

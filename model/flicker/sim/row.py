@@ -1,4 +1,4 @@
-"""Frames through the verilated chip back to back, as a host runs them: two under way, each with memory of its own (docs/programming.md).
+"""Frames through the verilated chip back to back, as a host runs them: two under way, each with memory of its own (docs/guide/programming.md).
 
     with ChipSession(packed, config) as chip:
         for done in back_to_back(chip, cameras):
