@@ -94,7 +94,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_axi_arbiter": ["flk_priority_arbiter", "flk_fifo"],
     "flk_frame_counters": [MEMORY],
     "flk_top": [
-        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_lane", "flk_preprocessing", "flk_rendering",
+        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_hold", "flk_axi_lane", "flk_preprocessing", "flk_rendering",
     ],
     "flk_top_axi": ["flk_top", "flk_reset_sync"],
     # The wrapper has no logic of its own.
@@ -385,7 +385,7 @@ def _top() -> list[Unit]:
     """The chip around its two halves."""
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
-        unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
+        unit("flk_axi_hold"), unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
         unit("flk_top", "faithful", **FAITHFUL.chip_parameters()),
         unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()), unit("flk_top_axi"),
     ]
