@@ -7,6 +7,7 @@
 // frame buffer is not touched.
 // A frame whose deadline has passed, so many cycles behind its start, ends as it is, with error_o.late. A half that works on it is stopped: *_stop_o until
 // *_stopped_i, which says that nothing of it is under way at the memory; its counters are kept, and *_reset_o resets it for four cycles. The other half goes on.
+// A half that ends by itself between *_stopped_i and its reset counts as stopped.
 // A late frame passes by the halves that it has not reached. The rendering half that has written all pairs of tiles by then is not late.
 // post_o is high for a cycle when a frame has ended; tag_o, error_o, pairs_o (of tiles written) and bank_o are its until the next one, which is posted only
 // after acknowledged_i, a pulse behind that cycle: what comes before or with post_o is of an earlier frame. Before the first
@@ -495,10 +496,10 @@ module flk_frame_control
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      front_done_i && !clear_i |-> front_q == RUN || front_q == STOP)
+      front_done_i && !clear_i |-> front_q == RUN || front_stop_o)
   else $error("flk_frame_control: the front end ends a frame that it was not given");
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      rendering_done_i && !clear_i |-> render_q == RUN || render_q == STOP)
+      rendering_done_i && !clear_i |-> render_q == RUN || rendering_stop_o)
   else $error("flk_frame_control: the rendering half ends a frame that it was not given");
 `endif
 

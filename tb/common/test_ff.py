@@ -253,7 +253,7 @@ def test_function_bounds(function: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("function", range(4), ids=tables.NAMES)
 def test_function_bounds_all(function: int) -> None:
-    """Every mantissa; prints what docs/reference/ff.md has in its table."""
+    """Every mantissa; prints the largest error for each number of mantissa bits."""
     worst = [float(error_ulp(function, M, np.arange(1 << M)).max()) for M in MAN_BITS]
     print(tables.NAMES[function], " ".join(f"{M}: {error:.3f}" for M, error in zip(MAN_BITS, worst)))
     assert max(worst) <= ff.FF_MAX_ULP[function]

@@ -1,8 +1,7 @@
 """The memory image: what its bits mean, what packing may change, which images are refused.
 
 A second decoder, written from docs/reference/memory_image.md with `struct`, one Gaussian at a time, says what an image means; the reader is held against
-it. Real scenes
-(FLICKER_SCENES) show how much of the picture packing costs.
+it. Real scenes (FLICKER_SCENES) show how much of the picture packing costs.
 """
 
 from __future__ import annotations

@@ -207,7 +207,7 @@ def test_reset_in_a_frame() -> None:
 
 @pytest.mark.parametrize(("latency", "perfect"), [(1, True), (100, True), (200, True), (100, False)])
 def test_rate(latency: int, perfect: bool) -> None:
-    """A cluster every four cycles, whatever the latency. perfect: a memory without DRAM. The figures of docs/reference/cluster_cull.md."""
+    """A cluster every four cycles, whatever the latency. perfect: a memory without DRAM."""
     packed, setup = demo()
     n = len(packed.table)
     unit = bench()

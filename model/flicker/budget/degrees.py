@@ -1,8 +1,7 @@
 """SH coefficients that say little: what the pictures would lose by fewer, Gaussian by Gaussian, and which clusters to take them from.
 
 The chip's memory holds as many coefficients for all Gaussians of a cluster as one of them needs (docs/reference/memory_image.md), so cuts are made by
-cluster. What is
-cut is replaced by its mean over the views, weighted by the squares of alpha T, in the constant term.
+cluster. What is cut is replaced by its mean over the views, weighted by the squares of alpha T, in the constant term.
 """
 
 from __future__ import annotations

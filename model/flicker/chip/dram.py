@@ -2,8 +2,7 @@
 
 Rules and times of the DRAM are those of sim/dram.hpp (open page, queues of `window` reads and `write_places` writes a channel, row hits first, refresh),
 compiled once, which also stand behind the AXI ports of simulations: docs/reference/memory_model.md. Numbers come from constants.py. Left out: the command
-bus, latency of
-the controller, dependences between bursts (the streams of a phase touch different arrays).
+bus, latency of the controller, dependences between bursts (the streams of a phase touch different arrays).
 """
 
 from __future__ import annotations

@@ -48,8 +48,7 @@ class MaskGenerator(ABC):
     """Says which mini-tiles, or which pixels of them, a splat is sent to. Subclasses are frozen dataclasses: equal fields, equal masks.
 
     pixels: the masks name single pixels. exact: never leaves out a pixel that the VRU would have blended, proved in docs/reference/mask_bounds.md.
-    free: masks
-    for nothing, a bound and no design. precision: formats, for tables. operations: hardware operations per element.
+    free: masks for nothing, a bound and no design. precision: formats, for tables. operations: hardware operations per element.
     """
 
     pixels: bool = False

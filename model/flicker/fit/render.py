@@ -4,8 +4,7 @@
     gradient = backward(frame, slope_of_image)        # dL/d image (H, W, 3) gives dL/d parameters[frame.index]
 
 The rules are those of the reference renderer (docs/reference/reference_renderer.md): projection and colours are its own functions. Where a derivative does
-not exist, at the clamp
-of alpha, of a colour, of the Jacobian, it is that of the side on which the value lies; skipped pairs and finished pixels give nothing.
+not exist, at the clamp of alpha, of a colour, of the Jacobian, it is that of the side on which the value lies; skipped pairs and finished pixels give nothing.
 """
 
 from __future__ import annotations
