@@ -134,7 +134,7 @@ PARTS = (
          ("breakdown", "formats", "families", "masks", "counts", "stability"), lanes.tables, scenes_missing,
          before=lanes.draw),
     Part("lane_stage", "the lanes' RTL: cycles and areas; cycles of cores that take more", ("cycles", "feeds", "area"), lane_stage.tables, scenes_missing),
-    Part("lists", "layouts of tile lists in DRAM", ("entries", "layouts", "flight"), lists.tables, scenes_missing),
+    Part("lists", "layouts of tile lists in DRAM", ("entries", "formats", "layouts", "flight"), lists.tables, scenes_missing),
     Part("long_lists", "ways to sort lists longer than a sorting unit", ("sizes", "early", "real", "means"), long_lists.tables, scenes_missing),
     Part("scale", "how a frame grows with the scene and the picture, with the chart", ("scene", "degree", "picture"), scale.tables, scenes_missing),
     Part("scale_hardware", "long lists and grown scenes in the whole chip's RTL; half an hour", ("",), scale_hardware.tables, scenes_missing),

@@ -7,13 +7,17 @@ from functools import partial
 import numpy as np
 
 from flicker.chip.frame import prepare
+from flicker.chip.line_formats import CHOSEN, FORMATS, PLAIN, fill
 from flicker.chip.list_layout import WRITERS, Chain, Keyed, LayoutResult, ListLayout, Replace, evaluate_layout, key_entries, read_cycles, visits, write
 from flicker.front.binning import pairs, pixel_boxes
-from flicker.front.view import View
+from flicker.front.view import View, load_view
+from flicker.golden.front.frame import run_front
 from flicker.markdown import table
 from flicker.params import TILE
+from flicker.pipeline import FrontOptions, packed_for_picture
+from flicker.scene.real import REAL_VIEWS
 
-from .common import Say, titled_views
+from .common import Say, folder_of_scenes, load, titled_views
 
 _table = partial(table, numbers=True)
 _POINTS = ((100, 16), (200, 16))
@@ -72,9 +76,34 @@ def _flight_rows(keyed: Keyed) -> list[tuple[str, ...]]:
     return rows
 
 
+SMALL = (320, 178)  # where lists are long
+
+
+def _format_rows(say: Say) -> list[tuple[str, ...]]:
+    """Formats of lines, by the lists that the golden front end leaves."""
+    frames = []
+    for view in REAL_VIEWS:
+        loaded = load(view)
+        frames.append((view.title, run_front(packed_for_picture(loaded, FrontOptions())[0], loaded.camera)))
+    small = load_view(REAL_VIEWS[0].path(folder_of_scenes()), REAL_VIEWS[0].number, SMALL)
+    frames.append((f"{REAL_VIEWS[0].title}, {SMALL[0]}x{SMALL[1]}", run_front(packed_for_picture(small, FrontOptions())[0], small.camera)))
+    rows = []
+    for title, frame in frames:
+        say(f"{title}: formats of lines")
+        plain = fill(frame, PLAIN)
+        for format_ in FORMATS:
+            found = fill(frame, format_)
+            name = f"**{format_.name}**" if format_ == CHOSEN else format_.name
+            runs = f"{found.run_lines / plain.run_lines:.0%}" if plain.run_lines else "-"
+            share = f"{found.lines / plain.lines:.1%}"
+            rows.append((title, name, f"{format_.bits}", f"{found.entries / found.lines:.2f}", f"{found.written / 1e6:.2f}", share, runs))
+    return rows
+
+
 def tables(say: Say) -> dict[str, str]:
     """Of every view."""
     entries, layouts, flights = [], [], []
+    formats = _format_rows(say)
     for title, view in titled_views(say):
         prepared = prepare(view)
         keyed = key_entries(prepared)
@@ -88,5 +117,6 @@ def tables(say: Say) -> dict[str, str]:
         "entries": _table(("view", "by boxes", "exact", "sub-tiles in masks", "mean list", "longest list", "needed", "busiest writer above mean"), entries),
         "layouts": _table(("view", "layout", "entries a line", "written MB", "pool MB", "write cycles", "efficiency", "read MB, early stop", "never read MB",
                            *(f"read, latency {lat}" for lat, _ in _POINTS), "combiner KB", "pointers KB"), layouts),
+        "formats": _table(("view", "format", "bits a line", "entries a line", "written MB", "of the lines of nine", "of lines of runs"), formats),
         "flight": _table(("chunk bytes", "latency", *(f"{n} lists in flight" for n in _FLIGHTS)), flights),
     }
