@@ -13,11 +13,13 @@
 // With two pointers on the chip for four lists (Pointers 2), lines of pointers move to the table and
 // back, by an agent of any speed.
 //
-// One entry of a frame, whichever pick_i chooses, has bit 0 set; the proof counts the places where it
-// is. Bit 1 is set in all entries of the chosen list, which tells its lines at the output. At most as many chunks as
-// a link can name. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
+// One entry of a frame, whichever pick_i chooses, has its mask bit set; the proof counts the places where it
+// is. The key bit is set in all entries of the chosen list, which tells its lines at the output. The record bit is free: entries
+// with the same one are near each other, and of these five are in a line, of others three. At most as many
+// chunks as a link can name. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
 module fv_list_writer #(
-  parameter int unsigned Pointers = 4
+  parameter int unsigned Pointers = 4,
+  parameter int unsigned Easy     = 0   // 1, for covers: nothing makes the writer wait
 ) (
   input logic       clk_i,
   input logic       again_i,
@@ -31,6 +33,7 @@ module fv_list_writer #(
   input logic       in_end_i,
   input logic       in_u_i,
   input logic       in_v_i,
+  input logic       in_record_i,
   input logic [1:0] list_i,
   input logic [5:0] at_i,
   input logic       out_ready_i,
@@ -58,7 +61,7 @@ module fv_list_writer #(
   logic        rst_n, idle, done, failed, in_ready, out_valid, tag;
   logic [2:0]  taken;
   logic [5:0]  out_address;
-  logic [15:0] out_data;
+  logic [31:0] out_data;
   logic        picked_q, mark;
   logic [1:0]  list_q;  // that is followed
   logic [5:0]  at_q;    // the address, from list_base_q
@@ -94,10 +97,15 @@ module fv_list_writer #(
     .CoordBits  (1),
     .ChunkLines (2),
     .ChunkBits  (2),
-    .EntryBits  (2),
-    .LineEntries(2),
-    .LineBits   (16),
-    .PointerBits(8),
+    .MaskBits   (1),
+    .RecordBits (1),
+    .KeyBits    (1),
+    .RecordKept (0),
+    .KeyKept    (1),
+    .LineEntries(3),
+    .ShortEntries(5),
+    .LineBits   (32),
+    .PointerBits(16),
     .AddressBits(6)
   ) dut (
     .clk_i,
@@ -121,7 +129,7 @@ module fv_list_writer #(
     .in_end_i,
     .in_u_i,
     .in_v_i,
-    .in_entry_i     ({mark, tag}),
+    .in_entry_i     ({mark, in_record_i, tag}),
     .out_valid_o    (out_valid),
     .out_ready_i,
     .out_address_o  (out_address),
@@ -196,7 +204,7 @@ module fv_list_writer #(
     end
     if (out_pointers && out_ready_i) begin
       table_q[{out_line, 1'b0}] <= out_data[3:0];
-      table_q[{out_line, 1'b1}] <= out_data[11:8];
+      table_q[{out_line, 1'b1}] <= out_data[19:16];
     end
     if (start_i && idle) begin
       due_q     <= '0;
@@ -219,9 +227,10 @@ module fv_list_writer #(
 
   // What is held where. Places are set and way.
 
-  logic [3:0][1:0]      count;   // entries of the open line
+  logic [3:0][2:0]      count;   // entries of the open line
   logic [3:0][1:0]      list;
-  logic [3:0][1:0][1:0] stored;  // entries in memory, by place and column
+  logic [3:0][3:0][1:0] stored;  // entries in columns, by place and column: mask and key
+  logic [3:0][2:0]      newest;  // the newest one of each line
   logic [3:0][3:0]      kept;    // the pointers on the chip
   logic [3:0][3:0]      value;   // of each list, wherever it is
 
@@ -229,12 +238,17 @@ module fv_list_writer #(
 
   for (genvar s = 0; s < 2; s++) begin : gen_set
     for (genvar w = 0; w < 2; w++) begin : gen_way
-      assign count[2*s+w] = dut.i_rows.storage_q[s][4*w+2+:2];
-      assign list[2*s+w]  = dut.i_rows.storage_q[s][4*w+:2];
+      assign count[2*s+w]  = dut.i_rows.storage_q[s][6*w+2+:3];
+      assign list[2*s+w]   = dut.i_rows.storage_q[s][6*w+:2];
+      assign newest[2*s+w] = dut.gen_newest[w].i_newest.storage_q[s];
     end
   end
   for (genvar p = 0; p < 4; p++) begin : gen_place
-    assign stored[p] = {dut.gen_columns[1].i_column.storage_q[p], dut.gen_columns[0].i_column.storage_q[p]};
+    assign stored[p] = {dut.gen_over[1].gen_rest[0].gen_piece.i_rest.storage_q[p],
+                        dut.gen_over[1].i_gap.storage_q[p],
+                        dut.gen_over[0].gen_rest[0].gen_piece.i_rest.storage_q[p],
+                        dut.gen_over[0].i_gap.storage_q[p],
+                        dut.gen_columns[1].i_kept.storage_q[p], dut.gen_columns[0].i_kept.storage_q[p]};
     assign kept[p] = dut.i_pointers.storage_q[p % Pointers];
   end
 
@@ -284,42 +298,67 @@ module fv_list_writer #(
     end
   end
 
-  // Bit b of column c of the line in place p, as stage D finds it, and as it will be.
-  function automatic logic now(logic [1:0] p, logic c, logic b);
-    if (dut.e_entry_q && dut.e_place_q == p && dut.e_column_q == 2'(c)) begin
-      return dut.e_word_q[b];
+  // Mask (b 0) or key (1) of column c of the line in place p, as stage D finds it, and as it will be.
+  function automatic logic now(logic [1:0] p, logic [1:0] c, logic b);
+    if (dut.e_push_q && dut.e_place_q == p && dut.e_column_q == 3'(c)) begin
+      return dut.e_newest_q[{b, 1'b0}];
     end
     return stored[p][c][b];
   endfunction
 
-  function automatic logic then_(logic [1:0] p, logic c, logic b);
-    if (dut.d_entry_q && dut.d_place_q == p && dut.d_column_q == 2'(c)) begin
-      return dut.d_word_q[b];
+  function automatic logic then_(logic [1:0] p, logic [1:0] c, logic b);
+    if (dut.d_push_q && dut.d_place_q == p && dut.d_column_q == 3'(c)) begin
+      return dut.d_newest_q[{b, 1'b0}];
     end
     return now(p, c, b);
   endfunction
 
+  // Entries of a line: the newest, two more in places of their own, two in gaps and tail.
+  function automatic logic [4:0] masks(logic [31:0] data);
+    return {data[7], data[4], data[6], data[3], data[0]};
+  endfunction
+
+  function automatic logic [4:0] keys(logic [31:0] data);
+    return {data[10], data[9], data[8], data[5], data[2]};
+  endfunction
+
   // Places where the chosen entry is.
 
-  logic [3:0] places;
+  logic [4:0] places;
   logic       out_list;  // what is at the output is a line of a list
+  logic [4:0] e_masks, e_keys, out_masks, out_keys, out_has, e_has;
 
-  assign out_list = out_valid && state != POINTERS && state != LAST;
+  assign out_list  = out_valid && state != POINTERS && state != LAST;
+  assign e_masks   = masks(dut.line);
+  assign e_keys    = keys(dut.line);
+  assign out_masks = masks(out_data);
+  assign out_keys  = keys(out_data);
+
+  for (genvar c = 0; c < 5; c++) begin : gen_has
+    assign out_has[c] = 4'(c) < out_data[14:11];
+    assign e_has[c]   = 3'(c) < dut.e_count_q;
+  end
 
   always_comb begin
-    places = 4'(dut.a_valid_q && !dut.a_flush_q && dut.a_entry_q[0]);
-    places += 4'(dut.b_valid_q && !dut.b_flush_q && dut.b_entry_q[0]);
+    places = 5'(dut.a_valid_q && !dut.a_flush_q && dut.a_entry_q[0]);
+    places += 5'(dut.r_valid_q && !dut.r_flush_q && dut.r_entry_q[0]);
+    places += 5'(dut.b_valid_q && !dut.b_flush_q && dut.b_entry_q[0]);
     for (int unsigned p = 0; p < 4; p++) begin
-      for (int unsigned c = 0; c < 2; c++) begin
-        places += 4'(2'(c) < count[p] && then_(2'(p), 1'(c), 1'b0));
+      places += 5'(count[p] != 3'd0 && newest[p][0]);
+      for (int unsigned c = 0; c < 4; c++) begin
+        places += 5'(3'(c + 1) < count[p] && then_(2'(p), 2'(c), 1'b0));
       end
     end
-    for (int unsigned c = 0; c < 2; c++) begin
-      if (dut.d_event_q && 2'(c) < dut.d_count_q) begin
-        places += 4'(dut.d_full_q && c == 1 ? dut.d_word_q[0] : now(dut.d_place_q, 1'(c), 1'b0));
+    places += 5'(dut.d_event_q && (dut.d_full_q ? dut.d_word_q[0] : dut.d_newest_q[0]));
+    for (int unsigned c = 0; c < 4; c++) begin
+      if (dut.d_event_q && 3'(c + 1) < dut.d_count_q) begin
+        places += 5'(dut.d_full_q && dut.d_column_q == 3'(c) ? dut.d_newest_q[0]
+                                                             : now(dut.d_place_q, 2'(c), 1'b0));
       end
-      places += 4'(dut.e_event_q && 2'(c) < dut.e_count_q && dut.line[2*c]);
-      places += 4'(out_list && 4'(c) < out_data[7:4] && out_data[2*c]);
+    end
+    for (int unsigned c = 0; c < 5; c++) begin
+      places += 5'(dut.e_event_q && e_has[c] && e_masks[c]);
+      places += 5'(out_list && out_has[c] && out_masks[c]);
     end
   end
 
@@ -337,8 +376,8 @@ module fv_list_writer #(
           picked_q <= 1'b1;
         end
         if (out_list && out_ready_i) begin
-          for (int unsigned c = 0; c < 2; c++) begin
-            if (4'(c) < out_data[7:4] && out_data[2*c] && delivered_q != 2'd3) begin
+          for (int unsigned c = 0; c < 5; c++) begin
+            if (out_has[c] && out_masks[c] && delivered_q != 2'd3) begin
               delivered_q <= delivered_q + 2'd1;
             end
           end
@@ -360,9 +399,9 @@ module fv_list_writer #(
   logic [3:0] chain_out, chain_e;
   logic [2:0] link;
 
-  assign chosen    = out_list && out_data[1];
+  assign chosen    = out_list && out_data[2];
   assign first     = !list_at[0];
-  assign link      = out_data[10:8];
+  assign link      = out_data[17:15];
   assign chain_out = {first ? 2'd1 : 2'd2, list_at[4:3]};
   assign e_chosen  = dut.e_sends_q && line_list_q == list_q;
   assign chain_e   = {dut.e_at_q[0] ? 2'd2 : 2'd1, dut.e_at_q[4:3]};
@@ -398,11 +437,13 @@ module fv_list_writer #(
   always_comb begin
     m_list: assume (list_i == list_q && at_i == at_q);
     m_chunks: assume (chunks_i <= 3'd4);
+    m_easy: assume (Easy == 0 || (start_i && in_valid_i && out_ready_i && mover_ready_i && mover_step_i && !again_i));
     if (rst_n) begin
       if (out_list) begin
-        a_count: assert (out_data[7:4] == 4'd1 || out_data[7:4] == 4'd2);
-        a_one_list: assert (out_data[7:4] == 4'd1 || out_data[3] == out_data[1]);
-        a_zero: assert (out_data[15:11] == 5'd0);
+        a_count: assert (out_data[14:11] >= 4'd1 && out_data[14:11] <= 4'd5);
+        a_one_list: assert ((out_keys & out_has) == ({5{out_keys[0]}} & out_has));
+        a_zero: assert (out_data[31:18] == 14'd0 && (out_masks & ~out_has & {2'b00, 3'b111}) == 5'd0 &&
+                        (out_keys & ~out_has) == 5'd0);
         a_fresh: assert (!first || 3'(list_at >> 3) == begun_q);
         a_down: assert (link[2] ? first && link[1:0] < list_at[4:3] : link == 3'd0);
         a_single: assert (!seen_q || list_at != at_q);
@@ -419,26 +460,26 @@ module fv_list_writer #(
         a_newest: assert (table_q[list_q] == chain_q);
       end
 
-      // Marks.
-      l_mark_a: assert (!dut.a_valid_q || dut.a_flush_q || dut.a_entry_q[1] == (dut.a_list_q == list_q));
-      l_mark_b: assert (!dut.b_valid_q || dut.b_flush_q || dut.b_entry_q[1] == (dut.b_list_q == list_q));
-      if (dut.d_entry_q) begin
-        l_mark_d: assert (dut.d_word_q[1] ==
-                          ((dut.d_full_q ? dut.d_list_q : list[dut.d_place_q]) == list_q));
+      // Keys.
+      l_mark_a: assert (!dut.a_valid_q || dut.a_flush_q || dut.a_entry_q[2] == (dut.a_list_q == list_q));
+      l_mark_r: assert (!dut.r_valid_q || dut.r_flush_q || dut.r_entry_q[2] == (dut.r_list_q == list_q));
+      l_mark_b: assert (!dut.b_valid_q || dut.b_flush_q || dut.b_entry_q[2] == (dut.b_list_q == list_q));
+      if (dut.d_push_q || dut.d_event_q) begin
+        l_mark_d: assert (dut.d_newest_q[2] == (dut.d_list_q == list_q));
       end
-      if (dut.d_event_q) begin
-        l_mark_line: assert (now(dut.d_place_q, 1'b0, 1'b1) == (dut.d_list_q == list_q) &&
-                             (dut.d_full_q || dut.d_count_q == 2'd1 ||
-                              now(dut.d_place_q, 1'b1, 1'b1) == (dut.d_list_q == list_q)));
+      if (dut.d_event_q && dut.d_full_q) begin
+        l_mark_word: assert (dut.d_word_q[2] == (dut.d_list_q == list_q));
+      end
+      if (dut.d_push_q && !dut.d_full_q) begin
+        l_push_list: assert (list[dut.d_place_q] == dut.d_list_q);
       end
       if (dut.e_event_q) begin
-        l_mark_e: assert (dut.line[1] == (line_list_q == list_q) &&
-                          (dut.e_count_q == 2'd1 || dut.line[3] == (line_list_q == list_q)));
+        l_mark_e: assert ((e_keys & e_has) == ({5{line_list_q == list_q}} & e_has));
         l_apart: assert (!dut.d_event_q || dut.d_list_q != line_list_q);
         l_apart_f: assert (!out_list || f_list_q != line_list_q);
       end
       if (out_list) begin
-        l_mark_f: assert (out_data[1] == (f_list_q == list_q));
+        l_mark_f: assert ((out_keys & out_has) == ({5{f_list_q == list_q}} & out_has));
         l_part: assert (list_at[5] == 1'b0);
       end
 
@@ -480,11 +521,20 @@ module fv_list_writer #(
   endfunction
 
   for (genvar p = 0; p < 4; p++) begin : gen_chain
-    for (genvar c = 0; c < 2; c++) begin : gen_mark
+    for (genvar c = 0; c < 4; c++) begin : gen_mark
       always_comb begin
         if (rst_n && state != CLEAR) begin
-          l_mark: assert (2'(c) >= count[p] || then_(2'(p), 1'(c), 1'b1) == (list[p] == list_q));
+          l_mark: assert (3'(c + 1) >= count[p] || then_(2'(p), 2'(c), 1'b1) == (list[p] == list_q));
         end
+        if (rst_n && dut.d_event_q && dut.d_place_q == 2'(p) && 3'(c + 1) < dut.d_count_q &&
+            !(dut.d_full_q && dut.d_column_q == 3'(c))) begin
+          l_mark_line: assert (now(2'(p), 2'(c), 1'b1) == (dut.d_list_q == list_q));
+        end
+      end
+    end
+    always_comb begin
+      if (rst_n && state != CLEAR) begin
+        l_mark_newest: assert (count[p] == 3'd0 || newest[p][2] == (list[p] == list_q));
       end
     end
     for (genvar q = 0; q < p; q++) begin : gen_apart
@@ -508,6 +558,7 @@ module fv_list_writer #(
   // An open line is still to be closed.
   function automatic logic pending(logic [1:0] p);
     return (dut.a_valid_q && dut.a_flush_q && {dut.a_set_q, dut.a_way_q} == p) ||
+        (dut.r_valid_q && dut.r_flush_q && {dut.r_set_q, dut.r_way_q} == p) ||
         (dut.b_valid_q && dut.b_flush_q && {dut.b_set_q, dut.b_way_q} == p) ||
         (state == OPEN_LINES && dut.step_q <= 3'(p));
   endfunction
@@ -531,8 +582,8 @@ module fv_list_writer #(
       end
 
       // The chosen entry is in one place.
-      l_sum: assert (state == CLEAR || 4'(delivered_q) + places <= 4'(picked_q));
-      l_kept: assert (failed || 4'(delivered_q) + places == 4'(picked_q) || idle || state == CLEAR);
+      l_sum: assert (state == CLEAR || 5'(delivered_q) + places <= 5'(picked_q));
+      l_kept: assert (failed || 5'(delivered_q) + places == 5'(picked_q) || idle || state == CLEAR);
       l_done: assert (!done || idle || Large && state == CLEAR);
       l_fresh: assert (state != CLEAR || Large || (delivered_q == 2'd0 && !picked_q && taken == 3'd0 && !failed));
       l_fresh_large: assert (state != CLEAR || delivered_q <= 2'(picked_q));
@@ -608,7 +659,7 @@ module fv_list_writer #(
         l_e_value: assert (dut.e_pointer_q == due_q[e_list_q]);
         l_e_last: assert (failed || dut.e_walk_last_q == e_list_q[0]);
         l_e_at: assert (dut.e_at_q == {3'd0, e_list_q[1], dut.writer_q});
-        l_e_pair: assert (!e_list_q[0] || out_data[11:8] == due_q[{e_list_q[1], 1'b0}]);
+        l_e_pair: assert (!e_list_q[0] || out_data[19:16] == due_q[{e_list_q[1], 1'b0}]);
       end
       if (state == POINTERS && dut.step_q[0]) begin
         l_step_pair: assert (dut.walk_q && 3'(dut.walk_list_q) + 3'd1 == dut.step_q);
@@ -624,12 +675,12 @@ module fv_list_writer #(
       end
       if (out_pointers) begin
         l_out_value: assert (out_data[3:0] == due_q[{out_line, 1'b0}] &&
-                             out_data[11:8] == due_q[{out_line, 1'b1}]);
+                             out_data[19:16] == due_q[{out_line, 1'b1}]);
       end
       l_lines: assert (state == CLEAR || state == IDLE || dut.pointer_lines_q == 2'd2 && dut.columns_q == 2'd2);
       if (state == CLEAR || state == IDLE || state == POINTERS || state == LAST) begin
-        l_empty: assert (!dut.a_valid_q && !dut.b_valid_q && !dut.d_entry_q && !dut.d_event_q &&
-                         !dut.e_entry_q && !dut.e_event_q);
+        l_empty: assert (!dut.a_valid_q && !dut.r_valid_q && !dut.b_valid_q && !dut.d_push_q &&
+                         !dut.d_event_q && !dut.e_push_q && !dut.e_event_q);
       end
       if (state == CLEAR || state == IDLE) begin
         l_quiet: assert (!out_valid);
@@ -653,24 +704,43 @@ module fv_list_writer #(
         l_walked_before: assert (3'(dut.walk_list_q) < dut.step_q);
       end
       l_flush: assert (!dut.a_valid_q || (dut.a_flush_q ? state == OPEN_LINES || state == DRAIN : state == ENTRIES));
+      l_flush_r: assert (!(dut.r_valid_q && dut.r_flush_q) || state == OPEN_LINES || state == DRAIN);
       l_flush_b: assert (!(dut.b_valid_q && dut.b_flush_q) || state == OPEN_LINES || state == DRAIN);
+      l_order_r: assert (!(dut.r_valid_q && !dut.r_flush_q) || state == ENTRIES ||
+                         (state == OPEN_LINES && dut.step_q == 3'd0 && !dut.a_valid_q));
       l_order: assert (!(dut.b_valid_q && !dut.b_flush_q) || state == ENTRIES ||
-                       (state == OPEN_LINES && dut.step_q == 3'd0 && !dut.a_valid_q));
+                       (state == OPEN_LINES && (dut.step_q == 3'd0 ? !dut.a_valid_q && !(dut.r_valid_q && dut.r_flush_q)
+                                                : dut.step_q == 3'd1 && !dut.r_valid_q && dut.a_valid_q)));
+      l_place_a: assert (!dut.a_valid_q || !dut.a_flush_q || state != OPEN_LINES ||
+                         3'({dut.a_set_q, dut.a_way_q}) + 3'd1 == dut.step_q);
+      l_order_d: assert (!(dut.d_event_q && count[dut.d_place_q] != 3'd0) || !(dut.b_valid_q && dut.b_flush_q));
 
       // Rows.
+      l_row_r: assert (!dut.r_valid_q || dut.r_row == dut.i_rows.storage_q[dut.r_set_q]);
       l_row: assert (!dut.b_valid_q || dut.row == dut.i_rows.storage_q[dut.b_set_q]);
       l_set_a: assert (!dut.a_valid_q || dut.a_flush_q || dut.a_set_q == dut.a_list_q[0]);
+      l_set_r: assert (!dut.r_valid_q || dut.r_flush_q || dut.r_set_q == dut.r_list_q[0]);
       l_set_b: assert (!dut.b_valid_q || dut.b_flush_q || dut.b_set_q == dut.b_list_q[0]);
       // Stages.
-      if (dut.d_entry_q) begin
-        l_column: assert (dut.d_full_q ? dut.d_event_q && dut.d_column_q == 2'd1 && count[dut.d_place_q] == 2'd0 :
-                          dut.d_column_q == 2'd0 && count[dut.d_place_q] == 2'd1);
+      if (dut.d_push_q) begin
+        l_column: assert (dut.d_full_q ? dut.d_event_q && dut.d_count_q == dut.d_column_q + 3'd2 &&
+                                         count[dut.d_place_q] == 3'd0
+                                       : !dut.d_event_q && dut.d_column_q <= 3'd2 &&
+                                         count[dut.d_place_q] == dut.d_column_q + 3'd2);
       end
       if (dut.d_event_q) begin
-        l_counted: assert (dut.d_full_q ? dut.d_entry_q && dut.d_count_q == 2'd2 : dut.d_count_q == 2'd1);
+        l_counted: assert (dut.d_full_q ? dut.d_push_q && (dut.d_count_q == 3'd3 || dut.d_count_q == 3'd5)
+                                        : !dut.d_push_q && dut.d_count_q != 3'd0 && dut.d_count_q <= 3'd4);
+        l_anew: assert (count[dut.d_place_q] <= 3'd1);
       end
       if (dut.e_event_q) begin
-        l_counted_e: assert (dut.e_full_q ? dut.e_entry_q && dut.e_count_q == 2'd2 : dut.e_count_q == 2'd1);
+        l_counted_e: assert (dut.e_full_q ? dut.e_push_q && dut.e_count_q == dut.e_column_q + 3'd2 &&
+                                            (dut.e_count_q == 3'd3 || dut.e_count_q == 3'd5)
+                                          : !dut.e_push_q && dut.e_count_q != 3'd0 && dut.e_count_q <= 3'd4);
+        if (dut.e_full_q) begin
+          l_full_e: assert (count[dut.e_place_q] <= 3'd1 &&
+                            !((dut.d_push_q || dut.d_event_q) && dut.d_place_q == dut.e_place_q));
+        end
         l_sends: assert (dut.e_sends_q || failed);
       end
       if (dut.e_sends_q) begin
@@ -683,17 +753,21 @@ module fv_list_writer #(
                                 (!Large || (held && tag_held == line)));
         end
       end
-      if (dut.e_entry_q) begin
-        l_column_e: assert (dut.e_column_q == 2'(dut.e_event_q && dut.e_full_q));
-      end
-      if (dut.e_entry_q && !(dut.e_event_q && dut.e_full_q)) begin
+      if (dut.e_push_q && !(dut.e_event_q && dut.e_full_q)) begin
+        l_column_e: assert (!dut.e_event_q && dut.e_column_q <= 3'd2);
+        l_recent: assert (dut.d_event_q && dut.d_place_q == dut.e_place_q
+                          ? dut.d_count_q == dut.e_column_q + 3'd2 + 3'(dut.d_full_q)
+                          : count[dut.e_place_q] == dut.e_column_q + 3'd2 +
+                            3'(dut.d_push_q && dut.d_place_q == dut.e_place_q));
         l_entry: assert (
-            (dut.d_event_q && dut.d_place_q == dut.e_place_q && dut.e_column_q < dut.d_count_q &&
-             !(dut.d_full_q && dut.e_column_q == 2'd1)) ||
-            (dut.e_column_q < count[dut.e_place_q] &&
-             !(dut.d_entry_q && dut.d_place_q == dut.e_place_q && dut.d_column_q == dut.e_column_q)));
+            (dut.d_event_q && dut.d_place_q == dut.e_place_q && dut.e_column_q + 3'd1 < dut.d_count_q &&
+             !(dut.d_full_q && dut.d_column_q == dut.e_column_q)) ||
+            (dut.e_column_q + 3'd1 < count[dut.e_place_q] &&
+             !(dut.d_push_q && dut.d_place_q == dut.e_place_q && dut.d_column_q == dut.e_column_q)));
       end
 
+      c_short: cover (out_list && out_data[14:11] == 4'd5 && picked_q);
+      c_part: cover (dut.d_event_q && count[dut.d_place_q] == 3'd1 && list[dut.d_place_q] == dut.d_list_q);
       c_written: cover (done && picked_q && !failed && taken == 3'd2);
       c_moved: cover (!Large || (!failed && spilled_q && fetched_q));
       c_failed: cover (done && failed && delivered_q == 2'd1);
@@ -704,14 +778,16 @@ module fv_list_writer #(
     always_comb begin
       if (rst_n) begin
         if (state == CLEAR) begin
-          l_clear: assert (dut.step_q <= 3'(p >> 1) || count[p] == 2'd0);
+          l_clear: assert (dut.step_q <= 3'(p >> 1) || count[p] == 3'd0);
           l_clear_pointer: assert (dut.step_q <= 3'(p) || kept[p] == 4'd0);
         end else begin
-          l_count: assert (count[p] <= 2'd1);
-          l_list: assert (count[p] == 2'd0 || list[p][0] == 1'(p >> 1));
-          l_open: assert (count[p] == 2'd0 || state == ENTRIES || pending(2'(p)) ||
+          l_count: assert (count[p] <= 3'd4);
+          l_list: assert (count[p] == 3'd0 || list[p][0] == 1'(p >> 1));
+          l_open: assert (count[p] == 3'd0 || state == ENTRIES || pending(2'(p)) ||
                           (state == OPEN_LINES && dut.step_q == 3'd0));
-          l_gone: assert (!dut.d_event_q || count[p] == 2'd0 || list[p] != dut.d_list_q);
+          l_gone: assert (!dut.d_event_q || count[p] == 3'd0 || list[p] != dut.d_list_q ||
+                          (dut.d_place_q == 2'(p) && count[p] == 3'd1 && !dut.d_full_q &&
+                           dut.i_rows.storage_q[p/2][12] != 1'(p)));
           if (state != IDLE) begin
             l_used: assert (due_q[p][3:2] <= 2'd2);
             l_inside: assert (due_q[p] == 4'd0 || (due_q[p][3:2] != 2'd0 && 3'(due_q[p][1:0]) < taken));
@@ -742,10 +818,21 @@ module fv_list_writer #(
     end
   end
 
+  for (genvar w = 0; w < 2; w++) begin : gen_newest
+    always_comb begin
+      if (rst_n) begin
+        l_newest_r: assert (!dut.r_valid_q || dut.r_newest[w] == newest[{dut.r_set_q, 1'(w)}]);
+        l_newest: assert (!dut.b_valid_q || dut.b_newest_q[w] == newest[{dut.b_set_q, 1'(w)}]);
+        l_hit: assert (!dut.b_valid_q || dut.b_flush_q || count[{dut.b_set_q, 1'(w)}] == 3'd0 ||
+                       dut.b_lists_q[w] == (list[{dut.b_set_q, 1'(w)}] == dut.b_list_q));
+      end
+    end
+  end
+
   for (genvar s = 0; s < 2; s++) begin : gen_unique
     always_comb begin
       if (rst_n && state != CLEAR) begin
-        l_unique: assert (count[2*s] == 2'd0 || count[2*s+1] == 2'd0 || list[2*s] != list[2*s+1]);
+        l_unique: assert (count[2*s] == 3'd0 || count[2*s+1] == 3'd0 || list[2*s] != list[2*s+1]);
       end
     end
   end

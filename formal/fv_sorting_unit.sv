@@ -35,6 +35,8 @@ module fv_sorting_unit #(
     .Ways       (Ways),
     .Lists      (2),
     .LineEntries(2),
+    .ShortEntries(2),
+    .TailBits   (0),
     .EntryBits  (Bits),
     .MaskBits   (1),
     .OutBits    (Bits)

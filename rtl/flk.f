@@ -21,6 +21,7 @@ common/flk_axi_write.sv
 common/flk_clock_gate.sv
 common/flk_delay.sv
 common/flk_delay_ram.sv
+common/flk_entry_near.sv
 common/flk_event_counter.sv
 common/flk_event_counters.sv
 common/flk_exp_neg.sv
@@ -98,6 +99,7 @@ sort/flk_bitonic_sorter.sv
 sort/flk_compare_exchange.sv
 sort/flk_delivery.sv
 sort/flk_entry_buffer.sv
+sort/flk_line_entry.sv
 sort/flk_list_reader.sv
 sort/flk_list_sorter.sv
 sort/flk_record_cache.sv

@@ -33,7 +33,7 @@ module flk_rendering
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
   parameter  int unsigned SortWays       = 8,    // runs that its last step merges
   parameter  int unsigned MergeLines     = 128,  // for lists that do not fit; half as many runs
-  parameter  int unsigned Chunks         = 16,   // in a list reader's memory
+  parameter  int unsigned Chunks         = 14,   // in a list reader's memory
   parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
   parameter  int unsigned Queue          = 64,   // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
@@ -213,7 +213,7 @@ module flk_rendering
 
   for (genvar u = 0; u < 4; u++) begin : gen_unit
     logic              line_last;
-    logic [8:0][51:0]  line_entries;
+    logic [471:0]      line_entries;
     logic [3:0]        line_count;
     logic [IdBits-1:0] unused_id, unused_run_id;
 

@@ -172,7 +172,7 @@ class ChipMemories:
     """
 
     sorted_entries: int = 2048
-    list_chunks: int = 16
+    list_chunks: int = 14
     sorted_ahead: int = 512
     pairs: int = 4
     survivors: int = 128

@@ -4,7 +4,7 @@
 // carries no entry; then the lines still open are written, then the pointers; done_o for one cycle,
 // with failed_o and the counters, which stay until the next start. When a chunk more is needed than
 // chunks_i, failed_o rises and nothing more is written in the frame.
-// Throughput: an entry a cycle. A line is at the output five cycles after the entry that causes it.
+// Throughput: an entry a cycle. A line is at the output six cycles after the entry that causes it.
 // At the end a cycle for each line of the combiner and each pointer of pointer_lines_i. After reset,
 // max(Pointers, sets) cycles until idle_o. One request a line, whole: address in lines, and data.
 // in_ready_o depends combinationally on out_ready_i, the pointer's write on move_write_i; no other path.
@@ -19,12 +19,19 @@
 // two more than a cycle a pointer for the others, and idle_o comes max(Pointers, sets) cycles after
 // done_o. After failed_o nothing is moved; lines that were moved before stay in the table.
 //
+// A line has up to LineEntries entries whatever they are, up to ShortEntries where each is near the
+// one before it (docs/reference/list_layout.md): then of all but the newest only KeptBits are kept,
+// and entries from LineEntries on lie in the gaps of the others. The newest entry of each open line lies
+// beside its set's row; the next one pushes it into the columns: LineEntries - 1 words of EntryBits, each
+// of a part that is kept and of a gap, which is written a second time by a later entry.
+//
 // Pipeline, moving as a whole when the output register is free: A entry taken, number of its list;
-// B row of the set is read; C hit, free way or the way in turn, row written, pointer read; D pointer
-// updated, line read if it has to go; E entry written to its line, line and address put together; F
-// output register. What stage E (C) writes while D (B) reads the same line (row) is taken from
-// registers, not from the memory; pointers need none, since two lines of a list never follow each
-// other in neighbouring stages.
+// R row of the set and its newest entries are read; B hits, and near or not, of all ways; C hit, free
+// way or the way in turn, row written, pointer read; D pointer updated, line read if it has to go; E the
+// entry before written to its line, line and address put together; F output register. What stage E
+// writes while D reads the same line, or C while R or B have the same row, is taken from registers, not
+// from the memory; pointers need none, since two lines of a list never follow each other in
+// neighbouring stages: a line that has just begun behind one that went is not the next to go.
 module flk_list_writer #(
   parameter  int unsigned SetBitsU    = 3,     // bits of the tile's column that choose a set
   parameter  int unsigned SetBitsV    = 3,     // of its row
@@ -34,11 +41,17 @@ module flk_list_writer #(
   parameter  int unsigned CoordBits   = 7,     // of u and v
   parameter  int unsigned ChunkLines  = 8,
   parameter  int unsigned ChunkBits   = 24,
-  parameter  int unsigned EntryBits   = 52,
+  parameter  int unsigned MaskBits    = 4,     // an entry: mask, record, key
+  parameter  int unsigned RecordBits  = 24,
+  parameter  int unsigned KeyBits     = 24,
+  parameter  int unsigned RecordKept  = 9,     // low bits of both in a short line
+  parameter  int unsigned KeyKept     = 17,
   parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned ShortEntries = 15,
   parameter  int unsigned LineBits    = 512,
   parameter  int unsigned PointerBits = 32,
   parameter  int unsigned AddressBits = 34,
+  localparam int unsigned EntryBits   = MaskBits + RecordBits + KeyBits,
   localparam int unsigned ListBits    = $clog2(Lists),
   localparam int unsigned LinesBits   = $clog2(Lists * PointerBits / LineBits + 1),
   localparam int unsigned IndexBits   = $clog2(LineBits / PointerBits), // of a pointer in its line
@@ -93,7 +106,7 @@ module flk_list_writer #(
   localparam int unsigned SetBits = SetBitsU + SetBitsV > 0 ? SetBitsU + SetBitsV : 1;
   localparam int unsigned WayBits = $clog2(Ways);
   localparam int unsigned PlaceBits = SetBits + WayBits;
-  localparam int unsigned CountBits = $clog2(LineEntries + 1);
+  localparam int unsigned CountBits = $clog2(ShortEntries + 1);
   localparam int unsigned UsedBits = $clog2(ChunkLines + 1);
   localparam int unsigned PerLine = LineBits / PointerBits;
   localparam int unsigned PerLineBits = IndexBits;
@@ -102,7 +115,15 @@ module flk_list_writer #(
   localparam int unsigned PlacesBits = Places > 1 ? $clog2(Places) : 1;
   localparam int unsigned Sharing = Lists / Pointers;   // lines that share a place
   localparam int unsigned TagBits = Sharing > 1 ? $clog2(Sharing) : 1;
-  localparam int unsigned HeaderAt = LineEntries * EntryBits;
+  // Of a short line: entries beyond LineEntries, each in a whole gap and a rest, the rests in the
+  // gaps that are left and in the tail.
+  localparam int unsigned Columns = LineEntries - 1;
+  localparam int unsigned Over = ShortEntries - LineEntries;
+  localparam int unsigned KeptBits = MaskBits + RecordKept + KeyKept;
+  localparam int unsigned GapBits = EntryBits - KeptBits;
+  localparam int unsigned RestBits = KeptBits - GapBits;
+  localparam int unsigned TailBits = Over * RestBits - (Columns - Over) * GapBits;
+  localparam int unsigned HeaderAt = LineEntries * EntryBits + TailBits;
   localparam int unsigned HeaderCount = 4;
   // Lists of a set have these bits in common.
   localparam int unsigned Common = SetBitsU < SetBitsV ? SetBitsU : SetBitsV;
@@ -124,9 +145,15 @@ module flk_list_writer #(
   if (ChunkLines < 2 || (ChunkLines & (ChunkLines - 1)) != 0) begin : gen_check_chunk
     $error("flk_list_writer: ChunkLines must be a power of two, at least 2");
   end
-  if (LineEntries < 2 || LineEntries > 15 || HeaderAt + HeaderCount + ChunkBits + 1 > LineBits ||
+  if (LineEntries < 3 || ShortEntries > 15 || HeaderAt + HeaderCount + ChunkBits + 1 > LineBits ||
       ChunkBits + UsedBits > PointerBits) begin : gen_check_line
     $error("flk_list_writer: entries, count and link must fit a line, a chunk's use a pointer");
+  end
+  if (ShortEntries <= LineEntries || Over > Columns || RestBits < 1 ||
+      (Over < Columns && RestBits > GapBits) ||
+      RecordKept > RecordBits || KeyKept > KeyBits || KeyKept < 1 ||
+      Over * RestBits <= (Columns - Over) * GapBits) begin : gen_check_short
+    $error("flk_list_writer: entries of a short line must fill the gaps and some bits more");
   end
 
   // ---- frame --------------------------------------------------------------------------------------
@@ -284,9 +311,12 @@ module flk_list_writer #(
     end
   end
 
-  // ---- B: row of the set ----------------------------------------------------------------------------
+  // ---- R: row of the set ----------------------------------------------------------------------------
+
+  typedef logic [EntryBits-1:0] entry_t;
 
   typedef struct packed {
+    logic                 tight;  // all entries are near each other
     logic [CountBits-1:0] count;  // 0: free
     logic [ListBits-1:0]  list;
   } way_t;
@@ -296,32 +326,51 @@ module flk_list_writer #(
     way_t [Ways-1:0]    way;
   } row_t;
 
+  logic                 r_valid_q, r_flush_q;
+  logic [WayBits-1:0]   r_way_q;
+  logic [SetBits-1:0]   r_set_q;
+  logic [ListBits-1:0]  r_list_q;
+  entry_t               r_entry_q;
+  row_t                 row_read, r_row, r_row_q, row, row_d;
+  entry_t [Ways-1:0]    newest_read, r_newest;
+  logic                 r_kept_q;    // r_row_q is what the set held when it was read
+  logic [Ways-1:0]      r_pushed_q;  // this way's newest entry is then r_pushed_entry_q
+  entry_t               r_pushed_entry_q;
+  logic                 row_write;
+  logic [Ways-1:0]      c_one;       // stage C: the way that is meant
+  logic                 c_same;      // the entry in stage R has the set of the one in C
+
   logic                 b_valid_q, b_flush_q;
   logic [WayBits-1:0]   b_way_q;
   logic [SetBits-1:0]   b_set_q;
   logic [ListBits-1:0]  b_list_q;
   logic [EntryBits-1:0] b_entry_q;
-  row_t                 row_read, row, row_d, row_q;
-  logic                 row_kept_q;  // row_q is what the set held when it was read
-  logic                 row_write;
+  row_t                 b_row_q;
+  entry_t [Ways-1:0]    b_newest_q;
+  logic [Ways-1:0]      b_lists_q;  // the way's list is the entry's
+  logic [Ways-1:0]      b_near_q;   // its newest entry is near it
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
+      r_valid_q <= 1'b0;
       b_valid_q <= 1'b0;
     end else if (advance) begin
-      b_valid_q <= a_valid_q;
+      r_valid_q <= a_valid_q;
+      b_valid_q <= r_valid_q;
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (advance && a_valid_q) begin
-      b_flush_q <= a_flush_q;
-      b_way_q   <= a_way_q;
-      b_set_q   <= a_set_q;
-      b_list_q  <= a_list_q;
-      b_entry_q <= a_entry_q;
-      row_q      <= row_d;
-      row_kept_q <= row_write && b_set_q == a_set_q;
+      r_flush_q        <= a_flush_q;
+      r_way_q          <= a_way_q;
+      r_set_q          <= a_set_q;
+      r_list_q         <= a_list_q;
+      r_entry_q        <= a_entry_q;
+      r_row_q          <= row_d;
+      r_kept_q         <= row_write && b_set_q == a_set_q;
+      r_pushed_q       <= row_write && b_set_q == a_set_q && !b_flush_q ? c_one : '0;
+      r_pushed_entry_q <= b_entry_q;
     end
   end
 
@@ -338,58 +387,145 @@ module flk_list_writer #(
     .rd_data_o(row_read)
   );
 
+  for (genvar w = 0; w < Ways; w++) begin : gen_newest
+    flk_sram #(
+      .Width(EntryBits),
+      .Depth(Sets)
+    ) i_newest (
+      .clk_i,
+      .wr_en_i  (row_write && !b_flush_q && c_one[w]),
+      .wr_addr_i(b_set_q),
+      .wr_data_i(b_entry_q),
+      .rd_en_i  (advance && a_valid_q),
+      .rd_addr_i(a_set_q),
+      .rd_data_o(newest_read[w])
+    );
+  end
+
+  // ---- B: what is known of all ways -----------------------------------------------------------------
+
+  logic [Ways-1:0] r_lists, r_near;
+  logic            r_list_same, r_near_same;  // of the entry in stage C
+
+  assign r_row       = r_kept_q ? r_row_q : row_read;
+  assign r_list_same = b_list_q[ListBits-1:Common] == r_list_q[ListBits-1:Common];
+  assign c_same      = b_valid_q && b_set_q == r_set_q;
+
+  flk_entry_near #(
+    .MaskBits  (MaskBits),
+    .RecordBits(RecordBits),
+    .KeyBits   (KeyBits),
+    .RecordKept(RecordKept),
+    .KeyKept   (KeyKept)
+  ) i_near_same (
+    .older_i(b_entry_q),
+    .newer_i(r_entry_q),
+    .near_o (r_near_same)
+  );
+
+  for (genvar w = 0; w < Ways; w++) begin : gen_ways
+    assign r_newest[w] = r_pushed_q[w] ? r_pushed_entry_q : newest_read[w];
+    assign r_lists[w]  = r_row.way[w].list[ListBits-1:Common] == r_list_q[ListBits-1:Common];
+
+    flk_entry_near #(
+      .MaskBits  (MaskBits),
+      .RecordBits(RecordBits),
+      .KeyBits   (KeyBits),
+      .RecordKept(RecordKept),
+      .KeyKept   (KeyKept)
+    ) i_near (
+      .older_i(r_newest[w]),
+      .newer_i(r_entry_q),
+      .near_o (r_near[w])
+    );
+
+    always_ff @(posedge clk_i) begin
+      if (advance && r_valid_q) begin
+        if (c_same && !b_flush_q && c_one[w]) begin
+          b_newest_q[w] <= b_entry_q;
+          b_lists_q[w]  <= r_list_same;
+          b_near_q[w]   <= r_near_same;
+        end else begin
+          b_newest_q[w] <= r_newest[w];
+          b_lists_q[w]  <= r_lists[w];
+          b_near_q[w]   <= r_near[w];
+        end
+      end
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (advance && r_valid_q) begin
+      b_flush_q <= r_flush_q;
+      b_way_q   <= r_way_q;
+      b_set_q   <= r_set_q;
+      b_list_q  <= r_list_q;
+      b_entry_q <= r_entry_q;
+      b_row_q   <= c_same ? row_d : r_row;
+    end
+  end
+
   // ---- C: the way -----------------------------------------------------------------------------------
 
   // What becomes of each way is known before which one is meant: the row is a loop of one cycle.
-  logic [Ways-1:0]      c_hits, c_frees, c_one;  // c_one: the way that is meant
+  // A line goes for another list (evict), because the entry is not near (part), or with it (full).
+  logic [Ways-1:0]      c_hits, c_frees, c_parts, c_fulls;
   logic [WayBits-1:0]   c_way;
-  logic                 c_hit, c_evict, c_full, c_event;
-  logic [CountBits-1:0] c_count, c_column;       // of the way; of the entry
+  logic                 c_hit, c_evict, c_part, c_full, c_event;
+  logic [CountBits-1:0] c_count;   // of the way
+  entry_t               c_newest;  // the way's
 
-  assign row = row_kept_q ? row_q : row_read;
+  assign row = b_row_q;
 
-  for (genvar w = 0; w < Ways; w++) begin : gen_ways
+  for (genvar w = 0; w < Ways; w++) begin : gen_meant
     localparam logic [Ways-1:0] LOWER = Ways'((1 << w) - 1);
-    assign c_hits[w]  = row.way[w].count != '0 &&
-                        row.way[w].list[ListBits-1:Common] == b_list_q[ListBits-1:Common];
+    logic close;
+    assign close      = row.way[w].tight && b_near_q[w];
+    assign c_hits[w]  = row.way[w].count != '0 && b_lists_q[w];
     assign c_frees[w] = row.way[w].count == '0;
+    assign c_parts[w] = c_hits[w] && row.way[w].count >= CountBits'(LineEntries) && !close;
+    assign c_fulls[w] = c_hits[w] &&
+                        (close ? row.way[w].count == CountBits'(ShortEntries - 1)
+                               : row.way[w].count == CountBits'(LineEntries - 1));
     assign c_one[w]   = b_flush_q ? b_way_q == WayBits'(w)
                       : c_hits[w] || (!c_hit && (c_frees == '0 ? row.turn == WayBits'(w)
                                                  : c_frees[w] && (c_frees & LOWER) == '0));
   end
 
   always_comb begin
-    c_way   = '0;
-    c_count = '0;
+    c_way    = '0;
+    c_count  = '0;
+    c_newest = '0;
     for (int unsigned w = 0; w < Ways; w++) begin
-      c_way   |= c_one[w] ? WayBits'(w) : '0;
-      c_count |= c_one[w] ? row.way[w].count : '0;
+      c_way    |= c_one[w] ? WayBits'(w) : '0;
+      c_count  |= c_one[w] ? row.way[w].count : '0;
+      c_newest |= c_one[w] ? b_newest_q[w] : '0;
     end
   end
 
   assign c_hit     = c_hits != '0;
   assign c_evict   = !b_flush_q && !c_hit && c_frees == '0;
-  assign c_column  = c_hit ? c_count : '0;
-  assign c_full    = !b_flush_q && c_column == CountBits'(LineEntries - 1);
-  assign c_event   = c_evict || c_full || (b_flush_q && c_count != '0);
+  assign c_part    = !b_flush_q && c_parts != '0;
+  assign c_full    = !b_flush_q && c_fulls != '0;
+  assign c_event   = c_evict || c_part || c_full || (b_flush_q && c_count != '0);
   assign row_write = advance && b_valid_q;
 
   always_comb begin
     row_d = row;
     for (int unsigned w = 0; w < Ways; w++) begin
       if (c_one[w]) begin
-        row_d.way[w].list  = b_list_q;
-        row_d.way[w].count = CountBits'(1);
-        if (b_flush_q || (c_hits[w] && row.way[w].count == CountBits'(LineEntries - 1))) begin
+        row_d.way[w] = '{tight: 1'b1, count: CountBits'(1), list: b_list_q};
+        if (b_flush_q || c_fulls[w]) begin
           row_d.way[w].count = '0;
-        end else if (c_hits[w]) begin
+        end else if (c_hits[w] && !c_parts[w]) begin
           row_d.way[w].count = row.way[w].count + 1'b1;
+          row_d.way[w].tight = row.way[w].tight && b_near_q[w];
         end
       end
     end
     if (b_flush_q) begin
       row_d.turn = '0;
-    end else if (c_evict) begin
+    end else if (c_evict || (c_parts & (Ways'(1) << row.turn)) != '0) begin
       row_d.turn = row.turn + 1'b1;
     end
   end
@@ -401,18 +537,20 @@ module flk_list_writer #(
     logic [ChunkBits-1:0] chunk;
   } pointer_t;
 
-  logic                 d_entry_q, d_event_q, d_full_q;
+  // d_push_q: the line's newest entry goes to column d_column_q. A line that goes ends with d_word_q
+  // if it is full, else with d_newest_q.
+  logic                 d_push_q, d_event_q, d_full_q;
   logic [PlaceBits-1:0] d_place_q;
   logic [CountBits-1:0] d_column_q, d_count_q;  // d_count_q: entries of the line that goes
   logic [ListBits-1:0]  c_list, d_list_q;       // its list
-  logic [EntryBits-1:0] d_word_q;
+  entry_t               d_word_q, d_newest_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      d_entry_q <= 1'b0;
+      d_push_q  <= 1'b0;
       d_event_q <= 1'b0;
     end else if (advance) begin
-      d_entry_q <= b_valid_q && !b_flush_q;
+      d_push_q  <= b_valid_q && !b_flush_q && c_hit && !c_part;
       d_event_q <= b_valid_q && c_event;
     end
   end
@@ -421,10 +559,11 @@ module flk_list_writer #(
     if (advance && b_valid_q) begin
       d_full_q   <= c_full;
       d_place_q  <= PlaceBits'({b_set_q, c_way});
-      d_column_q <= c_column;
-      d_count_q  <= c_full ? CountBits'(LineEntries) : c_count;
+      d_column_q <= c_count - 1'b1;
+      d_count_q  <= c_count + CountBits'(c_full);
       d_list_q   <= c_list;
       d_word_q   <= b_entry_q;
+      d_newest_q <= c_newest;
     end
   end
 
@@ -612,15 +751,14 @@ module flk_list_writer #(
 
   // ---- E: line, and where it goes -------------------------------------------------------------------
 
-  logic                                  e_entry_q, e_event_q, e_sends_q, e_full_q;
-  logic [PlaceBits-1:0]                  e_place_q;
-  logic [CountBits-1:0]                  e_column_q, e_count_q;
-  logic [EntryBits-1:0]                  e_word_q;
-  logic [LineEntries-1:0][EntryBits-1:0] line_read;
+  logic                 e_push_q, e_event_q, e_sends_q, e_full_q;
+  logic [PlaceBits-1:0] e_place_q;
+  logic [CountBits-1:0] e_column_q, e_count_q;
+  entry_t               e_word_q, e_newest_q;
   // What stage E wrote when D read.
-  logic                                  was_entry_q;
-  logic [CountBits-1:0]                  was_column_q;
-  logic [EntryBits-1:0]                  was_word_q;
+  logic                 was_push_q;
+  logic [CountBits-1:0] was_column_q;
+  entry_t               was_newest_q;
   // The pointer as it was, and whether the line begins a chunk.
   pointer_t                              e_pointer_q;
   logic                                  e_begins_q;
@@ -633,13 +771,13 @@ module flk_list_writer #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      e_entry_q     <= 1'b0;
+      e_push_q      <= 1'b0;
       e_event_q     <= 1'b0;
       e_sends_q     <= 1'b0;
       e_walk_q      <= 1'b0;
       e_walk_last_q <= 1'b0;
     end else if (advance) begin
-      e_entry_q     <= d_entry_q;
+      e_push_q      <= d_push_q;
       e_event_q     <= d_event_q;
       e_sends_q     <= sends;
       e_walk_q      <= walk_q;
@@ -654,9 +792,10 @@ module flk_list_writer #(
       e_column_q   <= d_column_q;
       e_count_q    <= d_count_q;
       e_word_q     <= d_word_q;
-      was_entry_q  <= e_entry_q && e_place_q == d_place_q;
+      e_newest_q   <= d_newest_q;
+      was_push_q   <= e_push_q && e_place_q == d_place_q;
       was_column_q <= e_column_q;
-      was_word_q   <= e_word_q;
+      was_newest_q <= e_newest_q;
     end
     if (advance && (d_event_q || walk_q)) begin
       e_pointer_q <= walk_q && walk_blank_q ? '0 : pointer;
@@ -665,35 +804,156 @@ module flk_list_writer #(
     end
   end
 
-  for (genvar i = 0; i < LineEntries; i++) begin : gen_columns
-    flk_sram #(
-      .Width(EntryBits),
-      .Depth(Sets * Ways)
-    ) i_column (
-      .clk_i,
-      .wr_en_i  (advance && e_entry_q && e_column_q == CountBits'(i)),
-      .wr_addr_i(e_place_q),
-      .wr_data_i(e_word_q),
-      .rd_en_i  (advance && d_event_q),
-      .rd_addr_i(d_place_q),
-      .rd_data_o(line_read[i])
-    );
+  // A word by what is kept in a short line, and its gap.
+  typedef struct packed {
+    logic [GapBits-1:0]  gap;   // upper bits of key and record
+    logic [KeptBits-1:0] kept;  // lower bits of both, mask
+  } parts_t;
+
+  function automatic parts_t parted(input entry_t entry);
+    parts_t parts;
+    parts.kept = {entry[MaskBits+RecordBits+:KeyKept], entry[0+:MaskBits+RecordKept]};
+    parts.gap  = GapBits'({entry[EntryBits-1:MaskBits+RecordBits] >> KeyKept,
+                           (RecordBits - RecordKept)'(entry[MaskBits+:RecordBits] >> RecordKept)});
+    return parts;
+  endfunction
+
+  // Columns 0 to Columns - 1 take words, later ones what is kept of a word: low bits in the gap of column Over less, the
+  // rest in the gaps from Over on, and in the tail. Memories are pieces that are written together.
+  localparam int unsigned RestArea = (Columns - Over) * GapBits;
+
+  parts_t                                e_parts, was_parts;
+  logic   [ShortEntries-2:0]             e_to, was_to;  // the column that is written, that was
+  logic   [ShortEntries-2:0]             e_has;         // columns of the line that goes
+  logic                                  e_short;       // it is a short one
+  logic   [Columns-1:0][KeptBits-1:0]    kept_read, kept;
+  logic   [Columns*GapBits+TailBits-1:0] gaps, used;
+
+  // Where a gap's bit lies in a word.
+  function automatic int unsigned gap_place(input int unsigned b);
+    return b < RecordBits - RecordKept ? MaskBits + RecordKept + b
+                                       : MaskBits + RecordBits + KeyKept + b
+                                         - (RecordBits - RecordKept);
+  endfunction
+
+  assign e_short   = e_count_q > CountBits'(LineEntries);
+  assign e_parts   = parted(e_newest_q);
+  assign was_parts = parted(was_newest_q);
+
+  for (genvar i = 0; i < ShortEntries - 1; i++) begin : gen_to
+    assign e_to[i]   = e_push_q && e_column_q == CountBits'(i);
+    assign was_to[i] = was_push_q && was_column_q == CountBits'(i);
+    assign e_has[i]  = e_count_q > CountBits'(i + 1);
   end
 
-  logic [LineBits-1:0]    line;
-  always_comb begin
-    line = '0;
-    for (int unsigned i = 0; i < LineEntries; i++) begin
-      if (CountBits'(i) < e_count_q) begin
-        line[i*EntryBits+:EntryBits] = line_read[i];
-        if (was_entry_q && was_column_q == CountBits'(i)) begin
-          line[i*EntryBits+:EntryBits] = was_word_q;
+  for (genvar i = 0; i < Columns; i++) begin : gen_columns
+    flk_sram #(
+      .Width(KeptBits),
+      .Depth(Sets * Ways)
+    ) i_kept (
+      .clk_i,
+      .wr_en_i  (advance && e_to[i]),
+      .wr_addr_i(e_place_q),
+      .wr_data_i(e_parts.kept),
+      .rd_en_i  (advance && d_event_q),
+      .rd_addr_i(d_place_q),
+      .rd_data_o(kept_read[i])
+    );
+
+    // The entry that was pushed last is not in the memory yet: the line is full with it.
+    assign kept[i] = e_to[i] ? e_parts.kept : was_to[i] ? was_parts.kept : kept_read[i];
+  end
+
+  // Whole gaps, and each later column's rest, which the end of a gap cuts at most once.
+  for (genvar k = 0; k < Over; k++) begin : gen_over
+    logic [GapBits-1:0] data, was;
+
+    assign data = e_to[k] ? e_parts.gap : e_parts.kept[GapBits-1:0];
+    assign was  = was_to[k] ? was_parts.gap : was_parts.kept[GapBits-1:0];
+
+    logic [GapBits-1:0] gap_read;
+
+    flk_sram #(
+      .Width(GapBits),
+      .Depth(Sets * Ways)
+    ) i_gap (
+      .clk_i,
+      .wr_en_i  (advance && (e_to[k] || e_to[Columns+k])),
+      .wr_addr_i(e_place_q),
+      .wr_data_i(data),
+      .rd_en_i  (advance && d_event_q),
+      .rd_addr_i(d_place_q),
+      .rd_data_o(gap_read)
+    );
+
+    assign gaps[k*GapBits+:GapBits] = e_to[k] || e_to[Columns+k] ? data
+                                    : was_to[k] || was_to[Columns+k] ? was : gap_read;
+    assign used[k*GapBits+:GapBits] = {GapBits{e_short ? e_has[Columns+k] : e_has[k]}};
+
+    for (genvar h = 0; h < 2; h++) begin : gen_rest
+      localparam int unsigned Begin = k * RestBits;
+      localparam int unsigned End   = Begin + RestBits;
+      localparam int unsigned Next  = (Begin / GapBits + 1) * GapBits;
+      localparam int unsigned Cut   = Begin < RestArea && Next < End ? Next : End;
+      localparam int unsigned Low   = h == 0 ? Begin : Cut;
+      localparam int unsigned Bits  = (h == 0 ? Cut : End) - Low;
+      localparam int unsigned At    = Over * GapBits + Low;
+
+      if (Bits > 0) begin : gen_piece
+        logic [Bits-1:0] rest, was_rest, piece_read;
+        logic            to, was_there;
+
+        if (Low < RestArea) begin : gen_word
+          localparam int unsigned Word = Over + Low / GapBits;
+          assign to        = e_to[Word] || e_to[Columns+k];
+          assign was_there = was_to[Word] || was_to[Columns+k];
+          assign rest      = e_to[Word] ? e_parts.gap[Low%GapBits+:Bits]
+                                        : e_parts.kept[GapBits+Low-Begin+:Bits];
+          assign was_rest  = was_to[Word] ? was_parts.gap[Low%GapBits+:Bits]
+                                          : was_parts.kept[GapBits+Low-Begin+:Bits];
+          assign used[At+:Bits] = {Bits{e_short ? e_has[Columns+k] : e_has[Word]}};
+        end else begin : gen_tail
+          assign to        = e_to[Columns+k];
+          assign was_there = was_to[Columns+k];
+          assign rest      = e_parts.kept[GapBits+Low-Begin+:Bits];
+          assign was_rest  = was_parts.kept[GapBits+Low-Begin+:Bits];
+          assign used[At+:Bits] = {Bits{e_short && e_has[Columns+k]}};
         end
+
+        flk_sram #(
+          .Width(Bits),
+          .Depth(Sets * Ways)
+        ) i_rest (
+          .clk_i,
+          .wr_en_i  (advance && to),
+          .wr_addr_i(e_place_q),
+          .wr_data_i(rest),
+          .rd_en_i  (advance && d_event_q),
+          .rd_addr_i(d_place_q),
+          .rd_data_o(piece_read)
+        );
+
+        assign gaps[At+:Bits] = to ? rest : was_there ? was_rest : piece_read;
       end
     end
-    if (e_full_q) begin
-      line[(LineEntries-1)*EntryBits+:EntryBits] = e_word_q;
+  end
+
+  logic [LineBits-1:0] line;
+
+  always_comb begin
+    line                = '0;
+    line[0+:EntryBits]  = e_full_q ? e_word_q : e_newest_q;
+    for (int unsigned i = 0; i < Columns; i++) begin
+      if (e_has[i]) begin
+        line[(i+1)*EntryBits+:MaskBits+RecordKept]       = kept[i][0+:MaskBits+RecordKept];
+        line[(i+1)*EntryBits+MaskBits+RecordBits+:KeyKept] = kept[i][MaskBits+RecordKept+:KeyKept];
+      end
+      for (int unsigned b = 0; b < GapBits; b++) begin
+        line[(i+1)*EntryBits+gap_place(b)] = gaps[i*GapBits+b] && used[i*GapBits+b];
+      end
     end
+    line[LineEntries*EntryBits+:TailBits] = gaps[Columns*GapBits+:TailBits] &
+                                            used[Columns*GapBits+:TailBits];
     line[HeaderAt+:HeaderCount] = HeaderCount'(e_count_q);
     if (e_begins_q && e_pointer_q.used != '0) begin
       line[HeaderAt+HeaderCount+:ChunkBits+1] = {1'b1, e_pointer_q.chunk};
@@ -731,8 +991,8 @@ module flk_list_writer #(
   assign unused_sum = ^(sum >> AddressBits);
 
   assign advance = (!out_valid_q || out_ready_i) && !hold_q;
-  assign busy    = a_valid_q || b_valid_q || d_entry_q || d_event_q || e_entry_q || e_event_q ||
-                   walk_q || e_walk_q || out_valid_q;
+  assign busy    = a_valid_q || r_valid_q || b_valid_q || d_push_q || d_event_q || e_push_q ||
+                   e_event_q || walk_q || e_walk_q || out_valid_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -9,10 +9,10 @@
 // line memory is free for it, so that the port never waits. Earlier lists come first, and the last two
 // slots are for the list that is being given: it never waits for the others.
 // Faults: an error of the memory; a pointer with 0 or more than ChunkLines lines used, or with a chunk
-// beyond chunks_i; a line with 0 or more than LineEntries entries; a header with other bits than it
-// may have; a link that does not go to a lower chunk, as a writer's always do (so a chain ends). The
-// list then ends with the last line before the fault, as an empty one where there is none, and
-// error_o rises and stays until start_i.
+// beyond chunks_i; a line with 0 entries; a plain one (up to LineEntries entries) with bits behind its
+// last place; a header with other bits than it may have; a link that does not go to a lower chunk, as
+// a writer's always do (so a chain ends). The list then ends with the last line before the fault, as an
+// empty one where there is none, and error_o rises and stays until start_i.
 // start_i while idle_o. Bases, columns_i and chunks_i stay until idle_o after the last tile; idle_o is
 // high whenever nothing is inside. clear_i forgets all lists; what is under way is read and dropped,
 // then idle_o rises; tiles are not taken until then.
@@ -28,7 +28,8 @@ module flk_list_reader #(
   parameter  int unsigned ChunkLines  = 8,
   parameter  int unsigned ChunkBits   = 24,
   parameter  int unsigned EntryBits   = 52,
-  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned LineEntries = 9,   // of a plain line; more: a short one
+  parameter  int unsigned TailBits    = 4,   // of a short line, behind what a plain one has
   parameter  int unsigned PointerBits = 32,
   parameter  int unsigned AddressBits = 34,  // of a line
   parameter  int unsigned Width       = 512,
@@ -36,6 +37,7 @@ module flk_list_reader #(
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
   localparam int unsigned Shift       = $clog2(Width / 8),
+  localparam int unsigned EntriesBits = LineEntries * EntryBits + TailBits,
   localparam int unsigned AddrBits    = AddressBits + Shift
 ) (
   input  logic                                  clk_i,
@@ -57,7 +59,7 @@ module flk_list_reader #(
   // Lines
   output logic                                  out_valid_o,
   input  logic                                  out_ready_i,
-  output logic [LineEntries-1:0][EntryBits-1:0] out_entries_o,
+  output logic [EntriesBits-1:0]                out_entries_o,
   output logic [3:0]                            out_count_o,
   output logic                                  out_last_o,
   // AXI4
@@ -88,7 +90,6 @@ module flk_list_reader #(
   localparam int unsigned WordBits = $clog2(PerLine);
   localparam int unsigned ListBits = 2 * (CoordBits - 1);
   localparam int unsigned OffsetBits = ChunkBits + 2 + $clog2(ChunkLines);
-  localparam int unsigned EntriesBits = LineEntries * EntryBits;
   localparam int unsigned HeaderCount = 4;
   localparam int unsigned RestBits = Width - EntriesBits - HeaderCount - ChunkBits - 1;
   localparam int unsigned ChunkTag = SlotBits + CtxBits;
@@ -103,7 +104,7 @@ module flk_list_reader #(
   if (ChunkLines < 2 || ChunkLines != 1 << $clog2(ChunkLines)) begin : gen_check_chunk
     $error("flk_list_reader: ChunkLines must be a power of two, at least 2");
   end
-  if (LineEntries > 15 || EntriesBits + HeaderCount + ChunkBits + 1 >= Width ||
+  if (LineEntries > 14 || TailBits < 1 || EntriesBits + HeaderCount + ChunkBits + 1 >= Width ||
       PerLine != 1 << WordBits || ChunkBits + LinesBits >= PointerBits) begin : gen_check_line
     $error("flk_list_reader: entries, count and link must fit a line, a chunk's use a pointer");
   end
@@ -331,6 +332,7 @@ module flk_list_reader #(
     logic                   linked;
     logic [ChunkBits-1:0]   link;
     logic [HeaderCount-1:0] count;
+    logic [TailBits-1:0]    tail;
   } header_t;
 
   logic [AtBits-1:0]      at_q;  // of the next beat in its request
@@ -359,7 +361,7 @@ module flk_list_reader #(
       h_last_q  <= beat_last;
       h_error_q <= beat_error;
       h_tag_q   <= beat_tag;
-      h_q       <= header_t'(beat_data[Width-1:EntriesBits]);
+      h_q       <= header_t'(beat_data[Width-1:EntriesBits-TailBits]);
       p_q       <= beat_data[32'(beat_tag.which[WordBits-1:0])*PointerBits+:PointerBits];
     end
   end
@@ -414,7 +416,8 @@ module flk_list_reader #(
   assign h_ctx    = h_tag_q.which[CtxBits-1:0];
   assign h_linked = h_first_q ? h_q.linked : chained_q;
   assign dropped  = ended_q[h_ctx];
-  assign wrong    = h_error_q || h_q.count == '0 || h_q.count > HeaderCount'(LineEntries)
+  assign wrong    = h_error_q || h_q.count == '0
+                    || (h_q.count <= HeaderCount'(LineEntries) && h_q.tail != '0)
                     || h_q.rest != '0 || (h_first_q ? h_q.linked && h_q.link >= chunk_q[h_ctx]
                                                     : h_q.linked || h_q.link != '0);
   assign good     = line && !dropped && !wrong;

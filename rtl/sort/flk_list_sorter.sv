@@ -15,6 +15,8 @@ module flk_list_sorter #(
   parameter  int unsigned Runs        = 64,   // of a list
   parameter  int unsigned MergeLines  = 128,  // in the memory of flk_run_merge
   parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned ShortEntries = 15,
+  parameter  int unsigned TailBits    = 4,
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
   parameter  int unsigned OutBits     = 28,
@@ -22,7 +24,8 @@ module flk_list_sorter #(
   parameter  int unsigned Width       = 512,
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
-  localparam int unsigned CountBits   = $clog2(LineEntries + 1),
+  localparam int unsigned LineBits    = LineEntries * EntryBits + TailBits,
+  localparam int unsigned CountBits   = $clog2(ShortEntries + 1),
   localparam int unsigned AddrBits    = AddressBits + $clog2(Width / 8)
 ) (
   input  logic                                  clk_i,
@@ -38,7 +41,7 @@ module flk_list_sorter #(
   // Lines
   input  logic                                  in_valid_i,
   output logic                                  in_ready_o,
-  input  logic [LineEntries-1:0][EntryBits-1:0] in_entries_i,
+  input  logic [LineBits-1:0]                   in_entries_i,
   input  logic [CountBits-1:0]                  in_count_i,
   input  logic                                  in_last_i,
   // Sorted entries
@@ -80,7 +83,7 @@ module flk_list_sorter #(
   logic                                  run_valid, run_ready, run_end, merging, stop;
   logic [EntryBits-1:0]                  run_entry;
   logic                                  again_valid, again_ready, limited, last, is_final;
-  logic [LineEntries-1:0][EntryBits-1:0] again_entries;
+  logic [LineBits-1:0]                   again_entries;
   logic [3:0]                            again_count;
   logic [KeyBits-1:0]                    limit;
   logic                                  pack_ready, begin_merge, merge_done, full, fault;
@@ -96,6 +99,8 @@ module flk_list_sorter #(
     .Ways       (Ways),
     .Lists      (Lists),
     .LineEntries(LineEntries),
+    .ShortEntries(ShortEntries),
+    .TailBits   (TailBits),
     .EntryBits  (EntryBits),
     .MaskBits   (MaskBits),
     .OutBits    (OutBits)
@@ -139,10 +144,12 @@ module flk_list_sorter #(
 
   flk_run_writer #(
     .LineEntries(LineEntries),
+    .ShortEntries(ShortEntries),
     .EntryBits  (EntryBits),
     .MaskBits   (MaskBits),
     .NumberBits (NumberBits),
     .RunBits    (RunBits),
+    .RunLines   (RunLines),
     .Width      (Width)
   ) i_writer (
     .clk_i,
@@ -166,13 +173,17 @@ module flk_list_sorter #(
   );
 
   // Of the next line: base_i + number, without an adder on the way out. There are cycles enough between two lists.
-  logic [AddressBits-1:0] beat_q;
+  logic [AddressBits-1:0] beat_q, run_beat_q;
 
   always_ff @(posedge clk_i) begin
     if (write_valid_o && write_ready_i) begin
       beat_q <= beat_q + 1'b1;
+    end else if (built_valid && built_ready) begin
+      beat_q     <= run_beat_q + AddressBits'(RunLines);
+      run_beat_q <= run_beat_q + AddressBits'(RunLines);
     end else if (number == '0) begin
-      beat_q <= base_i;
+      beat_q     <= base_i;
+      run_beat_q <= base_i;
     end
   end
 
@@ -185,6 +196,8 @@ module flk_list_sorter #(
     .Lines      (MergeLines),
     .Capacity   (Capacity),
     .LineEntries(LineEntries),
+    .ShortEntries(ShortEntries),
+    .TailBits   (TailBits),
     .EntryBits  (EntryBits),
     .MaskBits   (MaskBits),
     .AddressBits(AddressBits),

@@ -1,10 +1,10 @@
 // Sorted runs in memory, their lines in the order of their last entries: what a sorting unit takes a second time
 // (docs/reference/list_sorter.md).
 //
-// Runs come as first and last key, number after number, when their lines are on their way to memory; run r
-// lies from line RunLines r of base_i on. A run joins the first chain that it lies behind or before, else it
-// begins one. begin_i, when no more come and all are in memory: lines are given, in batches. The line with
-// the least last key of all chains is next; when a batch has no more lines free than there are chains left,
+// Runs come as first and last key and number of lines, number after number, when these are on their way to memory;
+// run r lies from line RunLines r of base_i on, key and record of its entries exchanged. A run joins the first
+// chain that it lies behind or before, else it begins one. begin_i, when no more come and all are in memory: lines are given, in batches. The line with
+// the least last key of all chains is next; when a batch might not hold another line and one of each chain left,
 // the next line of each chain is given with out_limited_o: entries above out_limit_o, the last key of the
 // line given last, are not of this batch, and the line comes again. out_last_o: a batch's last line,
 // with out_final_o the list's. stop_i, until done_o: nothing more is wanted; the batch ends with a line of
@@ -19,7 +19,9 @@ module flk_run_merge #(
   parameter  int unsigned Lines       = 128,  // of the line memory, a power of two, at least 2 Runs
   parameter  int unsigned Capacity    = 2048,  // entries of a run, and of the largest batch
   parameter  int unsigned Beats       = 8,    // of a request
-  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned LineEntries = 9,    // of a plain line
+  parameter  int unsigned ShortEntries = 15,
+  parameter  int unsigned TailBits    = 4,    // of a short line, behind what a plain one has
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
   parameter  int unsigned AddressBits = 34,   // of a line
@@ -28,6 +30,7 @@ module flk_run_merge #(
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
   localparam int unsigned KeyBits     = EntryBits - MaskBits,
+  localparam int unsigned LineBits    = LineEntries * EntryBits + TailBits,
   localparam int unsigned RunLines    = (Capacity + LineEntries - 1) / LineEntries,
   localparam int unsigned RunBits     = $clog2(RunLines + 1),
   localparam int unsigned Shift       = $clog2(Width / 8),
@@ -51,7 +54,7 @@ module flk_run_merge #(
   output logic                                  done_o,
   output logic                                  out_valid_o,
   input  logic                                  out_ready_i,
-  output logic [LineEntries-1:0][EntryBits-1:0] out_entries_o,
+  output logic [LineBits-1:0]                   out_entries_o,
   output logic [3:0]                            out_count_o,
   output logic                                  out_limited_o,
   output logic [KeyBits-1:0]                    out_limit_o,
@@ -78,18 +81,18 @@ module flk_run_merge #(
   localparam int unsigned LB = $clog2(RB + 1);     // levels of the tree
   localparam int unsigned NB = $clog2(Beats + 1);
   localparam int unsigned OB = $clog2(Runs * RunLines);  // a line from base_i on
-  localparam int unsigned FB = $clog2(Capacity / LineEntries + Runs + 1);
-  localparam int unsigned EntriesBits = LineEntries * EntryBits;
-  localparam int unsigned RestBits    = EntriesBits - KeyBits;  // without the last key
+  localparam int unsigned FB = $clog2(Capacity + 2);
+  localparam int unsigned Half     = KeyBits / 2;         // bits of a record, of a key
+  localparam int unsigned RestBits = LineBits - KeyBits;  // without the last key
 
   if (Runs < 2 || Runs != 1 << RB || Lines != 1 << SB || Lines < 2 * Runs) begin : gen_check
     $error("flk_run_merge: Runs and Lines must be powers of two, Lines at least twice Runs");
   end
-  if (EntriesBits + 4 > Width || LineEntries > 15) begin : gen_check_line
+  if (LineBits + 4 > Width || ShortEntries != 15) begin : gen_check_line
     $error("flk_run_merge: LineEntries and their number must fit a line");
   end
-  if ((Capacity >> 3) / LineEntries < 5) begin : gen_check_capacity
-    $error("flk_run_merge: an eighth of Capacity must hold more lines than four");
+  if (Capacity < ShortEntries * (Runs + 1)) begin : gen_check_capacity
+    $error("flk_run_merge: Capacity must hold a line of each run and one more");
   end
 
   typedef logic [KeyBits-1:0] key_t;
@@ -97,18 +100,27 @@ module flk_run_merge #(
   typedef logic [SB:0] place_t;  // of a chain's lines, modulo twice the line memory
 
   typedef struct packed {
-    key_t    first;
-    key_t    last;
-    number_t head;  // its first run
-    number_t tail;  // its last one
+    key_t               first;
+    key_t               last;
+    number_t            head;        // its first run
+    logic [RunBits-1:0] head_lines;
+    number_t            tail;        // its last one
   } chain_t;
+
+  // The run behind a run.
+  typedef struct packed {
+    number_t            run;
+    logic [RunBits-1:0] lines;
+  } next_t;
 
   typedef struct packed {
     number_t            run;    // of the line to be asked for next
     logic [RunBits-1:0] line;
+    logic [RunBits-1:0] left;   // of the run, with it
     logic               over;   // there is none
     place_t             asked;  // lines asked for
     place_t             used;   // lines used up
+    logic [SB-1:0]      behind; // the place one further, so that it is known early
   } state_t;
 
   typedef enum logic [1:0] {NONE = 2'd0, KEY = 2'd1, END = 2'd2} kind_e;
@@ -148,7 +160,6 @@ module flk_run_merge #(
   state_e              state_d, state_q;
   logic [RB:0]         runs_q, chains_q;  // numbers of them
   logic [RB:0]         live_q;            // chains with lines left
-  logic [RunBits-1:0]  last_lines_q;      // of the last run
   logic [RB:0]         at_q;              // chain or node that is looked at
   logic [LB-1:0]       levels, levels_q;
   logic [RB:0]         leaves;            // 1 << levels
@@ -157,7 +168,8 @@ module flk_run_merge #(
   // ---- chains ---------------------------------------------------------------------------------------
 
   logic    chain_read, chain_write, next_write, next_read;
-  number_t chain_at, chain_to, next_at, next_to, next_run, next_data;
+  number_t chain_at, chain_to, next_at, next_to;
+  next_t   next_run, next_data;
   chain_t  chain, chain_new;
   logic    seen_q;      // chain has been read
   number_t seen_at_q;   // its number
@@ -180,7 +192,7 @@ module flk_run_merge #(
   );
 
   flk_sram #(
-    .Width(RB),
+    .Width($bits(next_t)),
     .Depth(Runs)
   ) i_next (
     .clk_i,
@@ -203,18 +215,19 @@ module flk_run_merge #(
     chain_to  = number_t'(at_q);
     chain_new = chain;
     next_to   = chain.tail;
-    next_data = number_t'(runs_q);
+    next_data = '{run: number_t'(runs_q), lines: run_lines_i};
     if (!joins_q) begin
       chain_new = '{first: run_first_i, last: run_last_i, head: number_t'(runs_q),
-                    tail: number_t'(runs_q)};
+                    head_lines: run_lines_i, tail: number_t'(runs_q)};
     end else if (behind_q) begin
       chain_new.last = run_last_i;
       chain_new.tail = number_t'(runs_q);
     end else begin
-      chain_new.first = run_first_i;
-      chain_new.head  = number_t'(runs_q);
-      next_to         = number_t'(runs_q);
-      next_data       = chain.head;
+      chain_new.first      = run_first_i;
+      chain_new.head       = number_t'(runs_q);
+      chain_new.head_lines = run_lines_i;
+      next_to              = number_t'(runs_q);
+      next_data            = '{run: chain.head, lines: chain.head_lines};
     end
   end
 
@@ -253,14 +266,15 @@ module flk_run_merge #(
   logic               filled_q;  // FILL: a chain in this round has places left
   logic [1:0]         step_q;    // FILL: of the chain
   logic [NB-1:0]      beats;
-  logic [RunBits-1:0] left, left_q;
+  logic [RunBits-1:0] left_q;
   logic               wants, ends, more;
   logic               give;      // the winner's line is read
 
   // What is known of the chain after UPDATE or FILL's step 2.
   logic               commit_q, commit_go, commit_ends_q;
   state_t             commit_state_q;
-  number_t            commit_chain_q, commit_next_q;
+  number_t            commit_chain_q;
+  next_t              commit_next_q;
   logic               commit_tail_q;
   logic [NB-1:0]      commit_beats_q;
   logic               ask_valid_q, ask_ready;
@@ -284,23 +298,23 @@ module flk_run_merge #(
   always_comb begin
     now = read_state;
     if (state_q == FILL && first_q) begin
-      now = '{run: chain.head, line: '0, over: 1'b0, asked: '0, used: '0};
+      now = '{run: chain.head, line: '0, left: chain.head_lines, over: 1'b0, asked: '0, used: '0,
+              behind: SB'(1)};
     end
     if (state_q == GIVE) begin
-      now.used = read_state.used + 1'b1;
+      now.used   = read_state.used + 1'b1;
+      now.behind = read_state.behind + 1'b1;
     end
   end
 
   assign free = slots_q - (now.asked - now.used);
-  assign left = ((RB + 1)'(now.run) + 1'b1 == runs_q ? last_lines_q : RunBits'(RunLines))
-                - now.line;
 
   // A step of its own, so that what follows begins with registers.
   always_ff @(posedge clk_i) begin
     if (give || (state_q == FILL && step_q == 2'd1)) begin
       known_q <= now;
       free_q  <= free;
-      left_q  <= left;
+      left_q  <= now.left;
     end
   end
 
@@ -345,9 +359,11 @@ module flk_run_merge #(
     new_state       = commit_state_q;
     new_state.asked = commit_state_q.asked + place_t'(commit_beats_q);
     new_state.line  = commit_state_q.line + RunBits'(commit_beats_q);
+    new_state.left  = commit_state_q.left - RunBits'(commit_beats_q);
     if (commit_beats_q != '0 && commit_ends_q) begin
       new_state.line = '0;
-      new_state.run  = commit_next_q;
+      new_state.left = commit_next_q.lines;
+      new_state.run  = commit_next_q.run;
       new_state.over = commit_tail_q;
     end
   end
@@ -380,7 +396,7 @@ module flk_run_merge #(
   logic             unused_tag;
   tag_t             ar_tag;
 
-  assign unused_tag = ^{ar_tag, beat_data[Width-1:EntriesBits+4]};
+  assign unused_tag = ^{ar_tag, beat_data[Width-1:LineBits+4]};
 
   flk_axi_read #(
     .AddrBits(AddrBits),
@@ -423,8 +439,9 @@ module flk_run_merge #(
   );
 
   assign beat_place = place_of(beat_tag.chain, beat_tag.place + SB'(beat_q), levels_q, slot_mask_q);
-  assign wrong      = beat_error || beat_data[EntriesBits+:4] == '0 ||
-                      32'(beat_data[EntriesBits+:4]) > LineEntries;
+  assign wrong      = beat_error || beat_data[LineBits+:4] == '0 ||
+                      (32'(beat_data[LineBits+:4]) <= LineEntries &&
+                       beat_data[LineBits-1-:TailBits] != '0);
 
   logic fault_q;
 
@@ -456,7 +473,8 @@ module flk_run_merge #(
     .clk_i,
     .wr_en_i  (beat_valid),
     .wr_addr_i(beat_place),
-    .wr_data_i({wrong ? 4'd1 : beat_data[EntriesBits+:4], beat_data[RestBits-1:0]}),
+    .wr_data_i({wrong ? 4'd1 : beat_data[LineBits+:4], beat_data[LineBits-1:EntryBits],
+                beat_data[MaskBits-1:0]}),
     .rd_en_i  (line_read),
     .rd_addr_i(line_at),
     .rd_data_o({line_count, line_rest})
@@ -469,7 +487,7 @@ module flk_run_merge #(
     .clk_i,
     .wr_en_i  (beat_valid),
     .wr_addr_i(beat_place),
-    .wr_data_i(beat_data[EntriesBits-1-:KeyBits]),
+    .wr_data_i({beat_data[MaskBits+:Half], beat_data[MaskBits+Half+:Half]}),
     .rd_en_i  (key_read),
     .rd_addr_i(key_at),
     .rd_data_o(key)
@@ -512,11 +530,13 @@ module flk_run_merge #(
 
   logic          out_valid_q, out_limited_q, out_last_q, out_final_q, out_none_q, out_free;
   logic          exhausted, live, peek, peeked, next_valid, key_known_q, exhausted_q;
-  logic [FB-1:0] fed_q, room;
+  logic [FB-1:0] fed_q, room;   // entries
+  logic [FB:0]   need_q;        // of a line more, and one of each chain
   logic [RB:0]   peeked_q;
   key_t          limit_q;
   logic [SB-1:0] next_place_q;
   logic          building_q;  // the tree
+  key_t          out_key;
   logic          looked_q, live_look_q;  // PEEKED: whether the chain has a line is known
 
   assign out_free  = !out_valid_q || out_ready_i;
@@ -528,13 +548,11 @@ module flk_run_merge #(
 
   always_comb begin
     if (32'(chains_q) <= 4) begin
-      room = FB'((Capacity >> 3) / LineEntries);
+      room = FB'(Capacity >> 2);
     end else if (32'(chains_q) <= 8) begin
-      room = FB'((Capacity >> 2) / LineEntries);
-    end else if (32'(chains_q) <= 16) begin
-      room = FB'((Capacity >> 1) / LineEntries);
+      room = FB'(Capacity >> 1);
     end else begin
-      room = FB'(Capacity / LineEntries);
+      room = FB'(Capacity);
     end
   end
 
@@ -545,7 +563,7 @@ module flk_run_merge #(
   // The chain's next line; of one that is looked at the line that is given, too.
   logic [SB-1:0] next_place;
   assign next_place = state_q == GIVE
-                      ? place_of(winner_q.chain, SB'(read_state.used + 1'b1), levels_q, slot_mask_q)
+                      ? place_of(winner_q.chain, read_state.behind, levels_q, slot_mask_q)
                       : next_place_q;
   assign next_valid = valid_q[next_place];
   assign key_at     = next_place;
@@ -625,7 +643,7 @@ module flk_run_merge #(
           end else if (live_q == '0) begin
             state_d = DRAIN;
           end else begin
-            state_d = 32'(fed_q) + 32'(live_q) >= 32'(room) ? PEEK : CHOOSE;
+            state_d = (FB + 1)'(fed_q) + need_q > (FB + 1)'(room) ? PEEK : CHOOSE;
           end
         end
       end
@@ -834,16 +852,17 @@ module flk_run_merge #(
       default: begin
       end
     endcase
-    if (taken) begin
-      last_lines_q <= run_lines_i;
-    end
     if (give) begin
       limit_q     <= winner_q.key;
       key_known_q <= next_valid;
       exhausted_q <= exhausted;
-      fed_q       <= fed_q + 1'b1;
       live_q      <= live_q - (RB + 1)'(exhausted);
       peeked_q    <= '0;
+    end
+    // ShortEntries of them, and one.
+    need_q <= ((FB + 1)'(live_q) << 4) + (FB + 1)'(ShortEntries) - (FB + 1)'(live_q);
+    if (state_q == UPDATE) begin
+      fed_q <= fed_q + FB'(line_count);
     end
     if (peek) begin
       peeked_q <= peeked_q + 1'b1;
@@ -862,7 +881,9 @@ module flk_run_merge #(
 
   assign out_valid_o   = out_valid_q;
   // The last key of a line given is the limit, that of one with a limit has just been read.
-  assign out_entries_o = {out_limited_q ? key : limit_q, line_rest};
+  assign out_key       = out_limited_q ? key : limit_q;
+  assign out_entries_o = {line_rest[RestBits-1:MaskBits], out_key[Half-1:0],
+                          out_key[KeyBits-1:Half], line_rest[MaskBits-1:0]};
   assign out_count_o   = out_none_q ? '0 : line_count;
   assign out_limited_o = out_limited_q;
   assign out_limit_o   = limit_q;

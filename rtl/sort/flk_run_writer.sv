@@ -1,20 +1,25 @@
 // Sorted runs to lines of memory: a list's entries that a sorting unit does not hold (docs/reference/list_sorter.md).
 //
-// A run is entries, in order, then an element with in_end_i (no entry). Nine of them and their number are a
-// line; in a run's last line the last entry fills the places that are left. Lines have numbers from 0 on,
-// across runs; start_i, while nothing is inside, begins with 0 again. When a run's last line has been taken
-// its first and last key and the lines it took are offered as run_*; its end is taken with these.
+// A run is entries, in order, then an element with in_end_i (no entry). Lines are those of a list
+// (docs/reference/list_layout.md), with key and record of each entry exchanged: up to LineEntries of them, more while
+// each is near the one before it. Lines have numbers from 0 on; those of a run begin RunLines after those of the run
+// before it. start_i, while nothing is inside, begins with 0 again. When a run's last line has been taken its
+// first and last key and the lines it took are offered as run_*; its end is taken with these.
 // drop_i: a run that begins is swallowed with its end, and gives no line.
-// Throughput: an entry a cycle, two cycles for an end. Combinational: in_entry_i to out_data_o, in_valid_i and in_end_i to
-// out_valid_o, out_ready_i and run_ready_i to in_ready_o. clear_i (synchronous) empties it.
+// Throughput: an entry a cycle, two cycles for an end. Combinational: in_entry_i, in_valid_i and in_end_i to
+// out_valid_o, these, out_ready_i and run_ready_i to in_ready_o. clear_i (synchronous) empties it.
 module flk_run_writer #(
-  parameter  int unsigned LineEntries = 9,
-  parameter  int unsigned EntryBits   = 52,
-  parameter  int unsigned MaskBits    = 4,
-  parameter  int unsigned NumberBits  = 14,  // of a line
-  parameter  int unsigned RunBits     = 8,   // of a run's lines
-  parameter  int unsigned Width       = 512,
-  localparam int unsigned KeyBits     = EntryBits - MaskBits
+  parameter  int unsigned LineEntries  = 9,    // of a plain line
+  parameter  int unsigned ShortEntries = 15,   // of a short one
+  parameter  int unsigned EntryBits    = 52,
+  parameter  int unsigned MaskBits     = 4,
+  parameter  int unsigned RecordKept   = 9,    // low bits of the key in a short line
+  parameter  int unsigned KeyKept      = 17,   // of the record: they are exchanged
+  parameter  int unsigned NumberBits   = 14,   // of a line
+  parameter  int unsigned RunBits      = 8,    // of a run's lines
+  parameter  int unsigned RunLines     = 228,  // from run to run
+  parameter  int unsigned Width        = 512,
+  localparam int unsigned KeyBits      = EntryBits - MaskBits
 ) (
   input  logic                  clk_i,
   input  logic                  rst_ni,
@@ -39,27 +44,57 @@ module flk_run_writer #(
   output logic [RunBits-1:0]    run_lines_o
 );
 
-  localparam int unsigned Held = LineEntries - 1;
-  localparam int unsigned CountBits = 4;
+  localparam int unsigned CountBits  = 4;
+  localparam int unsigned Half       = KeyBits / 2;  // bits of a record, of a key
+  localparam int unsigned Columns    = LineEntries - 1;
+  localparam int unsigned Over       = ShortEntries - LineEntries;
+  localparam int unsigned KeptBits   = MaskBits + RecordKept + KeyKept;
+  localparam int unsigned GapBits    = EntryBits - KeptBits;
+  localparam int unsigned RecordGap  = Half - RecordKept;
+  localparam int unsigned RestBits   = KeptBits - GapBits;
+  localparam int unsigned TailBits   = Over * RestBits - (Columns - Over) * GapBits;
+  localparam int unsigned PlacesBits = Columns * EntryBits;
+  localparam int unsigned LineBits   = EntryBits + PlacesBits + TailBits;
 
-  if (LineEntries < 2 || LineEntries >= 1 << CountBits ||
-      LineEntries * EntryBits + CountBits > Width) begin : gen_check
+  if (LineEntries < 2 || ShortEntries >= 1 << CountBits ||
+      LineBits + CountBits > Width) begin : gen_check
     $error("flk_run_writer: LineEntries and their number must fit a line");
   end
 
-  logic [Held-1:0][EntryBits-1:0] held_q;
-  logic [CountBits-1:0]           count_q;
-  logic [KeyBits-1:0]             first_q;
-  logic [NumberBits-1:0]          number_q;
-  logic [RunBits-1:0]             lines_q;
-  logic                           begun_q, drop_q, drop;
-  logic                           entry, line, last_place, written;
+  typedef logic [EntryBits-1:0] entry_t;
+
+  entry_t                        entry_in, newest_q;  // with key and record exchanged
+  logic [Columns-1:0][EntryBits-1:0] places_q, places_d;  // the others of a line
+  logic [TailBits-1:0]           tail_q, tail_d;
+  logic [CountBits-1:0]          count_q;
+  logic                          tight_q;  // all of them are near each other
+  logic [KeyBits-1:0]            first_q;
+  logic [NumberBits-1:0]         number_q, run_number_q;
+  logic [RunBits-1:0]            lines_q;
+  logic                          begun_q, drop_q, drop, is_near, joins;
+  logic                          entry, line, written;
+
+  assign entry_in = {in_entry_i[MaskBits+:Half], in_entry_i[MaskBits+Half+:Half],
+                     in_entry_i[MaskBits-1:0]};
+
+  flk_entry_near #(
+    .MaskBits  (MaskBits),
+    .RecordBits(Half),
+    .KeyBits   (Half),
+    .RecordKept(RecordKept),
+    .KeyKept   (KeyKept)
+  ) i_near (
+    .older_i(newest_q),
+    .newer_i(entry_in),
+    .near_o (is_near)
+  );
 
   // A run is swallowed or not as a whole.
-  assign drop       = begun_q ? drop_q : drop_i;
-  assign last_place = count_q == CountBits'(Held);
-  assign line       = in_valid_i && !drop && (in_end_i ? count_q != '0 : last_place);
-  assign written    = line && out_ready_i;
+  assign drop    = begun_q ? drop_q : drop_i;
+  assign joins   = count_q < CountBits'(LineEntries) ||
+                   (tight_q && is_near && count_q != CountBits'(ShortEntries));
+  assign line    = in_valid_i && !drop && (in_end_i ? count_q != '0 : !joins);
+  assign written = line && out_ready_i;
 
   always_comb begin
     if (drop) begin
@@ -67,7 +102,7 @@ module flk_run_writer #(
     end else if (in_end_i) begin
       in_ready_o = count_q == '0 && run_ready_i;
     end else begin
-      in_ready_o = !last_place || out_ready_i;
+      in_ready_o = joins || out_ready_i;
     end
   end
 
@@ -76,23 +111,58 @@ module flk_run_writer #(
   assign out_number_o = number_q;
   assign run_valid_o  = in_valid_i && in_end_i && !drop && count_q == '0;
   assign run_first_o  = first_q;
-  assign run_last_o   = held_q[Held-1][EntryBits-1:MaskBits];
+  assign run_last_o   = {newest_q[MaskBits+:Half], newest_q[MaskBits+Half+:Half]};
   assign run_lines_o  = lines_q;
+  assign out_data_o   = Width'({count_q, tail_q, places_q, newest_q});
+
+  // The newest entry goes to the place behind those that are there; from place Columns on to the gaps, which are emptied
+  // before, and the tail: the low bits of what is kept to a whole gap, the rest behind the others'.
+  logic [KeptBits-1:0]                 later;
+  logic [Columns-1:0][GapBits-1:0]     gaps;
+  logic [Over*RestBits-1:0]            rests;
+  logic [ShortEntries-1:0]             to;  // entries of the line that the next one finds
+
+  assign later = {newest_q[MaskBits+Half+:KeyKept], newest_q[0+:MaskBits+RecordKept]};
+
+  for (genvar i = 0; i < ShortEntries; i++) begin : gen_to
+    assign to[i] = count_q == CountBits'(i);
+  end
 
   always_comb begin
-    out_data_o                                = '0;
-    out_data_o[Held*EntryBits-1:0]            = held_q;
-    out_data_o[Held*EntryBits+:EntryBits]     = in_end_i ? held_q[Held-1] : in_entry_i;
-    out_data_o[LineEntries*EntryBits+:CountBits] = in_end_i ? count_q : CountBits'(LineEntries);
+    rests = '0;
+    gaps  = '0;
+    for (int unsigned k = 0; k < Over; k++) begin
+      if (to[LineEntries+k]) begin
+        gaps[k]                    = later[GapBits-1:0];
+        rests[k*RestBits+:RestBits] = later[KeptBits-1:GapBits];
+      end
+    end
+    {tail_d, gaps[Columns-1:Over]} = rests;
+    tail_d = tail_d | tail_q;
+    for (int unsigned i = 0; i < Columns; i++) begin
+      places_d[i] = places_q[i];
+      if (to[LineEntries]) begin
+        places_d[i][MaskBits+RecordKept+:RecordGap]               = '0;
+        places_d[i][MaskBits+Half+KeyKept+:GapBits-RecordGap]     = '0;
+      end
+      places_d[i][MaskBits+RecordKept+:RecordGap] =
+          places_d[i][MaskBits+RecordKept+:RecordGap] | gaps[i][RecordGap-1:0];
+      places_d[i][MaskBits+Half+KeyKept+:GapBits-RecordGap] =
+          places_d[i][MaskBits+Half+KeyKept+:GapBits-RecordGap] | gaps[i][GapBits-1:RecordGap];
+      if (to[i+1]) begin
+        places_d[i] = newest_q;
+      end
+    end
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      count_q  <= '0;
-      number_q <= '0;
-      lines_q  <= '0;
-      begun_q  <= 1'b0;
-      drop_q   <= 1'b0;
+      count_q      <= '0;
+      number_q     <= '0;
+      run_number_q <= '0;
+      lines_q      <= '0;
+      begun_q      <= 1'b0;
+      drop_q       <= 1'b0;
     end else begin
       if (in_valid_i && !begun_q) begin
         drop_q <= drop_i;
@@ -101,30 +171,38 @@ module flk_run_writer #(
         begun_q <= !(in_end_i && in_ready_o);
       end
       if (written) begin
-        count_q  <= '0;
+        count_q  <= CountBits'(entry);
         number_q <= number_q + 1'b1;
         lines_q  <= lines_q + 1'b1;
       end else if (entry) begin
         count_q <= count_q + 1'b1;
       end
       if (run_valid_o && run_ready_i) begin
-        lines_q <= '0;
+        lines_q      <= '0;
+        number_q     <= run_number_q + NumberBits'(RunLines);
+        run_number_q <= run_number_q + NumberBits'(RunLines);
       end
       if (start_i || clear_i) begin
-        number_q <= '0;
-        lines_q  <= '0;
-        count_q  <= '0;
-        begun_q  <= 1'b0;
+        number_q     <= '0;
+        run_number_q <= '0;
+        lines_q      <= '0;
+        count_q      <= '0;
+        begun_q      <= 1'b0;
       end
     end
   end
 
-  // An entry goes to its place and all behind it, so that what is left of a line holds its last one.
   always_ff @(posedge clk_i) begin
-    for (int unsigned i = 0; i < Held; i++) begin
-      if (entry && (i == Held - 1 || count_q <= CountBits'(i))) begin
-        held_q[i] <= in_entry_i;
-      end
+    if (entry) begin
+      newest_q <= entry_in;
+      tight_q  <= count_q == '0 || line || (tight_q && is_near);
+    end
+    if (entry && (line || count_q == '0)) begin
+      places_q <= '0;
+      tail_q   <= '0;
+    end else if (entry) begin
+      places_q <= places_d;
+      tail_q   <= tail_d;
     end
     if (entry && count_q == '0 && lines_q == '0) begin
       first_q <= in_entry_i[EntryBits-1:MaskBits];

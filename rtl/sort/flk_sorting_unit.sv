@@ -1,11 +1,12 @@
 // Sorting unit: the lines of a tile's list in, its entries in order out (docs/reference/sorting_unit.md).
 //
 // Entries are {key 24, record 24, mask 4}; order is that of the upper 48 bits, unsigned, which are
-// distinct within a list. Lines hold in_count_i entries, the lowest, in any order; 0 only in the one line
-// of an empty list. Out come {record, mask}, then an element with out_end_o that carries no entry.
+// distinct within a list. Lines are those of docs/reference/list_layout.md without their header and hold
+// in_count_i entries, in any order; 0 only in the one line of an empty list. Out come {record, mask}, then an element with out_end_o that carries no entry.
 // A list of more than Capacity entries (docs/reference/list_sorter.md) leaves as runs, run_*: each Capacity entries of it in order, whole,
 // then an element with run_end_o. merging_o says that all of them have left; from then on its lines
-// come a second time as merge_*, in batches of at most Capacity entries: the entries of a batch are those
+// come a second time as merge_*, key and record of each entry exchanged, in batches of at most
+// Capacity entries: the entries of a batch are those
 // above the limit of the one before and, of lines with merge_limited_i, not above merge_limit_i.
 // After the batch with merge_final_i the list ends. Of the next list no line is taken before that.
 // finish_i, from any cycle until the end of the list at the output is taken: what there is of this
@@ -28,12 +29,15 @@ module flk_sorting_unit #(
   parameter  int unsigned Ways        = 8,  // runs that the last step merges
   parameter  int unsigned Block       = 32,  // of its memory, at most a run
   parameter  int unsigned Lists       = 8,  // whole lists waiting in a step, at most
-  parameter  int unsigned LineEntries = 9,
+  parameter  int unsigned LineEntries = 9,  // of a plain line
+  parameter  int unsigned ShortEntries = 15, // of a short one
+  parameter  int unsigned TailBits    = 4,  // of a short one, behind what a plain one has
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
   parameter  int unsigned OutBits     = 28,
   localparam int unsigned KeyBits     = EntryBits - MaskBits,
-  localparam int unsigned CountBits   = $clog2(LineEntries + 1)
+  localparam int unsigned LineBits    = LineEntries * EntryBits + TailBits,
+  localparam int unsigned CountBits   = $clog2(ShortEntries + 1)
 ) (
   input  logic                                  clk_i,
   input  logic                                  rst_ni,
@@ -47,7 +51,7 @@ module flk_sorting_unit #(
   // Lines
   input  logic                                  in_valid_i,
   output logic                                  in_ready_o,
-  input  logic [LineEntries-1:0][EntryBits-1:0] in_entries_i,
+  input  logic [LineBits-1:0]                   in_entries_i,
   input  logic [CountBits-1:0]                  in_count_i,
   input  logic                                  in_last_i,
   // Runs of a list that does not fit
@@ -60,7 +64,7 @@ module flk_sorting_unit #(
   // Its lines again
   input  logic                                  merge_valid_i,
   output logic                                  merge_ready_o,
-  input  logic [LineEntries-1:0][EntryBits-1:0] merge_entries_i,
+  input  logic [LineBits-1:0]                   merge_entries_i,
   input  logic [CountBits-1:0]                  merge_count_i,
   input  logic                                  merge_limited_i,
   input  logic [KeyBits-1:0]                    merge_limit_i,
@@ -99,14 +103,16 @@ module flk_sorting_unit #(
 
   logic                         line_valid_d, line_valid_q;
   logic                         line_last_q, line_limited_q, line_final_q;
-  entry_t [LineEntries-1:0]     line_q;
+  logic [LineBits-1:0]          line_q;
+  logic                         line_short_q, line_run_q, line_newest_q;  // its newest is next
   logic [CountBits-1:0]         line_left_d, line_left_q;  // entries, then the end of a last line
-  logic [CountBits-1:0]         line_at_d, line_at_q;
+  logic [CountBits-1:0]         take_count;
   logic                         line_take, list_take, line_free, line_entry, line_one, line_end;
   logic                         line_done, line_drop, fits, hold_q, again;
   logic                         x_valid_d, x_valid_q, x_end_q, x_limited_q, x_final_q, x_go, x_free;
-  entry_t                       x_q;
+  entry_t                       x_d, x_q;
 
+  assign take_count    = again ? merge_count_i : in_count_i;
   assign again         = mode_q == MERGE;
   assign line_entry    = line_valid_q && line_left_q != '0;
   assign line_end      = line_valid_q && line_left_q == '0;
@@ -122,15 +128,12 @@ module flk_sorting_unit #(
   always_comb begin
     line_valid_d = line_take || (line_valid_q && !line_done);
     line_left_d  = line_left_q;
-    line_at_d    = line_at_q;
     if (line_take) begin
-      line_left_d = again ? merge_count_i : in_count_i;
-      line_at_d   = '0;
+      line_left_d = take_count;
     end else if (line_drop) begin
       line_left_d = '0;
     end else if (line_entry && x_free) begin
       line_left_d = line_left_q - 1'b1;
-      line_at_d   = line_at_q + 1'b1;
     end
     x_valid_d = x_free ? (line_entry && !line_drop) || line_end : 1'b1;
   end
@@ -147,8 +150,10 @@ module flk_sorting_unit #(
 
   always_ff @(posedge clk_i) begin
     line_left_q <= line_left_d;
-    line_at_q   <= line_at_d;
     if (line_take) begin
+      line_short_q   <= 32'(take_count) > LineEntries;
+      line_run_q     <= again;
+      line_newest_q  <= 1'b1;
       line_q         <= again ? merge_entries_i : in_entries_i;
       line_last_q    <= again ? merge_last_i : in_last_i;
       line_limited_q <= again && merge_limited_i;
@@ -160,9 +165,36 @@ module flk_sorting_unit #(
       x_final_q   <= line_final_q;
     end
     if (x_free && line_entry) begin
-      x_q <= line_q[line_at_q];
+      x_q <= x_d;
+      if (!line_take) begin
+        line_newest_q <= 1'b0;
+      end
     end
   end
+
+  // Key and record in each other's places.
+  function automatic entry_t exchanged(input entry_t entry);
+    return {entry[MaskBits+:KeyBits/2], entry[EntryBits-1:MaskBits+KeyBits/2], entry[MaskBits-1:0]};
+  endfunction
+
+  entry_t line_entry_word;
+
+  assign x_d = line_run_q ? exchanged(line_entry_word) : line_entry_word;
+
+  // The entry given before it is in x, or was there last.
+  flk_line_entry #(
+    .MaskBits    (MaskBits),
+    .RecordBits  (KeyBits / 2),
+    .KeyBits     (KeyBits - KeyBits / 2),
+    .LineEntries (LineEntries),
+    .ShortEntries(ShortEntries)
+  ) i_entry (
+    .line_i (line_q),
+    .short_i(line_short_q),
+    .at_i   (line_newest_q ? '0 : line_left_q),
+    .newer_i(line_run_q ? exchanged(x_q) : x_q),
+    .entry_o(line_entry_word)
+  );
 
   logic              first_ready, first_drop;  // of the first step
   logic              final_valid, final_end, final_flag, out_free, out_drop;  // of the last one
@@ -195,7 +227,7 @@ module flk_sorting_unit #(
   // What is behind an end in x is of the next list.
   assign line_drop  = drop_here && line_entry && !(x_valid_q && x_end_q);
   // The list ends, and what is on its way fits.
-  assign fits       = mode_q == LIST && 32'(gathered_q) + LineEntries + 3 < Capacity;
+  assign fits       = mode_q == LIST && 32'(gathered_q) + ShortEntries + 3 < Capacity;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -552,7 +584,7 @@ module flk_sorting_unit #(
   else $error("flk_sorting_unit: a batch of more entries than fit");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      in_valid_i |-> 32'(in_count_i) <= LineEntries && (in_count_i != '0 || in_last_i))
+      in_valid_i |-> 32'(in_count_i) <= ShortEntries && (in_count_i != '0 || in_last_i))
   else $error("flk_sorting_unit: a line without entries");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

@@ -26,7 +26,6 @@ from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.golden.lanes.lists import front_lists
 from flicker.golden.list_reader import read_tile
-from flicker.golden.lists import ENTRY_BITS
 from flicker.golden.long_lists import sort_long
 from flicker.golden.sorting import CAPACITY
 from flicker.params import TILE, CatMode, RenderConfig
@@ -85,7 +84,7 @@ def lists_read(image: FrontImage, capacity: int) -> Lists:
     for y in range(lists.rows):
         for x in range(lists.cols):
             elements = read_tile(lists.memory, lists.pointers, lists.cols, x, y, lists.chunks).lines
-            entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in elements for k in range(line.used)]
+            entries = [entry for line in elements for entry in line.unpacked()]
             runs = sort_long(np.array(entries, np.uint64), capacity).lines if len(entries) > capacity else 0
             found = Lists(found.lists + 1, found.lines + (len(elements) if entries else 0), found.runs + runs)
     return found

@@ -3,6 +3,7 @@ layouts."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,17 @@ class Entries:
         if splats:
             self.key[rng.integers(0, splats, 3)] = (1 << 24) - 1
             self.record[-1] = (1 << 24) - 1
+
+    def close(self, rng: np.random.Generator, at_limits: float = 0.0) -> Entries:
+        """With keys that rise and fall by little, so that lines are short; now and then by as much as fits, or by one more."""
+        turn = rng.integers(-(1 << 13), 1 << 13, len(self.key))
+        limits = rng.random(len(turn)) < at_limits
+        turn[limits] = rng.choice([(1 << 16) - 1, 1 << 16, -(1 << 16), -(1 << 16) - 1], np.count_nonzero(limits))
+        step = rng.choice([1, 3, 16], len(turn))
+        step[rng.random(len(turn)) < at_limits] = rng.choice([511, 512])
+        self.key = (np.cumsum(turn) % (1 << 24)).astype(np.uint32)
+        self.record = (np.cumsum(step) % (1 << 24)).astype(np.uint32)
+        return self
 
     def write(self, chunks: int | None = None, held: int = HELD_POINTERS) -> ListImage:
         return write_lists(self.splat, self.tile, self.mask, self.key, self.record, self.cols, self.rows, chunks, held)
@@ -70,6 +82,9 @@ def cases() -> dict[str, Entries]:
         "last tile": Entries(one, one + 65535, full, 256, 256, 1, rng),
         "all in one tile": Entries(many, np.full(40000, 7), np.full(40000, 9, np.uint8), 5, 5, 40000, rng),
         "one splat over 4096x4096": Entries(0 * whole, whole, np.full(len(whole), 15, np.uint8), 256, 256, 1, rng),
+        "close": boxes(rng, 67, 34, 3000, 4).close(rng),
+        "close, in one tile": Entries(many, np.full(40000, 7), np.full(40000, 9, np.uint8), 5, 5, 40000, rng).close(rng, 0.1),
+        "close, few tiles": boxes(rng, 4, 5, 4000, 3).close(rng, 0.02),
         "tiles of one set in turn": Entries(np.arange(6000), 16 * turns, np.full(6000, 1, np.uint8), 80, 45, 6000, rng),
     }
 
@@ -93,11 +108,11 @@ def test_lists_read_back_are_those_written(name):
 
 def headers(image: ListImage, line: int) -> tuple[int, int, int, int]:
     """count, link, whether there is one, rest of a line's header."""
-    value = sum(int(x) << 64 * i for i, x in enumerate(image.memory[line])) >> 468
+    value = sum(int(x) << 64 * i for i, x in enumerate(image.memory[line])) >> 472
     return value & 15, value >> 4 & 0xFFFFFF, value >> 28 & 1, value >> 29
 
 
-@pytest.mark.parametrize("name", ["random", "narrow", "all in one tile", "tiles of one set in turn"])
+@pytest.mark.parametrize("name", ["random", "narrow", "all in one tile", "close", "tiles of one set in turn"])
 def test_each_chunk_belongs_to_one_list(name):
     given = CASES[name]
     image = given.write()
@@ -112,7 +127,7 @@ def test_each_chunk_belongs_to_one_list(name):
             assert chunk < image.taken[writer]
             assert owner.setdefault(4 * chunk + writer, tile) == tile
             found = [headers(image, (4 * chunk + writer) * 8 + k) for k in range(8)]
-            assert all(1 <= f[0] <= 9 and f[3] == 0 for f in found[:used]) and {f[1:] for f in found[1:used]} <= {(0, 0, 0)}
+            assert all(1 <= f[0] <= 15 and f[3] == 0 for f in found[:used]) and {f[1:] for f in found[1:used]} <= {(0, 0, 0)}
             assert found[used:] == [(0, 0, 0, 0)] * (8 - used)
             assert not found[0][2] or found[0][1] < chunk  # chains go back in the order of allocation, so they end
             chunk, used = found[0][1], 8 if found[0][2] else 0
@@ -123,6 +138,26 @@ def test_each_chunk_belongs_to_one_list(name):
         assert len(np.unique(lines)) == len(lines) == image.lines[writer] and (lines // 8 % 4 == writer).all()
         first = lines[lines % 8 == 0] // 32
         assert np.array_equal(first, np.arange(image.taken[writer]))
+
+
+def near(older: int, newer: int) -> bool:
+    """As docs/reference/list_layout.md says it."""
+    return 0 <= (newer >> 4 & 0xFFFFFF) - (older >> 4 & 0xFFFFFF) <= 511 and -65536 <= (older >> 28) - (newer >> 28) <= 65535
+
+
+def line_bits(words: list[int]) -> int:
+    """Bits of a line and its number of entries, which lie in the order of coming."""
+    bits = words[-1] | len(words) << 472
+    if len(words) <= 9:
+        return bits | sum(x << 52 * i for i, x in enumerate(words[:-1], 1))
+    gaps = [52 * (i + 1) + b for i in range(8) for b in (*range(13, 28), *range(45, 52))] + list(range(468, 472))
+    for i, x in enumerate(words[:-1]):
+        kept = x & 0x1FFF | (x >> 28 & 0x1FFFF) << 13
+        places = [52 * (i + 1) + b for b in (*range(13), *range(28, 45))]
+        if i >= 8:
+            places = gaps[22 * (i - 8) : 22 * (i - 7)] + gaps[132 + 8 * (i - 8) : 132 + 8 * (i - 7)]
+        bits |= sum((kept >> k & 1) << place for k, place in enumerate(places))
+    return bits
 
 
 def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[list[int]], dict[int, int]]:
@@ -144,10 +179,10 @@ def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[li
                 link[t] = chunk.get(t)
                 chunk[t], used[t] = taken, 0
                 taken += 1
-            head = len(words) | (0 if link[t] is None or used[t] else link[t] << 4 | 1 << 28)
+            head = 0 if link[t] is None or used[t] else link[t] << 4 | 1 << 28
             line = (4 * chunk[t] + b) * 8 + used[t]
             assert line not in memory
-            memory[line] = (sum(x << 52 * i for i, x in enumerate(words)) | head << 468).to_bytes(64, "little")
+            memory[line] = (line_bits(words) | head << 472).to_bytes(64, "little")
             writes[b].append(line)
             used[t] += 1
 
@@ -157,8 +192,13 @@ def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[li
                 continue
             s = y // 2 % 8 * 8 + x // 2 % 8
             held = [None if h is None else h[0] for h in ways[s]]
+            entry = int(m) | int(given.record[i]) << 4 | int(given.key[i]) << 28
             if t in held:
                 w = held.index(t)
+                if len(ways[s][w][1]) >= 9 and not near(ways[s][w][1][-1], entry):
+                    put(s, w)
+                    if turn[s] == w:
+                        turn[s] = (w + 1) % 4
             elif None in held:
                 w = held.index(None)
             else:
@@ -167,8 +207,9 @@ def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[li
                 put(s, w)
             if ways[s][w] is None:
                 ways[s][w] = (t, [])
-            ways[s][w][1].append(int(m) | int(given.record[i]) << 4 | int(given.key[i]) << 28)
-            if len(ways[s][w][1]) == 9:
+            words = ways[s][w][1]
+            words.append(entry)
+            if len(words) == 15 or len(words) == 9 and not all(map(near, words[:-1], words[1:])):
                 put(s, w)
         for s in range(64):
             for w in range(4):
@@ -181,7 +222,9 @@ def plain_writer(given: Entries, chunks: int) -> tuple[dict[int, bytes], list[li
     return memory, writes, pointers
 
 
-@pytest.mark.parametrize("name", ["random", "flat", "large boxes", "tiles of one set in turn", "all in one tile"])
+@pytest.mark.parametrize("name", [
+    "random", "flat", "large boxes", "tiles of one set in turn", "all in one tile", "close", "close, in one tile", "close, few tiles",
+])
 def test_memory_is_that_of_a_plain_writer(name):
     given = CASES[name]
     image = given.write()
@@ -189,22 +232,50 @@ def test_memory_is_that_of_a_plain_writer(name):
     assert [x.tolist() for x in image.writes] == writes
     assert all(image.memory[line].tobytes() == text for line, text in memory.items()) and np.count_nonzero(image.memory.any(axis=1)) == len(memory)
     assert {int(p): int(image.pointers[p]) for p in np.flatnonzero(image.pointers)} == pointers
-    assert name in ("flat", "all in one tile") or image.evicted.sum() > 50
+    assert name in ("flat", "all in one tile", "close, in one tile", "close, few tiles") or image.evicted.sum() > 50
+    counts = Counter(int(image.memory[line, 7]) >> 24 & 15 for line in memory)
+    assert max(counts) <= 9 if not name.startswith("close") else name == "close" or set(counts) >= set(range(9, 16))
 
 
 def test_bits_of_a_line():
     rng = np.random.default_rng(seed())
     given = Entries(np.arange(10), np.zeros(10, np.int64), np.arange(1, 11).astype(np.uint8), 2, 2, 10, rng)
     image = given.write()
-    want = sum((int(m) | int(r) << 4 | int(k) << 28) << 52 * i for i, (m, r, k) in enumerate(zip(given.mask[:9], given.record, given.key))) | 9 << 468
+    words = [int(m) | int(r) << 4 | int(k) << 28 for m, r, k in zip(given.mask[:9], given.record, given.key)]
+    want = sum(word << 52 * i for i, word in enumerate([words[-1], *words[:-1]])) | 9 << 472
     assert image.memory[0].tobytes() == want.to_bytes(64, "little")
-    last = int(given.mask[9]) | int(given.record[9]) << 4 | int(given.key[9]) << 28 | 1 << 468
+    last = int(given.mask[9]) | int(given.record[9]) << 4 | int(given.key[9]) << 28 | 1 << 472
     assert image.memory[1].tobytes() == last.to_bytes(64, "little") and not image.memory[2:].any()
     assert image.pointers.tolist() == [2 << 24] + 63 * [0]
-    given = Entries(np.zeros(73, np.int64), np.full(73, 3), np.full(73, 1, np.uint8), 2, 2, 1, rng)  # 8 lines of 9 and one entry
-    image = given.write()
-    assert image.pointers[48] == 1 << 24 | 1 and image.pointers.sum() == image.pointers[48]
-    assert headers(image, 32 + 24) == (1, 0, 1, 0) and headers(image, 24) == (9, 0, 0, 0)
+    for each, splats in ((15, np.zeros(121, np.int64)), (9, np.arange(73) % 2)):  # 8 lines of so many and one entry
+        given = Entries(splats, np.full(len(splats), 3), np.full(len(splats), 1, np.uint8), 2, 2, 2, rng)
+        given.key[:] = 0, 1 << 20
+        image = given.write()
+        assert image.pointers[48] == 1 << 24 | 1 and image.pointers.sum() == image.pointers[48]
+        assert headers(image, 32 + 24) == (1, 0, 1, 0) and headers(image, 24) == (each, 0, 0, 0)
+
+
+def test_lines_at_their_limits():
+    """First and last numbers of entries; the largest differences that fit, the first that do not: nine entries then, and the line as it was."""
+    rng = np.random.default_rng(seed())
+    middle = 1 << 23
+    for record, key, fits in ((0, 0, True), (511, 65536, True), (511, -65535, True), (512, 0, False), (0, 65537, False), (1, -65536, False), (-1, 0, False)):
+        word = [int(rng.integers(1, 16)) | middle << 4 | middle << 28, int(rng.integers(1, 16)) | middle + record << 4 | middle + key << 28]
+        assert golden.near(*np.array(word, np.uint64)) == near(*word) == fits
+        for count in range(9, 16):
+            entries = [word[0]] * (count - 1) + [word[1]]
+            if count > 9 and not fits:
+                with pytest.raises(FlickerError, match="not near each other"):
+                    golden.line_of(entries)
+                continue
+            line = golden.line_of(entries)
+            assert line == line_bits(entries) and golden.line_entries(line, count) == entries[::-1]
+    ends = [1 | 0 << 4 | 0 << 28, 2 | 511 << 4 | 65536 << 28]  # both ends of the number range, where differences may not wrap
+    assert golden.near(*np.array(ends, np.uint64)) and not golden.near(*np.array([(1 << 24) - 1 << 4, 0], np.uint64))
+    assert not golden.near(*np.array([0, (1 << 24) - 1 << 28], np.uint64)) and not golden.near(*np.array([(1 << 24) - 1 << 28, 0], np.uint64))
+    for entries in ([], [1] * 16, [1 << 52]):
+        with pytest.raises(FlickerError, match="lists: a line of"):
+            golden.line_of(entries)
 
 
 def test_pointer_table_has_no_line_of_two_writers():
@@ -306,12 +377,13 @@ def test_broken_lists_are_refused():
     line = (int(image.pointers[at]) & 0xFFFFFF) * 32
     for what, place, bits, message in (
         ("pointers", at, 0xFFFFFF, "chunk 16777215, but there are"), ("pointers", at, 9 << 24, f"tile {first % 67}, {first // 67}: pointer with"),
-        ("memory", line, 15 << 20, "entries"), ("memory", line, 1 << 63, "wrong bits"),
+        ("memory", line, 0, "holds 0 entries"), ("memory", line, 1 << 63, "wrong bits"), ("memory", line, 1 << 53, "wrong bits"),
+        ("memory", line, 1 << 20, "wrong bits"), ("memory", line, 1 << 23, "wrong bits"),
         ("pointers", int(pointer_place(other, 67)), None, f"tile {other % 67}, {other // 67}: chunk .* belongs to another list too"),
     ):
         memory, pointers = image.memory.copy(), image.pointers.copy()
         if what == "memory":
-            memory[place, 7] |= np.uint64(bits)
+            memory[place, 7] = memory[place, 7] | np.uint64(bits) if bits else memory[place, 7] & np.uint64(~(15 << 24) & (1 << 64) - 1)
         elif bits is None:
             pointers[place] = pointers[at]
         else:

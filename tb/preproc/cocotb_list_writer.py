@@ -14,16 +14,45 @@ LIST_BASE, POINTER_BASE = 0x2_12FF_FFC0, 0x1_0000_0077  # lists: lines from 64 o
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "alternate")]
 
 
+STEPS = (0, 1, 2, 40, 510, 511, 512, 513)  # of records: 511 is near, 512 is not
+TURNS = (0, 1, -1, 900, (1 << 16) - 1, 1 << 16, (1 << 16) + 1, -(1 << 16) + 1, -(1 << 16), -(1 << 16) - 1)  # of keys, behind those before: 2^16 is near
+
+
+def walk_entries(rng, tiles: list[tuple[int, int]], stays: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Keys and records: of each list near those before it for a while, at the limits of what is near, or far from them. stays: share of those near, None: any;
+    0: none is near."""
+    key: list[int] = []
+    record: list[int] = []
+    last: dict[tuple[int, int], tuple[int, int]] = {}
+    apart = stays == 0
+    stays = rng.choice((0.1, 0.6, 0.9, 0.97, 1.0)) if stays is None else stays
+    for tile in tiles:
+        k, r = last.get(tile, (rng.getrandbits(24), rng.getrandbits(24)))
+        far = rng.random() >= stays
+        step, turn = (rng.choice(STEPS), rng.choice(TURNS)) if far else (rng.randrange(512), rng.randrange(-(1 << 16) + 1, (1 << 16) + 1))
+        if apart:
+            k, r, step, turn = (k + (1 << 23)) % (1 << 24), r, 0, 0
+        elif far and rng.random() < 0.3:
+            k, r = rng.getrandbits(24), rng.getrandbits(24)
+        k, r = k + turn if 0 <= k + turn < 1 << 24 else k, r + step if r + step < 1 << 24 else r
+        last[tile] = k, r
+        key.append(k)
+        record.append(r)
+    return np.array(key, np.int64), np.array(record, np.int64)
+
+
 class Frame:
     """Entries of one writer and what it writes. cols, rows: tiles of the picture."""
 
-    def __init__(self, rng, writer: int, cols: int, rows: int, tiles: list[tuple[int, int]], chunks: int | None = None):
+    def __init__(self, rng, writer: int, cols: int, rows: int, tiles: list[tuple[int, int]], chunks: int | None = None,
+                 stays: float | None = None, like: Frame | None = None):
+        """like: the frame whose tiles they are, for the same keys and records."""
         self.writer, self.cols, self.rows = writer, cols, rows
         u, v = np.array(tiles, np.int64).reshape(-1, 2).T
         tile = 2 * u + (writer & 1) + cols * (2 * v + (writer >> 1))
         n = len(tile)
         splat, mask = np.arange(n), np.array([rng.randrange(1, 16) for _ in range(n)], np.int64)
-        key, record = (np.array([rng.getrandbits(24) for _ in range(n)], np.int64) for _ in range(2))
+        self.values = key, record = walk_entries(rng, tiles, stays) if like is None else like.values
         image = write_lists(splat, tile, mask, key, record, cols, rows, chunks, config()["pointers"])
         self.chunks, self.image = image.chunks, image
         self.items = [(0, int(a), int(b), int(w)) for a, b, w in zip(u, v, entry_words(splat, mask, key, record))] + [(1, 0, 0, rng.getrandbits(52))]
@@ -224,7 +253,7 @@ async def out_of_memory(dut, idle, stall):
         need = int(full.image.taken[full.writer])
         for chunks in (need, need - 1, rng.randrange(need), 0, need + 5):
             tiles = [(u, v) for end, u, v, _ in full.items if not end]
-            frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks)
+            frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks, like=full)
             assert frame.image.failed[frame.writer] == (chunks < need)
             await test.run(frame)
         full.chunks = MAX_CHUNKS  # the largest region there is; the model's memory is as large as the lists need
@@ -241,7 +270,7 @@ async def last_chunks(dut):
     need, tiles = int(full.image.taken[full.writer]), [(u, v) for end, u, v, _ in full.items if not end]
     assert need > 10
     for chunks in (need, need - 1):
-        frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks)
+        frame = Frame(rng, full.writer, full.cols, full.rows, tiles, chunks, like=full)
         frame.move(MAX_CHUNKS - chunks)
         await test.run(frame)
         assert int(dut.taken_o.value) == MAX_CHUNKS and int(dut.failed_o.value) == (chunks < need)
@@ -263,13 +292,15 @@ async def corners(dut):
 
 @cocotb.test()
 async def one_set(dut):
-    """Nine tiles of one set, one entry each in turn, and each line of one tile: the pipeline's registers stand in for the memories in every cycle."""
+    """Nine tiles of one set, one entry each in turn, and each line of one tile: the pipeline's registers stand in for the memories in every cycle. Entries near
+    each other, apart, and at the limits."""
     test = Writer(dut)
     await test.bench.reset()
     cols, rows = (256, 1) if config()["lists"] >= 128 else (96, 1)
     for turns in (9, 5, 4, 3, 2, 1):
         tiles = [(8 * (i % turns) % (cols // 2), 0) for i in range(400)]
-        await test.run(Frame(test.bench.rng, 0, cols, rows, tiles))
+        for stays in (0.0, 0.5, 0.95, 1.0):
+            await test.run(Frame(test.bench.rng, 0, cols, rows, tiles, stays=stays))
 
 
 @cocotb.test()
@@ -297,7 +328,7 @@ async def spilled(dut, idle, stall):
             tiles += [rng.choice(few) for _ in range(rng.randrange(1, 30))]
         frame = Frame(rng, writer, cols, rows, tiles)
         if k % 3 == 2:
-            frame = Frame(rng, writer, cols, rows, tiles, rng.randrange(int(frame.image.taken[writer])))
+            frame = Frame(rng, writer, cols, rows, tiles, rng.randrange(int(frame.image.taken[writer])), like=frame)
         test.mover.slow = k % 2 == 0
         await test.run(frame)
         moved += frame.image.spilled[writer], frame.image.fetched[writer]
@@ -310,17 +341,19 @@ async def spilled(dut, idle, stall):
 
 @cocotb.test()
 async def rate(dut):
-    """An entry a cycle; a line five cycles after the entry that fills it; in a picture whose pointers are all held, too."""
+    """An entry a cycle; a line six cycles after the entry that fills it, of nine or of fifteen; in a picture whose pointers are all held, too."""
     test = Writer(dut)
     await test.bench.reset()
     held = config()["pointers"]
     columns = max(8, held // 128)
-    frame = Frame(test.bench.rng, 3, 2 * columns, 2 * (held // columns), [(i % 8, 0) for i in range(720)])
-    assert 16 * frame.pointer_lines == held
-    await test.run(frame)
-    assert test.input.last - test.input.first == 720
-    assert test.output.first - test.input.first == 64 + 5
-    assert test.output.count == 80 + frame.pointer_lines
+    for stays, entries in ((0.0, 9), (1.0, 15)):
+        frame = Frame(test.bench.rng, 3, 2 * columns, 2 * (held // columns), [(i % 8, 0) for i in range(720)], stays=stays)
+        assert 16 * frame.pointer_lines == held and frame.image.lines[3] == 720 // entries
+        test.input.count = test.output.count = 0
+        await test.run(frame)
+        assert test.input.last - test.input.first == 720
+        assert test.output.first - test.input.first == 8 * (entries - 1) + 6
+        assert test.output.count == 720 // entries + frame.pointer_lines
 
 
 @cocotb.test()

@@ -29,7 +29,7 @@ def test_list_writer(pointers: int, lists: int, tests: list[str]) -> None:
 @pytest.mark.parametrize(("parameters", "message"), [
     ({"Ways": 3}, "Ways must be a power of two"), ({"Pointers": 40}, "Pointers must be a multiple"), ({"Pointers": 48, "Lists": 96}, "Lists must be"),
     ({"Pointers": 64, "Lists": 32}, "Lists must be"), ({"ChunkLines": 6}, "ChunkLines must be a power of two"),
-    ({"LineEntries": 10}, "must fit a line"),
+    ({"ShortEntries": 16}, "must fit a line"), ({"LineEntries": 10}, "must fill the gaps"),
 ])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
     with refused(message):

@@ -13,7 +13,7 @@ from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.list_reader import Line, pointer_line, read_tile
-from flicker.golden.lists import COUNT_BITS, HEADER_AT, MAX_CHUNKS, write_lists, writer_columns
+from flicker.golden.lists import COUNT_BITS, HEADER_AT, LINE_ENTRIES, MAX_CHUNKS, TAIL_AT, TAIL_BITS, write_lists, writer_columns
 from flicker.sim.memory import Memory, PortConfig
 
 PATTERNS = [("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts")]
@@ -34,6 +34,9 @@ class Frame:
         n = len(tile)
         mask = rng2.integers(1, 16, n)
         key, record = (rng2.integers(0, 1 << 24, n) for _ in range(2))
+        # Entries of half of the lists are near each other, so that lines are short ones.
+        here = (rng2.random(cols * rows) < 0.5)[tile]
+        key[here], record[here] = (tile * 50000 % (1 << 23) + key % (1 << 15))[here], (100 + 3 * np.arange(n))[here]
         image = write_lists(np.arange(n), tile, mask, key, record, cols, rows)
         self.chunks, self.memory, self.pointers = image.chunks, image.memory.copy(), image.pointers.copy()
         self.written = np.concatenate(image.writes)
@@ -276,10 +279,12 @@ def break_header(frame: Frame, rng, line: int, kind: str) -> None:
     count, first = 15 << HEADER_AT, line % 8 == 0
     if kind == "none":
         word &= ~count
-    elif kind == "many":
-        word = word & ~count | rng.randrange(10, 16) << HEADER_AT
+    elif kind == "tail":  # of a line that is none of a short one
+        word |= 1 << TAIL_AT + rng.randrange(TAIL_BITS)
+        if word >> HEADER_AT & 15 > LINE_ENTRIES:
+            word = word & ~count | rng.randrange(1, LINE_ENTRIES + 1) << HEADER_AT
     elif kind == "rest":
-        word |= 1 << HEADER_AT + 29 + rng.randrange(15)
+        word |= 1 << HEADER_AT + 29 + rng.randrange(11)
     elif first:  # to itself, or a higher chunk
         here = line // 32
         link = rng.choice([here, here, (1 << 24) - 1])
@@ -297,7 +302,7 @@ async def faults(dut, stall):
     rng = reader.rng
     await reader.bench.reset()
     kinds = ["used none", "used many", "used high", "chunk", "pool", "memory", "pointer memory",
-             "none", "many", "rest", "link", "link", "rest", "none", "first"]
+             "none", "tail", "rest", "link", "link", "rest", "none", "first"]
     for slot, kind in enumerate(kinds):
         frame = make(reader, 4, 4, sizes_of(rng, 16), slot, aligned=slot % 2 == 0)
         tiles = [t for t in range(16) if frame.read(t % 4, t // 4).requests]

@@ -11,10 +11,11 @@ from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
 from flicker_tb.axi import MemoryPort
 from flicker_tb.bench import Bench, config, rounds
+from flicker_tb.list_lines import lines_of
 
 from flicker.chip.dram import DramConfig
 from flicker.chip.long_lists import ORDERS, make_list
-from flicker.golden.lists import ENTRY_BITS, LINE_ENTRIES
+from flicker.golden.lists import HEADER_AT
 from flicker.golden.long_lists import LongList, run_lines, sort_long
 from flicker.perf import long_lists as perf
 from flicker.sim.memory import Memory, PortConfig
@@ -49,22 +50,6 @@ def make_job(rng: np.random.Generator, n: int, order: str, finish: int | None = 
     return Job(entries, long, (np.sort(entries) & np.uint64(OUT)).tolist(), finish)
 
 
-def lines_of(entries: np.ndarray, rng, full: bool, cut: bool = False) -> list[tuple[int, int, int]]:
-    """Lines (entries, count, last). cut: one ends with what the unit holds."""
-    lines, at, values = [], 0, entries.tolist()
-    while True:
-        count = min(LINE_ENTRIES if full or rng.random() < 0.8 else rng.randrange(1, LINE_ENTRIES + 1), len(values) - at)
-        if cut and at < CAPACITY:
-            count = min(count, CAPACITY - at)
-        word = rng.getrandbits(LINE_ENTRIES * ENTRY_BITS) >> count * ENTRY_BITS << count * ENTRY_BITS
-        for i in range(count):
-            word |= values[at + i] << i * ENTRY_BITS
-        at += count
-        lines.append((word, count, int(at == len(values))))
-        if at == len(values):
-            return lines
-
-
 class Sorter:
     """The design with its memory. share: of failing answers."""
 
@@ -91,14 +76,15 @@ class Sorter:
         Cycles."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
         idle, wait, stall = (stalls.make(p, rng) for p in patterns)
-        source: deque[tuple[int, int, int, int]] = deque((k, *line) for k, job in enumerate(jobs) for line in lines_of(job.entries, rng, full, pause > 0))
+        cut = CAPACITY if pause else 0
+        source: deque[tuple[int, int, int, int]] = deque((k, *line) for k, job in enumerate(jobs) for line in lines_of(job.entries, rng, full, cut))
         came, not_before = 0, 0  # entries of the list, cycle
         offered, out, cycle, written_at, held = False, 0, 0, 0, None
         limit = 20_000 + 60 * sum(len(j.entries) for j in jobs)
         pending: deque[tuple[int, int, int]] = deque()
         while out < len(jobs):
             offered = offered or (bool(source) and cycle >= not_before and not next(idle))
-            which, word, count, last = source[0] if offered else (0, rng.getrandbits(LINE_ENTRIES * ENTRY_BITS), rng.randrange(16), rng.randrange(2))
+            which, word, count, last = source[0] if offered else (0, rng.getrandbits(HEADER_AT), rng.randrange(16), rng.randrange(2))
             job = jobs[out]
             finish = int(job.finish is not None and len(job.out) >= job.finish)
             job.finished = job.finished or bool(finish)
@@ -166,10 +152,10 @@ class Sorter:
         if finished and not self.wrote:
             assert not self.read, f"{place}: lines read of a list that was not written"
             return
-        assert self.wrote == list(range(BASE, BASE + golden.lines)), f"{place}: lines written"
-        memory = b"".join(self.data[BASE + i].to_bytes(LINE, "little") for i in range(golden.lines))
+        lines = [BASE + place for place in golden.places]
+        assert self.wrote == lines, f"{place}: lines written"
+        memory = b"".join(self.data[line].to_bytes(LINE, "little") for line in lines)
         assert memory == golden.memory().tobytes(), f"{place}: what is written"
-        lines = range(BASE, BASE + golden.lines)
         assert self.read == Counter(lines) or (finished and self.read <= Counter(lines)), f"{place}: lines read"
         self.wrote.clear()
         self.read.clear()

@@ -10,20 +10,36 @@ import numpy as np
 from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
 from flicker_tb.bench import Bench, config, rounds
+from flicker_tb.list_lines import lines_of
 
+from flicker.golden.lists import HEADER_AT
 from flicker.golden.sorting import SortedList, sort_list
 from flicker.perf import sorting as perf
 
 CELLS, STAGES, WAYS = config().get("cells", 16), config().get("stages", 7), config().get("ways", 8)
 CAPACITY = CELLS << STAGES
 MERGE = ("valid", "entries", "count", "limited", "limit", "last", "final")  # its lines again
-LINE, ENTRY, OUT = 9, 52, (1 << 28) - 1
-KINDS = ("random", "few", "equal", "ascending", "descending", "extremes")
+OUT = (1 << 28) - 1
+KINDS = ("random", "few", "equal", "ascending", "descending", "extremes", "near", "limits")
 STALLS = (("never", "never"), ("half", "half"), ("never", "heavy"), ("heavy", "never"), ("bursts", "bursts"), ("rare", "half"))
+
+
+def walk(rng, count: int, limits: bool) -> np.ndarray:
+    """Entries near the ones before them, so that lines are short, or, now and then, the last that are near and the first that are not."""
+    key, record, found = rng.getrandbits(24), (1 << 24) - 1 - rng.randrange(1000), []
+    for _ in range(count):
+        found.append(key << 28 | record << 4 | rng.randrange(16))
+        turn, step = rng.randrange(-(1 << 16), 1 << 16), rng.randrange(1, 512)
+        if limits and rng.random() < 0.4:
+            turn, step = rng.choice((-(1 << 16) - 1, -(1 << 16), (1 << 16) - 1, 1 << 16, 0)), rng.choice((1, 511, 512))
+        key, record = key + turn if 0 <= key + turn < 1 << 24 else key, record - step
+    return np.array(found, np.uint64)
 
 
 def make_list(rng, count: int, kind: str) -> np.ndarray:
     """Entries with distinct (key, record), in the order of their records or, where the kind says so, of their keys."""
+    if kind in ("near", "limits"):
+        return walk(rng, count, kind == "limits")
     low = [rng.getrandbits(24) for _ in range(count)]
     keys = {
         "random": lambda: low, "few": lambda: [k & 3 for k in low], "equal": lambda: [low[0]] * count, "ascending": lambda: sorted(low),
@@ -38,20 +54,6 @@ def make_list(rng, count: int, kind: str) -> np.ndarray:
         records[0], records[-1] = 0, (1 << 24) - 1
         records[1:-1] = [min(max(r, 1), (1 << 24) - 2) for r in records[1:-1]]
     return np.array([key << 28 | record << 4 | rng.randrange(16) for key, record in zip(keys, records)], np.uint64)
-
-
-def lines_of(entries: np.ndarray, rng, full: bool) -> list[tuple[int, int, int]]:
-    """Lines (entries, count, last); what is above the count is random."""
-    lines, at = [], 0
-    while True:
-        count = min(LINE if full or rng.random() < 0.6 else rng.randrange(1, LINE + 1), len(entries) - at)
-        word = rng.getrandbits(LINE * ENTRY) >> count * ENTRY << count * ENTRY
-        for i in range(count):
-            word |= int(entries[at + i]) << i * ENTRY
-        at += count
-        lines.append((word, count, int(at == len(entries))))
-        if at == len(entries):
-            return lines
 
 
 @dataclass
@@ -93,7 +95,7 @@ class Unit:
         cycle = 0
         while out < len(jobs):
             offered = offered or (bool(lines) and not next(idle))
-            word, count, last = lines[0] if offered else (rng.getrandbits(LINE * ENTRY), rng.randrange(16), rng.randrange(2))
+            word, count, last = lines[0] if offered else (rng.getrandbits(HEADER_AT), rng.randrange(16), rng.randrange(2))
             job = jobs[out]
             if job.finish is not None and len(job.out) >= job.finish[0] and finish_at < 0:
                 finish_at = cycle + job.finish[1]

@@ -44,7 +44,7 @@ module list_readers_bench #(
 
 `define READER(n) \
   logic [3:0] count_``n; \
-  logic [467:0] entries_``n; \
+  logic [471:0] entries_``n; \
   flk_list_reader #(.Contexts(Contexts), .Slots(Slots)) i_reader_``n ( \
     .clk_i, .rst_ni, .start_i, .clear_i(1'b0), .idle_o(idle[n]), .error_o(error[n]), \
     .list_base_i, .pointer_base_i, .columns_i, .chunks_i, \

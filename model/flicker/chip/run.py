@@ -16,7 +16,7 @@ from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
 from ..golden.lanes.render import LaneFrame
-from ..golden.lists import LINE_ENTRIES
+from ..golden.lists import LINE_ENTRIES, SHORT_ENTRIES
 from ..params import CHANNELS, CORES, Coords, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_for_picture
 from ..progress import Steps
@@ -153,7 +153,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
-            "sorting units": int(np.max(rendering["entries"])) * (1.0 + LINE_ENTRIES * again / max(given, 1)) / phases["rendering"],
+            "sorting units": int(np.max(rendering["entries"])) * (1.0 + (LINE_ENTRIES + SHORT_ENTRIES) / 2 * again / max(given, 1)) / phases["rendering"],
             "delivery": given / (2 * phases["rendering"]), "record cache's port": int(rendering["lines"]) / phases["rendering"],
             "DRAM": peak["rendering"],
             **stage.pop("busy"),

@@ -38,7 +38,7 @@ from .dram import DramConfig
 from .tile_lists import TileLists
 
 CONFIG = RenderConfig()  # of the rendering stage
-ENTRY_BYTES = 64 / 9  # nine entries in a line of 64 bytes
+ENTRY_BYTES = 64 / 14  # most lines of 64 bytes have fourteen or fifteen entries
 VRUS = 32  # pixels that the stage visits in a cycle at most
 ENORMOUS = 0.25  # share of a view's tiles that a Gaussian is listed in
 LEAST_COLOUR = 1.0 / 255.0  # change of colour below which coefficients say nothing

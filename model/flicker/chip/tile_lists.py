@@ -12,7 +12,7 @@ from ..golden.frame_buffer import PAIR, PixelFormat
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.list_reader import read_tile
-from ..golden.lists import CHUNK_LINES, ENTRY_BITS, POINTER_BYTES, WRITERS, pointer_place
+from ..golden.lists import CHUNK_LINES, POINTER_BYTES, WRITERS, pointer_place
 from ..golden.long_lists import RUNS, sort_long
 from ..golden.sorting import CAPACITY
 from ..golden.walk import tile_walk
@@ -94,7 +94,7 @@ class TileLists:
                 first = (len(used) - 1) % CHUNK_LINES + 1  # the newest chunk comes first and is the one that is not full
                 chunks += [sum(used[:first])] + [sum(used[at : at + CHUNK_LINES]) for at in range(first, len(used), CHUNK_LINES)]
                 if capacity is not None and length > capacity:
-                    entries = [line.entries >> ENTRY_BITS * k & (1 << ENTRY_BITS) - 1 for line in read.lines for k in range(line.used)]
+                    entries = [entry for line in read.lines for entry in line.unpacked()]
                     long = sort_long(np.array(entries, np.uint64), capacity, merge_lines // 2)
                     cycles = merge_cycles(long, merge_lines)
                     run_lines[t] = long.lines

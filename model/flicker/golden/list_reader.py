@@ -12,17 +12,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .lists import CHUNK_LINES, COUNT_BITS, ENTRY_BITS, HEADER_AT, LINE_BYTES, LINE_ENTRIES, LINK_BITS, POINTERS_PER_LINE, WRITERS, pointer_place
+from .lists import (
+    CHUNK_LINES,
+    COUNT_BITS,
+    HEADER_AT,
+    LINE_BYTES,
+    LINE_ENTRIES,
+    LINK_BITS,
+    POINTERS_PER_LINE,
+    SHORT_ENTRIES,
+    TAIL_AT,
+    WRITERS,
+    line_entries,
+    pointer_place,
+)
 
 CHUNK_BYTES = CHUNK_LINES * LINE_BYTES
 
 
 class Line(NamedTuple):
-    """An element: bits of all nine entries, how many are used, last of its list."""
+    """An element: the line's bits without its header, how many entries it has, last of its list."""
 
     entries: int
     used: int
     last: bool
+
+    def unpacked(self) -> list[int]:
+        """Its entries in the order of reading."""
+        return line_entries(self.entries, self.used) if self.used else []
 
 
 @dataclass(frozen=True)
@@ -72,10 +89,11 @@ def read_tile(
             count, link = header & (1 << COUNT_BITS) - 1, header >> COUNT_BITS & (1 << LINK_BITS) - 1
             linked, rest = header >> COUNT_BITS + LINK_BITS & 1, header >> COUNT_BITS + LINK_BITS + 1
             wrong = rest != 0 or (linked and link >= chunk if k == 0 else link or linked)
-            if fails(first + k) or not 1 <= count <= LINE_ENTRIES or wrong:
+            wrong = wrong or (count <= LINE_ENTRIES and word >> TAIL_AT & (1 << HEADER_AT - TAIL_AT) - 1 != 0)
+            if fails(first + k) or not 1 <= count <= SHORT_ENTRIES or wrong:
                 fault, more = True, False
                 break
-            lines.append(Line(word & (1 << LINE_ENTRIES * ENTRY_BITS) - 1, count, False))
+            lines.append(Line(word & (1 << HEADER_AT) - 1, count, False))
             if k == 0 and linked:
                 more, following = True, link
         if more:

@@ -1,9 +1,13 @@
 """Tile lists in DRAM, bit for bit: what the four list writers leave in memory, and how it is read back (docs/reference/list_layout.md).
 
 Writer b serves the tiles with (column & 1) | (row & 1) << 1 == b; its tile (u, v) is column 2 u + (b & 1), row 2 v + (b >> 1) of the picture. It takes entries
-in the order of the scene and collects them in a combiner of 64 sets (3 low bits of u and v) and 4 ways of one line each. A line is written when it has nine
-entries, when another tile needs its place (ways in turn), and at the end (by set and way). Every line is written once, whole. All depends on the writer's own
-entries alone, so memory is the same in every run.
+in the order of the scene and collects them in a combiner of 64 sets (3 low bits of u and v) and 4 ways of one line each. Every line is written once, whole. All
+depends on the writer's own entries alone, so memory is the same in every run.
+
+A line is plain, up to nine entries, or short, ten to fifteen of which each but the newest is near the one behind it (`near`): of these only the low bits are
+kept, and the reader has the others from the entry before. Up to nine entries are taken whatever they are; a line is written when it has nine that are not all
+near, when it has fifteen, when a tenth or later one is not near (it begins the next line), when another tile needs its place (ways in turn, but not a line that
+has just begun so), and at the end (by set and way).
 
 Pointers lie on the chip by lines of 16, line n in place n mod (held / 16). Where a writer has more than it holds, a line that is wanted takes the place of the
 one there, which goes to its place in the pointer table (it is spilled) and comes back when it is wanted again (it is fetched).
@@ -22,15 +26,26 @@ from ..params import TILE
 
 WRITERS = 4
 LINE_BYTES = 64
-LINE_ENTRIES = 9
+LINE_ENTRIES = 9  # of a plain line
+SHORT_ENTRIES = 15  # of a short one
 CHUNK_LINES = 8
 COMBINER_SETS = 64  # 8 x 8 tiles
 COMBINER_WAYS = 4
 # An entry, least significant bit first, so that entries compare by key, then record.
 MASK_BITS, RECORD_BITS, KEY_BITS = 4, 24, 24
 ENTRY_BITS = MASK_BITS + RECORD_BITS + KEY_BITS
+RECORD_AT, KEY_AT = MASK_BITS, MASK_BITS + RECORD_BITS
+# Of an entry of a short line, but the newest: its mask and the low bits of record and key. What it leaves free of 52 bits, above these of both, is a gap.
+RECORD_KEPT, KEY_KEPT = 9, 17
+KEPT_BITS = MASK_BITS + RECORD_KEPT + KEY_KEPT
+GAP_BITS = ENTRY_BITS - KEPT_BITS
+# Entries 9 to 14 of a short line: the low bits of what they keep in the gaps of entries 1 to 6, the others in those of 7 and 8 and behind entry 8.
+OVER_BITS = KEPT_BITS - GAP_BITS
+OVER_ENTRIES = SHORT_ENTRIES - LINE_ENTRIES
+TAIL_BITS = max(OVER_ENTRIES * KEPT_BITS - (LINE_ENTRIES - 1) * GAP_BITS, 0)
 # The header of a line, behind its entries: count; in the first line of a chunk the chunk before it and whether there is one; zeros.
-HEADER_AT = LINE_ENTRIES * ENTRY_BITS
+TAIL_AT = LINE_ENTRIES * ENTRY_BITS
+HEADER_AT = TAIL_AT + TAIL_BITS
 COUNT_BITS, LINK_BITS = 4, 24
 # A pointer.
 POINTER_BITS, USED_BITS = 32, 4
@@ -41,7 +56,164 @@ MAX_CHUNKS = 1 << LINK_BITS  # of a writer
 HELD_POINTERS = 2048  # of a writer, on the chip: all of a picture up to 1080p
 
 _HEADER_SHIFT = HEADER_AT % 64
+_WORDS = LINE_BYTES // 8
 assert HEADER_AT // 64 == 7 and ENTRY_BITS <= 64 and COUNT_BITS + LINK_BITS + 1 <= 64 - _HEADER_SHIFT
+assert OVER_ENTRIES < LINE_ENTRIES and SHORT_ENTRIES < 1 << COUNT_BITS
+
+
+# ---- a line -------------------------------------------------------------------------------------
+
+
+@numba.njit(cache=True)
+def _put(words, at, bits, value):
+    """Set bits from `at` on of a line that is zero there."""
+    word, shift = at >> 6, np.uint64(at & 63)
+    words[word] |= value << shift
+    if at & 63 > 64 - bits:
+        words[word + 1] |= value >> (np.uint64(64) - shift)
+
+
+@numba.njit(cache=True)
+def _get(words, at, bits):
+    """uint64: bits from `at` on."""
+    word, shift = at >> 6, np.uint64(at & 63)
+    value = words[word] >> shift
+    if at & 63 > 64 - bits:
+        value |= words[word + 1] << (np.uint64(64) - shift)
+    return value & ((np.uint64(1) << np.uint64(bits)) - np.uint64(1))
+
+
+@numba.njit(cache=True)
+def _cut(word, at, bits):
+    return (word >> np.uint64(at)) & ((np.uint64(1) << np.uint64(bits)) - np.uint64(1))
+
+
+@numba.njit(cache=True)
+def near(older, newer):
+    """Whether an entry (uint64) can be told from the one that came behind it by its low bits: record at most 2^9 - 1 lower, key less than 2^16 lower or higher
+    (or 2^16 lower)."""
+    record = np.int64(_cut(newer, RECORD_AT, RECORD_BITS)) - np.int64(_cut(older, RECORD_AT, RECORD_BITS))
+    key = np.int64(_cut(older, KEY_AT, KEY_BITS)) - np.int64(_cut(newer, KEY_AT, KEY_BITS))
+    return 0 <= record < 1 << RECORD_KEPT and -(1 << KEY_KEPT - 1) <= key < 1 << KEY_KEPT - 1
+
+
+@numba.njit(cache=True)
+def _restored(kept, newer):
+    """uint64: the entry that keeps `kept` before `newer`."""
+    last = np.int64(_cut(newer, RECORD_AT, RECORD_BITS))
+    low = np.int64(_cut(kept, MASK_BITS, RECORD_KEPT))
+    record = last - ((last - low) & ((1 << RECORD_KEPT) - 1))
+    last = np.int64(_cut(newer, KEY_AT, KEY_BITS))
+    low = np.int64(_cut(kept, MASK_BITS + RECORD_KEPT, KEY_KEPT))
+    key = last + ((low - last + (1 << KEY_KEPT - 1)) & ((1 << KEY_KEPT) - 1)) - (1 << KEY_KEPT - 1)
+    tag = np.uint64(key & ((1 << KEY_BITS) - 1)) << np.uint64(RECORD_BITS) | np.uint64(record & ((1 << RECORD_BITS) - 1))
+    return tag << np.uint64(MASK_BITS) | _cut(kept, 0, MASK_BITS)
+
+
+@numba.njit(cache=True)
+def _over(words, over, value, filling):
+    """What entry 9 + `over` of a short line keeps, uint64: put into the gaps, or taken from them."""
+    record_gap = RECORD_BITS - RECORD_KEPT
+    at = ENTRY_BITS * (over + 1)
+    low = np.uint64(0)
+    # The gap of entry `over` + 1: above its record's low bits, above its key's.
+    for first, begin, bits in ((0, at + RECORD_AT + RECORD_KEPT, record_gap), (record_gap, at + KEY_AT + KEY_KEPT, GAP_BITS - record_gap)):
+        if filling:
+            _put(words, begin, bits, _cut(value, first, bits))
+        else:
+            low |= _get(words, begin, bits) << np.uint64(first)
+    # The others, bit by bit, in the gaps behind those.
+    for k in range(OVER_BITS):
+        place = over * OVER_BITS + k
+        gap, bit = OVER_ENTRIES + place // GAP_BITS, place % GAP_BITS
+        if gap >= LINE_ENTRIES - 1:
+            begin = TAIL_AT + place - (LINE_ENTRIES - 1 - OVER_ENTRIES) * GAP_BITS
+        else:
+            begin = ENTRY_BITS * (gap + 1) + (RECORD_AT + RECORD_KEPT + bit if bit < record_gap else KEY_AT + KEY_KEPT + bit - record_gap)
+        if filling:
+            _put(words, begin, 1, _cut(value, GAP_BITS + k, 1))
+        else:
+            low |= _get(words, begin, 1) << np.uint64(GAP_BITS + k)
+    return low
+
+
+@numba.njit(cache=True)
+def _kept(entry):
+    return (_cut(entry, KEY_AT, KEY_KEPT) << np.uint64(RECORD_KEPT) | _cut(entry, RECORD_AT, RECORD_KEPT)) << np.uint64(MASK_BITS) | _cut(entry, 0, MASK_BITS)
+
+
+@numba.njit(cache=True)
+def pack_line(entries, count, words):
+    """Put `count` entries (uint64, in the order of coming; ten or more are near each other) and their number into a line `words` (uint64 (8,)) of zeros."""
+    _put(words, 0, ENTRY_BITS, entries[count - 1])
+    gaps = ((np.uint64(1) << np.uint64(RECORD_KEPT)) - np.uint64(1)) << np.uint64(RECORD_AT)
+    gaps |= ((np.uint64(1) << np.uint64(KEY_KEPT)) - np.uint64(1)) << np.uint64(KEY_AT)
+    gaps |= (np.uint64(1) << np.uint64(MASK_BITS)) - np.uint64(1)
+    for i in range(1, count):
+        if i < LINE_ENTRIES:
+            _put(words, ENTRY_BITS * i, ENTRY_BITS, entries[i - 1] & gaps if count > LINE_ENTRIES else entries[i - 1])
+        else:
+            _over(words, i - LINE_ENTRIES, _kept(entries[i - 1]), True)
+    _put(words, HEADER_AT, COUNT_BITS, np.uint64(count))
+
+
+@numba.njit(cache=True)
+def unpack_line(words, count, entries):
+    """The entries of a line, the newest first: the order of reading."""
+    entries[0] = _get(words, 0, ENTRY_BITS)
+    for k in range(1, count):
+        i = count - k
+        if count <= LINE_ENTRIES:
+            entries[k] = _get(words, ENTRY_BITS * i, ENTRY_BITS)
+        elif i < LINE_ENTRIES:
+            entries[k] = _restored(_kept(_get(words, ENTRY_BITS * i, ENTRY_BITS)), entries[k - 1])
+        else:
+            entries[k] = _restored(_over(words, i - LINE_ENTRIES, np.uint64(0), False), entries[k - 1])
+
+
+@numba.njit(cache=True)
+def line_starts(entries):
+    """int64: where lines begin that take entries (uint64, in the order of coming) as a writer's do, and the number of entries."""
+    starts = np.zeros(len(entries) + 1, np.int64)
+    lines = count = 0
+    tight = True
+    for i in range(len(entries)):
+        joins = 0 < count < SHORT_ENTRIES
+        if count > 0:
+            close = tight and near(entries[i - 1], entries[i])
+            joins = joins and (count < LINE_ENTRIES or close)
+            tight = close
+        if joins:
+            count += 1
+        else:
+            starts[lines] = i
+            lines += 1
+            count = 1
+            tight = True
+    starts[lines] = len(entries)
+    return starts[: lines + 1]
+
+
+def line_entries(line: int, count: int) -> list[int]:
+    """Entries of a line, of which the lowest 472 bits matter, in the order of reading."""
+    entries = np.zeros(SHORT_ENTRIES, np.uint64)
+    unpack_line(np.frombuffer(bytearray(line.to_bytes(LINE_BYTES, "little")), np.uint64), count, entries)
+    return [int(entry) for entry in entries[:count]]
+
+
+def line_of(entries: list[int]) -> int:
+    """A line's bits without a link, of entries in the order of coming. Raises FlickerError for more than fit."""
+    word = np.array(entries, np.uint64)
+    if not 1 <= len(word) <= SHORT_ENTRIES or int(word.max()) >> ENTRY_BITS:
+        raise FlickerError(f"lists: a line of {len(word)} entries, not 1 to {SHORT_ENTRIES} of {ENTRY_BITS} bits")
+    if len(word) > LINE_ENTRIES and not all(near(a, b) for a, b in zip(word[:-1], word[1:])):
+        raise FlickerError(f"lists: {len(word)} entries that are not near each other in a line")
+    words = np.zeros(_WORDS, np.uint64)
+    pack_line(word, len(word), words)
+    return int.from_bytes(words.tobytes(), "little")
+
+
+# ---- writing ------------------------------------------------------------------------------------
 
 
 class ListError(IntEnum):
@@ -69,7 +241,7 @@ def pointer_place(tile: np.ndarray | int, cols: int) -> np.ndarray | int:
 
 
 def list_chunks(width: int, height: int, entries: int) -> int:
-    """Chunks of each list writer that hold so many entries in all wherever they fall, were lines full; 64 more for lines that are not."""
+    """Chunks of each list writer that hold so many entries in all wherever they fall, were lines plain and full; 64 more for lines that are not."""
     pair = 2 * TILE
     return min(-(-width // pair) * -(-height // pair) + entries // (CHUNK_LINES * LINE_ENTRIES) + 64, MAX_CHUNKS)
 
@@ -112,9 +284,10 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, moves, newest
     """
     held = np.full(COMBINER_SETS * COMBINER_WAYS, -1, np.int64)
     count = np.zeros(len(held), np.int64)
+    close = np.ones(len(held), np.bool_)  # its entries are near each other
     turn = np.zeros(COMBINER_SETS, np.int64)
-    buffer = np.zeros((len(held), LINE_ENTRIES), np.uint64)
-    words = np.zeros(8, np.uint64)
+    buffer = np.zeros((len(held), SHORT_ENTRIES), np.uint64)
+    words = np.zeros(_WORDS, np.uint64)
     n = 0
     m = 0
     free = 0
@@ -143,6 +316,10 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, moves, newest
                 turn[s // COMBINER_WAYS] = (turn[s // COMBINER_WAYS] + 1) % COMBINER_WAYS
                 full = slot
                 counters[2] += 1
+            elif count[slot] >= LINE_ENTRIES and not near(buffer[slot, count[slot] - 1], entry_word[e]):
+                full = slot
+                if turn[s // COMBINER_WAYS] == slot - s:
+                    turn[s // COMBINER_WAYS] = (turn[s // COMBINER_WAYS] + 1) % COMBINER_WAYS
         else:
             slot = e - len(tile)
             if count[slot] > 0:
@@ -177,12 +354,8 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, moves, newest
                 if not failed:
                     if len(memory):
                         words[:] = 0
-                        for i in range(count[full]):
-                            at = i * ENTRY_BITS
-                            words[at >> 6] |= buffer[full, i] << np.uint64(at & 63)
-                            if at & 63 > 64 - ENTRY_BITS:
-                                words[(at >> 6) + 1] |= buffer[full, i] >> np.uint64(64 - (at & 63))
-                        header = np.uint64(count[full])
+                        pack_line(buffer[full], count[full], words)
+                        header = np.uint64(0)
                         if used[t] == 0 and link[t] >= 0:
                             header |= np.uint64(link[t]) << np.uint64(COUNT_BITS) | np.uint64(1) << np.uint64(COUNT_BITS + LINK_BITS)
                         words[7] |= header << np.uint64(_HEADER_SHIFT)
@@ -195,9 +368,10 @@ def _write(entry_word, tile, cols, writer, chunks, memory, writes, moves, newest
             full = -1
             if step == 0 and e < len(tile):
                 held[slot] = which
+                close[slot] = count[slot] == 0 or (close[slot] and near(buffer[slot, count[slot] - 1], entry_word[e]))
                 buffer[slot, count[slot]] = entry_word[e]
                 count[slot] += 1
-                if count[slot] == LINE_ENTRIES:
+                if count[slot] == SHORT_ENTRIES or (count[slot] == LINE_ENTRIES and not close[slot]):
                     full = slot
     counters[1] = n
     counters[3] = free
@@ -274,7 +448,7 @@ def write_lists(
 @dataclass(eq=False)
 class ReadLists:
     """Lists of tiles row by row: entries of tile t are start[t]:start[t + 1] of key, record (uint32) and mask (uint8), in the order of reading: the newest
-    chunk first, its lines in order."""
+    chunk first, its lines in order, of a line the newest entry first."""
 
     start: np.ndarray
     key: np.ndarray
@@ -314,17 +488,14 @@ def _walk(memory, pointers, place, cols, tiles, chunks, owner, start, word):
             for k in range(used):
                 header = memory[first + k, 7] >> np.uint64(_HEADER_SHIFT)
                 count = np.int64(header & np.uint64((1 << COUNT_BITS) - 1))
-                if not 1 <= count <= LINE_ENTRIES:
+                if not 1 <= count <= SHORT_ENTRIES:
                     return 3, t, k, count
                 if (np.int64(header >> np.uint64(COUNT_BITS)) if k else link >> LINK_BITS + 1) != 0:
                     return 4, t, chunk, 0
+                if count <= LINE_ENTRIES and _get(memory[first + k], TAIL_AT, TAIL_BITS) != 0:
+                    return 4, t, chunk, 0
                 if filling:
-                    for i in range(count):
-                        at = i * ENTRY_BITS
-                        value = memory[first + k, at >> 6] >> np.uint64(at & 63)
-                        if at & 63 > 64 - ENTRY_BITS:
-                            value |= memory[first + k, (at >> 6) + 1] << np.uint64(64 - (at & 63))
-                        word[n + i] = value & np.uint64((1 << ENTRY_BITS) - 1)
+                    unpack_line(memory[first + k], count, word[n : n + count])
                 n += count
             chunk = link & (MAX_CHUNKS - 1) if link >> LINK_BITS else -1
             used = CHUNK_LINES

@@ -1,11 +1,12 @@
 """Lists that a sorting unit does not hold, bit for bit: runs, chains, batches (docs/reference/list_sorter.md).
 
-A list of more than `capacity` entries is read once. Each `capacity` entries of it, in the order of reading, are sorted and written back as a run: lines of
-nine entries in the layout of `flicker.golden.lists` (count in the header, no link), the runs one after the other, each but the last of the same number of
-lines. A run that lies wholly behind or before a chain of runs joins it, the first one that it fits, so that a chain is in order from its first line to its
-last one. Then the chains are merged through the sorting unit, in batches of as many lines as it holds, or fewer. Of all chains the line whose last entry is
-the least is next; when a batch has all the lines it may have but one for each chain that is left, the last entry of its last line is the batch's limit, and
-the next line of every chain gives what is not above it. What a batch delivers is above the limit of the one before: its bound.
+A list of more than `capacity` entries is read once. Each `capacity` entries of it, in the order of reading, are sorted and written back as a run: lines in the
+layout of `flicker.golden.lists` (count in the header, no link), with key and record of each entry exchanged, since here the keys rise by little. Runs begin as
+many lines from each other as a run of plain lines has. A run that lies wholly behind or before a chain of runs joins it, the first one that it fits, so that a
+chain is in order from its first line to its last one. Then the chains are merged through the sorting unit, in batches of as many entries as it holds, or fewer.
+Of all chains the line whose last entry is the least is next; when a batch might have no room for another line and one of each chain that is left, the last
+entry of its last line is the batch's limit, and the next line of every chain gives what is not above it. What a batch delivers is above the limit of the one
+before: its bound.
 
 The simple statement: `order` is np.sort of the upper 48 bits.
 """
@@ -18,13 +19,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import FlickerError
-from .lists import ENTRY_BITS, HEADER_AT, LINE_BYTES, LINE_ENTRIES, MASK_BITS
+from .lists import ENTRY_BITS, KEY_BITS, LINE_BYTES, LINE_ENTRIES, MASK_BITS, RECORD_BITS, SHORT_ENTRIES, line_starts, pack_line
 from .sorting import CAPACITY, ordered
 
 RUNS = 64  # that a list may have
 UNITS = 4
-SHARES = 3  # batches of few chains are smaller, down to capacity >> SHARES, and leave the unit earlier
-FEW = 4  # chains of the smallest batches; twice as many, and they have twice as many lines
+SHARES = 2  # batches of few chains are smaller, down to capacity >> SHARES, and leave the unit earlier
+FEW = 4  # chains of the smallest batches; twice as many, and they have twice as many entries
 WORDS = LINE_BYTES // 8
 
 
@@ -49,11 +50,13 @@ class Batch:
 
 @dataclass(eq=False)
 class LongList:
-    """order: uint64 (n,), the entries in order. runs: uint64, sorted. chains: numbers of their runs, nearest first. batches: what the unit gathers."""
+    """order: uint64 (n,), the entries in order. runs: uint64, sorted; starts: of each where its lines begin, and its length. chains: numbers of their runs,
+    nearest first. batches: what the unit gathers."""
 
     order: np.ndarray
     capacity: int
     runs: list[np.ndarray]
+    starts: list[np.ndarray]
     chains: list[list[int]]
     batches: list[Batch]
 
@@ -65,15 +68,20 @@ class LongList:
     @property
     def lines(self) -> int:
         """Lines written back."""
-        return (len(self.runs) - 1) * self.run_lines + -(-len(self.runs[-1]) // LINE_ENTRIES)
+        return sum(len(starts) - 1 for starts in self.starts)
+
+    @property
+    def places(self) -> list[int]:
+        """Where each line lies, in lines from the region's beginning."""
+        return [r * self.run_lines + k for r, starts in enumerate(self.starts) for k in range(len(starts) - 1)]
 
     def memory(self) -> np.ndarray:
-        """uint64 (lines, 8): what is written back."""
+        """uint64 (lines, 8): what is written back, without what lies between runs."""
         return np.concatenate([pack_lines(run) for run in self.runs])
 
 
 def run_lines(capacity: int = CAPACITY) -> int:
-    """Lines of a whole run."""
+    """Lines of a whole run, at most, and from run to run."""
     return -(-capacity // LINE_ENTRIES)
 
 
@@ -82,27 +90,26 @@ def region_bytes(capacity: int = CAPACITY, most: int = RUNS) -> int:
     return UNITS * most * run_lines(capacity) * LINE_BYTES
 
 
-def batch_lines(chains: int, capacity: int = CAPACITY) -> int:
-    """Lines of a batch, at most."""
+def batch_entries(chains: int, capacity: int = CAPACITY) -> int:
+    """Entries of lines in a batch, at most; more only where one line and one of each chain are more."""
     doublings = min((-(-chains // FEW) - 1).bit_length(), SHARES)
-    return (capacity >> SHARES - doublings) // LINE_ENTRIES
+    return capacity >> SHARES - doublings
+
+
+def exchanged(entries: np.ndarray) -> np.ndarray:
+    """Entries with key and record in each other's places (of which they have the same number of bits)."""
+    mask, record, key = (np.uint64((1 << n) - 1) for n in (MASK_BITS, RECORD_BITS, KEY_BITS))
+    tag = entries >> np.uint64(MASK_BITS)
+    return ((tag & record) << np.uint64(KEY_BITS) | tag >> np.uint64(RECORD_BITS) & key) << np.uint64(MASK_BITS) | entries & mask
 
 
 def pack_lines(entries: np.ndarray) -> np.ndarray:
-    """uint64 (lines, 8): entries by nine, the last line perhaps with fewer and its last one in the places that are left, so that a line's key is in one
-    place."""
-    count = -(-len(entries) // LINE_ENTRIES)
-    padded = np.zeros(count * LINE_ENTRIES, np.uint64)
-    padded[: len(entries)] = entries
-    padded[len(entries) :] = entries[-1:]
-    lines = np.zeros((count, WORDS), np.uint64)
-    for i in range(LINE_ENTRIES):
-        at, entry = i * ENTRY_BITS, padded[i::LINE_ENTRIES]
-        lines[:, at >> 6] |= entry << np.uint64(at & 63)
-        if at & 63 > 64 - ENTRY_BITS:
-            lines[:, (at >> 6) + 1] |= entry >> np.uint64(64 - (at & 63))
-    used = np.minimum(len(entries) - np.arange(count) * LINE_ENTRIES, LINE_ENTRIES).astype(np.uint64)
-    lines[:, -1] |= used << np.uint64(HEADER_AT & 63)
+    """uint64 (lines, 8): a sorted run, key and record exchanged; a line's last entry is in its first place."""
+    words = exchanged(np.asarray(entries, np.uint64))
+    starts = line_starts(words)
+    lines = np.zeros((len(starts) - 1, WORDS), np.uint64)
+    for k, (a, b) in enumerate(zip(starts[:-1], starts[1:])):
+        pack_line(words[a:b], b - a, lines[k])
     return lines
 
 
@@ -123,11 +130,11 @@ def chain_runs(runs: list[np.ndarray]) -> list[list[int]]:
     return chains
 
 
-def merge_batches(runs: list[np.ndarray], chains: list[list[int]], capacity: int) -> list[Batch]:
+def merge_batches(runs: list[np.ndarray], starts: list[np.ndarray], chains: list[list[int]], capacity: int) -> list[Batch]:
     """Batches in order."""
-    room = batch_lines(len(chains), capacity)
-    places = [[(r, k) for r in chain for k in range(-(-len(runs[r]) // LINE_ENTRIES))] for chain in chains]
-    largest = [[int(runs[r][min(LINE_ENTRIES * (k + 1), len(runs[r])) - 1]) >> MASK_BITS for r, k in chain] for chain in places]
+    room = batch_entries(len(chains), capacity)
+    places = [[(r, k) for r in chain for k in range(len(starts[r]) - 1)] for chain in chains]
+    largest = [[int(runs[r][starts[r][k + 1] - 1]) >> MASK_BITS for r, k in chain] for chain in places]
     owner = np.repeat(np.arange(len(chains)), [len(chain) for chain in places])
     order = owner[np.argsort(np.concatenate([np.array(keys, np.int64) for keys in largest]))]
     at = [0] * len(chains)
@@ -136,9 +143,12 @@ def merge_batches(runs: list[np.ndarray], chains: list[list[int]], capacity: int
     n, bound = 0, -1
     while n < len(order):
         fed: list[Fed] = []
-        while n < len(order) and (not fed or len(fed) + live < room):
+        count = 0
+        while n < len(order) and (not fed or count + SHORT_ENTRIES * (live + 1) <= room):
             c = int(order[n])
-            fed.append(Fed(*places[c][at[c]], True))
+            r, k = places[c][at[c]]
+            fed.append(Fed(r, k, True))
+            count += int(starts[r][k + 1] - starts[r][k])
             limit = largest[c][at[c]]
             at[c] += 1
             live -= at[c] == len(places[c])
@@ -147,7 +157,7 @@ def merge_batches(runs: list[np.ndarray], chains: list[list[int]], capacity: int
             limit = -1
         else:
             fed += [Fed(*places[c][at[c]], False) for c in range(len(chains)) if at[c] < len(places[c])]
-        given = np.concatenate([runs[f.run][LINE_ENTRIES * f.line : LINE_ENTRIES * (f.line + 1)] for f in fed])
+        given = np.concatenate([runs[f.run][starts[f.run][f.line] : starts[f.run][f.line + 1]] for f in fed])
         key = (given >> np.uint64(MASK_BITS)).astype(np.int64)
         batches.append(Batch(bound, limit, fed, ordered(given[(key > bound) & ((key <= limit) | (limit < 0))])))
         bound = limit
@@ -165,8 +175,9 @@ def sort_long(entries: np.ndarray, capacity: int = CAPACITY, most: int = RUNS) -
     if int(entries.max()) >> ENTRY_BITS:
         raise FlickerError("long lists: an entry of more than 52 bits")
     runs = [ordered(entries[i : i + capacity]) for i in range(0, len(entries), capacity)]
+    starts = [line_starts(exchanged(run)) for run in runs]
     chains = chain_runs(runs)
-    if len(chains) + 1 > batch_lines(len(chains), capacity):
+    if SHORT_ENTRIES * (len(chains) + 1) > capacity:
         raise FlickerError(f"long lists: {len(chains)} chains for a unit of {capacity}")
-    batches = merge_batches(runs, chains, capacity)
-    return LongList(np.concatenate([b.chunk for b in batches]), capacity, runs, chains, batches)
+    batches = merge_batches(runs, starts, chains, capacity)
+    return LongList(np.concatenate([b.chunk for b in batches]), capacity, runs, starts, chains, batches)

@@ -1,6 +1,6 @@
 """Cycles of a list that a sorting unit does not hold: runs written back, chains merged in batches (flicker.golden.long_lists, docs/reference/list_sorter.md).
 
-First reading: an entry a cycle, runs leave behind it. Then lines come in the order of the merge, nine cycles each; of every chain as many are read ahead as its
+First reading: an entry a cycle, runs leave behind it. Then lines come in the order of the merge, an entry a cycle; of every chain as many are read ahead as its
 part of the line memory holds. The chain whose line was used up must have its next one before another line is chosen.
 """
 
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from ..golden.lists import LINE_ENTRIES
 from ..golden.long_lists import LongList
 from .sorting import latency
 
@@ -81,7 +80,7 @@ def merge_cycles(golden: LongList, lines: int = LINES, memory: int = MEMORY) -> 
     owner = {r: c for c, chain in enumerate(golden.chains) for r in chain}
     fed = [f for b in golden.batches for f in b.fed]
     chain = np.array([owner[f.run] for f in fed])
-    entries = np.array([min(LINE_ENTRIES, len(golden.runs[f.run]) - LINE_ENTRIES * f.line) for f in fed], np.float64)
+    entries = np.array([golden.starts[f.run][f.line + 1] - golden.starts[f.run][f.line] for f in fed], np.float64)
     slots = chain_slots(len(golden.chains), lines)
     done = _give(chain, entries, np.array([f.whole for f in fed]), len(golden.chains), slots, float(memory), RATE, float(CHOOSE))
     given = runs + done[np.cumsum([len(b.fed) for b in golden.batches]) - 1].astype(np.int64)
