@@ -40,6 +40,7 @@ from doc_parts import (
     late,
     lists,
     long_lists,
+    modules,
     motion,
     mutants,
     order,
@@ -92,6 +93,9 @@ class Part:
 
 PARTS = (
     Part("parameters", "constants and counters of params.py", ("constants", "counters"), parameters.tables, cheap=True),
+    Part("modules", "every module: page, purpose, tests, parameters; what tests of units cover", ("inventory", "parameters", "tests"), modules.tables,
+         cheap=True),
+    Part("heads", "what modules say of their ports and timing", tuple(modules.HEADS), modules.heads, cheap=True),
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
     Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
          areas.missing, before=areas.save, cheap=True),

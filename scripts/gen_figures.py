@@ -162,7 +162,7 @@ def _sizes(figure: Figure, axis: int) -> tuple[list[float], list[float]]:
         first, last = box.cells[axis], box.cells[axis + 2]
         if box.kind == "group":
             continue
-        text = max(map(width_of, box.text)) if axis == 0 else LEADING * len(box.text)
+        text = max(width_of(box.text[0]) * (1.08 if box.kind == "box" else 1), *map(width_of, box.text)) if axis == 0 else LEADING * len(box.text)
         need[key] = text + 2 * PAD + (STACK * 2 if box.stack > 1 else 0)
         if last - first == 1:
             lengths[first] = max(lengths[first], need[key])
