@@ -61,7 +61,8 @@ HEADS = {
     "sorting_unit": "flk_sorting_unit flk_sort_runs flk_sort_merge flk_sort_select",
     "list_sorter": "flk_list_sorter flk_run_writer flk_run_merge", "delivery": "flk_entry_buffer flk_delivery flk_record_cache",
     "frame_writer": "flk_frame_writer", "record_to_splat": "flk_record_to_splat flk_splat_input", "render_stage": "flk_render_stage",
-    "ctu": "flk_ctu flk_ctu_controller flk_mmu", "prtu": "flk_prtu", "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_state flk_pixel_drain",
+    "ctu": "flk_ctu flk_ctu_controller flk_mmu", "prtu": "flk_prtu",
+    "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_state flk_pixel_drain",
     "lane_stage": "flk_lane_stage flk_lane_core flk_splat_setup flk_row_mask flk_lane_queue flk_lane flk_lane_result",
     "arithmetic": "flk_fp_add_pipe flk_fp_mul_pipe flk_weight flk_exp_neg_pipe flk_log_opacity_pipe",
 }
@@ -214,7 +215,11 @@ def module_head(name: str, text: str) -> str:
 
 def heads(say: Say) -> dict[str, str]:
     there = sources()
-    return {page: "\n\n".join(module_head(name, head(there[name].read_text())) for name in names.split()) for page, names in HEADS.items()}
+    found = {}
+    for page, names in HEADS.items():
+        own = re.compile(rf"\s*\(docs/reference/{page}\.md\)|docs/reference/{page}\.md, ")
+        found[page] = "\n\n".join(module_head(name, own.sub("", head(there[name].read_text()))) for name in names.split())
+    return found
 
 
 def pipeline_table() -> str:
@@ -226,7 +231,8 @@ def pipeline_table() -> str:
         shared = re.search(r"Units: ([^.]*)\.", head(there[pipeline.module].read_text()))
         if latency is None or shared is None:
             raise FlickerError(f"rtl: {pipeline.module}: no latency, or no units")
-        rows.append((f"`{pipeline.module}`", str(pipeline.interval), latency[1], pipeline.head.rstrip("."), " ".join(shared[1].replace(" of 0 bits", "").split())))
+        units = " ".join(shared[1].split()).replace(" of 0 bits", "")
+        rows.append((f"`{pipeline.module}`", str(pipeline.interval), latency[1], pipeline.head.rstrip("."), units))
     return table(["module", "interval", "latency", "what", "operations in units"], rows)
 
 
