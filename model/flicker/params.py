@@ -306,6 +306,7 @@ class RenderConfig:
 
     @property
     def chip_memories(self) -> ChipMemories:
+        """Sizes of the chip's memories that `memories` names."""
         return CHIP_MEMORIES[self.memories]
 
     def with_(self, **changes) -> RenderConfig:

@@ -42,6 +42,7 @@ class Counts(ctypes.Structure):
 
     @property
     def row_hits(self) -> int:
+        """Bursts that found their row open."""
         return self.bursts - self.activates
 
 
@@ -69,12 +70,14 @@ class Reply(ctypes.Structure):
 
 
 class Resp(IntEnum):
+    """AXI's responses, by their code."""
+
     OKAY, EXOKAY, SLVERR, DECERR = range(4)
 
 
 class Order(IntEnum):
-    """Answers in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn; in any order across ids, and a read is
-    answered once all of its beats are there, so that none waits for the DRAM in the middle of another's burst."""
+    """Responses: in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn; in any order across ids, and a read
+    begins once all of its beats are there, so that none waits for the DRAM in the middle of another's burst."""
 
     IN_ORDER, BY_ID, INTERLEAVED, WHOLE = range(4)
 
@@ -232,6 +235,7 @@ class Dram:
         return None if clock < 0 else clock
 
     def counts(self) -> Counts:
+        """What the channels have done until now."""
         out = Counts()
         self._lib.flk_dram_counts(self._at, ctypes.byref(out))
         return out
@@ -331,6 +335,7 @@ class Port:
         return [self._lib.flk_axi_error(self._at, i).decode() for i in range(self._lib.flk_axi_errors(self._at))]
 
     def counts(self, purpose: int) -> PurposeCounts:
+        """Traffic of the port by purpose, and cycles by channel."""
         out = PurposeCounts()
         self._lib.flk_axi_counts(self._at, purpose, ctypes.byref(out))
         return out
