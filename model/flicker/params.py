@@ -50,7 +50,7 @@ class Coords(IntEnum):
 
 
 class SortOrder(str, Enum):
-    """What splats are sorted by, near to far (docs/decisions/061-order-of-depth.md)."""
+    """What splats are sorted by, near to far (docs/decisions/032-depth-keys.md)."""
 
     DEPTH = "depth"  # along the camera's axis
     DISTANCE = "distance"  # to the camera: stays while it turns on the spot
