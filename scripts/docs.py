@@ -25,6 +25,7 @@ from doc_parts import (
     chip_hardware,
     chip_lanes,
     chip_memory,
+    commands,
     configurations,
     cuts,
     delivery,
@@ -93,6 +94,7 @@ class Part:
 PARTS = (
     Part("parameters", "constants and counters of params.py", ("constants", "counters"), parameters.tables, cheap=True),
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
+    Part("commands", "options of every command of flicker", commands.COMMANDS, commands.tables, cheap=True),
     Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
          areas.missing, before=areas.save, cheap=True),
     Part("instance", "instantiation templates, port duties, accesses of memory", ("", "chip", "axi", "duties", "managers"), instance.tables, cheap=True),
