@@ -64,7 +64,8 @@ def _meaning(command: Any, parameter: Any) -> str:
     """The help with its default; pages that it names are links."""
     if not parameter.help:
         raise FlickerError(f"flicker {command.name}: {parameter.opts[0]} has no help")
-    text = PAGE.sub(lambda found: f"([{found[2]}]({'' if found[1] == 'reference' else '../guide/'}{found[2]}))", parameter.help).replace("|", "\\|").replace("*", "\\*")
+    text = parameter.help.replace("|", "\\|").replace("*", "\\*")
+    text = PAGE.sub(lambda found: f"([{found[2]}]({'../guide/' if found[1] == 'guide' else ''}{found[2]}))", text)
     text = re.sub(r"\[default: (.*)\]$", r"(default: \1)", text)
     default = getattr(parameter.default, "value", parameter.default)
     if parameter.param_type_name == "option" and "default" not in text and isinstance(default, str | int | float | Path) and not isinstance(default, bool):
