@@ -25,7 +25,7 @@ PAGES = check_pages.pages()
 IDS = [page.relative_to(ROOT).as_posix() for page in PAGES]
 KINDS = ("guide", "reference", "results", "decisions")
 LONGEST = {"guide": 200, "reference": 200, "decisions": 80}  # lines of a page
-WRITTEN = 7_200  # lines of guide, reference and decisions together, without what commands write between marks: 4,000 is the goal; lower it with the pages
+WRITTEN = 6_000  # lines of guide, reference and decisions together, without what commands write between marks: 4,000 is the goal; lower it with the pages
 COLUMNS = 260  # of a line of prose; rows of tables are as long as they are
 GENERATED = re.compile(r"^<!-- make (?:docs|generate)\b.*?-->\n.*?^<!-- end(?: of \w+)? -->$", re.M | re.S)
 CODE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
@@ -45,7 +45,7 @@ PRIVATE = {
 QUESTIONS = (
     ("How do I get a first picture?", "docs/guide/first_frame.md", "make demo"),
     ("Which module sorts the tile lists, and where is its page?", "docs/reference/inventory.md", "[`flk_sorting_unit`"),
-    ("What does --memories small do?", "docs/reference/cli.md", "`--memories default\\|small`"),
+    ("How do I draw a scene from Python?", "docs/reference/api/index.md", "Drawing(Engine.GOLDEN"),
     ("How many KB of memory does the chip have?", "docs/results/chip_memory.md", "| chip | all |"),
     ("What happens when the memory responds with SLVERR?", "docs/reference/chip_ports.md", "SLVERR and DECERR end the frame with an error"),
     ("How do I add a mask generator?", "docs/guide/extending.md", "one entry in `GENERATORS`"),

@@ -15,7 +15,8 @@ from .common import Say
 REFERENCE = ROOT / "docs" / "reference"
 # Pages of modules that have none of their own name, without flk_; the first pattern that fits counts.
 PAGES = {
-    "ff": "ff_*", "arithmetic": "fp_* *_to_fp fixed_mul exp_neg* log_opacity* lzc table_pkg weight",
+    "ff": "ff_*",
+    "arithmetic": "fp_* *_to_fp fixed_mul exp_neg* log_opacity* lzc table_pkg weight",
     "stream_cells": "pipe_reg skid_buffer *fifo stream_arbiter priority_arbiter delay* event_counter*", "memory_port": "axi_arbiter axi_lane axi_hold",
     "axi": "axi_* line_writer", "chip_memory": "sram sram_single", "chip_ports": "top_axi clock_gate reset_sync", "constants": "pkg param_pkg",
     "chip": "top top_pkg", "frame_control": "frame_counters descriptor", "registers": "registers_pkg",
@@ -24,7 +25,8 @@ PAGES = {
     "datapath": "geometry_decode projection* splat_b* *_field colour_* coefficient phase_mux front_pkg",
     "rendering": "rendering_pkg tile_walk", "sorting_unit": "sort_*", "list_sorter": "run_*", "bitonic_sorter": "compare_exchange",
     "delivery": "entry_buffer record_cache", "record_to_splat": "shape_to_fp16 opacity_to_fp16 splat_input", "frame_writer": "pixel_out",
-    "render_stage": "stage stage_control perf_counters", "mask_generators": "mask_*", "ctu": "ctu* mmu prtu", "rendering_core": "fifo_monitor channel rendering_core",
+    "render_stage": "stage stage_control perf_counters", "mask_generators": "mask_*", "ctu": "ctu* mmu prtu",
+    "rendering_core": "fifo_monitor channel rendering_core",
     "vru": "blend_pipe pixel_*", "lane_stage": "lane_core lane_queue lane_counters", "lanes": "lane lane_* splat_setup row_mask",
 }
 
@@ -65,4 +67,4 @@ def said(path: Path) -> str:
     sentence = re.match(r"(.+?[.:;])(?= [A-Z(]| *$|  )", text)
     if not text:
         raise FlickerError(f"{path.name}: begins with no comment")
-    return (sentence[1] if sentence else text).rstrip(".:;").replace("|", "\\|").replace("*", "\\*")
+    return (sentence[1] if sentence else text).rstrip(".:;").replace("|", "\\|").replace("*", "\\*").replace("[", "\\[")

@@ -29,7 +29,7 @@ def said(top: str) -> str:
         if not line.startswith("//"):
             break
         lines.append(line.removeprefix("//").strip())
-    text = " ".join(filter(None, lines)).partition(" The assertions l_")[0].replace("|", "\\|").replace("*", "\\*")
+    text = " ".join(filter(None, lines)).partition(" The assertions l_")[0].replace("|", "\\|").replace("*", "\\*").replace("[", "\\[")
     if not text:
         raise FlickerError(f"formal/{top}.sv: begins with no comment")
     return text

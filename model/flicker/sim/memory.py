@@ -83,7 +83,7 @@ class Order(IntEnum):
 
 
 class WriteOrder(IntEnum):
-    """Data before, with or behind addresses; ready for data only behind addresses; ready for an address only once data are offered."""
+    """Data before, with or behind addresses, up to 16 beats before; ready for data only behind addresses; ready for an address only once data are offered."""
 
     ANY, ADDRESS_FIRST, DATA_FIRST = range(3)
 
@@ -97,11 +97,17 @@ class PortConfig:
     """Options of a port.
 
     latency: cycles that are added to the DRAM's, or, in a perfect memory, all there are. max_reads, max_writes: transactions that may be under way.
-    max_beats: longest burst that is legal. order, write_order: see there. hazards: a transaction that overlaps one under way, one of them a write, is an error
-    (writes of one id excepted). urgent: transactions of at least that AXI quality of service go before others where they wait for a place in a DRAM channel's
-    queue and where answers are chosen, except IN_ORDER; 16: none does. stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R).
-    run: channel to mean length of such a pause in cycles, default 1. stop_after: channel to transfers after which it is never ready or valid again. Random
-    choices follow `seed`.
+    max_beats: longest burst that is legal.
+
+    order, write_order: see there.
+
+    urgent: transactions of at least that AXI quality of service (`ar_qos`, `aw_qos`) go first in a DRAM channel's queue, have a lead there and have their
+    responses first, except IN_ORDER; 16: none does. Nothing bounds how long the others wait: for managers whose own work ends.
+
+    hazards: a transaction that overlaps one under way, one of them a write, is an error (writes of one id excepted, which follow each other).
+
+    stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R). run: channel to mean length of such a pause in cycles, default 1.
+    stop_after: channel to transfers after which it is never ready or valid again. Random choices follow `seed`; what is offered stays.
     """
 
     data_bits: int = 512
