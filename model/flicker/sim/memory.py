@@ -294,7 +294,22 @@ class Memory:
 
 
 class Port:
-    """An AXI4 port of a memory. Fill `request`, call `step` once a cycle, read `reply` for the next one."""
+    """An AXI4 port of a memory. Fill `request`, call `step` once a cycle, read `reply` for the next one.
+
+    ```python
+    memory = Memory(DramConfig().timing)                       # flicker.chip.dram
+    memory.allocate(0x1000, 4096)
+    port = Port(memory, port_config(seed=3, stall={"R": 0.2}))  # flicker.chip.dram
+    port.request.ar.valid, port.request.ar.addr, port.request.ar.size, port.request.ar.burst = 1, 0x1000, 6, 1
+    port.request.r_ready = 1
+    while not port.reply.r_valid:
+        taken = port.reply.ar_ready
+        memory.tick()
+        port.step()
+        if taken:
+            port.request.ar.valid = 0
+    ```
+    """
 
     def __init__(self, memory: Memory, config: PortConfig = PortConfig()) -> None:
         self._lib = memory._lib
