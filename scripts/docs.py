@@ -96,6 +96,9 @@ class Part:
 
 PARTS = (
     Part("parameters", "constants and counters of params.py", ("constants", "counters"), parameters.tables, cheap=True),
+    Part("modules", "every module: page, purpose, tests, parameters; what tests of units cover", ("inventory", "parameters", "tests"), modules.tables,
+         cheap=True),
+    Part("heads", "what modules say of their ports and timing", tuple(modules.HEADS), modules.heads, cheap=True),
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
     Part("commands", "options of every command of flicker", commands.COMMANDS, commands.tables, cheap=True),
     Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
@@ -106,7 +109,6 @@ PARTS = (
     Part("synthesis", "tables of make synth", ("units", "summary"), synthesis.tables, synthesis.missing),
     Part("chip_memory", "memories of the chip, unit by unit", ("", "sizes"), chip_memory.tables),
     Part("library", "another cell library beside our own", ("",), synthesis.library_tables, synthesis.library_missing),
-    Part("modules", "modules and packages of rtl/ with their pages", ("",), modules.tables, cheap=True),
     Part("proofs", "what is proved", ("",), proofs.tables, cheap=True),
     Part("families", "families of the stability suite", ("still", "moving"), families.tables, cheap=True),
     Part("formal", "results of make formal", ("",), formal.tables, formal.missing),

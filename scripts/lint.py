@@ -106,6 +106,7 @@ CHECKS: list[list[object]] = [
     [sys.executable, "scripts/gen_registers.py", "--check"],
     [sys.executable, "scripts/gen_params.py", "--check"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
+    [sys.executable, "scripts/gen_figures.py", "--check"],
     [sys.executable, "scripts/mutants.py", "--check"],
     [sys.executable, "scripts/check_pages.py"],
     [Path(sys.executable).parent / "lint-imports"],
