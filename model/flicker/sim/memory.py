@@ -76,14 +76,17 @@ class Resp(IntEnum):
 
 
 class Order(IntEnum):
-    """Responses: in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn; in any order across ids, and a read
-    begins once all of its beats are there, so that none waits for the DRAM in the middle of another's burst."""
+    """Order of responses.
+
+    IN_ORDER: that of all addresses. BY_ID: in order within an id, any across ids. INTERLEAVED: as BY_ID, reads of several ids also beat by beat in turn. WHOLE:
+    as BY_ID, and a read begins once all of its beats are there, so that none waits for the DRAM in the middle of another's burst.
+    """
 
     IN_ORDER, BY_ID, INTERLEAVED, WHOLE = range(4)
 
 
 class WriteOrder(IntEnum):
-    """Data before, with or behind addresses, up to 16 beats before; ready for data only behind addresses; ready for an address only once data are offered."""
+    """ANY: data before (up to 16 beats), with or behind addresses. ADDRESS_FIRST: ready for data only behind addresses. DATA_FIRST: the reverse."""
 
     ANY, ADDRESS_FIRST, DATA_FIRST = range(3)
 
