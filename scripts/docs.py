@@ -100,7 +100,7 @@ PARTS = (
          cheap=True),
     Part("heads", "what modules say of their ports and timing", tuple(modules.HEADS), modules.heads, cheap=True),
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
-    Part("commands", "options of every command of flicker", commands.COMMANDS, commands.tables, cheap=True),
+    Part("commands", "options of every command of flicker", commands.PLACES, commands.tables, cheap=True),
     Part("areas", "areas.csv from make synth; areas and energies that follow from it", ("stages", "generators", "events", "constants"), areas.tables,
          areas.missing, before=areas.save, cheap=True),
     Part("instance", "instantiation templates, port duties, accesses of memory", ("", "chip", "axi", "duties", "managers"), instance.tables, cheap=True),

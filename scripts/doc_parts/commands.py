@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pages
 from typer.main import get_command
 
 from flicker import markdown
@@ -15,6 +16,7 @@ from flicker.errors import FlickerError
 from .common import Say
 
 COMMANDS = ("render", "path", "view", "chip", "cost", "convert", "grow", "pack", "fit", "undistort", "budget", "report", "sweep", "stability")
+PLACES = ("all", *COMMANDS)
 WORDS = {"path": "FILE", "int": "N", "int range": "N", "float": "X", "float range": "X", "str": "TEXT", "bool": ""}
 NAMED = {"--size": "WxH", "--frame": "WxH", "--up": "AXIS", "--background": "COLOUR", "--config": "NAME", "--through": "NAME"}  # in place of TEXT
 PAGE = re.compile(r"\(docs/(reference|guide)/(\w+\.md)\)")
@@ -23,7 +25,18 @@ PAGE = re.compile(r"\(docs/(reference|guide)/(\w+\.md)\)")
 def tables(say: Say) -> dict[str, str]:
     commands = get_command(app).commands
     shared = {_key(p) for p in commands["render"].params}
-    return {name: table(commands[name], set() if name == "render" else shared) for name in COMMANDS}
+    return {"all": overview(commands), **{name: table(commands[name], set() if name == "render" else shared) for name in COMMANDS}}
+
+
+def overview(commands: dict[str, Any]) -> str:
+    """A row for each command, with the page that has its options."""
+    where = pages.places()
+    rows = []
+    for name, command in commands.items():
+        page = where.get(("commands", name))
+        link = "" if page is None else "[below](#flicker-render)" if name == "render" else f"[{page.name}]({page.name})"
+        rows.append([f"`flicker {name}`", command.help.strip().partition("\n")[0].rstrip(".").replace("|", "\\|"), link])
+    return markdown.table(["command", "what", "page"], rows)
 
 
 def table(command: Any, shared: set[tuple[str, str]]) -> str:
