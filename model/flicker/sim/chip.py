@@ -70,6 +70,7 @@ class Usage:
     traffic: dict[str, tuple[int, int]]
 
     def since(self, before: Usage) -> Usage:
+        """What has come since an earlier state."""
         return Usage(
             {name: (value - before.live[name]) % 2**32 for name, value in self.live.items()},
             {name: (read - before.traffic[name][0], written - before.traffic[name][1]) for name, (read, written) in self.traffic.items()},
@@ -169,10 +170,12 @@ class ChipSession(Half):
         return value
 
     def set_register(self, name: str, value: int, index: int = 0) -> None:
+        """Write a register by its name."""
         self._access(REGISTERS[name].offset + 4 * index, True, value)
         self._raise()
 
     def field(self, register: str, name: str) -> int:
+        """Read a field of a register by their names."""
         low, bits = REGISTERS[register].fields[name]
         return self.register(register) >> low & (1 << bits) - 1
 
@@ -286,6 +289,7 @@ class ChipSession(Half):
         self.wait(1)
 
     def counter(self, index: int) -> int:
+        """Read a counter of the frame that ended last, by its index."""
         value = self.driver.flk_counter(ctypes.byref(self.device), ctypes.c_uint32(index))
         self._raise()
         return value
