@@ -20,7 +20,7 @@ from .common import Say
 PAGES = (
     ("Chip", (
         ("chip.md", "flk_top"), ("chip_ports.md", "flk_top_axi"), ("registers.md", "flk_registers flk_registers_pkg"),
-        ("frame_control.md", "flk_frame_control flk_frame_counters flk_descriptor flk_top_pkg"),
+        ("frame_control.md", "flk_frame_control flk_frame_counters flk_counter_pkg flk_descriptor flk_top_pkg"),
         ("memory_port.md", "flk_axi_arbiter flk_axi_lane flk_axi_hold flk_priority_arbiter"), ("chip_memory.md", "flk_sram flk_sram_single"),
         ("chip_ports.md", "flk_clock_gate flk_reset_sync"),
     )),
