@@ -96,8 +96,8 @@ class Part:
 
 PARTS = (
     Part("parameters", "constants and counters of params.py", ("constants", "counters"), parameters.tables, cheap=True),
-    Part("modules", "every module: page, purpose, tests, parameters; what tests of units cover", ("inventory", "parameters", "tests"), modules.tables,
-         cheap=True),
+    Part("modules", "every module: page, purpose, tests, parameters; what tests of units cover",
+         ("inventory", "parameters", "tests", "pipelines"), modules.tables, cheap=True),
     Part("heads", "what modules say of their ports and timing", tuple(modules.HEADS), modules.heads, cheap=True),
     Part("configurations", "list of configurations and groups", ("list", "groups"), configurations.tables, cheap=True),
     Part("commands", "options of every command of flicker", commands.PLACES, commands.tables, cheap=True),

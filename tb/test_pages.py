@@ -25,7 +25,7 @@ PAGES = check_pages.pages()
 IDS = [page.relative_to(ROOT).as_posix() for page in PAGES]
 KINDS = ("guide", "reference", "results", "decisions")
 LONGEST = {"guide": 200, "reference": 200, "decisions": 80}  # lines of a page
-WRITTEN = 4_820  # lines of guide, reference and decisions together, without what commands write between marks: 4,000 is the goal; lower it with the pages
+WRITTEN = 4_700  # lines of guide, reference and decisions together, without what commands write between marks: 4,000 is the goal; lower it with the pages
 COLUMNS = 260  # of a line of prose; rows of tables are as long as they are
 GENERATED = re.compile(r"^<!-- make (?:docs|generate)\b.*?-->\n.*?^<!-- end(?: of \w+)? -->$", re.M | re.S)
 CODE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
@@ -433,6 +433,11 @@ def wrong_words(text: str) -> list[str]:
 @pytest.mark.parametrize("page", [page for page in PAGES if page.name != "glossary.md"], ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_words(page: Path) -> None:
     assert wrong_words(page.read_text()) == []
+
+
+def test_words_of_figures() -> None:
+    for figure in sorted((ROOT / "docs" / "figures").glob("*.fig")):
+        assert wrong_words(figure.read_text()) == [], figure.name
 
 
 def test_wrong_words_are_found() -> None:

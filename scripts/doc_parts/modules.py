@@ -9,6 +9,7 @@ import re
 import textwrap
 from pathlib import Path
 
+from flicker.datapath.units import PIPELINES
 from flicker.errors import FlickerError
 from flicker.markdown import table
 from flicker.toolchain import ROOT
@@ -56,11 +57,14 @@ HEADS = {
     "frame_control": "flk_frame_control flk_frame_counters", "memory_port": "flk_axi_arbiter flk_priority_arbiter flk_axi_hold flk_axi_lane",
     "front_end": "flk_preprocessing flk_preprocessing_core flk_colour_fetch", "cluster_cull": "flk_cluster_cull flk_geometry_fetch",
     "entries_and_records": "flk_tile_walker flk_entry_merge flk_record_writer", "list_writer": "flk_list_writer flk_pointer_port",
-    "rendering": "flk_rendering", "list_reader": "flk_list_reader", "sorting_unit": "flk_sorting_unit",
+    "rendering": "flk_rendering flk_tile_walk", "list_reader": "flk_list_reader", "bitonic_sorter": "flk_bitonic_sorter",
+    "sorting_unit": "flk_sorting_unit flk_sort_runs flk_sort_merge flk_sort_select",
     "list_sorter": "flk_list_sorter flk_run_writer flk_run_merge", "delivery": "flk_entry_buffer flk_delivery flk_record_cache",
     "frame_writer": "flk_frame_writer", "record_to_splat": "flk_record_to_splat flk_splat_input", "render_stage": "flk_render_stage",
-    "ctu": "flk_ctu flk_mmu", "prtu": "flk_prtu", "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru",
-    "lane_stage": "flk_lane_stage flk_lane_core",
+    "ctu": "flk_ctu flk_ctu_controller flk_mmu", "prtu": "flk_prtu",
+    "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_state flk_pixel_drain",
+    "lane_stage": "flk_lane_stage flk_lane_core flk_splat_setup flk_row_mask flk_lane_queue flk_lane flk_lane_result",
+    "arithmetic": "flk_fp_add_pipe flk_fp_mul_pipe flk_weight flk_exp_neg_pipe flk_log_opacity_pipe",
 }
 COLUMNS = 200
 
@@ -211,8 +215,26 @@ def module_head(name: str, text: str) -> str:
 
 def heads(say: Say) -> dict[str, str]:
     there = sources()
-    return {page: "\n\n".join(module_head(name, head(there[name].read_text())) for name in names.split()) for page, names in HEADS.items()}
+    found = {}
+    for page, names in HEADS.items():
+        own = re.compile(rf"\s*\(docs/reference/{page}\.md\)|docs/reference/{page}\.md, ")
+        found[page] = "\n\n".join(module_head(name, own.sub("", head(there[name].read_text()))) for name in names.split())
+    return found
+
+
+def pipeline_table() -> str:
+    """Pipelines made from the golden model, with how many operations share how many units."""
+    there, rows = sources(), []
+    package = there["flk_front_pkg"].read_text()
+    for pipeline in PIPELINES:
+        latency = re.search(rf" {pipeline.module.removeprefix('flk_').upper()}_LATENCY = (\d+);", package)
+        shared = re.search(r"Units: ([^.]*)\.", head(there[pipeline.module].read_text()))
+        if latency is None or shared is None:
+            raise FlickerError(f"rtl: {pipeline.module}: no latency, or no units")
+        units = " ".join(shared[1].split()).replace(" of 0 bits", "")
+        rows.append((f"`{pipeline.module}`", str(pipeline.interval), latency[1], pipeline.head.rstrip("."), units))
+    return table(["module", "interval", "latency", "what", "operations in units"], rows)
 
 
 def tables(say: Say) -> dict[str, str]:
-    return {"inventory": inventory(), "parameters": parameter_table(), "tests": test_table()}
+    return {"inventory": inventory(), "parameters": parameter_table(), "tests": test_table(), "pipelines": pipeline_table()}
