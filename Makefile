@@ -38,6 +38,7 @@ demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
 generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists) and the block diagrams of the pages
+	@$(BIN)/python scripts/gen_counters.py
 	@$(BIN)/python scripts/gen_registers.py
 	@$(BIN)/python scripts/gen_params.py
 	@$(BIN)/python scripts/gen_manifests.py

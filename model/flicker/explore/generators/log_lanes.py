@@ -48,8 +48,8 @@ class LogRows(MaskGenerator):
 
 
 def configurations() -> Iterator[Configuration]:
-    """The default build, one that takes an element a cycle, more lanes, as many as fit the area of the GSCore-like build, and the default one behind lists that end
-    as the reference's."""
+    """The default build, one that takes an element a cycle, more lanes, as many as fit the area of the GSCore-like build, and the default one behind lists that
+    end as the reference's."""
     for name, title, stage in (
         ("log-lanes", "lanes in the log domain", LogLanes()),
         ("log-lanes-one", "lanes in the log domain, one element a cycle", LogLanes(in_width=1)),
