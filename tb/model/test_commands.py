@@ -223,6 +223,16 @@ def test_command(command: str, sandbox: Path, monkeypatch: pytest.MonkeyPatch) -
         assert (sandbox / name).stat().st_size > 0, (option, name)
 
 
+def test_example_of_the_api(sandbox: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The program of docs/reference/api/index.md, with a small scene in place of the demo's."""
+    (program,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "reference" / "api" / "index.md").read_text(), re.M | re.S)
+    view = 'load_view("demo", 0, (640, 360))'
+    assert view in program
+    monkeypatch.chdir(sandbox)
+    exec(program.replace(view, 'load_view("scene.ply", 0, (48, 32))'), {})
+    assert (sandbox / "picture.png").is_file() and float(capsys.readouterr().out) > 30
+
+
 def test_as_typed(sandbox: Path) -> None:
     """The words themselves in a shell, where `.venv` is the checkout's; make finds the environment up to date."""
     done = subprocess.run(["bash", "-c", ".venv/bin/flicker pack scene.ply -o typed.flk && make help"], cwd=sandbox, capture_output=True, text=True)
