@@ -137,7 +137,7 @@ def package(found: dict[str, list[Counter]]) -> str:
         """row: word, what it is."""
         argument = f"{half}_counters_t counters" + more
         out.extend([
-            "", f"  function automatic logic [{half.upper()}_WORDS-1:0][31:0] {name}({argument});", f"    {name} = '0;",
+            "", f"  function automatic logic [{half.upper()}_WORDS-1:0][31:0] {name}(", f"      {argument});", f"    {name} = '0;",
             *(f"    {name}[{word}] = {value};" for word, value in row), "  endfunction",
         ])
 

@@ -186,7 +186,8 @@ package flk_counter_pkg;
 
   // In the order in which flk_frame_counters takes them; a word without a counter is zero.
 
-  function automatic logic [FRONT_WORDS-1:0][31:0] front_counter_words(front_counters_t counters);
+  function automatic logic [FRONT_WORDS-1:0][31:0] front_counter_words(
+      front_counters_t counters);
     front_counter_words = '0;
     front_counter_words[0] = counters.cycles;
     front_counter_words[1] = counters.culled_clusters;
@@ -233,7 +234,8 @@ package flk_counter_pkg;
     front_counter_words[44] = counters.beat_waits;
   endfunction
 
-  function automatic logic [RENDERING_WORDS-1:0][31:0] rendering_counter_words(rendering_counters_t counters, logic [STAMP_WORDS-1:0][31:0] stamps);
+  function automatic logic [RENDERING_WORDS-1:0][31:0] rendering_counter_words(
+      rendering_counters_t counters, logic [STAMP_WORDS-1:0][31:0] stamps);
     rendering_counter_words = '0;
     rendering_counter_words[0] = counters.cycles;
     rendering_counter_words[1] = counters.entries[0];
