@@ -34,6 +34,8 @@ def walk_entries(rng, tiles: list[tuple[int, int]], stays: float | None) -> tupl
             k, r, step, turn = (k + (1 << 23)) % (1 << 24), r, 0, 0
         elif far and rng.random() < 0.3:
             k, r = rng.getrandbits(24), rng.getrandbits(24)
+        elif far and rng.random() < 0.2:  # from one end of the keys to the other, which is not near
+            k, step, turn = (0 if k >> 23 else (1 << 24) - 1), 1, 0
         k, r = k + turn if 0 <= k + turn < 1 << 24 else k, r + step if r + step < 1 << 24 else r
         last[tile] = k, r
         key.append(k)
