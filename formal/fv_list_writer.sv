@@ -19,7 +19,7 @@
 // chunks as a link can name. Two columns of tiles, four lists. The assertions l_* describe the pipeline for induction.
 module fv_list_writer #(
   parameter int unsigned Pointers = 4,
-  parameter int unsigned Easy     = 0   // 1, for covers: nothing makes the writer wait
+  parameter int unsigned Easy     = 0   // 1: ten entries of two lists, and nothing waits
 ) (
   input logic       clk_i,
   input logic       again_i,
@@ -434,10 +434,24 @@ module fv_list_writer #(
     end
   end
 
+  // Entries of the frame, for easy traces.
+  logic [3:0] count_q;
+
+  always_ff @(posedge clk_i or negedge rst_n) begin
+    if (!rst_n) begin
+      count_q <= 4'd0;
+    end else if (start_i && idle) begin
+      count_q <= 4'd0;
+    end else if (in_valid_i && in_ready && !in_end_i && count_q != 4'd15) begin
+      count_q <= count_q + 4'd1;
+    end
+  end
+
   always_comb begin
     m_list: assume (list_i == list_q && at_i == at_q);
     m_chunks: assume (chunks_i <= 3'd4);
-    m_easy: assume (Easy == 0 || (start_i && in_valid_i && out_ready_i && mover_ready_i && mover_step_i && !again_i));
+    m_easy: assume (Easy == 0 || (start_i && in_valid_i && out_ready_i && mover_ready_i && mover_step_i && !again_i &&
+                                  !in_v_i && in_record_i == count_q[0] && in_end_i == (count_q == 4'd10)));
     if (rst_n) begin
       if (out_list) begin
         a_count: assert (out_data[14:11] >= 4'd1 && out_data[14:11] <= 4'd5);
