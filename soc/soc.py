@@ -63,7 +63,7 @@ class SimSoC(SoCCore):
         self.crg = _Crg(platform)
         super().__init__(
             platform, clk_freq=CLOCK_HZ, cpu_type="vexriscv", cpu_variant="imac", integrated_rom_size=ROM_BYTES, integrated_sram_size=SRAM_BYTES,
-            uart_name="sim", ident="FLICKER in simulation", ident_version=False,
+            uart_name="sim", bus_bursting=True, ident="FLICKER in simulation", ident_version=False,
         )
         add_flicker(self, chip)
         pads = platform.request("mem")

@@ -38,6 +38,6 @@ flk_status_t reset_chip(void); /* the memory is taken away from it meanwhile */
 uint32_t crc(const uint8_t *data, uint32_t size);
 void refused_descriptor(void);
 void provoke(void); /* every error */
-flk_status_t sleep_until(uint32_t mask, uint32_t *slept, uint32_t *when); /* an interrupt of mask; acknowledges all but frame_done */
+flk_status_t sleep_until(uint32_t mask, uint32_t *slept, uint32_t *when); /* an interrupt of mask; acknowledges all but frame_done; adds to *slept */
 
 #endif

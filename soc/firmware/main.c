@@ -4,6 +4,7 @@
 #include <string.h>
 
 enum { SLEEP_LIMIT = 200000000 }; /* cycles of a frame */
+#define ENDS (FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK)
 
 firmware_t g;
 
@@ -288,21 +289,20 @@ static int fits(const flk_frame_t *frame)
   return end <= frame->frame_buffer + g.region_bytes;
 }
 
-static flk_status_t start_frame(const flk_frame_t *frame, const flk_frame_t *other, cost_t *cost, uint32_t *from)
+static flk_status_t start_frame(const flk_frame_t *frame, const flk_frame_t *other, cost_t *cost, uint32_t *from, uint16_t *number)
 {
   const uint32_t begin = cycles();
   flk_status_t status = flk_frame_write(&g.device, frame, other);
   cost->set_up = cycles() - begin;
+  flk_interrupt_enable(&g.device, ENDS);
   *from = cycles();
   if (status == FLK_OK)
-    status = flk_start(&g.device, NULL);
+    status = flk_start(&g.device, number);
   return status;
 }
 
-/* Sleep until an interrupt of the chip. */
 flk_status_t sleep_until(uint32_t mask, uint32_t *slept, uint32_t *when)
 {
-  *slept = 0;
   flk_interrupt_enable(&g.device, mask);
   for (;;) {
     const uint32_t begin = cycles();
@@ -317,16 +317,30 @@ flk_status_t sleep_until(uint32_t mask, uint32_t *slept, uint32_t *when)
       break;
   }
   flk_interrupt_enable(&g.device, 0);
-  return flk_ready(&g.device) == FLK_DEAD ? FLK_DEAD : FLK_OK;
+  return FLK_OK;
+}
+
+/* Sleep until a frame has ended; interrupts of what was before wake and are forgotten. */
+static flk_status_t sleep_until_end(uint16_t number, uint32_t *slept, uint32_t *when)
+{
+  flk_status_t status;
+  *slept = 0;
+  do {
+    status = sleep_until(ENDS, slept, when);
+    if (status == FLK_OK)
+      status = flk_poll(&g.device, number);
+  } while (status == FLK_BUSY);
+  return status;
 }
 
 flk_status_t run_frame(const flk_frame_t *frame, cost_t *cost)
 {
   uint32_t from, when;
-  flk_status_t status = start_frame(frame, NULL, cost, &from);
+  uint16_t number;
+  flk_status_t status = start_frame(frame, NULL, cost, &from, &number);
   if (status != FLK_OK)
     return status;
-  status = sleep_until(FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK, &cost->asleep, &when);
+  status = sleep_until_end(number, &cost->asleep, &when);
   cost->start_to_end = when - from;
   cost->result = flk_result(&g.device);
   return status;
@@ -425,6 +439,7 @@ static void walk(uint32_t frames)
   flk_frame_t frame[2];
   cost_t cost;
   uint32_t slept, when, from, begin = 0;
+  uint16_t number[2];
   if (!ready_for_frames())
     return;
   for (uint32_t n = 0; n <= frames; n++) {
@@ -434,7 +449,7 @@ static void walk(uint32_t frames)
       while (n > 0 && flk_ready(&g.device) == FLK_BUSY) {
       }
       frame[n % 2] = frame_of(&g.camera, n % 2);
-      const flk_status_t status = start_frame(&frame[n % 2], n > 0 ? &frame[(n - 1) % 2] : NULL, &cost, &from);
+      const flk_status_t status = start_frame(&frame[n % 2], n > 0 ? &frame[(n - 1) % 2] : NULL, &cost, &from, &number[n % 2]);
       if (status != FLK_OK) {
         say_status(status);
         return;
@@ -444,7 +459,7 @@ static void walk(uint32_t frames)
       if (n == 0)
         continue;
     }
-    const flk_status_t status = sleep_until(FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK, &slept, &when);
+    const flk_status_t status = sleep_until_end(number[(n - 1) % 2], &slept, &when);
     if (status != FLK_OK) {
       say_status(status);
       return;
@@ -529,11 +544,11 @@ static void memory_loop(void)
   say(" words wrong\n");
 }
 
-/* A descriptor that the chip must refuse: no chunks, which the driver would not write. */
+/* A descriptor that the chip must refuse: a stride of 0, which the driver would not write. */
 void refused_descriptor(void)
 {
-  cost_t cost;
-  uint32_t when;
+  uint32_t slept, when;
+  uint16_t number = 0;
   flk_camera_t camera = g.camera;
   if (!ready_for_frames())
     return;
@@ -541,11 +556,11 @@ void refused_descriptor(void)
   const flk_frame_t frame = frame_of(&camera, 0);
   flk_status_t status = flk_frame_write(&g.device, &frame, NULL);
   if (status == FLK_OK) {
-    bus_write(NULL, FLK_CHUNKS_OFFSET, 0);
-    status = flk_start(&g.device, NULL);
+    bus_write(NULL, FLK_STRIDE_OFFSET, 0);
+    status = flk_start(&g.device, &number);
   }
   if (status == FLK_OK)
-    status = sleep_until(FLK_INTERRUPT_FRAME_DONE_MASK | FLK_INTERRUPT_ERROR_MASK, &cost.asleep, &when);
+    status = sleep_until_end(number, &slept, &when);
   if (status != FLK_OK) {
     say_status(status);
     return;

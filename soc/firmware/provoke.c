@@ -198,7 +198,7 @@ static void results(uint32_t wanted)
 {
   const flk_frame_t good = small_frame(0);
   const uint32_t beyond = MAIN_RAM_BASE + MAIN_RAM_SIZE;
-  uint32_t slept, when;
+  uint32_t slept = 0, when;
   uint16_t number;
   flk_status_t status;
   flk_scene_t scene = g.scene;
@@ -219,9 +219,12 @@ static void results(uint32_t wanted)
   scene.slots = 16;
   f = good;
   f.scene = &scene;
-  f.region.record_bytes = 64;
+  f.region.record_bytes = 256;
   run(&f);
-  f = good;
+  f = small_frame(0);
+  f.camera.width = f.camera.height = 64;
+  f.stride = flk_least_stride(64, f.pixel_format);
+  f.region = frame_of(&f.camera, 0).region;
   f.region.chunks = 1;
   run(&f);
   /* Answers to reads of records, of lists are errors. */
@@ -269,11 +272,16 @@ static void results(uint32_t wanted)
   if (status == FLK_OK)
     status = sleep_until(FLK_INTERRUPT_ABORTED_MASK, &slept, &when);
   say_errors(flk_result(&g.device).error);
+  if (flk_interrupt_pending(&g.device) & FLK_INTERRUPT_FRAME_DONE_MASK)
+    flk_release(&g.device); /* it had ended before */
   again(wanted, "an abort");
 
   flk_set_timeout(&g.device, 4);
   run(&good);
   say_errors(flk_result(&g.device).error);
+  /* A start that is not waited for is ignored, and told. */
+  chip_bus()->write(NULL, FLK_CONTROL_OFFSET, FLK_CONTROL_START_MASK);
+  say(flk_interrupt_pending(&g.device) & FLK_INTERRUPT_REFUSED_MASK ? "FLK_INTERRUPT_REFUSED: a start while the chip was not ready\n" : "WRONG: a start was taken\n");
   flk_set_timeout(&g.device, FLK_TIMEOUT_CYCLES_RESET);
   say_status(reset_chip());
   again(wanted, "a time-out");
