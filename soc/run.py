@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE / "firmware")]
+sys.path.insert(0, str(HERE))
 
-import build as firmware  # noqa: E402
-import scene as scenes  # noqa: E402
+import firmware  # noqa: E402
+import pictures  # noqa: E402
 import simulation  # noqa: E402
 
 from flicker.chip.dram import DramConfig  # noqa: E402
@@ -64,7 +64,7 @@ def check_pictures(soc: simulation.Soc, text: str, golden: list[np.ndarray], fol
         path = folder / (f"{name}.png" if len(told) == 1 else f"{name}-{n + 1}.png")
         save_png(path, got.reshape(height, width, 3) / 255.0)
         # A frame buffer may be another frame's by now: its sum is of when it ended.
-        if int(words[4], 16) != scenes.word_sum(want):
+        if int(words[4], 16) != pictures.word_sum(want):
             raise FlickerError(f"soc: {path}: the firmware's word sum is not that of the golden model's picture")
         last = all(words[2] != other[2] for other in told[n + 1 :])
         if last and not np.array_equal(got, want):
@@ -118,12 +118,12 @@ def run(options: argparse.Namespace) -> None:
     from flicker_litex import CHIPS
 
     config: RenderConfig = CHIPS[options.chip]
-    golden = [scenes.golden_picture(packed, camera, config) for camera in cameras[:3]]
+    golden = [pictures.golden_picture(packed, camera, config) for camera in cameras[:3]]
     image = packed.image()
     prepared = time.time()
     with simulation.Soc(built, rom, timing=DramConfig().timing, echo=lambda text: print(text, end="", flush=True)) as soc:
         soc.write(SCENE_AT, image)
-        soc.write(SCENE_AT + -(-len(image) // scenes.BLOCK) * scenes.BLOCK, scenes.path_block(cameras))
+        soc.write(SCENE_AT + -(-len(image) // pictures.BLOCK) * pictures.BLOCK, pictures.path_block(cameras))
         soc.expect("> ", LIMIT)
         boot = soc.cycles
         soc.send("5")

@@ -21,11 +21,12 @@ except ImportError as error:  # told where a person sees it
     raise ImportError(f"{error.name} is not installed: make soc sets it up") from None
 
 from flicker.errors import FlickerError  # noqa: E402
+from flicker.output import write_text  # noqa: E402
 from flicker.sim import half  # noqa: E402
 from flicker.sim.chip import PORT  # noqa: E402
 from flicker.sim.chip import build as chip_simulator  # noqa: E402
 from flicker.sim.memory import HEADERS, Order, PortConfig, Timing, _Config  # noqa: E402
-from flicker.toolchain import BUILD, sources_of, verilate  # noqa: E402
+from flicker.toolchain import BUILD, locked, sources_of, verilate  # noqa: E402
 
 RAM = 0x4000_0000
 RAM_BYTES = 64 << 20
@@ -46,10 +47,10 @@ def emitted(chip: str) -> Path:
 
 
 def _for_verilator(text: str) -> str:
-    """LiteX' Verilog without the date, and with blocking assignments in its combinational blocks."""
+    """LiteX' Verilog without comments, which hold the date, and with blocking assignments in its combinational blocks."""
     lines, combinational = [], False
-    for line in text.splitlines():
-        if line.startswith("// Date"):
+    for line in text[text.index("`timescale") :].splitlines():
+        if line.startswith("//"):
             continue
         combinational = line.startswith("always @(*)") or (combinational and line != "end")
         lines.append(re.sub(r"^(\s+[\w\[\]:{}, ]+) <= (.*;)$", r"\1 = \2", line) if combinational else line)
@@ -70,11 +71,12 @@ def build(chip: str, shared: bool = False) -> Built:
     flk_top_axi, and the rest of the SoC is built without it: the same cycles, in less time to build and more to run."""
     import pythondata_cpu_vexriscv
 
-    folder = emitted(chip)
     cpu = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_IMAC.v"
-    source, text = folder / "model.v", _for_verilator((folder / "flk_soc.v").read_text())
-    if not source.exists() or source.read_text() != text:
-        source.write_text(text)
+    with locked(BUILD / "soc" / f"{chip}.lock"):
+        folder = emitted(chip)
+        source, text = folder / "model.v", _for_verilator((folder / "flk_soc.v").read_text())
+        if not source.exists() or source.read_text() != text:
+            source.write_text(text)
     if shared:
         sources = [*sources_of("flk_param_pkg"), *sources_of("flk_lane_pkg"), HERE / "flk_top_axi_shim.sv"]
         other, define, settings = chip_simulator(CHIPS[chip]), "-DFLK_SHIM", []
@@ -85,7 +87,7 @@ def build(chip: str, shared: bool = False) -> Built:
         args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--output-groups", half.GROUPS, "--inline-mult", "20000",
               "-Wno-lint", "-Wno-style", "-Wno-TIMESCALEMOD", "-Wno-MULTITOP"],
         cpp=[HERE / "harness.cpp"], depends=HEADERS, settings=settings,
-        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{half.HERE}".replace("  ", " "), opt="-O2", shared=True, kind="soc", name="soc",
+        cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{half.HERE}".replace("  ", " "), opt="-O1", shared=True, kind="soc", name="soc",
     )
     return Built(folder, library, other)
 
@@ -123,7 +125,7 @@ class Soc:
     ) -> None:
         folder = built.folder
         words = np.frombuffer(rom + bytes(-len(rom) % 4), "<u4")
-        (folder / "flk_soc_rom.init").write_text("".join(f"{word:08x}\n" for word in words))
+        write_text(folder / "flk_soc_rom.init", "".join(f"{word:08x}\n" for word in words))
         self._lib, self._echo, self.text, self._chip = _library(built.library), echo, "", None
         configs = (_Config * 2)(PORT.structure(), CPU_PORT.structure())
         options = timing or Timing(*[1] * len(Timing._fields_))

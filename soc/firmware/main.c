@@ -305,8 +305,8 @@ flk_status_t sleep_until(uint32_t mask, uint32_t *slept, uint32_t *when)
 {
   flk_interrupt_enable(&g.device, mask);
   for (;;) {
-    const uint32_t begin = cycles();
-    if (!sleep_until_chip(SLEEP_LIMIT, when)) {
+    uint32_t begin;
+    if (!sleep_until_chip(SLEEP_LIMIT, &begin, when)) {
       flk_interrupt_enable(&g.device, 0);
       return FLK_WAITED;
     }

@@ -64,7 +64,7 @@ void interrupted(void)
   lines(0);
 }
 
-int sleep_until_chip(uint32_t limit, uint32_t *when)
+int sleep_until_chip(uint32_t limit, uint32_t *from, uint32_t *when)
 {
   g_lines = 0;
   if (limit != 0) {
@@ -77,6 +77,7 @@ int sleep_until_chip(uint32_t limit, uint32_t *when)
   }
   interrupts(0);
   lines(CHIP_LINE | (limit != 0 ? TIMER_LINE : 0));
+  *from = cycles();
   while (g_lines == 0) {
     __asm__ volatile("wfi"); /* an interrupt that waits ends it, though interrupts are off: none is missed between the look and the sleep */
     interrupts(1);
@@ -87,7 +88,6 @@ int sleep_until_chip(uint32_t limit, uint32_t *when)
   interrupts(1);
   store(CSR_TIMER0_EN_ADDR, 0);
   store(CSR_TIMER0_EV_ENABLE_ADDR, 0);
-  if (when != 0)
-    *when = g_when;
+  *when = g_when;
   return (g_lines & CHIP_LINE) != 0;
 }

@@ -60,7 +60,7 @@ void say_number(uint32_t value, int width); /* decimal, right in `width` places 
 void say_hex(uint32_t value);               /* eight digits behind 0x */
 int key(void);                              /* waits for one */
 
-/* Sleep until the chip's interrupt, at most `limit` cycles (0: without bound): 1, or 0. *when: cycles() in the handler. */
-int sleep_until_chip(uint32_t limit, uint32_t *when);
+/* Sleep until the chip's interrupt, at most `limit` cycles (0: without bound): 1, or 0. *from: cycles() when it falls asleep; *when: in the handler. */
+int sleep_until_chip(uint32_t limit, uint32_t *from, uint32_t *when);
 
 #endif

@@ -259,7 +259,7 @@ static void results(uint32_t wanted)
   if (status == FLK_OK) {
     say_status(flk_poll(&g.device, number));
     say_status(flk_wait(&g.device, number, 1, NULL, NULL));
-    say_status(sleep_until_chip(2000, NULL) ? FLK_OK : FLK_WAITED);
+    say_status(sleep_until_chip(2000, &slept, &when) ? FLK_OK : FLK_WAITED);
     say_status(flk_wait(&g.device, number, 0, NULL, NULL));
     flk_release(&g.device);
   }

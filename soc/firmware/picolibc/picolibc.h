@@ -1,1 +1,1 @@
-/* Settings of picolibc, of which a few functions are compiled (../build.py): none. */
+/* Settings of picolibc, of which a few functions are compiled (firmware.py): none. */

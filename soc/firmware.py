@@ -1,6 +1,6 @@
-"""Builds the firmware (docs/reference/soc.md): the driver of sw/ as it is, this folder's C, and of picolibc what they call.
+"""Builds the firmware (docs/reference/soc.md): the driver of sw/ as it is, the C of firmware/, and of picolibc what they call.
 
-    python soc/firmware/build.py build/soc/small        # a folder of soc.py, with the SoC's headers
+    python soc/firmware.py build/soc/small        # a folder of soc.py, with the SoC's headers
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
 
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parent / "firmware"
 PREFIX = "riscv64-unknown-elf-"
 ROM_BYTES = 32768
 # -ffp-contract=off: the driver's arithmetic is the golden model's bit for bit. -fno-builtin is not given: the compiler may call memcpy and memset, which are there.
