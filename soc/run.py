@@ -141,7 +141,7 @@ def run(options: argparse.Namespace) -> None:
         }
         (folder / "numbers.json").write_text(json.dumps(numbers, indent=2) + "\n")
         print(f"\n\nsoc: four pictures equal the golden model's, bit for bit: {folder / 'frame.png'}")
-        print(f"soc: boot and first frame {first_cycles:,} cycles in {first:.0f} s; {soc.cycles / seconds:,.0f} cycles a second; prepared in {prepared - began:.0f} s")
+        print(f"soc: boot and first frame {first_cycles:,} cycles in {first:.0f} s; {soc.cycles / seconds:,.0f} cycles a second")
         if options.keys:
             print("soc: keys go to the firmware (? for help), Ctrl-C ends", flush=True)
             terminal(soc)

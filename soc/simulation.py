@@ -30,6 +30,7 @@ from flicker.toolchain import BUILD, locked, sources_of, verilate  # noqa: E402
 
 RAM = 0x4000_0000
 RAM_BYTES = 64 << 20
+REGISTERS = 0xA000_0000
 SLICE = 10_000  # cycles between looks at the terminal
 # Memory that serves the CPU: one access at a time, with the latency of the chip's port.
 CPU_PORT = PortConfig(id_bits=4, max_reads=1, max_writes=1, latency=PORT.latency, hazards=False, order=Order.IN_ORDER, urgent=14)

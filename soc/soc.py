@@ -91,14 +91,18 @@ def emit(soc: SoCCore, folder: Path, name: str = "flk_soc") -> Path:
             soc.platform.get_verilog(soc, name=name).write(f"{name}.v")
         finally:
             os.chdir(here)
-    headers = {
-        "csr.h": export.get_csr_header(soc.csr.regions, soc.constants, soc.csr.csr_base if hasattr(soc.csr, "csr_base") else None, with_access_functions=False),
+    write_headers(soc, folder)
+    return folder / f"{name}.v"
+
+
+def write_headers(soc: SoCCore, folder: Path) -> None:
+    """csr.h, soc.h, mem.h: the addresses that a firmware needs."""
+    for header, text in {
+        "csr.h": export.get_csr_header(soc.csr.regions, soc.constants, soc.mem_regions["csr"].origin, with_access_functions=False),
         "soc.h": export.get_soc_header(soc.constants, with_access_functions=False),
         "mem.h": export.get_mem_header(soc.mem_regions),
-    }
-    for header, text in headers.items():
+    }.items():
         (folder / header).write_text(text)
-    return folder / f"{name}.v"
 
 
 def main() -> None:

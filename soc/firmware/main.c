@@ -198,7 +198,7 @@ static void look_at_box(void)
 /* Bytes of a part that begins and ends within RAM. */
 static int in_ram(uint32_t at, uint64_t size)
 {
-  return at >= MAIN_RAM_BASE && at - MAIN_RAM_BASE <= MAIN_RAM_SIZE && size <= MAIN_RAM_SIZE - (at - MAIN_RAM_BASE);
+  return at >= RAM_BEGIN && at - RAM_BEGIN <= RAM_BYTES && size <= RAM_BYTES - (at - RAM_BEGIN);
 }
 
 /* parts: all checksums are computed, else those of the header and of the cluster table. */
@@ -206,7 +206,7 @@ static flk_status_t open_scene(uint32_t at, int parts)
 {
   const uint8_t *const image = (const uint8_t *)(uintptr_t)at;
   const uint64_t size = (uint64_t)load(at + 28) * 64;
-  const flk_status_t status = flk_scene_open(&g.scene, image, in_ram(at, size) ? (size_t)size : MAIN_RAM_SIZE - (at - MAIN_RAM_BASE), at, parts ? 0 : FLK_NO_PART_CRC);
+  const flk_status_t status = flk_scene_open(&g.scene, image, in_ram(at, size) ? (size_t)size : RAM_BYTES - (at - RAM_BEGIN), at, parts ? 0 : FLK_NO_PART_CRC);
   if (status == FLK_OK && !parts && crc(image + (uint64_t)load(at + 32) * 64, load(at + 36) * 64) != load(at + 40))
     return FLK_IMAGE_TABLE_CRC;
   return status;
@@ -214,12 +214,12 @@ static flk_status_t open_scene(uint32_t at, int parts)
 
 static void find_scene(int parts)
 {
-  uint32_t end = MAIN_RAM_BASE;
+  uint32_t end = RAM_BEGIN;
   flk_status_t status = FLK_IMAGE_MAGIC;
   g.found = 0;
   g.views = 0;
   forget_cache();
-  for (uint32_t at = MAIN_RAM_BASE; at < MAIN_RAM_BASE + MAIN_RAM_SIZE && !(g.found && g.views); at += BLOCK) {
+  for (uint32_t at = RAM_BEGIN; at < RAM_BEGIN + RAM_BYTES && !(g.found && g.views); at += BLOCK) {
     const char *const text = (const char *)(uintptr_t)at;
     if (!g.found && memcmp(text, "FLKSCENE", 8) == 0) {
       status = open_scene(at, parts);
@@ -260,7 +260,7 @@ static void find_scene(int parts)
   else
     look_at_box();
   end = (end + 4095) & ~4095u;
-  g.region_bytes = (MAIN_RAM_BASE + MAIN_RAM_SIZE - end) / 2 & ~4095u;
+  g.region_bytes = (RAM_BEGIN + RAM_BYTES - end) / 2 & ~4095u;
   g.region[0] = end;
   g.region[1] = end + g.region_bytes;
 }
@@ -529,7 +529,7 @@ static void turn(double s)
 /* Words with all addresses and their complements through 64 KB behind the scene. */
 static void memory_loop(void)
 {
-  const uint32_t base = g.found ? g.region[0] : MAIN_RAM_BASE + MAIN_RAM_SIZE - BLOCK;
+  const uint32_t base = g.found ? g.region[0] : RAM_BEGIN + RAM_BYTES - BLOCK;
   const uint32_t size = BLOCK / 8;
   uint32_t wrong = 0;
   for (uint32_t inverse = 0; inverse < 2; inverse++) {

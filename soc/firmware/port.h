@@ -8,6 +8,9 @@
 #include "mem.h"
 #include "soc.h"
 
+#define RAM_BEGIN ((uint32_t)MAIN_RAM_BASE)
+#define RAM_BYTES ((uint32_t)MAIN_RAM_SIZE)
+
 static inline uint32_t load(uint32_t address)
 {
   return *(volatile uint32_t *)(uintptr_t)address;

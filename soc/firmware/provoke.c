@@ -197,7 +197,7 @@ static void again(uint32_t wanted, const char *behind)
 static void results(uint32_t wanted)
 {
   const flk_frame_t good = small_frame(0);
-  const uint32_t beyond = MAIN_RAM_BASE + MAIN_RAM_SIZE;
+  const uint32_t beyond = RAM_BEGIN + RAM_BYTES;
   uint32_t slept = 0, when;
   uint16_t number;
   flk_status_t status;

@@ -2,7 +2,8 @@
 
 Covered: the firmware's commands, every status of the driver and every error of the chip, RAM without a scene, with damaged ones, with none of a path; pictures
 against the golden model; the guide's examples; boards. The default tests put the chip's own simulator, which other tests build too, in the place of the chip
-(`simulation.build(shared=True)`); the slow one simulates what LiteX emits as a whole. Skipped where LiteX (make soc installs it) or the cross compiler is missing.
+(`simulation.build(shared=True)`); the slow one simulates what LiteX emits as a whole. Skipped where LiteX, which make soc installs, or the cross compiler is
+missing.
 """
 
 from __future__ import annotations

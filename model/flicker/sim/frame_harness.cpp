@@ -221,6 +221,13 @@ int flk_half_load(Sim* sim, uint64_t base, uint64_t allocated, const uint8_t* by
   return 1;
 }
 
+// Into a range that is allocated.
+int flk_half_write(Sim* sim, uint64_t base, uint64_t size, const uint8_t* bytes) {
+  uint8_t* at = sim->memory.store.find(base, size);
+  if (at) std::memcpy(at, bytes, size);
+  return at != nullptr;
+}
+
 int flk_half_read(Sim* sim, uint64_t base, uint64_t size, uint8_t* bytes) {
   const uint8_t* at = sim->memory.store.find(base, size);
   if (!at) return 0;
