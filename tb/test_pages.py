@@ -140,7 +140,7 @@ def test_site_is_built(tmp_path: Path) -> None:
 # ---- what pages name exists -------------------------------------------------------------------------
 
 
-FOLDERS = "rtl|model|tb|scripts|sw|docs|formal|lint"
+FOLDERS = "rtl|model|tb|scripts|sw|soc|docs|formal|lint"
 
 
 def missing_paths(text: str) -> list[str]:
