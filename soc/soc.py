@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from flicker_litex import CHIPS, ROOT, add_flicker  # noqa: E402
+from flk_litex import CHIPS, ROOT, add_flicker  # noqa: E402
 from litex.build.generic_platform import Pins, Subsignal  # noqa: E402
 from litex.build.sim import SimPlatform  # noqa: E402
 from litex.soc.integration import export  # noqa: E402

@@ -200,7 +200,7 @@ def missing_modules(text: str) -> list[str]:
 @cache
 def sources() -> str:
     """Everything that may define a name of the hardware, of its benches or of the driver."""
-    folders = (ROOT / "rtl", ROOT / "sw", ROOT / "formal", ROOT / "tb" / "top")
+    folders = (ROOT / "rtl", ROOT / "sw", ROOT / "soc", ROOT / "formal", ROOT / "tb" / "top")
     files = [path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix in (".sv", ".h", ".c", ".rdl")]
     return "\n".join(path.read_text() + path.stem for path in files)
 
