@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from flk_litex import CHIPS, ROOT, add_flicker  # noqa: E402
+from litex_flicker import CHIPS, ROOT, add_flicker  # noqa: E402
 from soc import write_headers  # noqa: E402
 
 # Name: target of litex-boards. All have a DDR4 memory on a LiteDRAM controller.

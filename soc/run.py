@@ -92,7 +92,7 @@ def terminal(soc: simulation.Soc) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--chip", default="small", help="name of the table of flk_litex.py")
+    parser.add_argument("--chip", default="small", help="name of the table of litex_flicker.py")
     parser.add_argument("--scene", default="demo", help="a scene file with cameras, or demo")
     parser.add_argument("--size", default="160x90", help="WxH of the pictures")
     parser.add_argument("--keys", action="store_true", help="then give the terminal to the firmware")
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace) -> None:
     rom = firmware.build(built.folder)
     print(f"soc: firmware of {len(rom)} bytes; the scene, and its pictures by the golden model", flush=True)
     packed, cameras = scene_and_path(options.scene, width, height)
-    from flk_litex import CHIPS
+    from litex_flicker import CHIPS
 
     config: RenderConfig = CHIPS[options.chip]
     golden = [pictures.golden_picture(packed, camera, config) for camera in cameras[:3]]

@@ -16,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 try:
-    from flk_litex import CHIPS
+    from litex_flicker import CHIPS
 except ImportError as error:  # told where a person sees it
     raise ImportError(f"{error.name} is not installed: make soc sets it up") from None
 

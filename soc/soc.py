@@ -15,13 +15,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from flk_litex import CHIPS, ROOT, add_flicker  # noqa: E402
 from litex.build.generic_platform import Pins, Subsignal  # noqa: E402
 from litex.build.sim import SimPlatform  # noqa: E402
 from litex.soc.integration import export  # noqa: E402
 from litex.soc.integration.soc import SoCRegion  # noqa: E402
 from litex.soc.integration.soc_core import SoCCore  # noqa: E402
 from litex.soc.interconnect import wishbone  # noqa: E402
+from litex_flicker import CHIPS, ROOT, add_flicker  # noqa: E402
 from migen import ClockDomain  # noqa: E402
 
 RAM_ORIGIN, RAM_BYTES = 0x4000_0000, 0x0400_0000

@@ -640,12 +640,12 @@ static void command(int c)
     break;
   case 'r':
     address = hex_argument();
-    say_hex(load(address & ~3u));
+    say_hex(load(address));
     say("\n");
     break;
   case 'w':
     address = hex_argument();
-    store(address & ~3u, hex_argument());
+    store(address, hex_argument());
     break;
   case '\r':
   case '\n':

@@ -74,8 +74,8 @@ def test_simulated_chip() -> None:
         assert late.errors == ["ended by its deadline; progress tells what of the picture is written"] and late.pairs < 6
         assert np.array_equal(shown(late.buffer, CAMERA)[0, :3], BLUE)
         assert np.array_equal(shown(device.render(CAMERA, background=BLUE).buffer, CAMERA), golden(CAMERA))
-        with pytest.raises(FlickerError, match="device: FLK_CAMERA_FOCAL: "):
-            device.render(Camera(8, 8, -1.0, 1.0, np.zeros(3), np.eye(3)))
+        with pytest.raises(FlickerError, match="device: FLK_CAMERA_CENTRE: "):
+            device.render(Camera(8, 8, 1.0, 1.0, np.zeros(3), np.eye(3), cx=4e4))
         with pytest.raises(FlickerError, match="scene and frame take .* bytes, the memory has 16,777,216"):
             device.render(Camera(4096, 4096, 80.0, 80.0, np.zeros(3), np.eye(3)))
         image = bytearray(packed().image())
@@ -132,7 +132,8 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """flicker render --device, with a backend of one's own; wrong names are told."""
     save_ply(scene(), tmp_path / "scene.ply")
     (tmp_path / "my_board.py").write_text(
-        "from flicker.device import SimulatedChip\nfrom flicker.params import RenderConfig\n\ndef board():\n    return SimulatedChip(RenderConfig(stage='lanes'))\n"
+        "from flicker.device import SimulatedChip\nfrom flicker.params import RenderConfig\n\n"
+        "def board():\n    return SimulatedChip(RenderConfig(stage='lanes'))\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -1,6 +1,7 @@
 """Other ways to take the chip: the structs of PULP's axi, boards of litex-boards, the guide's example.
 
-Read by slang, which elaborates the chip behind the structs with types as PULP's macros make them. Not covered: Bender, which is not installed here, vendors' tools.
+Read by slang, which elaborates the chip behind the structs with types as PULP's macros make them. Not covered: Bender, which is not installed here, tools of
+vendors.
 """
 
 from __future__ import annotations

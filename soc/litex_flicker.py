@@ -1,6 +1,6 @@
 """FLICKER for LiteX: the chip as a module, and two lines that put it into a SoC (docs/guide/soc.md).
 
-    from flk_litex import add_flicker
+    from litex_flicker import add_flicker
     add_flicker(self, chip="small")                      # in the SoC's __init__, behind its SDRAM
 
 Registers are memory-mapped (1 KB, not cached), the interrupt is one of the CPU's. The chip's memory port, AXI4 of 512 bits, goes to the SoC's LiteDRAM
