@@ -115,3 +115,34 @@ def test_guide_example() -> None:
     soc.finalize()
     assert soc.flicker.chip == "small" and soc.bus.regions["flicker"].origin == 0xA000_0000 and soc.irq.locs["flicker"] is not None
     assert len(soc.flicker.memory.r.data) == 512
+
+
+def test_ip_folder(tmp_path: Path) -> None:
+    """component.xml has every port with its width, two AXI interfaces whose pins are those ports, the registers of the map, and the sources beside it."""
+    pytest.importorskip("peakrdl_ipxact", reason="peakrdl-ipxact is not installed: make soc sets it up")
+    import xml.etree.ElementTree as Xml
+
+    from flicker.chip_registers import REGISTERS
+
+    if str(SOC / "xilinx") not in sys.path:
+        sys.path.insert(0, str(SOC / "xilinx"))
+    import package_ip
+
+    package_ip.package(tmp_path)
+    root = Xml.parse(tmp_path / "component.xml").getroot()
+    name = {"s": package_ip.SPIRIT}
+    ports = {port.findtext("s:name", None, name): port for port in root.iterfind("s:model/s:ports/s:port", name)}
+    declared = re.findall(r"^  (input|output)\s+logic (?:\[.*?\])?\s*(\w+)", (ROOT / "rtl" / "flk_top_axi.sv").read_text(), re.M)
+    assert {pin: kind[:-3] if kind == "output" else "in" for kind, pin in declared} == {
+        pin: port.findtext("s:wire/s:direction", None, name) for pin, port in ports.items()
+    }
+    assert ports["m_axi_rdata"].findtext("s:wire/s:vector/s:left", None, name) == "511"
+    mapped = [place.text for place in root.iterfind("s:busInterfaces/s:busInterface/s:portMaps/s:portMap/s:physicalPort/s:name", name)]
+    assert sorted(mapped) == sorted(set(ports) - {"test_en"})
+    offsets = {
+        register.findtext("s:name", None, name): int(register.findtext("s:addressOffset", "", name), 0)
+        for register in root.iterfind("s:memoryMaps/s:memoryMap/s:addressBlock/s:register", name)
+    }
+    assert {key: at for key, at in offsets.items() if key in REGISTERS} == {key: register.offset for key, register in REGISTERS.items() if key in offsets}
+    assert len(offsets) >= len(REGISTERS)
+    assert all((tmp_path / file.text).is_file() for file in root.iterfind("s:fileSets/s:fileSet/s:file/s:name", name) if file.text)
