@@ -481,7 +481,7 @@ static void walk(uint32_t frames)
 flk_status_t reset_chip(void)
 {
   /* What the memory still owes is waited for, at most so many times. */
-  ;
+  store(CSR_FLICKER_HOLD_ADDR, 1);
   for (int n = 0; n < 100000 && load(CSR_FLICKER_IDLE_ADDR) == 0; n++) {
   }
   flk_reset(&g.device);

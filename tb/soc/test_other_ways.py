@@ -7,6 +7,7 @@ vendors.
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pyslang
 import pytest
 import yaml
 
+from flicker import toolchain
 from flicker.toolchain import ROOT, filelist
 
 SOC = ROOT / "soc"
@@ -146,3 +148,21 @@ def test_ip_folder(tmp_path: Path) -> None:
     assert {key: at for key, at in offsets.items() if key in REGISTERS} == {key: register.offset for key, register in REGISTERS.items() if key in offsets}
     assert len(offsets) >= len(REGISTERS)
     assert all((tmp_path / file.text).is_file() for file in root.iterfind("s:fileSets/s:fileSet/s:file/s:name", name) if file.text)
+
+
+@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["set up", "linted"])
+def test_fusesoc(whole: bool, tmp_path: Path) -> None:
+    """The SoC as a core of FuseSoC: LiteX emits it beside the chip's sources, Verilator reads all of it."""
+    litex()
+    environment = toolchain.environment()
+    environment["PATH"] = f"{Path(sys.executable).parent}:{environment['PATH']}"
+    steps = [] if whole else ["--setup"]
+    done = subprocess.run(
+        [sys.executable, "-m", "fusesoc.main", "--cores-root", ROOT, "run", "--target", "lint", "--work-root", tmp_path / "work", *steps,
+         "flicker_soc"],
+        cwd=tmp_path, env={**environment, "HOME": str(tmp_path)}, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )
+    assert done.returncode == 0 and "%Error" not in done.stdout, done.stdout[-3000:]
+    options = next((tmp_path / "work").glob("*.vc")).read_text()
+    assert "--top-module flk_soc" in options and all(path.name in options for path in filelist())
+    assert all(name in options for name in ("flk_soc.v", "VexRiscv_IMAC.v"))
