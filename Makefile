@@ -40,10 +40,12 @@ FORCE:
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists)
+generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists) and the block diagrams of the pages
+	@$(BIN)/python scripts/gen_counters.py
 	@$(BIN)/python scripts/gen_registers.py
 	@$(BIN)/python scripts/gen_params.py
 	@$(BIN)/python scripts/gen_manifests.py
+	@$(BIN)/python scripts/gen_figures.py
 
 test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
 	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) --dist worksteal tb
