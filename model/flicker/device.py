@@ -80,12 +80,14 @@ class SimulatedChip(Backend):
         self._half.load(self.base, self.size, b"", 0)
 
     def register(self, offset: int, value: int | None = None) -> int:
+        """As of `Backend`."""
         word = ctypes.c_uint32(value or 0)
         if self._half._lib.flk_chip_register(self._half._sim, offset, value is not None, ctypes.byref(word)) != 1:
             raise self._half._failure()
         return word.value
 
     def memory(self, address: int, data: bytes | int) -> bytes:
+        """As of `Backend`; takes no time."""
         if isinstance(data, int):
             return self._half.read(address, data).tobytes()
         if not self._half._lib.flk_half_write(self._half._sim, address, len(data), data):
@@ -93,10 +95,12 @@ class SimulatedChip(Backend):
         return b""
 
     def pause(self) -> None:
+        """A thousand cycles."""
         if self._half._lib.flk_chip_wait(self._half._sim, 1000, 0) < 0:
             raise self._half._failure()
 
     def close(self) -> None:
+        """Ends the simulation."""
         self._half.__exit__()
 
 
@@ -117,6 +121,7 @@ class SimulatedSoc(Backend):
         self._soc.expect("> ")
 
     def register(self, offset: int, value: int | None = None) -> int:
+        """As of `Backend`."""
         if value is None:
             self._soc.send(f"r{self._registers + offset:x}\n")
             return int(self._soc.expect("> ").split()[0], 16)
@@ -125,15 +130,18 @@ class SimulatedSoc(Backend):
         return 0
 
     def memory(self, address: int, data: bytes | int) -> bytes:
+        """As of `Backend`; takes no time."""
         if isinstance(data, int):
             return self._soc.read(address, data).tobytes()
         self._soc.write(address, data)
         return b""
 
     def pause(self) -> None:
+        """A thousand cycles."""
         self._soc.run(1000)
 
     def close(self) -> None:
+        """Ends the simulation."""
         self._soc.__exit__()
 
 
@@ -216,6 +224,7 @@ class Device:
         return {name: getattr(self._device, name) for name in ("minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat")}
 
     def counter(self, index: int) -> int:
+        """A performance counter, by its number (`chip_registers.ChipCounter`)."""
         value = self.driver.flk_counter(ctypes.byref(self._device), ctypes.c_uint32(index))
         self._raise()
         return value
