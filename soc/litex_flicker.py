@@ -12,7 +12,7 @@ from pathlib import Path
 
 from litex.gen import LiteXModule
 from litex.soc.integration.soc import SoCRegion
-from litex.soc.interconnect import axi
+from litex.soc.interconnect import axi, stream
 from litex.soc.interconnect.csr import CSRStatus, CSRStorage
 from migen import Cat, ClockSignal, If, Instance, ResetSignal, Signal
 
@@ -124,8 +124,10 @@ class Flicker(LiteXModule):
             registers = axi.AXILiteInterface(data_width=32, address_width=32, clock_domain=clock_domain)
             memory = axi.AXIInterface(data_width=DATA_BITS, address_width=ADDRESS_BITS, id_width=ID_BITS, clock_domain=clock_domain)
             irq = Signal()
-            self.registers_crossing = axi.AXILiteClockDomainCrossing(self.registers, registers, cd_from="sys", cd_to=clock_domain)
-            self.memory_crossing = axi.AXIClockDomainCrossing(memory, gated, cd_from=clock_domain, cd_to="sys")
+            for name in ("aw", "w", "b", "ar", "r"):
+                back = name in ("b", "r")
+                self._cross(getattr(registers if back else self.registers, name), getattr(self.registers if back else registers, name), back, clock_domain)
+                self._cross(getattr(gated if back else memory, name), getattr(memory if back else gated, name), not back, clock_domain)
             self.specials += MultiReg(irq, self.ev.irq)
 
         ports = {
@@ -136,25 +138,31 @@ class Flicker(LiteXModule):
             ("aw", False, ("addr", "prot")), ("w", False, ("data", "strb")), ("b", True, ("resp",)), ("ar", False, ("addr", "prot")),
             ("r", True, ("data", "resp")),
         ):
-            stream = getattr(registers, channel)
+            endpoint = getattr(registers, channel)
             for name in (*names, "valid"):
                 # LiteX's AXI-Lite has no PROT.
-                value = getattr(stream, name) if name != "prot" else 0
+                value = getattr(endpoint, name) if name != "prot" else 0
                 ports[f"{'o' if out else 'i'}_s_axil_{channel}{name}"] = value[:10] if name == "addr" else value
-            ports[f"{'i' if out else 'o'}_s_axil_{channel}ready"] = stream.ready
+            ports[f"{'i' if out else 'o'}_s_axil_{channel}ready"] = endpoint.ready
         address = ("id", "addr", "len", "size", "burst", "lock", "cache", "prot", "qos", "region", "valid")
         for channel, out, names in (
             ("aw", True, address), ("w", True, ("data", "strb", "last", "valid")), ("b", False, ("id", "resp", "valid")), ("ar", True, address),
             ("r", False, ("id", "data", "resp", "last", "valid")),
         ):
-            stream = getattr(memory, channel)
+            endpoint = getattr(memory, channel)
             for name in names:
-                ports[f"{'o' if out else 'i'}_m_axi_{channel}{name}"] = getattr(stream, name)
-            ports[f"{'i' if out else 'o'}_m_axi_{channel}ready"] = stream.ready
+                ports[f"{'o' if out else 'i'}_m_axi_{channel}{name}"] = getattr(endpoint, name)
+            ports[f"{'i' if out else 'o'}_m_axi_{channel}ready"] = endpoint.ready
         self.specials += Instance("flk_top_axi", **{f"p_{name}": value for name, value in self.parameters.items()}, **ports)
         if platform is not None:
             for path in rtl_sources():
                 platform.add_source(str(path))
+
+    def _cross(self, source, sink, to_sys: bool, clock_domain: str) -> None:
+        """LiteX' crossing of a channel, between the chip's domain and "sys"."""
+        crossing = stream.ClockDomainCrossing(source.description, clock_domain if to_sys else "sys", "sys" if to_sys else clock_domain, depth=8)
+        self.submodules += crossing
+        self.comb += [source.connect(crossing.sink), crossing.source.connect(sink)]
 
 
 def add_flicker(soc, chip: str = "small", name: str = "flicker", origin: int = ORIGIN, clock_domain: str = "sys") -> Flicker:

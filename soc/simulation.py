@@ -37,14 +37,14 @@ CPU_PORT = PortConfig(id_bits=4, max_reads=1, max_writes=1, latency=PORT.latency
 SETTINGS = ("preprocessing", "render_stage", "lanes", "rendering")
 
 
-def emitted(chip: str) -> Path:
+def emitted(chip: str, crossing: bool = False) -> Path:
     """Folder with the SoC's Verilog and headers, made anew."""
     import logging
 
     logging.disable(logging.CRITICAL)
     from soc import SimSoC, emit
 
-    return emit(SimSoC(chip), BUILD / "soc" / chip).parent
+    return emit(SimSoC(chip, crossing), BUILD / "soc" / (f"{chip}-crossing" if crossing else chip)).parent
 
 
 def _for_verilator(text: str) -> str:
@@ -67,14 +67,14 @@ class Built:
     chip: Path | None = None
 
 
-def build(chip: str, shared: bool = False) -> Built:
+def build(chip: str, shared: bool = False, crossing: bool = False) -> Built:
     """A SoC's simulator, cached by content. shared: the chip's own simulator (`flicker.sim.chip.build`), which may be built already, stands for the instance of
-    flk_top_axi, and the rest of the SoC is built without it: the same cycles, in less time to build and more to run."""
+    flk_top_axi, and the rest of the SoC is built without it: the same cycles, in less time to build and more to run. crossing: as of SimSoC."""
     import pythondata_cpu_vexriscv
 
     cpu = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_IMAC.v"
     with locked(BUILD / "soc" / f"{chip}.lock"):
-        folder = emitted(chip)
+        folder = emitted(chip, crossing)
         source, text = folder / "model.v", _for_verilator((folder / "flk_soc.v").read_text())
         if not source.exists() or source.read_text() != text:
             source.write_text(text)

@@ -22,7 +22,7 @@ from litex.soc.integration.soc import SoCRegion  # noqa: E402
 from litex.soc.integration.soc_core import SoCCore  # noqa: E402
 from litex.soc.interconnect import wishbone  # noqa: E402
 from litex_flicker import CHIPS, ROOT, add_flicker  # noqa: E402
-from migen import ClockDomain  # noqa: E402
+from migen import ClockDomain, ClockSignal, ResetSignal  # noqa: E402
 
 RAM_ORIGIN, RAM_BYTES = 0x4000_0000, 0x0400_0000
 ROM_BYTES, SRAM_BYTES = 0x8000, 0x2000
@@ -56,16 +56,19 @@ class _Crg:
 
 
 class SimSoC(SoCCore):
-    """chip: name of CHIPS."""
+    """chip: name of CHIPS. crossing: the chip has a clock domain of its own, with the same clock, behind LiteX' crossings."""
 
-    def __init__(self, chip: str = "small") -> None:
+    def __init__(self, chip: str = "small", crossing: bool = False) -> None:
         platform = SimPlatform("SIM", list(IO), name="flk_soc")
         self.crg = _Crg(platform)
         super().__init__(
             platform, clk_freq=CLOCK_HZ, cpu_type="vexriscv", cpu_variant="imac", integrated_rom_size=ROM_BYTES, integrated_sram_size=SRAM_BYTES,
             uart_name="sim", bus_bursting=True, ident="FLICKER in simulation", ident_version=False,
         )
-        add_flicker(self, chip)
+        if crossing:
+            self.cd_chip = ClockDomain()
+            self.comb += [self.cd_chip.clk.eq(ClockSignal("sys")), self.cd_chip.rst.eq(ResetSignal("sys"))]
+        add_flicker(self, chip, clock_domain="chip" if crossing else "sys")
         pads = platform.request("mem")
         for channel, fields in _AXI.items():
             stream, out = getattr(self.flicker.memory, channel), channel in ("aw", "w", "ar")

@@ -191,6 +191,17 @@ def test_firmware(built: simulation.Built) -> None:
 
 
 @pytest.mark.slow
+def test_clock_domain() -> None:
+    """The chip behind crossings of clock domains: registers, memory and interrupt."""
+    built = simulation.build("lanes", shared=True, crossing=True)
+    with simulation.Soc(built, firmware.build(built.folder), timing=DramConfig().timing, seed=seed()) as soc:
+        soc.write(SCENE_AT, packed().image())
+        soc.write(PATH_AT, pictures.path_block([CAMERA]))
+        soc.expect("> ", LIMIT)
+        assert np.array_equal(picture(soc, command(soc, "f")), golden(CAMERA))
+
+
+@pytest.mark.slow
 def test_whole(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What make soc does, smaller: the SoC as LiteX emits it, in one simulator."""
     import run
