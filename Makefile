@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV   := .venv
 STAMP  := $(VENV)/.installed
+SOC    := $(VENV)/.installed-soc
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
@@ -11,12 +12,14 @@ CONFIG ?=
 NETLIST ?=
 SLOW   ?=
 LIBERTY ?=
+CHIP   ?= small
+KEYS   ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs site clean FORCE
+.PHONY: help setup demo generate test sim lint waves mutants synth formal soc report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -66,6 +69,14 @@ synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG=
 
 formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))
+
+soc: $(SOC) ## a processor boots and renders frames with the chip, simulated: make soc [CHIP=small] [KEYS=1]
+	@$(BIN)/python soc/run.py --chip "$(CHIP)" $(if $(KEYS),--keys)
+
+# LiteX and what comes with it: the lines of the lock file that name the extra.
+$(SOC): $(STAMP) requirements.lock scripts/setup.sh
+	@scripts/setup.sh "$(VENV)" soc
+	@touch $@
 
 report: $(STAMP) ## build/report/index.html: make report [SCENES="a.ply b.sog"]
 	@$(BIN)/flicker report $(SCENES)

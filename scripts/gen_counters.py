@@ -127,7 +127,7 @@ def package(found: dict[str, list[Counter]]) -> str:
         out += [
             f"  }} {half}_counters_t;", "",
             "  // Those that events count; the others are zero.",
-            f"  function automatic {half}_counters_t {half}_events(logic [{half.upper()}_EVENTS-1:0][31:0] totals);",
+            f"  function automatic {half}_counters_t {half}_events(", f"      logic [{half.upper()}_EVENTS-1:0][31:0] totals);",
             f"    {half}_events = '0;",
             *(f"    {half}_events.{c.name} = totals[{half.upper()}_EVENT_{c.name.upper()}];" for c in events),
             "  endfunction",

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Checks the tools that must come with the machine and installs the rest into a virtual
-# environment. Usage: scripts/setup.sh FOLDER, from the root of the repository.
+# environment. Usage: scripts/setup.sh FOLDER [EXTRA], from the root of the repository. With the name
+# of an extra it installs the lines of the lock file that are marked so, into an environment that is there.
 set -euo pipefail
 
 venv=$1
@@ -30,9 +31,17 @@ case $PWD in
   *[[:space:]]*) fail "Verilator cannot build in a path with spaces: $PWD" ;;
 esac
 
+pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off)
+if [[ -n ${2-} ]]; then
+  echo "setup: installing the packages of the extra $2 into $venv"
+  sed -n "s/ *; *extra == \"$2\"\$//p" requirements.lock > "$venv/extra-$2.txt"
+  [[ -s $venv/extra-$2.txt ]] || fail "requirements.lock has no packages of an extra $2"
+  "${pip[@]}" --no-deps -r "$venv/extra-$2.txt" || fail "could not install the packages of the extra $2"
+  exit
+fi
+
 echo "setup: installing into $venv (a few minutes the first time)"
 [[ -x $venv/bin/python ]] || "$python" -m venv "$venv"
-pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off)
 # Scripts of a copied or moved environment name the old place.
 "$venv/bin/python" - "$PWD/$venv" << 'END'
 import pathlib, re, sys

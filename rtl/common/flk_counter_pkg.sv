@@ -104,7 +104,8 @@ package flk_counter_pkg;
   } front_counters_t;
 
   // Those that events count; the others are zero.
-  function automatic front_counters_t front_events(logic [FRONT_EVENTS-1:0][31:0] totals);
+  function automatic front_counters_t front_events(
+      logic [FRONT_EVENTS-1:0][31:0] totals);
     front_events = '0;
     front_events.too_near = totals[FRONT_EVENT_TOO_NEAR];
     front_events.outside = totals[FRONT_EVENT_OUTSIDE];
@@ -171,7 +172,8 @@ package flk_counter_pkg;
   } rendering_counters_t;
 
   // Those that events count; the others are zero.
-  function automatic rendering_counters_t rendering_events(logic [RENDERING_EVENTS-1:0][31:0] totals);
+  function automatic rendering_counters_t rendering_events(
+      logic [RENDERING_EVENTS-1:0][31:0] totals);
     rendering_events = '0;
     rendering_events.list_waits = totals[RENDERING_EVENT_LIST_WAITS];
     rendering_events.sorted_waits = totals[RENDERING_EVENT_SORTED_WAITS];

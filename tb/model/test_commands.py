@@ -50,6 +50,9 @@ OWN = {"nearest": "vanilla", "nearest,flicker": "vanilla,flicker"}  # the reader
 
 # Who runs a command: "run" and "slow" are this file, in the sandbox; else the test that does the same, or why nothing does. The first pattern that fits.
 ACCOUNTS: tuple[tuple[str, str], ...] = (
+    (r"flicker render .*--device .*", "tb/soc/test_device.py::test_command"),
+    (r"\.venv/bin/python soc/.*", "tb/soc/test_other_ways.py::test_boards"),
+    (r"make soc(?: .*)?", "tb/soc/test_soc.py::test_whole"),
     (r"(?:\.venv/bin/)?flicker (?:render|path) .*--engine (?:rtl|chip)\b(?!-).*", "slow"),
     (r"flicker (?:chip .* --.*|cost .* --size .*)", "slow"),
     (r"(?:\.venv/bin/)?flicker render .*", "run"),

@@ -116,6 +116,9 @@ def render(
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
     order: Annotated[SortOrder, typer.Option(help=ORDER_HELP)] = SortOrder.DEPTH,
     chosen: Chosen,
+    device: Annotated[str | None, typer.Option(
+        help="of --engine chip: render with the driver on a device: chip (simulated), soc (a SoC in simulation), or MODULE:NAME, a Python backend of a board",
+    )] = None,
     compare: Annotated[CompareChoice | None, typer.Option(help="report the PSNR against the float64 reference")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture (.png)")] = None,
     depth: Annotated[Path | None, typer.Option(
@@ -131,6 +134,8 @@ def render(
     writable(stats, "--stats")
     if alpha is not None and chosen.whole:
         raise FlickerError(f"--alpha: not with --engine {chosen.engine.value}, whose frame buffer has none; --engine golden has that of the same stage")
+    if device is not None and chosen.engine.value != "chip":
+        raise FlickerError(f"--device: for --engine chip only, not {chosen.engine.value}")
     wanted, behind = parse_size(size), background_of(background)
     check_scene(scene)
     check_there(cameras)
@@ -149,7 +154,12 @@ def render(
     def one(k: int, told: Steps) -> dict:
         """Render and write a view: its statistics."""
         loaded = view_of(source, k, wanted, behind, order=order)
-        result = drawing.render(loaded, compare=compare is not None, alpha=alpha is not None, steps=told)
+        if device is None:
+            result = drawing.render(loaded, compare=compare is not None, alpha=alpha is not None, steps=told)
+        else:
+            from ..device import render_on_device
+
+            result = render_on_device(loaded, device, config=drawing.config, options=drawing.options, compare=compare is not None, steps=told)
         found = result.stats | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
         empty = unseen(loaded, result.image, found.get("visible"))
         return found if empty is None else found | {"unseen": empty, "advice": advice(empty, source.cameras_from, len(source.cameras))}

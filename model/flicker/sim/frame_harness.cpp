@@ -221,6 +221,13 @@ int flk_half_load(Sim* sim, uint64_t base, uint64_t allocated, const uint8_t* by
   return 1;
 }
 
+// Into a range that is allocated.
+int flk_half_write(Sim* sim, uint64_t base, uint64_t size, const uint8_t* bytes) {
+  uint8_t* at = sim->memory.store.find(base, size);
+  if (at) std::memcpy(at, bytes, size);
+  return at != nullptr;
+}
+
 int flk_half_read(Sim* sim, uint64_t base, uint64_t size, uint8_t* bytes) {
   const uint8_t* at = sim->memory.store.find(base, size);
   if (!at) return 0;
@@ -290,6 +297,54 @@ int64_t flk_chip_wait(Sim* sim, uint64_t limit, int interrupt) {
     g_failure = e.what();
     return -1;
   }
+}
+
+// A cycle of the chip between somebody else's pins, not its own memory: inputs as the edge sees them, outputs behind it. Words as in soc/flk_top_axi_shim.sv.
+void flk_chip_pins(Sim* sim, int reset, const uint32_t* in, uint32_t* out) {
+  Vtop& top = *sim->top;
+  auto bits = [&](int word, int low, int count) { return in[word] >> low & ((1u << count) - 1); };
+  top.rst_ni = !reset;
+  top.test_en_i = bits(0, 0, 1);
+  top.ar_ready_i = bits(0, 1, 1);
+  top.w_ready_i = bits(0, 2, 1);
+  top.aw_ready_i = bits(0, 3, 1);
+  top.reg_r_ready_i = bits(0, 4, 1);
+  top.reg_ar_valid_i = bits(0, 5, 1);
+  top.reg_b_ready_i = bits(0, 6, 1);
+  top.reg_w_valid_i = bits(0, 7, 1);
+  top.reg_aw_valid_i = bits(0, 8, 1);
+  top.reg_w_strb_i = bits(0, 9, 4);
+  top.reg_aw_addr_i = bits(1, 0, 10);
+  top.reg_ar_addr_i = bits(1, 10, 10);
+  top.reg_w_data_i = in[2];
+  top.b_id_i = bits(3, 0, 7);
+  top.b_resp_i = bits(3, 7, 2);
+  top.b_valid_i = bits(3, 9, 1);
+  top.r_id_i = bits(3, 10, 7);
+  top.r_resp_i = bits(3, 17, 2);
+  top.r_valid_i = bits(3, 19, 1);
+  top.r_last_i = bits(3, 20, 1);
+  if (top.r_valid_i) std::memcpy(&top.r_data_i[0], in + 4, 64);
+  top.clk_i = 0;
+  top.eval();
+  top.clk_i = 1;
+  top.eval();
+  auto join = [](std::initializer_list<std::pair<uint32_t, int>> fields) {
+    uint32_t word = 0;
+    for (auto [value, count] : fields) word = word << count | value;
+    return word;
+  };
+  std::memset(out, 0, 4 * 29);
+  out[0] = join({{top.irq_o, 1}, {top.reg_aw_ready_o, 1}, {top.reg_w_ready_o, 1}, {top.reg_b_valid_o, 1}, {top.reg_b_resp_o, 2}, {top.reg_ar_ready_o, 1},
+                 {top.reg_r_valid_o, 1}, {top.reg_r_resp_o, 2}, {top.b_ready_o, 1}, {top.r_ready_o, 1}, {top.w_valid_o, 1}, {top.w_last_o, 1}});
+  out[1] = top.reg_r_data_o;
+  const uint64_t aw = top.aw_addr_o, ar = top.ar_addr_o, strb = top.w_strb_o;
+  std::memcpy(out + 2, &aw, 8);
+  out[4] = join({{top.aw_id_o, 7}, {top.aw_len_o, 8}, {top.aw_size_o, 3}, {top.aw_burst_o, 2}, {top.aw_qos_o, 4}, {top.aw_valid_o, 1}});
+  std::memcpy(out + 5, &ar, 8);
+  out[7] = join({{top.ar_id_o, 7}, {top.ar_len_o, 8}, {top.ar_size_o, 3}, {top.ar_burst_o, 2}, {top.ar_qos_o, 4}, {top.ar_valid_o, 1}});
+  std::memcpy(out + 8, &strb, 8);
+  if (top.w_valid_o) std::memcpy(out + 10, &top.w_data_o[0], 64);
 }
 
 // The memory's side of the port is held in reset (1) or no more (0).
