@@ -158,7 +158,7 @@ def _digest(*parts: object) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:16]
 
 
-def _literal(value: str | int) -> str:
+def literal(value: str | int) -> str:
     """A parameter value for the command line; truth values become numbers."""
     return f'"{value}"' if isinstance(value, str) else str(int(value))
 
@@ -204,7 +204,7 @@ def verilate(
     cflags = f"{_CFLAGS} {cflags}".strip()
     options = [
         *args,
-        *(f"-G{key}={_literal(value)}" for key, value in (parameters or {}).items()),
+        *(f"-G{key}={literal(value)}" for key, value in (parameters or {}).items()),
         "-CFLAGS", cflags,
     ]
     if ldflags:
