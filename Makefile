@@ -10,6 +10,7 @@ PART   ?=
 CONFIG ?=
 NETLIST ?=
 SLOW   ?=
+FRESH  ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
@@ -42,8 +43,8 @@ generate: $(STAMP) ## write the generated sources (registers, packages, mask gen
 	@$(BIN)/python scripts/gen_params.py
 	@$(BIN)/python scripts/gen_manifests.py
 
-test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
-	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) --dist worksteal tb
+test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
+	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadgroup --no-loadscope-reorder --cached tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
