@@ -11,13 +11,14 @@ CONFIG ?=
 NETLIST ?=
 SLOW   ?=
 FRESH  ?=
+BASE   ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test sim lint waves mutants synth formal report docs site clean FORCE
+.PHONY: help setup demo generate test check sim lint waves mutants synth formal report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -46,6 +47,9 @@ generate: $(STAMP) ## write the generated sources (registers, packages, mask gen
 test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
 	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadgroup --no-loadscope-reorder --cached tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
+
+check: $(STAMP) ## lint and tests of what an edit changes, two minutes; against another commit: make check BASE=main
+	@$(BIN)/python scripts/check.py --jobs $(JOBS) --base $(or $(BASE),HEAD)
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import csv
 import functools
 import os
 import sys
@@ -94,3 +95,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if _simulates(item.path):
             item.add_marker("sim")
+    items.sort(key=lambda item: -_costs().get(item.nodeid.split("::")[0], 0.0))  # files in the order of what they cost: the last ones to end are short
+
+
+@functools.cache
+def _costs() -> dict[str, float]:
+    """Processor seconds of test files on a fresh build."""
+    with (TB / "costs.csv").open(newline="") as rows:
+        return {row["file"]: float(row["cpu"]) for row in csv.DictReader(rows)}

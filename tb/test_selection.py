@@ -11,9 +11,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import check
 import pytest
 from flicker_tb import inputs, passed
 
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
 
 
@@ -82,6 +84,67 @@ def test_surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert passed.surroundings(False) != empty
 
 
+# ---- make check -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("edited", "about", "above", "further"), [
+    ("rtl/ctu/flk_mmu.sv", {"mmu"}, {"ctu"}, {"frames", "chip_frames"}),
+    ("rtl/sort/flk_delivery.sv", {"delivery"}, {"rendering"}, {"chip_frames"}),
+    ("rtl/common/flk_pkg.sv", set(), {"vru", "channel"}, {"pages"}),
+    ("model/flicker/golden/vru.py", {"golden", "vru"}, {"channel"}, {"commands"}),
+    ("model/flicker/scene/camera.py", {"camera", "camera_files"}, {"perf"}, {"pages"}),
+    ("tb/render/cocotb_vru.py", {"vru"}, set(), {"pages"}),
+    ("tb/model/test_camera.py", {"camera"}, set(), {"pages"}),
+    ("docs/glossary.md", {"pages"}, set(), {"docs"}),
+    ("model/flicker/cost/areas.csv", set(), set(), {"docs", "chip"}),
+])
+def test_plan(edited: str, about: set[str], above: set[str], further: set[str]) -> None:
+    """Test files by how near they are to a changed file."""
+    plan = check.plan([edited])
+    for expected, found in zip((about, above, further), plan.tests):
+        assert expected <= {path.stem.removeprefix("test_") for path in found}, found
+    assert {path for group in plan.tests for path in group} == {path for path in inputs.test_files() if ROOT / edited in inputs.inputs(path)}
+    assert (plan.python, plan.modules, plan.pages) == (
+        [edited] if edited.endswith(".py") else [], [Path(edited).stem] if edited.endswith(".sv") else [], edited.endswith(".md"))
+
+
+def test_as_many_as_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In their order; one that is too long leaves the time to shorter ones behind it."""
+    tests = [ROOT / "tb" / f"test_{k}.py" for k in range(5)]
+    monkeypatch.setattr(check, "costs", lambda: {f"tb/test_{k}.py": seconds for k, seconds in enumerate((30, 200, 60, 120))})
+    assert check.fitting(tests, 100, 2) == [tests[0], tests[2], tests[4]]
+    assert check.fitting(tests, 105, 2) == [tests[0], tests[2], tests[3]]
+    assert check.fitting(tests, 400, 2) == tests
+
+
+def test_every_test_file_has_a_cost() -> None:
+    """The order of a run and `make check` go by tb/costs.csv."""
+    assert set(check.costs()) == {path.relative_to(ROOT).as_posix() for path in inputs.test_files()}
+
+
+def test_what_changed(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Edited and new files, against any commit; files that git ignores are none."""
+    monkeypatch.setattr(check, "ROOT", checkout)
+
+    def git(*words: str) -> None:
+        subprocess.run(["git", "-c", "user.name=x", "-c", "user.email=x@x", *words], cwd=checkout, check=True, capture_output=True)
+
+    git("init", "-q")
+    (checkout / ".gitignore").write_text("build/\n*.log\n")
+    git("add", "-A")
+    git("commit", "-qm", "one")
+    assert check.changed("HEAD") == []
+    (checkout / "CHANGELOG.md").write_text("x")
+    (checkout / "new.py").write_text("x")
+    (checkout / "x.log").write_text("x")
+    assert check.changed("HEAD") == ["CHANGELOG.md", "new.py"]
+    git("add", "-A")
+    git("commit", "-qm", "two")
+    assert check.changed("HEAD") == [] and check.changed("HEAD~1") == ["CHANGELOG.md", "new.py"]
+    with pytest.raises(FlickerError, match="BASE=nothing: "):
+        check.changed("nothing")
+
+
 # ---- a run in a checkout of its own -------------------------------------------------------------
 
 TESTS = {
@@ -90,6 +153,7 @@ import json, subprocess, sys
 from pathlib import Path
 import pytest
 from reads_data import value
+from flicker.errors import FlickerError
 from flicker.toolchain import ROOT, filelist
 NAME = "glossary"
 

@@ -63,7 +63,7 @@ def tree() -> frozenset[Path]:
 
 
 @functools.cache
-def _rtl() -> dict[str, Path]:
+def rtl() -> dict[str, Path]:
     return {path.stem: path for path in toolchain.filelist()}
 
 
@@ -248,25 +248,27 @@ def _sources(module: str) -> frozenset[Path]:
     return frozenset(toolchain.sources_of(module))
 
 
-def _words(path: Path, text: Text | None) -> frozenset[str]:
-    return text.words if text is not None else frozenset(re.findall(r"[\w.]+", re.sub(r"//.*", "", path.read_text())))
+@functools.cache
+def words(path: Path) -> frozenset[str]:
+    """Words of a file that may name another one: of Python those in its strings, of others all but comments."""
+    return text_of(path).words if path.suffix == ".py" else frozenset(re.findall(r"[\w.]+", re.sub(r"//.*", "", path.read_text())))
 
 
 def _used(path: Path) -> Iterator[Path]:
     """Files that a file of the tree uses itself."""
     text = text_of(path) if path.suffix == ".py" else None
-    words = _words(path, text)
+    said = words(path)
     if text is not None:
         yield from imports(path)
         for at in text.paths:
             yield from below(at)
         for prefix in text.prefixes if not _inside(path, MODEL) else ():
-            yield from (source for name, source in _rtl().items() if name.startswith(prefix))
+            yield from (source for name, source in rtl().items() if name.startswith(prefix))
         if text.beside:
             yield from (other for other in below(path.parent.relative_to(ROOT).as_posix()) if other.suffix != ".py" and path.parent == other.parent)
     if _inside(path, TB) and path not in SERVANTS:
-        yield from (other for word in words & _beside(path.parent).keys() for other in _beside(path.parent)[word])
-    if (named := words & _rtl().keys()) and (not _inside(path, MODEL) or any(_inside(path, folder) for folder in BUILDERS)):
+        yield from (other for word in said & _beside(path.parent).keys() for other in _beside(path.parent)[word])
+    if (named := said & rtl().keys()) and (not _inside(path, MODEL) or any(_inside(path, folder) for folder in BUILDERS)):
         yield toolchain.FILELIST
         for name in named:
             yield from _sources(name)
