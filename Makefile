@@ -12,13 +12,14 @@ NETLIST ?=
 SLOW   ?=
 FRESH  ?=
 BASE   ?=
+REASON ?=
 LIBERTY ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test check sim lint waves mutants synth formal report docs site clean FORCE
+.PHONY: help setup demo generate test check record sim lint waves mutants synth formal report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -50,6 +51,11 @@ test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that
 
 check: $(STAMP) ## lint and tests of what an edit changes, two minutes; against another commit: make check BASE=main
 	@$(BIN)/python scripts/check.py --jobs $(JOBS) --base $(or $(BASE),HEAD)
+
+record: $(STAMP) ## figures that a change has moved, with the reason: make record REASON="sorts in half the time"
+	@$(if $(strip $(REASON)),,echo 'record: say why figures move: make record REASON="..."'; exit 2;) \
+	  FLICKER_SEED=1 FLICKER_RECORD="$(REASON)" $(BIN)/python -m pytest -q -n $(JOBS) tb/model/test_figures.py tb/frames/test_chip_frames.py \
+	  -k "figures or what_holds_a_frame_up" && git diff --stat -- tb/figures.csv
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb
