@@ -26,7 +26,7 @@ ROOT = toolchain.ROOT
 TB = ROOT / "tb"
 RTL = ROOT / "rtl"
 # They work for whoever calls them: what they read, callers name. Their own text is still an input.
-SERVANTS = {ROOT / "model/flicker/toolchain.py", *(TB / "flicker_tb" / f"{name}.py" for name in (
+SERVANTS = {ROOT / "model/flicker/toolchain.py", ROOT / "model/flicker/kernels.py", *(TB / "flicker_tb" / f"{name}.py" for name in (
     "inputs", "passed", "durations", "progress", "runner", "elaboration", "four_state", "bench", "signal_view"))}
 MODEL = ROOT / "model"
 BUILDERS = tuple(MODEL / "flicker" / name for name in ("sim", "cost"))  # packages that build RTL; others of the model only speak of it
