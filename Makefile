@@ -46,7 +46,7 @@ generate: $(STAMP) ## write the generated sources (registers, packages, mask gen
 	@$(BIN)/python scripts/gen_manifests.py
 
 test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
-	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadgroup --no-loadscope-reorder --cached tb
+	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cached tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 
 check: $(STAMP) ## lint and tests of what an edit changes, two minutes; against another commit: make check BASE=main
