@@ -40,10 +40,12 @@ FORCE:
 demo: $(STAMP) ## make the demo scene and render it through the RTL
 	@$(BIN)/flicker demo
 
-generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists)
+generate: $(STAMP) ## write the generated sources (registers, packages, mask generators, file lists) and the block diagrams of the pages
+	@$(BIN)/python scripts/gen_counters.py
 	@$(BIN)/python scripts/gen_registers.py
 	@$(BIN)/python scripts/gen_params.py
 	@$(BIN)/python scripts/gen_manifests.py
+	@$(BIN)/python scripts/gen_figures.py
 
 test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
 	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cached tb
@@ -54,8 +56,8 @@ check: $(STAMP) ## lint and tests of what an edit changes, two minutes; against 
 
 record: $(STAMP) ## figures that a change has moved, with the reason: make record REASON="sorts in half the time"
 	@$(if $(strip $(REASON)),,echo 'record: say why figures move: make record REASON="..."'; exit 2;) \
-	  FLICKER_SEED=1 FLICKER_RECORD="$(REASON)" $(BIN)/python -m pytest -q -n $(JOBS) tb/model/test_figures.py tb/frames/test_chip_frames.py \
-	  -k "figures or what_holds_a_frame_up" && git diff --stat -- tb/figures.csv
+	  FLICKER_SEED=1 FLICKER_RECORD="$(REASON)" $(BIN)/python -m pytest -q -n $(JOBS) tb/model/test_gates.py tb/frames/test_chip_frames.py \
+	  -k "test_gates or what_holds_a_frame_up" && git diff --stat -- tb/figures.csv
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb

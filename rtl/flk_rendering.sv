@@ -16,6 +16,7 @@
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
 module flk_rendering
   import flk_pkg::*;
+  import flk_counter_pkg::*;
   import flk_param_pkg::*;
   import flk_rendering_pkg::*;
 #(
@@ -660,12 +661,10 @@ module flk_rendering
 
   // ---- counters -------------------------------------------------------------------------------------
 
-  localparam int unsigned Waits = 9;
-
-  logic [31:0]            cycles_q;
-  logic [Waits-1:0][3:0]  waits;    // by sorting unit or core
-  logic [Waits-1:0][31:0] waited;
-  logic [CORES-1:0]       first_valid;
+  logic [31:0]                       cycles_q;
+  logic [RENDERING_EVENTS-1:0][3:0]  waits;    // by sorting unit or core
+  logic [RENDERING_EVENTS-1:0][31:0] waited;
+  logic [CORES-1:0]                  first_valid;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_first
     assign first_valid[k] = record_valid[k][0];
@@ -681,18 +680,18 @@ module flk_rendering
     end
   end
 
-  assign waits[0] = list_valid & ~list_ready;
-  assign waits[1] = sorted_valid & ~sorted_ready;
-  assign waits[2] = 4'(delivery_waits[0] && running_q);
-  assign waits[3] = 4'(delivery_waits[1]);
-  assign waits[4] = 4'(delivery_waits[2]);
-  assign waits[5] = 4'(delivery_waits[3]);
-  assign waits[6] = first_valid & ~record_ready;
-  assign waits[7] = has & ~open;
-  assign waits[8] = 4'(line_valid && !line_ready);
+  assign waits[RENDERING_EVENT_LIST_WAITS]    = list_valid & ~list_ready;
+  assign waits[RENDERING_EVENT_SORTED_WAITS]  = sorted_valid & ~sorted_ready;
+  assign waits[RENDERING_EVENT_ENTRY_MISSING] = 4'(delivery_waits[0] && running_q);
+  assign waits[RENDERING_EVENT_ENTRY_WAITS]   = 4'(delivery_waits[1]);
+  assign waits[RENDERING_EVENT_QUEUE_WAITS]   = 4'(delivery_waits[2]);
+  assign waits[RENDERING_EVENT_CACHE_WAITS]   = 4'(delivery_waits[3]);
+  assign waits[RENDERING_EVENT_RECORD_WAITS]  = first_valid & ~record_ready;
+  assign waits[RENDERING_EVENT_PAIR_WAITS]    = has & ~open;
+  assign waits[RENDERING_EVENT_FRAME_WAITS]   = 4'(line_valid && !line_ready);
 
   flk_event_counters #(
-    .Counters(Waits),
+    .Counters(RENDERING_EVENTS),
     .Sources (4)
   ) i_waits (
     .clk_i,
@@ -712,21 +711,14 @@ module flk_rendering
     end
   end
 
-  assign counters_o.cycles   = cycles_q;
-  assign counters_o.entries  = entries;
-  assign counters_o.readings = readings;
-  assign counters_o.dropped  = dropped;
-  assign counters_o.lines    = cache_lines;
-
-  assign counters_o.list_waits    = waited[0];
-  assign counters_o.sorted_waits  = waited[1];
-  assign counters_o.entry_missing = waited[2];
-  assign counters_o.entry_waits   = waited[3];
-  assign counters_o.queue_waits   = waited[4];
-  assign counters_o.cache_waits   = waited[5];
-  assign counters_o.record_waits  = waited[6];
-  assign counters_o.pair_waits    = waited[7];
-  assign counters_o.frame_waits   = waited[8];
+  always_comb begin
+    counters_o          = rendering_events(waited);
+    counters_o.cycles   = cycles_q;
+    counters_o.entries  = entries;
+    counters_o.readings = readings;
+    counters_o.dropped  = dropped;
+    counters_o.lines    = cache_lines;
+  end
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

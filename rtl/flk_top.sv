@@ -14,6 +14,7 @@
 // irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone; w_ready_i and b_* reach
 // the writers combinationally.
 module flk_top
+  import flk_counter_pkg::*;
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;
   import flk_rendering_pkg::*;
@@ -681,29 +682,8 @@ module flk_top
   logic [31:0]                      kept_value, live_value_q;
   logic                             live_q_chosen, kept_chosen, posted_q;
 
-  // Words of a frame: the first field of the counters' structures first.
-  assign front_words = {
-    front_counters.beat_waits, front_counters.line_waits, front_counters.merged_waits,
-    front_counters.entry_waits, front_counters.record_waits, front_counters.colour_waits,
-    front_counters.request_waits, front_counters.place_waits, front_counters.lane_waits,
-    front_counters.group_missing, front_counters.cluster_waits,
-    front_counters.fetched, front_counters.spilled,
-    64'b0,  // 30 and 31 have no counter
-    32'(front_counters.taken[3]), 32'(front_counters.taken[2]),
-    32'(front_counters.taken[1]), 32'(front_counters.taken[0]),
-    front_counters.evicted, front_counters.lines, front_counters.entries,
-    front_counters.record_beats, front_counters.colour_beats, front_counters.geometry_beats,
-    front_counters.header_beats, front_counters.clipped, front_counters.saturated,
-    front_counters.unlisted, front_counters.faint, front_counters.survivors,
-    front_counters.outside, front_counters.too_near, front_counters.culled_gaussians,
-    front_counters.culled_clusters, front_counters.cycles};
-  assign rendering_words = {
-    rendering_counters.frame_waits, rendering_counters.pair_waits, rendering_counters.record_waits,
-    rendering_counters.cache_waits, rendering_counters.queue_waits, rendering_counters.entry_waits,
-    rendering_counters.entry_missing, rendering_counters.sorted_waits,
-    rendering_counters.list_waits,
-    stamps, rendering_counters.lines, rendering_counters.dropped, rendering_counters.readings,
-    rendering_counters.entries, rendering_counters.cycles};
+  assign front_words     = front_counter_words(front_counters);
+  assign rendering_words = rendering_counter_words(rendering_counters, stamps);
 
   flk_frame_counters i_counters (
     .clk_i,

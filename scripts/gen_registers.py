@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write what follows from rtl/regs/flk_registers.rdl (`make generate`); `--check` only compares.
+"""Write what follows from rtl/regs/flk_registers.rdl and flk_counters.rdl, which it includes (`make generate`); `--check` only compares.
 
 rtl/regs/flk_registers.sv, flk_registers_pkg.sv   by PeakRDL-regblock, as AXI4-Lite subordinate with flat pins
 sw/flk_registers.h                                offsets, masks, reset values, numbers of bits, counters and modes for the driver

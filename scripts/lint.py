@@ -104,8 +104,10 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
 CHECKS: list[list[object]] = [
     [sys.executable, "-m", "mypy"],
     [sys.executable, "scripts/gen_registers.py", "--check"],
+    [sys.executable, "scripts/gen_counters.py", "--check"],
     [sys.executable, "scripts/gen_params.py", "--check"],
     [sys.executable, "scripts/gen_manifests.py", "--check"],
+    [sys.executable, "scripts/gen_figures.py", "--check"],
     [sys.executable, "scripts/mutants.py", "--check"],
     [sys.executable, "scripts/check_pages.py"],
     [Path(sys.executable).parent / "lint-imports"],

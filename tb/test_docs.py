@@ -6,12 +6,15 @@ Not covered: whether tables that take minutes (pictures, cycles, chip, stability
 from __future__ import annotations
 
 import re
+from enum import Enum
 from pathlib import Path
+from typing import Annotated
 
 import docs
 import pages
 import pytest
-from doc_parts import areas, frames
+import typer
+from doc_parts import areas, commands, frames, proofs
 
 from flicker.cost import stamp
 from flicker.cost.area import TABLE, parts
@@ -42,7 +45,7 @@ def test_every_mark_belongs_to_a_part_and_the_reverse() -> None:
 def test_no_place_is_empty_and_no_end_is_left_over() -> None:
     for place in pages.places():
         text = pages.get(place)
-        assert "|" in text or "```" in text, f"{pages.mark(place)} holds no table: make docs PART={place[0]}"
+        assert "|" in text or "```" in text or text.startswith("**`fl"), f"{pages.mark(place)} holds no table: make docs PART={place[0]}"
     for page in pages.all_pages():
         text = page.read_text()
         assert len(pages.END_LINE.findall(text)) == len(pages.MARK.findall(text)), page
@@ -228,3 +231,40 @@ def test_summary_says_what_is_assumed() -> None:
     assert "closed form" in gscore and "no RTL" in lanes and "host" in lanes and "early exit" in lanes and "%" in lanes
     row = {"cycles": 1_799_954, "psnr_db": 42.36, "energy_uj": 903.4}
     assert frames.figures(row) == "1.80 / 42.4 / 900"
+
+
+class Size(str, Enum):
+    SMALL = "small"
+    LARGE = "large"
+
+
+def test_tables_of_options() -> None:
+    """Choices, words for types, defaults, pages; options of another command are named together; one without help is an error."""
+    app = typer.Typer(add_completion=False)
+
+    @app.command()
+    def one(
+        scene: Path, size: Annotated[Size, typer.Option(help="a|b (docs/reference/cli.md)")] = Size.SMALL,
+        out: Annotated[Path | None, typer.Option("--out", "-o", help="a file [default: none]")] = None,
+        steps: Annotated[int, typer.Option(help="how many")] = 1500, fast: Annotated[bool, typer.Option("--fast", help="hurry")] = False,
+    ) -> None:
+        pass
+
+    command = typer.main.get_command(app)
+    with pytest.raises(FlickerError, match="scene has no help"):
+        commands.table(command, set())
+    command.params[0].help = "a scene"
+    assert commands.table(command, {("--fast", "hurry")}).splitlines()[2:] == [
+        "| `SCENE` | a scene |", r"| `--size small\|large` | a\|b ([cli.md](cli.md)) (default: small) |", "| `--out FILE`, `-o` | a file (default: none) |",
+        "| `--steps N` | how many (default: 1,500) |", "| `--fast` | as of [`flicker render`](cli.md#flicker-render) |",
+    ]
+
+
+def test_what_a_proof_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(proofs, "FORMAL", tmp_path)
+    (tmp_path / "fv_a.sv").write_text("// One [a]\n//\n// two. The assertions l_* link.\nmodule fv_a;\n")
+    (tmp_path / "fv_b.sv").write_text("module fv_b;\n")
+    assert proofs.said("fv_a") == r"One \[a] two."
+    with pytest.raises(FlickerError, match="fv_b.sv: begins with no comment"):
+        proofs.said("fv_b")
+    assert proofs.sets([{"A": 1}, {"A": 2, "B": 0}, {"A": 1}]) == "`A` 1, 2; `B` 0" and proofs.sets([]) == "defaults"

@@ -16,44 +16,55 @@ from .errors import FlickerError
 
 
 class Form(IntEnum):
-    """How the Gaussian weight E is written (docs/reference/number_formats.md)."""
+    """How the Gaussian weight E is written, CONIC or FACTORED (docs/reference/number_formats.md)."""
 
     CONIC = 0
     FACTORED = 1
 
 
 class Precision(IntEnum):
-    """Number formats of the contribution test (paper, Fig. 7c)."""
+    """Number formats of the contribution test (paper, Fig. 7c).
+
+    FP16. MIXED: FP16 differences, E4M3 from there on. FP8: coordinates, too, are E4M3. FIXED: fixed-point differences, E4M3 from there on.
+    """
 
     FP16 = 0
-    MIXED = 1  # FP16 differences, E4M3 from there on
-    FP8 = 2  # coordinates, too, are E4M3
-    FIXED = 3  # fixed-point differences, E4M3 from there on
+    MIXED = 1
+    FP8 = 2
+    FIXED = 3
 
 
 class CatMode(IntEnum):
-    """Leader pixels of the contribution-aware test (paper, Sec. III-A)."""
+    """Leader pixels of the contribution-aware test (paper, Sec. III-A).
 
-    OFF = 0  # every splat goes to all four mini-tiles
-    DENSE = 1  # Uniform-Dense: 4 corners of each mini-tile
-    SPARSE = 2  # Uniform-Sparse: 2 diagonal corners
-    SMOOTH = 3  # Smooth-Focused: dense for smooth splats, sparse for spiky ones
-    SPIKY = 4  # Spiky-Focused: the opposite
-    AUTO = 5  # Smooth-Focused, falls to Uniform-Sparse where the CTU is the bottleneck
+    OFF: every splat goes to all four mini-tiles. DENSE: Uniform-Dense, 4 corners of each mini-tile. SPARSE: Uniform-Sparse, 2 diagonal corners. SMOOTH:
+    Smooth-Focused, dense for smooth splats, sparse for spiky ones. SPIKY: Spiky-Focused, the opposite. AUTO: Smooth-Focused, falls to Uniform-Sparse where the
+    CTU is the bottleneck.
+    """
+
+    OFF = 0
+    DENSE = 1
+    SPARSE = 2
+    SMOOTH = 3
+    SPIKY = 4
+    AUTO = 5
 
 
 class Coords(IntEnum):
-    """Where the projected mean is rounded to FP16."""
+    """Where the projected mean is rounded to FP16. LOCAL: relative to the sub-tile. ABSOLUTE: in screen coordinates, made local by an FP16 subtraction."""
 
-    LOCAL = 0  # relative to the sub-tile
-    ABSOLUTE = 1  # screen coordinates in FP16, made local by an FP16 subtraction
+    LOCAL = 0
+    ABSOLUTE = 1
 
 
 class SortOrder(str, Enum):
-    """What splats are sorted by, near to far (docs/decisions/061-order-of-depth.md)."""
+    """What splats are sorted by, near to far (docs/decisions/032-depth-keys.md).
 
-    DEPTH = "depth"  # along the camera's axis
-    DISTANCE = "distance"  # to the camera: stays while it turns on the spot
+    DEPTH: along the camera's axis. DISTANCE: to the camera; stays while it turns on the spot.
+    """
+
+    DEPTH = "depth"
+    DISTANCE = "distance"
 
 
 TILE = 16
@@ -306,6 +317,7 @@ class RenderConfig:
 
     @property
     def chip_memories(self) -> ChipMemories:
+        """Sizes of the chip's memories that `memories` names."""
         return CHIP_MEMORIES[self.memories]
 
     def with_(self, **changes) -> RenderConfig:

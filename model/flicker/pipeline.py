@@ -37,13 +37,17 @@ from .sim.render_stage import RtlFrame, build, render_rtl
 
 
 class Engine(str, Enum):
-    """What renders the picture."""
+    """What renders the picture.
 
-    REFERENCE = "reference"  # float64, vanilla rules
-    GOLDEN = "golden"  # bit-true model
-    RTL = "rtl"  # verilated rendering stage
-    CHIP_GOLDEN = "chip-golden"  # bit-true model of the whole chip
-    CHIP = "chip"  # verilated chip, from a packed scene in memory to a frame buffer in memory
+    REFERENCE: float64, vanilla rules. GOLDEN: bit-true model. RTL: verilated rendering stage. CHIP_GOLDEN: bit-true model of the whole chip. CHIP: verilated
+    chip, from a packed scene in memory to a frame buffer in memory.
+    """
+
+    REFERENCE = "reference"
+    GOLDEN = "golden"
+    RTL = "rtl"
+    CHIP_GOLDEN = "chip-golden"
+    CHIP = "chip"
 
     @property
     def whole(self) -> bool:
@@ -52,11 +56,11 @@ class Engine(str, Enum):
 
 
 class Front(str, Enum):
-    """What makes records and lists of a scene."""
+    """What makes records and lists of a scene. FLOAT: float64 on the host. GOLDEN: bit-true model of the front end. RTL: verilated front end."""
 
-    FLOAT = "float"  # float64 on the host
-    GOLDEN = "golden"  # bit-true model of the front end
-    RTL = "rtl"  # verilated front end
+    FLOAT = "float"
+    GOLDEN = "golden"
+    RTL = "rtl"
 
 
 @dataclass(frozen=True)

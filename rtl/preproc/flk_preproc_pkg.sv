@@ -174,39 +174,4 @@ package flk_preproc_pkg;
   localparam int unsigned FRONT_ERROR_HEADER = 5;   // or of a cluster's header
   localparam int unsigned FRONT_ERRORS = 6;
 
-  typedef struct packed {
-    logic [31:0]       cycles;
-    logic [31:0]       culled_clusters;
-    logic [31:0]       culled_gaussians;
-    logic [31:0]       too_near;        // Gaussians
-    logic [31:0]       outside;
-    logic [31:0]       survivors;
-    logic [31:0]       faint;           // of the survivors
-    logic [31:0]       unlisted;
-    logic [31:0]       saturated;
-    logic [31:0]       clipped;
-    logic [31:0]       header_beats;
-    logic [31:0]       geometry_beats;
-    logic [31:0]       colour_beats;
-    logic [31:0]       record_beats;
-    logic [3:0][31:0]  entries;         // by list writer
-    logic [3:0][31:0]  lines;
-    logic [3:0][31:0]  evicted;
-    logic [3:0][24:0]  taken;           // chunks
-    logic [31:0]       spilled;         // lines of pointers, by all list writers
-    logic [31:0]       fetched;
-    // Cycles in which something waits, added up over lanes and list writers.
-    logic [31:0]       cluster_waits;   // a cluster for the fetch of geometry
-    logic [31:0]       group_missing;   // the projection for a group
-    logic [31:0]       lane_waits;      // a projected group for the lanes
-    logic [31:0]       place_waits;     // for places of records
-    logic [31:0]       request_waits;   // for the fetch of colours
-    logic [31:0]       colour_waits;    // colours for a lane
-    logic [31:0]       record_waits;    // a record for its queue
-    logic [31:0]       entry_waits;     // an entry for the merge
-    logic [31:0]       merged_waits;    // for a list writer
-    logic [31:0]       line_waits;      // a line of a list for its write
-    logic [31:0]       beat_waits;      // a line of records for its write
-  } front_counters_t;
-
 endpackage

@@ -11,6 +11,7 @@
 // Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
 // registers is at most Lists / 16.
 module flk_preprocessing
+  import flk_counter_pkg::*;
   import flk_param_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
@@ -205,6 +206,7 @@ module flk_preprocessing
   logic              group_valid, group_ready, group_end;
   group_t            group;
   logic              cull_error, geometry_error, colour_error, cull_damaged, geometry_damaged;
+  logic [31:0]       culled_clusters, culled_gaussians, header_beats, geometry_beats, colour_beats;
   logic              unused_cull_done, unused_geometry_done;
 
   flk_cluster_cull #(
@@ -220,8 +222,8 @@ module flk_preprocessing
     .done_o            (unused_cull_done),
     .error_o           (cull_error),
     .damaged_o         (cull_damaged),
-    .culled_clusters_o (counters_o.culled_clusters),
-    .culled_gaussians_o(counters_o.culled_gaussians),
+    .culled_clusters_o (culled_clusters),
+    .culled_gaussians_o(culled_gaussians),
     .out_valid_o       (kept_valid),
     .out_ready_i       (kept_ready),
     .out_end_o         (kept_end),
@@ -255,8 +257,8 @@ module flk_preprocessing
     .done_o          (unused_geometry_done),
     .error_o         (geometry_error),
     .damaged_o       (geometry_damaged),
-    .header_beats_o  (counters_o.header_beats),
-    .geometry_beats_o(counters_o.geometry_beats),
+    .header_beats_o  (header_beats),
+    .geometry_beats_o(geometry_beats),
     .in_valid_i      (kept_valid),
     .in_ready_o      (kept_ready),
     .in_end_i        (kept_end),
@@ -577,7 +579,7 @@ module flk_preprocessing
     .chunked_i  (registers_i.lane.chunked),
     .colours_i  (registers_i.colours_beat),
     .error_o    (colour_error),
-    .beats_o    (counters_o.colour_beats),
+    .beats_o    (colour_beats),
     .in_valid_i (exit_valid && (&lane_ready) && record_room),
     .in_ready_o (colour_room),
     .in_data_i  (survivors),
@@ -818,6 +820,8 @@ module flk_preprocessing
     assign out[b] = {address, 4'hf, data};
   end
 
+  logic [31:0] pointer_lines_spilled, pointer_lines_fetched;
+
   flk_pointer_port #(
     .NumberBits (NumberBits),
     .AddressBits(BEAT_BITS),
@@ -830,8 +834,8 @@ module flk_preprocessing
     .base_i       (registers_i.pointers_beat),
     .read_error_o (pointer_read_error),
     .write_error_o(pointer_write_error),
-    .put_o        (counters_o.spilled),
-    .got_o        (counters_o.fetched),
+    .put_o        (pointer_lines_spilled),
+    .got_o        (pointer_lines_fetched),
     .in_valid_i   (move_valid),
     .in_ready_o   (move_ready),
     .in_put_i     (move_put),
@@ -943,23 +947,21 @@ module flk_preprocessing
 
   // ---- errors and counters --------------------------------------------------------------------------
 
-  localparam int unsigned Events = 19;
-
-  logic                            write_error_q;
-  logic [31:0]                     cycles_q;
-  logic [Events-1:0][LANES-1:0]    events;  // by lane
-  logic [Events-1:0][31:0]         totals;
+  logic                               write_error_q;
+  logic [31:0]                        cycles_q;
+  logic [FRONT_EVENTS-1:0][LANES-1:0] events;  // by lane
+  logic [FRONT_EVENTS-1:0][31:0]      totals;
 
   // What happens is counted a few cycles later; after a frame's last event comes the end of its lists, of its last wait that of its
   // writes.
-  assign events[0] = go ? side.used & lane_near : '0;
-  assign events[1] = go ? side.used & ~lane_near & lane_outside : '0;
-  assign events[2] = go ? alive : '0;
-  assign events[3] = saturated;
-  assign events[4] = clipped;
-  assign events[5] = faint;
-  assign events[6] = unlisted;
-  assign events[7] = LANES'(line_valid && line_ready);
+  assign events[FRONT_EVENT_TOO_NEAR]      = go ? side.used & lane_near : '0;
+  assign events[FRONT_EVENT_OUTSIDE]       = go ? side.used & ~lane_near & lane_outside : '0;
+  assign events[FRONT_EVENT_SURVIVORS]     = go ? alive : '0;
+  assign events[FRONT_EVENT_SATURATED]     = saturated;
+  assign events[FRONT_EVENT_CLIPPED]       = clipped;
+  assign events[FRONT_EVENT_FAINT]         = faint;
+  assign events[FRONT_EVENT_UNLISTED]      = unlisted;
+  assign events[FRONT_EVENT_RECORD_BEATS]  = LANES'(line_valid && line_ready);
 
   // Waits: where a projected group has several reasons, the first one. What comes late in its cycle is looked at in the next.
   logic             front_q, group_valid_q, exit_valid_q, places_q, colours_q;
@@ -1006,21 +1008,22 @@ module flk_preprocessing
 
   logic went;  // nothing waited at the end of the projection
 
-  assign went       = !exit_valid_q || ((&lanes_q) && places_q && colours_q);
-  assign events[8]  = LANES'(kept_q == 2'b01);
-  assign events[9]  = LANES'(front_q && went && !group_valid_q);
-  assign events[10] = LANES'(exit_valid_q && !(&lanes_q));
-  assign events[11] = LANES'(exit_valid_q && (&lanes_q) && !places_q);
-  assign events[12] = LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
-  assign events[13] = part_q & ~part_ready_q;
-  assign events[14] = record_q & ~record_ready_q;
-  assign events[15] = entry_q & ~entry_ready_q;
-  assign events[16] = merged_q & ~merged_ready_q;
-  assign events[17] = out_q & ~out_ready_q;
-  assign events[18] = LANES'(line_q == 2'b01);
+  assign went = !exit_valid_q || ((&lanes_q) && places_q && colours_q);
+  assign events[FRONT_EVENT_CLUSTER_WAITS] = LANES'(kept_q == 2'b01);
+  assign events[FRONT_EVENT_GROUP_MISSING] = LANES'(front_q && went && !group_valid_q);
+  assign events[FRONT_EVENT_LANE_WAITS]    = LANES'(exit_valid_q && !(&lanes_q));
+  assign events[FRONT_EVENT_PLACE_WAITS]   = LANES'(exit_valid_q && (&lanes_q) && !places_q);
+  assign events[FRONT_EVENT_REQUEST_WAITS] =
+      LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
+  assign events[FRONT_EVENT_COLOUR_WAITS]  = part_q & ~part_ready_q;
+  assign events[FRONT_EVENT_RECORD_WAITS]  = record_q & ~record_ready_q;
+  assign events[FRONT_EVENT_ENTRY_WAITS]   = entry_q & ~entry_ready_q;
+  assign events[FRONT_EVENT_MERGED_WAITS]  = merged_q & ~merged_ready_q;
+  assign events[FRONT_EVENT_LINE_WAITS]    = out_q & ~out_ready_q;
+  assign events[FRONT_EVENT_BEAT_WAITS]    = LANES'(line_q == 2'b01);
 
   flk_event_counters #(
-    .Counters(Events),
+    .Counters(FRONT_EVENTS),
     .Sources (LANES)
   ) i_counters (
     .clk_i,
@@ -1046,30 +1049,21 @@ module flk_preprocessing
     end
   end
 
-  assign counters_o.too_near     = totals[0];
-  assign counters_o.outside      = totals[1];
-  assign counters_o.survivors    = totals[2];
-  assign counters_o.saturated    = totals[3];
-  assign counters_o.clipped      = totals[4];
-  assign counters_o.faint        = totals[5];
-  assign counters_o.unlisted     = totals[6];
-  assign counters_o.record_beats = totals[7];
-  assign counters_o.cluster_waits = totals[8];
-  assign counters_o.group_missing = totals[9];
-  assign counters_o.lane_waits    = totals[10];
-  assign counters_o.place_waits   = totals[11];
-  assign counters_o.request_waits = totals[12];
-  assign counters_o.colour_waits  = totals[13];
-  assign counters_o.record_waits  = totals[14];
-  assign counters_o.entry_waits   = totals[15];
-  assign counters_o.merged_waits  = totals[16];
-  assign counters_o.line_waits    = totals[17];
-  assign counters_o.beat_waits    = totals[18];
-  assign counters_o.cycles       = cycles_q;
-  assign counters_o.entries      = list_entries;
-  assign counters_o.lines        = list_lines;
-  assign counters_o.evicted      = list_evicted;
-  assign counters_o.taken        = list_taken;
+  always_comb begin
+    counters_o                  = front_events(totals);
+    counters_o.cycles           = cycles_q;
+    counters_o.culled_clusters  = culled_clusters;
+    counters_o.culled_gaussians = culled_gaussians;
+    counters_o.header_beats     = header_beats;
+    counters_o.geometry_beats   = geometry_beats;
+    counters_o.colour_beats     = colour_beats;
+    counters_o.entries          = list_entries;
+    counters_o.lines            = list_lines;
+    counters_o.evicted          = list_evicted;
+    counters_o.taken            = list_taken;
+    counters_o.spilled          = pointer_lines_spilled;
+    counters_o.fetched          = pointer_lines_fetched;
+  end
 
   assign error_o = {geometry_damaged, cull_damaged, |list_failed, beyond_q,
                     write_error_q || pointer_write_error,

@@ -8,7 +8,7 @@
 // a copy takes a cycle a word.
 module flk_frame_counters
   import flk_param_pkg::*;
-  import flk_top_pkg::*;
+  import flk_counter_pkg::*;
 #(
   localparam int unsigned IndexBits = 8
 ) (

@@ -1,4 +1,4 @@
-// The chip: descriptor of a frame, errors, counters.
+// The chip: descriptor of a frame, errors, managers of the memory port.
 package flk_top_pkg;
   import flk_preproc_pkg::*;
 
@@ -44,17 +44,6 @@ package flk_top_pkg;
     logic front_write;
     logic front_read;
   } frame_error_t;
-
-  // Counters: words of a frame, from each half, and those that run on. Numbers as in the enumeration counter_e of rtl/regs/flk_registers.rdl.
-  localparam int unsigned COUNTER_FRONT = 0;
-  localparam int unsigned COUNTER_RENDERING = 34;
-  localparam int unsigned COUNTER_LIVE = 64;
-  localparam int unsigned COUNTER_FRONT_WAITS = 96;  // the last ones of the front end
-  localparam int unsigned COUNTER_STAGE = 128;
-  localparam int unsigned FRONT_WAITS = 11;
-  localparam int unsigned FRONT_WORDS = COUNTER_RENDERING + FRONT_WAITS;
-  localparam int unsigned RENDERING_WORDS = 27;
-  localparam int unsigned LIVE_WORDS = 20;
 
   // Managers of the memory port; the first reader and the first writer go first. The rendering half's come before the front end's.
   localparam int unsigned RENDERING_READERS = 2;

@@ -16,9 +16,9 @@ import numpy as np
 
 from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig, Refresh
-from flicker.chip.run import FRONT_WAITS, RENDERING_WAITS
 from flicker.chip.tile_lists import TileLists
 from flicker.chip.whole import WholeFrame, whole_frame
+from flicker.chip_counters import FRONT, RENDERING
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import render_chip
@@ -47,12 +47,6 @@ FLOWERS_CHUNKS = 24_000  # of that view whole
 BUILDS = {
     "default": (RenderConfig(), PackedFormat.CHUNK, ListKind.ELLIPSE),
     "faithful": (FAITHFUL, PackedFormat.FP16, ListKind.BOX),
-}
-UNITS = 4
-# Counters of waits that are sums over as many units.
-OF_ALL = {
-    *(("front", f"{name}_waits") for name in ("colour", "record", "entry", "merged", "line")),
-    *(("rendering", f"{name}_waits") for name in ("list", "sorted", "record", "pair")),
 }
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
@@ -162,9 +156,8 @@ def tables(say: Say) -> dict[str, str]:
             f"{off[3]:+.1%}", f"{found.interval / max(halves):.2f}", found.model.bottleneck, f"{found.simulated / found.seconds:,.0f}",
         ))
         waits[title] = [
-            f"{int(counters[counter]) / (half * (UNITS if (side, counter) in OF_ALL else 1)):.1%}"
-            for side, texts, counters, half in (("front", FRONT_WAITS, alone.front, halves[0]), ("rendering", RENDERING_WAITS, alone.rendering, halves[1]))
-            for counter in texts
+            f"{int(values[counter.name]) / (half * counter.units):.1%}"
+            for counters, values, half in ((FRONT, alone.front, halves[0]), (RENDERING, alone.rendering, halves[1])) for counter in counters if counter.stall
         ]
         lines = found.model.bytes["records"] / moved["records"] - 1
         traffic.append((title, *(f"{moved[name] / 1e6:.2f}" for name in PURPOSES), f"{sum(moved.values()) / 1e6:.2f}", f"{lines:+.1%}"))
@@ -173,6 +166,6 @@ def tables(say: Say) -> dict[str, str]:
             ["view", "front end, cycles", "model off by", "rendering, cycles", "model off by", "frame, cycles", "model off by", "interval back to back",
              "model off by", "of the slower half alone", "what the model says it waits for", "simulated cycles a second of processor time"], rows,
         ),
-        "waits": table(["what waits", *waits], list(zip([*FRONT_WAITS.values(), *RENDERING_WAITS.values()], *waits.values()))),
+        "waits": table(["what waits", *waits], list(zip([counter.stall for counter in (*FRONT, *RENDERING) if counter.stall], *waits.values()))),
         "traffic": table(["view, MB of the DRAM", *PURPOSES, "all", "records' model off by"], traffic),
     }

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flicker.front.lists import ellipse_lists, tile_lists
+from flicker.front.lists import ellipse_lists, square_lists, tile_lists
 from flicker.front.paths import Asked, path_of
 from flicker.front.records import SubtileLists
 from flicker.front.view import View
@@ -38,8 +38,10 @@ def kinds(view: View) -> dict[str, SubtileLists]:
     """Lists that end in different places, each without the sub-tiles where alpha is below 1/255."""
     projected, lists = view.projected, view.lists(Form.FACTORED)
     wide = replace(projected, circle=np.ceil(BEYOND * projected.circle + 1.0))
-    all_ = {FIRST: lists, SQUARES: tile_lists(lists, projected, view.camera), ALL: tile_lists(lists, wide, view.camera)}
-    return {name: ellipse_lists(each, projected, view.camera) for name, each in all_.items()}
+    return {
+        FIRST: ellipse_lists(lists, projected, view.camera), SQUARES: square_lists(lists, projected, view.camera),
+        ALL: ellipse_lists(tile_lists(lists, wide, view.camera), projected, view.camera),
+    }
 
 
 def _costs(view: View) -> dict[str, tuple[int, int]]:

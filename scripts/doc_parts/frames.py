@@ -17,6 +17,7 @@ SUMMARY, ABLATION, DEEPER = "summary", "ablation", "deeper FIFOs"
 LISTS = {
     "subtile": "3-sigma boxes", "tile": "boxes on 16x16 tiles", "obb": "oriented boxes",
     "reach": "the box of alpha = 1/255, made on the host in float64", "ellipse": "the ellipse of alpha = 1/255, made on the host in float64",
+    "squares": "boxes on 16x16 tiles and the ellipse of alpha = 1/255, made on the host in float64",
 }
 CHANGES = {
     "lists": "lists", "generator": "mask generator", "masks": "masks name pixels, VRUs visit pixels", "stop": "early exit", "stage": "rendering stage",

@@ -64,7 +64,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make (?:setup|test|lint)", "tb/test_tooling.py::test_copied_checkout_tests_itself"),
     (r"make test (?:SLOW|FRESH)=1", "is what runs this"),
     (r"make check(?: BASE=.*)?", "tb/test_selection.py::test_plan"),
-    (r"make record(?: REASON=.*)?", "tb/model/test_figures.py::test_holding"),
+    (r"make record(?: REASON=.*)?", "tb/model/test_gates.py::test_holding"),
     (r"make site", "tb/test_pages.py::test_site_is_built"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),
@@ -226,6 +226,16 @@ def test_command(command: str, sandbox: Path, monkeypatch: pytest.MonkeyPatch) -
         assert (sandbox / name).stat().st_size > 0, (option, name)
 
 
+def test_example_of_the_api(sandbox: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The program of docs/reference/api/index.md, with a small scene in place of the demo's."""
+    (program,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "reference" / "api" / "index.md").read_text(), re.M | re.S)
+    view = 'load_view("demo", 0, (640, 360))'
+    assert view in program
+    monkeypatch.chdir(sandbox)
+    exec(program.replace(view, 'load_view("scene.ply", 0, (48, 32))'), {})
+    assert (sandbox / "picture.png").is_file() and float(capsys.readouterr().out) > 30
+
+
 def test_as_typed(sandbox: Path) -> None:
     """The words themselves in a shell, where `.venv` is the checkout's; make finds the environment up to date."""
     done = subprocess.run(["bash", "-c", ".venv/bin/flicker pack scene.ply -o typed.flk && make help"], cwd=sandbox, capture_output=True, text=True)
@@ -289,7 +299,7 @@ def names_of(target: str) -> set[str]:
 
 
 def test_names_of_units_and_parts() -> None:
-    """Each UNIT, PART and CONFIG of a page is one that its target knows; LIBERTY is a file's."""
+    """Each UNIT, PART (one or more) and CONFIG of a page is one that its target knows; LIBERTY is a file's."""
     from flicker.cost.synth.units import all_units
 
     seen: dict[str, set[str]] = {}
@@ -297,7 +307,7 @@ def test_names_of_units_and_parts() -> None:
         target, given = words_of(command)[1], dict(word.split("=", 1) for word in words_of(command)[2:])
         known = seen.setdefault(target, names_of(target))
         for key in ("UNIT", "PART"):
-            assert key not in given or re.search(r"=(<|name|$)", command) or given[key] in known, (command, WHOLE[command])
+            assert key not in given or re.search(r"=(<|name|$)", command) or set(given[key].split()) <= known, (command, WHOLE[command])
         if "CONFIG" in given:
             assert (given["UNIT"], given["CONFIG"]) in {(unit.name, unit.config) for unit in all_units()}, command
 

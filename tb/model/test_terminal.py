@@ -29,7 +29,7 @@ from PIL import Image
 from rich.table import Table
 
 from flicker import output
-from flicker.chip.run import FRONT_WAITS, RENDERING_WAITS, stall_shares
+from flicker.chip.run import FRONT, RENDERING, stall_shares
 from flicker.cli import main as entry
 from flicker.cli.tables import Terminal, bar, bytes_text, decibels
 from flicker.errors import FlickerError, FlickerWarning, Interrupted
@@ -170,7 +170,7 @@ def statistics() -> dict[str, Any]:
     """Of a frame of the chip in which everything waits that can."""
     from flicker.cli.render import timed
 
-    waits = ["no records for the lanes", "no slot in the lanes' store", "no room in a lane's queue", *FRONT_WAITS.values(), *RENDERING_WAITS.values()]
+    waits = ["no records for the lanes", "no slot in the lanes' store", "no room in a lane's queue", *(c.stall for c in (*FRONT, *RENDERING) if c.stall)]
     stalls = {cause: 1000 * (k + 1) ** 2 for k, cause in enumerate(waits)} | {"records, at the port": 0}
     return timed({
         "scene": "scenes/flowers/point_cloud.ply", "view": 0, "width": 1280, "height": 720, "cameras": "cameras.json beside the scene", "engine": "chip",
@@ -204,7 +204,7 @@ def test_summary_of_a_frame() -> None:
             sections.setdefault(section, []).append(float(found[1]))
     waits, front = sections["waits"], sections["front end"]
     assert waits == sorted(waits, reverse=True) and front == sorted(front, reverse=True) and "at the port" not in shown
-    assert len(waits) + len(front) == len(statistics()["stalls"]) - 1 and len(front) == len(set(FRONT_WAITS.values()))
+    assert len(waits) + len(front) == len(statistics()["stalls"]) - 1 and len(front) == sum(bool(c.stall) for c in FRONT)
     assert set(figures(shown)) <= set(figures(on_screen(table, 44)))
 
 

@@ -7,13 +7,16 @@ of the address space that has no register; lock; commands; interrupts that come 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
+import gen_counters
 import gen_registers
+import pytest
 from flicker_tb.runner import build_and_test
 
+from flicker import chip_counters
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
-from flicker.sim import preprocessing, rendering
 from flicker.toolchain import ROOT
 
 PACKAGE = ROOT / "rtl" / "regs" / "flk_registers_pkg.sv"
@@ -79,35 +82,27 @@ def test_registers_do_not_overlap() -> None:
     assert len(set(words)) == len(words) and all(word % 4 == 0 for word in words)
 
 
-def test_counters_are_the_description() -> None:
-    """Where the words of flk_top_pkg begin, and how many there are, is what the numbers of the counters say."""
-    text = (ROOT / "rtl" / "top" / "flk_top_pkg.sv").read_text()
-    numbers = {name: int(value) for name, value in re.findall(r"localparam int unsigned (\w+) = (\d+);", text)}
-    bases = {
-        "COUNTER_FRONT": ChipCounter.FRONT_CYCLES, "COUNTER_RENDERING": ChipCounter.RENDERING_CYCLES, "COUNTER_LIVE": ChipCounter.LIVE_CYCLES,
-        "COUNTER_FRONT_WAITS": ChipCounter.FRONT_CLUSTER_WAITS, "COUNTER_STAGE": ChipCounter.STAGE,
-    }
-    assert {name: numbers[name] for name in bases} == {name: int(base) for name, base in bases.items()}
-    ends = {
-        "COUNTER_RENDERING": ChipCounter.POINTERS_FETCHED - ChipCounter.FRONT_CYCLES,  # the front end's words but waits
-        "FRONT_WAITS": ChipCounter.FRONT_BEAT_WAITS - ChipCounter.FRONT_CLUSTER_WAITS,
-        "RENDERING_WORDS": ChipCounter.FRAME_WAITS - ChipCounter.RENDERING_CYCLES,
-        "LIVE_WORDS": ChipCounter.LIVE_DATA_WAITS - ChipCounter.LIVE_CYCLES,
-    }
-    assert {name: numbers[name] for name in ends} == {name: last + 1 for name, last in ends.items()}
+def test_counters_are_in_both() -> None:
+    """rtl/counters.toml, by way of the register map and of Python."""
+    counters = {kind: [(c.name, c.number, c.words) for c in each] for kind, each in gen_counters.load().items() if kind != "stage"}
+    assert counters == {kind: [(c.name, c.number, c.words) for c in getattr(chip_counters, kind.upper())] for kind in counters}
+    numbers = {c.member.upper(): c.number for each in gen_counters.load().values() for c in each}
+    assert numbers == {member.name: int(member) for member in ChipCounter}
 
 
-def test_waits_are_where_they_are_said_to_be() -> None:
-    """Counters of waits come in one order: fields of the halves' structures, words that the top makes of them, numbers, names that the harness reads."""
-    top = (ROOT / "rtl" / "flk_top.sv").read_text()
-    for half, package, waits, first, prefix in (
-        ("front", "preproc/flk_preproc_pkg", preprocessing.WAITS, ChipCounter.FRONT_CLUSTER_WAITS, "FRONT_"),
-        ("rendering", "common/flk_rendering_pkg", rendering.WAITS, ChipCounter.LIST_LINE_WAITS, ""),
-    ):
-        names = [name for name, *_ in waits]
-        struct = (ROOT / "rtl" / f"{package}.sv").read_text().split(f"}} {half}_counters_t;")[0].rsplit("typedef struct packed {", 1)[1]
-        assert re.findall(r"logic \[31:0\] +(\w+);", struct)[-len(names) :] == names
-        words = top.split(f"assign {half}_words = {{")[1].split("};")[0]
-        assert re.findall(rf"{half}_counters\.(\w+)", words)[: len(names)] == names[::-1]
-        numbers = [ChipCounter(first + k).name.removeprefix(prefix).lower() for k in range(len(names))]
-        assert [name.replace("list_line_waits", "list_waits") for name in numbers] == names
+@pytest.mark.parametrize("old,new,message", [
+    ("number = 2,", "number = 1,", "culled_gaussians: number 1 belongs to culled_clusters"),
+    ("number = 98,", "number = 110,", "front: not in the order of numbers"),
+    ('number = 106, name = "beat_waits"', 'number = 107, name = "beat_waits"', "front_beat_waits: number 107 is not the one behind front_line_waits"),
+    ("number = 83,", "number = 84,", "live_data_waits: number 84 is not the one behind live_front_address_waits"),
+    ('name = "clipped"', 'name = "faint"', "faint: two counters have this symbol"), ("bits = 25", "bytes = 25", "taken: .*unexpected keyword argument 'bytes'"),
+    ("stamps = [", "stamp = [", "kinds are front, rendering, stamps, live, stage"),
+    ('number = 0, name = "cycles"', 'number = 30, name = "cycles"', "front: not in the order of numbers"),
+])
+def test_counters_that_cannot_be(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = gen_counters.SOURCE.read_text()
+    assert text.count(old) == 1
+    path = tmp_path / "counters.toml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(SystemExit, match=message):
+        gen_counters.load(path)

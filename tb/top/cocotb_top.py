@@ -9,6 +9,7 @@ import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.bench import Bench, config, four_state, rounds
 
+from flicker.chip_counters import FRONT, RENDERING, STAMPS
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
 
 SETTINGS = config()
@@ -17,9 +18,8 @@ FRONT_DONE, FRAME_DONE, ERROR, ABORTED, REFUSED = (1 << REGISTERS["interrupt"].f
     "front_done", "frame_done", "error", "aborted", "refused"))
 LATE = 1 << ResultError.LATE
 ALL = FRONT_DONE | FRAME_DONE | ERROR | ABORTED | REFUSED
-# Numbers of counters that a frame leaves; 30 and 31 have none.
-PLACES = {*range(30), *range(32, ChipCounter.FRAME_WAITS + 1), *range(ChipCounter.FRONT_CLUSTER_WAITS, ChipCounter.FRONT_BEAT_WAITS + 1),
-          *range(ChipCounter.STAGE, ChipCounter.STAGE + 128)}
+# Numbers of counters that a frame leaves.
+PLACES = {*(c.number + k for c in (*FRONT, *RENDERING, *STAMPS) for k in range(c.words)), *range(ChipCounter.STAGE, ChipCounter.STAGE + 128)}
 
 
 class Chip:

@@ -29,6 +29,8 @@ _GAUSSIAN_BYTES = 12  # geometry in chunks
 
 
 class Kind(str, Enum):
+    """What a budget is given in; values as in `Goal`."""
+
     KEEP = "keep"
     DB = "db"
     CYCLES = "cycles"
@@ -50,6 +52,7 @@ class Goal:
 
     @property
     def of_chip(self) -> bool:
+        """Whether the chip model has to tell whether the goal is met: cycles or bytes."""
         return self.kind in (Kind.CYCLES, Kind.MBYTES)
 
 

@@ -58,6 +58,8 @@ _FULL_RATE = 38.0  # dB at which rates are those of `Rates`; nearer pictures nee
 
 
 class Phase(str, Enum):
+    """Steps of a reduction in their order; as rows and checkpoints name them."""
+
     MERGE = "merge"
     REMOVE = "remove"
     TUNE = "tune"

@@ -76,14 +76,17 @@ class DramConfig:
 
     @property
     def burst_bytes(self) -> int:
+        """Bytes of a burst."""
         return self.burst_length * self.width_bits // 8
 
     @property
     def burst_clocks(self) -> int:
+        """Clocks of the command bus that a burst takes on the data bus."""
         return self.burst_length // 2
 
     @property
     def bytes_per_second(self) -> int:
+        """Peak rate of all channels."""
         return self.channels * self.width_bits * self.rate // 8
 
     @property
@@ -130,10 +133,12 @@ class DramResult:
 
     @property
     def row_hits(self) -> int:
+        """Bursts that found their row open."""
         return self.bursts - self.activates
 
     @property
     def seconds(self) -> float:
+        """Time of all bursts."""
         return self.clocks / (self.config.rate / 2)
 
     @property
@@ -143,6 +148,7 @@ class DramResult:
 
     @property
     def efficiency(self) -> float:
+        """Share of the peak rate."""
         return self.bytes / (self.seconds * self.config.bytes_per_second) if self.clocks else 1.0
 
 
@@ -172,6 +178,7 @@ class Stream:
 
     @property
     def moved_bytes(self) -> int:
+        """Bytes of the whole bursts."""
         return len(self.burst) * c.LINE_BYTES
 
     @staticmethod

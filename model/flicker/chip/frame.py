@@ -173,6 +173,7 @@ class FrameEstimate:
 
     @property
     def fps(self) -> float:
+        """Frames a second at the chip's clock, from the interval."""
         return c.CLOCK_HZ / self.interval_cycles
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import params
+from ..chip_counters import FRONT, RENDERING
 from ..errors import FlickerError
 from ..front.view import View
 from ..golden.chip import render_chip
@@ -83,26 +84,9 @@ def _picture(
     return frame_image(frame.buffer, camera), stats
 
 
-# Counters of waits of both halves: what is stalled.
-FRONT_WAITS = {
-    "cluster_waits": "front end, cluster for its geometry", "group_missing": "front end, projection for Gaussians",
-    "lane_waits": "front end, projected for lanes", "place_waits": "front end, projected for places of records",
-    "request_waits": "front end, projected for requests of colours", "colour_waits": "front end, colours for lanes", "record_waits": "front end, records",
-    "entry_waits": "front end, entries for the merge", "merged_waits": "front end, entries for list writers", "line_waits": "front end, lines of lists",
-    "beat_waits": "front end, lines of records",
-}
-RENDERING_WAITS = {
-    "list_waits": "lists for sorting units", "sorted_waits": "sorted entries for buffers", "entry_missing": "delivery for entries",
-    "entry_waits": "entries for delivery", "queue_waits": "records for cores' queues", "cache_waits": "records for their lines",
-    "record_waits": "records for cores", "pair_waits": "cores for the frame writer", "frame_waits": "lines of the frame buffer",
-}
-
 # Stalls that are sums over several units.
 SUMMED = {
-    **{FRONT_WAITS[name]: "4 lanes" for name in ("colour_waits", "record_waits", "entry_waits")},
-    **{FRONT_WAITS[name]: "4 list writers" for name in ("merged_waits", "line_waits")},
-    **{RENDERING_WAITS[name]: "4 sorting units" for name in ("list_waits", "sorted_waits")},
-    **{RENDERING_WAITS[name]: f"{CORES} cores" for name in ("record_waits", "pair_waits")},
+    **{counter.stall: f"{counter.units} {counter.unit}" for counter in (*FRONT, *RENDERING) if counter.units > 1},
     **dict.fromkeys(("contribution test", "no records for the contribution test"), f"{CORES} cores"),
     "feature FIFO full": f"{CORES * CHANNELS} channels",
     **dict.fromkeys(("no records for the lanes", "no slot in the lanes' store", "no room in a lane's queue"), f"{CORES} cores"),
@@ -161,7 +145,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     }
     stalls = {
         **stage.pop("stalls"),
-        **{text: int(front[name]) for name, text in FRONT_WAITS.items()}, **{text: int(rendering[name]) for name, text in RENDERING_WAITS.items()},
+        **{c.stall: int(counts[c.name]) for counters, counts in ((FRONT, front), (RENDERING, rendering)) for c in counters if c.stall},
         **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
     }
     longest = max(phases, key=lambda name: phases[name])

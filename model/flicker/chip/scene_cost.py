@@ -128,6 +128,7 @@ class ViewCost:
 
     @property
     def frames_per_second(self) -> float:
+        """At the chip's clock, from the slower half."""
         return CLOCK_HZ / self.interval
 
 

@@ -54,7 +54,7 @@ def convert(
     scene: Annotated[Path, typer.Argument(help="scene as for flicker render, or demo")],
     out: Annotated[Path, typer.Argument(help="file to write: .ply, .compressed.ply, .spz, .sog, .splat, .flk")],
     box: Annotated[str | None, typer.Option(help="keep what lies in x0,y0,z0,x1,y1,z1 [default: all]")] = None,
-    no_flyaways: Annotated[bool, typer.Option("--no-flyaways", help="leave out Gaussians far away from most (docs/reference/scenes.md)")] = False,
+    no_flyaways: Annotated[bool, typer.Option("--no-flyaways", help="leave out Gaussians far away from most (docs/reference/memory_image.md)")] = False,
     degree: Annotated[int, typer.Option(min=0, max=3, help="cut spherical harmonics to this degree")] = 3,
 ) -> None:
     """Convert a scene to another format; what is lost is measured and told."""

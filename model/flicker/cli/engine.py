@@ -119,7 +119,9 @@ def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str,
 
 
 def engine_options(
-    engine: Annotated[EngineChoice, typer.Option(help="what renders")] = EngineChoice.GOLDEN,
+    engine: Annotated[EngineChoice, typer.Option(
+        help="what renders: float64; rendering stage, bit-true or verilated; whole chip, bit-true or verilated",
+    )] = EngineChoice.GOLDEN,
     front: Annotated[FrontChoice | None, typer.Option(
         help="what makes records and lists: float64 on the host, bit-true front end, its RTL; not for the chip, which has its own [default: float]",
     )] = None,

@@ -17,7 +17,7 @@ TABLE_ROWS = 60  # longer results are in the file only
 
 
 def sweep(
-    config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/guide/sweep.md)")],
+    config: Annotated[Path, typer.Argument(help="YAML: scenes, views, size, configurations (docs/guide/report.md)")],
     cluster: Annotated[str | None, typer.Option(help="address of a Dask scheduler [default: processes of this machine]")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="local processes [default: number of cores, 2 at most]")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="folder for results [default: build/sweep]")] = None,

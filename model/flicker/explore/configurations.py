@@ -71,7 +71,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     # docs/results/motion.md: every mode of FLICKER, GSCore's test, none, lanes
     "stability in time": (
         "gscore", "no-ctu-32", "faithful", "flicker", "flicker-dense-fixed-factored", "flicker-sparse-fixed-factored", "flicker-spiky-fixed-factored",
-        "flicker-auto-fixed-factored", "flicker-dense-fp16-factored", "log-lanes", "log-lanes-128",
+        "flicker-auto-fixed-factored", "flicker-dense-fp16-factored", "log-lanes", "log-lanes-128", "log-lanes-squares",
     ),
     "stability, quick": (
         "vanilla", "no-ctu-32", "no-ctu-32-conic", "gscore", "seele", "faithful", "flicker", "flicker-dense-fp16-factored", "exact-e4m3", "exact",

@@ -56,14 +56,17 @@ class MaskGenerator(ABC):
 
     @property
     def exact(self) -> bool:
+        """Whether it provably leaves out no pixel that the VRU would have blended."""
         return False
 
     @property
     def precision(self) -> str:
+        """Number format of the test, for tables."""
         return "-"
 
     @property
     def operations(self) -> Operations:
+        """Hardware operations of an element, for area and energy."""
         return NONE
 
     @abstractmethod
@@ -106,7 +109,8 @@ class RenderingStage(ABC):
 
     @property
     @abstractmethod
-    def vrus(self) -> int: ...
+    def vrus(self) -> int:
+        """VRUs or lanes of the whole stage."""
 
     def rtl(self) -> dict | None:
         """Fields of `RenderConfig` that make the RTL this stage; None where it cannot."""
@@ -155,10 +159,12 @@ class Configuration:
 
     @property
     def form(self) -> Form:
+        """Form of the Gaussian weight: the stage's."""
         return self.stage.form
 
     @property
     def vrus(self) -> int:
+        """VRUs or lanes of the whole stage."""
         return self.stage.vrus
 
     @property

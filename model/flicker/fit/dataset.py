@@ -42,6 +42,7 @@ class Dataset:
 
     @property
     def shots(self) -> list[Shot]:
+        """All photographs, those to fit to first."""
         return [*self.fitted, *self.tests]
 
 

@@ -25,18 +25,22 @@ class Parameters:
 
     @property
     def means(self) -> np.ndarray:
+        """(N, 3), a view of `values`."""
         return self.values[:, MEAN:SCALE]
 
     @property
     def log_scales(self) -> np.ndarray:
+        """(N, 3), natural logarithms of the standard deviations, a view of `values`."""
         return self.values[:, SCALE:QUAT]
 
     @property
     def quats(self) -> np.ndarray:
+        """(N, 4), w first, of any length, a view of `values`."""
         return self.values[:, QUAT:LOGIT]
 
     @property
     def logits(self) -> np.ndarray:
+        """(N,), logits of the opacities, a view of `values`."""
         return self.values[:, LOGIT]
 
     @property
@@ -46,6 +50,7 @@ class Parameters:
 
     @property
     def degree(self) -> int:
+        """Degree of the harmonics, 0 to 3."""
         return SH_DEGREES[self.sh.shape[1]]
 
     def like(self, values: np.ndarray) -> Parameters:
@@ -58,6 +63,7 @@ class Parameters:
 
     @classmethod
     def of(cls, scene: Scene) -> Parameters:
+        """Parameters of a scene."""
         columns = (scene.means, np.log(scene.scales), scene.quats, logits(scene.opacities)[:, None], scene.sh.reshape(len(scene), -1))
         return cls(np.concatenate(columns, axis=1, dtype=np.float32), scene.antialiased)
 

@@ -276,6 +276,7 @@ class Trainer:
             raise
 
     def scene(self) -> Scene:
+        """The scene of the present parameters, activated."""
         return self.parameters.scene()
 
     def measure(self) -> float:

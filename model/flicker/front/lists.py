@@ -183,6 +183,11 @@ def subtile_lists(
     return lists
 
 
-# Kinds made from `subtile`: `tile` is vanilla's, `obb` GSCore's; `reach` and `ellipse` leave out entries that cannot contribute (factored form).
-DERIVED = {"tile": tile_lists, "obb": obb_lists, "reach": reach_lists, "ellipse": ellipse_lists}
+def square_lists(lists: SubtileLists, projected: Projected, camera: Camera) -> SubtileLists:
+    """`ellipse_lists` of `tile_lists`: they end where those of the float64 reference do, not at the 3-sigma boxes, beyond which alpha is up to 2.8/255."""
+    return ellipse_lists(tile_lists(lists, projected, camera), projected, camera)
+
+
+# Kinds made from `subtile`: `tile` is vanilla's, `obb` GSCore's; `reach`, `ellipse` and `squares` leave out entries that cannot contribute (factored form).
+DERIVED = {"tile": tile_lists, "obb": obb_lists, "reach": reach_lists, "ellipse": ellipse_lists, "squares": square_lists}
 LISTS = ("subtile", *DERIVED)

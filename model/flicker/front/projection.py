@@ -83,6 +83,7 @@ class Projected:
 
     @property
     def n_visible(self) -> int:
+        """Number of splats M."""
         return len(self.depth)
 
 

@@ -98,6 +98,7 @@ def _round_splats(conic, cov, opacity, rgb, factored, gauss, clamped):
 
 @numba.njit(parallel=True, cache=True)
 def local_means(mean, start, entry, cols, absolute, out):
+    """Fill out (E, 2) with FP16 bits of each entry's mean, relative to its sub-tile; absolute: rounded in screen coordinates first."""
     for s in numba.prange(start.shape[0] - 1):
         ox = (s % cols) * SUBTILE
         oy = (s // cols) * SUBTILE

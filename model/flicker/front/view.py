@@ -50,12 +50,14 @@ class View:
 
     @property
     def scene(self) -> Scene:
+        """The scene. ValueError where only the projection is given."""
         if self._scene is None:
             raise ValueError("this view is only a projection")
         return self._scene
 
     @cached_property
     def projected(self) -> Projected:
+        """Splats of the scene, near to far, in float64."""
         return project(self.scene, self.camera, self.order)
 
     @cached_property

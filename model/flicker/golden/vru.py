@@ -1,4 +1,4 @@
-"""Volume rendering unit: one pixel-Gaussian pair, FP16 (docs/reference/vru.md).
+"""Volume rendering unit: one pixel-Gaussian pair, FP16 (docs/reference/rendering_core.md).
 
 Rules of vanilla 3DGS: E < 0 (or NaN) is skipped, alpha is clamped to 0.99, alpha < 1/255 is skipped, and the splat that would
 take the transmittance below 1e-4 is not blended but finishes the pixel. Order of operations, each rounded to FP16:

@@ -46,4 +46,5 @@ class Scene:
 
     @property
     def sh_degree(self) -> int:
+        """Degree of the harmonics, 0 to 3."""
         return SH_DEGREES[self.sh.shape[1]]

@@ -11,8 +11,8 @@ import numpy as np
 from .camera import Camera
 from .packed import POSITION_BITS, PackedFormat, PackedScene, means_and_scales, split
 
-# Steps over the sizes of Gaussians on the screen (root mean square) from which on there is a warning. Ordinary scenes have up to 0.1; at 0.25 packing alone
-# leaves 46 dB to scenes of small Gaussians and 62 dB to scenes of large ones (docs/reference/memory_image.md).
+# Steps over the sizes of Gaussians on the screen (root mean square) from which on there is a warning (docs/reference/memory_image.md). Ordinary scenes have
+# up to 0.1; what packing alone leaves of pictures is in docs/results/memory_formats.md.
 COARSE = 0.25
 VIEWS = 16  # cameras looked through, evenly from all
 _NEAR = 0.2  # depth from which on Gaussians are drawn

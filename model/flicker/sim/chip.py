@@ -14,13 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ..chip_counters import FRONT, LIVE, RENDERING, STAMPS, Counter
 from ..chip_registers import REGISTERS, ChipCounter, ResultError
 from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import ListKind
 from ..params import CORES, COUNTER_INDEX_BITS, TILE, RenderConfig, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedScene
-from . import driver, half, preprocessing, rendering
+from . import driver, half
 from .half import PAGE, Half, MemoryOptions
 from .memory import Order, PortConfig, PurposeCounts
 
@@ -32,15 +33,6 @@ IMAGE = 1 << 28  # address of the scene
 ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more
 LIMIT = 100_000_000  # cycles of a frame
 SLICE = 5_000  # cycles between looks at the progress
-
-# Names in the order of their words, and how many words each has.
-# Two words between the list writers' and the pointers' have no counter.
-FRONT, POINTERS, FRONT_WAITS = (
-    [(name, n) for name, _, n in fields] for fields in (preprocessing.WORK[:-2], preprocessing.WORK[-2:], preprocessing.WAITS)
-)
-RENDERING, RENDERING_WAITS = ([(name, n) for name, _, n in fields] for fields in (rendering.WORK, rendering.WAITS))
-STAMPS = [(counter.name.removeprefix("STAMP_").lower(), 1) for counter in ChipCounter if counter.name.startswith("STAMP_")]
-LIVE = [(counter.name.removeprefix("LIVE_").lower(), 1) for counter in ChipCounter if counter.name.startswith("LIVE_")]
 
 
 def build(config: RenderConfig) -> Path:
@@ -70,6 +62,7 @@ class Usage:
     traffic: dict[str, tuple[int, int]]
 
     def since(self, before: Usage) -> Usage:
+        """What has come since an earlier state."""
         return Usage(
             {name: (value - before.live[name]) % 2**32 for name, value in self.live.items()},
             {name: (read - before.traffic[name][0], written - before.traffic[name][1]) for name, (read, written) in self.traffic.items()},
@@ -169,10 +162,12 @@ class ChipSession(Half):
         return value
 
     def set_register(self, name: str, value: int, index: int = 0) -> None:
+        """Write a register by its name."""
         self._access(REGISTERS[name].offset + 4 * index, True, value)
         self._raise()
 
     def field(self, register: str, name: str) -> int:
+        """Read a field of a register by their names."""
         low, bits = REGISTERS[register].fields[name]
         return self.register(register) >> low & (1 << bits) - 1
 
@@ -286,22 +281,22 @@ class ChipSession(Half):
         self.wait(1)
 
     def counter(self, index: int) -> int:
+        """Read a counter of the frame that ended last, by its index."""
         value = self.driver.flk_counter(ctypes.byref(self.device), ctypes.c_uint32(index))
         self._raise()
         return value
 
-    def _counters(self, base: int, names: Sequence[tuple[str, int]]) -> dict[str, int | np.ndarray]:
-        """By name, from the words that begin at `base`."""
+    def _counters(self, counters: Sequence[Counter]) -> dict[str, int | np.ndarray]:
+        """By name."""
         out: dict[str, int | np.ndarray] = {}
-        for name, n in names:
-            values = [self.counter(base + k) for k in range(n)]
-            out[name] = values[0] if n == 1 else np.array(values, np.int64)
-            base += n
+        for counter in counters:
+            values = [self.counter(counter.number + k) for k in range(counter.words)]
+            out[counter.name] = values[0] if counter.words == 1 else np.array(values, np.int64)
         return out
 
     def usage(self) -> Usage:
         """Of all frames until now."""
-        live = {name: int(value) for name, value in self._counters(ChipCounter.LIVE_CYCLES, LIVE).items()}
+        live = {name: int(value) for name, value in self._counters(LIVE).items()}
         return Usage(live, {name: (int(c.dram_read_bytes), int(c.dram_write_bytes)) for name, c in self.purposes().items()})
 
     def finish(self, frame: driver.CFrame, limit: int = LIMIT, progress: Callable[[int, int], None] | None = None) -> ChipFrame:
@@ -312,10 +307,8 @@ class ChipSession(Half):
         else:
             self._wait_with(progress, frame, limit)
         buffer = self.buffer(frame)
-        front = self._counters(ChipCounter.FRONT_CYCLES, FRONT) | self._counters(ChipCounter.POINTERS_SPILLED, POINTERS)
-        front |= self._counters(ChipCounter.FRONT_CLUSTER_WAITS, FRONT_WAITS)
-        rendering_ = self._counters(ChipCounter.RENDERING_CYCLES, RENDERING) | self._counters(ChipCounter.LIST_LINE_WAITS, RENDERING_WAITS)
-        stamps = {name: int(value) for name, value in self._counters(ChipCounter.STAMP_TAKEN, STAMPS).items()}
+        front, rendering_ = self._counters(FRONT), self._counters(RENDERING)
+        stamps = {name: int(value) for name, value in self._counters(STAMPS).items()}
         words = 1 << COUNTER_INDEX_BITS
         stage = np.array([self.counter(ChipCounter.STAGE + k) for k in range(CORES * words)], np.int64).reshape(CORES, words)
         result = self.driver.flk_result(ctypes.byref(self.device))

@@ -11,6 +11,7 @@ from typing import Self
 
 import numpy as np
 
+from ..chip_counters import Counter
 from ..errors import FlickerError
 from ..toolchain import verilate
 from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
@@ -116,11 +117,13 @@ class Half:
             raise self._failure(f"{size} bytes at {base:#x} are not there")
         return out
 
-    def run(self, registers: Fields, counters: Sequence[tuple[str, int, int]], frames: int, limit: int) -> tuple[dict[str, int | np.ndarray], list[int]]:
+    def run(
+        self, registers: Fields, counters: Sequence[Counter], frames: int, limit: int,
+    ) -> tuple[dict[str, int | np.ndarray], list[int]]:
         """Frames one after the other: counters of the last by name, int or int64 (n,), and error_o of each.
 
-        counters: name, width, how many; the highest first. Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails or a
-        rule of AXI is broken.
+        counters: of the design's structure, the first in the highest bits. Raises FlickerError where a frame does not end within `limit` cycles, an assertion
+        fails or a rule of AXI is broken.
         """
         for ranges, writes in ((self.memory.fail, True), (self.memory.fail_reads, False)):
             for base, size in ranges:
@@ -131,7 +134,7 @@ class Half:
             word = word << width | value
         count = -(-sum(width for _, width in registers) // 32)
         given = np.frombuffer(word.to_bytes(4 * count, "little"), np.uint32).copy()
-        out = np.zeros(-(-sum(width * n for _, width, n in counters) // 32), np.uint32)
+        out = np.zeros(-(-sum(c.bits * c.words for c in counters) // 32), np.uint32)
         error = ctypes.c_uint32()
         errors = []
         for frame in range(frames):
@@ -161,8 +164,9 @@ class Half:
             raise self._failure(f"core {core} did not get {lists} lists")
         return out.astype(np.int64)
 
-    def waits(self, names: Sequence[str]) -> dict[str, int]:
-        """Counters of waits of the last frame as the harness counts them, those of `names` that it can; not of the chip."""
+    def waits(self, counters: Sequence[Counter]) -> dict[str, int]:
+        """Those of `counters` that count a stall, of the last frame as the harness counts them, as far as it can; not of the chip."""
+        names = [counter.name for counter in counters if counter.stall]
         out = np.zeros(len(names), np.int64)
         if self._lib.flk_half_waits(self._sim, out.ctypes.data) != len(names):
             raise self._failure(f"not {len(names)} counters of waits")
@@ -174,13 +178,13 @@ class Half:
         return self._lib.flk_half_efficiency(self._sim)
 
 
-def _counters(words: np.ndarray, counters: Sequence[tuple[str, int, int]]) -> dict[str, int | np.ndarray]:
+def _counters(words: np.ndarray, counters: Sequence[Counter]) -> dict[str, int | np.ndarray]:
     word = int.from_bytes(words.tobytes(), "little")
     out: dict[str, int | np.ndarray] = {}
-    for name, width, n in reversed(counters):
+    for counter in reversed(counters):
         values = []
-        for _ in range(n):
-            values.append(word & (1 << width) - 1)
-            word >>= width
-        out[name] = values[0] if n == 1 else np.array(values, np.int64)
+        for _ in range(counter.words):
+            values.append(word & (1 << counter.bits) - 1)
+            word >>= counter.bits
+        out[counter.name] = values[0] if counter.words == 1 else np.array(values, np.int64)
     return out

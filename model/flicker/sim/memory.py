@@ -42,6 +42,7 @@ class Counts(ctypes.Structure):
 
     @property
     def row_hits(self) -> int:
+        """Bursts that found their row open."""
         return self.bursts - self.activates
 
 
@@ -69,18 +70,23 @@ class Reply(ctypes.Structure):
 
 
 class Resp(IntEnum):
+    """AXI's responses, by their code."""
+
     OKAY, EXOKAY, SLVERR, DECERR = range(4)
 
 
 class Order(IntEnum):
-    """Answers in the order of all addresses; in any order across ids; reads of several ids also beat by beat in turn; in any order across ids, and a read is
-    answered once all of its beats are there, so that none waits for the DRAM in the middle of another's burst."""
+    """Order of responses.
+
+    IN_ORDER: that of all addresses. BY_ID: in order within an id, any across ids. INTERLEAVED: as BY_ID, reads of several ids also beat by beat in turn. WHOLE:
+    as BY_ID, and a read begins once all of its beats are there, so that none waits for the DRAM in the middle of another's burst.
+    """
 
     IN_ORDER, BY_ID, INTERLEAVED, WHOLE = range(4)
 
 
 class WriteOrder(IntEnum):
-    """Data before, with or behind addresses; ready for data only behind addresses; ready for an address only once data are offered."""
+    """ANY: data before (up to 16 beats), with or behind addresses. ADDRESS_FIRST: ready for data only behind addresses. DATA_FIRST: the reverse."""
 
     ANY, ADDRESS_FIRST, DATA_FIRST = range(3)
 
@@ -94,11 +100,17 @@ class PortConfig:
     """Options of a port.
 
     latency: cycles that are added to the DRAM's, or, in a perfect memory, all there are. max_reads, max_writes: transactions that may be under way.
-    max_beats: longest burst that is legal. order, write_order: see there. hazards: a transaction that overlaps one under way, one of them a write, is an error
-    (writes of one id excepted). urgent: transactions of at least that AXI quality of service go before others where they wait for a place in a DRAM channel's
-    queue and where answers are chosen, except IN_ORDER; 16: none does. stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R).
-    run: channel to mean length of such a pause in cycles, default 1. stop_after: channel to transfers after which it is never ready or valid again. Random
-    choices follow `seed`.
+    max_beats: longest burst that is legal.
+
+    order, write_order: see there.
+
+    urgent: transactions of at least that AXI quality of service (`ar_qos`, `aw_qos`) go first in a DRAM channel's queue, have a lead there and have their
+    responses first, except IN_ORDER; 16: none does. Nothing bounds how long the others wait: for managers whose own work ends.
+
+    hazards: a transaction that overlaps one under way, one of them a write, is an error (writes of one id excepted, which follow each other).
+
+    stall: channel to share of the cycles without ready (AW, W, AR) or valid (B, R). run: channel to mean length of such a pause in cycles, default 1.
+    stop_after: channel to transfers after which it is never ready or valid again. Random choices follow `seed`; what is offered stays.
     """
 
     data_bits: int = 512
@@ -232,6 +244,7 @@ class Dram:
         return None if clock < 0 else clock
 
     def counts(self) -> Counts:
+        """What the channels have done until now."""
         out = Counts()
         self._lib.flk_dram_counts(self._at, ctypes.byref(out))
         return out
@@ -284,7 +297,22 @@ class Memory:
 
 
 class Port:
-    """An AXI4 port of a memory. Fill `request`, call `step` once a cycle, read `reply` for the next one."""
+    """An AXI4 port of a memory. Fill `request`, call `step` once a cycle, read `reply` for the next one.
+
+    ```python
+    memory = Memory(DramConfig().timing)                       # flicker.chip.dram
+    memory.allocate(0x1000, 4096)
+    port = Port(memory, port_config(seed=3, stall={"R": 0.2}))  # flicker.chip.dram
+    port.request.ar.valid, port.request.ar.addr, port.request.ar.size, port.request.ar.burst = 1, 0x1000, 6, 1
+    port.request.r_ready = 1
+    while not port.reply.r_valid:
+        taken = port.reply.ar_ready
+        memory.tick()
+        port.step()
+        if taken:
+            port.request.ar.valid = 0
+    ```
+    """
 
     def __init__(self, memory: Memory, config: PortConfig = PortConfig()) -> None:
         self._lib = memory._lib
@@ -331,6 +359,7 @@ class Port:
         return [self._lib.flk_axi_error(self._at, i).decode() for i in range(self._lib.flk_axi_errors(self._at))]
 
     def counts(self, purpose: int) -> PurposeCounts:
+        """Traffic of the port by purpose, and cycles by channel."""
         out = PurposeCounts()
         self._lib.flk_axi_counts(self._at, purpose, ctypes.byref(out))
         return out

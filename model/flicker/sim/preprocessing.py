@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arithmetic.ff import ff_bits
+from ..chip_counters import FRONT
 from ..errors import FlickerError
 from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
@@ -31,20 +32,6 @@ PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "point
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory",
           "the cluster table is damaged", "a cluster's header is damaged")
 LIST_ERROR = 3  # bit of the last
-
-# front_counters_t of flk_preproc_pkg, the first field in the highest bits.
-WORK = (
-    *((name, 32, 1) for name in (
-        "cycles", "culled_clusters", "culled_gaussians", "too_near", "outside", "survivors", "faint", "unlisted", "saturated", "clipped", "header_beats",
-        "geometry_beats", "colour_beats", "record_beats",
-    )),
-    ("entries", 32, 4), ("lines", 32, 4), ("evicted", 32, 4), ("taken", 25, 4), ("spilled", 32, 1), ("fetched", 32, 1),
-)
-WAITS = tuple((name, 32, 1) for name in (
-    "cluster_waits", "group_missing", "lane_waits", "place_waits", "request_waits", "colour_waits", "record_waits", "entry_waits", "merged_waits", "line_waits",
-    "beat_waits",
-))
-COUNTERS = WORK + WAITS
 
 
 @dataclass(frozen=True)
@@ -110,8 +97,8 @@ class RtlFront:
     """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
     noise, that of `before`: records and memory as they were.
 
-    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate. waits: of WAITS, as the harness counts
-    them, those that it can.
+    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate. waits: of those with a stall, as the
+    harness counts them, those that it can.
     """
 
     records: np.ndarray
@@ -184,13 +171,13 @@ def front_rtl(
         ):
             sim.load(base, size, b"", purpose)
         before = _records(sim, regions, kind), _lines(sim, regions)
-        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks, order), COUNTERS, frames, limit)
+        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks, order), FRONT, frames, limit)
         if any(sim.read(base, len(part)).tobytes() != part for base, part in scene):
             raise FlickerError(f"front end: it has written over the scene (seed {seed})")
         return RtlFront(
             _records(sim, regions, kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,
-            sim.waits([name for name, *_ in WAITS]),
+            sim.waits(FRONT),
         )
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..chip_counters import RENDERING
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.front.memory import FrontImage
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS
@@ -28,19 +29,12 @@ PORTS = {"list": PORT, "record": replace(PORT, data_bits=256), "write": PORT}
 PURPOSES = ("lists", "pointers", "records", "frame")
 ERRORS = ("lists could not be read", "records could not be read", "a write failed")
 
-# Of flk_rendering_pkg, the first field in the highest bits.
-WORK = (("cycles", 32, 1), ("entries", 32, 4), ("readings", 32, 4), ("dropped", 32, 4), ("lines", 32, 1))
-WAITS = tuple((name, 32, 1) for name in (
-    "list_waits", "sorted_waits", "entry_missing", "entry_waits", "queue_waits", "cache_waits", "record_waits", "pair_waits", "frame_waits",
-))
-COUNTERS = WORK + WAITS
-
 
 @dataclass(eq=False)
 class RtlRendering:
     """What a frame left. buffer: uint8 (rows of pixels, stride); bytes that it did not write are noise. errors: of each frame. traffic: by purpose.
-    given: int64 (S,), records that a core got of each sub-tile in the last frame; S as in `golden.chip.whole_pairs`. waits: of WAITS, as the harness
-    counts them, those that it can."""
+    given: int64 (S,), records that a core got of each sub-tile in the last frame; S as in `golden.chip.whole_pairs`. waits: stalls, as the harness counts
+    them, those that it can."""
 
     buffer: np.ndarray
     counters: dict[str, int | np.ndarray]
@@ -90,13 +84,13 @@ def rendering_rtl(
             (int(config.cat), 3), (int(format_), 1), (background[0] | background[1] << 8 | background[2] << 16, 24), (pairs, 8), (rows, 9),
             (pairs * rows, 16), (base["lists"] // BEAT, 34), (chunks, 25), (base["pointers"] // BEAT, 34), (base["records"] // BEAT, 34),
             (base["frame"] // BEAT, 34), (stride // 32, 12),
-        ), COUNTERS, frames, limit)
+        ), RENDERING, frames, limit)
         buffer = sim.read(base["frame"], stride * rows * TILE).reshape(rows * TILE, stride)
         given = np.zeros((2 * rows, 4 * pairs), np.int64)
         x, y = tile_walk(pairs, rows)
         for k in range(CORES):
             given[2 * y + k // 2, 2 * x + k % 2] = sim.given(k, len(x))
-        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.waits([name for name, *_ in WAITS]), sim.efficiency)
+        return RtlRendering(buffer, counters, errors, sim.traffic(PURPOSES), given.ravel(), sim.waits(RENDERING), sim.efficiency)
 
 
 def regions(image: FrontImage, frame_bytes: int) -> dict[str, int]:

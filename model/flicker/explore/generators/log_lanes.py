@@ -48,7 +48,8 @@ class LogRows(MaskGenerator):
 
 
 def configurations() -> Iterator[Configuration]:
-    """The default build, one that takes an element a cycle, more lanes, and as many as fit the area of the GSCore-like build."""
+    """The default build, one that takes an element a cycle, more lanes, as many as fit the area of the GSCore-like build, and the default one behind lists that
+    end as the reference's."""
     for name, title, stage in (
         ("log-lanes", "lanes in the log domain", LogLanes()),
         ("log-lanes-one", "lanes in the log domain, one element a cycle", LogLanes(in_width=1)),
@@ -56,3 +57,4 @@ def configurations() -> Iterator[Configuration]:
         ("log-lanes-128", "128 lanes in the log domain, one element a cycle, half the store", LogLanes(128, 1, 12, 8)),
     ):
         yield Configuration(name, title, "lanes", LogRows(), stage, lists="ellipse")
+    yield Configuration("log-lanes-squares", "lanes in the log domain, lists that end as the reference's", "lanes", LogRows(), LogLanes(), lists="squares")

@@ -42,7 +42,7 @@ class LogLanes(RenderingStage):
     slots: int = 20
     fifo_depth: int = 16
     form = Form.FACTORED
-    lists_of_rtl: ClassVar[tuple[str, ...]] = ("subtile", "ellipse")
+    lists_of_rtl: ClassVar[tuple[str, ...]] = ("subtile", "ellipse", "squares")
     assumed: ClassVar[tuple[str, ...]] = (
         FIXED_PLACES, "empty sub-tiles not streamed", "a finished sub-tile leaves its list, as late as in the RTL", "records of the float64 projection",
     )

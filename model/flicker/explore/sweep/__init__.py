@@ -1,4 +1,4 @@
-"""Sweeps: scenes x views x configurations on a Dask cluster, results in Parquet (docs/guide/sweep.md)."""
+"""Sweeps: scenes x views x configurations on a Dask cluster, results in Parquet (docs/reference/sweep.md)."""
 
 from .config import Sweep, load_sweep
 from .results import load_results

@@ -102,6 +102,7 @@ class PathSection(_Section):
         return self
 
     def kind(self) -> str | None:
+        """Kind of the path, as `front.path_rules.kind_of` reads it."""
         try:
             return kind_of(self.model_dump(), str)
         except FlickerError as error:

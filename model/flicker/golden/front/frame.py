@@ -53,10 +53,10 @@ FP16_STEP = 2.0**-COEFFICIENT_FRACTION  # in place of a header's
 
 
 class ListKind(str, Enum):
-    """What lists a splat in a tile."""
+    """What lists a splat in a tile. ELLIPSE: alpha = 1/255, cut by 3 standard deviations an axis. BOX: 3 standard deviations an axis."""
 
-    ELLIPSE = "ellipse"  # alpha = 1/255, cut by 3 standard deviations an axis
-    BOX = "box"  # 3 standard deviations an axis
+    ELLIPSE = "ellipse"
+    BOX = "box"
 
 
 class Outcome:

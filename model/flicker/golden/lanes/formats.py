@@ -66,7 +66,7 @@ class LaneFormats:
         return f"{self.uv} / {self.log} / {self.sum}, {h}; {self.mantissa}; {self.accumulator}"
 
 
-FORMATS = LaneFormats()  # the default; docs/decisions/059-number-formats-of-the-lanes.md says why
+FORMATS = LaneFormats()  # the default; docs/decisions/051-logarithms.md says why
 
 # ints: uv, guard, place, log, sum, mantissa, accumulator, limit, clamp, x_max, h_max, s_max, top, drop, root_bits, root_shift. Arrays, int64: lo, bound,
 # mask_bound (by opacity code), h (by La), exp2 (by the top bits of a fraction), root (by significant bits), result (by fraction of S).
