@@ -127,7 +127,7 @@ def package(found: dict[str, list[Counter]]) -> str:
         out += [
             f"  }} {half}_counters_t;", "",
             "  // Those that events count; the others are zero.",
-            f"  function automatic {half}_counters_t {half}_events(logic [{half.upper()}_EVENTS-1:0][31:0] totals);",
+            f"  function automatic {half}_counters_t {half}_events(", f"      logic [{half.upper()}_EVENTS-1:0][31:0] totals);",
             f"    {half}_events = '0;",
             *(f"    {half}_events.{c.name} = totals[{half.upper()}_EVENT_{c.name.upper()}];" for c in events),
             "  endfunction",
@@ -137,7 +137,7 @@ def package(found: dict[str, list[Counter]]) -> str:
         """row: word, what it is."""
         argument = f"{half}_counters_t counters" + more
         out.extend([
-            "", f"  function automatic logic [{half.upper()}_WORDS-1:0][31:0] {name}({argument});", f"    {name} = '0;",
+            "", f"  function automatic logic [{half.upper()}_WORDS-1:0][31:0] {name}(", f"      {argument});", f"    {name} = '0;",
             *(f"    {name}[{word}] = {value};" for word, value in row), "  endfunction",
         ])
 

@@ -104,7 +104,8 @@ package flk_counter_pkg;
   } front_counters_t;
 
   // Those that events count; the others are zero.
-  function automatic front_counters_t front_events(logic [FRONT_EVENTS-1:0][31:0] totals);
+  function automatic front_counters_t front_events(
+      logic [FRONT_EVENTS-1:0][31:0] totals);
     front_events = '0;
     front_events.too_near = totals[FRONT_EVENT_TOO_NEAR];
     front_events.outside = totals[FRONT_EVENT_OUTSIDE];
@@ -171,7 +172,8 @@ package flk_counter_pkg;
   } rendering_counters_t;
 
   // Those that events count; the others are zero.
-  function automatic rendering_counters_t rendering_events(logic [RENDERING_EVENTS-1:0][31:0] totals);
+  function automatic rendering_counters_t rendering_events(
+      logic [RENDERING_EVENTS-1:0][31:0] totals);
     rendering_events = '0;
     rendering_events.list_waits = totals[RENDERING_EVENT_LIST_WAITS];
     rendering_events.sorted_waits = totals[RENDERING_EVENT_SORTED_WAITS];
@@ -186,7 +188,8 @@ package flk_counter_pkg;
 
   // In the order in which flk_frame_counters takes them; a word without a counter is zero.
 
-  function automatic logic [FRONT_WORDS-1:0][31:0] front_counter_words(front_counters_t counters);
+  function automatic logic [FRONT_WORDS-1:0][31:0] front_counter_words(
+      front_counters_t counters);
     front_counter_words = '0;
     front_counter_words[0] = counters.cycles;
     front_counter_words[1] = counters.culled_clusters;
@@ -233,7 +236,8 @@ package flk_counter_pkg;
     front_counter_words[44] = counters.beat_waits;
   endfunction
 
-  function automatic logic [RENDERING_WORDS-1:0][31:0] rendering_counter_words(rendering_counters_t counters, logic [STAMP_WORDS-1:0][31:0] stamps);
+  function automatic logic [RENDERING_WORDS-1:0][31:0] rendering_counter_words(
+      rendering_counters_t counters, logic [STAMP_WORDS-1:0][31:0] stamps);
     rendering_counter_words = '0;
     rendering_counter_words[0] = counters.cycles;
     rendering_counter_words[1] = counters.entries[0];

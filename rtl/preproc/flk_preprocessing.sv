@@ -954,14 +954,14 @@ module flk_preprocessing
 
   // What happens is counted a few cycles later; after a frame's last event comes the end of its lists, of its last wait that of its
   // writes.
-  assign events[FRONT_EVENT_TOO_NEAR] = go ? side.used & lane_near : '0;
-  assign events[FRONT_EVENT_OUTSIDE] = go ? side.used & ~lane_near & lane_outside : '0;
-  assign events[FRONT_EVENT_SURVIVORS] = go ? alive : '0;
-  assign events[FRONT_EVENT_SATURATED] = saturated;
-  assign events[FRONT_EVENT_CLIPPED] = clipped;
-  assign events[FRONT_EVENT_FAINT] = faint;
-  assign events[FRONT_EVENT_UNLISTED] = unlisted;
-  assign events[FRONT_EVENT_RECORD_BEATS] = LANES'(line_valid && line_ready);
+  assign events[FRONT_EVENT_TOO_NEAR]      = go ? side.used & lane_near : '0;
+  assign events[FRONT_EVENT_OUTSIDE]       = go ? side.used & ~lane_near & lane_outside : '0;
+  assign events[FRONT_EVENT_SURVIVORS]     = go ? alive : '0;
+  assign events[FRONT_EVENT_SATURATED]     = saturated;
+  assign events[FRONT_EVENT_CLIPPED]       = clipped;
+  assign events[FRONT_EVENT_FAINT]         = faint;
+  assign events[FRONT_EVENT_UNLISTED]      = unlisted;
+  assign events[FRONT_EVENT_RECORD_BEATS]  = LANES'(line_valid && line_ready);
 
   // Waits: where a projected group has several reasons, the first one. What comes late in its cycle is looked at in the next.
   logic             front_q, group_valid_q, exit_valid_q, places_q, colours_q;
@@ -1008,18 +1008,19 @@ module flk_preprocessing
 
   logic went;  // nothing waited at the end of the projection
 
-  assign went       = !exit_valid_q || ((&lanes_q) && places_q && colours_q);
+  assign went = !exit_valid_q || ((&lanes_q) && places_q && colours_q);
   assign events[FRONT_EVENT_CLUSTER_WAITS] = LANES'(kept_q == 2'b01);
   assign events[FRONT_EVENT_GROUP_MISSING] = LANES'(front_q && went && !group_valid_q);
-  assign events[FRONT_EVENT_LANE_WAITS] = LANES'(exit_valid_q && !(&lanes_q));
-  assign events[FRONT_EVENT_PLACE_WAITS] = LANES'(exit_valid_q && (&lanes_q) && !places_q);
-  assign events[FRONT_EVENT_REQUEST_WAITS] = LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
-  assign events[FRONT_EVENT_COLOUR_WAITS] = part_q & ~part_ready_q;
-  assign events[FRONT_EVENT_RECORD_WAITS] = record_q & ~record_ready_q;
-  assign events[FRONT_EVENT_ENTRY_WAITS] = entry_q & ~entry_ready_q;
-  assign events[FRONT_EVENT_MERGED_WAITS] = merged_q & ~merged_ready_q;
-  assign events[FRONT_EVENT_LINE_WAITS] = out_q & ~out_ready_q;
-  assign events[FRONT_EVENT_BEAT_WAITS] = LANES'(line_q == 2'b01);
+  assign events[FRONT_EVENT_LANE_WAITS]    = LANES'(exit_valid_q && !(&lanes_q));
+  assign events[FRONT_EVENT_PLACE_WAITS]   = LANES'(exit_valid_q && (&lanes_q) && !places_q);
+  assign events[FRONT_EVENT_REQUEST_WAITS] =
+      LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
+  assign events[FRONT_EVENT_COLOUR_WAITS]  = part_q & ~part_ready_q;
+  assign events[FRONT_EVENT_RECORD_WAITS]  = record_q & ~record_ready_q;
+  assign events[FRONT_EVENT_ENTRY_WAITS]   = entry_q & ~entry_ready_q;
+  assign events[FRONT_EVENT_MERGED_WAITS]  = merged_q & ~merged_ready_q;
+  assign events[FRONT_EVENT_LINE_WAITS]    = out_q & ~out_ready_q;
+  assign events[FRONT_EVENT_BEAT_WAITS]    = LANES'(line_q == 2'b01);
 
   flk_event_counters #(
     .Counters(FRONT_EVENTS),
