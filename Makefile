@@ -11,6 +11,9 @@ PART   ?=
 CONFIG ?=
 NETLIST ?=
 SLOW   ?=
+FRESH  ?=
+BASE   ?=
+REASON ?=
 LIBERTY ?=
 CHIP   ?= small
 KEYS   ?=
@@ -19,7 +22,7 @@ KEYS   ?=
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test sim lint waves mutants synth formal soc report docs site clean FORCE
+.PHONY: help setup demo generate test check record sim lint waves mutants synth formal soc report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -47,9 +50,17 @@ generate: $(STAMP) ## write the generated sources (registers, packages, mask gen
 	@$(BIN)/python scripts/gen_manifests.py
 	@$(BIN)/python scripts/gen_figures.py
 
-test: $(STAMP) lint ## lint, all tests, the fast proofs; with SLOW=1 also the tests that take long
-	@SLOW="$(SLOW)" $(BIN)/python -m pytest -n $(JOBS) --dist worksteal tb
+test: $(STAMP) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
+	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cached tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
+
+check: $(STAMP) ## lint and tests of what an edit changes, two minutes; against another commit: make check BASE=main
+	@$(BIN)/python scripts/check.py --jobs $(JOBS) --base $(or $(BASE),HEAD)
+
+record: $(STAMP) ## figures that a change has moved, with the reason: make record REASON="sorts in half the time"
+	@$(if $(strip $(REASON)),,echo 'record: say why figures move: make record REASON="..."'; exit 2;) \
+	  FLICKER_SEED=1 FLICKER_RECORD="$(REASON)" $(BIN)/python -m pytest -q -n $(JOBS) tb/model/test_gates.py tb/frames/test_chip_frames.py \
+	  -k "test_gates or what_holds_a_frame_up" && git diff --stat -- tb/figures.csv
 
 sim: $(STAMP) ## simulations of all units, or of one, or of its netlist: make sim UNIT=prtu [NETLIST=1]
 	@NETLIST="$(NETLIST)" $(BIN)/python -m pytest -n $(JOBS) -m sim $(if $(UNIT),--unit $(UNIT)) tb

@@ -26,6 +26,7 @@ sys.path.insert(0, str(HERE))
 import firmware  # noqa: E402
 import pictures  # noqa: E402
 import simulation  # noqa: E402
+from litex_flicker import CHIPS  # noqa: E402
 
 from flicker.chip.dram import DramConfig  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
@@ -106,17 +107,19 @@ def main() -> None:
 def run(options: argparse.Namespace) -> None:
     if not re.fullmatch(r"\d+x\d+", options.size):
         raise FlickerError(f"--size: WxH, as 160x90, not {options.size}")
+    if options.keys and not sys.stdin.isatty():
+        raise FlickerError("--keys: standard input is no terminal")
+    if options.chip not in CHIPS:
+        raise FlickerError(f"--chip: one of {', '.join(CHIPS)}, not {options.chip}")
     width, height = map(int, options.size.split("x"))
     folder = BUILD / "soc"
     began = time.time()
     firmware.compiler()
+    packed, cameras = scene_and_path(options.scene, width, height)
     print("soc: building the SoC's simulator (minutes, once)", flush=True)
     built = simulation.build(options.chip)
     rom = firmware.build(built.folder)
-    print(f"soc: firmware of {len(rom)} bytes; the scene, and its pictures by the golden model", flush=True)
-    packed, cameras = scene_and_path(options.scene, width, height)
-    from litex_flicker import CHIPS
-
+    print(f"soc: firmware of {len(rom)} bytes; pictures by the golden model", flush=True)
     config: RenderConfig = CHIPS[options.chip]
     golden = [pictures.golden_picture(packed, camera, config) for camera in cameras[:3]]
     image = packed.image()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import csv
 import functools
 import os
 import sys
@@ -13,7 +14,7 @@ import pytest
 TB = Path(__file__).resolve().parent
 sys.path.insert(0, str(TB))
 
-from flicker_tb import progress, runner  # noqa: E402
+from flicker_tb import durations, passed, progress, runner  # noqa: E402
 
 from flicker import toolchain  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
@@ -36,12 +37,17 @@ demo.generate = _made_once(demo.generate)  # before a test module takes it
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also the tests marked slow (as with SLOW=1)")
+    parser.addoption("--cached", action="store_true", help="leave out tests that passed on the same inputs (FRESH=1: none)")
     parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py; slow ones too where it has no others")
 
 
 def _simulates(path: Path) -> bool:
     """Whether a test file simulates hardware: those in the folders of tb/ but tb/model and tb/sw do."""
     return path.parent != TB and not any(path.is_relative_to(TB / folder) for folder in ("model", "sw"))
+
+
+def _slow(config: pytest.Config) -> bool:
+    return config.getoption("--slow") or os.environ.get("SLOW") == "1"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -63,6 +69,8 @@ def pytest_configure(config: pytest.Config) -> None:
         what = f"unit {unit!r} does not simulate" if exists else f"no unit {unit!r}"
         raise pytest.UsageError(f"{what}; {'those that simulate' if sim else 'there are'}: {', '.join(sorted(units))}")
     progress.register(config)
+    durations.register(config)
+    passed.register(config, _slow(config))
 
 
 def pytest_report_header() -> str:
@@ -78,7 +86,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    slow = config.getoption("--slow") or os.environ.get("SLOW") == "1"
+    slow = _slow(config)
     named = config.getoption("--unit") is not None and all(item.get_closest_marker("slow") for item in items)
     if not slow and not named:
         left_out = [item for item in items if item.get_closest_marker("slow")]
@@ -87,3 +95,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if _simulates(item.path):
             item.add_marker("sim")
+    items.sort(key=lambda item: -_costs().get(item.nodeid.split("::")[0], 0.0))  # files in the order of what they cost: the last ones to end are short
+
+
+@functools.cache
+def _costs() -> dict[str, float]:
+    """Processor seconds of test files on a fresh build."""
+    with (TB / "costs.csv").open(newline="") as rows:
+        return {row["file"]: float(row["cpu"]) for row in csv.DictReader(rows)}

@@ -19,7 +19,7 @@ import lint
 import pytest
 import registers
 import yaml
-from flicker_tb import runner, signal_view
+from flicker_tb import elaboration, runner, signal_view
 
 from flicker import toolchain
 from flicker.chip_registers import REGISTERS, ResultError
@@ -128,6 +128,29 @@ def test_progress_is_shown(workers: int, tmp_path: Path) -> None:
     test, build = r"test_slow.py::test_slow \(\d s\)", r"building flk_x \(sim\) \(\d s\)"  # the longest first; both began just now
     assert re.search(rf"^\[\d+ s, under way: ({test}, {build}|{build}, {test})\]$", done.stdout, re.M), done.stdout
     assert "test_quick (" not in done.stdout
+
+
+# ---- parameters that are refused ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("top", "parameters"), [
+    ("flk_fifo", {"Depth": 0}), ("flk_bitonic_sorter", {"Lanes": 3, "KeyWidth": 0}), ("flk_axi_split", {"Bytes": 48, "AddrBits": 12}),
+])
+def test_slang_and_verilator_refuse_the_same(top: str, parameters: dict[str, int]) -> None:
+    """The other tests of parameters ask slang alone."""
+    with pytest.raises(FlickerError) as raised:
+        runner.build(top, parameters=parameters)
+    log = Path(re.search(r"\(see (.*)\)", str(raised.value))[1]).read_text()
+    told = set(re.findall(r"-USERERROR: \S+:\d+:\d+: (.*)", log))
+    assert told == set(elaboration.refusals(top, parameters)) and len(told) == len(parameters), log
+
+
+def test_defaults_are_not_refused() -> None:
+    """No module refuses its own defaults; a parameter that is not there, and messages that nobody says, are failures."""
+    assert {top: said for top in (path.stem for path in filelist()) if not top.endswith("_pkg") and (said := elaboration.refusals(top, {}))} == {}
+    for parameters, message in (({"Deepth": 0}, "Depth must be"), ({"Depth": 0}, "Width must be"), ({"Depth": 8}, "Depth must be")):
+        with pytest.raises(AssertionError, match="no parameter Deepth|not refused with"):
+            elaboration.refused("flk_fifo", parameters, message)
 
 
 # ---- traces -------------------------------------------------------------------------------------

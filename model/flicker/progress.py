@@ -15,7 +15,7 @@ class Steps:
         """Around a step of unknown length."""
         return nullcontext()
 
-    def bar(self, text: str) -> AbstractContextManager[Callable[[int, int], None]]:
+    def bar(self, text: str) -> AbstractContextManager[Callable[[float, int], None]]:
         """Around a step that reports (done, total)."""
         return nullcontext(lambda done, total: None)
 

@@ -68,7 +68,7 @@ def _version(tool: str, env: Mapping[str, str] | None = None) -> str:
 
 
 @functools.cache
-def _versions() -> str:
+def versions() -> str:
     """Version lines of Verilator and the C++ compiler."""
     env = environment()
     return "\n".join(_version(tool, env) for tool in ("verilator", compiler()))
@@ -158,7 +158,7 @@ def _digest(*parts: object) -> str:
     return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:16]
 
 
-def _literal(value: str | int) -> str:
+def literal(value: str | int) -> str:
     """A parameter value for the command line; truth values become numbers."""
     return f'"{value}"' if isinstance(value, str) else str(int(value))
 
@@ -204,7 +204,7 @@ def verilate(
     cflags = f"{_CFLAGS} {cflags}".strip()
     options = [
         *args,
-        *(f"-G{key}={_literal(value)}" for key, value in (parameters or {}).items()),
+        *(f"-G{key}={literal(value)}" for key, value in (parameters or {}).items()),
         "-CFLAGS", cflags,
     ]
     if ldflags:
@@ -216,7 +216,7 @@ def verilate(
         for part in (path, hashlib.sha256(path.read_bytes()).hexdigest())
     ]
     how = Path(shared_text.__file__).read_text() if shared else ""
-    key = _digest(top, verilator_root(), _versions(), opt, how, *options, "--", *contents)
+    key = _digest(top, verilator_root(), versions(), opt, how, *options, "--", *contents)
 
     name = name or top
     folder = BUILD / kind / f"{name}-{key}"
@@ -231,7 +231,7 @@ def verilate(
         folder.mkdir(parents=True)
         log = folder / "build.log"
         with under_way(f"building {name} ({kind})"):
-            _run(
+            run_tool(
                 ["verilator", "-cc", "--exe", "--prefix", "Vtop", "--top-module", top, "-Mdir", folder,
                  "-o", product.name, *options, *settings, *cpp, *sources],
                 log,
@@ -241,7 +241,7 @@ def verilate(
             make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
                     f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
             _share_runtime(folder, make, cflags, log, jobs)
-            _run([*make, *_share_headers(folder, make, cflags, log), f"-j{jobs}"], log)
+            run_tool([*make, *_share_headers(folder, make, cflags, log), f"-j{jobs}"], log)
         stamp.touch()
     return product
 
@@ -267,12 +267,12 @@ def compile_library(
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         with under_way(f"building {name} (C++)"):
-            _run([compiler(), *options, "-o", product, *cpp], folder / "build.log", dict(os.environ))
+            run_tool([compiler(), *options, "-o", product, *cpp], folder / "build.log", dict(os.environ))
         stamp.touch()
     return product
 
 
-def _run(command: Sequence[object], log: Path, env: Mapping[str, str] | None = None) -> None:
+def run_tool(command: Sequence[object], log: Path, env: Mapping[str, str] | None = None) -> None:
     """Run a build tool with its output appended to ``log``; default environment: that of Verilator's builds."""
     with log.open("a") as out:
         out.write(" ".join(map(str, command)) + "\n")
@@ -318,11 +318,11 @@ def _share_runtime(folder: Path, make: Sequence[object], cflags: str, log: Path,
     )
     commands = {name: line for line in dry.stdout.replace(str(folder), "").splitlines() for name in objects if f" -o {name} " in line}
     cache = BUILD / "verilator-runtime"
-    cached = {name: cache / f"{_digest(_versions(), commands.get(name, dry.stdout))}-{name}" for name in objects}
+    cached = {name: cache / f"{_digest(versions(), commands.get(name, dry.stdout))}-{name}" for name in objects}
     with locked(cache.with_suffix(".lock")):
         missing = [name for name in objects if not cached[name].exists()]
         if missing:
-            _run([*make, f"-j{jobs}", *missing], log)
+            run_tool([*make, f"-j{jobs}", *missing], log)
             cache.mkdir(exist_ok=True)
             for name in missing:
                 shutil.copy(folder / name, cached[name].with_suffix(".new"))
@@ -347,12 +347,12 @@ def _share_headers(folder: Path, make: Sequence[object], cflags: str, log: Path)
         return []
     flags = found[1].replace("-MMD", "").split()
     names = ["verilated.h", *(["verilated_vpi.h"] if (folder / "verilated_vpi.o").exists() else [])]
-    cache = BUILD / "verilator-headers" / _digest(_versions(), *flags, *names)
+    cache = BUILD / "verilator-headers" / _digest(versions(), *flags, *names)
     header, compiled = cache / "headers.h", cache / "headers.h.gch"
     with locked(cache.with_suffix(".lock")):
         if not compiled.exists():
             cache.mkdir(exist_ok=True)
             header.write_text("".join(f'#include "{name}"\n' for name in names))
-            _run([compiler(), *flags, "-x", "c++-header", header, "-o", cache / "new"], log)
+            run_tool([compiler(), *flags, "-x", "c++-header", header, "-o", cache / "new"], log)
             os.replace(cache / "new", compiled)
     return [f"CXX={compiler()} -include {header}"]

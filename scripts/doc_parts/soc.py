@@ -41,4 +41,4 @@ def tables(say: Say) -> dict[str, str]:
         ("of these the CPU asleep", f"{costs['of these CPU asleep, permille'] / 10:.1f} %"),
     ]
     head = f"{numbers['scene']} scene, {numbers['size']}, chip `{numbers['chip']}`; all pictures equal the golden model's, bit for bit.\n\n"
-    return {"": head + table([("what", "number"), *rows])}
+    return {"": head + table(("what", "number"), rows)}

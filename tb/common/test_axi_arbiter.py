@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import pytest
 from flicker_tb.bench import four_state
-from flicker_tb.runner import build, build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [
@@ -26,5 +27,4 @@ def test_of_the_chip() -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("at most 16"):
-        build("flk_axi_arbiter", parameters={"Readers": 17, "Patience": 20})
+    refused("flk_axi_arbiter", {"Readers": 17, "Patience": 20}, "at most 16")

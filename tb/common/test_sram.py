@@ -6,7 +6,8 @@ State space: random traffic on few addresses, all ports free. Parameter space: o
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("module", ["flk_sram", "flk_sram_single"])
@@ -18,5 +19,4 @@ def test_sram(module: str, width: int, depth: int) -> None:
 
 @pytest.mark.parametrize("module", ["flk_sram", "flk_sram_single"])
 def test_illegal_parameters(module: str) -> None:
-    with refused("must be at least 1"):
-        build_and_test(module, "cocotb_sram", parameters={"Width": 0})
+    refused(module, {"Width": 0}, "must be at least 1")

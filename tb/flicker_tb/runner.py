@@ -7,13 +7,12 @@ missing; WAVES_FORMAT=fst or vcd chooses.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -94,17 +93,6 @@ def build(
         opt=opt,
         kind="sim",
     )
-
-
-@contextlib.contextmanager
-def refused(*messages: str) -> Iterator[None]:
-    """Expects a build that fails with all ``messages`` in its log; the units inside may have something to say first."""
-    with pytest.raises(FlickerError) as raised:
-        yield
-    log = re.search(r"\(see (.*)\)", str(raised.value))
-    assert log is not None, str(raised.value)
-    text = Path(log[1]).read_text()
-    assert not [message for message in messages if message not in text], str(raised.value)
 
 
 def build_and_test(

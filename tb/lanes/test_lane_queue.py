@@ -8,7 +8,8 @@ Parameter space: 8, 4 and 2 pixels; depths 16, 5 (no power of two) and 2; slots 
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build, build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [
@@ -20,5 +21,4 @@ def test_lane_queue(parameters: dict[str, int]) -> None:
 
 @pytest.mark.parametrize("name", ["Pixels", "Slots", "Depth"])
 def test_illegal_parameters(name: str) -> None:
-    with refused("must be at least 2"):
-        build("flk_lane_queue", parameters={name: 1})
+    refused("flk_lane_queue", {name: 1}, "must be at least 2")

@@ -10,7 +10,8 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from flicker_tb.runner import build, refused, seed
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import seed
 
 from flicker.golden.lanes.formats import FORMATS, tables
 from flicker.golden.lanes.lane import colour_bits, transmittance_bits
@@ -89,5 +90,4 @@ def test_illegal_formats(name: str, value: int, tmp_path: Path) -> None:
     assert count == 1
     other = tmp_path / package.name
     other.write_text(text)
-    with refused("colours must have 12 bits or more"):
-        build("flk_lane_result", sources=[other if path == package else path for path in sources])
+    refused("flk_lane_result", {}, "colours must have 12 bits or more", sources=[other if path == package else path for path in sources])

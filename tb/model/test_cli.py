@@ -55,6 +55,28 @@ def test_engines_and_files(demo, tmp_path):
     assert stats["golden"]["gaussians"] == len(load_scene(demo / "demo.ply"))
 
 
+def test_json_and_quiet(demo, tmp_path):
+    """--json prints the statistics and nothing else, --quiet nothing; both write their files; of all views a list. `flicker cost` likewise."""
+    path, scene = tmp_path / "s.json", demo / "demo.ply"
+    common = (scene, "--size", "64x36", "--engine", "golden", "--out", tmp_path / "x.png", "--stats", path)
+    done = flicker("render", *common, "--json")
+    assert done.returncode == 0 and done.stderr == "" and json.loads(done.stdout) == json.loads(path.read_text()), done.stderr
+    for file in (path, tmp_path / "x.png"):
+        file.unlink()
+    done = flicker("render", *common, "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "") and path.exists() and (tmp_path / "x.png").exists()
+    views = json.loads(flicker("render", scene, "--size", "32x18", "--engine", "golden", "--view", "all", "--json").stdout)
+    assert [row["view"] for row in views] == list(range(4))
+    words = ("cost", scene, "--size", "64x36", "--view", 0)
+    done = flicker(*words, "--json", "-")
+    assert done.returncode == 0 and {"scene", "numbers"} <= json.loads(done.stdout).keys()
+    assert flicker(*words, "--json", path).stdout.startswith(str(scene)) and json.loads(path.read_text()) == json.loads(done.stdout)
+    assert flicker(*words, "-q").stdout == ""
+    for more in (("render", scene, "--json", "-q"), (*words, "--json", "-", "-q")):
+        done = flicker(*more)
+        assert done.returncode and done.stdout == "" and len(done.stderr.splitlines()) == 1 and "not with --quiet" in done.stderr
+
+
 def test_options_reach_the_engine(demo, tmp_path):
     """Each option changes what it says; --faithful is the combination that it names."""
     def run(*args) -> dict:

@@ -6,7 +6,6 @@ That area and energy are right in silicon is not covered; operators that no cons
 from __future__ import annotations
 
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from flicker.explore.machine import MaskGenerator
 from flicker.front.view import View
 from flicker.params import CORES
 from flicker.scene.camera import orbit_camera
-from flicker.toolchain import ROOT
 
 # What the rendering stage has beside its parts: for each core a count of the tokens in its mask generator, of two bits without an output FIFO.
 CELLS = {name: cell.area for name, cell in Library(DEFAULT_LIBERTY).cells.items()}
@@ -146,7 +144,6 @@ def test_integer_adders_beside_published_figures(bits):
 
 def test_float32_beside_published_figures():
     """Our multiplier and adder as float32, which nothing in the design uses: synthesised here, four times the energy of those ACTIVITY was chosen by."""
-    sys.path.insert(0, str(ROOT / "scripts"))
     from doc_parts.areas import loads
 
     runner = run_synthesis.Runner(DEFAULT_LIBERTY)

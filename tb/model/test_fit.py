@@ -119,7 +119,11 @@ def whole(gradient: Gradient, count: int) -> np.ndarray:
     (3, -3.0, None, False), (1, -1.3, None, False), (0, -3.0, "flicker-sparse-fixed-factored", False), (0, -3.0, None, True),
 ])
 def test_derivatives(degree: int, z: float, name: str | None, antialiased: bool) -> None:
-    """Every parameter of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them."""
+    """Parameters of every Gaussian that the view shows, to 1e-4, where the two step sizes say that no rule switches between them.
+
+    All of a Gaussian's, but of harmonics every sixth, and through a machine every second, others in the next Gaussian: a picture takes as long as a thousand
+    of its derivatives.
+    """
     parameters, camera = busy(18, degree), look(31, 23, 28.0, z)
     if antialiased:
         parameters.antialiased, camera = True, replace(camera, cx=11.25, cy=14.0)
@@ -131,15 +135,19 @@ def test_derivatives(degree: int, z: float, name: str | None, antialiased: bool)
     checked = np.zeros(parameters.values.shape[1], int)
     largest = np.abs(found).max(axis=0)
     clamped = 0
-    for i in frame.index:
+    asked = np.zeros(parameters.values.shape[1], int)
+    for number, i in enumerate(frame.index):
         clamped += int(parameters.values[i, LOGIT] == 6.0)
         for column in range(parameters.values.shape[1]):
+            if (number + column) % (6 if column >= SH + 3 else 2 if name else 1):
+                continue
+            asked[column] += 1
             wanted, doubt = difference(parameters, camera, weight, int(i), column, machine)
             scale = max(abs(wanted), 1e-3 * largest[column], 1e-6)
             if doubt < 2e-5 * scale:
                 assert abs(found[i, column] - wanted) < 1e-4 * scale, (i, column, found[i, column], wanted)
                 checked[column] += 1
-    assert clamped >= 3 and (checked >= len(frame.index) // 3).all(), checked
+    assert clamped >= 3 and (asked >= len(frame.index) // 6).all() and (checked >= np.maximum(1, asked // 3)).all(), (asked, checked)
 
 
 def test_rules_near() -> None:

@@ -18,6 +18,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,9 +29,9 @@ from PIL import Image
 from rich.table import Table
 
 from flicker import output
-from flicker.chip.run import stalled
+from flicker.chip.run import FRONT, RENDERING, stall_shares
 from flicker.cli import main as entry
-from flicker.cli.tables import Terminal, decibels
+from flicker.cli.tables import Terminal, bar, bytes_text, decibels
 from flicker.errors import FlickerError, FlickerWarning, Interrupted
 from flicker.scene.files import save_ply
 from flicker.toolchain import ROOT
@@ -165,6 +166,48 @@ def test_rows_keep_their_names() -> None:
     assert "a [bold]/[x] :smile: " in on_screen(label_table(), None)
 
 
+def statistics() -> dict[str, Any]:
+    """Of a frame of the chip in which everything waits that can."""
+    from flicker.cli.render import timed
+
+    waits = ["no records for the lanes", "no slot in the lanes' store", "no room in a lane's queue", *(c.stall for c in (*FRONT, *RENDERING) if c.stall)]
+    stalls = {cause: 1000 * (k + 1) ** 2 for k, cause in enumerate(waits)} | {"records, at the port": 0}
+    return timed({
+        "scene": "scenes/flowers/point_cloud.ply", "view": 0, "width": 1280, "height": 720, "cameras": "cameras.json beside the scene", "engine": "chip",
+        "formats": "9 / 9 / 16", "front": "rtl", "format": "chunk", "records": "factored-16", "psnr_db": 41.234, "gaussians": 1234567, "visible": 234567,
+        "list_entries": 3456789, "subtile_pairs": 2345678, "lanes": {"lanes": 32, "visited": 15475440, "skipped": 400000}, "cycles": 766540,
+        "phases": {"front end": 98148, "rendering": 668392}, "dram_bytes": {"table": (12345, 0), "records": (12345678, 1234567), "frame": (0, 2764800)},
+        "dram_efficiency": 0.41, "refresh": "all-banks", "stalls": stalls, "stall_shares": stall_shares(stalls, 766540),
+        "bottleneck": "rendering: lanes, busy 71%",
+        "busy": {"front end": {"lanes": 0.31, "DRAM": 0.5}, "rendering": {"lanes": 0.71, "record cache's port": 1.02}}, "simulated_cycles_per_second": 12345,
+        "gaussians_left_out": {"opacity of 0": 12}, "adjusted": {"colour above 2 clipped": 3},
+    }, True)
+
+
+def test_summary_of_a_frame() -> None:
+    """Sections in 80 columns, each label on one line, waits as bars with the longest first, units and thousands; a narrow terminal loses no figure."""
+    from flicker.cli.render import summary
+
+    table = summary(statistics(), Path("out/picture.png"))
+    shown = on_screen(table, 80)
+    lines = [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown.splitlines() if line.startswith("│")]
+    assert max(map(len, shown.splitlines())) <= 80
+    assert [name for name, _, _ in lines if name] == ["picture", "quality", "work", "time", "memory", "busy", "waits", "front end", "left out", "adjusted"]
+    labels = [str(cell).strip() for cell in table.columns[1].cells]
+    assert [label for _, label, _ in lines if label] == labels and len(labels) > 40
+    assert "766,540 cycles" in shown and "0.767 ms, 1,305 a second" in shown and "12.35 MB read" in shown and "12.3 KB read" in shown
+    assert f"{'█' * 12} 102.0%" in shown and f"{'█' * 6}{' ' * 8}50.0%" in shown
+    sections: dict[str, list[float]] = {}
+    for name, _, value in lines:
+        section = name or section  # noqa: F821  # the first line has one
+        if found := re.search(r"(?:^| )([\d.]+)%$", value):
+            sections.setdefault(section, []).append(float(found[1]))
+    waits, front = sections["waits"], sections["front end"]
+    assert waits == sorted(waits, reverse=True) and front == sorted(front, reverse=True) and "at the port" not in shown
+    assert len(waits) + len(front) == len(statistics()["stalls"]) - 1 and len(front) == sum(bool(c.stall) for c in FRONT)
+    assert set(figures(shown)) <= set(figures(on_screen(table, 44)))
+
+
 def test_every_command_prints_through_the_terminal() -> None:
     """No other console in the commands, nothing that rich would take for markup."""
     for path in CLI.glob("*.py"):
@@ -176,7 +219,9 @@ def test_every_command_prints_through_the_terminal() -> None:
 
 def test_units() -> None:
     assert decibels(None) == decibels(np.inf) == "equal" and decibels(31.416) == "31.42 dB" and decibels(31.416, 1, "") == "31.4"
-    assert stalled("front end, records", 1234) == "1,234 cycles, sum over 4 lanes" and stalled("delivery for entries", 1) == "1 cycle"
+    assert (bytes_text(9999), bytes_text(12345), bytes_text(1234567890)) == ("9,999 bytes", "12.3 KB", "1,234.57 MB")
+    assert (bar(0.0, 4), bar(0.125, 4), bar(0.99, 4), bar(1.5, 4)) == ("       0.0%", "▌     12.5%", "████  99.0%", "████ 150.0%")
+    assert stall_shares({"front end, records": 200, "delivery for entries": 200}, 1000) == {"front end, records": 0.05, "delivery for entries": 0.2}
     for path in [*CLI.glob("*.py"), *(ROOT / "model" / "flicker" / "view").glob("*.py")]:
         assert "999" not in path.read_text(), path.name
 

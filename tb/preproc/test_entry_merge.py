@@ -7,7 +7,8 @@ and back-pressure patterns, different ones for each lane and bank; reset in a fr
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("depth", [2, 4])
@@ -17,5 +18,4 @@ def test_entry_merge(depth: int) -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Depth must be at least 2"):
-        build_and_test("flk_entry_merge", "cocotb_entry_merge", parameters={"Depth": 1})
+    refused("flk_entry_merge", {"Depth": 1}, "Depth must be at least 2")

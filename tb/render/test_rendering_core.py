@@ -9,7 +9,8 @@ output with 16 places, idle input with one; the other patterns with SLOW=1. Not 
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 from flicker.params import SUBTILE_PIXELS, Form
 
@@ -50,5 +51,4 @@ def test_pixel_masks() -> None:
     ],
 )
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
-    with refused(message):
-        build_and_test("flk_rendering_core", "cocotb_rendering_core", parameters=parameters)
+    refused("flk_rendering_core", parameters, message)

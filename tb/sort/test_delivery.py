@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flicker_tb.runner import build_and_test, refused, seed
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test, seed
 
 from flicker.chip.dram import DramConfig
 from flicker.golden.delivery import RecordCache
@@ -32,10 +33,8 @@ def test_ends_of_the_product() -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Queue must be even, at least 8"):
-        build_and_test("flk_delivery", "cocotb_delivery", parameters={"Queue": 6})
-    with refused("InWidth must be 1 or 2"):
-        build_and_test("flk_delivery", "cocotb_delivery", parameters={"InWidth": 3})
+    refused("flk_delivery", {"Queue": 6}, "Queue must be even, at least 8")
+    refused("flk_delivery", {"InWidth": 3}, "InWidth must be 1 or 2")
 
 
 def test_alone() -> None:

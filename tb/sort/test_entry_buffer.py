@@ -7,7 +7,8 @@ the chip's, 512, of which clear in traffic with SLOW=1. Not covered: reset in tr
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize(("depth", "tests"), [(4, []), (10, []), (512, ["capacity"]), pytest.param(512, ["clear"], marks=pytest.mark.slow)])
@@ -16,5 +17,4 @@ def test_entry_buffer(depth: int, tests: list[str]) -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Depth must be even, at least 4"):
-        build_and_test("flk_entry_buffer", "cocotb_entry_buffer", parameters={"Depth": 5})
+    refused("flk_entry_buffer", {"Depth": 5}, "Depth must be even, at least 4")

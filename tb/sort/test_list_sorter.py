@@ -8,7 +8,8 @@ steps of eight runs, as it is, of two and four; the unit as it is with SLOW=1, w
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 SMALL = {"Cells": 16, "Stages": 5, "Runs": 16, "MergeLines": 32}
 SETTINGS = {"cells": 16, "stages": 5, "runs": 16, "merge_lines": 32}
@@ -34,7 +35,5 @@ def test_100000(ways: int) -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Lines at least twice Runs"):
-        build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={"MergeLines": 64})
-    with refused("Capacity must hold"):
-        build_and_test("flk_list_sorter", "cocotb_list_sorter", parameters={"Stages": 3})
+    refused("flk_list_sorter", {"MergeLines": 64}, "Lines at least twice Runs")
+    refused("flk_list_sorter", {"Stages": 3}, "Capacity must hold")

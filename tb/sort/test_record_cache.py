@@ -8,7 +8,8 @@ with short queues, records of 32 bytes.
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 SMALL = {"Banks": 2, "Sets": 4, "Ways": 2, "Depth": 8, "Places": 4}
 
@@ -21,5 +22,4 @@ def test_record_cache(parameters: dict[str, int]) -> None:
 
 @pytest.mark.parametrize(("parameters", "message"), [({"RecordBits": 96}, "RecordBits must be 128 or 256"), ({"Ways": 3}, "must be powers of two")])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
-    with refused(message):
-        build_and_test("flk_record_cache", "cocotb_record_cache", parameters=parameters)
+    refused("flk_record_cache", parameters, message)

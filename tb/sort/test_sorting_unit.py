@@ -9,7 +9,8 @@ with eight runs too, in everything, with cycles. Longer lists: test_list_sorter.
 from __future__ import annotations
 
 import pytest
-from flicker_tb.runner import build_and_test, refused
+from flicker_tb.elaboration import refused
+from flicker_tb.runner import build_and_test
 
 SMALL = ["lists", "many", "finished", "clear_in_the_middle"]
 
@@ -28,7 +29,5 @@ def test_sorting_unit(tests: list[str], ways: int) -> None:
 
 
 def test_illegal_parameters() -> None:
-    with refused("Cells must be a power of two"):
-        build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Cells": 12})
-    with refused("Ways must be a power of two"):
-        build_and_test("flk_sorting_unit", "cocotb_sorting_unit", parameters={"Stages": 1, "Ways": 4})
+    refused("flk_sorting_unit", {"Cells": 12}, "Cells must be a power of two")
+    refused("flk_sorting_unit", {"Stages": 1, "Ways": 4}, "Ways must be a power of two")

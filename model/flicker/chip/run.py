@@ -93,9 +93,9 @@ SUMMED = {
 }
 
 
-def stalled(cause: str, cycles: int) -> str:
-    """Cycles of a stall of `chip_stats` with their unit."""
-    return f"{cycles:,} cycle{'s' * (cycles != 1)}" + (f", sum over {SUMMED[cause]}" if cause in SUMMED else "")
+def stall_shares(stalls: Mapping[str, int], cycles: int) -> dict[str, float]:
+    """Stalls as shares of the cycles of a frame, of all the units that wait."""
+    return {cause: count / (cycles * int(SUMMED.get(cause, "1").split()[0])) for cause, count in stalls.items()}
 
 
 def counted(frame: ChipFrame, config: RenderConfig) -> dict[str, int]:
@@ -143,6 +143,11 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
             **stage.pop("busy"),
         },
     }
+    stalls = {
+        **stage.pop("stalls"),
+        **{c.stall: int(counts[c.name]) for counters, counts in ((FRONT, front), (RENDERING, rendering)) for c in counters if c.stall},
+        **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
+    }
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
@@ -155,11 +160,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
         "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
-        "stalls": {
-            **stage.pop("stalls"),
-            **{c.stall: int(counts[c.name]) for counters, counts in ((FRONT, front), (RENDERING, rendering)) for c in counters if c.stall},
-            **{f"{name.removesuffix('_waits')}, at the port": count for name, count in live.items() if "waits" in name},
-        },
+        "stalls": stalls, "stall_shares": stall_shares(stalls, cycles),
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
         "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},
         **stage,

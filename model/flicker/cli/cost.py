@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from ..errors import FlickerError
 from ..output import json_text, write_text
+from ..progress import Steps
 from .engine import FormatChoice
-from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say_source, writable, write_atomically
+from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say, say_source, writable, write_atomically
 
 
 def _picture(cost, number: int, out: Path) -> None:
@@ -71,11 +73,15 @@ def cost(
     size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory [default: chunk or as packed]")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture: Gaussians visited per pixel of the dearest view")] = None,
-    json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON")] = None,
+    json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON; -: printed, and nothing else")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
 ) -> None:
     """Say what a scene costs on the chip, view by view, and which Gaussians cost more than they give."""
+    printed = json_ == Path("-")
+    if printed and quiet:
+        raise FlickerError("--json -: not with --quiet")
     writable(out, "--out")
-    writable(json_, "--json")
+    writable(None if printed else json_, "--json")
     wanted = parse_size(size)
     check_scene(scene)
     check_there(cameras)
@@ -89,7 +95,18 @@ def cost(
     found = source.cameras
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]
     chosen = [view_of(source, n, wanted) for n in numbers]
-    result = scene_cost(source.scene, [of.camera for of in chosen], form=None if form is None else PackedFormat(form.value), steps=RichSteps())
+    result = scene_cost(source.scene, [of.camera for of in chosen], form=None if form is None else PackedFormat(form.value),
+                        steps=Steps() if printed or quiet else RichSteps())
+    if out is not None:
+        dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
+        _picture(result, dearest, out)
+    everything = {"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary()
+    if printed:
+        say(everything, True, False, Table)
+    elif json_ is not None:
+        write_text(json_, json_text(everything))
+    if printed or quiet:
+        return
     packed = result.packing.packed
     console.print(f"{scene}: {len(result.scene):,} Gaussians, {packed.format.value}, {len(packed.table):,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
     say_source(source.file, source.cameras_from)
@@ -98,8 +115,4 @@ def cost(
             console.print(f"view {of.number}: {nothing}", highlight=False, soft_wrap=True)
     _show(result, numbers)
     if out is not None:
-        dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
-        _picture(result, dearest, out)
         console.print(f"view {numbers[dearest]}: {out}")
-    if json_ is not None:
-        write_text(json_, json_text({"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary()))

@@ -8,7 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from rich.table import Table
+
 from ..errors import FlickerError
+from ..output import json_text
 from ..output import write_atomically as write_atomically
 from ..progress import Steps
 from .tables import Terminal
@@ -36,6 +39,14 @@ class RichSteps(Steps):
                       console=console, transient=True, disable=not console.is_terminal) as p:
             task = p.add_task(text, total=None)
             yield lambda done, total: p.update(task, completed=done, total=total)
+
+
+def say(found: object, as_json: bool, quiet: bool, shown: Callable[[], Table]) -> None:
+    """Print what a command has found: as JSON, not at all, or as `shown` makes it."""
+    if as_json:
+        console.file.write(json_text(found).rstrip("\n") + "\n")
+    elif not quiet:
+        console.print(shown())
 
 
 def say_source(scene: object, cameras_from: str) -> None:

@@ -28,79 +28,131 @@ from .options import (
     console,
     parse_size,
     parse_view,
+    say,
     writable,
     write_atomically,
 )
 from .pictures import Files, check_distinct, write_pictures
-from .tables import decibels
+from .tables import bar, bytes_text, decibels
 
 CompareChoice = Enum("CompareChoice", {"REFERENCE": "reference"}, type=str)
+
+
+LEFT_OUT, ADJUSTED, UNSEEN = "left out", "adjusted", "unseen"  # sections that a reader should see
+LABEL = 36  # characters of a label that is never wrapped
 
 
 def _number(value) -> str:
     return f"{value:,}" if isinstance(value, int) else str(value)
 
 
-def summary(stats: dict, picture: Path | None) -> Table:
-    """What a run prints at its end."""
-    from ..scene.files import scene_title
-
-    table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
-    table.add_column(style="bold")
-    table.add_column(justify="right", overflow="fold")  # long paths
-    if picture is not None:
-        table.add_row("picture", str(picture))
-    table.add_row("cameras", stats["cameras"])
+def _where(stats: dict, picture: Path | None) -> list[tuple[str, str]]:
+    rows = [] if picture is None else [("file", str(picture))]
+    rows += [("scene", stats["file"])] if "file" in stats else []
+    rows += [(key, stats[key]["file"]) for key in ("alpha", "depth") if key in stats]
     engine = stats["engine"]
     if "formats" in stats:
         engine += " (lanes)"
     elif engine != "reference":
         engine += f" ({stats['form']}, {stats['precision']}, cat {stats['cat']}, FIFO {stats['fifo_depth']})"
-    table.add_row("engine", engine)
+    rows += [("cameras", stats["cameras"]), ("engine", engine)]
     if stats.get("front") != "float":
-        table.add_row("front end", f"{stats['front']} ({stats['format']}, records {stats['records']})")
-    if "psnr_db" in stats:
-        table.add_row("PSNR against float64", decibels(stats["psnr_db"]))
-    for key, label in (("gaussians", "Gaussians"), ("visible", "visible"), ("list_entries", "list entries"), ("subtile_pairs", "sub-tile pairs"),
-                       ("minitiles_sent", "mini-tiles sent"), ("front_cycles", "cycles of the front end"), ("cycles", "cycles")):
-        if stats.get(key) is not None:
-            table.add_row(label, _number(stats[key]))
+        rows.append(("front end", f"{stats['front']} ({stats['format']}, records {stats['records']})"))
+    return rows
+
+
+def _work(stats: dict) -> list[tuple[str, str]]:
+    rows = [(label, _number(stats[key])) for key, label in (
+        ("gaussians", "Gaussians"), ("visible", "visible"), ("list_entries", "list entries"), ("subtile_pairs", "sub-tile pairs"),
+        ("minitiles_sent", "mini-tiles sent"),
+    ) if stats.get(key) is not None]
     if "lanes" in stats:
         lanes = stats["lanes"]
-        table.add_row("pixel visits", f"{_number(lanes['visited'])}, {lanes['skipped'] / max(lanes['visited'], 1):.1%} of them skipped")
-        if "least_cycles" in lanes:
-            table.add_row(f"cycles of {lanes['lanes']} lanes, at least", _number(lanes["least_cycles"]))
-        for cause, share in lanes.get("waiting", {}).items():
-            table.add_row(f"  lanes waiting: {cause}", f"{share:.1%} of their cycles")
-    for key, label in (("lane_utilisation", "lanes with a pair that counts"), ("vru_utilisation", "VRU utilisation"),
-                       ("ctu_utilisation", "CTU utilisation"), ("ctu_stall_rate", "CTU stall rate")):
-        if key in stats:
-            table.add_row(label, f"{stats[key]:.1%}")
-    if "phases" in stats:
-        from ..chip.run import stalled
+        rows.append(("pixel visits", f"{_number(lanes['visited'])}, {lanes['skipped'] / max(lanes['visited'], 1):.1%} of them skipped"))
+    return rows
 
-        for name, cycles in stats["phases"].items():
-            table.add_row(f"  {name}", f"{cycles:,} cycles")
-        for name, (read, written) in stats["dram_bytes"].items():
-            table.add_row(f"  bytes of {name}", " + ".join(f"{_number(n)} {what}" for n, what in ((read, "read"), (written, "written")) if n))
-        moved = sum(map(sum, stats["dram_bytes"].values()))
-        table.add_row("memory", f"{moved / 1e6:.2f} MB, {stats['dram_efficiency']:.0%} of the peak rate, refresh {stats['refresh']}")
-        for cause, cycles in stats["stalls"].items():
-            if cycles:
-                table.add_row(f"  stalled: {cause}", stalled(cause, cycles))
-        table.add_row("bottleneck", stats["bottleneck"])
+
+def _time(stats: dict) -> list[tuple[str, str]]:
+    rows = []
+    if stats.get("cycles") is not None:
+        whole = "frames_per_second" in stats
+        rows.append(("frame" if whole else "rendering stage", f"{stats['cycles']:,} cycles"))
+        rows.append(("  at 1 GHz", f"{stats['milliseconds']:.3f} ms" + (f", {stats['frames_per_second']:,.0f} a second" if whole else "")))
+    if stats.get("front_cycles") is not None:
+        rows.append(("front end", f"{stats['front_cycles']:,} cycles"))
+    rows += [(f"  {name}", f"{cycles:,} cycles") for name, cycles in stats.get("phases", {}).items()]
+    if "least_cycles" in stats.get("lanes", {}):
+        rows.append((f"{stats['lanes']['lanes']} lanes, at least", f"{stats['lanes']['least_cycles']:,} cycles"))
+    if "bottleneck" in stats:
+        rows.append(("bottleneck", stats["bottleneck"]))
     if stats.get("simulated_cycles_per_second"):
-        table.add_row("simulation speed", f"{stats['simulated_cycles_per_second']:,} cycles/s")
-    for reason, count in {**stats["gaussians_left_out"], **stats["adjusted"]}.items():
-        table.add_row(Text(reason, "yellow"), _number(count))
-    for key, label in (("alpha", "alpha"), ("depth", "depth of the float64 reference")):
-        if key in stats:
-            table.add_row(label, stats[key]["file"])
+        rows.append(("simulation", f"{stats['simulated_cycles_per_second']:,} cycles a second"))
+    return rows
+
+
+def _busy(stats: dict) -> list[tuple[str, str]]:
+    rows = [(label, bar(stats[key])) for key, label in (
+        ("lane_utilisation", "lanes with a pair that counts"), ("vru_utilisation", "VRUs"), ("ctu_utilisation", "CTU"),
+    ) if key in stats]
+    return rows + [(f"{half}: {part}", bar(share)) for half, parts in stats.get("busy", {}).items() for part, share in parts.items()]
+
+
+def _memory(stats: dict) -> list[tuple[str, str]]:
+    if "dram_bytes" not in stats:
+        return []
+    moved = sum(map(sum, stats["dram_bytes"].values()))
+    rows = [("all", f"{bytes_text(moved)}, {stats['dram_efficiency']:.0%} of the peak rate, refresh {stats['refresh']}")]
+    return rows + [
+        (name, ", ".join(f"{bytes_text(n)} {what}" for n, what in ((read, "read"), (written, "written")) if n))
+        for name, (read, written) in stats["dram_bytes"].items()
+    ]
+
+
+def _waits(stats: dict, front: bool) -> list[tuple[str, str]]:
+    """Shares of the cycles in which something waits, the longest first: of the front end, or of the rest."""
+    shares = {cause: share for cause, share in stats.get("stall_shares", {}).items() if share}
+    if not front:
+        shares |= {f"lanes: {cause}": share for cause, share in stats.get("lanes", {}).get("waiting", {}).items()}
+        shares |= {"CTU": stats["ctu_stall_rate"]} if "ctu_stall_rate" in stats else {}
+    begun = "front end, "
+    found = {cause.removeprefix(begun): share for cause, share in shares.items() if cause.startswith(begun) == front}
+    return [(cause, bar(share)) for cause, share in sorted(found.items(), key=lambda entry: -entry[1])]
+
+
+def summary(stats: dict, picture: Path | None) -> Table:
+    """What a run prints at its end, by section; all of it is in its statistics."""
+    from ..scene.files import scene_title
+
+    table = Table(show_header=False, title=f"{scene_title(stats['scene'])}, view {stats['view']}, {stats['width']}x{stats['height']}")
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_column(overflow="fold")  # long paths
+    sections: list[tuple[str, list[tuple[str, str]]]] = [
+        ("picture", _where(stats, picture)),
+        ("quality", [("PSNR against float64", decibels(stats["psnr_db"]))] if "psnr_db" in stats else []),
+        ("work", _work(stats)), ("time", _time(stats)), ("memory", _memory(stats)), ("busy", _busy(stats)), ("waits", _waits(stats, False)),
+        ("  front end", _waits(stats, True)),
+        (LEFT_OUT, [(reason, _number(count)) for reason, count in stats["gaussians_left_out"].items()]),
+        (ADJUSTED, [(reason, _number(count)) for reason, count in stats["adjusted"].items()]),
+    ]
     if "unseen" in stats:
-        for reason, count in stats["unseen"].items():
-            table.add_row(Text(f"nothing is seen: {reason}", "yellow"), _number(count))
-        table.add_row(Text("what may help", "yellow"), stats["advice"])
+        nothing = [(f"nothing is seen: {reason}", _number(count)) for reason, count in stats["unseen"].items()]
+        sections.append((UNSEEN, [*nothing, ("what may help", stats["advice"])]))
+    for name, rows in sections:
+        colour = "yellow" if name in (LEFT_OUT, ADJUSTED, UNSEEN) else ""
+        for number, (label, value) in enumerate(rows):
+            table.add_row("" if number else name, Text(label, colour, no_wrap=len(label) <= LABEL), value, end_section=number == len(rows) - 1)
     return table
+
+
+def timed(stats: dict, whole: bool) -> dict:
+    """Statistics with the time of a frame at the chip's clock; of the whole chip also frames a second."""
+    if not stats.get("cycles"):
+        return stats
+    from ..chip.constants import CLOCK_HZ
+
+    seconds = stats["cycles"] / CLOCK_HZ
+    return stats | {"milliseconds": 1e3 * seconds} | ({"frames_per_second": 1 / seconds} if whole else {})
 
 
 @takes_engine
@@ -126,8 +178,12 @@ def render(
     )] = None,
     alpha: Annotated[Path | None, typer.Option(help="what the engine's Gaussians cover of each pixel (.png of 16 bits, 65535: all); not of a chip")] = None,
     stats: Annotated[Path | None, typer.Option(help="statistics (.json)")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="print the statistics as JSON, and nothing else")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
 ) -> None:
     """Render one view of a scene, or all."""
+    if json_ and quiet:
+        raise FlickerError("--json: not with --quiet")
     number = parse_view(view)
     results = [Files(option, path, number is None) for option, path in (("--out", out), ("--depth", depth), ("--alpha", alpha))]
     check_distinct(results)
@@ -139,7 +195,7 @@ def render(
     wanted, behind = parse_size(size), background_of(background)
     check_scene(scene)
     check_there(cameras)
-    steps = RichSteps()
+    steps = Steps() if json_ or quiet else RichSteps()
     with steps.step("starting"):
         from ..front.unseen import advice, unseen
         from ..front.view import view_of
@@ -160,18 +216,17 @@ def render(
             from ..device import render_on_device
 
             result = render_on_device(loaded, device, config=drawing.config, options=drawing.options, compare=compare is not None, steps=told)
-        found = result.stats | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
+        found = timed(result.stats, chosen.whole) | {"background": list(behind)} | write_pictures(loaded, result, *(files.of(k) for files in results))
         empty = unseen(loaded, result.image, found.get("visible"))
         return found if empty is None else found | {"unseen": empty, "advice": advice(empty, source.cameras_from, len(source.cameras))}
 
     if number is not None:
         found = one(number, steps)
+        if source.file != str(scene):
+            found["file"] = source.file
         if stats is not None:
             write_text(stats, json_text(found))
-        table = summary(found, out)
-        if source.file != str(scene):
-            table.add_row("scene", source.file)
-        console.print(table)
+        say(found, json_, quiet, lambda: summary(found, out))
         return
     rows: list[dict] = []
     try:
@@ -182,8 +237,11 @@ def render(
         if stats is not None and rows:
             write_text(stats, json_text(rows))
         if 0 < len(rows) < len(source.cameras):
-            console.print(f"{len(rows)} of {len(source.cameras)} views are written", highlight=False)
-    console.print(_of_all(rows, source.file))
+            if not (json_ or quiet):
+                console.print(f"{len(rows)} of {len(source.cameras)} views are written", highlight=False)
+    say(rows, json_, quiet, lambda: _of_all(rows, source.file))
+    if json_ or quiet:
+        return
     for files in results:
         if files.path is not None:
             console.print(f"{files}: {len(rows)} views", highlight=False, soft_wrap=True)
@@ -231,11 +289,11 @@ def demo(
             rtl = render_on_chip(view, Engine.CHIP, config=RECOMMENDED, compare=True, steps=steps)
             if not (golden.image == rtl.image).all():
                 raise FlickerError("demo: the chip's picture differs from its golden model's")
-            stats = rtl.stats | {"scene": str(folder / scene_path.name)}
+            stats = timed(rtl.stats, True) | {"scene": str(folder / scene_path.name)}
             write_atomically(made / "demo.png", lambda path: save_png(path, rtl.image))
             write_text(made / "stats.json", json_text(stats))
     except KeyboardInterrupt:
         raise Interrupted(f"nothing was written to {folder}; simulators that were built are kept, and the same command begins anew") from None
     table = summary(stats, folder / "demo.png")
-    table.add_row("golden model", "equal, bit for bit")
+    table.add_row("check", "golden model", "equal, bit for bit")
     console.print(table)

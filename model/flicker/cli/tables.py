@@ -10,6 +10,7 @@ from rich.console import Console, ConsoleDimensions
 from rich.table import Column, Table
 from rich.text import Text
 
+BAR = 12  # columns of a bar
 PIPE = 1_000_000  # columns of what is no terminal: nothing is wrapped there
 _FIGURE = re.compile(r"[-+(]*\d[\d.,:x%)^-]*$")
 _FOLDED = 20  # characters of a word, such as a path, that a narrow column may break; figures are never broken
@@ -18,6 +19,18 @@ _FOLDED = 20  # characters of a word, such as a path, that a narrow column may b
 def decibels(value: float | None, digits: int = 2, unit: str = " dB") -> str:
     """A PSNR; None and infinity are those of equal pictures."""
     return "equal" if value is None or value == math.inf else f"{value:.{digits}f}{unit}"
+
+
+def bytes_text(count: int) -> str:
+    """A number of bytes in the unit that leaves three figures or more."""
+    return f"{count / 1e6:,.2f} MB" if count >= 1e6 else f"{count / 1e3:,.1f} KB" if count >= 1e4 else f"{count:,} bytes"
+
+
+def bar(share: float, columns: int = BAR) -> str:
+    """A share as a bar with its percentage; shares of sums may lie above 1."""
+    eighths = min(max(round(8 * columns * share), 0), 8 * columns)
+    full, rest = divmod(eighths, 8)
+    return ("█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")).ljust(columns) + f" {share:6.1%}"
 
 
 class Terminal(Console):
@@ -48,7 +61,7 @@ class Terminal(Console):
 
 
 def _text(cell: Any, console: Console) -> Text:
-    return cell if isinstance(cell, Text) else console.render_str(str(cell))
+    return cell.copy() if isinstance(cell, Text) else console.render_str(str(cell))
 
 
 def _natural(texts: list[Text]) -> int:
@@ -56,9 +69,12 @@ def _natural(texts: list[Text]) -> int:
 
 
 def _least(texts: list[Text]) -> int:
-    """Columns that the longest word needs, behind the indentation of its line."""
+    """Columns that the longest word needs, behind the indentation of its line; of a text that is not to be wrapped all."""
     found = 1
     for text in texts:
+        if text.no_wrap:
+            found = max(found, text.cell_len)
+            continue
         for line in text.plain.splitlines():
             indent = len(line) - len(line.lstrip())
             words = (len(word) if _FIGURE.match(word) else min(len(word), _FOLDED) for word in line.split())
@@ -113,6 +129,10 @@ def fitted(table: Table, console: Console) -> list[Table]:
 
     every = list(range(len(cells)))
     widths = _widths(table, shown, room(len(every)))
+    if widths is None:  # what is better not wrapped is, rather than too wide
+        for text in (text for column in shown for text in column):
+            text.no_wrap = False
+        widths = _widths(table, shown, room(len(every)))
     if widths is not None:
         return [made(every, widths)]
     first = next((k for k, column in enumerate(table.columns) if k and column.justify == "right" and all(
