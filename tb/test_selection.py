@@ -117,9 +117,10 @@ def test_as_many_as_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     assert check.fitting(tests, 400, 2) == tests
 
 
-def test_every_test_file_has_a_cost() -> None:
-    """The order of a run and `make check` go by tb/costs.csv."""
-    assert set(check.costs()) == {path.relative_to(ROOT).as_posix() for path in inputs.test_files()}
+def test_costs_are_of_test_files() -> None:
+    """The order of a run and `make check` go by tb/costs.csv: no line is left over, and few files are without one (these count as UNKNOWN)."""
+    files = {path.relative_to(ROOT).as_posix() for path in inputs.test_files()}
+    assert check.costs().keys() <= files and len(files - check.costs().keys()) <= len(files) // 20
 
 
 def test_what_changed(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
