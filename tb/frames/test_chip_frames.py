@@ -315,10 +315,12 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     if seed() == 1:
         figures.hold(f"RTL, {part}, cycles of the rendering half", cycles)
         figures.hold(f"model over RTL, {part}, cycles of the rendering half", modelled / cycles)
-    # Entries of lists that are sorted twice count twice.
+    # Entries of lists that are sorted twice count twice. How many they are follows from lines of runs, which hold 9 to 15 and count as their mean.
     entries = np.diff(tables.start)
-    work = np.where(entries > CONFIG.chip_memories.sorted_entries, 2, 1) * entries
-    assert stats["busy"]["rendering"]["sorting units"] * cycles == pytest.approx(max(work[k::4].sum() for k in range(4)), rel=0.01)
+    again = entries > CONFIG.chip_memories.sorted_entries
+    work = np.where(again, 2, 1) * entries
+    units = stats["busy"]["rendering"]["sorting units"] * cycles
+    assert units == pytest.approx(max(work[k::4].sum() for k in range(4)), rel=0.13 if again.any() else 0.01)
 
 
 def test_opaque_layers() -> None:
