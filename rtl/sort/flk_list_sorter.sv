@@ -81,7 +81,8 @@ module flk_list_sorter #(
 
   logic                                  unit_idle, merge_idle;
   logic                                  run_valid, run_ready, run_end, merging, stop;
-  logic [EntryBits-1:0]                  run_entry;
+  logic [EntryBits-1:0]                  run_entry, held_entry;
+  logic                                  held_valid, held_ready, held_end, pack_idle;
   logic                                  again_valid, again_ready, limited, last, is_final;
   logic [LineBits-1:0]                   again_entries;
   logic [3:0]                            again_count;
@@ -140,7 +141,21 @@ module flk_list_sorter #(
   );
 
   // Runs of the next list wait until the last one has left the memory.
-  assign run_ready = pack_ready && !begun_q;
+  assign run_ready = held_ready && !begun_q;
+
+  flk_skid_buffer #(
+    .Width(EntryBits + 1)
+  ) i_held (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (run_valid && !begun_q),
+    .in_ready_o (held_ready),
+    .in_data_i  ({run_end, run_entry}),
+    .out_valid_o(held_valid),
+    .out_ready_i(pack_ready),
+    .out_data_o ({held_end, held_entry})
+  );
 
   flk_run_writer #(
     .LineEntries(LineEntries),
@@ -157,10 +172,11 @@ module flk_list_sorter #(
     .clear_i     (1'b0),
     .start_i     (merge_done),
     .drop_i      (full),
-    .in_valid_i  (run_valid && !begun_q),
+    .idle_o      (pack_idle),
+    .in_valid_i  (held_valid),
     .in_ready_o  (pack_ready),
-    .in_end_i    (run_end),
-    .in_entry_i  (run_entry),
+    .in_end_i    (held_end),
+    .in_entry_i  (held_entry),
     .out_valid_o (write_valid_o),
     .out_ready_i (write_ready_i),
     .out_number_o(number),
@@ -188,7 +204,7 @@ module flk_list_sorter #(
   end
 
   assign write_beat_o = beat_q;
-  assign waits_o      = merging && !begun_q;
+  assign waits_o      = merging && !begun_q && !held_valid && pack_idle;
   assign begin_merge  = waits_o && written_i;
 
   flk_run_merge #(
@@ -248,7 +264,7 @@ module flk_list_sorter #(
       error_q <= 1'b0;
     end else begin
       begun_q <= begun_q ? merging || !merge_idle : begin_merge;
-      error_q <= (error_q && !start_i) || fault || (full && run_valid && !begun_q);
+      error_q <= (error_q && !start_i) || fault || (full && !pack_idle);
     end
   end
 

@@ -6,8 +6,9 @@
 // before it. start_i, while nothing is inside, begins with 0 again. When a run's last line has been taken its
 // first and last key and the lines it took are offered as run_*; its end is taken with these.
 // drop_i: a run that begins is swallowed with its end, and gives no line.
-// Throughput: an entry a cycle, two cycles for an end. Combinational: in_entry_i, in_valid_i and in_end_i to
-// out_valid_o, these, out_ready_i and run_ready_i to in_ready_o. clear_i (synchronous) empties it.
+// idle_o: what was taken is in lines that were taken, or in the open one.
+// Latency: a cycle. Throughput: an entry a cycle, two cycles for an end. Combinational: out_ready_i, run_ready_i and
+// drop_i to in_ready_o. clear_i (synchronous) empties it.
 module flk_run_writer #(
   parameter  int unsigned LineEntries  = 9,    // of a plain line
   parameter  int unsigned ShortEntries = 15,   // of a short one
@@ -26,6 +27,7 @@ module flk_run_writer #(
   input  logic                  clear_i,
   input  logic                  start_i,
   input  logic                  drop_i,
+  output logic                  idle_o,
   // Entries
   input  logic                  in_valid_i,
   output logic                  in_ready_o,
@@ -63,7 +65,7 @@ module flk_run_writer #(
 
   typedef logic [EntryBits-1:0] entry_t;
 
-  entry_t                        entry_in, newest_q;  // with key and record exchanged
+  entry_t                        entry_in, entry_q, newest_q;  // with key and record exchanged
   logic [Columns-1:0][EntryBits-1:0] places_q, places_d;  // the others of a line
   logic [TailBits-1:0]           tail_q, tail_d;
   logic [CountBits-1:0]          count_q;
@@ -72,6 +74,7 @@ module flk_run_writer #(
   logic [NumberBits-1:0]         number_q, run_number_q;
   logic [RunBits-1:0]            lines_q;
   logic                          begun_q, drop_q, drop, is_near, joins;
+  logic                          valid_q, end_q, near_q, ready;
   logic                          entry, line, written;
 
   assign entry_in = {in_entry_i[MaskBits+:Half], in_entry_i[MaskBits+Half+:Half],
@@ -84,32 +87,52 @@ module flk_run_writer #(
     .RecordKept(RecordKept),
     .KeyKept   (KeyKept)
   ) i_near (
-    .older_i(newest_q),
+    .older_i(entry_q),
     .newer_i(entry_in),
     .near_o (is_near)
   );
 
+  // An entry, and whether it is near the one before it, which takes a good part of a cycle.
+  assign in_ready_o = !valid_q || ready;
+  assign idle_o     = !valid_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      valid_q <= 1'b0;
+    end else begin
+      valid_q <= (in_valid_i || !in_ready_o) && !clear_i;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (in_valid_i && in_ready_o) begin
+      entry_q <= entry_in;
+      end_q   <= in_end_i;
+      near_q  <= is_near;
+    end
+  end
+
   // A run is swallowed or not as a whole.
   assign drop    = begun_q ? drop_q : drop_i;
   assign joins   = count_q < CountBits'(LineEntries) ||
-                   (tight_q && is_near && count_q != CountBits'(ShortEntries));
-  assign line    = in_valid_i && !drop && (in_end_i ? count_q != '0 : !joins);
+                   (tight_q && near_q && count_q != CountBits'(ShortEntries));
+  assign line    = valid_q && !drop && (end_q ? count_q != '0 : !joins);
   assign written = line && out_ready_i;
 
   always_comb begin
     if (drop) begin
-      in_ready_o = 1'b1;
-    end else if (in_end_i) begin
-      in_ready_o = count_q == '0 && run_ready_i;
+      ready = 1'b1;
+    end else if (end_q) begin
+      ready = count_q == '0 && run_ready_i;
     end else begin
-      in_ready_o = joins || out_ready_i;
+      ready = joins || out_ready_i;
     end
   end
 
-  assign entry        = in_valid_i && in_ready_o && !in_end_i && !drop;
+  assign entry        = valid_q && ready && !end_q && !drop;
   assign out_valid_o  = line;
   assign out_number_o = number_q;
-  assign run_valid_o  = in_valid_i && in_end_i && !drop && count_q == '0;
+  assign run_valid_o  = valid_q && end_q && !drop && count_q == '0;
   assign run_first_o  = first_q;
   assign run_last_o   = {newest_q[MaskBits+:Half], newest_q[MaskBits+Half+:Half]};
   assign run_lines_o  = lines_q;
@@ -164,11 +187,11 @@ module flk_run_writer #(
       begun_q      <= 1'b0;
       drop_q       <= 1'b0;
     end else begin
-      if (in_valid_i && !begun_q) begin
+      if (valid_q && !begun_q) begin
         drop_q <= drop_i;
       end
-      if (in_valid_i) begin
-        begun_q <= !(in_end_i && in_ready_o);
+      if (valid_q) begin
+        begun_q <= !(end_q && ready);
       end
       if (written) begin
         count_q  <= CountBits'(entry);
@@ -194,8 +217,8 @@ module flk_run_writer #(
 
   always_ff @(posedge clk_i) begin
     if (entry) begin
-      newest_q <= entry_in;
-      tight_q  <= count_q == '0 || line || (tight_q && is_near);
+      newest_q <= entry_q;
+      tight_q  <= count_q == '0 || line || (tight_q && near_q);
     end
     if (entry && (line || count_q == '0)) begin
       places_q <= '0;
@@ -205,7 +228,7 @@ module flk_run_writer #(
       tail_q   <= tail_d;
     end
     if (entry && count_q == '0 && lines_q == '0) begin
-      first_q <= in_entry_i[EntryBits-1:MaskBits];
+      first_q <= {entry_q[MaskBits+:Half], entry_q[MaskBits+Half+:Half]};
     end
   end
 

@@ -334,7 +334,7 @@ def _front() -> list[Unit]:
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
-        unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_memory", "512 x 52", Depth=512),
+        unit("flk_entry_near"), unit("flk_line_entry"), unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_memory", "512 x 52", Depth=512),
         unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),
         *(unit("flk_sort_select", f"{ways} runs of {2048 // ways}", Run=2048 // ways, Ways=ways) for ways in (2, 8)),
         unit("flk_sorting_unit"), unit("flk_sorting_unit", "2 runs in the last step", Ways=2), unit("flk_run_writer"), unit("flk_run_merge"),
