@@ -177,6 +177,9 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_opacity_to_fp16": ["opacity_o[15]"],
         # A record of two quarters lies at the first.
         "flk_record_writer": [f"in_place_i[{9 * lane}]" for lane in range(4)] if parameters.get("Quarters") == 2 else [],
+        # Masks are not compared, nor made from another entry's.
+        "flk_entry_near": [f"{side}_i[{bit}]" for side in ("older", "newer") for bit in range(4)],
+        "flk_line_entry": [f"newer_i[{bit}]" for bit in range(4)],
         "flk_splat_setup": ["record_i[127]"],  # what is spiky the lanes do not ask
         "flk_row_mask": [f"splat_i[{bit}]" for bit in range(30)],  # colours
         "flk_lane_core": [f"in_elem_i[{153 * way + 151}]" for way in range(parameters.get("InWidth", 1))],  # record_i[127]
