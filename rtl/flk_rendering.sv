@@ -112,7 +112,7 @@ module flk_rendering
 
   state_e     state_q;
   logic       start, pixels_done, lines_idle, quiet, done_q;
-  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error;
+  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error, again;
   logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
 
   assign start  = state_q == START && delivery_idle;
@@ -281,6 +281,7 @@ module flk_rendering
       .entries_o    (entries[u]),
       .readings_o   (readings[u]),
       .dropped_o    (dropped[u]),
+      .again_o      (again[u]),
       .in_valid_i   (list_valid[u]),
       .in_ready_o   (list_ready[u]),
       .in_entries_i (line_entries),
@@ -662,8 +663,8 @@ module flk_rendering
   // ---- counters -------------------------------------------------------------------------------------
 
   logic [31:0]                       cycles_q;
-  logic [RENDERING_EVENTS-1:0][3:0]  waits;    // by sorting unit or core
-  logic [RENDERING_EVENTS-1:0][31:0] waited;
+  logic [RENDERING_EVENTS-1:0][3:0]  events;   // by sorting unit or core
+  logic [RENDERING_EVENTS-1:0][31:0] totals;
   logic [CORES-1:0]                  first_valid;
 
   for (genvar k = 0; k < CORES; k++) begin : gen_first
@@ -680,25 +681,26 @@ module flk_rendering
     end
   end
 
-  assign waits[RENDERING_EVENT_LIST_WAITS]    = list_valid & ~list_ready;
-  assign waits[RENDERING_EVENT_SORTED_WAITS]  = sorted_valid & ~sorted_ready;
-  assign waits[RENDERING_EVENT_ENTRY_MISSING] = 4'(delivery_waits[0] && running_q);
-  assign waits[RENDERING_EVENT_ENTRY_WAITS]   = 4'(delivery_waits[1]);
-  assign waits[RENDERING_EVENT_QUEUE_WAITS]   = 4'(delivery_waits[2]);
-  assign waits[RENDERING_EVENT_CACHE_WAITS]   = 4'(delivery_waits[3]);
-  assign waits[RENDERING_EVENT_RECORD_WAITS]  = first_valid & ~record_ready;
-  assign waits[RENDERING_EVENT_PAIR_WAITS]    = has & ~open;
-  assign waits[RENDERING_EVENT_FRAME_WAITS]   = 4'(line_valid && !line_ready);
+  assign events[RENDERING_EVENT_LIST_WAITS]    = list_valid & ~list_ready;
+  assign events[RENDERING_EVENT_SORTED_WAITS]  = sorted_valid & ~sorted_ready;
+  assign events[RENDERING_EVENT_ENTRY_MISSING] = 4'(delivery_waits[0] && running_q);
+  assign events[RENDERING_EVENT_ENTRY_WAITS]   = 4'(delivery_waits[1]);
+  assign events[RENDERING_EVENT_QUEUE_WAITS]   = 4'(delivery_waits[2]);
+  assign events[RENDERING_EVENT_CACHE_WAITS]   = 4'(delivery_waits[3]);
+  assign events[RENDERING_EVENT_RECORD_WAITS]  = first_valid & ~record_ready;
+  assign events[RENDERING_EVENT_PAIR_WAITS]    = has & ~open;
+  assign events[RENDERING_EVENT_FRAME_WAITS]   = 4'(line_valid && !line_ready);
+  assign events[RENDERING_EVENT_SORTED_AGAIN]  = again;
 
   flk_event_counters #(
     .Counters(RENDERING_EVENTS),
     .Sources (4)
-  ) i_waits (
+  ) i_events (
     .clk_i,
     .rst_ni,
     .clear_i (start),
-    .events_i(waits),
-    .values_o(waited)
+    .events_i(events),
+    .values_o(totals)
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -712,7 +714,7 @@ module flk_rendering
   end
 
   always_comb begin
-    counters_o          = rendering_events(waited);
+    counters_o          = rendering_events(totals);
     counters_o.cycles   = cycles_q;
     counters_o.entries  = entries;
     counters_o.readings = readings;

@@ -14,7 +14,7 @@
 #define FLK_VERSION_MAJOR_RESET 0x3u
 #define FLK_VERSION_MINOR_MASK 0x0000ff00u
 #define FLK_VERSION_MINOR_SHIFT 8
-#define FLK_VERSION_MINOR_RESET 0x2u
+#define FLK_VERSION_MINOR_RESET 0x3u
 
 #define FLK_CAPABILITY_OFFSET 0x008u
 #define FLK_CAPABILITY_STAGE_MASK 0x0000000fu
@@ -430,6 +430,7 @@
 #define FLK_COUNTER_RECORD_WAITS 58  /* cycles in which a record at the end of its queue waits for its core, of all four */
 #define FLK_COUNTER_PAIR_WAITS 59  /* cycles in which a core waits for a place in the frame writer, of all four */
 #define FLK_COUNTER_FRAME_WAITS 60  /* cycles in which a line of the frame buffer waits for its write */
+#define FLK_COUNTER_SORTED_AGAIN 61  /* entries of lists that are sorted twice, of all four sorting units */
 #define FLK_COUNTER_LIVE_CYCLES 64  /* cycles */
 #define FLK_COUNTER_LIVE_RECORD_BEATS 65  /* beats read, of 32 bytes: records */
 #define FLK_COUNTER_LIVE_LIST_BEATS 66  /* beats read: lists and pointers */

@@ -72,6 +72,7 @@ RENDERING = (
     Counter("record_waits", 58, 1, 32, "records for cores", 4, "cores", "cycles in which a record at the end of its queue waits for its core, of all four"),
     Counter("pair_waits", 59, 1, 32, "cores for the frame writer", 4, "cores", "cycles in which a core waits for a place in the frame writer, of all four"),
     Counter("frame_waits", 60, 1, 32, "lines of the frame buffer", 1, "", "cycles in which a line of the frame buffer waits for its write"),
+    Counter("sorted_again", 61, 1, 32, "", 1, "", "entries of lists that are sorted twice, of all four sorting units"),
 )
 
 STAMPS = (

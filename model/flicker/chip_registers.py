@@ -139,6 +139,7 @@ class ChipCounter(IntEnum):
     RECORD_WAITS = 58  # cycles in which a record at the end of its queue waits for its core, of all four
     PAIR_WAITS = 59  # cycles in which a core waits for a place in the frame writer, of all four
     FRAME_WAITS = 60  # cycles in which a line of the frame buffer waits for its write
+    SORTED_AGAIN = 61  # entries of lists that are sorted twice, of all four sorting units
     LIVE_CYCLES = 64  # cycles
     LIVE_RECORD_BEATS = 65  # beats read, of 32 bytes: records
     LIVE_LIST_BEATS = 66  # beats read: lists and pointers

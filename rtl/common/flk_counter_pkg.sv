@@ -12,7 +12,7 @@ package flk_counter_pkg;
   // Words of each half that are kept of a frame, and of those that run on.
   localparam int unsigned FRONT_WAITS = 11;
   localparam int unsigned FRONT_WORDS = 45;
-  localparam int unsigned RENDERING_WORDS = 27;
+  localparam int unsigned RENDERING_WORDS = 28;
   localparam int unsigned LIVE_WORDS = 20;
   localparam int unsigned STAMP_WORDS = 4;
 
@@ -129,7 +129,7 @@ package flk_counter_pkg;
   endfunction
 
   // Places of the rendering events in their flk_event_counters.
-  localparam int unsigned RENDERING_EVENTS = 9;
+  localparam int unsigned RENDERING_EVENTS = 10;
   localparam int unsigned RENDERING_EVENT_LIST_WAITS = 0;
   localparam int unsigned RENDERING_EVENT_SORTED_WAITS = 1;
   localparam int unsigned RENDERING_EVENT_ENTRY_MISSING = 2;
@@ -139,6 +139,7 @@ package flk_counter_pkg;
   localparam int unsigned RENDERING_EVENT_RECORD_WAITS = 6;
   localparam int unsigned RENDERING_EVENT_PAIR_WAITS = 7;
   localparam int unsigned RENDERING_EVENT_FRAME_WAITS = 8;
+  localparam int unsigned RENDERING_EVENT_SORTED_AGAIN = 9;
 
   typedef struct packed {
     // cycles of the rendering half, start to end
@@ -169,6 +170,8 @@ package flk_counter_pkg;
     logic [31:0] pair_waits;
     // cycles in which a line of the frame buffer waits for its write
     logic [31:0] frame_waits;
+    // entries of lists that are sorted twice, of all four sorting units
+    logic [31:0] sorted_again;
   } rendering_counters_t;
 
   // Those that events count; the others are zero.
@@ -184,6 +187,7 @@ package flk_counter_pkg;
     rendering_events.record_waits = totals[RENDERING_EVENT_RECORD_WAITS];
     rendering_events.pair_waits = totals[RENDERING_EVENT_PAIR_WAITS];
     rendering_events.frame_waits = totals[RENDERING_EVENT_FRAME_WAITS];
+    rendering_events.sorted_again = totals[RENDERING_EVENT_SORTED_AGAIN];
   endfunction
 
   // In the order in which flk_frame_counters takes them; a word without a counter is zero.
@@ -262,6 +266,7 @@ package flk_counter_pkg;
     rendering_counter_words[24] = counters.record_waits;
     rendering_counter_words[25] = counters.pair_waits;
     rendering_counter_words[26] = counters.frame_waits;
+    rendering_counter_words[27] = counters.sorted_again;
     rendering_counter_words[14] = stamps[0];
     rendering_counter_words[15] = stamps[1];
     rendering_counter_words[16] = stamps[2];

@@ -5,6 +5,7 @@
 // and the unit takes them again. in_*, out_*, finish_i and the counters: flk_sorting_unit.
 // write_*: lines, with the address of each; written_i, while waits_o: what was taken is in memory and will be read
 // as written (low in the cycle after a line was taken, until then). base_i stays while idle_o is low.
+// again_o: an entry goes into a run, and will be sorted a second time.
 // error_o, until start_i: the list has more runs than fit, of which the far ones of the reading are left out, or what
 // was read of them is wrong; what there is leaves all the same. start_i while idle_o.
 module flk_list_sorter #(
@@ -38,6 +39,7 @@ module flk_list_sorter #(
   output logic [31:0]                           entries_o,
   output logic [31:0]                           readings_o,
   output logic [31:0]                           dropped_o,
+  output logic                                  again_o,
   // Lines
   input  logic                                  in_valid_i,
   output logic                                  in_ready_o,
@@ -142,6 +144,7 @@ module flk_list_sorter #(
 
   // Runs of the next list wait until the last one has left the memory.
   assign run_ready = held_ready && !begun_q;
+  assign again_o   = run_valid && run_ready && !run_end;
 
   flk_skid_buffer #(
     .Width(EntryBits + 1)

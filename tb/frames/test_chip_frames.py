@@ -277,7 +277,7 @@ def test_what_a_frame_tells() -> None:
     """Shares of the DRAM's rate and bytes of the halves add up to those of the frame."""
     dram = DramConfig(refresh=Refresh.PER_BANK)
     with session(memory=MemoryOptions(dram.timing)) as chip:
-        stats = chip_stats(chip, chip.render(camera()), camera(), CONFIG, dram)
+        stats = chip_stats(chip, chip.render(camera()), CONFIG, dram)
     live, moved = stats["counters"]["live"], stats["dram_bytes"]
     assert [64 * live[f"{name}_beats"] for name in ("table", "geometry", "colour")] == [
         moved["table"][0], moved["headers"][0] + moved["geometry"][0], moved["colour"][0],
@@ -305,7 +305,7 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     dram = DramConfig(channels=channels)
     view = Camera(width, width, 80.0, 80.0, np.zeros(3), np.eye(3))
     with session(specks(count, size, width / 170), memory=MemoryOptions(dram.timing)) as chip:
-        stats = chip_stats(chip, check(chip, view), view, CONFIG, dram)
+        stats = chip_stats(chip, check(chip, view), CONFIG, dram)
         front = run_front(chip.packed, view)
     assert stats["bottleneck"].startswith(part), (stats["bottleneck"], stats["phases"], stats["busy"])
     # The model of the rendering half is that of this chip.
@@ -315,12 +315,12 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     if seed() == 1:
         figures.hold(f"RTL, {part}, cycles of the rendering half", cycles)
         figures.hold(f"model over RTL, {part}, cycles of the rendering half", modelled / cycles)
-    # Entries of lists that are sorted twice count twice. How many they are follows from lines of runs, which hold 9 to 15 and count as their mean.
+    # Entries of lists that are sorted twice count twice.
     entries = np.diff(tables.start)
     again = entries > CONFIG.chip_memories.sorted_entries
     work = np.where(again, 2, 1) * entries
-    units = stats["busy"]["rendering"]["sorting units"] * cycles
-    assert units == pytest.approx(max(work[k::4].sum() for k in range(4)), rel=0.13 if again.any() else 0.01)
+    assert stats["counters"]["rendering"]["sorted_again"] == entries[again].sum() and again.any() == (part == "rendering: sorting units")
+    assert stats["busy"]["rendering"]["sorting units"] * cycles == pytest.approx(max(work[k::4].sum() for k in range(4)), rel=0.01)
 
 
 def test_opaque_layers() -> None:

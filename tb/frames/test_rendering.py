@@ -121,6 +121,8 @@ def check(size: tuple[int, int], config: RenderConfig = CONFIG, format_: PixelFo
             assert entries + rtl.counters["dropped"].sum() == len(front.entry_tile)
             assert due.lines <= lines <= due.lines + due.runs
         assert readings == due.lists and rtl.traffic["lists"].write_beats == frames * due.runs
+        own = np.bincount(front.entry_tile, minlength=1)  # entries of each tile's list
+        assert rtl.counters["sorted_again"] == own[own > config.chip_memories.sorted_entries].sum()
         assert {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items() if n != "lists"} == {
             "pointers": (frames * tiles, 0), "frame": (0, frames * written),
             # A sub-tile that finishes elsewhere in time makes a frame of other lookups.

@@ -394,7 +394,7 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3 | 2 << 8)
+        self.set("version", 3 | 3 << 8)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
@@ -657,7 +657,7 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (2, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (3, 1, 1, 2, 2, 3, 32)
     assert (device.lists, device.beat) == (16384, 64)
     assert device.started == 0xFFFF and not chip.writes
     chip.set("version", 2)

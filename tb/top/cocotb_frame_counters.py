@@ -6,8 +6,13 @@ import cocotb
 from cocotb.triggers import ReadOnly, RisingEdge
 from flicker_tb.bench import Bench
 
-# Words of flk_top_pkg.
-FRONT_WORDS, RENDERING_WORDS, RENDERING_AT, FRONT_WAITS_AT, STAGE_AT, STAGE_WORDS, BANK = 45, 27, 34, 96, 128, 128, 256
+from flicker.chip_counters import FRONT, RENDERING
+from flicker.chip_registers import ChipCounter
+
+# Words of flk_counter_pkg.
+WAITS = [counter for counter in FRONT if counter.stall]
+RENDERING_AT, FRONT_WAITS_AT, STAGE_AT, STAGE_WORDS, BANK = RENDERING[0].number, WAITS[0].number, int(ChipCounter.STAGE), 128, 256
+FRONT_WORDS, RENDERING_WORDS = RENDERING_AT + len(WAITS), RENDERING[-1].number + RENDERING[-1].words - RENDERING_AT
 LATENCY = 1
 
 

@@ -244,7 +244,7 @@ async def clocks(dut: Any) -> None:
         dut.test_en_i.value = 0
         await chip.start(7)
         await chip.until(FRAME_DONE)
-        edges.append((await chip.counter(ChipCounter.FRONT_BEAT_WAITS), await chip.counter(ChipCounter.FRAME_WAITS)))
+        edges.append((await chip.counter(FRONT[-1].number), await chip.counter(RENDERING[-1].number)))
         await chip.write("interrupt", ALL)
         dut.test_en_i.value = test
     for half in range(2):

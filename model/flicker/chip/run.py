@@ -13,11 +13,9 @@ from ..chip_counters import FRONT, RENDERING
 from ..errors import FlickerError
 from ..front.view import View
 from ..golden.chip import render_chip
-from ..golden.frame_buffer import PixelFormat
 from ..golden.front.frame import OUTCOMES, Outcome
 from ..golden.front.record import RecordKind
 from ..golden.lanes.render import LaneFrame
-from ..golden.lists import LINE_ENTRIES, SHORT_ENTRIES
 from ..params import CHANNELS, CORES, Coords, RenderConfig
 from ..pipeline import Engine, Front, FrontOptions, Rendered, basic_stats, bit_true_front, compared, golden_lists, lane_lists, lane_stats, packed_for_picture
 from ..progress import Steps
@@ -26,7 +24,6 @@ from ..sim.chip import ChipFrame, ChipSession, build
 from ..sim.half import MemoryOptions
 from .constants import CLOCK_HZ
 from .dram import DramConfig
-from .rendering import frame_beats
 
 SCENE = ("table", "headers", "geometry", "colour")  # what the front end reads
 
@@ -80,7 +77,7 @@ def _picture(
         began = time.process_time()
         frame = chip.render(camera, background=(red, green, blue), lists=options.lists, order=view.order, progress=report)
         seconds = time.process_time() - began
-        stats = packing | chip_stats(chip, frame, camera, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
+        stats = packing | chip_stats(chip, frame, config, dram) | {"simulated_cycles_per_second": round(chip.usage().live["cycles"] / seconds)}
     return frame_image(frame.buffer, camera), stats
 
 
@@ -106,10 +103,10 @@ def counted(frame: ChipFrame, config: RenderConfig) -> dict[str, int]:
     }
 
 
-def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
+def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: DramConfig) -> dict[str, Any]:
     """Of a frame of `ChipSession.render`: cycles by phase, bytes by purpose, stalls by cause, how busy each part was and which one held the frame up.
 
-    camera: of the frame. dram: the memory of the session.
+    dram: the memory of the session.
     """
     assert frame.usage is not None
     front, rendering, live = frame.front, frame.rendering, frame.usage.live
@@ -128,7 +125,6 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
     tested = chip.scene.gaussians - count("culled_gaussians")
     # Entries of all sorting units, and lines of those that they do not hold and sort a second time: of the one with most the same share.
     given = int(np.sum(rendering["entries"]))
-    again = live["frame_written"] - frame_beats(camera.width, camera.height, PixelFormat.RGB8, frame.buffer.shape[1])
     # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each,
     # in delivery two.
     busy = {
@@ -137,7 +133,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, camera: Camera, config: Rend
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
-            "sorting units": int(np.max(rendering["entries"])) * (1.0 + (LINE_ENTRIES + SHORT_ENTRIES) / 2 * again / max(given, 1)) / phases["rendering"],
+            "sorting units": int(np.max(rendering["entries"])) * (1.0 + int(rendering["sorted_again"]) / max(given, 1)) / phases["rendering"],
             "delivery": given / (2 * phases["rendering"]), "record cache's port": int(rendering["lines"]) / phases["rendering"],
             "DRAM": peak["rendering"],
             **stage.pop("busy"),
