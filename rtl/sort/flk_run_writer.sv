@@ -227,7 +227,7 @@ module flk_run_writer #(
       places_q <= places_d;
       tail_q   <= tail_d;
     end
-    if (entry && count_q == '0 && lines_q == '0) begin
+    if (entry && count_q == '0) begin  // a line that ends within a run leaves an entry
       first_q <= {entry_q[MaskBits+:Half], entry_q[MaskBits+Half+:Half]};
     end
   end
