@@ -37,6 +37,7 @@ DRAM_WINDOW = 32
 DRAM_WRITE_PLACES = 64
 DRAM_URGENT_LEAD = 24
 DRAM_BATCH_BURSTS = 256
+DRAM_REQUEST_BURSTS = 16
 DRAM_LATENCY_CYCLES = 100
 
 # ---- preprocessing -----------------------------------------------------------------------------
@@ -117,6 +118,7 @@ SOURCES = {
     "DRAM_WRITE_PLACES": "assumption: writes a channel's controller gathers and answers at once, to turn the bus more rarely; as gem5's memory controller",
     "DRAM_URGENT_LEAD": "assumption: clocks by which bursts of urgent transactions may move later than others and still go first",
     "DRAM_BATCH_BURSTS": "assumption: bursts of one purpose before the arbiter turns to the next (32 a channel)",
+    "DRAM_REQUEST_BURSTS": "the same where both halves of the chip share the memory: a request for a chunk of a list, 512 bytes",
     "DRAM_LATENCY_CYCLES": "assumption: 100 ns from request to data, controller and interconnect included",
     "PREPROCESSING_CORES": _PAPER,
     "CLUSTER_TEST_CYCLES": "assumption: one cluster a cycle and core, five planes in parallel",

@@ -156,8 +156,8 @@ def _bursts(beat: np.ndarray, step: int) -> np.ndarray:
     return (beat[:, None] * step + np.arange(step)).ravel()
 
 
-def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER) -> int:
-    """Cycles of the chip's clock that the DRAM needs for a frame's traffic; writes come `gather` lines at a time."""
+def in_order(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER) -> Stream:
+    """A frame's traffic as bursts in the order of time; writes come `gather` lines at a time."""
     reads = [b for b in beats if not b.write]
     writes = [b for b in beats if b.write]
     read, read_due = np.concatenate([b.beat for b in reads]), np.concatenate([b.due for b in reads])
@@ -170,7 +170,7 @@ def dram_cycles(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER
     beat = np.concatenate([read, write])[order]
     kind = np.concatenate([np.full(len(read), READ, np.int8), np.full(len(write), WRITE, np.int8)])[order]
     step = BEAT // config.burst_bytes
-    return simulate(_bursts(beat, step), np.repeat(kind, step), config).cycles
+    return Stream("front end", _bursts(beat, step), np.repeat(kind, step), len(beat) * BEAT)
 
 
 @numba.njit(cache=True)
@@ -308,13 +308,14 @@ def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = 
 @dataclass(frozen=True, eq=False)
 class Preprocessing:
     """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each
-    alone; cycles: of both together."""
+    alone; cycles: of both together. gather: lines that are written together."""
 
     beats: Sequence[Beats]
     used: dict[str, int]
     units: int
     dram: int
     cycles: int
+    gather: int = GATHER
 
     @property
     def bytes(self) -> dict[str, int]:
@@ -336,5 +337,6 @@ def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, si
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
     units = unit_cycles(frame, sizes.survivors)
-    dram = dram_cycles(beats, config, sizes.gathered_lines) if config else 0
-    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors))
+    order = in_order(beats, config, sizes.gathered_lines) if config else None
+    dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
+    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors), sizes.gathered_lines)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from . import constants as c
 from .dram import DramConfig, interleave, simulate
-from .preprocessing import Preprocessing
+from .preprocessing import Preprocessing, in_order
 from .rendering import Rendering
 
 
 @dataclass(frozen=True, eq=False)
 class WholeFrame:
-    """front, back: the halves, each with the memory to itself. dram_cycles: of the DRAM for the traffic of both."""
+    """front, back: the halves, each with the memory to itself. dram_cycles: of the DRAM for the traffic of both, side by side."""
 
     front: Preprocessing
     back: Rendering
@@ -42,5 +43,7 @@ class WholeFrame:
 
 
 def whole_frame(front: Preprocessing, back: Rendering, dram: DramConfig) -> WholeFrame:
-    """Both halves, estimated with this memory."""
-    return WholeFrame(front, back, front.dram + simulate(*interleave(back.traffic), dram).cycles)
+    """Both halves, estimated with this memory, where their requests take turns: rows are opened and the bus is turned more
+    often than for one after the other."""
+    streams = [in_order(front.beats, dram, front.gather), *back.traffic]
+    return WholeFrame(front, back, simulate(*interleave(streams, c.DRAM_REQUEST_BURSTS), dram).cycles)
