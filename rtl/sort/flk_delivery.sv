@@ -185,7 +185,8 @@ module flk_delivery #(
       if (!rst_ni) begin
         finish_q[u] <= 1'b0;
       end else begin
-        finish_q[u] <= !stop && (&(finished_q & unopened)) && unit_q == UnitBits'(u) && !e_end_taken;
+        finish_q[u] <= !stop && (&(finished_q & unopened)) &&
+                       unit_q == UnitBits'(u) && !e_end_taken;
       end
     end
   end

@@ -4,7 +4,8 @@ State space: the demo scene and small ones, both pixel formats, pauses on every 
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
 Parameter space: a stage of 32 lanes, with one sorting unit, list writer and preprocessing lane too; with SLOW=1 of channels too, with modes that travel with
-their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half with channels). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
+their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half with channels).
+Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
