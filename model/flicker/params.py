@@ -219,6 +219,8 @@ class ChipMemories:
         return {"Waiting": self.survivors, "Gather": self.gathered_lines} if self != ChipMemories() else {}
 
 
+LINE_BITS = 512  # of what units read and write at once
+PORT_WIDTHS = (128, 256, LINE_BITS)  # of the memory port
 SORT_CELLS = 16  # entries of a sorting unit's first runs
 CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64)}  # small: within the paper's 288 KB
 
@@ -233,7 +235,7 @@ class RenderConfig:
     of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
     mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `lanes` of all cores; `in_width` elements
     that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue. Of the whole chip: `delivered` records that a core gets
-    in a cycle there, and so takes, whatever `in_width`; `memories`, key of CHIP_MEMORIES.
+    in a cycle there, and so takes, whatever `in_width`; `memories`, key of CHIP_MEMORIES; `port_bits` of the memory port, which changes cycles alone.
     """
 
     form: Form = Form.FACTORED
@@ -250,6 +252,7 @@ class RenderConfig:
     slots: int = 20
     delivered: int = 1
     memories: str = "default"
+    port_bits: int = LINE_BITS
 
     def __post_init__(self) -> None:
         for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES), ("memories", CHIP_MEMORIES)):
@@ -271,6 +274,8 @@ class RenderConfig:
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
         if self.delivered not in ((1, 2) if self.by_lanes else (1,)):
             raise FlickerError(f"configuration: delivered must be {'1 or 2' if self.by_lanes else '1 with stage ' + self.stage}, not {self.delivered}")
+        if self.port_bits not in PORT_WIDTHS:
+            raise FlickerError(f"configuration: port_bits must be {', '.join(map(str, PORT_WIDTHS[:-1]))} or {PORT_WIDTHS[-1]}, not {self.port_bits}")
         for field in ("slots", "fifo_depth"):
             if self.by_lanes and not 2 <= (value := getattr(self, field)) <= MAX_LANE_ENTRIES:
                 raise FlickerError(f"configuration: {field} must be 2 to {MAX_LANE_ENTRIES} with stage lanes, not {value}")
@@ -314,6 +319,11 @@ class RenderConfig:
         if parameters.pop("InWidth", None) and self.delivered != 1:
             parameters["InWidth"] = self.delivered
         return {"Stage": list(STAGES).index(self.stage), **parameters, **self.chip_memories.rendering_parameters()}
+
+    def top_parameters(self) -> dict[str, int]:
+        """Of the whole chip, flk_top and what wraps it: `chip_parameters`, the front end's sizes, the port; those that are not the default."""
+        port = {"PortBits": self.port_bits} if self.port_bits != LINE_BITS else {}
+        return {**self.chip_parameters(), **self.chip_memories.front_parameters(), **port}
 
     @property
     def chip_memories(self) -> ChipMemories:

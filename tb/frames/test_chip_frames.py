@@ -22,7 +22,9 @@ from flicker_tb.runner import seed
 
 from flicker import params
 from flicker.chip import rendering
+from flicker.chip.compare import frame_cost
 from flicker.chip.dram import DramConfig, Refresh
+from flicker.chip.drawing import Drawing
 from flicker.chip.run import chip_stats, render_on_chip
 from flicker.chip.tile_lists import TileLists
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
@@ -135,6 +137,44 @@ def demo(config: RenderConfig) -> tuple[View, PackedScene, ListKind]:
     view = load_view(DEMO, 0, (160, 90))
     format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
     return view, packed_scene(view, format_), lists
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bits", [128, 256])
+def test_narrow_port(bits: int) -> None:
+    """A port of fewer bits than a line: the same bytes and counts as with 512, one beat of the memory for each part; cycles as the model has them, within a
+    tenth; pauses and answers in any order; an error of the memory, an abort and a reset with frames behind."""
+    config, dram = CONFIG.with_(port_bits=bits), DramConfig(port_bits=bits)
+    view, packed, lists = demo(config)
+    with session(packed, config=config, memory=MemoryOptions(dram.timing)) as chip:
+        done = check(chip, view.camera, config=config, lists=lists)
+        assert done.usage is not None and 1 << chip.field("capability", "log2_beat") == bits // 8
+        live, traffic = done.usage.live, chip.purposes()
+        parts = 512 // bits
+        assert traffic["records"].read_beats == max(1, 256 // bits) * done.rendering["lines"] and live["record_beats"] == done.rendering["lines"]
+        assert traffic["table"].read_beats == parts * live["table_beats"]
+        assert traffic["frame"].write_beats + traffic["lists"].write_beats == parts * (live["frame_written"] + int(done.front["lines"].sum()))
+        cost = frame_cost(view, Drawing(Engine.CHIP, config))
+        for phase, name in (("front end", "front_cycles"), ("rendering", "render_cycles")):
+            assert done.phases[phase] == pytest.approx(cost[name], rel=0.1), phase
+    for number in range(3):
+        with session(config=config, port=any_port(random.Random(f"{seed()} {number} narrow"), number)) as chip:
+            check(chip, camera(), config=config)
+            frame = chip.frame(camera(), chip.place(camera()), background=BLUE, tag=3)
+            chip.fail(frame.region.records, frame.region.record_bytes)
+            chip.start(frame)
+            assert chip.finish(frame, LIMIT).error
+            chip.mend()
+            chip.start(frame)
+            chip.step(3_000 * (number + 1))
+            chip.driver.flk_abort(ctypes.byref(chip.device))
+            for _ in range(1000):
+                if not chip.field("status", "aborting"):
+                    break
+                chip.step(10)
+            assert chip.quiet and chip.field("status", "ready")
+            chip.set_register("interrupt", 31)
+            check(chip, camera(), config=config)
 
 
 @pytest.mark.parametrize("config", ALL_CONFIGS)

@@ -22,6 +22,7 @@ from ..params import (
     LANE_COUNTS,
     MAX_FIFO_DEPTH,
     MAX_LANE_ENTRIES,
+    PORT_WIDTHS,
     RECOMMENDED,
     STAGES,
     CatMode,
@@ -140,6 +141,7 @@ def engine_options(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
+    port_bits: Annotated[int | None, typer.Option(help=f"of --engine chip: data of the memory port, {', '.join(map(str, PORT_WIDTHS))} [default: 512]")] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
@@ -151,7 +153,7 @@ def engine_options(
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
     if engine is not EngineChoice.CHIP:
-        for option, value in (("--memories", memories), ("--refresh", refresh)):
+        for option, value in (("--memories", memories), ("--port-bits", port_bits), ("--refresh", refresh)):
             if value is not None:
                 raise FlickerError(f"{option}: for --engine chip only")
     if not whole and front in (None, FrontChoice.FLOAT):
@@ -173,6 +175,7 @@ def engine_options(
         stage=_stage(stage, engine, lanes, of_stage),
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
+        port_bits=base.port_bits if port_bits is None else port_bits,
     )
     return Chosen(engine, config, front, memory, lists, rechunk, refresh, faithful)
 
