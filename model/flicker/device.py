@@ -24,6 +24,7 @@ import numpy as np
 from .chip.dram import DramConfig
 from .chip.run import frame_image
 from .chip_registers import REGISTERS, ChipCounter, ResultError
+from .chips import name_of
 from .errors import FlickerError
 from .front.view import View
 from .golden.frame_buffer import PixelFormat
@@ -313,7 +314,9 @@ def backend_of(name: str, config: RenderConfig) -> Backend:
     if name == "chip":
         return SimulatedChip(config, DramConfig())
     if name == "soc":
-        return SimulatedSoc(config.memories if config.memories != "default" else "lanes" if config.by_lanes else "channels")
+        if (chip := name_of(config)) is None:
+            raise FlickerError("--device soc: takes a chip of chips.toml (--chip)")
+        return SimulatedSoc(chip)
     module, _, attribute = name.partition(":")
     if not attribute:
         raise FlickerError(f"--device: chip, soc or MODULE:NAME, not {name}")

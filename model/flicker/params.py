@@ -172,6 +172,14 @@ LANE_COUNTS = (32, 64, 128)  # lanes of all cores
 MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
 
+SORT_CELLS = 16  # entries of a sorting unit's first runs
+
+
+def _power(value: int) -> bool:
+    """A power of two."""
+    return value > 0 and value & (value - 1) == 0
+
+
 @dataclass(frozen=True)
 class ChipMemories:
     """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/reference/chip_memory.md).
@@ -190,6 +198,24 @@ class ChipMemories:
     sort_ways: int = 8
     gathered_lines: int = 256
     merge_lines: int = 128
+
+    def __post_init__(self) -> None:
+        rules = {
+            "sorted_entries": (_power(self.sorted_entries) and self.sorted_entries >= 64, "a power of two from 64 on"),
+            "list_chunks": (self.list_chunks >= 4, "at least 4"),
+            "sorted_ahead": (self.sorted_ahead >= 4 and self.sorted_ahead % 2 == 0, "even, at least 4"),
+            "pairs": (self.pairs in (2, 4, 8), "2, 4 or 8"),
+            "survivors": (_power(self.survivors) and self.survivors >= 8, "a power of two from 8 on"),
+            "sort_ways": (_power(self.sort_ways) and 2 <= self.sort_ways <= self.sorted_entries // SORT_CELLS, "a power of two, 2 to sorted_entries / 16"),
+            "gathered_lines": (self.gathered_lines >= 8, "at least 8"),
+            "merge_lines": (_power(self.merge_lines) and self.merge_lines >= 8, "a power of two from 8 on"),
+        }
+        for name, (legal, text) in rules.items():
+            if not legal:
+                raise FlickerError(f"memories: {name} must be {text}, not {getattr(self, name)}")
+        if self.merge_lines // 2 * -(-self.sorted_entries // 9) > 64 * 228:
+            most = 2 * 64 * 228 // -(-self.sorted_entries // 9)
+            raise FlickerError(f"memories: merge_lines must be at most {most} with sorted_entries {self.sorted_entries}, not {self.merge_lines}")
 
     @property
     def sort_stages(self) -> int:
@@ -221,7 +247,6 @@ class ChipMemories:
 
 LINE_BITS = 512  # of what units read and write at once
 PORT_WIDTHS = (128, 256, LINE_BITS)  # of the memory port
-SORT_CELLS = 16  # entries of a sorting unit's first runs
 CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64)}  # small: within the paper's 288 KB
 
 

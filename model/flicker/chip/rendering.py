@@ -586,9 +586,10 @@ def estimate(
     moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * int(misses), "frame": others["frame"]}
     traffic: list[Stream] = []
     if dram:
+        written = moved["frame"] + BEAT * int(tables.run_lines.sum())
         total = max(
             total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second),
-            dram.port_cycles(sum(moved.values()) - moved["frame"], moved["frame"]) if config.port_bits != LINE_BITS else 0,
+            dram.port_cycles(sum(moved.values()) - written, written) if config.port_bits != LINE_BITS else 0,
         )
         traffic = tables.traffic(batches, missed[:misses], format_, stride)
     grid = np.zeros((2 * tables.rows, 2 * tables.cols), np.int64)

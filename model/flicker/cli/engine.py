@@ -11,10 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..chips import chip_of
 from ..errors import FlickerError
 from ..params import (
     CHIP_MEMORIES,
@@ -143,6 +145,8 @@ def engine_options(
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
     port_bits: Annotated[int | None, typer.Option(help=f"of --engine chip: data of the memory port, {', '.join(map(str, PORT_WIDTHS))} [default: 512]")] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
+    chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml, as tiny, instead of options of its parts")] = None,
+    chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
 ) -> Chosen:
@@ -164,8 +168,23 @@ def engine_options(
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
-    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
     base = FAITHFUL if faithful else RenderConfig()
+    if chips_file is not None and chip is None:
+        raise FlickerError("--chips: with --chip NAME only")
+    if chip is not None:
+        parts = {
+            "stage": stage, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
+            "port-bits": port_bits, "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
+        }
+        if names := ", ".join(f"--{k}" for k, v in parts.items() if v is not None):
+            raise FlickerError(f"--chip: fixes the configuration, so it cannot be combined with {names}")
+        if engine is EngineChoice.REFERENCE:
+            raise FlickerError("--chip: not for --engine reference, which has no stage")
+        config = chip_of(chip, chips_file).config
+        # Records of 32 bytes mean the paper's scene format and lists, as --faithful does.
+        conic = config.form is Form.CONIC and (whole or front not in (None, FrontChoice.FLOAT)) and not any(v is not None for v in chosen.values())
+        return Chosen(engine, config, front, memory, lists, rechunk, refresh, conic)
+    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
     config = base.with_(
         cat=CatMode[cat.name] if cat else base.cat,
         precision=Precision[precision.name] if precision else base.precision,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ... import layout
 from ...arithmetic.ff_stages import STAGES
+from ...chips import Chip, chips
 from ...datapath.units import PIPELINES
 from ...params import (
     CHANNELS,
@@ -394,9 +395,18 @@ def _top() -> list[Unit]:
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
         unit("flk_axi_hold"), unit("flk_axi_lane"), unit("flk_axi_downsizer", "128 bit"), unit("flk_axi_downsizer", "256 bit", PortBits=256),
         unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
-        unit("flk_top", "faithful", **FAITHFUL.chip_parameters()),
-        unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()), unit("flk_top_axi"),
+        *(unit("flk_top", CHIP_ROWS.get(chip.name, chip.name), **chip.parameters) for chip in chips().values() if chip.name != "channels"),
+        unit("flk_top_axi"),
     ]
+
+
+# Rows of chips that have a name of their own; the channels are what flk_top is without parameters.
+CHIP_ROWS = {"default": "32 lanes", "channels": "default"}
+
+
+def chip_row(chip: Chip) -> tuple[str, str]:
+    """Unit and configuration of a chip of the table."""
+    return "top", CHIP_ROWS.get(chip.name, chip.name)
 
 
 def all_units() -> list[Unit]:
