@@ -222,7 +222,11 @@ class Device:
     @property
     def capability(self) -> dict[str, int]:
         """What the chip was built with, by the names of flk_device_t."""
-        return {name: getattr(self._device, name) for name in ("minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat")}
+        names = (
+            "minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat", "cores", "preproc_lanes", "list_writers",
+            "sort_units",
+        )
+        return {name: getattr(self._device, name) for name in names}
 
     def counter(self, index: int) -> int:
         """A performance counter, by its number (`chip_registers.ChipCounter`)."""
