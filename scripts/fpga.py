@@ -2,7 +2,8 @@
 """Resources of a chip on FPGAs, by unit and in all, and how full known boards are (docs/reference/fpga.md): make fpga [CHIP=tiny]
 [BOARD=kv260].
 
-Exits 1 when the chip does not fit the board. Without a board: the family's, all of them. Writes build/fpga/<chip>-<family>.json, which make docs PART=fpga takes.
+Exits 1 when the chip does not fit the board. Without a board: the family's, all of them. Writes build/fpga/<chip>-<family>.json, which make docs
+PART=fpga takes.
 """
 
 from __future__ import annotations

@@ -496,6 +496,9 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--engine", "chip-golden", "--port-bits", "128"], "--port-bits: for --engine chip only"),
     (["--engine", "chip", "--port-bits", "64"], "configuration: port_bits must be 128, 256 or 512, not 64"),
     (["--engine", "rtl", "--refresh", "per-bank"], "--refresh: for --engine chip only"),
+    (["--engine", "rtl", "--sort-units", "2"], "--sort-units: for --engine chip only"),
+    (["--engine", "chip", "--list-writers", "3"], "list_writers must be 1, 2 or 4, not 3"),
+    (["--engine", "chip", "--preproc-lanes", "0"], "preproc_lanes must be 1, 2 or 4, not 0"),
     (["--engine", "chip", "--stage", "lanes", "--faithful"], "--stage lanes: takes records of 16 bytes"),
 ])
 def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:

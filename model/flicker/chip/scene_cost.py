@@ -260,7 +260,7 @@ class SceneCost:
 def frame_cost(front: FrontFrame, dram: DramConfig, config: RenderConfig = CONFIG) -> tuple[dict[str, int], dict[str, int]]:
     """Cycles of each half of a chip, bytes of both by purpose."""
     image, sizes = front_memory(front), config.chip_memories
-    first = preprocessing.estimate(front, image, dram, sizes)
+    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers)
     second = rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
     bytes_ = dict(first.bytes)
     for name, more in second.bytes.items():

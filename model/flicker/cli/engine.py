@@ -27,6 +27,7 @@ from ..params import (
     PORT_WIDTHS,
     RECOMMENDED,
     STAGES,
+    UNIT_COUNTS,
     CatMode,
     Coords,
     Form,
@@ -57,6 +58,7 @@ def _faithful() -> str:
     return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
 
 
+UNITS = ", ".join(map(str, UNIT_COUNTS))
 CatChoice = _choices(CatMode)
 FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
@@ -144,6 +146,9 @@ def engine_options(
     )] = None,
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
     port_bits: Annotated[int | None, typer.Option(help=f"of --engine chip: data of the memory port, {', '.join(map(str, PORT_WIDTHS))} [default: 512]")] = None,
+    sort_units: Annotated[int | None, typer.Option(help=f"of --engine chip: sorting units, {UNITS} [default: {_default('sort_units')}]")] = None,
+    list_writers: Annotated[int | None, typer.Option(help=f"of --engine chip: list writers, {UNITS} [default: {_default('list_writers')}]")] = None,
+    preproc_lanes: Annotated[int | None, typer.Option(help=f"of --engine chip: preprocessing cores, {UNITS} [default: {_default('preproc_lanes')}]")] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
     chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml, as tiny, instead of options of its parts")] = None,
     chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
@@ -157,7 +162,10 @@ def engine_options(
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
     if engine is not EngineChoice.CHIP:
-        for option, value in (("--memories", memories), ("--port-bits", port_bits), ("--refresh", refresh)):
+        for option, value in (
+            ("--memories", memories), ("--port-bits", port_bits), ("--refresh", refresh), ("--sort-units", sort_units), ("--list-writers", list_writers),
+            ("--preproc-lanes", preproc_lanes),
+        ):
             if value is not None:
                 raise FlickerError(f"{option}: for --engine chip only")
     if not whole and front in (None, FrontChoice.FLOAT):
@@ -174,7 +182,8 @@ def engine_options(
     if chip is not None:
         parts = {
             "stage": stage, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
-            "port-bits": port_bits, "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
+            "port-bits": port_bits, "sort-units": sort_units, "list-writers": list_writers, "preproc-lanes": preproc_lanes,
+            "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
         }
         if names := ", ".join(f"--{k}" for k, v in parts.items() if v is not None):
             raise FlickerError(f"--chip: fixes the configuration, so it cannot be combined with {names}")
@@ -195,6 +204,9 @@ def engine_options(
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
         port_bits=base.port_bits if port_bits is None else port_bits,
+        sort_units=base.sort_units if sort_units is None else sort_units,
+        list_writers=base.list_writers if list_writers is None else list_writers,
+        preproc_lanes=base.preproc_lanes if preproc_lanes is None else preproc_lanes,
     )
     return Chosen(engine, config, front, memory, lists, rechunk, refresh, faithful)
 
