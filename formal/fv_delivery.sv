@@ -62,6 +62,7 @@ module fv_delivery #(
     .out_ready_i,
     .out_end_o    (out_end),
     .out_record_o (out_record),
+    .out_subtile_o(),
     .finished_i   (finished),
     .ar_valid_o   (),
     .ar_ready_i   (1'b0),

@@ -27,7 +27,8 @@ module flk_top
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
-  parameter  int unsigned Lanes          = 32,
+  parameter  int unsigned Cores          = CORES,  // of lanes: 1, 2 or 4
+  parameter  int unsigned Lanes          = 32,     // of all cores
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
@@ -602,6 +603,7 @@ module flk_top
     .CtuFifoDepth  (CtuFifoDepth),
     .VrusPerChannel(VrusPerChannel),
     .MaskGenerator (MaskGenerator),
+    .Cores         (Cores),
     .Lanes         (Lanes),
     .Slots         (Slots),
     .Depth         (Depth),
