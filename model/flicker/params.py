@@ -271,8 +271,7 @@ class RenderConfig:
         if self.cores not in (CORE_COUNTS if self.by_lanes else (CORES,)):
             raise FlickerError(f"configuration: cores must be {'1, 2 or 4' if self.by_lanes else f'{CORES} with stage {self.stage}'}, not {self.cores}")
         if self.lanes not in (counts := [self.cores * own for own in LANES_PER_CORE]):
-            of = "core" if self.cores == 1 else f"{self.cores} cores"
-            raise FlickerError(f"configuration: lanes must be {', '.join(map(str, counts[:-1]))} or {counts[-1]} with {of}, not {self.lanes}")
+            raise FlickerError(f"configuration: lanes must be {', '.join(map(str, counts[:-1]))} or {counts[-1]} with cores {self.cores}, not {self.lanes}")
         if self.in_width not in (1, 2):
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
         if self.delivered not in ((1, 2) if self.by_lanes else (1,)):

@@ -129,7 +129,7 @@ class Writer:
             if int(dut.done_o.value) or (int(dut.stopped_o.value) and left):
                 break
             assert stall != "never" or not 0 < late < cycle - 142, "not stopped behind the pair that leaves"
-            assert cycle < 2000 + 3000 * len(pairs), f"stands still after {freed} of {len(pairs)} pairs"
+            assert cycle < 2000 + 3000 * 4 // CORES * len(pairs), f"stands still after {freed} of {len(pairs)} pairs"
         dut.in_valid_i.value = 0
         assert freed == len(pairs) - left and (left or not any(any(w) for w in work)) and int(dut.idle_o.value) == (left == 0)
         row = least_stride(PAIR, form)
@@ -156,7 +156,8 @@ async def bytes_of_frames(dut, form, kind):
     """Frames of several sizes one after the other, rows with and without a gap."""
     test = Writer(dut)
     await test.bench.reset()
-    for cols, rows in ((1, 1), (5, 3), (12, 2))[: rounds(2, 3) if LANES and kind != "mixed" else 3]:
+    heavy = CORES < 4 and ("heavy" in kind or kind == "mixed")  # the fewer cores, the longer a pair takes
+    for cols, rows in ((1, 1), (5, 3), (12, 2))[: 1 if heavy else rounds(2, 3) if LANES and kind != "mixed" else 3]:
         pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
         idle, stall = ([pick() for _ in range(CORES)], pick()) if kind == "mixed" else ([kind.split()[0]] * CORES, kind.split()[1])
         walk, order = test.rng.choice(("rows", "any")), test.rng.choice(("any", "ahead", "pairs"))
