@@ -165,7 +165,11 @@ def test_one_core() -> None:
     with session(config=ONE_CORE) as chip:
         check(chip, camera(40, 24), config=ONE_CORE)
         done = check(chip, camera(72, 40), PixelFormat.RGBA16F, ONE_CORE)
+        front = run_front(chip.packed, camera(72, 40))
     assert done.stage[0].any() and not done.stage[1:].any()
+    sizes = ONE_CORE.chip_memories
+    tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
+    assert rendering.estimate(tables, ONE_CORE, None).cycles == pytest.approx(done.phases["rendering"], rel=0.15)
 
 
 def live_beats(done: ChipFrame, traffic: dict[str, PurposeCounts]) -> None:

@@ -401,11 +401,10 @@ def simulate_lanes(
     lanes = config.lanes // config.cores
     streams = core_streams(work, np.arange(len(work.mask)) if work.entry is None else work.entry, config.cores, empty)
     counters, ends = np.zeros((config.cores, len(LANE_COUNTERS)), np.int64), np.zeros((config.cores, 2), np.int64)
-    finish, end, number = work.finish, np.zeros(streams.cols * streams.rows, np.int64), slice(None)
-    if config.cores != CORES:  # whole tiles
-        number = whole_tiles(work.cols, work.rows)[2]
-        finish = np.zeros((len(end), SUBTILE_PIXELS), np.int64)
-        finish[number] = work.finish
+    # A core that is shared has whole tiles.
+    number = np.arange(work.cols * work.rows) if config.cores == CORES else whole_tiles(work.cols, work.rows)[2]
+    finish, end = np.zeros((streams.cols * streams.rows, SUBTILE_PIXELS), np.int64), np.zeros(streams.cols * streams.rows, np.int64)
+    finish[number] = work.finish
     position = np.arange(len(work.mask)) - np.repeat(work.start[:-1], np.diff(work.start))
     _cores(
         streams.order, streams.core_start, streams.start, streams.element, streams.member, streams.subtile, position, work.mask, work.passes, finish,
