@@ -68,6 +68,7 @@ module fv_entry_merge
     .out_valid_o(out_valid),
     .out_ready_i,
     .out_end_o  (out_end),
+    .out_bank_o (),
     .out_u_o    (),
     .out_v_o    (),
     .out_entry_o(out_entry)

@@ -127,6 +127,7 @@ module fv_list_writer #(
     .in_valid_i,
     .in_ready_o     (in_ready),
     .in_end_i,
+    .in_bank_i      (1'b0),
     .in_u_i,
     .in_v_i,
     .in_entry_i     ({mark, in_record_i, tag}),

@@ -1,6 +1,6 @@
 // Rendering: from tile lists and records in memory to a frame buffer in memory (docs/reference/rendering.md).
 //
-// What flk_preprocessing leaves is read back list by list: four list readers and sorting units take the tiles of the walk in turn,
+// What flk_preprocessing leaves is read back list by list: list readers and sorting units (SortUnits of each) take the tiles of the walk in turn,
 // delivery fetches records and gives them to the cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
 // puts finished pixels together. The walk goes in pairs of tiles (flk_tile_walk); a tile that the picture lacks has an empty list.
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
@@ -8,7 +8,8 @@
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
 // lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
-// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to 3, of runs 4 to 7), records (read, 256 bits), frame buffer and runs (write, 512 bits).
+// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to SortUnits - 1, of runs SortUnits to 2 SortUnits - 1), records (read, 256 bits), frame buffer and
+// runs (write, 512 bits).
 // stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
 // nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four of a tile say so the
@@ -32,6 +33,7 @@ module flk_rendering
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,    // records a cycle of each core: 1, with lanes 2
+  parameter  int unsigned SortUnits      = 4,    // 1, 2 or 4, each with a list reader and a buffer
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
   parameter  int unsigned SortWays       = 8,    // runs that its last step merges
   parameter  int unsigned MergeLines     = 128,  // for lists that do not fit; half as many runs
@@ -106,6 +108,12 @@ module flk_rendering
 
   localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? 128 : 256;
   localparam int unsigned BeatBits = RENDERING_BEAT_BITS;
+  localparam int unsigned Readers  = 2 * SortUnits;  // of lists, of runs
+  localparam int unsigned TurnBits = SortUnits > 1 ? $clog2(SortUnits) : 1;
+
+  if (SortUnits != 1 && SortUnits != 2 && SortUnits != 4) begin : gen_check_units
+    $error("flk_rendering: SortUnits must be 1, 2 or 4");
+  end
 
   // ---- frame ----------------------------------------------------------------------------------------
 
@@ -113,7 +121,7 @@ module flk_rendering
 
   state_e     state_q;
   logic       start, pixels_done, lines_idle, quiet, done_q;
-  logic [3:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error, again;
+  logic [SortUnits-1:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error, again;
   logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
 
   assign start  = state_q == START && delivery_idle;
@@ -161,20 +169,20 @@ module flk_rendering
 
   logic                        walk_done, walk_next, unused_second;
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
-  logic [1:0]                  turn_q;
-  logic [3:0]                  tile_ready, tile_valid;
-  logic [7:0]                  ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
-  logic [3:0]                  list_valid, list_ready;  // lines
-  logic [7:0][AddrBits-1:0]    ask_addr;
-  logic [7:0][7:0]             ask_len;
-  logic [7:0][2:0]             ask_size;
-  logic [7:0][1:0]             ask_burst;
-  logic [3:0]                  sorted_valid, sorted_ready, sorted_end, finish;
-  logic [3:0][27:0]            sorted_entry;
-  logic [3:0]                  finish_unit, entry_ready;
-  logic [3:0][1:0]             entry_valid, entry_end;
-  logic [3:0][1:0][27:0]       entry;
-  logic [3:0][31:0]            entries, readings, dropped;
+  logic [TurnBits-1:0]         turn_q;
+  logic [SortUnits-1:0]        tile_ready, tile_valid;
+  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
+  logic [SortUnits-1:0]               list_valid, list_ready;  // lines
+  logic [Readers-1:0][AddrBits-1:0]   ask_addr;
+  logic [Readers-1:0][7:0]            ask_len;
+  logic [Readers-1:0][2:0]            ask_size;
+  logic [Readers-1:0][1:0]            ask_burst;
+  logic [SortUnits-1:0]               sorted_valid, sorted_ready, sorted_end, finish;
+  logic [SortUnits-1:0][27:0]         sorted_entry;
+  logic [SortUnits-1:0]               finish_unit, entry_ready;
+  logic [SortUnits-1:0][1:0]          entry_valid, entry_end;
+  logic [SortUnits-1:0][1:0][27:0]    entry;
+  logic [SortUnits-1:0][31:0]         entries, readings, dropped;
 
   // Runs: lines to memory, and whether those of a unit are there.
   localparam int unsigned Runs     = MergeLines / 2;
@@ -184,9 +192,9 @@ module flk_rendering
     $error("flk_rendering: SortStages, MergeLines: drivers hold 64 runs of 228 lines a unit");
   end
 
-  logic [3:0]               run_valid, run_ready, run_waits, run_open_q;
-  logic [3:0][BeatBits-1:0] run_beat, run_base_q;
-  logic [3:0][511:0]        run_data;
+  logic [SortUnits-1:0]               run_valid, run_ready, run_waits, run_open_q;
+  logic [SortUnits-1:0][BeatBits-1:0] run_beat, run_base_q;
+  logic [SortUnits-1:0][511:0]        run_data;
 
   flk_tile_walk #(
     .CoordBits(TILE_COORD_BITS)
@@ -209,17 +217,17 @@ module flk_rendering
     if (!rst_ni) begin
       turn_q <= '0;
     end else begin
-      turn_q <= start ? '0 : turn_q + 2'(walk_next);
+      turn_q <= start ? '0 : (turn_q + TurnBits'(walk_next)) & TurnBits'(SortUnits - 1);
     end
   end
 
-  for (genvar u = 0; u < 4; u++) begin : gen_unit
+  for (genvar u = 0; u < SortUnits; u++) begin : gen_unit
     logic              line_last;
     logic [471:0]      line_entries;
     logic [3:0]        line_count;
     logic [IdBits-1:0] unused_id, unused_run_id;
 
-    assign tile_valid[u] = !walk_done && turn_q == 2'(u);
+    assign tile_valid[u] = !walk_done && turn_q == TurnBits'(u);
 
     flk_list_reader #(
       .Slots (Chunks),
@@ -271,7 +279,7 @@ module flk_rendering
       .Runs      (Runs),
       .MergeLines(MergeLines),
       .IdBits    (IdBits),
-      .Id        (4 + u)
+      .Id        (SortUnits + u)
     ) i_sorter (
       .clk_i,
       .rst_ni,
@@ -299,15 +307,15 @@ module flk_rendering
       .write_data_o (run_data[u]),
       .waits_o      (run_waits[u]),
       .written_i    (!run_open_q[u]),
-      .ar_valid_o   (ask_valid[4+u]),
-      .ar_ready_i   (ask_ready[4+u]),
+      .ar_valid_o   (ask_valid[SortUnits+u]),
+      .ar_ready_i   (ask_ready[SortUnits+u]),
       .ar_id_o      (unused_run_id),
-      .ar_addr_o    (ask_addr[4+u]),
-      .ar_len_o     (ask_len[4+u]),
-      .ar_size_o    (ask_size[4+u]),
-      .ar_burst_o   (ask_burst[4+u]),
-      .r_valid_i    (beat_valid[4+u]),
-      .r_ready_o    (beat_ready[4+u]),
+      .ar_addr_o    (ask_addr[SortUnits+u]),
+      .ar_len_o     (ask_len[SortUnits+u]),
+      .ar_size_o    (ask_size[SortUnits+u]),
+      .ar_burst_o   (ask_burst[SortUnits+u]),
+      .r_valid_i    (beat_valid[SortUnits+u]),
+      .r_ready_o    (beat_ready[SortUnits+u]),
       .r_id_i       (list_r_id_i),
       .r_data_i     (list_r_data_i),
       .r_resp_i     (list_r_resp_i),
@@ -335,7 +343,7 @@ module flk_rendering
   end
 
   flk_axi_read_mux #(
-    .Managers(8),
+    .Managers(Readers),
     .AddrBits(AddrBits),
     .IdBits  (IdBits)
   ) i_lists (
@@ -372,6 +380,7 @@ module flk_rendering
   logic [3:0]                                    delivery_waits;
 
   flk_delivery #(
+    .Units     (SortUnits),
     .RecordBits(RecordBits),
     .InWidth   (InWidth),
     .Queue     (Queue),
@@ -544,22 +553,26 @@ module flk_rendering
   localparam int unsigned WriteBits = BeatBits + 4 + 512;
   localparam int unsigned SeqBits   = 12;  // more lines than are ever under way
 
-  logic [4:0]                write_valid, write_ready;
-  logic [4:0][WriteBits-1:0] write;
+  localparam int unsigned Stores    = SortUnits + 1;
+
+  logic [Stores-1:0]                write_valid, write_ready;
+  logic [Stores-1:0][WriteBits-1:0] write;
   logic                      store_valid, store_ready, answered;
   logic [WriteBits-1:0]      store;
-  logic [2:0]                unused_from;
+  logic [$clog2(Stores)-1:0] unused_from;
   logic [SeqBits-1:0]        stored_q, answered_q;
-  logic [3:0][SeqBits-1:0]   mark_q;  // number of a unit's last line
+  logic [SortUnits-1:0][SeqBits-1:0] mark_q;  // number of a unit's last line
 
   assign write_valid = {run_valid, line_valid};
-  assign write       = {{run_beat[3], 4'hf, run_data[3]}, {run_beat[2], 4'hf, run_data[2]},
-                        {run_beat[1], 4'hf, run_data[1]}, {run_beat[0], 4'hf, run_data[0]},
-                        {line_beat, line_strobe, line_data}};
+  assign write[0]    = {line_beat, line_strobe, line_data};
   assign {run_ready, line_ready} = write_ready;
 
+  for (genvar u = 0; u < SortUnits; u++) begin : gen_stores
+    assign write[1+u] = {run_beat[u], 4'hf, run_data[u]};
+  end
+
   flk_stream_arbiter #(
-    .Inputs(5),
+    .Inputs(Stores),
     .Width (WriteBits)
   ) i_store (
     .clk_i,
@@ -582,7 +595,7 @@ module flk_rendering
     end else begin
       stored_q   <= stored_q + SeqBits'(store_valid && store_ready);
       answered_q <= answered_q + SeqBits'(answered);
-      for (int unsigned u = 0; u < 4; u++) begin
+      for (int unsigned u = 0; u < SortUnits; u++) begin
         if (run_valid[u] && run_ready[u]) begin
           run_open_q[u] <= 1'b1;
         end else if (answered && answered_q == mark_q[u]) begin
@@ -593,7 +606,7 @@ module flk_rendering
   end
 
   always_ff @(posedge clk_i) begin
-    for (int unsigned u = 0; u < 4; u++) begin
+    for (int unsigned u = 0; u < SortUnits; u++) begin
       if (run_valid[u] && run_ready[u]) begin
         mark_q[u] <= stored_q;
       end
@@ -707,8 +720,8 @@ module flk_rendering
     end
   end
 
-  assign events[RENDERING_EVENT_LIST_WAITS]    = list_valid & ~list_ready;
-  assign events[RENDERING_EVENT_SORTED_WAITS]  = sorted_valid & ~sorted_ready;
+  assign events[RENDERING_EVENT_LIST_WAITS]    = 4'({list_valid & ~list_ready});
+  assign events[RENDERING_EVENT_SORTED_WAITS]  = 4'({sorted_valid & ~sorted_ready});
   assign events[RENDERING_EVENT_ENTRY_MISSING] = 4'(delivery_waits[0] && running_q);
   assign events[RENDERING_EVENT_ENTRY_WAITS]   = 4'(delivery_waits[1]);
   assign events[RENDERING_EVENT_QUEUE_WAITS]   = 4'(delivery_waits[2]);
@@ -716,7 +729,7 @@ module flk_rendering
   assign events[RENDERING_EVENT_RECORD_WAITS]  = 4'(record_waits);
   assign events[RENDERING_EVENT_PAIR_WAITS]    = 4'(pair_waits);
   assign events[RENDERING_EVENT_FRAME_WAITS]   = 4'(line_valid && !line_ready);
-  assign events[RENDERING_EVENT_SORTED_AGAIN]  = again;
+  assign events[RENDERING_EVENT_SORTED_AGAIN]  = 4'(again);
 
   flk_event_counters #(
     .Counters(RENDERING_EVENTS),
@@ -742,9 +755,9 @@ module flk_rendering
   always_comb begin
     counters_o          = rendering_events(totals);
     counters_o.cycles   = cycles_q;
-    counters_o.entries  = entries;
-    counters_o.readings = readings;
-    counters_o.dropped  = dropped;
+    counters_o.entries  = 128'(entries);
+    counters_o.readings = 128'(readings);
+    counters_o.dropped  = 128'(dropped);
     counters_o.lines    = cache_lines;
   end
 

@@ -32,12 +32,15 @@ module flk_top
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
+  parameter  int unsigned SortUnits      = 4,     // 1, 2 or 4: sorting units and list readers
   parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
   parameter  int unsigned SortWays       = 8,
   parameter  int unsigned MergeLines     = 128,
   parameter  int unsigned Chunks         = 14,
   parameter  int unsigned Entries        = 512,
   parameter  int unsigned Pairs          = 4,
+  parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
+  parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
   parameter  int unsigned Gather         = 256,   // of flk_preprocessing
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
@@ -494,12 +497,14 @@ module flk_top
   logic [COUNTER_BITS-1:0]      stage_data;
 
   flk_preprocessing #(
-    .Form    (Form),
-    .Pointers(Pointers),
-    .Lists   (Lists),
-    .Gather  (Gather),
-    .Waiting (Waiting),
-    .IdBits  (IdBits)
+    .Form        (Form),
+    .PreprocLanes(PreprocLanes),
+    .ListWriters (ListWriters),
+    .Pointers    (Pointers),
+    .Lists       (Lists),
+    .Gather      (Gather),
+    .Waiting     (Waiting),
+    .IdBits      (IdBits)
   ) i_front (
     .clk_i               (front_clk),
     .rst_ni              (front_rst_n),
@@ -608,6 +613,7 @@ module flk_top
     .Slots         (Slots),
     .Depth         (Depth),
     .InWidth       (InWidth),
+    .SortUnits     (SortUnits),
     .SortStages    (SortStages),
     .SortWays      (SortWays),
     .MergeLines    (MergeLines),

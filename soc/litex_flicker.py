@@ -38,7 +38,7 @@ def chip_parameters(chip: str) -> dict[str, int]:
     if chip not in CHIPS:
         raise ValueError(f"chip must be one of {', '.join(CHIPS)}, not {chip}")
     config = CHIPS[chip]
-    return {**config.chip_parameters(), **config.chip_memories.front_parameters()}
+    return {**config.chip_parameters(), **config.front_parameters()}
 
 
 def rtl_sources() -> list[Path]:

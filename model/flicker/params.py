@@ -171,6 +171,7 @@ VRU_COUNTS = (1, 2, 4)  # VRUs per channel that the RTL can have
 LANE_COUNTS = (32, 64, 128)  # lanes of all of four cores
 CORE_COUNTS = (1, 2, 4)  # cores of the stage of lanes
 LANES_PER_CORE = (4, 8, 16, 32)
+UNIT_COUNTS = (1, 2, 4)  # sorting units, list writers, preprocessing lanes
 MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
 
@@ -235,7 +236,8 @@ class RenderConfig:
     depends on it. mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `cores`, each with 4, 2
     or 1 sub-tiles of a tile; `lanes` of all cores; `in_width` elements that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a
     lane's queue. Of the whole chip: `delivered` records that a core gets in a cycle there, and so takes, whatever `in_width`; `memories`, key of
-    CHIP_MEMORIES.
+    CHIP_MEMORIES; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of lists; `preproc_lanes`,
+    preprocessing cores. No bit of records, lists and pictures depends on their numbers.
     """
 
     form: Form = Form.FACTORED
@@ -253,6 +255,9 @@ class RenderConfig:
     slots: int = 20
     delivered: int = 1
     memories: str = "default"
+    sort_units: int = UNIT_COUNTS[-1]
+    list_writers: int = UNIT_COUNTS[-1]
+    preproc_lanes: int = UNIT_COUNTS[-1]
 
     def __post_init__(self) -> None:
         for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES), ("memories", CHIP_MEMORIES)):
@@ -276,6 +281,9 @@ class RenderConfig:
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
         if self.delivered not in ((1, 2) if self.by_lanes else (1,)):
             raise FlickerError(f"configuration: delivered must be {'1 or 2' if self.by_lanes else '1 with stage ' + self.stage}, not {self.delivered}")
+        for field in ("sort_units", "list_writers", "preproc_lanes"):
+            if (value := getattr(self, field)) not in UNIT_COUNTS:
+                raise FlickerError(f"configuration: {field} must be 1, 2 or 4, not {value}")
         for field in ("slots", "fifo_depth"):
             if self.by_lanes and not 2 <= (value := getattr(self, field)) <= MAX_LANE_ENTRIES:
                 raise FlickerError(f"configuration: {field} must be 2 to {MAX_LANE_ENTRIES} with stage lanes, not {value}")
@@ -319,7 +327,13 @@ class RenderConfig:
         parameters = self.rtl_parameters()
         if parameters.pop("InWidth", None) and self.delivered != 1:
             parameters["InWidth"] = self.delivered
-        return {"Stage": list(STAGES).index(self.stage), **parameters, **self.chip_memories.rendering_parameters()}
+        units = {"SortUnits": self.sort_units} if self.sort_units != UNIT_COUNTS[-1] else {}
+        return {"Stage": list(STAGES).index(self.stage), **parameters, **self.chip_memories.rendering_parameters(), **units}
+
+    def front_parameters(self) -> dict[str, int]:
+        """Module parameters of the front end and the chip: what is not the default."""
+        units = {"PreprocLanes": self.preproc_lanes, "ListWriters": self.list_writers}
+        return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]}
 
     @property
     def chip_memories(self) -> ChipMemories:

@@ -1,7 +1,7 @@
 // Colour fetch: colours of survivors from memory to the lanes (docs/reference/memory_image.md, docs/reference/front_end.md).
 //
-// Survivors of a group of four come in the order of the scene; of their colours those beats are read
-// that hold any, each once. All lanes see one beat at a time; a lane keeps the two that its Gaussians
+// Survivors of a group of four, or of Lanes neighbours of one, come in the order of the scene, Gaussian n for lane n modulo
+// Lanes; of their colours the beats from the first one's to the last one's are read, each once. All lanes see one beat at a time; a lane keeps the two that its Gaussians
 // need next and takes them apart (colour_part_t), in order; the beat goes on when no lane needs it.
 // oldest_o: no part of a cluster before it will be given any more (a running number, modulo); while
 // nothing is under way it follows exit_i, the cluster whose groups are coming now.
@@ -12,6 +12,7 @@
 module flk_colour_fetch
   import flk_preproc_pkg::*;
 #(
+  parameter  int unsigned Lanes       = LANES, // 1, 2 or 4
   parameter  int unsigned BufferBeats = 64,
   parameter  int unsigned Items       = 128, // Gaussians of a lane that wait for colours
   parameter  int unsigned MaxBeats    = 16,
@@ -37,9 +38,9 @@ module flk_colour_fetch
   input  cluster_index_t           exit_i,
   output cluster_index_t           oldest_o,
   // Colours
-  output logic         [LANES-1:0] out_valid_o,
-  input  logic         [LANES-1:0] out_ready_i,
-  output colour_part_t [LANES-1:0] out_data_o,
+  output logic         [Lanes-1:0] out_valid_o,
+  input  logic         [Lanes-1:0] out_ready_i,
+  output colour_part_t [Lanes-1:0] out_data_o,
   // AXI4
   output logic                     ar_valid_o,
   input  logic                     ar_ready_i,
@@ -82,9 +83,11 @@ module flk_colour_fetch
   cluster_index_t                    a_cluster_q;
   logic [31:0]                       a_colour_q;
   logic [1:0]                        a_degree_q;
-  logic [LANES-1:0]                  a_alive_q;
-  logic [LANES-1:0][BYTE_BITS-1:0]   a_start_q;
+  logic [Lanes-1:0]                  a_alive_q;
+  logic [Lanes-1:0][BYTE_BITS-1:0]   a_start_q;
   logic [6:0]                        in_stride, a_stride_q;
+  logic [1:0]                        in_at;     // place in the group of those that come
+  logic [Lanes-1:0]                  in_alive;
   logic                              b_valid_q, b_move;
   cluster_index_t                    b_cluster_q;
   logic [LowBits:0]                  b_low_q;    // of the beat where the cluster's colours begin
@@ -94,6 +97,17 @@ module flk_colour_fetch
 
   assign in_stride  = stride(chunked_i, in_data_i.degree);
   assign in_ready_o = !a_valid_q;
+
+  always_comb begin
+    in_at    = '0;
+    in_alive = Lanes'(in_data_i.alive);
+    for (int unsigned at = Lanes; at < LANES; at += Lanes) begin
+      if (Lanes'(in_data_i.alive >> at) != '0) begin
+        in_at    = 2'(at);
+        in_alive = Lanes'(in_data_i.alive >> at);
+      end
+    end
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -108,10 +122,10 @@ module flk_colour_fetch
       a_cluster_q <= in_data_i.cluster;
       a_colour_q  <= in_data_i.colour;
       a_degree_q  <= in_data_i.degree;
-      a_alive_q   <= in_data_i.alive;
+      a_alive_q   <= in_alive;
       a_stride_q  <= in_stride;
-      for (int unsigned k = 0; k < LANES; k++) begin
-        a_start_q[k] <= BYTE_BITS'({in_data_i.group, 2'(k)}) * BYTE_BITS'(in_stride);
+      for (int unsigned k = 0; k < Lanes; k++) begin
+        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_at | 2'(k)}) * BYTE_BITS'(in_stride);
       end
     end
   end
@@ -120,17 +134,17 @@ module flk_colour_fetch
 
   logic [AT_BITS-1:0]   lowest;
   logic [BYTE_BITS-1:0] highest;
-  logic [LANES-1:0]     lane_ready;
+  logic [Lanes-1:0]     lane_ready;
 
   always_comb begin
     lowest  = a_start_q[0][BYTE_BITS-1:6];
     highest = a_start_q[0];
-    for (int unsigned k = LANES; k > 0; k--) begin
+    for (int unsigned k = Lanes; k > 0; k--) begin
       if (a_alive_q[k-1]) begin
         lowest = a_start_q[k-1][BYTE_BITS-1:6];
       end
     end
-    for (int unsigned k = 0; k < LANES; k++) begin
+    for (int unsigned k = 0; k < Lanes; k++) begin
       if (a_alive_q[k]) begin
         highest = a_start_q[k];
       end
@@ -309,7 +323,7 @@ module flk_colour_fetch
   logic             seen_valid_d, seen_valid_q, advance, stale;
   mark_t            seen_q;
   logic [Width-1:0] seen_data_q;
-  logic [LANES-1:0] lane_empty, lane_served;  // no Gaussian waits; the beat is taken or not needed
+  logic [Lanes-1:0] lane_empty, lane_served;  // no Gaussian waits; the beat is taken or not needed
 
   // Nothing is under way and groups of a later cluster come: what is known of beats is forgotten.
   // The next cluster with survivors may be any number of clusters further and bear the same number.
@@ -350,10 +364,10 @@ module flk_colour_fetch
     logic [BYTE_BITS-1:0] start;
   } item_t;
 
-  logic           [LANES-1:0] lane_busy;
-  cluster_index_t [LANES-1:0] lane_cluster;  // of the oldest that is not given yet
+  logic           [Lanes-1:0] lane_busy;
+  cluster_index_t [Lanes-1:0] lane_cluster;  // of the oldest that is not given yet
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_lanes
+  for (genvar k = 0; k < Lanes; k++) begin : gen_lanes
     logic                 item_valid, item_empty;
     item_t                item;
     logic                 next_take, next_free, next_valid_q, none;
@@ -612,7 +626,7 @@ module flk_colour_fetch
   // Of the clusters that lanes are working on, the oldest.
   always_comb begin
     least = seen_q.cluster;
-    for (int unsigned k = 0; k < LANES; k++) begin
+    for (int unsigned k = 0; k < Lanes; k++) begin
       if (lane_busy[k] &&
           CLUSTER_BITS'(least - lane_cluster[k]) < CLUSTER_BITS'(COLOUR_CLUSTERS)) begin
         least = lane_cluster[k];
@@ -656,6 +670,10 @@ module flk_colour_fetch
                     empty && out_valid_o == '0;
 
 `ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      in_valid_i |-> 4'({in_alive}) << in_at == in_data_i.alive)
+  else $error("flk_colour_fetch: survivors that are no neighbours");
+
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o && !in_valid_i)
   else $error("flk_colour_fetch: start while a frame is under way");
 

@@ -1,4 +1,10 @@
-// List writer: entries of the tiles of one parity into lists in DRAM (docs/reference/list_writer.md).
+// List writer: entries of the tiles of one parity, or of several, into lists in DRAM (docs/reference/list_writer.md).
+//
+// Tiles of one parity of row and column are a bank: their lists have chunks and lines of pointers of their own. A writer of
+// Banks banks writes of each what a writer of its own would: sets of the combiner, pointers and chunks taken are by bank. Its
+// banks are writer_i and every (4 / Banks)th one behind it; in_bank_i says which of them. Pointers, Lists, columns_i,
+// pointer_lines_i and chunks_i are of a bank; failed_o rises with the first bank that needs a chunk more than chunks_i, and of
+// that bank alone nothing more is written.
 //
 // A frame: start_i with the configuration while idle_o; entries; an element with in_end_i, which
 // carries no entry; then the lines still open are written, then the pointers; done_o for one cycle,
@@ -6,7 +12,7 @@
 // chunks_i, failed_o rises and nothing more is written in the frame.
 // Throughput: an entry a cycle. A line is at the output six cycles after the entry that causes it.
 // At the end a cycle for each line of the combiner and each pointer of pointer_lines_i. After reset,
-// max(Pointers, sets) cycles until idle_o. One request a line, whole: address in lines, and data.
+// Banks x max(Pointers, sets) cycles until idle_o. One request a line, whole: address in lines, and data.
 // in_ready_o depends combinationally on out_ready_i, the pointer's write on move_write_i; no other path.
 //
 // A frame of more lists than Pointers ("large"): the pointers are a store of lines, line n in place n
@@ -16,7 +22,7 @@
 // Who moves (flk_pointer_port) gets a request with the numbers of both lines, reads (move_read_i,
 // the pointer a cycle later) and writes pointers of the place, and says move_done_i; all stands for
 // so long. At the end lines that are in the table and not held are left out, two cycles each and
-// two more than a cycle a pointer for the others, and idle_o comes max(Pointers, sets) cycles after
+// two more than a cycle a pointer for the others, and idle_o comes Banks x max(Pointers, sets) cycles after
 // done_o. After failed_o nothing is moved; lines that were moved before stay in the table.
 //
 // A line has up to LineEntries entries whatever they are, up to ShortEntries where each is near the
@@ -33,6 +39,7 @@
 // from the memory; pointers need none, since two lines of a list never follow each other in
 // neighbouring stages: a line that has just begun behind one that went is not the next to go.
 module flk_list_writer #(
+  parameter  int unsigned Banks       = 1,     // 1, 2 or 4
   parameter  int unsigned SetBitsU    = 3,     // bits of the tile's column that choose a set
   parameter  int unsigned SetBitsV    = 3,     // of its row
   parameter  int unsigned Ways        = 4,
@@ -52,21 +59,22 @@ module flk_list_writer #(
   parameter  int unsigned PointerBits = 32,
   parameter  int unsigned AddressBits = 34,
   localparam int unsigned EntryBits   = MaskBits + RecordBits + KeyBits,
-  localparam int unsigned ListBits    = $clog2(Lists),
+  localparam int unsigned BankBits    = Banks > 1 ? $clog2(Banks) : 1,
   localparam int unsigned LinesBits   = $clog2(Lists * PointerBits / LineBits + 1),
   localparam int unsigned IndexBits   = $clog2(LineBits / PointerBits), // of a pointer in its line
   localparam int unsigned MoveBits    = $clog2(ChunkLines + 1) + ChunkBits,
-  localparam int unsigned NumberBits  = LinesBits > 1 ? LinesBits - 1 : 1  // of a line of pointers
+  localparam int unsigned AllBits     = $clog2(Banks * Lists * PointerBits / LineBits + 1),
+  localparam int unsigned NumberBits  = AllBits > 1 ? AllBits - 1 : 1  // of a line of pointers
 ) (
   input  logic                   clk_i,
   input  logic                   rst_ni,
   // Frame
   input  logic                   start_i,
   output logic                   idle_o,
-  input  logic [1:0]             writer_i,         // parity of the tiles: row, column
-  input  logic [CoordBits:0]     columns_i,        // tiles of this writer in a row
-  input  logic [LinesBits-1:0]   pointer_lines_i,  // lines of pointers of this writer
-  input  logic [ChunkBits:0]     chunks_i,         // it may take
+  input  logic [1:0]             writer_i,         // its first bank: parity of the tiles, row and column
+  input  logic [CoordBits:0]     columns_i,        // tiles of a bank in a row
+  input  logic [LinesBits-1:0]   pointer_lines_i,  // lines of pointers of a bank
+  input  logic [ChunkBits:0]     chunks_i,         // a bank may take
   input  logic [AddressBits-1:0] list_base_i,      // in lines
   input  logic [AddressBits-1:0] pointer_base_i,
   output logic                   done_o,
@@ -74,11 +82,12 @@ module flk_list_writer #(
   output logic [31:0]            entries_o,
   output logic [31:0]            lines_o,
   output logic [31:0]            evicted_o,
-  output logic [ChunkBits:0]     taken_o,
+  output logic [Banks-1:0][ChunkBits:0] taken_o,
   // Entries
   input  logic                   in_valid_i,
   output logic                   in_ready_o,
   input  logic                   in_end_i,
+  input  logic [BankBits-1:0]    in_bank_i,
   input  logic [CoordBits-1:0]   in_u_i,
   input  logic [CoordBits-1:0]   in_v_i,
   input  logic [EntryBits-1:0]   in_entry_i,
@@ -102,17 +111,24 @@ module flk_list_writer #(
   input  logic                   move_done_i
 );
 
-  localparam int unsigned Sets = 1 << (SetBitsU + SetBitsV);
-  localparam int unsigned SetBits = SetBitsU + SetBitsV > 0 ? SetBitsU + SetBitsV : 1;
+  localparam int unsigned BankShift = $clog2(Banks);
+  localparam int unsigned Held = Banks * Pointers;
+  localparam int unsigned All = Banks * Lists;
+  localparam int unsigned ListBits = $clog2(All);
+  localparam int unsigned TileBits = SetBitsU + SetBitsV;  // of a tile, in its set's number
+  localparam int unsigned TileSetBits = TileBits > 0 ? TileBits : 1;
+  localparam int unsigned Sets = Banks << TileBits;
+  localparam int unsigned SetBits = TileBits + BankShift > 0 ? TileBits + BankShift : 1;
   localparam int unsigned WayBits = $clog2(Ways);
   localparam int unsigned PlaceBits = SetBits + WayBits;
   localparam int unsigned CountBits = $clog2(ShortEntries + 1);
   localparam int unsigned UsedBits = $clog2(ChunkLines + 1);
   localparam int unsigned PerLine = LineBits / PointerBits;
   localparam int unsigned PerLineBits = IndexBits;
-  localparam int unsigned HeldBits = Pointers > 1 ? $clog2(Pointers) : 1;
-  localparam int unsigned Places = Pointers / PerLine;  // of lines of pointers
-  localparam int unsigned PlacesBits = Places > 1 ? $clog2(Places) : 1;
+  localparam int unsigned HeldBits = Held > 1 ? $clog2(Held) : 1;
+  localparam int unsigned Places = Pointers / PerLine;  // of lines of pointers, of a bank
+  localparam int unsigned AllPlaces = Banks * Places;
+  localparam int unsigned PlacesBits = AllPlaces > 1 ? $clog2(AllPlaces) : 1;
   localparam int unsigned Sharing = Lists / Pointers;   // lines that share a place
   localparam int unsigned TagBits = Sharing > 1 ? $clog2(Sharing) : 1;
   // Of a short line: entries beyond LineEntries, each in a whole gap and a rest, the rests in the
@@ -127,11 +143,14 @@ module flk_list_writer #(
   localparam int unsigned HeaderCount = 4;
   // Lists of a set have these bits in common.
   localparam int unsigned Common = SetBitsU < SetBitsV ? SetBitsU : SetBitsV;
-  localparam int unsigned Clear = Pointers > Sets ? Pointers : Sets;
-  localparam int unsigned Most = Clear > Lists ? Clear : Lists;
+  localparam int unsigned Clear = Held > Sets ? Held : Sets;
+  localparam int unsigned Most = Clear > All ? Clear : All;
   localparam int unsigned Steps = Most > Sets * Ways ? Most : Sets * Ways;
   localparam int unsigned StepBits = $clog2(Steps + 1);
 
+  if (Banks != 1 && Banks != 2 && Banks != 4) begin : gen_check_banks
+    $error("flk_list_writer: Banks must be 1, 2 or 4");
+  end
   if (Ways < 2 || Ways != 1 << WayBits) begin : gen_check_ways
     $error("flk_list_writer: Ways must be a power of two, at least 2");
   end
@@ -167,7 +186,7 @@ module flk_list_writer #(
 
   logic [1:0]             writer_q;
   logic [CoordBits:0]     columns_q;
-  logic [LinesBits-1:0]   pointer_lines_q;
+  logic [AllBits-1:0]     pointer_lines_q;  // of all banks
   logic [ChunkBits:0]     chunks_q;
   logic [AddressBits-1:0] base_q, pointer_base_q;  // base_q: of lists, then of pointers
   logic                   large_q;
@@ -186,7 +205,7 @@ module flk_list_writer #(
   assign take_end = in_valid_i && in_ready_o && in_end_i;
   assign flushing = state_q == OPEN_LINES;
   assign walking  = state_q == POINTERS && (!large_q || look_q == WALK);
-  assign last_line = LinesBits'(step_q >> PerLineBits) == pointer_lines_q - 1'b1;
+  assign last_line = AllBits'(step_q >> PerLineBits) == pointer_lines_q - 1'b1;
 
   always_comb begin
     state_d = state_q;
@@ -260,7 +279,7 @@ module flk_list_writer #(
     if (start) begin
       writer_q        <= writer_i;
       columns_q       <= columns_i;
-      pointer_lines_q <= pointer_lines_i;
+      pointer_lines_q <= AllBits'(pointer_lines_i) << BankShift;
       chunks_q        <= chunks_i;
       pointer_base_q  <= pointer_base_i;
       large_q         <= 32'(pointer_lines_i) > Places;
@@ -276,21 +295,39 @@ module flk_list_writer #(
 
   logic                 a_valid_d, a_valid_q, a_flush_q;
   logic [WayBits-1:0]   a_way_q;
+  logic [TileSetBits-1:0] tile_set;
   logic [SetBits-1:0]   a_set_d, a_set_q;
-  logic [ListBits-1:0]  a_list_q;
+  logic [ListBits-1:0]  a_list_q, a_list;  // in its bank; of all
   logic [EntryBits-1:0] a_entry_q;
 
   assign in_ready_o = advance && state_q == ENTRIES;
   assign a_valid_d  = take || flushing;
 
-  if (SetBitsU + SetBitsV == 0) begin : gen_one_set
-    assign a_set_d = '0;
+  if (TileBits == 0) begin : gen_one_set
+    assign tile_set = '0;
   end else if (SetBitsV == 0) begin : gen_row_sets
-    assign a_set_d = in_u_i[SetBitsU-1:0];
+    assign tile_set = in_u_i[SetBitsU-1:0];
   end else if (SetBitsU == 0) begin : gen_column_sets
-    assign a_set_d = in_v_i[SetBitsV-1:0];
+    assign tile_set = in_v_i[SetBitsV-1:0];
   end else begin : gen_sets
-    assign a_set_d = {in_v_i[SetBitsV-1:0], in_u_i[SetBitsU-1:0]};
+    assign tile_set = {in_v_i[SetBitsV-1:0], in_u_i[SetBitsU-1:0]};
+  end
+
+  // A bank has sets of its own. In the numbers of all lists it stands above the bits that number a line's pointers, so that lines of
+  // pointers are those of all banks in turn, as in the table.
+  if (Banks == 1) begin : gen_bank
+    logic unused_bank;
+    assign unused_bank = ^in_bank_i;
+    assign a_set_d     = tile_set;
+    assign a_list      = a_list_q;
+  end else begin : gen_banks
+    localparam int unsigned Above = PerLineBits + BankShift;
+    logic [BankBits-1:0] a_bank;
+
+    assign a_set_d = SetBits'({in_bank_i, tile_set} >> (TileSetBits - TileBits));
+    assign a_bank  = BankBits'(a_set_q >> TileBits);
+    assign a_list  = ((a_list_q >> PerLineBits) << Above) |
+                     ListBits'({a_bank, a_list_q[PerLineBits-1:0]});
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -365,7 +402,7 @@ module flk_list_writer #(
       r_flush_q        <= a_flush_q;
       r_way_q          <= a_way_q;
       r_set_q          <= a_set_q;
-      r_list_q         <= a_list_q;
+      r_list_q         <= a_list;
       r_entry_q        <= a_entry_q;
       r_row_q          <= row_d;
       r_kept_q         <= row_write && b_set_q == a_set_q;
@@ -573,8 +610,23 @@ module flk_list_writer #(
   logic                walk_q, walk_last_q, walk_blank_q, walk_clear;
   logic [ListBits-1:0] walk_list_q;
   logic                pointer_write, begins, enough, sends;
-  logic [ChunkBits:0]  taken_d, taken_q, taken_more;
-  logic                failed_d, failed_q;
+  logic [ChunkBits:0]  taken, taken_d, taken_more;  // of the bank in stage D
+  logic                failed_d;
+  logic [Banks-1:0]    failed_q;
+  logic [Banks-1:0][ChunkBits:0] taken_q;
+
+  logic [BankBits-1:0] d_bank, walk_bank;
+  logic [1:0]          d_writer;  // the bank's number among all
+
+  if (Banks == 1) begin : gen_bank_of_event
+    assign d_bank    = '0;
+    assign walk_bank = '0;
+    assign d_writer  = writer_q;
+  end else begin : gen_banks_of_event
+    assign d_bank    = d_list_q[PerLineBits+:BankBits];
+    assign walk_bank = walk_list_q[PerLineBits+:BankBits];
+    assign d_writer  = writer_q | (2'(d_bank) << (2 - BankShift));
+  end
 
   // The way that may have to go is known before it is known whether it goes.
   assign c_list = b_flush_q || c_evict ? row.way[b_flush_q ? b_way_q : row.turn].list : b_list_q;
@@ -612,10 +664,10 @@ module flk_list_writer #(
   logic                  here, placing;
 
   assign look_list  = hold_q ? d_list_q : ListBits'(step_q);
-  assign look_tag   = TagBits'(look_list >> $clog2(Pointers));
-  assign look_place = Places > 1 ? PlacesBits'(look_list >> PerLineBits) : '0;
+  assign look_tag   = TagBits'(look_list >> $clog2(Held));
+  assign look_place = AllPlaces > 1 ? PlacesBits'(look_list >> PerLineBits) : '0;
   assign here       = place_read.held && place_read.tag == look_tag;
-  assign placing    = hold_q && look_q == COMPARE && !here && !failed_q;
+  assign placing    = hold_q && look_q == COMPARE && !here && !failed_q[d_bank];
   assign skip       = state_q == POINTERS && look_q == COMPARE && !here &&
                       place_read.stored[look_tag];
 
@@ -680,11 +732,11 @@ module flk_list_writer #(
   logic place_read_en, place_write;
 
   assign place_read_en = look_q == LOOK && (hold_q || (state_q == POINTERS && large_q));
-  assign place_write   = (state_q == CLEAR && step_q < StepBits'(Places)) || placing;
+  assign place_write   = (state_q == CLEAR && step_q < StepBits'(AllPlaces)) || placing;
 
   flk_sram_single #(
     .Width($bits(place_t)),
-    .Depth(Places)
+    .Depth(AllPlaces)
   ) i_places (
     .clk_i,
     .en_i     (place_read_en || place_write),
@@ -701,7 +753,7 @@ module flk_list_writer #(
 
   // The place as it was stays at the memory's output until the line has moved.
   function automatic logic [NumberBits-1:0] line_of(input logic [TagBits-1:0] tag);
-    return (NumberBits'(tag) << $clog2(Places)) | NumberBits'(look_place);
+    return (NumberBits'(tag) << $clog2(AllPlaces)) | NumberBits'(look_place);
   endfunction
 
   assign move_valid_o    = hold_q && look_q == ASK;
@@ -720,10 +772,10 @@ module flk_list_writer #(
 
   flk_sram #(
     .Width($bits(pointer_t)),
-    .Depth(Pointers)
+    .Depth(Held)
   ) i_pointers (
     .clk_i,
-    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Pointers)) || pointer_write || walk_clear ||
+    .wr_en_i  ((state_q == CLEAR && step_q < StepBits'(Held)) || pointer_write || walk_clear ||
                move_write_i),
     .wr_addr_i(state_q == CLEAR ? HeldBits'(step_q) : move_write_i ? moved_at :
                walk_clear ? HeldBits'(walk_list_q) : HeldBits'(d_list_q)),
@@ -737,15 +789,16 @@ module flk_list_writer #(
   // After a large frame all is cleared.
   assign walk_clear    = advance && walk_q && !large_q;
   assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
-  assign enough        = !begins || taken_q != chunks_q;
-  assign sends         = d_event_q && enough && !failed_q;
+  assign taken         = taken_q[d_bank];
+  assign enough        = !begins || taken != chunks_q;
+  assign sends         = d_event_q && enough && !failed_q[d_bank];
   assign pointer_write = advance && sends;
-  assign failed_d      = failed_q || (d_event_q && !enough);
-  assign taken_more    = taken_q + 1'b1;
-  assign taken_d       = sends && begins ? taken_more : taken_q;
+  assign failed_d      = failed_q[d_bank] || (d_event_q && !enough);
+  assign taken_more    = taken + 1'b1;
+  assign taken_d       = sends && begins ? taken_more : taken;
 
   always_comb begin
-    pointer_d.chunk = begins ? ChunkBits'(taken_q) : pointer.chunk;
+    pointer_d.chunk = begins ? ChunkBits'(taken) : pointer.chunk;
     pointer_d.used  = begins ? UsedBits'(1) : pointer.used + 1'b1;
   end
 
@@ -765,8 +818,9 @@ module flk_list_writer #(
   logic                                  e_walk_q, e_walk_last_q;
   logic [AddressBits-1:0]                e_at_d, e_at_q;  // from the first line of its kind
 
-  assign e_at_d = walk_q ? AddressBits'({walk_list_q >> PerLineBits, writer_q})
-                : AddressBits'({pointer_d.chunk, writer_q,
+  assign e_at_d = walk_q ? (AddressBits'(walk_list_q >> PerLineBits) << (2 - BankShift)) |
+                           AddressBits'(writer_q)
+                : AddressBits'({pointer_d.chunk, d_writer,
                                 $clog2(ChunkLines)'(begins ? '0 : pointer.used)});
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -781,7 +835,7 @@ module flk_list_writer #(
       e_event_q     <= d_event_q;
       e_sends_q     <= sends;
       e_walk_q      <= walk_q;
-      e_walk_last_q <= walk_last_q && !failed_q;
+      e_walk_last_q <= walk_last_q && !failed_q[walk_bank];
     end
   end
 
@@ -1022,16 +1076,16 @@ module flk_list_writer #(
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       done_q   <= 1'b0;
-      failed_q <= 1'b0;
+      failed_q <= '0;
       taken_q  <= '0;
     end else begin
       done_q <= state_q == LAST && !busy;
       if (start) begin
-        failed_q <= 1'b0;
+        failed_q <= '0;
         taken_q  <= '0;
       end else if (advance) begin
-        failed_q <= failed_d;
-        taken_q  <= taken_d;
+        failed_q[d_bank] <= failed_d;
+        taken_q[d_bank]  <= taken_d;
       end
     end
   end
@@ -1063,7 +1117,7 @@ module flk_list_writer #(
 
   assign idle_o    = state_q == IDLE;
   assign done_o    = done_q;
-  assign failed_o  = failed_q;
+  assign failed_o  = failed_q != '0;
   assign taken_o   = taken_q;
 
 `ifndef SYNTHESIS
@@ -1079,7 +1133,7 @@ module flk_list_writer #(
   else $error("flk_list_writer: column of a tile outside the picture");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      a_valid_q && !a_flush_q |-> 32'(a_list_q) < 32'(pointer_lines_q) * PerLine)
+      a_valid_q && !a_flush_q |-> 32'(a_list) < 32'(pointer_lines_q) * PerLine)
   else $error("flk_list_writer: row of a tile outside the picture");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)

@@ -7,10 +7,10 @@
 // For the writer that is served: index_o and read_o ask for a pointer, which is in_pointer_i in the
 // next cycle; index_o, write_o and pointer_o are one for it; done_o, with the last of these, ends its
 // request. A put takes 17 cycles and a write, a get 2 and a read; then 16 pointers go to the writer.
-// Line n of writer b is line base_i + 4 n + b of memory; base_i stays for the frame.
+// Line n of writer b is line base_i + Writers n + b of memory; base_i stays for the frame.
 // Errors of the memory are kept until start_i, which comes while nothing is asked for. After one,
 // zeros stand for what is read: what comes of it are lists of the writer's own chunks, in any case.
-// Combinational: in_valid_i to in_ready_o; all else depends on registers alone.
+// Combinational: in_valid_i to in_ready_o (of several writers); all else depends on registers alone.
 module flk_pointer_port #(
   parameter  int unsigned Writers     = 4,
   parameter  int unsigned NumberBits  = 10,  // of a line
@@ -21,10 +21,11 @@ module flk_pointer_port #(
   localparam int unsigned Width       = 512,
   localparam int unsigned Bytes       = Width / 8,
   localparam int unsigned AddrBits    = AddressBits + $clog2(Bytes),
-  localparam int unsigned WriterBits  = $clog2(Writers),
+  localparam int unsigned WriterShift = $clog2(Writers),
+  localparam int unsigned WriterBits  = Writers > 1 ? WriterShift : 1,
   localparam int unsigned PerLine     = Width / PointerBits,
   localparam int unsigned IndexBits   = $clog2(PerLine),
-  localparam int unsigned AtBits      = NumberBits + WriterBits
+  localparam int unsigned AtBits      = NumberBits + WriterShift
 ) (
   input  logic                                clk_i,
   input  logic                                rst_ni,
@@ -79,8 +80,8 @@ module flk_pointer_port #(
   input  logic [1:0]                          b_resp_i
 );
 
-  if (Writers < 2 || Writers != 1 << WriterBits) begin : gen_check
-    $error("flk_pointer_port: Writers must be a power of two, at least 2");
+  if (Writers != 1 << WriterShift) begin : gen_check
+    $error("flk_pointer_port: Writers must be a power of two");
   end
 
   typedef struct packed {
@@ -117,21 +118,28 @@ module flk_pointer_port #(
                            get: in_get_i[k], get_line: in_get_line_i[k]};
   end
 
-  flk_stream_arbiter #(
-    .Inputs(Writers),
-    .Width ($bits(request_t))
-  ) i_turns (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i,
-    .in_ready_o,
-    .in_data_i  (requests),
-    .out_valid_o(chosen_valid),
-    .out_ready_i(state_q == IDLE),
-    .out_data_o (chosen),
-    .out_index_o(index)
-  );
+  if (Writers == 1) begin : gen_one
+    assign chosen_valid = in_valid_i[0];
+    assign in_ready_o   = state_q == IDLE;
+    assign chosen       = requests[0];
+    assign index        = '0;
+  end else begin : gen_turns
+    flk_stream_arbiter #(
+      .Inputs(Writers),
+      .Width ($bits(request_t))
+    ) i_turns (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i,
+      .in_ready_o,
+      .in_data_i  (requests),
+      .out_valid_o(chosen_valid),
+      .out_ready_i(state_q == IDLE),
+      .out_data_o (chosen),
+      .out_index_o(index)
+    );
+  end
 
   assign take  = state_q == IDLE && chosen_valid;
   assign last  = &step_q[IndexBits-1:0];
@@ -208,9 +216,10 @@ module flk_pointer_port #(
     end
     // The sum of an address, its lower part first.
     if (take) begin
-      at_q <= {chosen.put ? chosen.put_line : chosen.get_line, index};
+      at_q <= (AtBits'(chosen.put ? chosen.put_line : chosen.get_line) << WriterShift) |
+              AtBits'(index);
     end else if (state_q == PUT && put_done) begin
-      at_q <= {get_line_q, owner_q};
+      at_q <= (AtBits'(get_line_q) << WriterShift) | AtBits'(owner_q);
     end
     low_q     <= {1'b0, base_i[AtBits-1:0]} + {1'b0, at_q};
     address_q <= {base_i[AddressBits-1:AtBits] + (AddressBits - AtBits)'(low_q[AtBits]),

@@ -2,7 +2,7 @@
 package flk_preproc_pkg;
   import flk_front_pkg::*;
 
-  localparam int unsigned LANES = 4;
+  localparam int unsigned LANES = 4;             // at most, and Gaussians of a group
   localparam int unsigned SEQ_BITS = 12;         // of a survivor's number in its frame, modulo
   localparam int unsigned NUMBER_BITS = 24;      // of a record
   localparam int unsigned BEAT_BITS = 34;        // address of 64 bytes

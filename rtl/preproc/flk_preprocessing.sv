@@ -1,6 +1,6 @@
 // Preprocessing: from a packed scene in memory to records and tile lists (docs/reference/front_end.md).
 //
-// Four cores behind three AXI4 read ports (cluster table, geometry, colours), one write port and one
+// PreprocLanes cores behind three AXI4 read ports (cluster table, geometry, colours), one write port and one
 // of both kinds, for list pointers of pictures with more lists than Pointers a writer. A frame: start_i while idle_o, with the frame's registers, which stay until done_o; done_o is high
 // for a cycle when all has been written and answered, error_o and the counters then stay until the
 // next start. Everything that is written is the same for every timing. Form: records of 16 bytes in
@@ -8,6 +8,9 @@
 // error_o: bits of FRONT_ERROR_*. An error of the memory, or a float of the cluster table or a header
 // that is not finite, ends the frame early where it was met; a cluster beyond the records' region
 // writes nothing; a list writer without a chunk writes no more.
+// A group of four Gaussians takes the lanes as many turns as it needs, two cycles each. ListWriters share the four banks of lists:
+// writer w has bank w and every ListWriters-th one behind it. What is written is the same bytes for any number of both; colours are read
+// for the survivors of a turn. entries, lines and evicted of the counters are by writer, taken by bank.
 // Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
 // registers is at most Lists / 16.
 module flk_preprocessing
@@ -16,12 +19,14 @@ module flk_preprocessing
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned Form     = FORM_FACTORED,
-  parameter  int unsigned Pointers = 2048,  // of a list writer, held on the chip
-  parameter  int unsigned Lists    = 16384, // of a writer, at most
-  parameter  int unsigned Gather   = 256,   // lines that are written together
-  parameter  int unsigned Waiting  = 128,   // survivors of a lane that wait for colours
-  parameter  int unsigned IdBits   = 4,
+  parameter  int unsigned Form         = FORM_FACTORED,
+  parameter  int unsigned PreprocLanes = 4,     // 1, 2 or 4
+  parameter  int unsigned ListWriters  = 4,     // 1, 2 or 4
+  parameter  int unsigned Pointers     = 2048,  // of a bank of lists, held on the chip
+  parameter  int unsigned Lists        = 16384, // of a bank, at most
+  parameter  int unsigned Gather       = 256,   // lines that are written together
+  parameter  int unsigned Waiting      = 128,   // survivors of a lane that wait for colours
+  parameter  int unsigned IdBits       = 4,
   localparam int unsigned Width    = 512,
   localparam int unsigned Bytes    = Width / 8,
   localparam int unsigned AddrBits = BEAT_BITS + 6
@@ -138,6 +143,19 @@ module flk_preprocessing
   localparam int unsigned Records = 4 / Quarters;
   localparam int unsigned InBeatBits = $clog2(Records);
 
+  localparam int unsigned Turns = LANES / PreprocLanes;  // of a group, at most
+  localparam int unsigned TurnShift = $clog2(Turns);
+  localparam int unsigned TurnBits = Turns > 1 ? TurnShift : 1;
+  localparam int unsigned GroupBits = 6 + TurnShift;
+  localparam int unsigned Banks = 4 / ListWriters;       // of a list writer
+  localparam int unsigned BankBits = Banks > 1 ? $clog2(Banks) : 1;
+
+  if (PreprocLanes != 1 && PreprocLanes != 2 && PreprocLanes != 4) begin : gen_check_lanes
+    $error("flk_preprocessing: PreprocLanes must be 1, 2 or 4");
+  end
+  if (ListWriters != 1 && ListWriters != 2 && ListWriters != 4) begin : gen_check_writers
+    $error("flk_preprocessing: ListWriters must be 1, 2 or 4");
+  end
   if (GEOMETRY_DECODE_LATENCY % 2 != 0 || ProjectionLatency % 2 != 0) begin : gen_check
     $error("flk_preprocessing: latencies of the front must be multiples of its interval, 2");
   end
@@ -150,8 +168,8 @@ module flk_preprocessing
   logic   start, cull_idle, geometry_idle, front_idle, back_idle;
   logic   merge_idle, records_idle, write_idle;
   logic   colour_idle, ended_q, lists_end, arbiter_empty;
-  logic [LANES-1:0] lane_idle, queued_empty;
-  logic [3:0]       list_idle, list_failed;
+  logic [PreprocLanes-1:0] lane_idle, queued_empty;
+  logic [ListWriters-1:0]  list_idle, list_failed;
 
   assign start  = state_q == IDLE && start_i;
   assign idle_o = state_q == IDLE && (&list_idle);
@@ -292,24 +310,55 @@ module flk_preprocessing
 
   typedef struct packed {
     logic           last;
-    logic [5:0]     group;
-    logic [3:0]     used;
+    logic [GroupBits-1:0]    group;  // and turn
+    logic [PreprocLanes-1:0] used;
     cluster_index_t cluster;
   } side_t;
 
-  logic                   front_en, front_phase_q, enter, room, beyond, beyond_q, take_end;
+  logic                   front_en, front_phase_q, enter, room, beyond, beyond_q, take_end, opens;
   cluster_index_t         cluster_q, cluster, oldest, exit, exit_q;
   place_of_cluster_t [COLOUR_CLUSTERS-1:0] clusters_q;
   side_t                  side_in, side;
   logic [Latency-1:0]     front_valid_q;
   logic                   exit_valid, go;
 
-  assign cluster     = group.first ? cluster_q + 1'b1 : cluster_q;
-  assign room        = !group.first ||
+  // The Gaussians of a group that enter now: as many neighbours as there are lanes.
+  logic [TurnBits-1:0]                turn_q;
+  logic                               turn_first, turn_last;
+  logic [PreprocLanes-1:0]            turn_used;
+  logic [PreprocLanes-1:0][4:0][31:0] turn_word;
+
+  if (Turns == 1) begin : gen_whole
+    assign turn_q     = '0;
+    assign turn_first = group.first;
+    assign turn_last  = 1'b1;
+    assign turn_used  = group.used;
+    assign turn_word  = group.word;
+  end else begin : gen_in_turns
+    assign turn_first = group.first && turn_q == '0;
+    assign turn_last  = group.used >> (PreprocLanes * (32'(turn_q) + 1)) == '0;
+    assign turn_used  = PreprocLanes'(group.used >> (PreprocLanes * 32'(turn_q)));
+
+    for (genvar k = 0; k < PreprocLanes; k++) begin : gen_word
+      assign turn_word[k] = group.word[2'(PreprocLanes*32'(turn_q)+k)];
+    end
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        turn_q <= '0;
+      end else if (enter) begin
+        turn_q <= turn_last ? '0 : turn_q + 1'b1;
+      end
+    end
+  end
+
+  assign cluster     = turn_first ? cluster_q + 1'b1 : cluster_q;
+  assign room        = !turn_first ||
                        CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
-  assign group_ready = front_en && !front_phase_q && (group_end || room);
-  assign enter       = group_valid && group_ready && !group_end;
-  assign take_end    = group_valid && group_ready && group_end;
+  assign opens       = front_en && !front_phase_q && (group_end || room);
+  assign group_ready = opens && (group_end || turn_last);
+  assign enter       = group_valid && opens && !group_end;
+  assign take_end    = group_valid && opens && group_end;
   // Records of a cluster beyond their region: none of its Gaussians is used.
   assign beyond      = 25'({group.cluster.first, 4'b0}) + 25'(group.cluster.last) >=
                        25'({registers_i.record_beats, {InBeatBits{1'b0}}});
@@ -343,15 +392,15 @@ module flk_preprocessing
   end
 
   always_ff @(posedge clk_i) begin
-    if (enter && group.first) begin
+    if (enter && turn_first) begin
       clusters_q[cluster[HeaderBits-1:0]] <= {group.header.colour, group.cluster.first,
                                               group.cluster.degree};
     end
   end
 
-  assign side_in.last    = group.last;
-  assign side_in.group   = group.group;
-  assign side_in.used    = beyond ? '0 : group.used;
+  assign side_in.last    = group.last && turn_last;
+  assign side_in.group   = (GroupBits'(group.group) << TurnShift) | GroupBits'(turn_q);
+  assign side_in.used    = beyond ? '0 : turn_used;
   assign side_in.cluster = cluster;
 
   flk_delay #(
@@ -383,8 +432,8 @@ module flk_preprocessing
 
   // ---- survivors: numbers and places ----------------------------------------------------------------
 
-  logic [LANES-1:0]                  lane_near, lane_outside, lane_ready, alive;
-  logic [LANES-1:0][1:0] ahead;   // survivors of the group in lanes before this one
+  logic [PreprocLanes-1:0]           lane_near, lane_outside, lane_ready, alive;
+  logic [PreprocLanes-1:0][1:0]      ahead;   // survivors of the group in lanes before this one
   logic [2:0]                        count;
   logic [SEQ_BITS-1:0]               issued_q;
   logic [8:0]                        rank_q;  // survivors of the cluster so far
@@ -399,9 +448,9 @@ module flk_preprocessing
   logic [2:0]                        count_q;
   record_beat_t                      told;
   place_of_cluster_t                 of;
-  logic [LANES-1:0][NUMBER_BITS-1:0] number;
-  place_t [LANES-1:0]                place;
-  logic [LANES-1:0][SEQ_BITS-1:0]    seq;
+  logic [PreprocLanes-1:0][NUMBER_BITS-1:0] number;
+  place_t [PreprocLanes-1:0]         place;
+  logic [PreprocLanes-1:0][SEQ_BITS-1:0]    seq;
   survivors_t                        survivors;
 
   assign exit_valid = front_valid_q[Latency-1];
@@ -411,7 +460,7 @@ module flk_preprocessing
 
   always_comb begin
     count = '0;
-    for (int unsigned k = 0; k < LANES; k++) begin
+    for (int unsigned k = 0; k < PreprocLanes; k++) begin
       ahead[k] = 2'(count);
       count     = count + 3'(alive[k]);
     end
@@ -422,9 +471,9 @@ module flk_preprocessing
   assign partial = side.last && fill[InBeatBits-1:0] != '0;
 
   // What a lane's survivor gets is known for each number of survivors before it; that number comes late, so a bit for each selects.
-  logic [LANES-1:0][NUMBER_BITS-1:0] numbers;
-  place_t [LANES-1:0]                places;
-  logic [LANES-1:0][SEQ_BITS-1:0]    seqs;
+  logic [PreprocLanes-1:0][NUMBER_BITS-1:0] numbers;
+  place_t [PreprocLanes-1:0]                places;
+  logic [PreprocLanes-1:0][SEQ_BITS-1:0]    seqs;
 
   // first + rank / 16, and one more.
   logic [NUMBER_BITS-5:0] high_number, more_number;
@@ -433,7 +482,7 @@ module flk_preprocessing
   assign high_number                 = of.first + (NUMBER_BITS - 4)'(rank_q[8:4]);
   assign {more_number, unused_carry} = {of.first, 1'b1} + {(NUMBER_BITS - 4)'(rank_q[8:4]), 1'b1};
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_numbers
+  for (genvar k = 0; k < PreprocLanes; k++) begin : gen_numbers
     logic [2:0] at;
     logic [4:0] low_number;
     assign at                = 3'(rank_q[InBeatBits-1:0]) + 3'(k);
@@ -448,7 +497,7 @@ module flk_preprocessing
     number = '0;
     place  = '0;
     seq    = '0;
-    for (int unsigned k = 0; k < LANES; k++) begin
+    for (int unsigned k = 0; k < PreprocLanes; k++) begin
       for (int unsigned n = 0; n <= k; n++) begin
         number[k] |= numbers[n] & {NUMBER_BITS{ahead[k] == 2'(n)}};
         place[k]  |= places[n] & {$bits(place_t){ahead[k] == 2'(n)}};
@@ -457,9 +506,9 @@ module flk_preprocessing
     end
   end
 
-  // So many beats may be needed at most: those of four records, the open one, and one that is told in this cycle.
+  // So many beats may be needed at most: those of a record a lane, the open one, and one that is told in this cycle.
   // Behind two full beats a third one may still have to be told.
-  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - (LANES / Records + 2)) &&
+  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - ((PreprocLanes + Records - 1) / Records + 2)) &&
                         (Quarters == 1 || !left_q);
   assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
   assign front_en     = !exit_valid || go;
@@ -470,8 +519,8 @@ module flk_preprocessing
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
   assign survivors.degree  = of.degree;
-  assign survivors.group   = side.group;
-  assign survivors.alive   = alive;
+  assign survivors.group   = 6'(side.group >> TurnShift);
+  assign survivors.alive   = 4'(alive) << (PreprocLanes * (32'(side.group) % Turns));
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -565,10 +614,11 @@ module flk_preprocessing
 
   // ---- colours --------------------------------------------------------------------------------------
 
-  logic         [LANES-1:0] part_valid, part_ready;
-  colour_part_t [LANES-1:0] part;
+  logic         [PreprocLanes-1:0] part_valid, part_ready;
+  colour_part_t [PreprocLanes-1:0] part;
 
   flk_colour_fetch #(
+    .Lanes      (PreprocLanes),
     .BufferBeats(128),
     .IdBits     (IdBits)
   ) i_colours (
@@ -605,14 +655,14 @@ module flk_preprocessing
 
   // ---- lanes ----------------------------------------------------------------------------------------
 
-  logic   [LANES-1:0]               record_valid, record_ready, entry_valid, entry_ready;
-  place_t [LANES-1:0]               record_place;
-  logic   [LANES-1:0][RecordBits-1:0] record;
-  entry_t [LANES-1:0]               entry;
-  logic   [LANES-1:0][SEQ_BITS-1:0] progress;
-  logic   [LANES-1:0]               saturated, clipped, faint, unlisted;
+  logic   [PreprocLanes-1:0]               record_valid, record_ready, entry_valid, entry_ready;
+  place_t [PreprocLanes-1:0]               record_place;
+  logic   [PreprocLanes-1:0][RecordBits-1:0] record;
+  entry_t [PreprocLanes-1:0]               entry;
+  logic   [PreprocLanes-1:0][SEQ_BITS-1:0] progress;
+  logic   [PreprocLanes-1:0]               saturated, clipped, faint, unlisted;
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_lanes
+  for (genvar k = 0; k < PreprocLanes; k++) begin : gen_lanes
     flk_preprocessing_core #(
       .Form   (Form),
       .Waiting(Waiting)
@@ -623,7 +673,7 @@ module flk_preprocessing
       .idle_o        (lane_idle[k]),
       .front_en_i    (front_en),
       .front_phase_i (front_phase_q),
-      .words_i       (group.word[k]),
+      .words_i       (turn_word[k]),
       .scale_low_i   (group.header.scale_low),
       .scale_step_i  (group.header.scale_step),
       .low_i         (low),
@@ -635,7 +685,7 @@ module flk_preprocessing
       .seq_i         (seq[k]),
       .number_i      (number[k]),
       .place_i       (place[k]),
-      .header_valid_i(enter && group.first),
+      .header_valid_i(enter && turn_first),
       .header_index_i(cluster[HeaderBits-1:0]),
       .header_i      (colour_header),
       .part_valid_i  (part_valid[k]),
@@ -667,11 +717,11 @@ module flk_preprocessing
 
   // Lanes that want the same quarter take turns; two records of each wait, so that no lane's colours stand for
   // another's record, nor for the time of that choice.
-  logic   [LANES-1:0]        queued_valid, queued_ready;
-  place_t [LANES-1:0]        queued_place;
-  logic   [LANES-1:0][RecordBits-1:0] queued_record;
+  logic   [PreprocLanes-1:0] queued_valid, queued_ready;
+  place_t [PreprocLanes-1:0] queued_place;
+  logic   [PreprocLanes-1:0][RecordBits-1:0] queued_record;
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_records
+  for (genvar k = 0; k < PreprocLanes; k++) begin : gen_records
     logic       unused_full;
     logic [1:0] unused_usage;
 
@@ -695,6 +745,7 @@ module flk_preprocessing
   end
 
   flk_record_writer #(
+    .Lanes     (PreprocLanes),
     .RecordBits(RecordBits),
     .Quarters  (Quarters)
   ) i_records (
@@ -722,12 +773,15 @@ module flk_preprocessing
 
   // ---- lists ----------------------------------------------------------------------------------------
 
-  logic [3:0]                   merged_valid, merged_ready, merged_end;
-  logic [3:0][6:0]              merged_u, merged_v;
-  logic [3:0][NUMBER_BITS+27:0] merged;
+  logic [ListWriters-1:0]                   merged_valid, merged_ready, merged_end;
+  logic [ListWriters-1:0][BankBits-1:0]     merged_bank;
+  logic [ListWriters-1:0][6:0]              merged_u, merged_v;
+  logic [ListWriters-1:0][NUMBER_BITS+27:0] merged;
 
   flk_entry_merge #(
-    .Depth(32)
+    .Lanes  (PreprocLanes),
+    .Writers(ListWriters),
+    .Depth  (32)
   ) i_merge (
     .clk_i,
     .rst_ni,
@@ -741,6 +795,7 @@ module flk_preprocessing
     .out_valid_o(merged_valid),
     .out_ready_i(merged_ready),
     .out_end_o  (merged_end),
+    .out_bank_o (merged_bank),
     .out_u_o    (merged_u),
     .out_v_o    (merged_v),
     .out_entry_o(merged)
@@ -752,29 +807,35 @@ module flk_preprocessing
     logic [Width-1:0]     data;
   } line_t;
 
-  logic  [4:0]              out_valid, out_ready;
-  line_t [4:0]              out;
-  logic [3:0][31:0]         list_entries, list_lines, list_evicted;
-  logic [3:0][24:0]         list_taken;
-  logic [3:0]               unused_done;
+  logic  [ListWriters:0]        out_valid, out_ready;  // of records, the last one
+  line_t [ListWriters:0]        out;
+  logic [ListWriters-1:0][31:0] list_entries, list_lines, list_evicted;
+  logic [3:0][24:0]             list_taken;            // by bank
+  logic [ListWriters-1:0]       unused_done;
   localparam int unsigned   LinesBits = $clog2(Lists / 16 + 1);
-  localparam int unsigned   NumberBits = LinesBits - 1;  // of a line of pointers
+  localparam int unsigned   NumberBits = LinesBits - 1 + $clog2(Banks);  // of a line of pointers
   localparam int unsigned   MoveBits = 28;  // of a pointer
 
   // Lines of pointers that move
-  logic [3:0]                move_valid, move_ready, move_put, move_get;
-  logic [3:0]                move_read, move_write, move_done;
-  logic [3:0][NumberBits-1:0] move_put_line, move_get_line;
+  logic [ListWriters-1:0]    move_valid, move_ready, move_put, move_get;
+  logic [ListWriters-1:0]    move_read, move_write, move_done;
+  logic [ListWriters-1:0][NumberBits-1:0] move_put_line, move_get_line;
   logic [3:0]                move_index;
-  logic [3:0][MoveBits-1:0]  move_from;
+  logic [ListWriters-1:0][MoveBits-1:0]  move_from;
   logic [MoveBits-1:0]       move_to;
   logic                      pointer_read_error, pointer_write_error;
 
-  for (genvar b = 0; b < 4; b++) begin : gen_lists
+  for (genvar b = 0; b < ListWriters; b++) begin : gen_lists
     logic [ListAddrBits-1:0] address;
     logic [Width-1:0]        data;
+    logic [Banks-1:0][24:0]  taken;
+
+    for (genvar k = 0; k < Banks; k++) begin : gen_taken
+      assign list_taken[b+ListWriters*k] = taken[k];
+    end
 
     flk_list_writer #(
+      .Banks   (Banks),
       .Pointers(Pointers),
       .Lists   (Lists)
     ) i_list (
@@ -793,10 +854,11 @@ module flk_preprocessing
       .entries_o      (list_entries[b]),
       .lines_o        (list_lines[b]),
       .evicted_o      (list_evicted[b]),
-      .taken_o        (list_taken[b]),
+      .taken_o        (taken),
       .in_valid_i     (merged_valid[b]),
       .in_ready_o     (merged_ready[b]),
       .in_end_i       (merged_end[b]),
+      .in_bank_i      (merged_bank[b]),
       .in_u_i         (merged_u[b]),
       .in_v_i         (merged_v[b]),
       .in_entry_i     (merged[b]),
@@ -823,6 +885,7 @@ module flk_preprocessing
   logic [31:0] pointer_lines_spilled, pointer_lines_fetched;
 
   flk_pointer_port #(
+    .Writers    (ListWriters),
     .NumberBits (NumberBits),
     .AddressBits(BEAT_BITS),
     .MoveBits   (MoveBits),
@@ -879,18 +942,18 @@ module flk_preprocessing
     .b_resp_i     (pointer_b_resp_i)
   );
 
-  assign out_valid[4] = line_valid;
-  assign line_ready   = out_ready[4];
-  assign out[4]       = {line_beat, line_strobe, line_data};
+  assign out_valid[ListWriters] = line_valid;
+  assign line_ready             = out_ready[ListWriters];
+  assign out[ListWriters]       = {line_beat, line_strobe, line_data};
 
   // ---- writes ---------------------------------------------------------------------------------------
 
   logic       chosen_valid, chosen_ready, lines_empty, write_failed;
   line_t      chosen;
-  logic [2:0] unused_index;
+  logic [$clog2(ListWriters+1)-1:0] unused_index;
 
   flk_stream_arbiter #(
-    .Inputs(5),
+    .Inputs(ListWriters + 1),
     .Width ($bits(line_t))
   ) i_arbiter (
     .clk_i,
@@ -949,26 +1012,27 @@ module flk_preprocessing
 
   logic                               write_error_q;
   logic [31:0]                        cycles_q;
-  logic [FRONT_EVENTS-1:0][LANES-1:0] events;  // by lane
+  logic [FRONT_EVENTS-1:0][LANES-1:0] events;  // by lane or list writer
   logic [FRONT_EVENTS-1:0][31:0]      totals;
 
   // What happens is counted a few cycles later; after a frame's last event comes the end of its lists, of its last wait that of its
   // writes.
-  assign events[FRONT_EVENT_TOO_NEAR]      = go ? side.used & lane_near : '0;
-  assign events[FRONT_EVENT_OUTSIDE]       = go ? side.used & ~lane_near & lane_outside : '0;
-  assign events[FRONT_EVENT_SURVIVORS]     = go ? alive : '0;
-  assign events[FRONT_EVENT_SATURATED]     = saturated;
-  assign events[FRONT_EVENT_CLIPPED]       = clipped;
-  assign events[FRONT_EVENT_FAINT]         = faint;
-  assign events[FRONT_EVENT_UNLISTED]      = unlisted;
+  assign events[FRONT_EVENT_TOO_NEAR]      = LANES'({side.used & lane_near & {PreprocLanes{go}}});
+  assign events[FRONT_EVENT_OUTSIDE]       =
+      LANES'({side.used & ~lane_near & lane_outside & {PreprocLanes{go}}});
+  assign events[FRONT_EVENT_SURVIVORS]     = LANES'({alive & {PreprocLanes{go}}});
+  assign events[FRONT_EVENT_SATURATED]     = LANES'(saturated);
+  assign events[FRONT_EVENT_CLIPPED]       = LANES'(clipped);
+  assign events[FRONT_EVENT_FAINT]         = LANES'(faint);
+  assign events[FRONT_EVENT_UNLISTED]      = LANES'(unlisted);
   assign events[FRONT_EVENT_RECORD_BEATS]  = LANES'(line_valid && line_ready);
 
   // Waits: where a projected group has several reasons, the first one. What comes late in its cycle is looked at in the next.
   logic             front_q, group_valid_q, exit_valid_q, places_q, colours_q;
   logic [1:0]       kept_q, line_q;  // ready above valid
-  logic [LANES-1:0] lanes_q;
-  logic [LANES-1:0] part_q, part_ready_q, record_q, record_ready_q, entry_q, entry_ready_q;
-  logic [3:0]       merged_q, merged_ready_q, out_q, out_ready_q;
+  logic [PreprocLanes-1:0] lanes_q;
+  logic [PreprocLanes-1:0] part_q, part_ready_q, record_q, record_ready_q, entry_q, entry_ready_q;
+  logic [ListWriters-1:0]  merged_q, merged_ready_q, out_q, out_ready_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -990,7 +1054,7 @@ module flk_preprocessing
       record_q     <= record_valid;
       entry_q      <= entry_valid;
       merged_q     <= merged_valid;
-      out_q        <= out_valid[3:0];
+      out_q        <= out_valid[ListWriters-1:0];
     end
   end
 
@@ -1003,7 +1067,7 @@ module flk_preprocessing
     record_ready_q <= record_ready;
     entry_ready_q  <= entry_ready;
     merged_ready_q <= merged_ready;
-    out_ready_q    <= out_ready[3:0];
+    out_ready_q    <= out_ready[ListWriters-1:0];
   end
 
   logic went;  // nothing waited at the end of the projection
@@ -1015,11 +1079,11 @@ module flk_preprocessing
   assign events[FRONT_EVENT_PLACE_WAITS]   = LANES'(exit_valid_q && (&lanes_q) && !places_q);
   assign events[FRONT_EVENT_REQUEST_WAITS] =
       LANES'(exit_valid_q && (&lanes_q) && places_q && !colours_q);
-  assign events[FRONT_EVENT_COLOUR_WAITS]  = part_q & ~part_ready_q;
-  assign events[FRONT_EVENT_RECORD_WAITS]  = record_q & ~record_ready_q;
-  assign events[FRONT_EVENT_ENTRY_WAITS]   = entry_q & ~entry_ready_q;
-  assign events[FRONT_EVENT_MERGED_WAITS]  = merged_q & ~merged_ready_q;
-  assign events[FRONT_EVENT_LINE_WAITS]    = out_q & ~out_ready_q;
+  assign events[FRONT_EVENT_COLOUR_WAITS]  = LANES'({part_q & ~part_ready_q});
+  assign events[FRONT_EVENT_RECORD_WAITS]  = LANES'({record_q & ~record_ready_q});
+  assign events[FRONT_EVENT_ENTRY_WAITS]   = LANES'({entry_q & ~entry_ready_q});
+  assign events[FRONT_EVENT_MERGED_WAITS]  = LANES'({merged_q & ~merged_ready_q});
+  assign events[FRONT_EVENT_LINE_WAITS]    = LANES'({out_q & ~out_ready_q});
   assign events[FRONT_EVENT_BEAT_WAITS]    = LANES'(line_q == 2'b01);
 
   flk_event_counters #(
@@ -1057,9 +1121,9 @@ module flk_preprocessing
     counters_o.header_beats     = header_beats;
     counters_o.geometry_beats   = geometry_beats;
     counters_o.colour_beats     = colour_beats;
-    counters_o.entries          = list_entries;
-    counters_o.lines            = list_lines;
-    counters_o.evicted          = list_evicted;
+    counters_o.entries          = 128'(list_entries);
+    counters_o.lines            = 128'(list_lines);
+    counters_o.evicted          = 128'(list_evicted);
     counters_o.taken            = list_taken;
     counters_o.spilled          = pointer_lines_spilled;
     counters_o.fetched          = pointer_lines_fetched;

@@ -1,4 +1,4 @@
-// Preprocessing core: one of four in the front end (docs/reference/front_end.md).
+// Preprocessing core: a lane of the front end (docs/reference/front_end.md).
 //
 // Front: a Gaussian as it lies in memory goes through decoding and projection. All lanes move
 // together: front_en_i, front_phase_i and the cluster's numbers come from outside, low_i and step_i

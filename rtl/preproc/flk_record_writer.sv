@@ -13,6 +13,7 @@
 module flk_record_writer
   import flk_preproc_pkg::*;
 #(
+  parameter  int unsigned Lanes      = LANES,        // 1 or more
   parameter  int unsigned RecordBits = 128,
   parameter  int unsigned Quarters   = 1,            // of a beat, that a record takes: 1 or 2
   localparam int unsigned Records    = 4 / Quarters  // of a beat
@@ -21,10 +22,10 @@ module flk_record_writer
   input  logic                             rst_ni,
   output logic                             idle_o,
   // Records
-  input  logic [LANES-1:0]                 in_valid_i,
-  output logic [LANES-1:0]                 in_ready_o,
-  input  place_t [LANES-1:0]               in_place_i,
-  input  logic [LANES-1:0][RecordBits-1:0] in_record_i,
+  input  logic [Lanes-1:0]                 in_valid_i,
+  output logic [Lanes-1:0]                 in_ready_o,
+  input  place_t [Lanes-1:0]               in_place_i,
+  input  logic [Lanes-1:0][RecordBits-1:0] in_record_i,
   // Beats
   input  logic                             beat_valid_i,
   output logic                             beat_ready_o,
@@ -71,44 +72,51 @@ module flk_record_writer
   logic [PLACE_BEAT_BITS-1:0]                 head_q;
   logic [3:0]                                 here;  // of the first beat, by quarter
   logic [Records-1:0]                         none;  // no record
-  logic [LANES-1:0][ItemBits-1:0]             item;
-  logic [3:0][LANES-1:0]                      ready;  // by quarter
+  logic [Lanes-1:0][ItemBits-1:0]             item;
+  logic [3:0][Lanes-1:0]                      ready;  // by quarter
   logic [Records-1:0]                         written;
   logic [Records-1:0][PLACE_BEAT_BITS-1:0]    written_at;
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_lane
+  for (genvar k = 0; k < Lanes; k++) begin : gen_lane
     assign item[k]       = {in_place_i[k].beat, in_record_i[k]};
     assign in_ready_o[k] = ready[in_place_i[k].quarter][k];
   end
 
   for (genvar r = 0; r < Records; r++) begin : gen_record
-    logic [LANES-1:0]          wants;
+    logic [Lanes-1:0]          wants;
     logic [RecordBits-1:0]     record;
-    logic [$clog2(LANES)-1:0]  unused_lane;
     logic [Beats-1:0]          there_q;
-    logic [LANES-1:0]          taken;
+    logic [Lanes-1:0]          taken;
 
     localparam int unsigned First = r * Quarters;  // its first quarter
 
-    for (genvar k = 0; k < LANES; k++) begin : gen_wants
+    for (genvar k = 0; k < Lanes; k++) begin : gen_wants
       assign wants[k] = in_valid_i[k] && in_place_i[k].quarter >> (Quarters - 1) == 2'(r);
     end
 
-    flk_stream_arbiter #(
-      .Inputs(LANES),
-      .Width (ItemBits)
-    ) i_arbiter (
-      .clk_i,
-      .rst_ni,
-      .clear_i    (1'b0),
-      .in_valid_i (wants),
-      .in_ready_o (taken),
-      .in_data_i  (item),
-      .out_valid_o(written[r]),
-      .out_ready_i(1'b1),
-      .out_data_o ({written_at[r], record}),
-      .out_index_o(unused_lane)
-    );
+    if (Lanes == 1) begin : gen_alone
+      assign written[r]              = wants[0];
+      assign {written_at[r], record} = item[0];
+      assign taken                   = 1'b1;
+    end else begin : gen_turns
+      logic [$clog2(Lanes)-1:0] unused_lane;
+
+      flk_stream_arbiter #(
+        .Inputs(Lanes),
+        .Width (ItemBits)
+      ) i_arbiter (
+        .clk_i,
+        .rst_ni,
+        .clear_i    (1'b0),
+        .in_valid_i (wants),
+        .in_ready_o (taken),
+        .in_data_i  (item),
+        .out_valid_o(written[r]),
+        .out_ready_i(1'b1),
+        .out_data_o ({written_at[r], record}),
+        .out_index_o(unused_lane)
+      );
+    end
 
     flk_sram #(
       .Width(RecordBits),
@@ -196,7 +204,7 @@ module flk_record_writer
     else $error("flk_record_writer: half a record");
   end
 
-  for (genvar k = 0; k < LANES; k++) begin : gen_held
+  for (genvar k = 0; k < Lanes; k++) begin : gen_held
     assert property (@(posedge clk_i) disable iff (!rst_ni)
         in_valid_i[k] && !in_ready_o[k] |=>
         in_valid_i[k] && $stable(in_place_i[k]) && $stable(in_record_i[k]))

@@ -1,7 +1,7 @@
-// Delivery: sorted entries of four sorting units to records at Cores cores (docs/reference/delivery.md).
+// Delivery: sorted entries of the sorting units to records at Cores cores (docs/reference/delivery.md).
 //
 // Sub-tile s of a tile is of core s mod Cores, bit s of an entry's mask says whether it sees the record.
-// Tile i of the walk comes from unit i mod 4. Tiles go one after the other, two entries a cycle (pairs of
+// Tile i of the walk comes from unit i mod Units. Tiles go one after the other, two entries a cycle (pairs of
 // flk_entry_buffer, never beyond the end of a list). An entry's record is looked up in the cache
 // (flk_record_cache) and put into the queues of the cores of its mask; the end of a list goes to all of them.
 // From its queue it goes to the core as an element for each of the core's sub-tiles in the mask, the lowest first.
@@ -22,6 +22,7 @@
 // Latency 7 for a record in the cache. in_ready_o depends on no input of the same cycle; out_valid_o
 // and out_* come from registers through a multiplexer.
 module flk_delivery #(
+  parameter  int unsigned Units      = 4,    // sorting units: 1, 2 or 4
   parameter  int unsigned RecordBits = 128,
   parameter  int unsigned NumberBits = 24,
   parameter  int unsigned InWidth    = 1,    // elements that a core takes in a cycle, 1 or 2
@@ -50,11 +51,11 @@ module flk_delivery #(
   output logic [3:0]                        waits_o,
   input  logic [AddrBits-Shift-1:0]         record_base_i,  // in 32 bytes
   // Sorting units
-  input  logic [3:0][1:0]                       in_valid_i,
-  output logic [3:0]                            in_ready_o,
-  input  logic [3:0][1:0]                       in_end_i,
-  input  logic [3:0][1:0][NumberBits+Subtiles-1:0] in_entry_i,
-  output logic [3:0]                            finish_o,
+  input  logic [Units-1:0][1:0]                          in_valid_i,
+  output logic [Units-1:0]                               in_ready_o,
+  input  logic [Units-1:0][1:0]                          in_end_i,
+  input  logic [Units-1:0][1:0][NumberBits+Subtiles-1:0] in_entry_i,
+  output logic [Units-1:0]                               finish_o,
   // Cores
   output logic [Cores-1:0][InWidth-1:0]                 out_valid_o,
   input  logic [Cores-1:0]                              out_ready_i,
@@ -80,10 +81,14 @@ module flk_delivery #(
 
   localparam int unsigned FillBits = $clog2(Queue + 3);  // the queue holds two more
   localparam int unsigned EndBits = $clog2(Depth + Queue + 16);
+  localparam int unsigned UnitBits = Units > 1 ? $clog2(Units) : 1;
   localparam int unsigned Margin = 6;  // records under way when a queue is seen to be nearly full
 
   if (Queue < 8 || Queue % 2 != 0) begin : gen_check_queue
     $error("flk_delivery: Queue must be even, at least 8");
+  end
+  if (Units != 1 && Units != 2 && Units != 4) begin : gen_check_units
+    $error("flk_delivery: Units must be 1, 2 or 4");
   end
   if (InWidth != 1 && InWidth != 2) begin : gen_check_width
     $error("flk_delivery: InWidth must be 1 or 2");
@@ -105,7 +110,7 @@ module flk_delivery #(
 
   // ---- entries ----------------------------------------------------------------------------------------
 
-  logic [1:0]                  unit_q;              // that is taken from
+  logic [UnitBits-1:0]         unit_q;              // that is taken from
   logic [1:0]                  e_valid_q, leaves, nothing, look, look_ready;
   what_t [1:0]                 e_q, what;
   logic [1:0][NumberBits-1:0]  e_record_q;
@@ -165,7 +170,7 @@ module flk_delivery #(
     end else if (stop) begin
       unit_q <= '0;
     end else begin
-      unit_q <= unit_q + 2'(e_end_taken);
+      unit_q <= (unit_q + UnitBits'(e_end_taken)) & UnitBits'(Units - 1);
     end
   end
 
@@ -184,17 +189,17 @@ module flk_delivery #(
   assign waits_o = {head_waits, offered_q && !taken_q, !offered_q && taken_q};
 
   // All sub-tiles are finished with the tile that a unit gives.
-  logic [3:0] finish_q;
+  logic [Units-1:0] finish_q;
 
-  for (genvar u = 0; u < 4; u++) begin : gen_unit
-    assign in_ready_o[u] = e_ready && unit_q == 2'(u);
+  for (genvar u = 0; u < Units; u++) begin : gen_unit
+    assign in_ready_o[u] = e_ready && unit_q == UnitBits'(u);
     assign finish_o[u]   = finish_q[u];
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
         finish_q[u] <= 1'b0;
       end else begin
-        finish_q[u] <= !stop && (&over) && unit_q == 2'(u) && !e_end_taken;
+        finish_q[u] <= !stop && (&over) && unit_q == UnitBits'(u) && !e_end_taken;
       end
     end
   end

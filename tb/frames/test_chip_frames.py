@@ -3,9 +3,9 @@
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
-Parameter space: a stage of 32 lanes, of 8 in one core; with SLOW=1 of two cores, of channels too, with modes that travel with their frame, the paper's
-configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half with channels). Units: tb/top, tb/common,
-tb/preproc, tb/sort; driver: tb/sw.
+Parameter space: a stage of 32 lanes; 8 in one core, with one sorting unit, list writer and preprocessing lane; with SLOW=1 of two cores, of channels too, with
+modes that travel with their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half
+with channels). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ ALL_CONFIGS = [
         ("two cores", CONFIG.with_(cores=2, lanes=16, delivered=2)),
     )
 ]
-ONE_CORE = CONFIG.with_(cores=1, lanes=8, memories="small")
+FEW = CONFIG.with_(memories="small", cores=1, lanes=8, sort_units=1, list_writers=1, preproc_lanes=1)
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
     (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders
@@ -120,7 +120,7 @@ def compare(
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
     # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat for up to four sub-tiles; tile i of the
-    # walk is of sorting unit i mod 4, which delivers what the core that needs most of the tile's list needs.
+    # walk is of sorting unit i modulo their number, which delivers what the sub-tile that needs most of the tile's list needs.
     counters = params.STAGES[config.stage].counters
     taken, of_frame = done.stage[:, counters.index("gaussians_in")], want.frame.lists
     lengths, needed = (of_cores(values, of_frame.cols, config.cores) for values in (np.diff(of_frame.start), want.frame.needed))
@@ -129,7 +129,8 @@ def compare(
     delivered = np.asarray(done.rendering["entries"])
     x, y = chip_walk(of_frame)
     least = want.frame.needed.reshape(of_frame.rows // 2, 2, of_frame.cols // 2, 2).max(axis=(1, 3))[y, x]
-    assert all(delivered[k] >= least[k::4].sum() for k in range(4)), (delivered, least)
+    units = config.sort_units
+    assert all(delivered[k] >= least[k::units].sum() for k in range(units)) and not delivered[units:].any(), (delivered, least)
     assert taken.sum() <= CORES * delivered.sum() and delivered.sum() <= counts["entries"]
     for name in ("blended", "pixels_finished") if config.by_lanes else ("minitiles_sent", "pixels_finished"):
         words = [k for k, counter in enumerate(counters) if counter.split()[-1] == name]
@@ -142,6 +143,22 @@ def demo(config: RenderConfig) -> tuple[View, PackedScene, ListKind]:
     view = load_view(DEMO, 0, (160, 90))
     format_, lists = (PackedFormat.FP16, ListKind.BOX) if config is FAITHFUL else (PackedFormat.CHUNK, ListKind.ELLIPSE)
     return view, packed_scene(view, format_), lists
+
+
+def test_few_units() -> None:
+    """One core of 8 lanes, sorting unit, list writer and preprocessing lane with the small memories: the picture of four of each; the model of the rendering
+    half. A second frame, of a picture that is no whole number of tiles."""
+    view = load_view(DEMO, 0, (96, 54))
+    packed = packed_scene(view, PackedFormat.CHUNK)
+    with session(packed, config=FEW) as chip:
+        done = check(chip, view.camera, config=FEW)
+        assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
+        assert not done.front["entries"][1:].any() and done.front["taken"].all()
+        assert done.stage[0].any() and not done.stage[1:].any()
+        front, sizes = run_front(packed, view.camera), FEW.chip_memories
+        tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
+        assert rendering.estimate(tables, FEW, None).cycles == pytest.approx(done.phases["rendering"], rel=0.15)
+        check(chip, replace(view.camera, width=40, height=24, cx=None, cy=None), PixelFormat.RGBA16F, FEW)
 
 
 @pytest.mark.parametrize("config", ALL_CONFIGS)
@@ -158,18 +175,6 @@ def test_demo_scene(config: RenderConfig) -> None:
         assert done.usage is not None
         live_beats(done, traffic)
         assert not done.front["spilled"] and not done.usage.live["pointer_beats"] and not done.usage.live["pointer_written"]
-
-
-def test_one_core() -> None:
-    """One core of 8 lanes for all four sub-tiles: the picture of four cores. Frames one after the other, of a picture that is no whole number of tiles."""
-    with session(config=ONE_CORE) as chip:
-        check(chip, camera(40, 24), config=ONE_CORE)
-        done = check(chip, camera(72, 40), PixelFormat.RGBA16F, ONE_CORE)
-        front = run_front(chip.packed, camera(72, 40))
-    assert done.stage[0].any() and not done.stage[1:].any()
-    sizes = ONE_CORE.chip_memories
-    tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
-    assert rendering.estimate(tables, ONE_CORE, None).cycles == pytest.approx(done.phases["rendering"], rel=0.15)
 
 
 def live_beats(done: ChipFrame, traffic: dict[str, PurposeCounts]) -> None:

@@ -3,9 +3,9 @@
 State space: the middle of the demo scene (the whole with SLOW=1), both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing,
 frames one after the other, an odd number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: channels with every mode; with SLOW=1 small memories, one and four VRUs, no contribution test, and 32, 64 and 128 lanes, one core and two, which
-tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end makes. Not covered: resets within
-a frame.
+Parameter space: channels with every mode; with SLOW=1 one and two sorting units, small memories, one and four VRUs, no contribution test, and 32, 64 and 128
+lanes, one core and two, which tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end
+makes. Not covered: resets within a frame.
 """
 
 from __future__ import annotations
@@ -225,6 +225,20 @@ def test_two_records_a_cycle() -> None:
     check((32, 32), wide, scene="layers")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("units", [1, 2])
+def test_fewer_sorting_units(units: int) -> None:
+    """The same picture and as many lines; lists that are left early, runs, an odd number of tiles, frames one after the other behind ports that pause."""
+    few = LANES.with_(sort_units=units)
+    rtl = check((96, 54), few, scene="demo")
+    assert left_out(rtl, view_of(96, 54, "demo")[0]) > 0.14 and rtl.counters["dropped"].any()
+    assert all((rtl.counters[name] > 0).tolist() == [k < units for k in range(4)] for name in ("entries", "readings"))
+    shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
+    check((80, 40), few, PixelFormat.RGBA16F, gap=1, memory=MemoryOptions(DramConfig().timing, paused(shares)), frames=2)
+    check((32, 32), few, scene="layers")
+    check((32, 32), few.with_(memories="small"), scene="haze")
+
+
 def test_pauses_and_dram() -> None:
     """DRAM behind ports that pause; two frames one after the other."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
@@ -258,6 +272,10 @@ def test_demo_scene_larger() -> None:
     for k in range(5):
         shares = {"AR": 0.1 * k, "R": 0.1 * k, "AW": 0.3, "W": 0.1 * k, "B": 0.3}
         check((320, 180), scene="demo", memory=MemoryOptions(None, paused(shares, 10 * k)))
+
+
+def test_number_of_units() -> None:
+    refused("flk_rendering", {"SortUnits": 3}, "SortUnits must be 1, 2 or 4")
 
 
 @pytest.mark.parametrize("parameters", [{"SortStages": 8}, {"MergeLines": 256}], ids=str)

@@ -494,6 +494,9 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--front", "rtl", "--stage", "lanes", "--form", "conic"], "--stage lanes: takes records of 16 bytes"),
     (["--engine", "chip-golden", "--memories", "small"], "--memories: for --engine chip only"),
     (["--engine", "rtl", "--refresh", "per-bank"], "--refresh: for --engine chip only"),
+    (["--engine", "rtl", "--sort-units", "2"], "--sort-units: for --engine chip only"),
+    (["--engine", "chip", "--list-writers", "3"], "list_writers must be 1, 2 or 4, not 3"),
+    (["--engine", "chip", "--preproc-lanes", "0"], "preproc_lanes must be 1, 2 or 4, not 0"),
     (["--engine", "chip", "--stage", "lanes", "--faithful"], "--stage lanes: takes records of 16 bytes"),
 ])
 def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:

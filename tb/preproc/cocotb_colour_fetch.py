@@ -42,8 +42,9 @@ class Fetch:
         stalls = {k: rng.choice([0.0, 0.3]) for k in ("AR", "R")} if not perfect else {}
         self.port = MemoryPort(dut, self.memory, PortConfig(max_reads=64, latency=latency, stall=stalls), writes=False)
         self.source = StreamSource(Stream(dut, "in", ("data",)), self.bench.stall(idle))
-        self.stalls = [self.bench.stall(stall) for _ in range(4)]
-        self.parts: list[list[int]] = [[] for _ in range(4)]
+        self.lanes = int(dut.Lanes.value)
+        self.stalls = [self.bench.stall(stall) for _ in range(self.lanes)]
+        self.parts: list[list[int]] = [[] for _ in range(self.lanes)]
         for name, value in (("start", 0), ("chunked", chunked), ("colours", BASE // 64), ("exit", 0), ("out_ready", 0)):
             getattr(dut, f"{name}_i").value = value
         self.under_way: list[Survivors] = []
@@ -61,14 +62,19 @@ class Fetch:
             moved = int(valid) & ready
             if moved:
                 word = int(dut.out_data_o.value)
-                for k in range(4):
+                for k in range(self.lanes):
                     if moved >> k & 1:
                         self.parts[k].append(word >> (width * k) & (1 << width) - 1)
+
+    def turns(self, g: Survivors) -> list[Survivors]:
+        """A group as it comes: the survivors of as many neighbours as there are lanes, one part after the other."""
+        mask = (1 << self.lanes) - 1
+        return [Survivors(g.cluster, g.colour, g.degree, g.group, g.alive & mask << k) for k in range(0, 4, self.lanes)]
 
     def due(self, groups: list[Survivors]) -> list[list[dict[str, int]]]:
         """Parts of each lane."""
         form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
-        lanes: list[list[dict[str, int]]] = [[] for _ in range(4)]
+        lanes: list[list[dict[str, int]]] = [[] for _ in range(self.lanes)]
         size = 1 if self.chunked else 2
         number = lambda at: int.from_bytes(self.data[at : at + size], "little")  # noqa: E731
         for g in groups:
@@ -81,12 +87,14 @@ class Fetch:
                 opacity, dc = (head[0], head[:0:-1]) if self.chunked else (head[0], head[1:])
                 for part, used in enumerate(USED[g.degree]):
                     raw = {(i, c): number(at + size * (4 + 12 * part + 3 * i + c)) for i in range(4) for c in range(3) if used >> i & 1}
-                    lanes[k].append({"cluster": g.cluster % 16, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
-                                     "opacity": opacity, "dc": dc, "raw": raw})
+                    lanes[k % self.lanes].append({
+                        "cluster": g.cluster % 16, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
+                        "opacity": opacity, "dc": dc, "raw": raw,
+                    })
         return lanes
 
     def beats(self, groups: list[Survivors]) -> int:
-        """Beats from a group's first survivor to its last one, each once."""
+        """Beats from the first survivor of those that come together to the last one, each once."""
         form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
         found = set()
         for g in groups:
@@ -100,6 +108,7 @@ class Fetch:
     async def run(self, groups: list[Survivors]) -> int:
         """A frame. Returns its cycles."""
         dut = self.dut
+        groups = [part for group in groups for part in self.turns(group)]
         await self.bench.until(lambda: int(dut.idle_o.value) == 1, 2000, "idle")
         for lane in self.parts:
             lane.clear()

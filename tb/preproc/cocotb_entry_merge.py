@@ -10,7 +10,7 @@ from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
 from flicker_tb.bench import Bench
 
-LANES, BANKS, SEQ = 4, 4, 12
+LANES, SEQ = 4, 12
 LOW = (1 << SEQ) - 1
 ENTRY_BITS = 12 + 8 + 8 + 24 + 24 + 4
 Entry = tuple[int, int, int, int, int, int]  # seq, row, column, key, number, mask
@@ -45,6 +45,8 @@ class Merge:
         self.dut, self.bench, self.ahead = dut, Bench(dut), ahead
         self.rng = self.bench.rng
         self.cycles = 0
+        self.lanes, self.banks = int(dut.Lanes.value), int(dut.Writers.value)  # banks: outputs
+        self.bank_bits = len(dut.out_bank_o) // self.banks
         for name in ("start", "end", "in_valid", "in_data", "progress", "out_ready"):
             getattr(dut, f"{name}_i").value = 0
 
@@ -57,14 +59,16 @@ class Merge:
         lanes = [Lane(stalls.make(p, rng), late) for p in patterns[0]]
         for lane in lanes:
             lane.shown = deque([base] * (late + 1))
+        lanes, patterns = lanes[: self.lanes], (patterns[0], patterns[1][: self.banks])
+        splats = [(lane % self.lanes, entries) for lane, entries in splats]
         banks = [stalls.make(p, rng) for p in patterns[1]]
-        due: list[deque[Entry]] = [deque() for _ in range(BANKS)]
+        due: list[deque[Entry]] = [deque() for _ in range(self.banks)]
         for _, entries in splats:
             for entry in entries:
-                due[(entry[2] & 1) + 2 * (entry[1] & 1)].append(entry)
+                due[((entry[2] & 1) + 2 * (entry[1] & 1)) % self.banks].append(entry)
         count = [len(d) for d in due]
         assigned, oldest, cycle = base, base, 0
-        ended, last, held = [False] * BANKS, [0] * BANKS, [None] * BANKS
+        ended, last, held = [False] * self.banks, [0] * self.banks, [None] * self.banks
         assert int(dut.idle_o.value) == 1
         dut.start_i.value = 1
         dut.end_i.value = 0
@@ -103,12 +107,13 @@ class Merge:
                     lane.offered = False
             leaves = int(dut.out_valid_o.value)
             if leaves:
-                end, u, v, word = (int(getattr(dut, f"out_{n}_o").value) for n in ("end", "u", "v", "entry"))
-                for b in range(BANKS):
+                end, u, v, word, bank = (int(getattr(dut, f"out_{n}_o").value) for n in ("end", "u", "v", "entry", "bank"))
+                for b in range(self.banks):
                     if not leaves >> b & 1:
                         assert held[b] is None, f"bank {b}: valid fell"
                         continue
-                    got = (end >> b & 1, u >> 7 * b & 127, v >> 7 * b & 127, word >> 52 * b & (1 << 52) - 1)
+                    got = (end >> b & 1, u >> 7 * b & 127, v >> 7 * b & 127, word >> 52 * b & (1 << 52) - 1,
+                           bank >> self.bank_bits * b & (1 << self.bank_bits) - 1)
                     assert held[b] in (None, got), f"bank {b}: changed before its transfer"
                     held[b] = None if ready >> b & 1 else got
                     if ready >> b & 1:
@@ -119,23 +124,23 @@ class Merge:
                 return last
         assert not any(due)
         dut.end_i.value = 0
-        dut.out_ready_i.value = (1 << BANKS) - 1
+        dut.out_ready_i.value = (1 << self.banks) - 1
         for _ in range(6):
             await edge
             assert int(dut.out_valid_o.value) == 0
         assert int(dut.idle_o.value) == 1
         return last
 
-    def check(self, bank: int, got: tuple[int, int, int, int], due: deque[Entry], count: int) -> None:
-        end, u, v, word = got
+    def check(self, bank: int, got: tuple[int, int, int, int, int], due: deque[Entry], count: int) -> None:
+        end, u, v, word, of_bank = got
         place = f"bank {bank}, element {count - len(due)}"
         if end:
             assert not due, f"{place}: end, but entries are to come"
             return
         assert due, f"{place}: an entry after the last"
         _, row, column, key, number, mask = due.popleft()
-        want = (column >> 1, row >> 1, key << 28 | number << 4 | mask)
-        assert (u, v, word) == want, f"{place}: {(u, v, hex(word))}, due {(*want[:2], hex(want[2]))}"
+        want = (column >> 1, row >> 1, ((column & 1) + 2 * (row & 1)) // self.banks, key << 28 | number << 4 | mask)
+        assert (u, v, of_bank, word) == want, f"{place}: {(u, v, of_bank, hex(word))}, due {(*want[:3], hex(want[3]))}"
 
 
 def scene(rng, count: int, base: int = 0, entries: int = 6, weights: tuple[int, ...] = (1, 1, 1, 1)) -> list[tuple[int, list[Entry]]]:
@@ -152,9 +157,9 @@ def scene(rng, count: int, base: int = 0, entries: int = 6, weights: tuple[int, 
 
 def patterns(rng, kind: str) -> Patterns:
     if kind == "mixed":
-        return [rng.choice(stalls.PATTERNS) for _ in range(LANES)], [rng.choice(stalls.PATTERNS) for _ in range(BANKS)]
+        return [rng.choice(stalls.PATTERNS) for _ in range(LANES)], [rng.choice(stalls.PATTERNS) for _ in range(4)]
     lanes, banks = kind.split()
-    return [lanes] * LANES, [banks] * BANKS
+    return [lanes] * LANES, [banks] * 4
 
 
 @cocotb.test()

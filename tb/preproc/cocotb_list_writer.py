@@ -140,14 +140,15 @@ class Writer:
 
     def __init__(self, dut, idle: str = "never", stall: str = "never"):
         self.dut, self.bench = dut, Bench(dut)
-        entries, lines = Stream(dut, "in", ("end", "u", "v", "entry")), Stream(dut, "out", ("address", "data"))
+        several = int(dut.Banks.value) > 1
+        entries, lines = Stream(dut, "in", ("end", *["bank"] * several, "u", "v", "entry")), Stream(dut, "out", ("address", "data"))
         self.source = StreamSource(entries, self.bench.stall(idle))
         self.sink = StreamSink(lines, self.bench.stall(stall))
         self.out: list[tuple[int, int]] = []
         self.output = Monitor(lines, self.out.append)
         self.input = Monitor(entries)
         self.mover = Mover(dut, self.bench, self.out)
-        dut.start_i.value = 0
+        dut.start_i.value = dut.in_bank_i.value = 0
         for name, value in (("writer", 0), ("columns", 0), ("pointer_lines", 0), ("chunks", 0), ("list_base", LIST_BASE), ("pointer_base", POINTER_BASE)):
             getattr(dut, f"{name}_i").value = value
 
@@ -339,6 +340,74 @@ async def spilled(dut, idle, stall):
         if k == 3:
             await test.run(random_frame(rng, held, 300))
     assert moved.min() > 50 and failed and skipped
+
+
+@cocotb.test()
+@cocotb.parametrize((("idle", "stall"), PATTERNS[:: rounds(2, 1)]))
+async def banks(dut, idle, stall):
+    """A writer of several banks, entries of all of them in turn: of each bank lines, moves, pointers and chunks are those of the model, which has a writer a
+    bank; banks that run out of chunks, alone and all."""
+    test = Writer(dut, idle, stall)
+    rng = test.bench.rng
+    count, held, lists = int(dut.Banks.value), config()["pointers"], config()["lists"]
+    await test.bench.reset()
+    failed = moved = 0
+    for k in range(8):
+        first = rng.randrange(4 // count)
+        own = [first + 4 // count * j for j in range(count)]
+        large = k % 2 == 1 and lists > held
+        most = lists if large else held
+        least = max(2, most // 128)
+        columns = rng.randrange(least, max(least + 1, min(128, most) // 4))
+        rows = min(128, most // columns)
+        cols, lines = 2 * columns, pointer_lines(2 * columns, 2 * rows) // 4
+        assert (16 * lines > held) == large
+        places = [(rng.randrange(columns), rng.randrange(rows)) for _ in range(12)]
+        tiles: list[tuple[int, int, int]] = []
+        while len(tiles) < rounds(500, 1000):
+            u, v = rng.choice(places) if rng.random() < 0.7 else (rng.randrange(columns), rng.randrange(rows))
+            turn = own if rng.random() < 0.5 else [rng.choice(own)]
+            tiles += [(2 * u + (b & 1), 2 * v + (b >> 1), b) for b in turn for _ in range(rng.randrange(1, 20))]
+        key, record = walk_entries(rng, [tile[:2] for tile in tiles], None)
+        splat, mask = np.arange(len(tiles)), np.array([rng.randrange(1, 16) for _ in tiles], np.int64)
+        number = np.array([x + cols * y for x, y, _ in tiles], np.int64)
+        chunks = None
+        if k % 4 >= 2:  # some banks or all run out of chunks
+            need = write_lists(splat, number, mask, key, record, cols, 2 * rows, None, held).taken[own]
+            chunks = int(rng.choice((need.max() - 1, need.min() - 1)))
+        image = write_lists(splat, number, mask, key, record, cols, 2 * rows, chunks, held)
+        words = [int(word) for word in entry_words(splat, mask, key, record)]
+        await test.bench.until(lambda: int(dut.idle_o.value) == 1, 20_000, "idle")
+        for name, value in (("writer", first), ("columns", columns), ("pointer_lines", lines), ("chunks", image.chunks)):
+            getattr(dut, f"{name}_i").value = value
+        dut.start_i.value = 1
+        await RisingEdge(dut.clk_i)
+        dut.start_i.value = 0
+        test.out.clear()
+        test.mover.moves.clear()
+        test.mover.table.clear()
+        test.mover.slow = k % 3 == 0
+        test.source.send([(0, own.index(b), x >> 1, y >> 1, word) for (x, y, b), word in zip(tiles, words)] + [(1, rng.randrange(count), 0, 0, 0)])
+        limit = 4000 + 40 * (len(tiles) + 256 * count + 16 * lines * count) + 200 * sum(len(m) for m in image.moves)
+        await test.bench.until(lambda: int(dut.done_o.value) == 1, limit, "done")
+        lists_out = [(at - LIST_BASE, data) for at, data in test.out[: sum(image.lines[b] for b in own)]]
+        table = {line: data for line, data in test.mover.table.items()} | {
+            ((at - POINTER_BASE - first) * count // 4): data for at, data in test.out[len(lists_out) :]}
+        assert len(test.out) == sum(int(image.lines[b]) + len(image.closed[b]) for b in own)
+        for j, b in enumerate(own):
+            due = [(int(at), int.from_bytes(image.memory[at].tobytes(), "little")) for at in image.writes[b]]
+            assert [item for item in lists_out if item[0] >> 3 & 3 == b] == due, f"bank {b}: lines"
+            got = [tuple(at // count if at >= 0 else -1 for at in (put, get)) for _, put, get in test.mover.moves if max(put, get) % count == j]
+            assert got == [tuple(m[1:]) for m in image.moves[b].tolist()], f"bank {b}: moves"
+            want = [int.from_bytes(part.tobytes(), "little") for part in image.pointers.reshape(-1, 4, 16)[:, b]]
+            assert [table.get(count * line + j, 0) for line in range(lines)] == want, f"bank {b}: pointers"
+            assert int(dut.taken_o.value) >> 25 * j & (1 << 25) - 1 == image.taken[b], f"bank {b}: chunks"
+        for name in ("entries", "lines", "evicted"):
+            assert int(getattr(dut, f"{name}_o").value) == getattr(image, name)[own].sum(), name
+        assert int(dut.failed_o.value) == image.failed[own].any()
+        failed += 0 < image.failed[own].sum() < count
+        moved += len(test.mover.moves)
+    assert failed and (moved > 20) == (lists > held)
 
 
 @cocotb.test()

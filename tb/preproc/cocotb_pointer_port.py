@@ -211,9 +211,9 @@ async def alone(dut):
     await test.start()
     cycles = {}
     for name, put, get in (("put", 1, None), ("get", None, 1), ("both", 2, 1)):
-        test.writers[1].ask(put, get)
+        test.writers[-1].ask(put, get)
         n = 0
-        while test.writers[1].request is not None:
+        while test.writers[-1].request is not None:
             await RisingEdge(dut.clk_i)
             n += 1
         cycles[name] = n

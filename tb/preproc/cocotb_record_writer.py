@@ -28,9 +28,10 @@ class Writer:
     def __init__(self, dut) -> None:
         self.dut, self.bench = dut, Bench(dut)
         self.rng = self.bench.rng
-        self.place_bits = len(dut.in_place_i) // LANES
+        self.lanes = int(dut.Lanes.value)
+        self.place_bits = len(dut.in_place_i) // self.lanes
         self.ring = 1 << self.place_bits - 2
-        self.record_bits = len(dut.in_record_i) // LANES
+        self.record_bits = len(dut.in_record_i) // self.lanes
         self.records = len(dut.out_data_o) // self.record_bits  # of a beat
         self.quarters = 4 // self.records  # of a record
         for name in ("in_valid", "in_place", "in_record", "beat_valid", "beat_data", "out_ready"):
@@ -58,9 +59,9 @@ class Writer:
     async def run(self, beats: list[Beat], idle: list[str], stall: str, beat_idle: str = "never", shuffle: bool = True, lane_of=None, stop: int = 0) -> int:
         """All beats; cycles from the first record's transfer to the last line's. idle: of the lanes. lane_of: (beat, record) to lane."""
         dut, rng, edge = self.dut, self.rng, RisingEdge(self.dut.clk_i)
-        lanes: list[list[tuple[int, int, int]]] = [[] for _ in range(LANES)]  # place, record
+        lanes: list[list[tuple[int, int, int]]] = [[] for _ in range(self.lanes)]  # place, record
         idles, stop_line, stop_beat = [stalls.make(p, rng) for p in idle], stalls.make(stall, rng), stalls.make(beat_idle, rng)
-        offered: list[tuple[int, int, int] | None] = [None] * LANES
+        offered: list[tuple[int, int, int] | None] = [None] * self.lanes
         items: deque[int] = deque()
         assigned = freed = lines = cycle = inside = 0
         item_offered, held, first = False, None, -1
@@ -69,11 +70,11 @@ class Writer:
             while assigned < len(beats) and assigned - freed < self.ring:
                 beat, at = beats[assigned], (self.head + assigned) % self.ring
                 for r, record in beat.records.items():
-                    lanes[rng.randrange(LANES) if lane_of is None else lane_of(assigned, r)].append((at, self.quarters * r, record))
+                    lanes[rng.randrange(self.lanes) if lane_of is None else lane_of(assigned, r)].append((at, self.quarters * r, record))
                 items.append(beat.address << 4 | self.marked(beat.records))
                 assigned += 1
             valid = places = records = 0
-            for k in range(LANES):
+            for k in range(self.lanes):
                 if offered[k] is None and lanes[k] and not next(idles[k]):
                     offered[k] = lanes[k].pop(rng.randrange(len(lanes[k])) if shuffle else 0)
                 shown = offered[k]
@@ -90,7 +91,7 @@ class Writer:
             cycle += 1
             assert not (inside and int(dut.idle_o.value)), "idle with records inside"
             taken = valid & int(dut.in_ready_o.value)
-            for k in range(LANES):
+            for k in range(self.lanes):
                 if taken >> k & 1:
                     offered[k] = None
                     inside += 1

@@ -5,7 +5,7 @@ State space: entries of one tile and of tiles in turn (hits, free ways, eviction
 and full, no entries, memory that runs out at every place, idle and back-pressure patterns, reset in a frame; lines of pointers that are moved to their table
 and back, by an agent of any speed; the last chunks of the largest region. Parameter space: 64 pointers for as many lists, 32 for 256; 2048 for 16,384 as in
 the chip, corners of the largest picture only, with SLOW=1 whole frames, those with moves and the rate too; with 256 lists half of the patterns without SLOW=1;
-the format is fixed. Not covered: counters of entries of more than 2**16.
+four banks, with SLOW=1 two, and four of the chip's sizes; the format is fixed. Not covered: counters of entries of more than 2**16.
 """
 
 from __future__ import annotations
@@ -27,7 +27,16 @@ def test_list_writer(pointers: int, lists: int, tests: list[str]) -> None:
                    inner="last_chunks" in tests)
 
 
+@pytest.mark.parametrize(("banks", "pointers", "lists"), [
+    (4, 32, 128), *(pytest.param(*sizes, marks=pytest.mark.slow) for sizes in ((2, 64, 64), (2, 32, 256), (4, 2048, 16384))),
+])
+def test_several_banks(banks: int, pointers: int, lists: int) -> None:
+    parameters = {"Banks": banks, "Pointers": pointers, "Lists": lists}
+    build_and_test("flk_list_writer", "cocotb_list_writer", parameters=parameters, config={"pointers": pointers, "lists": lists}, tests=["banks"])
+
+
 @pytest.mark.parametrize(("parameters", "message"), [
+    ({"Banks": 3}, "Banks must be 1, 2 or 4"),
     ({"Ways": 3}, "Ways must be a power of two"), ({"Pointers": 40}, "Pointers must be a multiple"), ({"Pointers": 48, "Lists": 96}, "Lists must be"),
     ({"Pointers": 64, "Lists": 32}, "Lists must be"), ({"ChunkLines": 6}, "ChunkLines must be a power of two"),
     ({"ShortEntries": 16}, "must fit a line"), ({"LineEntries": 10}, "must fill the gaps"),

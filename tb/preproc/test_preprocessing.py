@@ -3,7 +3,7 @@
 State space: formats, list kinds, records of 16 and of 32 bytes, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters
 all culled, one Gaussian, pictures of 4096x4096, 4096x1 and 1x4096, a Gaussian over the whole of the largest (SLOW=1), a camera inside a cluster, errors of the
 memory by address, list memory that runs out, a table that points beyond the records. Registers and memories begin random; bytes that no one should write are
-compared too.
+compared too. Parameter space: with SLOW=1 one and two lanes and list writers.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from flicker_tb.elaboration import refused
 from flicker_tb.runner import seed
 
 from flicker.chip.dram import DramConfig
@@ -55,12 +56,14 @@ def demo() -> View:
 
 def check(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1,
-    kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH,
+    kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH, lanes: int = 4, writers: int = 4,
 ) -> tuple[FrontFrame, RtlFront]:
     """A frame of both, compared."""
     golden = run_front(packed, camera, lists, kind, order=order)
     image = front_memory(golden)
-    rtl = front_rtl(packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed(), order=order)
+    rtl = front_rtl(
+        packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed(), order=order, lanes=lanes, writers=writers,
+    )
     assert rtl.error == 0 and "value beyond FP16 clamped" not in golden.adjusted
     assert rtl.waits == {name: rtl.counters[name] for name in rtl.waits}
     written = image.written
@@ -76,8 +79,10 @@ def check(
     ]
     assert count["survivors"] == len(golden.gaussian) and count["culled_clusters"] == len(packed.table) - golden.clusters_kept
     assert count["saturated"] == golden.adjusted.get("mean beyond 2^22 pixels", 0) and count["clipped"] == golden.adjusted.get("colour above 2 clipped", 0)
-    for name in ("entries", "lines", "evicted", "taken"):
-        assert np.array_equal(count[name], getattr(image.lists, name)), name
+    assert np.array_equal(count["taken"], image.lists.taken)
+    for name in ("entries", "lines", "evicted"):  # a writer has every `writers`th bank
+        banks = getattr(image.lists, name)
+        assert list(count[name]) == [banks[w::writers].sum() if w < writers else 0 for w in range(4)], name
     traffic = {n: (c.read_beats, c.write_beats) for n, c in rtl.traffic.items()}
     per = lambda n: frames * int(count[n])  # noqa: E731
     for name in ("header", "geometry", "colour"):
@@ -86,7 +91,7 @@ def check(
     for name, moved in (("spilled", image.lists.spilled), ("fetched", image.lists.fetched)):
         assert count[name] == moved.sum(), name
     beats = dict.fromkeys(traffic, (0, 0))
-    for b in chip_traffic(golden, image):
+    for b in chip_traffic(golden, image, lanes):
         read, written = beats[b.name]
         beats[b.name] = (read, written + frames * len(b.beat)) if b.write else (read + frames * len(b.beat), written)
     assert beats == traffic
@@ -251,6 +256,48 @@ def wide(count: int = 400, **changes) -> tuple[PackedScene, Camera]:
     means = np.stack([rng.uniform(-0.6, 0.6, count) * z, rng.uniform(-0.6, 0.6, count) * height / width * z, z], axis=1)
     scene = some(count, means=means, scales=rng.uniform(0.005, 0.05, (count, 3)), **changes)
     return pack(scene, PackedFormat.CHUNK).packed, Camera(width, height, width, width, np.zeros(3), np.eye(3))
+
+
+FEWER = [(1, 1), (2, 2), (4, 1), (1, 4)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lanes", "writers"), FEWER)
+def test_fewer_lanes_and_writers(lanes: int, writers: int) -> None:
+    """The same bytes: the demo scene, groups of one to four Gaussians and all degrees behind a slow memory, lines of pointers that move."""
+    view = demo()
+    golden, rtl = check(pack(view.scene, PackedFormat.CHUNK).packed, view.camera, lanes=lanes, writers=writers)
+    assert abs(unit_cycles(golden, lanes=lanes, writers=writers).all / rtl.cycles - 1) <= 0.1
+    sizes = some(2000)
+    for degree, form in enumerate((PackedFormat.FP16, PackedFormat.CHUNK, PackedFormat.FP16, PackedFormat.CHUNK)):
+        scene = dataclasses.replace(sizes, sh=sizes.sh[:, : (degree + 1) ** 2])
+        check(pack(scene, form).packed, plain_camera(), memory=lpddr4(), frames=2, lanes=lanes, writers=writers)
+    packed, camera = wide()
+    check(packed, camera, memory=lpddr4(), lanes=lanes, writers=writers)
+    packed, camera = wide(150, size=(4096, 4096))
+    check(packed, camera, lanes=lanes, writers=writers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lanes", "writers"), FEWER[:2])
+def test_fewer_writers_out_of_list_memory(lanes: int, writers: int) -> None:
+    """Each bank ends by itself, in pictures with all pointers held and with more."""
+    for packed, camera in ((pack(some(2000), PackedFormat.CHUNK).packed, plain_camera()), wide()):
+        frame = run_front(packed, camera)
+        full = front_memory(frame).lists
+        image = front_memory(frame, (int(full.taken.min()) + int(full.taken.max())) // 2).lists
+        rtl = front_rtl(packed, camera, chunks=image.chunks, seed=seed(), lanes=lanes, writers=writers)
+        assert image.failed.any() and rtl.error == 1 << ERRORS.index("out of list memory") and np.array_equal(rtl.counters["taken"], image.taken)
+        lines = np.unique(np.concatenate(image.writes))
+        assert np.array_equal(rtl.memory[lines], image.memory[lines])
+        assert np.array_equal(np.delete(rtl.memory, lines, axis=0), np.delete(rtl.before[1], lines, axis=0))
+        for bank in np.flatnonzero(image.failed == 0):
+            assert np.array_equal(rtl.pointers.reshape(-1, 4, 16)[:, bank], image.pointers.reshape(-1, 4, 16)[:, bank])
+
+
+@pytest.mark.parametrize("parameters", [{"PreprocLanes": 3}, {"ListWriters": 3}], ids=str)
+def test_illegal_parameters(parameters: dict[str, int]) -> None:
+    refused("flk_preprocessing", parameters, f"{next(iter(parameters))} must be 1, 2 or 4")
 
 
 @pytest.mark.parametrize("memory", [QUICK, lpddr4()], ids=["perfect", "lpddr4"])

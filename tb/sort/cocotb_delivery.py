@@ -10,7 +10,7 @@ from flicker_tb.axi import MemoryPort
 from flicker_tb.bench import Bench, config, rounds
 
 from flicker.chip.dram import DramConfig
-from flicker.golden.delivery import END, LINE_BYTES, SUBTILES, UNITS, core_records
+from flicker.golden.delivery import END, LINE_BYTES, SUBTILES, core_records
 from flicker.sim.memory import Memory, PortConfig
 
 BASE, RECORDS = 0x7_6543_2100 // LINE_BYTES * LINE_BYTES, 1 << 12
@@ -52,6 +52,7 @@ class Delivery:
     def __init__(self, dut, idle="never", stall="never", latency=5, pauses=0.0, finish=0.0, pace=(1, 1, 1, 1), perfect=True, deaf=False):
         self.dut, self.bench, self.finish, self.pace, self.deaf = dut, Bench(dut), finish, pace, deaf
         rng = self.rng = self.bench.rng
+        self.count = int(dut.Units.value)  # sorting units
         self.width = len(dut.out_valid_o) // CORES  # elements that a core takes in a cycle
         self.bytes = len(dut.out_record_o) // (8 * CORES * self.width)
         memory = Memory(DramConfig().timing, perfect)
@@ -61,7 +62,7 @@ class Delivery:
         self.port = MemoryPort(dut, memory, PortConfig(
             data_bits=256, latency=latency, max_reads=256, max_beats=1, stall={"AR": pauses, "R": pauses}, seed=rng.getrandbits(30),
         ), writes=False)
-        self.idle = [self.bench.stall(idle) for _ in range(UNITS)]
+        self.idle = [self.bench.stall(idle) for _ in range(self.count)]
         self.stall = [self.bench.stall(stall) for _ in range(CORES)]
         for name in ("start", "in_valid", "in_end", "in_entry", "out_ready", "finished"):
             getattr(dut, f"{name}_i").value = 0
@@ -71,7 +72,7 @@ class Delivery:
 
     def reset(self) -> None:
         self.tiles: list[Tile] = []
-        self.units = [Unit() for _ in range(UNITS)]
+        self.units = [Unit() for _ in range(self.count)]
         self.due: list[deque[tuple[int, int] | None]] = [deque() for _ in range(CORES)]
         self.tile = [0] * CORES  # that the core is taking
         self.rest = [0] * CORES  # cycles until it takes the next one
@@ -90,10 +91,10 @@ class Delivery:
     def give(self, tiles: list[Tile]) -> None:
         """Tiles of a frame, in the order of the walk."""
         first = len(self.tiles)
-        assert first % UNITS == 0
+        assert first % self.count == 0
         self.tiles += tiles
         for k, entries in enumerate(tiles):
-            self.units[k % UNITS].lists.append((first + k, deque(entries)))
+            self.units[k % self.count].lists.append((first + k, deque(entries)))
         for k in range(CORES):
             self.due[k].extend(core_records(tiles, k, CORES))
         for s in range(SUBTILES):
@@ -101,7 +102,7 @@ class Delivery:
 
     async def _run(self) -> None:
         dut, edge = self.dut, RisingEdge(self.dut.clk_i)
-        bits, number = 8 * self.bytes, len(dut.in_entry_i) // 8
+        bits, number = 8 * self.bytes, len(dut.in_entry_i) // (2 * self.count)
         ready = 0
         turn, due = 0, 0  # unit that is taken from; waits_o of it in the next cycle
         told: list[set[int]] = [set() for _ in range(SUBTILES)]
@@ -123,7 +124,7 @@ class Delivery:
             assert waits >> 2 != 3, "the head waits for two things"
             self.waits = [n + (waits >> k & 1) for k, n in enumerate(self.waits)]
             if offered and taken and any(self.units[turn].item(k)[0] for k in range(offered)):
-                turn = (turn + 1) % UNITS
+                turn = (turn + 1) % self.count
             # Units
             moved, finish = int(dut.in_ready_o.value), int(dut.finish_o.value)
             for u, unit in enumerate(self.units):
@@ -267,7 +268,7 @@ async def ends_alone(dut):
     await test.bench.reset()
     await test.ready()
     test.rest[0] = 3 * room
-    test.give([[] for _ in range(room + room % UNITS + 40)])
+    test.give([[] for _ in range(room + room % 4 + 40)])
     await test.bench.until(lambda: test.rest[0] < room, 3 * room, "a core that takes again")
     assert test.tile[0] == 0 and len(test.tiles) > len(test.tiles) - sum(len(unit.lists) for unit in test.units) >= room, "ends that are under way"
     await test.run(make(test.rng, 8))

@@ -88,7 +88,7 @@ def test_refused(parameters: dict[str, int], message: str) -> None:
 # ---- the whole chip -----------------------------------------------------------------------------
 
 CONFIG = RenderConfig(stage="lanes", memories="small")
-PARAMETERS = {**CONFIG.chip_parameters(), **CONFIG.chip_memories.front_parameters(), "IdWidth": 9}
+PARAMETERS = {**CONFIG.chip_parameters(), **CONFIG.front_parameters(), "IdWidth": 9}
 SIZE = 1 << 29  # of the memory; only what is written takes place
 
 

@@ -25,7 +25,7 @@ from ..golden.front.frame import FrontFrame, ListKind, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import MEAN_FRACTION
-from ..params import CHIP_MEMORIES, TILE, ChipMemories, Coords, Form, RenderConfig
+from ..params import TILE, Coords, Form, RenderConfig
 from ..perf.render_stage import StageCycles
 from ..pipeline import Engine, Front, FrontOptions, golden_front, packed_scene
 from ..scene.packed import PackedFormat
@@ -77,11 +77,11 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
-def _first_half(front: FrontFrame, sizes: ChipMemories, dram: DramConfig, sorter: bool = True) -> tuple[preprocessing.Preprocessing, TileLists]:
+def _first_half(front: FrontFrame, config: RenderConfig, dram: DramConfig, sorter: bool = True) -> tuple[preprocessing.Preprocessing, TileLists]:
     """Preprocessing of a frame, and the lists that it leaves. sorter: False: for an ideal one, which costs the bytes of one reading and no time."""
-    image = front_memory(front)
+    image, sizes = front_memory(front), config.chip_memories
     tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
-    return preprocessing.estimate(front, image, dram, sizes), tables
+    return preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers), tables
 
 
 def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
@@ -97,7 +97,7 @@ def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
     if not drawing.engine.whole and drawing.front is Front.FLOAT:
         options = FrontOptions(*FRONTS[config.form])
     packed = packed_scene(view, options.format, options.rechunk)
-    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config.chip_memories, drawing.dram)
+    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, drawing.dram)
     found = whole_frame(first, rendering.estimate(tables, config, drawing.dram), drawing.dram)
     return {
         "cycles": found.interval, "latency_cycles": found.latency, "front_cycles": found.front.cycles, "render_cycles": found.back.cycles,
@@ -115,7 +115,7 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
     """Cycles, bytes and the bottleneck of configurations in whole frames, by name; front ends by the form of the stage (`FRONTS`), lists of GSCore by oriented
     boxes. Rivals (`own_sorter`) have an ideal sorter, which costs the bytes of one reading and no time. memories: `RenderConfig.memories`. FlickerError for one
     that the chip cannot have."""
-    dram, sizes = dram or DramConfig(), CHIP_MEMORIES[memories]
+    dram = dram or DramConfig()
     fronts: dict[tuple[Form, bool, bool], tuple[preprocessing.Preprocessing, TileLists]] = {}
     facts = {}
     for name in names:
@@ -128,7 +128,7 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
             format_, lists = FRONTS[configuration.form]
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form), order=view.order)
             front = by_oriented_boxes(front) if key[1] else front
-            fronts[key] = _first_half(front, sizes, dram, not key[2])
+            fronts[key] = _first_half(front, stage.with_(memories=memories), dram, not key[2])
         first, tables = fronts[key]
         frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
         facts[name] = {

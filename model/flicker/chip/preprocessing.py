@@ -18,16 +18,16 @@ from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
 from ..golden.front.setup import FrameSetup
-from ..golden.lists import ENTRY_BITS, WRITERS
-from ..params import CHIP_MEMORIES, TILE, ChipMemories
+from ..golden.lists import COMBINER_SETS, COMBINER_WAYS, ENTRY_BITS, POINTERS_PER_LINE, WRITERS, pointer_lines
+from ..params import CHIP_MEMORIES, TILE, UNIT_COUNTS, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
 from .dram import READ, WRITE, DramConfig, Stream, simulate
 
 # Of the RTL, times in cycles.
-LANES = 4
+LANES, LIST_WRITERS = UNIT_COUNTS[-1], UNIT_COUNTS[-1]
 CLUSTER_CYCLES = 4  # of the cluster test
-GROUP_CYCLES = 2  # a group of four enters the front
+GROUP_CYCLES = 2  # a Gaussian of each lane enters the front
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
 LATENCY = 110  # from a group to its entries, colours at hand
 SIZES = CHIP_MEMORIES["default"]
@@ -64,8 +64,8 @@ def _ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     return np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
 
 
-def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
-    """All beats of a frame, by purpose, at the addresses of `Regions.of`. image: of `front_memory`."""
+def traffic(frame: FrontFrame, image: FrontImage, lanes: int = LANES) -> list[Beats]:
+    """All beats of a frame, by purpose, at the addresses of `Regions.of`. image: of `front_memory`. lanes: neighbours whose colours are asked for together."""
     packed, camera = frame.packed, frame.camera
     regions = Regions.of(packed, camera, image.lists.chunks, frame.kind)
     base, at = {}, (regions.image + HEADER_BYTES) // BEAT
@@ -97,7 +97,7 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
     within = frame.gaussian - packed.start[cluster]
     place = before[slot] + within
     beat, due = _colour_beats(cluster, within, place, packed.headers["colour"].astype(np.int64), np.array([packed.format.colour_stride(d) for d in range(4)]),
-                              packed.degrees)
+                              packed.degrees, lanes)
     out.append(Beats("colour", base["colour"] + beat, due, False))
     record = np.unique(regions.records + frame.number * frame.kind.bytes) // BEAT
     last = np.concatenate([record[1:] != record[:-1], [True]]) if len(record) else np.zeros(0, np.bool_)
@@ -128,8 +128,8 @@ def traffic(frame: FrontFrame, image: FrontImage) -> list[Beats]:
 
 
 @numba.njit(cache=True)
-def _colour_beats(cluster, within, place, colour, stride, degree):
-    """Beats with colours of survivors, each once, from a group's first survivor to its last; and when."""
+def _colour_beats(cluster, within, place, colour, stride, degree, lanes):
+    """Beats with colours of survivors, each once, from the first survivor of `lanes` neighbours to the last; and when."""
     beat = np.empty(len(cluster) * 4 + 4, np.int64)
     due = np.empty(len(beat))
     n = 0
@@ -138,7 +138,7 @@ def _colour_beats(cluster, within, place, colour, stride, degree):
     while i < len(cluster):
         k = cluster[i]
         j = i
-        while j + 1 < len(cluster) and cluster[j + 1] == k and within[j + 1] // 4 == within[i] // 4:
+        while j + 1 < len(cluster) and cluster[j + 1] == k and within[j + 1] // lanes == within[i] // lanes:
             j += 1
         size = stride[degree[k]]
         low = colour[k] + within[i] * size // 64
@@ -174,38 +174,38 @@ def in_order(beats: Sequence[Beats], config: DramConfig, gather: int = GATHER) -
 
 
 @numba.njit(cache=True)
-def _unit_cycles(enters, lane, busy, first, bank, bands, waiting, depth, latency):
+def _unit_cycles(enters, lane, busy, first, bank, bands, waiting, depth, latency, lanes, banks):
     """Cycles until the last entry is with its list writer; and when each survivor left the front.
 
     Survivors in the order of the scene: enters (cycle in which its group may leave the front; no two groups in one), lane, busy (cycles of the colour stage),
-    first entry (S + 1,), bands. bank: of each entry. waiting, depth: places of a lane's queue, of a queue of the merge.
+    first entry (S + 1,), bands. bank: list writer of each entry, one of `banks`. waiting, depth: places of a lane's queue, of a queue of the merge.
     """
     survivors = len(enters)
     went = np.zeros(survivors, np.int64)
-    own = np.empty((4, survivors), np.int64)  # survivors of each lane
-    count = np.zeros(4, np.int64)
+    own = np.empty((lanes, survivors), np.int64)  # survivors of each lane
+    count = np.zeros(lanes, np.int64)
     for s in range(survivors):
         own[lane[s], count[lane[s]]] = s
         count[lane[s]] += 1
     ready = np.zeros(survivors, np.int64)  # when a survivor may begin its entries
-    queue = np.zeros((4, 4, depth), np.int64)
-    head, size = np.zeros((4, 4), np.int64), np.zeros((4, 4), np.int64)
-    begun, at, until, free = np.zeros(4, np.int64), np.zeros(4, np.int64), np.zeros(4, np.int64), np.zeros(4, np.int64)
-    out = np.zeros(4, np.int64)  # survivors of each lane that left the front
+    queue = np.zeros((lanes, banks, depth), np.int64)
+    head, size = np.zeros((lanes, banks), np.int64), np.zeros((lanes, banks), np.int64)
+    begun, at, until, free = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64), np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
+    out = np.zeros(lanes, np.int64)  # survivors of each lane that left the front
     next_survivor = 0
     clock = np.int64(0)
     shift = np.int64(0)  # cycles that the front has stood
     left = np.int64(0)
     while left < len(bank) or next_survivor < survivors or begun.min() < 0:
         # Banks take the earliest entry that waits, when none before it can come.
-        for b in range(4):
+        for b in range(banks):
             best, which = np.int64(1) << 60, -1
-            for k in range(4):
+            for k in range(lanes):
                 if size[k, b] > 0 and queue[k, b, head[k, b]] < best:
                     best, which = queue[k, b, head[k, b]], k
             if which < 0:
                 continue
-            for k in range(4):
+            for k in range(lanes):
                 if size[k, b] == 0:
                     earliest = own[k, begun[k]] if begun[k] < out[k] else next_survivor
                     if earliest < best:
@@ -216,7 +216,7 @@ def _unit_cycles(enters, lane, busy, first, bank, bands, waiting, depth, latency
                 size[which, b] -= 1
                 left += 1
         # Lanes hand over an entry a cycle; a splat takes a cycle a band at least.
-        for k in range(4):
+        for k in range(lanes):
             if begun[k] >= out[k]:
                 continue
             s = own[k, begun[k]]
@@ -265,11 +265,11 @@ class UnitCycles:
     all: int
 
 
-def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
-    """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries."""
+def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, writers: int = LIST_WRITERS) -> UnitCycles:
+    """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries. lanes, writers: how many there are."""
     packed = frame.packed
     keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)))
-    groups = -(-packed.counts[keep] // LANES)
+    groups = -(-packed.counts[keep] // lanes)  # Gaussians that enter together
     start = np.concatenate([[0], np.cumsum(groups)])
     cluster = packed.cluster[frame.gaussian]
     within = frame.gaussian - packed.start[cluster]
@@ -278,7 +278,7 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
     enters = GROUP_CYCLES * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES * (keep + 1) - GROUP_CYCLES * start[:-1])
     place = np.concatenate([[0], np.cumsum(packed.counts[keep])])[slot] + within
     degree = packed.degrees[cluster]
-    lane = within % LANES
+    lane = within % lanes
     cols = -(-frame.camera.width // TILE)
     first = np.concatenate([[0], np.cumsum(np.bincount(frame.entry_splat, minlength=len(frame.gaussian)))])
     x, y = frame.entry_tile % cols, frame.entry_tile // cols
@@ -286,17 +286,21 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING) -> UnitCycles:
     half = np.stack([(frame.entry_mask & 3) > 0, (frame.entry_mask & 12) > 0], axis=1)
     band = (frame.entry_splat.astype(np.int64)[:, None] << 20 | y[:, None].astype(np.int64) << 1 | np.arange(2))[half]
     bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
+    bank = ((x & 1 | (y & 1) << 1) % writers).astype(np.int64)
     front, went = _unit_cycles(
-        enters[slot] + GROUP_CYCLES * (within // LANES), lane, np.array(LANE_CYCLES)[degree], first, (x & 1 | (y & 1) << 1).astype(np.int64), bands, waiting,
-        MERGE_DEPTH, LATENCY,
+        enters[slot] + GROUP_CYCLES * (within // lanes), lane, np.array(LANE_CYCLES)[degree], first, bank, bands, waiting,
+        MERGE_DEPTH, LATENCY, lanes, writers,
     )
     fed = enters[-1] + GROUP_CYCLES * groups[-1] if len(keep) else 0
-    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES * len(packed.table))))
+    # At the end a writer closes its banks one after the other; those of the first are within what the estimate leaves out.
+    closed = COMBINER_SETS * COMBINER_WAYS + POINTERS_PER_LINE * pointer_lines(cols, -(-frame.camera.height // TILE)) // WRITERS
+    more = (WRITERS // writers - 1) * closed
+    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES * len(packed.table))) + more)
 
 
-def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING) -> int:
+def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING, lanes: int = LANES) -> int:
     """Cycles of a frame whose traffic takes the DRAM `dram` cycles, beats at an even rate."""
-    step = waiting * LANES
+    step = waiting * lanes
     bounds = np.arange(step, len(units.went), step)  # the first survivor of each phase but the first
     unit = np.diff(np.concatenate([[0], units.went[bounds], [units.all]]))
     due = np.concatenate([b.due for b in beats])
@@ -330,13 +334,15 @@ class Preprocessing:
         ]
 
 
-def estimate(frame: FrontFrame, image: FrontImage, config: DramConfig | None, sizes: ChipMemories = SIZES) -> Preprocessing:
-    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory."""
-    beats = traffic(frame, image)
+def estimate(
+    frame: FrontFrame, image: FrontImage, config: DramConfig | None, sizes: ChipMemories = SIZES, lanes: int = LANES, writers: int = LIST_WRITERS,
+) -> Preprocessing:
+    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. lanes, writers: how many there are."""
+    beats = traffic(frame, image, lanes)
     used = bytes_of(beats)
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    units = unit_cycles(frame, sizes.survivors)
+    units = unit_cycles(frame, sizes.survivors, lanes, writers)
     order = in_order(beats, config, sizes.gathered_lines) if config else None
     dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
-    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors), sizes.gathered_lines)
+    return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors, lanes), sizes.gathered_lines)

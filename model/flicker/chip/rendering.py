@@ -38,8 +38,6 @@ from .constants import CLOCK_HZ, LINE_BYTES
 from .dram import DramConfig, Refresh, Stream
 from .tile_lists import BEAT, RECORD_LINE, TileLists
 
-UNITS = 4
-
 # Of the RTL, times in cycles.
 CLEAR = 68  # of the record cache, at the beginning of a frame
 READ = 4  # registers from a request to the port and behind it
@@ -140,12 +138,12 @@ def _frame(
     elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many elements of a tile. refresh: (period,
     length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
-    behind a sorting unit, pairs of tiles in the frame writer. cores: that share the four sub-tiles of a tile.
+    behind a sorting unit, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
     """
     tiles = len(tile_start) - 1
     ring = 256
-    sorted_held, back, slots, buffer, held_pairs = sizes
-    # Sorting units: by tile, since unit i takes tiles i, i + 4, ...
+    sorted_held, back, slots, buffer, held_pairs, units = sizes
+    # Sorting units: by tile, since unit i takes tiles i, i + units, ...
     gate_end = np.zeros(tiles, np.int64)
     out_begin, out_end = np.zeros((2, tiles), np.int64)
     chunk_free = np.zeros((4, 64), np.int64)
@@ -298,20 +296,20 @@ def _frame(
         if tile >= tiles:
             break
         # ---- the next lookup
-        t_c, u = tile, tile % 4
+        t_c, u = tile, tile % units
         if not begun:
             begun = True
             at = tile_start[t_c]
             n = tile_start[t_c + 1] - tile_start[t_c]
             # Chunks of its list: asked for one after the other, in the order of the lists.
             came = np.int64(CLEAR)
-            if t_c >= 4 * CONTEXTS:
-                came = max(came, gate_end[t_c - 4 * CONTEXTS])
-            if t_c < 4:
+            if t_c >= units * CONTEXTS:
+                came = max(came, gate_end[t_c - units * CONTEXTS])
+            if t_c < units:
                 came += FIRST - CHAIN + read_latency
-            gate = gate_end[t_c - 4] if t_c >= 4 else np.int64(CLEAR)
-            if t_c >= 4 * SORTED_LISTS:
-                gate = max(gate, out_end[t_c - 4 * SORTED_LISTS])
+            gate = gate_end[t_c - units] if t_c >= units else np.int64(CLEAR)
+            if t_c >= units * SORTED_LISTS:
+                gate = max(gate, out_end[t_c - units * SORTED_LISTS])
             for j in range(lines_start[t_c], lines_start[t_c + 1]):
                 came = max(came, chunk_free[u, chunk_count[u] % slots]) + CHAIN + read_latency
                 gate = max(gate, came) + chunk_entries[j]
@@ -319,11 +317,11 @@ def _frame(
                 chunk_count[u] += 1
             # What lies as many entries before as it holds has left, of the list there as many as make room for this one.
             total = n
-            before = t_c - 4
+            before = t_c - units
             while before >= 0 and total <= sorted_held:
                 total += tile_start[before + 1] - tile_start[before]
-                before -= 4
-            b = before + 4
+                before -= units
+            b = before + units
             if b < t_c and total > sorted_held:
                 gate = max(gate, out_begin[b] + (out_end[b] - out_begin[b]) * (total - sorted_held) // (tile_start[b + 1] - tile_start[b]))
             gate += 1
@@ -339,8 +337,8 @@ def _frame(
                 part_gate = gate + back + batch_given[r]
                 part_end = at + batch_size[r]
                 ready = part_gate + batch_delay[r]
-            if t_c >= 4:
-                ready = max(ready, out_end[t_c - 4] + NEXT)
+            if t_c >= units:
+                ready = max(ready, out_end[t_c - units] + NEXT)
             out_begin[t_c] = ready
         is_end = at == tile_start[t_c + 1]
         # The unit gives an entry a cycle, while its buffer has a place; two a cycle are looked up.
@@ -571,7 +569,7 @@ def estimate(
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
-             sizes.sorted_ahead + OUTPUTS, sizes.pairs), config.cores, missed,
+             sizes.sorted_ahead + OUTPUTS, sizes.pairs, config.sort_units), config.cores, missed,
         )
         others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
         total = int(clock) + END + latency_cycles

@@ -151,7 +151,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     longest = max(phases, key=lambda name: phases[name])
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
-        **counted(frame, config), "memories": config.memories, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value,
+        **counted(frame, config), "memories": config.memories, "sort_units": config.sort_units, "list_writers": config.list_writers,
+        "preproc_lanes": config.preproc_lanes, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value,
         "clusters": chip.scene.clusters, "clusters_kept": chip.scene.clusters - count("culled_clusters"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),

@@ -25,6 +25,7 @@ from ..params import (
     MAX_LANE_ENTRIES,
     RECOMMENDED,
     STAGES,
+    UNIT_COUNTS,
     CatMode,
     Coords,
     Form,
@@ -55,6 +56,7 @@ def _faithful() -> str:
     return f"{', '.join(words)}, FIFO {FAITHFUL.fifo_depth}"
 
 
+UNITS = ", ".join(map(str, UNIT_COUNTS))
 CatChoice = _choices(CatMode)
 FormChoice = _choices(Form)
 PrecisionChoice = _choices(Precision)
@@ -145,6 +147,9 @@ def engine_options(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
+    sort_units: Annotated[int | None, typer.Option(help=f"of --engine chip: sorting units, {UNITS} [default: {_default('sort_units')}]")] = None,
+    list_writers: Annotated[int | None, typer.Option(help=f"of --engine chip: list writers, {UNITS} [default: {_default('list_writers')}]")] = None,
+    preproc_lanes: Annotated[int | None, typer.Option(help=f"of --engine chip: preprocessing cores, {UNITS} [default: {_default('preproc_lanes')}]")] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
@@ -156,7 +161,10 @@ def engine_options(
     if whole and front is not None:
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
     if engine is not EngineChoice.CHIP:
-        for option, value in (("--memories", memories), ("--refresh", refresh)):
+        for option, value in (
+            ("--memories", memories), ("--refresh", refresh), ("--sort-units", sort_units), ("--list-writers", list_writers),
+            ("--preproc-lanes", preproc_lanes),
+        ):
             if value is not None:
                 raise FlickerError(f"{option}: for --engine chip only")
     if not whole and front in (None, FrontChoice.FLOAT):
@@ -179,6 +187,9 @@ def engine_options(
         cores=base.cores if cores is None else cores,
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
+        sort_units=base.sort_units if sort_units is None else sort_units,
+        list_writers=base.list_writers if list_writers is None else list_writers,
+        preproc_lanes=base.preproc_lanes if preproc_lanes is None else preproc_lanes,
     )
     return Chosen(engine, config, front, memory, lists, rechunk, refresh, faithful)
 

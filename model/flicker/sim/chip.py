@@ -39,7 +39,7 @@ def build(config: RenderConfig) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content."""
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
-        "flk_top", {**config.chip_parameters(), **config.chip_memories.front_parameters()}, settings, ["--inline-mult", "20000"],
+        "flk_top", {**config.chip_parameters(), **config.front_parameters()}, settings, ["--inline-mult", "20000"],
         define="-DFLK_CHIP",
     )
 

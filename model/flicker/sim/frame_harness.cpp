@@ -1,6 +1,6 @@
 // Runs flk_preprocessing, with FLK_RENDERING flk_rendering, with FLK_CHIP flk_top against a memory (memory.hpp); called through ctypes by sim/half.py and
 // sim/chip.py. Both halves have the same pins beside their AXI ports: start_i, idle_o, registers_i, done_o, error_o, counters_o; the chip has
-// registers behind AXI4-Lite and an interrupt.
+// registers behind AXI4-Lite and an interrupt. FLK_SORT_UNITS, FLK_PREPROC_LANES, FLK_LIST_WRITERS: parameters of the half.
 #include <algorithm>
 #include <cstring>
 #include <memory>
@@ -147,14 +147,15 @@ struct Sim {
         ones(FLK_OF(list_valid) & ~FLK_OF(list_ready)), ones(FLK_OF(sorted_valid) & ~FLK_OF(sorted_ready)), ready && !valid && !FLK_OF(pixels_done),
         valid && !ready, -1, -1, ones(first & ~FLK_OF(record_ready)), ones(FLK_OF(has) & ~FLK_OF(open)), FLK_OF(line_valid) && !FLK_OF(line_ready),
     };
-    if (ready && (valid & FLK_OF(entry_end) >> 2 * turn)) turn = (turn + 1) % 4;
+    if (ready && (valid & FLK_OF(entry_end) >> 2 * turn)) turn = (turn + 1) % FLK_SORT_UNITS;
 #else
 #define FLK_OF(name) root.flk_preprocessing__DOT__##name
-    const bool leaves = FLK_OF(exit_valid), lanes = FLK_OF(lane_ready) == 15, places = FLK_OF(record_room);
+    const bool leaves = FLK_OF(exit_valid), lanes = FLK_OF(lane_ready) == (1 << FLK_PREPROC_LANES) - 1, places = FLK_OF(record_room);
     const int now[WAITS] = {
         FLK_OF(kept_valid) && !FLK_OF(kept_ready), -1, leaves && !lanes, leaves && lanes && !places, leaves && lanes && places && !FLK_OF(colour_room),
         ones(FLK_OF(part_valid) & ~FLK_OF(part_ready)), ones(FLK_OF(record_valid) & ~FLK_OF(record_ready)), ones(FLK_OF(entry_valid) & ~FLK_OF(entry_ready)),
-        ones(FLK_OF(merged_valid) & ~FLK_OF(merged_ready)), ones(FLK_OF(out_valid) & ~FLK_OF(out_ready) & 15), FLK_OF(line_valid) && !FLK_OF(line_ready),
+        ones(FLK_OF(merged_valid) & ~FLK_OF(merged_ready)), ones(FLK_OF(out_valid) & ~FLK_OF(out_ready) & ((1 << FLK_LIST_WRITERS) - 1)),
+        FLK_OF(line_valid) && !FLK_OF(line_ready),
     };
 #endif
 #undef FLK_OF

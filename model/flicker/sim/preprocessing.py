@@ -20,7 +20,7 @@ from ..golden.front.record import RecordKind
 from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..golden.long_lists import region_bytes
-from ..params import TILE, SortOrder
+from ..params import TILE, UNIT_COUNTS, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
 from . import half
@@ -97,8 +97,8 @@ class RtlFront:
     """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
     noise, that of `before`: records and memory as they were.
 
-    counters: by name; of the list writers int64 (4,). traffic: by purpose. efficiency: share of the memory's peak rate. waits: of those with a stall, as the
-    harness counts them, those that it can.
+    counters: by name; of the list writers int64 (4,), `taken` of the banks. traffic: by purpose. efficiency: share of the memory's peak rate. waits: of those
+    with a stall, as the harness counts them, those that it can.
     """
 
     records: np.ndarray
@@ -120,13 +120,16 @@ class RtlFront:
         return int(self.counters["cycles"])
 
 
-def build(kind: RecordKind = RecordKind.FACTORED16) -> Path:
+def build(kind: RecordKind = RecordKind.FACTORED16, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1]) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content.
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "preprocessing_watched")]
-    return half.build("flk_preprocessing", {"Form": int(kind.form)}, settings, ["--inline-mult", "20000"])
+    return half.build(
+        "flk_preprocessing", {"Form": int(kind.form), "PreprocLanes": lanes, "ListWriters": writers}, settings, ["--inline-mult", "20000"],
+        define=f"-DFLK_PREPROC_LANES={lanes} -DFLK_LIST_WRITERS={writers}",
+    )
 
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
@@ -146,15 +149,17 @@ def front_rtl(
     seed: int = 1,
     limit: int = 20_000_000,
     order: SortOrder = SortOrder.DEPTH,
+    lanes: int = UNIT_COUNTS[-1],
+    writers: int = UNIT_COUNTS[-1],
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
     kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
-    many times; what the last leaves counts. order: of the keys.
+    many times; what the last leaves counts. order: of the keys. lanes, writers: of the RTL, preprocessing lanes and list writers.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails, a rule of AXI is broken or the scene is no longer what it was.
     """
     regions = regions or Regions.of(packed, camera, chunks, kind)
-    with Half("front end", build(kind), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+    with Half("front end", build(kind, lanes, writers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         data = image or packed.image()
         at = regions.image
         sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
