@@ -22,7 +22,7 @@ KEYS   ?=
 unexport MAKEFLAGS MFLAGS
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo generate test check record sim lint waves mutants synth formal soc report docs site clean FORCE
+.PHONY: help setup demo generate test check record sim lint waves mutants synth fpga formal soc report docs site clean FORCE
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r name text; \
@@ -77,6 +77,9 @@ mutants: $(STAMP) ## every mutant of the hardware must die in its unit's tests; 
 
 synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG="conic fp8"]] [LIBERTY=path]
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
+
+fpga: $(STAMP) ## what a chip takes on an FPGA: make fpga [CHIP=tiny] [BOARD=kv260]
+	@$(BIN)/python scripts/fpga.py --chip "$(if $(filter file,$(origin CHIP)),tiny,$(CHIP))" $(if $(BOARD),--board "$(BOARD)")
 
 formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))

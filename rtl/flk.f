@@ -12,6 +12,7 @@ preproc/flk_preproc_pkg.sv
 regs/flk_registers_pkg.sv
 top/flk_top_pkg.sv
 common/flk_axi_arbiter.sv
+common/flk_axi_downsizer.sv
 common/flk_axi_fetch.sv
 common/flk_axi_hold.sv
 common/flk_axi_lane.sv

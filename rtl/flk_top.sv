@@ -2,8 +2,8 @@
 //
 // A host writes a frame's descriptor through AXI4-Lite (docs/reference/registers.md) and starts it; flk_preprocessing makes records and tile
 // lists of the scene, flk_rendering makes the picture of them. Both halves work at the same time, on frames that follow
-// each other (flk_frame_control). One AXI4 port for all memory: 512 bits of data, records read as narrow beats of 256 bits;
-// who waits for whom is stated in flk_axi_arbiter and flk_top_pkg.
+// each other (flk_frame_control). One AXI4 port for all memory, of PortBits: with 512 records are read as narrow beats of 256 bits, with
+// less all beats are whole (flk_axi_downsizer); who waits for whom is stated in flk_axi_arbiter and flk_top_pkg.
 //
 // control.abort: nothing more is asked of the memory, what has been asked for comes, then both halves are reset and all frames
 // are forgotten. No answer of the memory for timeout.cycles: status.dead, nothing works until control.reset.
@@ -46,6 +46,7 @@ module flk_top
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
   parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
+  parameter  int unsigned PortBits       = 512,   // of the memory port: 128, 256, 512
   localparam int unsigned IdBits         = 4,
   localparam int unsigned PortIdBits     = IdBits + 3,
   localparam int unsigned AddrBits       = TOP_ADDR_BITS,
@@ -87,7 +88,7 @@ module flk_top
   input  logic                    r_valid_i,
   output logic                    r_ready_o,
   input  logic [PortIdBits-1:0]   r_id_i,
-  input  logic [511:0]            r_data_i,
+  input  logic [PortBits-1:0]     r_data_i,
   input  logic [1:0]              r_resp_i,
   input  logic                    r_last_i,
   output logic                    aw_valid_o,
@@ -100,8 +101,8 @@ module flk_top
   output logic [3:0]              aw_qos_o,
   output logic                    w_valid_o,
   input  logic                    w_ready_i,
-  output logic [511:0]            w_data_o,
-  output logic [63:0]             w_strb_o,
+  output logic [PortBits-1:0]     w_data_o,
+  output logic [PortBits/8-1:0]   w_strb_o,
   output logic                    w_last_o,
   input  logic                    b_valid_i,
   output logic                    b_ready_o,
@@ -109,7 +110,11 @@ module flk_top
   input  logic [1:0]              b_resp_i
 );
 
-  localparam int unsigned Width = 512;
+  localparam int unsigned Width = 512;  // of a line, which units read and write
+
+  if (PortBits != 128 && PortBits != 256 && PortBits != Width) begin : gen_check_port
+    $error("flk_top: PortBits must be 128, 256 or 512");
+  end
 
   // ---- registers --------------------------------------------------------------------------------------
 
@@ -340,6 +345,18 @@ module flk_top
   logic [IdBits-1:0]                b_id;
   logic [1:0]                       b_resp;
   logic [Width/2-1:0]               record_data;
+  logic                             line_ar_valid, line_ar_ready, line_aw_valid, line_aw_ready;
+  logic                             line_r_valid, line_r_last, unused_line_r_ready;  // always 1
+  logic                             line_w_valid, line_w_ready, line_w_last;
+  logic                             line_b_valid, line_b_ready;
+  logic [PortIdBits-1:0]            line_ar_id, line_r_id, line_aw_id, line_b_id;
+  logic [AddrBits-1:0]              line_ar_addr, line_aw_addr;
+  logic [7:0]                       line_ar_len, line_aw_len;
+  logic [2:0]                       line_ar_size, line_aw_size;
+  logic [1:0]                       line_ar_burst, line_aw_burst, line_r_resp, line_b_resp;
+  logic [3:0]                       line_ar_qos, line_aw_qos;
+  logic [Width-1:0]                 line_r_data, line_w_data;
+  logic [Width/8-1:0]               line_w_strb;
 
   flk_axi_arbiter #(
     .Readers (READERS),
@@ -380,6 +397,80 @@ module flk_top
     .b_valid_o (b_valid),
     .b_id_o    (b_id),
     .b_resp_o  (b_resp),
+    .ar_valid_o(line_ar_valid),
+    .ar_ready_i(line_ar_ready),
+    .ar_id_o   (line_ar_id),
+    .ar_addr_o (line_ar_addr),
+    .ar_len_o  (line_ar_len),
+    .ar_size_o (line_ar_size),
+    .ar_burst_o(line_ar_burst),
+    .ar_qos_o  (line_ar_qos),
+    .r_valid_i (line_r_valid),
+    .r_ready_o (unused_line_r_ready),
+    .r_id_i    (line_r_id),
+    .r_data_i  (line_r_data),
+    .r_resp_i  (line_r_resp),
+    .r_last_i  (line_r_last),
+    .aw_valid_o(line_aw_valid),
+    .aw_ready_i(line_aw_ready),
+    .aw_id_o   (line_aw_id),
+    .aw_addr_o (line_aw_addr),
+    .aw_len_o  (line_aw_len),
+    .aw_size_o (line_aw_size),
+    .aw_burst_o(line_aw_burst),
+    .aw_qos_o  (line_aw_qos),
+    .w_valid_o (line_w_valid),
+    .w_ready_i (line_w_ready),
+    .w_data_o  (line_w_data),
+    .w_strb_o  (line_w_strb),
+    .w_last_o  (line_w_last),
+    .b_valid_i (line_b_valid),
+    .b_ready_o (line_b_ready),
+    .b_id_i    (line_b_id),
+    .b_resp_i  (line_b_resp)
+  );
+
+  flk_axi_downsizer #(
+    .AddrBits(AddrBits),
+    .Width   (Width),
+    .PortBits(PortBits),
+    .IdBits  (PortIdBits),
+    .OwnBits (IdBits),
+    .UsedBits(READ_ID_BITS)
+  ) i_downsizer (
+    .clk_i,
+    .rst_ni,
+    .clear_i      (forget),
+    .in_ar_valid_i(line_ar_valid),
+    .in_ar_ready_o(line_ar_ready),
+    .in_ar_id_i   (line_ar_id),
+    .in_ar_addr_i (line_ar_addr),
+    .in_ar_len_i  (line_ar_len),
+    .in_ar_size_i (line_ar_size),
+    .in_ar_burst_i(line_ar_burst),
+    .in_ar_qos_i  (line_ar_qos),
+    .in_r_valid_o (line_r_valid),
+    .in_r_id_o    (line_r_id),
+    .in_r_data_o  (line_r_data),
+    .in_r_resp_o  (line_r_resp),
+    .in_r_last_o  (line_r_last),
+    .in_aw_valid_i(line_aw_valid),
+    .in_aw_ready_o(line_aw_ready),
+    .in_aw_id_i   (line_aw_id),
+    .in_aw_addr_i (line_aw_addr),
+    .in_aw_len_i  (line_aw_len),
+    .in_aw_size_i (line_aw_size),
+    .in_aw_burst_i(line_aw_burst),
+    .in_aw_qos_i  (line_aw_qos),
+    .in_w_valid_i (line_w_valid),
+    .in_w_ready_o (line_w_ready),
+    .in_w_data_i  (line_w_data),
+    .in_w_strb_i  (line_w_strb),
+    .in_w_last_i  (line_w_last),
+    .in_b_valid_o (line_b_valid),
+    .in_b_ready_i (line_b_ready),
+    .in_b_id_o    (line_b_id),
+    .in_b_resp_o  (line_b_resp),
     .ar_valid_o,
     .ar_ready_i,
     .ar_id_o,
@@ -720,7 +811,7 @@ module flk_top
       live_q  <= '0;
       event_q <= '0;
     end else begin
-      event_q   <= {w_valid_o && !w_ready_i, aw_valid & ~aw_ready, ar_valid & ~ar_ready,
+      event_q   <= {line_w_valid && !line_w_ready, aw_valid & ~aw_ready, ar_valid & ~ar_ready,
                     w_valid & w_ready, r_valid};
       live_q[0] <= live_q[0] + 1'b1;
       for (int unsigned k = 1; k < LIVE_WORDS; k++) begin
@@ -765,7 +856,11 @@ module flk_top
       4'(MaskGenerator);
   assign to_host.capability.log2_lanes.next  = 4'($clog2(Lanes));
   assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
-  assign to_host.capability.log2_beat.next   = 4'($clog2(Width / 8));
+  assign to_host.capability.log2_beat.next   = 4'($clog2(PortBits / 8));
+  assign to_host.capability_units.log2_cores.next         = 4'($clog2(Cores));
+  assign to_host.capability_units.log2_preproc_lanes.next = 4'($clog2(PreprocLanes));
+  assign to_host.capability_units.log2_list_writers.next  = 4'($clog2(ListWriters));
+  assign to_host.capability_units.log2_sort_units.next    = 4'($clog2(SortUnits));
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;
   assign to_host.status.render_busy.next     = rendering_busy;

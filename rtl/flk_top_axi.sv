@@ -10,7 +10,7 @@
 module flk_top_axi
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Stage          = STAGE_CHANNELS,  // up to Patience: as of flk_top
+  parameter int unsigned Stage          = STAGE_CHANNELS,  // up to PortBits: as of flk_top
   parameter int unsigned Form           = FORM_FACTORED,
   parameter int unsigned Precision      = PRECISION_FIXED,
   parameter int unsigned FifoDepth      = FIFO_DEPTH,
@@ -36,6 +36,7 @@ module flk_top_axi
   parameter int unsigned Pointers       = 2048,
   parameter int unsigned Lists          = 16384,
   parameter int unsigned Patience       = 16,
+  parameter int unsigned PortBits       = 512,  // of the memory port: 128, 256, 512
   parameter int unsigned IdWidth        = 7,  // of m_axi_*id: 7 or more
   parameter int unsigned UserWidth      = 1,  // of m_axi_*user: 1 or more
   parameter int unsigned Cache          = 3,  // of m_axi_*cache: normal, not cacheable, bufferable
@@ -80,8 +81,8 @@ module flk_top_axi
   output logic [UserWidth-1:0] m_axi_awuser,
   output logic                 m_axi_awvalid,
   input  logic                 m_axi_awready,
-  output logic [511:0]         m_axi_wdata,
-  output logic [63:0]          m_axi_wstrb,
+  output logic [PortBits-1:0]  m_axi_wdata,
+  output logic [PortBits/8-1:0] m_axi_wstrb,
   output logic                 m_axi_wlast,
   output logic [UserWidth-1:0] m_axi_wuser,
   output logic                 m_axi_wvalid,
@@ -105,7 +106,7 @@ module flk_top_axi
   output logic                 m_axi_arvalid,
   input  logic                 m_axi_arready,
   input  logic [IdWidth-1:0]   m_axi_rid,
-  input  logic [511:0]         m_axi_rdata,
+  input  logic [PortBits-1:0]  m_axi_rdata,
   input  logic [1:0]           m_axi_rresp,
   input  logic                 m_axi_rlast,
   input  logic [UserWidth-1:0] m_axi_ruser,
@@ -212,7 +213,8 @@ module flk_top_axi
     .Gather        (Gather),
     .Pointers      (Pointers),
     .Lists         (Lists),
-    .Patience      (Patience)
+    .Patience      (Patience),
+    .PortBits      (PortBits)
   ) i_top (
     .clk_i         (aclk),
     .rst_ni        (rst_n),

@@ -64,6 +64,8 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_preprocessing": [{"Form": 0, "PreprocLanes": 1, "ListWriters": 1}, {"PreprocLanes": 2, "ListWriters": 2}],
     "flk_top_axi": [{"Stage": 1, "IdWidth": 12, "UserWidth": 4, "ResetStages": 0}],
     "flk_rendering": [{"Stage": 1, "SortUnits": 1}],
+    "flk_axi_downsizer": [{"PortBits": 256}, {"PortBits": 512}],
+    "flk_top": [{"PortBits": 128}, {"PortBits": 256}],
     "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}, {"Cores": 1, "Lanes": 8}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],
     "flk_prtu": [{"Form": f, "Precision": p} for f in (0, 1) for p in (0, 1, 2)],

@@ -16,8 +16,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from litex_flicker import CHIPS, ROOT, add_flicker  # noqa: E402
+from litex_flicker import ROOT, add_flicker  # noqa: E402
 from soc import write_headers  # noqa: E402
+
+from flicker.chips import chips  # noqa: E402  (litex_flicker makes it known)
 
 # Name: target of litex-boards. All have a DDR4 memory on a LiteDRAM controller.
 BOARDS = {
@@ -48,7 +50,7 @@ def emit_board(board: str, chip: str, folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("board", choices=BOARDS)
-    parser.add_argument("--chip", choices=CHIPS, default="small")
+    parser.add_argument("--chip", choices=chips(), default="small")
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
     out = options.out or ROOT / "build" / "soc" / options.board

@@ -4,7 +4,7 @@
 module flk_top_axi
   import flk_param_pkg::*;
 #(
-  parameter int unsigned Stage          = STAGE_CHANNELS,  // up to Patience: as of flk_top
+  parameter int unsigned Stage          = STAGE_CHANNELS,  // up to PortBits: as of flk_top
   parameter int unsigned Form           = FORM_FACTORED,
   parameter int unsigned Precision      = PRECISION_FIXED,
   parameter int unsigned FifoDepth      = FIFO_DEPTH,
@@ -30,6 +30,7 @@ module flk_top_axi
   parameter int unsigned Pointers       = 2048,
   parameter int unsigned Lists          = 16384,
   parameter int unsigned Patience       = 16,
+  parameter int unsigned PortBits       = 512,  // of the memory port: 128, 256, 512
   parameter int unsigned IdWidth        = 7,  // of m_axi_*id: 7 or more
   parameter int unsigned UserWidth      = 1,  // of m_axi_*user: 1 or more
   parameter int unsigned Cache          = 3,  // of m_axi_*cache: normal, not cacheable, bufferable
@@ -74,8 +75,8 @@ module flk_top_axi
   output logic [UserWidth-1:0] m_axi_awuser,
   output logic                 m_axi_awvalid,
   input  logic                 m_axi_awready,
-  output logic [511:0]         m_axi_wdata,
-  output logic [63:0]          m_axi_wstrb,
+  output logic [PortBits-1:0]  m_axi_wdata,
+  output logic [PortBits/8-1:0] m_axi_wstrb,
   output logic                 m_axi_wlast,
   output logic [UserWidth-1:0] m_axi_wuser,
   output logic                 m_axi_wvalid,
@@ -99,7 +100,7 @@ module flk_top_axi
   output logic                 m_axi_arvalid,
   input  logic                 m_axi_arready,
   input  logic [IdWidth-1:0]   m_axi_rid,
-  input  logic [511:0]         m_axi_rdata,
+  input  logic [PortBits-1:0]  m_axi_rdata,
   input  logic [1:0]           m_axi_rresp,
   input  logic                 m_axi_rlast,
   input  logic [UserWidth-1:0] m_axi_ruser,
@@ -121,7 +122,7 @@ module flk_top_axi
     in_pins[32+:20] = {s_axil_araddr, s_axil_awaddr};
     in_pins[64+:32] = s_axil_wdata;
     in_pins[96+:21] = {m_axi_rlast, m_axi_rvalid, m_axi_rresp, m_axi_rid[6:0], m_axi_bvalid, m_axi_bresp, m_axi_bid[6:0]};
-    in_pins[128+:512] = m_axi_rdata;
+    in_pins[128+:PortBits] = m_axi_rdata;
   end
 
   always @(posedge aclk) begin
@@ -138,8 +139,8 @@ module flk_top_axi
   assign {m_axi_awid, m_axi_awlen, m_axi_awsize, m_axi_awburst, m_axi_awqos, m_axi_awvalid} = {IdWidth'(out_pins[146+:7]), out_pins[128+:18]};
   assign m_axi_araddr = out_pins[160+:40];
   assign {m_axi_arid, m_axi_arlen, m_axi_arsize, m_axi_arburst, m_axi_arqos, m_axi_arvalid} = {IdWidth'(out_pins[242+:7]), out_pins[224+:18]};
-  assign m_axi_wstrb = out_pins[256+:64];
-  assign m_axi_wdata = out_pins[320+:512];
+  assign m_axi_wstrb = out_pins[256+:PortBits/8];
+  assign m_axi_wdata = out_pins[320+:PortBits];
 
   assign m_axi_awlock   = 1'b0;
   assign m_axi_awcache  = 4'(Cache);

@@ -26,11 +26,10 @@ sys.path.insert(0, str(HERE))
 import firmware  # noqa: E402
 import pictures  # noqa: E402
 import simulation  # noqa: E402
-from litex_flicker import CHIPS  # noqa: E402
 
 from flicker.chip.dram import DramConfig  # noqa: E402
+from flicker.chips import chip_of  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
-from flicker.params import RenderConfig  # noqa: E402
 from flicker.scene.camera import Camera  # noqa: E402
 from flicker.scene.image import save_png  # noqa: E402
 from flicker.scene.packed import PackedFormat, PackedScene  # noqa: E402
@@ -109,8 +108,7 @@ def run(options: argparse.Namespace) -> None:
         raise FlickerError(f"--size: WxH, as 160x90, not {options.size}")
     if options.keys and not sys.stdin.isatty():
         raise FlickerError("--keys: standard input is no terminal")
-    if options.chip not in CHIPS:
-        raise FlickerError(f"--chip: one of {', '.join(CHIPS)}, not {options.chip}")
+    config = chip_of(options.chip).config
     width, height = map(int, options.size.split("x"))
     folder = BUILD / "soc"
     began = time.time()
@@ -120,7 +118,6 @@ def run(options: argparse.Namespace) -> None:
     built = simulation.build(options.chip)
     rom = firmware.build(built.folder)
     print(f"soc: firmware of {len(rom)} bytes; pictures by the golden model", flush=True)
-    config: RenderConfig = CHIPS[options.chip]
     golden = [pictures.golden_picture(packed, camera, config) for camera in cameras[:3]]
     image = packed.image()
     prepared = time.time()

@@ -7,7 +7,7 @@ import functools
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +16,11 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 try:
-    from litex_flicker import CHIPS
+    import litex_flicker  # noqa: F401
 except ImportError as error:  # told where a person sees it
     raise ImportError(f"{error.name} is not installed: make soc sets it up") from None
 
+from flicker.chips import chip_of  # noqa: E402
 from flicker.errors import FlickerError  # noqa: E402
 from flicker.output import write_text  # noqa: E402
 from flicker.sim import half  # noqa: E402
@@ -60,11 +61,12 @@ def _for_verilator(text: str) -> str:
 
 @dataclass(frozen=True)
 class Built:
-    """folder: of the emitted SoC. library: of its simulator. chip: of the chip's, where that is another library; else None."""
+    """folder: of the emitted SoC. library: of its simulator. chip: of the chip's, where that is another library; else None. data_bits: of the memory port."""
 
     folder: Path
     library: Path
     chip: Path | None = None
+    data_bits: int = 512
 
 
 def build(chip: str, shared: bool = False, crossing: bool = False) -> Built:
@@ -80,7 +82,7 @@ def build(chip: str, shared: bool = False, crossing: bool = False) -> Built:
             source.write_text(text)
     if shared:
         sources = [*sources_of("flk_param_pkg"), *sources_of("flk_lane_pkg"), HERE / "flk_top_axi_shim.sv"]
-        other, define, settings = chip_simulator(CHIPS[chip]), "-DFLK_SHIM", []
+        other, define, settings = chip_simulator(chip_of(chip).config), "-DFLK_SHIM", []
     else:
         sources, other, define, settings = sources_of("flk_top_axi"), None, "", [half.HERE / f"{name}.vlt" for name in SETTINGS]
     library = verilate(
@@ -90,7 +92,7 @@ def build(chip: str, shared: bool = False, crossing: bool = False) -> Built:
         cpp=[HERE / "harness.cpp"], depends=HEADERS, settings=settings,
         cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{half.HERE}".replace("  ", " "), opt="-O1", shared=True, kind="soc", name="soc",
     )
-    return Built(folder, library, other)
+    return Built(folder, library, other, chip_of(chip).config.port_bits)
 
 
 @functools.cache
@@ -128,7 +130,7 @@ class Soc:
         words = np.frombuffer(rom + bytes(-len(rom) % 4), "<u4")
         write_text(folder / "flk_soc_rom.init", "".join(f"{word:08x}\n" for word in words))
         self._lib, self._echo, self.text, self._chip = _library(built.library), echo, "", None
-        configs = (_Config * 2)(PORT.structure(), CPU_PORT.structure())
+        configs = (_Config * 2)(replace(PORT, data_bits=built.data_bits).structure(), CPU_PORT.structure())
         options = timing or Timing(*[1] * len(Timing._fields_))
         if built.chip:
             self._chips = half._library(built.chip)

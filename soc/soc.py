@@ -21,8 +21,10 @@ from litex.soc.integration import export  # noqa: E402
 from litex.soc.integration.soc import SoCRegion  # noqa: E402
 from litex.soc.integration.soc_core import SoCCore  # noqa: E402
 from litex.soc.interconnect import wishbone  # noqa: E402
-from litex_flicker import CHIPS, ROOT, add_flicker  # noqa: E402
+from litex_flicker import ROOT, add_flicker  # noqa: E402
 from migen import ClockDomain, ClockSignal, ResetSignal  # noqa: E402
+
+from flicker.chips import chips  # noqa: E402  (litex_flicker makes it known)
 
 RAM_ORIGIN, RAM_BYTES = 0x4000_0000, 0x0400_0000
 ROM_BYTES, SRAM_BYTES = 0x8000, 0x2000
@@ -56,7 +58,7 @@ class _Crg:
 
 
 class SimSoC(SoCCore):
-    """chip: name of CHIPS. crossing: the chip has a clock domain of its own, with the same clock, behind LiteX' crossings."""
+    """chip: name in chips.toml. crossing: the chip has a clock domain of its own, with the same clock, behind LiteX' crossings."""
 
     def __init__(self, chip: str = "small", crossing: bool = False) -> None:
         platform = SimPlatform("SIM", list(IO), name="flk_soc")
@@ -110,7 +112,7 @@ def write_headers(soc: SoCCore, folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--chip", choices=CHIPS, default="small")
+    parser.add_argument("--chip", choices=chips(), default="small")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "soc" / "emitted")
     options = parser.parse_args()
     print(emit(SimSoC(options.chip), options.out))

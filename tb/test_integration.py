@@ -76,7 +76,7 @@ def test_figures_of_the_page() -> None:
         ("512 bits of data, byte addresses of 40 bits", r"\[39:0\]\s+m_axi_araddr"), ("32 bits of data and 10 of address, 1 KB", r"\[9:0\]\s+s_axil_araddr"),
     ):
         assert text in page and re.search(bits, ports)
-    assert re.search(r"\[511:0\]\s+m_axi_rdata", ports) and re.search(r"\[31:0\]\s+s_axil_rdata", ports)
+    assert re.search(r"\[PortBits-1:0\]\s+m_axi_rdata", ports) and re.search(r"PortBits\s+= 512\b", ports) and re.search(r"\[31:0\]\s+s_axil_rdata", ports)
     for name, value, text in (
         ("Cache", 3, "CACHE is 3 ("), ("ResetStages", 2, "with `ResetStages` of 2 (default)"), ("IdWidth", 7, "fewer than 7 bits of identifiers are refused"),
     ):

@@ -24,6 +24,7 @@ import numpy as np
 from .chip.dram import DramConfig
 from .chip.run import frame_image
 from .chip_registers import REGISTERS, ChipCounter, ResultError
+from .chips import name_of
 from .errors import FlickerError
 from .front.view import View
 from .golden.frame_buffer import PixelFormat
@@ -221,7 +222,11 @@ class Device:
     @property
     def capability(self) -> dict[str, int]:
         """What the chip was built with, by the names of flk_device_t."""
-        return {name: getattr(self._device, name) for name in ("minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat")}
+        names = (
+            "minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat", "cores", "preproc_lanes", "list_writers",
+            "sort_units",
+        )
+        return {name: getattr(self._device, name) for name in names}
 
     def counter(self, index: int) -> int:
         """A performance counter, by its number (`chip_registers.ChipCounter`)."""
@@ -313,7 +318,9 @@ def backend_of(name: str, config: RenderConfig) -> Backend:
     if name == "chip":
         return SimulatedChip(config, DramConfig())
     if name == "soc":
-        return SimulatedSoc(config.memories if config.memories != "default" else "lanes" if config.by_lanes else "channels")
+        if (chip := name_of(config)) is None:
+            raise FlickerError("--device soc: takes a chip of chips.toml (--chip)")
+        return SimulatedSoc(chip)
     module, _, attribute = name.partition(":")
     if not attribute:
         raise FlickerError(f"--device: chip, soc or MODULE:NAME, not {name}")

@@ -175,6 +175,14 @@ UNIT_COUNTS = (1, 2, 4)  # sorting units, list writers, preprocessing lanes
 MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
 
+SORT_CELLS = 16  # entries of a sorting unit's first runs
+
+
+def _power(value: int) -> bool:
+    """A power of two."""
+    return value > 0 and value & (value - 1) == 0
+
+
 @dataclass(frozen=True)
 class ChipMemories:
     """Sizes of the chip's memories that cost cycles or bytes and no bit of a picture (docs/reference/chip_memory.md).
@@ -193,6 +201,24 @@ class ChipMemories:
     sort_ways: int = 8
     gathered_lines: int = 256
     merge_lines: int = 128
+
+    def __post_init__(self) -> None:
+        rules = {
+            "sorted_entries": (_power(self.sorted_entries) and self.sorted_entries >= 64, "a power of two from 64 on"),
+            "list_chunks": (self.list_chunks >= 4, "at least 4"),
+            "sorted_ahead": (self.sorted_ahead >= 4 and self.sorted_ahead % 2 == 0, "even, at least 4"),
+            "pairs": (self.pairs in (2, 4, 8), "2, 4 or 8"),
+            "survivors": (_power(self.survivors) and self.survivors >= 8, "a power of two from 8 on"),
+            "sort_ways": (_power(self.sort_ways) and 2 <= self.sort_ways <= self.sorted_entries // SORT_CELLS, "a power of two, 2 to sorted_entries / 16"),
+            "gathered_lines": (self.gathered_lines >= 8, "at least 8"),
+            "merge_lines": (_power(self.merge_lines) and self.merge_lines >= 8, "a power of two from 8 on"),
+        }
+        for name, (legal, text) in rules.items():
+            if not legal:
+                raise FlickerError(f"memories: {name} must be {text}, not {getattr(self, name)}")
+        if self.merge_lines // 2 * -(-self.sorted_entries // 9) > 64 * 228:
+            most = 2 * 64 * 228 // -(-self.sorted_entries // 9)
+            raise FlickerError(f"memories: merge_lines must be at most {most} with sorted_entries {self.sorted_entries}, not {self.merge_lines}")
 
     @property
     def sort_stages(self) -> int:
@@ -222,7 +248,8 @@ class ChipMemories:
         return {"Waiting": self.survivors, "Gather": self.gathered_lines} if self != ChipMemories() else {}
 
 
-SORT_CELLS = 16  # entries of a sorting unit's first runs
+LINE_BITS = 512  # of what units read and write at once
+PORT_WIDTHS = (128, 256, LINE_BITS)  # of the memory port
 CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64)}  # small: within the paper's 288 KB
 
 
@@ -236,8 +263,8 @@ class RenderConfig:
     depends on it. mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `cores`, each with 4, 2
     or 1 sub-tiles of a tile; `lanes` of all cores; `in_width` elements that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a
     lane's queue. Of the whole chip: `delivered` records that a core gets in a cycle there, and so takes, whatever `in_width`; `memories`, key of
-    CHIP_MEMORIES; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of lists; `preproc_lanes`,
-    preprocessing cores. No bit of records, lists and pictures depends on their numbers.
+    CHIP_MEMORIES; `port_bits` of the memory port; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of
+    lists; `preproc_lanes`, preprocessing cores. No bit of records, lists and pictures depends on their numbers.
     """
 
     form: Form = Form.FACTORED
@@ -255,6 +282,7 @@ class RenderConfig:
     slots: int = 20
     delivered: int = 1
     memories: str = "default"
+    port_bits: int = LINE_BITS
     sort_units: int = UNIT_COUNTS[-1]
     list_writers: int = UNIT_COUNTS[-1]
     preproc_lanes: int = UNIT_COUNTS[-1]
@@ -281,6 +309,8 @@ class RenderConfig:
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
         if self.delivered not in ((1, 2) if self.by_lanes else (1,)):
             raise FlickerError(f"configuration: delivered must be {'1 or 2' if self.by_lanes else '1 with stage ' + self.stage}, not {self.delivered}")
+        if self.port_bits not in PORT_WIDTHS:
+            raise FlickerError(f"configuration: port_bits must be {', '.join(map(str, PORT_WIDTHS[:-1]))} or {PORT_WIDTHS[-1]}, not {self.port_bits}")
         for field in ("sort_units", "list_writers", "preproc_lanes"):
             if (value := getattr(self, field)) not in UNIT_COUNTS:
                 raise FlickerError(f"configuration: {field} must be 1, 2 or 4, not {value}")
@@ -334,6 +364,11 @@ class RenderConfig:
         """Module parameters of the front end and the chip: what is not the default."""
         units = {"PreprocLanes": self.preproc_lanes, "ListWriters": self.list_writers}
         return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]}
+
+    def top_parameters(self) -> dict[str, int]:
+        """Of the whole chip, flk_top and what wraps it: `chip_parameters`, `front_parameters`, the port; those that are not the default."""
+        port = {"PortBits": self.port_bits} if self.port_bits != LINE_BITS else {}
+        return {**self.chip_parameters(), **self.front_parameters(), **port}
 
     @property
     def chip_memories(self) -> ChipMemories:

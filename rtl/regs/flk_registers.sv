@@ -241,6 +241,7 @@ module flk_registers (
         logic counter_select;
         logic counter_value;
         logic progress;
+        logic capability_units;
         logic frame;
         logic background;
         logic size;
@@ -318,6 +319,8 @@ module flk_registers (
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h2c);
         decoded_reg_strb.progress = cpuif_req_masked & (cpuif_addr == 10'h30) & !cpuif_req_is_wr;
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h30);
+        decoded_reg_strb.capability_units = cpuif_req_masked & (cpuif_addr == 10'h34) & !cpuif_req_is_wr;
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h34);
         decoded_reg_strb.frame = cpuif_req_masked & (cpuif_addr == 10'h100);
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h100);
         decoded_reg_strb.background = cpuif_req_masked & (cpuif_addr == 10'h104);
@@ -2543,7 +2546,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h3;
+            readback_data_var[15:8] = 8'h4;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2595,6 +2598,12 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h30) begin
             readback_data_var[15:0] = hwif_in.progress.pairs.next;
+        end
+        if(rd_mux_addr == 10'h34) begin
+            readback_data_var[3:0] = hwif_in.capability_units.log2_cores.next;
+            readback_data_var[7:4] = hwif_in.capability_units.log2_preproc_lanes.next;
+            readback_data_var[11:8] = hwif_in.capability_units.log2_list_writers.next;
+            readback_data_var[15:12] = hwif_in.capability_units.log2_sort_units.next;
         end
         if(rd_mux_addr == 10'h100) begin
             readback_data_var[15:0] = field_storage.frame.tag.value;

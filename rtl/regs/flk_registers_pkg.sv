@@ -153,6 +153,29 @@ package flk_registers_pkg;
     } flk_registers__progress__in_t;
 
     typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability_units__log2_cores__in_t;
+
+    typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability_units__log2_preproc_lanes__in_t;
+
+    typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability_units__log2_list_writers__in_t;
+
+    typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability_units__log2_sort_units__in_t;
+
+    typedef struct packed {
+        flk_registers__capability_units__log2_cores__in_t log2_cores;
+        flk_registers__capability_units__log2_preproc_lanes__in_t log2_preproc_lanes;
+        flk_registers__capability_units__log2_list_writers__in_t log2_list_writers;
+        flk_registers__capability_units__log2_sort_units__in_t log2_sort_units;
+    } flk_registers__capability_units__in_t;
+
+    typedef struct packed {
         logic descriptor_locked;
         flk_registers__capability__in_t capability;
         flk_registers__status__in_t status;
@@ -161,6 +184,7 @@ package flk_registers_pkg;
         flk_registers__frames__in_t frames;
         flk_registers__counter_value__in_t counter_value;
         flk_registers__progress__in_t progress;
+        flk_registers__capability_units__in_t capability_units;
     } flk_registers__in_t;
 
     typedef struct packed {

@@ -55,6 +55,7 @@ package flk_top_pkg;
   localparam int unsigned READ_COLOURS = 3;
   localparam int unsigned READ_GEOMETRY = 4;
   localparam int unsigned READ_TABLE = 5;
+  localparam int unsigned READ_ID_BITS = 3;  // of identifiers of its own that a reader has in use
   localparam int unsigned WRITERS = 3;
   localparam int unsigned WRITE_FRAME = 0;
   localparam int unsigned WRITE_POINTERS = 1;

@@ -37,7 +37,7 @@ DUTIES = (
     (r"(ar|aw)_(id|addr|len|size|burst|qos)_o", "INCR, in order within an identifier, never across 4 KB ([below](#memory-port))"),
     (r"(ar|aw|w)_ready_i", "may come and go; `w_ready_i` reaches the writers combinationally"),
     (r"r_valid_i", "what was asked for, no more. Beats of several identifiers may be interleaved; low in reset"),
-    (r"r_(id|data|resp|last)_i", "all 512 bits, of narrow reads those that are asked for; SLVERR and DECERR end the frame with an error"),
+    (r"r_(id|data|resp|last)_i", "the whole width, of narrow reads those that are asked for; SLVERR and DECERR end the frame with an error"),
     (r"(r|b)_ready_o", "always 1"),
     (r"w_valid_o", "may come before its address does; bursts in the order of the addresses, not interleaved"),
     (r"w_(data|strb|last)_o", "whole width; strobes may be any, and none at all after an abort"),

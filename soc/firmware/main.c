@@ -172,6 +172,10 @@ static void find_chip(void)
   say_line("lanes", g.device.lanes);
   say_line("lists of a writer", g.device.lists);
   say_line("bytes of a beat", g.device.beat);
+  say_line("cores", g.device.cores);
+  say_line("preprocessing lanes", g.device.preproc_lanes);
+  say_line("list writers", g.device.list_writers);
+  say_line("sorting units", g.device.sort_units);
 }
 
 static void take_view(uint32_t view)

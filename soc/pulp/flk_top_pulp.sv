@@ -1,6 +1,6 @@
 // The chip with the structs of PULP's axi: req and resp of an AXI4 manager for memory and of an AXI4-Lite subordinate for registers.
 //
-// The types are the caller's, as the macros AXI_TYPEDEF_ALL and AXI_LITE_TYPEDEF_ALL of that package make them: data of 512 bits,
+// The types are the caller's, as the macros AXI_TYPEDEF_ALL and AXI_LITE_TYPEDEF_ALL of that package make them: data of PortBits,
 // addresses of 40 bits or more, identifiers of 7 or more for memory; 32 bits of data for registers. No logic but wires: latency and
 // combinational paths are those of flk_top. Answers bring identifiers back as they came. ATOP 0: no atomics. LOCK, REGION, USER 0.
 module flk_top_pulp
@@ -32,6 +32,7 @@ module flk_top_pulp
   parameter int unsigned Pointers       = 2048,
   parameter int unsigned Lists          = 16384,
   parameter int unsigned Patience       = 16,
+  parameter int unsigned PortBits       = 512,  // of the memory port: 128, 256, 512
   parameter type         axi_req_t      = logic,  // memory: what the chip drives
   parameter type         axi_resp_t     = logic,
   parameter type         axi_lite_req_t = logic,  // registers: what the host drives
@@ -54,8 +55,8 @@ module flk_top_pulp
   logic [1:0]  aw_burst, ar_burst;
   logic [3:0]  aw_qos, ar_qos;
   logic        aw_valid, ar_valid, w_valid, w_last, b_ready, r_ready;
-  logic [511:0] w_data;
-  logic [63:0]  w_strb;
+  logic [PortBits-1:0]   w_data;
+  logic [PortBits/8-1:0] w_strb;
 
   always_comb begin
     mst_req_o          = '0;
@@ -109,7 +110,8 @@ module flk_top_pulp
     .Gather         (Gather),
     .Pointers       (Pointers),
     .Lists          (Lists),
-    .Patience       (Patience)
+    .Patience       (Patience),
+    .PortBits       (PortBits)
   ) i_top (
     .clk_i         (clk_i),
     .rst_ni        (rst_ni),

@@ -5,7 +5,7 @@ cameras and modes of their own, overlapped or not; aborts and resets at random t
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
 Parameter space: a stage of 32 lanes; 8 in one core, with one sorting unit, list writer and preprocessing lane; with SLOW=1 of two cores, of channels too, with
 modes that travel with their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half
-with channels). Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
+with channels); ports of 128 and 256 bits. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
@@ -23,10 +23,13 @@ from flicker_tb.runner import seed
 
 from flicker import params
 from flicker.chip import rendering
+from flicker.chip.compare import frame_cost
 from flicker.chip.dram import DramConfig, Refresh
+from flicker.chip.drawing import Drawing
 from flicker.chip.run import chip_stats, render_on_chip
 from flicker.chip.tile_lists import TileLists
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
+from flicker.chips import chip_of
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import ChipFrame as GoldenFrame
@@ -58,7 +61,7 @@ ALL_CONFIGS = [
         ("two cores", CONFIG.with_(cores=2, lanes=16, delivered=2)),
     )
 ]
-FEW = CONFIG.with_(memories="small", cores=1, lanes=8, sort_units=1, list_writers=1, preproc_lanes=1)
+FEW = chip_of("tiny").config.with_(cores=1, lanes=8)
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
     (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders
@@ -145,9 +148,47 @@ def demo(config: RenderConfig) -> tuple[View, PackedScene, ListKind]:
     return view, packed_scene(view, format_), lists
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("bits", [128, 256])
+def test_narrow_port(bits: int) -> None:
+    """A port of fewer bits than a line: the same bytes and counts as with 512, one beat of the memory for each part; cycles as the model has them, within a
+    tenth; pauses and answers in any order; an error of the memory, an abort and a reset with frames behind."""
+    config, dram = CONFIG.with_(port_bits=bits), DramConfig(port_bits=bits)
+    view, packed, lists = demo(config)
+    with session(packed, config=config, memory=MemoryOptions(dram.timing)) as chip:
+        done = check(chip, view.camera, config=config, lists=lists)
+        assert done.usage is not None and 1 << chip.field("capability", "log2_beat") == bits // 8
+        live, traffic = done.usage.live, chip.purposes()
+        parts = 512 // bits
+        assert traffic["records"].read_beats == max(1, 256 // bits) * done.rendering["lines"] and live["record_beats"] == done.rendering["lines"]
+        assert traffic["table"].read_beats == parts * live["table_beats"]
+        assert traffic["frame"].write_beats + traffic["lists"].write_beats == parts * (live["frame_written"] + int(done.front["lines"].sum()))
+        cost = frame_cost(view, Drawing(Engine.CHIP, config))
+        for phase, name in (("front end", "front_cycles"), ("rendering", "render_cycles")):
+            assert done.phases[phase] == pytest.approx(cost[name], rel=0.1), phase
+    for number in range(3):
+        with session(config=config, port=any_port(random.Random(f"{seed()} {number} narrow"), number)) as chip:
+            check(chip, camera(), config=config)
+            frame = chip.frame(camera(), chip.place(camera()), background=BLUE, tag=3)
+            chip.fail(frame.region.records, frame.region.record_bytes)
+            chip.start(frame)
+            assert chip.finish(frame, LIMIT).error
+            chip.mend()
+            chip.start(frame)
+            chip.step(3_000 * (number + 1))
+            chip.driver.flk_abort(ctypes.byref(chip.device))
+            for _ in range(1000):
+                if not chip.field("status", "aborting"):
+                    break
+                chip.step(10)
+            assert chip.quiet and chip.field("status", "ready")
+            chip.set_register("interrupt", 31)
+            check(chip, camera(), config=config)
+
+
 def test_few_units() -> None:
-    """One core of 8 lanes, sorting unit, list writer and preprocessing lane with the small memories: the picture of four of each; the model of the rendering
-    half. A second frame, of a picture that is no whole number of tiles."""
+    """The smallest chip, one core of 8 lanes, one sorting unit, list writer and preprocessing lane with small memories and a port of 128 bits: the picture of
+    the default one; the model of the rendering half. A second frame, of a picture that is no whole number of tiles."""
     view = load_view(DEMO, 0, (96, 54))
     packed = packed_scene(view, PackedFormat.CHUNK)
     with session(packed, config=FEW) as chip:

@@ -493,6 +493,8 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--front", "golden", "--coords", "absolute"], "coords absolute: for --front float only"),
     (["--front", "rtl", "--stage", "lanes", "--form", "conic"], "--stage lanes: takes records of 16 bytes"),
     (["--engine", "chip-golden", "--memories", "small"], "--memories: for --engine chip only"),
+    (["--engine", "chip-golden", "--port-bits", "128"], "--port-bits: for --engine chip only"),
+    (["--engine", "chip", "--port-bits", "64"], "configuration: port_bits must be 128, 256 or 512, not 64"),
     (["--engine", "rtl", "--refresh", "per-bank"], "--refresh: for --engine chip only"),
     (["--engine", "rtl", "--sort-units", "2"], "--sort-units: for --engine chip only"),
     (["--engine", "chip", "--list-writers", "3"], "list_writers must be 1, 2 or 4, not 3"),

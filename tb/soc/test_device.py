@@ -113,7 +113,7 @@ def test_soc() -> None:
     pytest.importorskip("litex", reason="LiteX is not installed: make soc sets it up")
     if not shutil.which("riscv64-unknown-elf-gcc"):
         pytest.skip("riscv64-unknown-elf-gcc is not installed (Debian: gcc-riscv64-unknown-elf)")
-    with Device(SimulatedSoc("lanes", shared=True)) as device:
+    with Device(SimulatedSoc("default", shared=True)) as device:
         device.load(packed())
         frame = device.render(CAMERA, background=BLUE)
         assert np.array_equal(shown(frame.buffer, CAMERA), golden(CAMERA))

@@ -59,7 +59,7 @@ def packed() -> PackedScene:
 
 @pytest.fixture(scope="module")
 def built() -> simulation.Built:
-    return simulation.build("lanes", shared=True)
+    return simulation.build("default", shared=True)
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_firmware(built: simulation.Built) -> None:
 @pytest.mark.slow
 def test_clock_domain() -> None:
     """The chip behind crossings of clock domains: registers, memory and interrupt."""
-    built = simulation.build("lanes", shared=True, crossing=True)
+    built = simulation.build("default", shared=True, crossing=True)
     with simulation.Soc(built, firmware.build(built.folder), timing=DramConfig().timing, seed=seed()) as soc:
         soc.write(SCENE_AT, packed().image())
         soc.write(PATH_AT, pictures.path_block([CAMERA]))

@@ -394,7 +394,8 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3 | 3 << 8)
+        self.set("version", 3 | 4 << 8)
+        self.field("capability_units", log2_cores=1, log2_preproc_lanes=0, log2_list_writers=2, log2_sort_units=1)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
@@ -657,9 +658,12 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (3, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (4, 1, 1, 2, 2, 3, 32)
     assert (device.lists, device.beat) == (16384, 64)
+    assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (2, 1, 4, 2)
     assert device.started == 0xFFFF and not chip.writes
+    chip.set("version", 3 | 3 << 8)  # of before these
+    assert chip.probe() == "OK" and (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (4, 4, 4, 4)
     chip.set("version", 2)
     assert chip.probe() == "DEVICE_VERSION"
     chip.set("id", 0xFFFFFFFF)

@@ -88,7 +88,7 @@ def test_refused(parameters: dict[str, int], message: str) -> None:
 # ---- the whole chip -----------------------------------------------------------------------------
 
 CONFIG = RenderConfig(stage="lanes", memories="small")
-PARAMETERS = {**CONFIG.chip_parameters(), **CONFIG.front_parameters(), "IdWidth": 9}
+PARAMETERS = {**CONFIG.top_parameters(), "IdWidth": 9}
 SIZE = 1 << 29  # of the memory; only what is written takes place
 
 
@@ -101,7 +101,7 @@ class Recorded(ChipSession):
         reset = {name: int(value, 16) for name, value in re.findall(r"#define FLK_(\w+)_RESET 0x(\w+)u", (driver.SW / "flk_registers.h").read_text())}
         version = reset["VERSION_MAJOR"] | reset["VERSION_MINOR"] << 8
         self.answers = {REGISTERS[name].offset: value for name, value in (
-            ("id", reset["ID_VALUE"]), ("version", version), ("capability", capability), ("status", 1),
+            ("id", reset["ID_VALUE"]), ("version", version), ("capability", capability), ("capability_units", 0x2222), ("status", 1),
         )}
         self.written: list[tuple[int, int]] = []
         self._calls = driver.READ(self._read), driver.WRITE(self._write)

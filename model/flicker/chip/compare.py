@@ -96,9 +96,9 @@ def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
     options = drawing.options
     if not drawing.engine.whole and drawing.front is Front.FLOAT:
         options = FrontOptions(*FRONTS[config.form])
-    packed = packed_scene(view, options.format, options.rechunk)
-    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, drawing.dram)
-    found = whole_frame(first, rendering.estimate(tables, config, drawing.dram), drawing.dram)
+    packed, dram = packed_scene(view, options.format, options.rechunk), replace(drawing.dram, port_bits=config.port_bits)
+    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, dram)
+    found = whole_frame(first, rendering.estimate(tables, config, dram), dram)
     return {
         "cycles": found.interval, "latency_cycles": found.latency, "front_cycles": found.front.cycles, "render_cycles": found.back.cycles,
         **{f"bytes_{purpose}": count for purpose, count in found.bytes.items()},

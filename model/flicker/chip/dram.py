@@ -7,6 +7,7 @@ bus, latency of the controller, dependences between bursts (the streams of a pha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,10 +15,13 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import FlickerError
+from ..params import LINE_BITS, PORT_WIDTHS
 from ..sim.memory import MASKED_WRITE, READ, WRITE, PortConfig, Timing, run_bursts
 from . import constants as c
 
 __all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Refresh", "Stream", "interleave", "port_config", "simulate"]
+
+PORT_EFFICIENCY = 0.94  # of the port's cycles where it is what a frame waits for; fitted to the demo scene on a chip with 128 bits (test_chip_frames.py)
 
 
 class Refresh(StrEnum):
@@ -30,7 +34,8 @@ class Refresh(StrEnum):
 
 @dataclass(frozen=True)
 class DramConfig:
-    """Organisation and timing; times in clocks of the command bus (rate / 2). Sources: constants.py."""
+    """Organisation and timing; times in clocks of the command bus (rate / 2). Sources: constants.py. port_bits: of the port between chip and memory, which
+    moves as many in a cycle of the chip, reads and writes each (`RenderConfig.port_bits`)."""
 
     channels: int = c.DRAM_CHANNELS
     width_bits: int = c.DRAM_WIDTH_BITS
@@ -60,11 +65,14 @@ class DramConfig:
     trfc: int = c.DRAM_TRFC
     trfc_bank: int = c.DRAM_TRFC_BANK
     refresh: Refresh = Refresh.ALL_BANKS
+    port_bits: int = LINE_BITS
 
     def __post_init__(self) -> None:
         for name in ("channels", "banks", "interleave_bytes", "page_bytes"):
             if (value := getattr(self, name)) < 1 or value & (value - 1):
                 raise FlickerError(f"DRAM: {name} must be a power of two, not {value}")
+        if self.port_bits not in PORT_WIDTHS:
+            raise FlickerError(f"DRAM: port_bits must be {', '.join(map(str, PORT_WIDTHS[:-1]))} or {PORT_WIDTHS[-1]}, not {self.port_bits}")
         if self.interleave_bytes < self.burst_bytes or self.interleave_bytes > self.page_bytes:
             raise FlickerError(f"DRAM: interleave_bytes must be {self.burst_bytes} to {self.page_bytes}, not {self.interleave_bytes}")
         if self.window < 1:
@@ -88,6 +96,10 @@ class DramConfig:
     def bytes_per_second(self) -> int:
         """Peak rate of all channels."""
         return self.channels * self.width_bits * self.rate // 8
+
+    def port_cycles(self, read_bytes: int, written_bytes: int) -> int:
+        """Cycles of the chip that the port takes: reads and writes go side by side."""
+        return math.ceil(8 * max(read_bytes, written_bytes) / (PORT_EFFICIENCY * self.port_bits))
 
     @property
     def timing(self) -> Timing:

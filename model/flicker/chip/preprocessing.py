@@ -312,7 +312,7 @@ def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = 
 @dataclass(frozen=True, eq=False)
 class Preprocessing:
     """A frame's preprocessing. beats: by purpose. used: bytes of each purpose that are needed, the rest is padding. units, dram: cycles of each
-    alone; cycles: of both together. gather: lines that are written together."""
+    alone, the DRAM behind its port; cycles: of both together. gather: lines that are written together."""
 
     beats: Sequence[Beats]
     used: dict[str, int]
@@ -345,4 +345,7 @@ def estimate(
     units = unit_cycles(frame, sizes.survivors, lanes, writers)
     order = in_order(beats, config, sizes.gathered_lines) if config else None
     dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
+    if config:
+        read, written = (sum(len(b.beat) for b in beats if b.write == write) * BEAT for write in (False, True))
+        dram = max(dram, config.port_cycles(read, written))
     return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors, lanes), sizes.gathered_lines)

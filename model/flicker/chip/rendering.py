@@ -29,7 +29,7 @@ from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.lanes.lists import front_lists
 from ..golden.masked import render_masked
 from ..golden.render import stream_order
-from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, TILE, CatMode, RenderConfig, vru_stages
+from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, LINE_BITS, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.long_lists import BEGIN
 from ..perf.render_stage import finish_events
@@ -129,14 +129,15 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 def _frame(
     tile_start, record, mask, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
     element_cycles, finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token,
-    depth, blend, out_delay, served, needed, base, memory, sizes, cores, missed,
+    depth, blend, out_delay, served, needed, base, memory, gap, sizes, cores, missed,
 ):
     """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
     of records in the order in which they are read.
 
     Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), batches of their lists, and the
     elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many elements of a tile. refresh: (period,
-    length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a
+    length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. gap: cycles from line to
+    line of records at the port. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
     behind a sorting unit, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
     """
@@ -398,7 +399,7 @@ def _frame(
                         ask += refresh[1] - ask % refresh[0]
                     if channels:
                         ask = np.int64(np.ceil(_moves(base + line, float(ask), *memory, open_row, activated, last_activated, bus)))
-                    last_line = max(ask + READ + line_latency, last_line + 1)
+                    last_line = max(ask + READ + line_latency, last_line + gap)
                     line_at[misses % PLACES] = last_line
                     come = max(come, last_line + 3)
                     line_used[misses % PLACES] = max(come, last_found)
@@ -558,7 +559,10 @@ def estimate(
     missed = np.empty(len(tables.record), np.int64)
     stride = stride or least_stride(lists.width, format_)
     others = {"pointers": LINE_BYTES * len(tables.lines), "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride)}
+    if dram and dram.port_bits != config.port_bits:
+        raise ValueError(f"the memory's port has {dram.port_bits} bits, the chip's {config.port_bits}")
     busy = 0.0  # share of the memory's time that is not the records'
+    gap = max(1, 8 * RECORD_LINE // config.port_bits)  # lists, asked for ahead, stand back while lines of records come
     for _ in range(ROUNDS if dram else 1):
         # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits.
         rate, later = (*memory[:-1], memory[-1] / (1.0 - busy)), round(LOADED * busy / (1.0 - busy))
@@ -567,7 +571,7 @@ def estimate(
             tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op),
             listed, RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency + later, refresh, reads, early,
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
-            tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate,
+            tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
              sizes.sorted_ahead + OUTPUTS, sizes.pairs, config.sort_units), config.cores, missed,
         )
@@ -581,7 +585,11 @@ def estimate(
     moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * int(misses), "frame": others["frame"]}
     traffic: list[Stream] = []
     if dram:
-        total = max(total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second))
+        written = moved["frame"] + BEAT * int(tables.run_lines.sum())
+        total = max(
+            total, -(-sum(moved.values()) * CLOCK_HZ // dram.bytes_per_second),
+            dram.port_cycles(sum(moved.values()) - written, written) if config.port_bits != LINE_BITS else 0,
+        )
         traffic = tables.traffic(batches, missed[:misses], format_, stride)
     grid = np.zeros((2 * tables.rows, 2 * tables.cols), np.int64)
     for k in range(CORES):

@@ -25,7 +25,7 @@ from ..golden.front.frame import FrontFrame, run_front
 from ..golden.front.memory import front_memory
 from ..golden.front.setup import MEAN_FRACTION, FrameSetup
 from ..golden.render import stream_order
-from ..params import ALPHA_MIN, CORES, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig, SortOrder
+from ..params import ALPHA_MIN, CORES, LINE_BITS, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig, SortOrder
 from ..pipeline import packing_of
 from ..progress import Steps
 from ..scene.camera import Camera
@@ -36,8 +36,9 @@ from . import preprocessing, rendering
 from .constants import CLOCK_HZ
 from .dram import DramConfig
 from .tile_lists import TileLists
+from .whole import whole_frame
 
-CONFIG = RenderConfig()  # of the rendering stage
+CONFIG = RenderConfig()  # of the stage by whose visits Gaussians are judged, and of the chip unless another is asked for
 ENTRY_BYTES = 64 / 14  # most lines of 64 bytes have fourteen or fifteen entries
 VRUS = 32  # pixels that the stage visits in a cycle at most
 ENORMOUS = 0.25  # share of a view's tiles that a Gaussian is listed in
@@ -99,7 +100,7 @@ def stage_cycles(visits: np.ndarray, entries: np.ndarray) -> np.ndarray:
 
 @dataclass(eq=False)
 class ViewCost:
-    """One view. cycles: of each half. bytes: by purpose.
+    """One view. cycles: of each half, and of a memory port narrower than a line. bytes: by purpose.
 
     Of each Gaussian of the scene, in its file's order: entries, tiles: int64 (N,), entries of its 8x8 sub-tiles and of 16x16 tiles; visits: int64 (N,), pixels
     visited for it; weight, peak: float64 (N,), sum over pixels and largest of alpha T; fetched, recorded: bool (N,), its geometry was read, it got a record.
@@ -123,7 +124,7 @@ class ViewCost:
 
     @property
     def interval(self) -> int:
-        """Cycles between frames that follow each other: the slower half's."""
+        """Cycles between frames that follow each other: the slower half's, or those of a memory port that both wait for."""
         return max(self.cycles.values())
 
     @property
@@ -256,23 +257,28 @@ class SceneCost:
         }
 
 
-def frame_cost(front: FrontFrame, dram: DramConfig) -> tuple[dict[str, int], dict[str, int]]:
-    """Cycles of each half of the chip, bytes of both by purpose."""
-    image = front_memory(front)
-    first = preprocessing.estimate(front, image, dram)
-    second = rendering.estimate(TileLists.of(front, image), CONFIG, dram)
+def frame_cost(front: FrontFrame, dram: DramConfig, config: RenderConfig = CONFIG) -> tuple[dict[str, int], dict[str, int]]:
+    """Cycles of each half of a chip, bytes of both by purpose."""
+    image, sizes = front_memory(front), config.chip_memories
+    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers)
+    second = rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
     bytes_ = dict(first.bytes)
     for name, more in second.bytes.items():
         bytes_[name] = bytes_.get(name, 0) + more
-    return {"front end": first.cycles, "rendering": second.cycles}, bytes_
+    cycles = {"front end": first.cycles, "rendering": second.cycles}
+    if config.port_bits != LINE_BITS:
+        cycles["memory port"] = whole_frame(first, second, dram).dram_cycles
+    return cycles, bytes_
 
 
-def view_cost(packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None, order: SortOrder = SortOrder.DEPTH) -> ViewCost:
+def view_cost(
+    packing: Packing, gaussians: int, camera: Camera, dram: DramConfig | None, order: SortOrder = SortOrder.DEPTH, config: RenderConfig = CONFIG,
+) -> ViewCost:
     """One view of a packed scene of so many Gaussians in its file. dram: None: without cycles and bytes of the halves, which take most of the time. order: of
-    the lists."""
+    the lists. config: of the chip, with records of 16 bytes."""
     packed = packing.packed
     front = run_front(packed, camera, order=order)
-    cycles, bytes_ = frame_cost(front, dram) if dram else ({}, {})
+    cycles, bytes_ = frame_cost(front, dram, config) if dram else ({}, {})
     weight, peak, visits, visited, entry = _entries(front)
     lists = front.subtile_lists()
     number = packing.order[front.gaussian]  # in the file, of each record
@@ -317,14 +323,16 @@ def packed_for_cost(scene: Scene, form: PackedFormat | None = None, steps: Steps
     return scene, packing
 
 
-def scene_cost(scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat | None = None, steps: Steps | None = None) -> SceneCost:
-    """Look at a scene through cameras, as `packing_of` puts it into memory. form: None: that of a packed scene, else chunk. FlickerError where it cannot be
-    packed."""
+def scene_cost(
+    scene: Scene, cameras: Sequence[Camera], *, form: PackedFormat | None = None, config: RenderConfig = CONFIG, steps: Steps | None = None,
+) -> SceneCost:
+    """Look at a scene through cameras, as `packing_of` puts it into memory. form: None: that of a packed scene, else chunk. config: of the chip.
+    FlickerError where it cannot be packed."""
     steps = steps or Steps()
     scene, packing = packed_for_cost(scene, form, steps)
     views = []
     with steps.bar("views") as report:
         for k, camera in enumerate(cameras):
             report(k, len(cameras))
-            views.append(view_cost(packing, len(scene), camera, DramConfig()))
+            views.append(view_cost(packing, len(scene), camera, DramConfig(port_bits=config.port_bits), config=config))
     return SceneCost(scene, packing, views)

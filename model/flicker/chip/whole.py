@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from . import constants as c
-from .dram import DramConfig, interleave, simulate
+from .dram import READ, DramConfig, interleave, simulate
 from .preprocessing import Preprocessing, in_order
 from .rendering import Rendering
 
 
 @dataclass(frozen=True, eq=False)
 class WholeFrame:
-    """front, back: the halves, each with the memory to itself. dram_cycles: of the DRAM for the traffic of both, side by side."""
+    """front, back: the halves, each with the memory to itself. dram_cycles: of the DRAM, or of the port before it, for the traffic of
+    both, side by side."""
 
     front: Preprocessing
     back: Rendering
@@ -46,4 +47,7 @@ def whole_frame(front: Preprocessing, back: Rendering, dram: DramConfig) -> Whol
     """Both halves, estimated with this memory, where their requests take turns: rows are opened and the bus is turned more
     often than for one after the other."""
     streams = [in_order(front.beats, dram, front.gather), *back.traffic]
-    return WholeFrame(front, back, simulate(*interleave(streams, c.DRAM_REQUEST_BURSTS), dram).cycles)
+    bursts, kinds = interleave(streams, c.DRAM_REQUEST_BURSTS)
+    written = int((kinds != READ).sum()) * dram.burst_bytes
+    port = dram.port_cycles(len(kinds) * dram.burst_bytes - written, written)
+    return WholeFrame(front, back, max(simulate(bursts, kinds, dram).cycles, port))

@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from ..chips import chip_of
 from ..errors import FlickerError
 from ..output import json_text, write_text
+from ..params import Form, RenderConfig
 from ..progress import Steps
 from .engine import FormatChoice
 from .options import CAMERAS_HELP, SIZE_HELP, RichSteps, check_scene, check_there, console, parse_size, say, say_source, writable, write_atomically
@@ -72,6 +74,8 @@ def cost(
     up: Annotated[str | None, typer.Option(help="axis of the scene that points up, for the orbit: x, y, z, -x, -y, -z [default: -y]")] = None,
     size: Annotated[str | None, typer.Option(help=SIZE_HELP)] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory [default: chunk or as packed]")] = None,
+    chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml [default: that of the stage of channels]")] = None,
+    chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture: Gaussians visited per pixel of the dearest view")] = None,
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON; -: printed, and nothing else")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
@@ -82,6 +86,11 @@ def cost(
         raise FlickerError("--json -: not with --quiet")
     writable(out, "--out")
     writable(None if printed else json_, "--json")
+    if chips_file is not None and chip is None:
+        raise FlickerError("--chips: with --chip NAME only")
+    config = RenderConfig() if chip is None else chip_of(chip, chips_file).config
+    if config.form is not Form.FACTORED:
+        raise FlickerError(f"--chip {chip}: has records of 32 bytes; costs are counted for those of 16")
     wanted = parse_size(size)
     check_scene(scene)
     check_there(cameras)
@@ -95,12 +104,12 @@ def cost(
     found = source.cameras
     numbers = [view] if view is not None else [int(k * len(found) / min(views, len(found))) for k in range(min(views, len(found)))]
     chosen = [view_of(source, n, wanted) for n in numbers]
-    result = scene_cost(source.scene, [of.camera for of in chosen], form=None if form is None else PackedFormat(form.value),
+    result = scene_cost(source.scene, [of.camera for of in chosen], form=None if form is None else PackedFormat(form.value), config=config,
                         steps=Steps() if printed or quiet else RichSteps())
     if out is not None:
         dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
         _picture(result, dearest, out)
-    everything = {"scene": scene, "cameras": source.cameras_from, "numbers": numbers} | result.summary()
+    everything = {"scene": scene, "chip": chip, "cameras": source.cameras_from, "numbers": numbers} | result.summary()
     if printed:
         say(everything, True, False, Table)
     elif json_ is not None:
@@ -108,7 +117,8 @@ def cost(
     if printed or quiet:
         return
     packed = result.packing.packed
-    console.print(f"{scene}: {len(result.scene):,} Gaussians, {packed.format.value}, {len(packed.table):,} clusters; chip at 1 GHz, LPDDR4 of 51.2 GB/s")
+    console.print(f"{scene}: {len(result.scene):,} Gaussians, {packed.format.value}, {len(packed.table):,} clusters; chip {chip or ''}".rstrip()
+                  + " at 1 GHz, LPDDR4 of 51.2 GB/s")
     say_source(source.file, source.cameras_from)
     for of, found_of in zip(chosen, result.views):
         if not found_of.recorded.any() and (nothing := why_empty(of)):

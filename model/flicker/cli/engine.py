@@ -11,10 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..chips import chip_of
 from ..errors import FlickerError
 from ..params import (
     CHIP_MEMORIES,
@@ -23,6 +25,7 @@ from ..params import (
     LANES_PER_CORE,
     MAX_FIFO_DEPTH,
     MAX_LANE_ENTRIES,
+    PORT_WIDTHS,
     RECOMMENDED,
     STAGES,
     UNIT_COUNTS,
@@ -147,10 +150,13 @@ def engine_options(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
     memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed or within the paper's 288 KB [default: default]")] = None,
+    port_bits: Annotated[int | None, typer.Option(help=f"of --engine chip: data of the memory port, {', '.join(map(str, PORT_WIDTHS))} [default: 512]")] = None,
     sort_units: Annotated[int | None, typer.Option(help=f"of --engine chip: sorting units, {UNITS} [default: {_default('sort_units')}]")] = None,
     list_writers: Annotated[int | None, typer.Option(help=f"of --engine chip: list writers, {UNITS} [default: {_default('list_writers')}]")] = None,
     preproc_lanes: Annotated[int | None, typer.Option(help=f"of --engine chip: preprocessing cores, {UNITS} [default: {_default('preproc_lanes')}]")] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
+    chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml, as tiny, instead of options of its parts")] = None,
+    chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
     coords: Annotated[CoordsChoice, typer.Option(help="where means are rounded to FP16")] = CoordsChoice.LOCAL,
     faithful: Annotated[bool, typer.Option("--faithful", help=f"the paper's configuration: {_faithful()}")] = False,
 ) -> Chosen:
@@ -162,7 +168,7 @@ def engine_options(
         raise FlickerError(f"--front {front.value}: not with --engine {engine.value}, which has its own front end")
     if engine is not EngineChoice.CHIP:
         for option, value in (
-            ("--memories", memories), ("--refresh", refresh), ("--sort-units", sort_units), ("--list-writers", list_writers),
+            ("--memories", memories), ("--port-bits", port_bits), ("--refresh", refresh), ("--sort-units", sort_units), ("--list-writers", list_writers),
             ("--preproc-lanes", preproc_lanes),
         ):
             if value is not None:
@@ -175,8 +181,24 @@ def engine_options(
     if faithful and any(v is not None for v in given.values()):
         names = ", ".join(f"--{k}" for k, v in given.items() if v is not None)
         raise FlickerError(f"--faithful: fixes the configuration, so it cannot be combined with {names}")
-    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
     base = FAITHFUL if faithful else RenderConfig()
+    if chips_file is not None and chip is None:
+        raise FlickerError("--chips: with --chip NAME only")
+    if chip is not None:
+        parts = {
+            "stage": stage, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
+            "port-bits": port_bits, "sort-units": sort_units, "list-writers": list_writers, "preproc-lanes": preproc_lanes,
+            "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
+        }
+        if names := ", ".join(f"--{k}" for k, v in parts.items() if v is not None):
+            raise FlickerError(f"--chip: fixes the configuration, so it cannot be combined with {names}")
+        if engine is EngineChoice.REFERENCE:
+            raise FlickerError("--chip: not for --engine reference, which has no stage")
+        config = chip_of(chip, chips_file).config
+        # Records of 32 bytes mean the paper's scene format and lists, as --faithful does.
+        conic = config.form is Form.CONIC and (whole or front not in (None, FrontChoice.FLOAT)) and not any(v is not None for v in chosen.values())
+        return Chosen(engine, config, front, memory, lists, rechunk, refresh, conic)
+    of_stage = given | {"faithful": faithful or None, "coords": None if coords is CoordsChoice.LOCAL else coords}
     config = base.with_(
         cat=CatMode[cat.name] if cat else base.cat,
         precision=Precision[precision.name] if precision else base.precision,
@@ -187,6 +209,7 @@ def engine_options(
         cores=base.cores if cores is None else cores,
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
+        port_bits=base.port_bits if port_bits is None else port_bits,
         sort_units=base.sort_units if sort_units is None else sort_units,
         list_writers=base.list_writers if list_writers is None else list_writers,
         preproc_lanes=base.preproc_lanes if preproc_lanes is None else preproc_lanes,

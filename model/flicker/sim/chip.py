@@ -39,7 +39,7 @@ def build(config: RenderConfig) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content."""
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "render_stage", "lanes", "rendering")]
     return half.build(
-        "flk_top", {**config.chip_parameters(), **config.front_parameters()}, settings, ["--inline-mult", "20000"],
+        "flk_top", config.top_parameters(), settings, ["--inline-mult", "20000"],
         define="-DFLK_CHIP",
     )
 
@@ -113,7 +113,7 @@ class ChipSession(Half):
         self, packed: PackedScene, config: RenderConfig, *, memory: MemoryOptions | None = None, seed: int = 1,
         image: bytes | None = None, port: PortConfig = PORT,
     ) -> None:
-        super().__init__("chip", build(config), {"memory": port}, memory or MemoryOptions(), seed)
+        super().__init__("chip", build(config), {"memory": replace(port, data_bits=config.port_bits)}, memory or MemoryOptions(), seed)
         lib = self._lib
         lib.flk_chip_register.argtypes = [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_int, ctypes.c_void_p]
         lib.flk_chip_wait.argtypes = [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int]

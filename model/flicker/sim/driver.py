@@ -65,7 +65,8 @@ class CBus(ctypes.Structure):
 class CDevice(ctypes.Structure):
     _fields_ = [
         ("bus", CBus), ("minor", u32), ("stage", u32), ("form", u32), ("precision", u32), ("vrus", u32), ("mask_generator", u32), ("lanes", u32),
-        ("lists", u32), ("beat", u32), ("started", u16), ("region", ctypes.c_uint),
+        ("lists", u32), ("beat", u32),
+        ("cores", u32), ("preproc_lanes", u32), ("list_writers", u32), ("sort_units", u32), ("started", u16), ("region", ctypes.c_uint),
     ]
 
 

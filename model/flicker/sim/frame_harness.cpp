@@ -328,7 +328,7 @@ void flk_chip_pins(Sim* sim, int reset, const uint32_t* in, uint32_t* out) {
   top.r_resp_i = bits(3, 17, 2);
   top.r_valid_i = bits(3, 19, 1);
   top.r_last_i = bits(3, 20, 1);
-  if (top.r_valid_i) std::memcpy(&top.r_data_i[0], in + 4, 64);
+  if (top.r_valid_i) flk::pins::store(top.r_data_i, in + 4);
   top.clk_i = 0;
   top.eval();
   top.clk_i = 1;
@@ -348,7 +348,7 @@ void flk_chip_pins(Sim* sim, int reset, const uint32_t* in, uint32_t* out) {
   std::memcpy(out + 5, &ar, 8);
   out[7] = join({{top.ar_id_o, 7}, {top.ar_len_o, 8}, {top.ar_size_o, 3}, {top.ar_burst_o, 2}, {top.ar_qos_o, 4}, {top.ar_valid_o, 1}});
   std::memcpy(out + 8, &strb, 8);
-  if (top.w_valid_o) std::memcpy(out + 10, &top.w_data_o[0], 64);
+  if (top.w_valid_o) flk::pins::load(top.w_data_o, out + 10);
 }
 
 // The memory's side of the port is held in reset (1) or no more (0).

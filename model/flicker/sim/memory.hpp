@@ -377,6 +377,7 @@ class AxiPort {
         t.ready[k] = now_ + c_.latency;
         continue;
       }
+      if (leader(t, k) < k) continue;  // its burst of the DRAM moves for an earlier beat
       count.dram_read_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * step(a), step(a), ~uint64_t{0}, dram::READ, urgent(a), t.done[k], count);
     }
     count.errors += bad;
@@ -434,13 +435,25 @@ class AxiPort {
       for (uint64_t b = 0; b < bytes_; ++b) {
         if (beat.strb >> b & 1) to[b] = from[b];
       }
-      if (!memory_.perfect) count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(k) * bytes_, bytes_, beat.strb, dram::WRITE, urgent(t.a), t.done[0], count);
+      if (memory_.perfect) continue;
+      // Beats that share a burst of the DRAM go there together, with the last of them.
+      const int first = leader(t, k);
+      if (k + 1 < t.beats && leader(t, k + 1) == first) continue;
+      uint64_t strb = 0;
+      for (int j = first; j <= k; ++j) strb |= t.data[j].strb << (j - first) * bytes_ % 64;
+      count.dram_write_bytes += to_dram(t.a.addr + static_cast<uint64_t>(first) * bytes_, (k - first + 1) * bytes_, strb, dram::WRITE, urgent(t.a), t.done[0], count);
     }
     count.errors += t.resp != OKAY;
     t.data.clear();
   }
 
-  // A beat of `bytes` as bursts of the DRAM; bytes moved. A write without strobes moves none, one with some of a burst's bytes is masked.
+  // The first beat that lies in the same burst of the DRAM as beat `k`: beats narrower than one share it.
+  int leader(const Transaction& t, int k) const {
+    const uint64_t burst = memory_.engine.timing().burst_bytes, bytes = step(t.a), at = t.a.addr + static_cast<uint64_t>(k) * bytes;
+    return bytes >= burst ? k : k - static_cast<int>(std::min<uint64_t>(k, at % burst / bytes));
+  }
+
+  // Bytes as bursts of the DRAM; bytes moved. A write without strobes moves none, one with some of a burst's bytes is masked.
   uint64_t to_dram(uint64_t address, uint64_t bytes, uint64_t strb, int8_t kind, bool urgent, dram::Completion& done, AxiCounts& count) {
     const uint64_t burst = memory_.engine.timing().burst_bytes, step = std::min(burst, bytes);
     const uint64_t all = step < 64 ? (uint64_t{1} << step) - 1 : ~uint64_t{0};
@@ -463,9 +476,10 @@ class AxiPort {
 
   // Whether data of `k` (or its write) are there in the next cycle.
   bool there(const Transaction& t, int k) const {
-    const dram::Completion& done = t.done[k];
+    const int first = memory_.perfect ? k : leader(t, k);
+    const dram::Completion& done = t.done[first];
     if (done.waiting) return false;
-    const uint64_t from = done.clock ? static_cast<uint64_t>(memory_.engine.cycle_of(done.clock)) + c_.latency : t.ready[k];
+    const uint64_t from = done.clock ? static_cast<uint64_t>(memory_.engine.cycle_of(done.clock)) + c_.latency : t.ready[first];
     return now_ + 1 >= from;
   }
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ... import layout
 from ...arithmetic.ff_stages import STAGES
+from ...chips import Chip, chips
 from ...datapath.units import PIPELINES
 from ...params import (
     CHANNELS,
@@ -92,9 +93,11 @@ COMPOSED: dict[str, list[str]] = {
     "flk_splat_input": ["flk_record_to_splat"],
     "flk_stage": ["flk_splat_input", *(stage.module for stage in RENDERING_STAGES.values())],
     "flk_axi_arbiter": ["flk_priority_arbiter", "flk_fifo"],
+    "flk_axi_downsizer": [SINGLE],
     "flk_frame_counters": [MEMORY],
     "flk_top": [
-        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_hold", "flk_axi_lane", "flk_preprocessing", "flk_rendering",
+        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold", "flk_axi_lane", "flk_preprocessing",
+        "flk_rendering",
     ],
     "flk_top_axi": ["flk_top", "flk_reset_sync"],
     # The wrapper has no logic of its own.
@@ -168,6 +171,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_registers": [f"s_axil_{channel}{name}[{bit}]" for channel in ("aw", "ar") for name, bits in (("addr", 2), ("prot", 3)) for bit in range(bits)],
         "flk_top_axi": ["m_axi_buser[0]", "m_axi_ruser[0]"],  # answers carry nothing beside them
         "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
+        # Bits of identifiers that are not in use; no part is narrower than the port.
+        "flk_axi_downsizer": ["r_id_i[3]"],
         "flk_axi_lane": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
@@ -389,10 +394,20 @@ def _top() -> list[Unit]:
     """The chip around its two halves."""
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
-        unit("flk_axi_hold"), unit("flk_axi_lane"), unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
-        unit("flk_top", "faithful", **FAITHFUL.chip_parameters()),
-        unit("flk_top", "32 lanes", **RenderConfig(stage="lanes").chip_parameters()), unit("flk_top_axi"),
+        unit("flk_axi_hold"), unit("flk_axi_lane"), unit("flk_axi_downsizer", "128 bit"), unit("flk_axi_downsizer", "256 bit", PortBits=256),
+        unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
+        *(unit("flk_top", CHIP_ROWS.get(chip.name, chip.name), **chip.parameters) for chip in chips().values() if chip.name != "channels"),
+        unit("flk_top_axi"),
     ]
+
+
+# Rows of chips that have a name of their own; the channels are what flk_top is without parameters.
+CHIP_ROWS = {"default": "32 lanes", "channels": "default"}
+
+
+def chip_row(chip: Chip) -> tuple[str, str]:
+    """Unit and configuration of a chip of the table."""
+    return "top", CHIP_ROWS.get(chip.name, chip.name)
 
 
 def all_units() -> list[Unit]:

@@ -1,0 +1,107 @@
+"""Chips by name: the table in the root, files of one's own, what is refused.
+
+State space: every field of the wrong kind, unknown, out of range; files that are none; sizes of memories of a chip's own. The commands that take a name.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from flicker_tb.command import flicker
+
+from flicker.chip.dram import DramConfig
+from flicker.chips import STATUS, TABLE, chip_of, chips, name_of
+from flicker.errors import FlickerError
+from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, RenderConfig
+
+LINE = '[mine]\npurpose = "x"\nstatus = "untested"\nstage = "lanes"\n'
+
+
+def test_table() -> None:
+    """The names that pages and tools rely on; no two lines are one chip."""
+    table = chips()
+    assert list(table) == ["tiny", "small", "default", "wide", "max", "channels", "faithful"]
+    assert table["default"].config == RECOMMENDED and table["faithful"].config == FAITHFUL and table["channels"].config == RenderConfig()
+    assert all(chip.status in STATUS and chip.purpose for chip in table.values())
+    assert len({tuple(chip.parameters.items()) for chip in table.values()}) == len(table)
+    assert name_of(table["tiny"].config) == "tiny" and name_of(RenderConfig(fifo_depth=3)) is None
+    assert table["tiny"].parameters["PortBits"] == 128 and "PortBits" not in table["default"].parameters
+
+
+def test_own_file(tmp_path: Path) -> None:
+    """Beside those of the table; memories by name and with sizes of its own, which are the named ones where they are the same."""
+    file = tmp_path / "own.toml"
+    file.write_text(LINE + "lanes = 64\nmemories = {pairs = 2, sort_ways = 4}\n" + LINE.replace("mine", "other") + 'memories = "small"\n')
+    mine, other = chip_of("mine", file), chip_of("other", file)
+    assert mine.config.lanes == 64 and mine.config.chip_memories == ChipMemories(pairs=2, sort_ways=4) and mine.parameters["Pairs"] == 2
+    assert other.config.memories == "small" and chip_of("tiny", file) == chip_of("tiny")
+    file.write_text(LINE + "memories = {sorted_entries = 2048}\n")
+    assert chip_of("mine", file).config.memories == "default"
+    assert set(CHIP_MEMORIES) >= {"default", "small", "own.toml: mine"}
+
+
+@pytest.mark.parametrize("text, says", [
+    ("", "own.toml: has no chip"),
+    ("[mine", "own.toml: Expected ']'"),
+    ("lanes = 32", "own.toml: lanes stands outside of a chip's table"),
+    ("[mine]", "own.toml: chip mine: purpose must be a text"),
+    ('[mine]\npurpose = "x"\nstatus = "good"', "own.toml: chip mine: status must be verified, built or untested, not good"),
+    (LINE + "lane = 32", "own.toml: chip mine: unknown field lane, is lanes meant?"),
+    (LINE + "lanes = 48", "own.toml: chip mine: lanes must be 32, 64 or 128, not 48"),
+    (LINE + 'lanes = "32"', "own.toml: chip mine: lanes must be a whole number, not '32'"),
+    (LINE + "lanes = true", "own.toml: chip mine: lanes must be a whole number, not True"),
+    (LINE + "port_bits = 64", "own.toml: chip mine: port_bits must be 128, 256 or 512, not 64"),
+    (LINE + "port_bits = 1024", "own.toml: chip mine: port_bits must be 128, 256 or 512, not 1024"),
+    (LINE + 'form = "round"', "own.toml: chip mine: form must be conic or factored, not round"),
+    (LINE + 'memories = "tiny"', "own.toml: chip mine: memories must be one of"),
+    (LINE + "memories = {pair = 2}", "own.toml: chip mine: unknown field memories.pair, is pairs meant?"),
+    (LINE + "memories = {pairs = 3}", "own.toml: chip mine: memories: pairs must be 2, 4 or 8, not 3"),
+    (LINE + "memories = {sorted_entries = 1000}", "own.toml: chip mine: memories: sorted_entries must be a power of two from 64 on, not 1000"),
+    (LINE + "memories = {merge_lines = 4096}", "own.toml: chip mine: memories: merge_lines must be at most 128 with sorted_entries 2048, not 4096"),
+    (LINE + "memories = {pairs = 0}", "own.toml: chip mine: memories.pairs must be a whole number from 1 on, not 0"),
+])
+def test_refused(tmp_path: Path, text: str, says: str) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(text)
+    with pytest.raises(FlickerError, match="^" + re.escape(says)) as error:
+        chips(file)
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(FlickerError, match="none.toml: No such file"):
+        chips(tmp_path / "none.toml")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(FlickerError, match="bytes.toml: is no text in UTF-8"):
+        chips(tmp_path / "bytes.toml")
+    with pytest.raises(FlickerError, match="chip: one of tiny, .*, not huge"):
+        chip_of("huge")
+    with pytest.raises(FlickerError, match="DRAM: port_bits must be 128, 256 or 512, not 100"):
+        DramConfig(port_bits=100)
+
+
+@pytest.mark.parametrize("arguments, says", [
+    (["render", "demo", "--chip", "huge"], "chip: one of tiny"),
+    (["render", "demo", "--chips", str(TABLE)], "--chips: with --chip NAME only"),
+    (["render", "demo", "--engine", "chip", "--chip", "tiny", "--lanes", "64", "--port-bits", "128"], "so it cannot be combined with --lanes, --port-bits"),
+    (["render", "demo", "--chip", "tiny", "--engine", "reference"], "--chip: not for --engine reference"),
+    (["cost", "demo", "--chip", "faithful"], "--chip faithful: has records of 32 bytes"),
+    (["cost", "demo", "--chips", str(TABLE)], "--chips: with --chip NAME only"),
+])
+def test_commands_refuse(arguments: list[str], says: str) -> None:
+    ended = flicker(*arguments)
+    assert ended.returncode and says in ended.stderr and ended.stderr.count("\n") == 1
+
+
+def test_commands_take_a_name(tmp_path: Path) -> None:
+    """Costs follow the port, which both halves share."""
+    cycles = []
+    for name in ("tiny", "default"):
+        assert flicker("cost", "demo", "--size", "32x32", "--view", "0", "--chip", name, "--quiet", "--json", tmp_path / "cost.json").returncode == 0
+        found = json.loads((tmp_path / "cost.json").read_text())
+        assert found["chip"] == name
+        cycles.append(found["views"][0]["interval"])
+    assert cycles[0] > 1.5 * cycles[1]
