@@ -7,7 +7,8 @@ left out. Pointers and frame buffer are moved to the byte as in the RTL, lists t
 of records depend on the order of lookups, in the RTL's timing or in the one that is estimated here. docs/results/rendering.md has the estimate beside
 the RTL.
 
-Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenly to the elements that it takes.
+Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenly to the elements that it takes. Where a core has several sub-tiles, each of
+them goes through the pass as if it had a core, but for its elements: those of a core are blended one after the other, and share the cycles of the tile.
 
 Left out: conflicts of banks in the cache; in the memory, when records wait for anything but each other (their lines go to channels and banks, what else moves
 takes its share of the rate, lists have the latency of a lone access, and all together the peak rate); the order of entries within a merge, arbitration between
@@ -128,7 +129,7 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 def _frame(
     tile_start, record, mask, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
     element_cycles, finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token,
-    depth, blend, out_delay, served, needed, base, memory, gap, sizes, missed,
+    depth, blend, out_delay, served, needed, base, memory, gap, sizes, cores, missed,
 ):
     """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
     of records in the order in which they are read.
@@ -138,7 +139,7 @@ def _frame(
     length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. gap: cycles from line to
     line of records at the port. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
-    behind a sorting unit, pairs of tiles in the frame writer, sorting units.
+    behind a sorting unit, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
     """
     tiles = len(tile_start) - 1
     ring = 256
@@ -261,19 +262,19 @@ def _frame(
                 for c2 in range(4):
                     if not sent >> c2 & 1:
                         continue
-                    start = max(x + 1, vru[k, c2])
+                    start = max(x + 1, vru[k % cores, c2])
                     if is_end:
                         pop = max(start, drained[k, c2])
                         token_gone[k, c2] = pop
-                        port[k] = max(port[k], pop + out_delay) + 16
-                        drained[k, c2] = port[k]
+                        port[k % cores] = max(port[k % cores], pop + out_delay) + 16
+                        drained[k, c2] = port[k % cores]
                     elif done[k, c2] <= start:
                         pop = start
                     else:
                         pop = min(start + cost - 1, done[k, c2])
                         if element == finish[t_now, k, c2]:
                             done[k, c2] = start + finish_op[t_now, k, c2] + blend + 1
-                    vru[k, c2] = pop + 1
+                    vru[k % cores, c2] = pop + 1
                     e = entries[k, c2] % fifo
                     written[k, c2, e], popped[k, c2, e] = x, pop
                     entries[k, c2] += 1
@@ -494,11 +495,11 @@ class _Cores:
             ones = np.ones(int(work.start[-1]), np.int64)
             end = simulate_lanes(work, config.with_(in_width=config.delivered), leave=True).subtile_end
             order, core_start = stream_order(work, True)
-            served = np.zeros_like(end)
-            for k in range(CORES):
-                own = order[core_start[k] : core_start[k + 1]]
-                served[own] = np.maximum(np.diff(end[own], prepend=0), 0)
-            needed = np.minimum(np.diff(work.start), work.finish.max(axis=1) + 1)
+            served, needed = np.zeros_like(end), np.minimum(np.diff(work.start), work.finish.max(axis=1) + 1)
+            for k in range(config.cores):
+                own = np.stack([order[core_start[s] : core_start[s + 1]] for s in range(k, CORES, config.cores)])  # a row for each of its sub-tiles
+                cycles, share = np.maximum(np.diff(end[own].max(axis=0), prepend=0), 0), needed[own]
+                served[own] = cycles * share // np.maximum(share.sum(axis=0), 1) if len(own) > 1 else cycles
             return _Cores(
                 15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, config.slots, served, needed,
             )
@@ -572,7 +573,7 @@ def estimate(
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
-             sizes.sorted_ahead + OUTPUTS, sizes.pairs, config.sort_units), missed,
+             sizes.sorted_ahead + OUTPUTS, sizes.pairs, config.sort_units), config.cores, missed,
         )
         others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
         total = int(clock) + END + latency_cycles

@@ -1,9 +1,10 @@
 """Delivery of records, bit for bit: what each core gets of the tiles' sorted entries, and which lines of memory the record cache reads
 (docs/reference/delivery.md).
 
-An entry of a sorted list is a record number and a mask of four bits, one for each core. A core gets the records of the entries with its bit, in the order
-of the list, tile by tile, and behind them the end of the list. Of a finished sub-tile, whose pixels take no more, records may be missing at the end of its
-list: which, depends on timing, `may_be_given` is what holds for all of them. The cache holds lines of 32 bytes; its contents depend on the order of the
+An entry of a sorted list is a record number and a mask of four bits, one for each sub-tile of the tile. Sub-tile s is of core s mod cores. A core gets the
+records of the entries with a bit of its sub-tiles, once for each of them, the lowest first, in the order of the list, tile by tile, and behind them the end
+of the list. Of a finished sub-tile, whose pixels take no more, records may be missing at the end of its list: which, depends on timing, `may_be_given` is
+what holds for all of them. The cache holds lines of 32 bytes; its contents depend on the order of the
 lookups alone.
 """
 
@@ -13,16 +14,17 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-CORES, UNITS = 4, 4
+SUBTILES, UNITS = 4, 4
 LINE_BYTES = 32
 END = None  # of a list
 
 
-def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int) -> list[int | None]:
-    """Record numbers that a core gets, `END` behind each tile's. tiles: sorted entries (record, mask) of each tile of the walk."""
-    out: list[int | None] = []
+def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int, cores: int = SUBTILES) -> list[tuple[int, int] | None]:
+    """Record numbers that a core gets, with the sub-tile that each is for, `END` behind each tile's. tiles: sorted entries (record, mask) of each tile of the
+    walk."""
+    out: list[tuple[int, int] | None] = []
     for entries in tiles:
-        out += [record for record, mask in entries if mask >> core & 1]
+        out += [(record, s) for record, mask in entries for s in range(core, SUBTILES, cores) if mask >> s & 1]
         out.append(END)
     return out
 
