@@ -171,7 +171,7 @@ module flk_rendering
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
   logic [TurnBits-1:0]         turn_q;
   logic [SortUnits-1:0]        tile_ready, tile_valid;
-  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
+  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // lists, runs
   logic [SortUnits-1:0]               list_valid, list_ready;  // lines
   logic [Readers-1:0][AddrBits-1:0]   ask_addr;
   logic [Readers-1:0][7:0]            ask_len;
