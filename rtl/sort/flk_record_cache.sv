@@ -211,7 +211,6 @@ module flk_record_cache #(
 
   // ---- B: tags --------------------------------------------------------------------------------------
 
-  logic [Banks-1:0]         row_write;
   row_t [Banks-1:0]         row_read;
   row_t [1:0]               row, row_d, kept_q;
   logic [1:0]               is_kept_q, miss, changed;  // changed: the row
@@ -220,27 +219,46 @@ module flk_record_cache #(
   element_t [1:0]           pushed, head;
   miss_t [1:0]              missed, next;
 
+  // Rows that a lookup has changed are written in the cycle after it.
+  logic [1:0]               store_valid_q;
+  logic [1:0][BankBits-1:0] store_bank_q;
+  logic [1:0][SetBits-1:0]  store_set_q;
+  row_t [1:0]               store_row_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      store_valid_q <= '0;
+    end else begin
+      store_valid_q <= (advance && !stop) ? changed : '0;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    for (int unsigned c = 0; c < 2; c++) begin
+      if (advance) begin
+        store_bank_q[c] <= b_bank[c];
+        store_set_q[c]  <= b_set[c];
+        store_row_q[c]  <= row_d[c];
+      end
+    end
+  end
+
   for (genvar b = 0; b < Banks; b++) begin : gen_bank
     logic [1:0] reads, writes;
-    logic       second;  // is the one that is looked up here, if any is
-
-    assign second = b_valid_q[1] && !b_skip_q[1] && b_bank[1] == BankBits'(b);
 
     for (genvar c = 0; c < 2; c++) begin : gen_port
       assign reads[c]  = take[c] && !in_skip_i[c] && in_bank[c] == BankBits'(b);
-      assign writes[c] = changed[c] && b_bank[c] == BankBits'(b);
+      assign writes[c] = store_valid_q[c] && store_bank_q[c] == BankBits'(b);
     end
-
-    assign row_write[b] = advance && writes != '0;
 
     flk_sram #(
       .Width($bits(row_t)),
       .Depth(Sets)
     ) i_rows (
       .clk_i,
-      .wr_en_i  (clearing || row_write[b]),
-      .wr_addr_i(clearing ? step_q : second ? b_set[1] : b_set[0]),
-      .wr_data_i(clearing ? '0 : second ? row_d[1] : row_d[0]),
+      .wr_en_i  (clearing || writes != '0),
+      .wr_addr_i(clearing ? step_q : writes[1] ? store_set_q[1] : store_set_q[0]),
+      .wr_data_i(clearing ? '0 : writes[1] ? store_row_q[1] : store_row_q[0]),
       .rd_en_i  (reads != '0),
       .rd_addr_i(reads[1] ? in_set[1] : in_set[0]),
       .rd_data_o(row_read[b])
@@ -258,7 +276,8 @@ module flk_record_cache #(
     assign miss[c] = b_valid_q[c] && !b_skip_q[c] && hits[c] == '0;
 
     // The first way that may go from the one in turn on; else the first of all that may; else the one in turn. One-hot.
-    logic [Ways-1:0] keeps, behind, late, early, turn, victim, used;
+    logic [Ways-1:0]    keeps, behind, late, early, turn, victim;
+    logic [WayBits-1:0] found, leaves;
 
     for (genvar w = 0; w < Ways; w++) begin : gen_keeps
       logic [2:0] same;  // wanted until this tile, the next, the one behind
@@ -268,9 +287,10 @@ module flk_record_cache #(
       end
 
       assign keeps[w]  = row[c].way[w].valid && same != '0;
-      assign behind[w] = WayBits'(w) >= row[c].turn;
       assign turn[w]   = WayBits'(w) == row[c].turn;
     end
+
+    assign behind = {Ways{1'b1}} << row[c].turn;
 
     always_comb begin
       late   = ~keeps & behind;
@@ -278,11 +298,13 @@ module flk_record_cache #(
       late  &= ~(late - 1'b1);
       early &= ~(early - 1'b1);
       victim = late != '0 ? late : early != '0 ? early : turn;
-      used   = hits[c] | (victim & {Ways{miss[c]}});
-      way[c] = '0;
+      found  = '0;
+      leaves = '0;
       for (int unsigned w = 0; w < Ways; w++) begin
-        way[c] |= used[w] ? WayBits'(w) : '0;
+        found  |= hits[c][w] ? WayBits'(w) : '0;
+        leaves |= victim[w] ? WayBits'(w) : '0;
       end
+      way[c] = hits[c] != '0 ? found : leaves;
     end
 
     always_comb begin
@@ -306,10 +328,16 @@ module flk_record_cache #(
       end
     end
 
-    // A row that is written as it is read.
+    // A row that has been changed and is not in the memory as it is read.
     always_ff @(posedge clk_i) begin
       if (take[c]) begin
         is_kept_q[c] <= 1'b0;
+        for (int unsigned o = 0; o < 2; o++) begin
+          if (store_valid_q[o] && {store_set_q[o], store_bank_q[o]} == {in_set[c], in_bank[c]}) begin
+            is_kept_q[c] <= 1'b1;
+            kept_q[c]    <= store_row_q[o];
+          end
+        end
         for (int unsigned o = 0; o < 2; o++) begin
           if (changed[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]}) begin
             is_kept_q[c] <= 1'b1;

@@ -17,8 +17,8 @@ from flicker.scene.packed import PackedFormat
 
 from .common import Say, titled_views
 
-DEFAULT = (1024, 8)  # lines, ways
-SIZES = ((512, 8), (1024, 2), (1024, 4), DEFAULT, (1024, 16), (2048, 8))
+DEFAULT = (1024, 4)  # lines, ways
+SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (2048, 4))
 
 
 @numba.njit(cache=True)

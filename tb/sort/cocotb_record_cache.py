@@ -234,7 +234,7 @@ async def latency(dut):
 
 @cocotb.test()
 async def wanted(dut):
-    """A line that is wanted outlives as many others of its set as there are ways; one that is not goes when its turn comes; wanted lines alone do not stop others."""
+    """A wanted line outlives as many others of its set as there are ways; one that is not goes in its turn; wanted lines alone do not stop others."""
     cache = Cache(dut)
     await cache.bench.reset()
     await cache.ready()

@@ -41,7 +41,7 @@ from .tile_lists import BEAT, RECORD_LINE, TileLists
 UNITS = 4
 
 # Of the RTL, times in cycles.
-CLEAR = 36  # of the record cache, at the beginning of a frame
+CLEAR = 68  # of the record cache, at the beginning of a frame
 READ = 4  # registers from a request to the port and behind it
 CHAIN = 12  # from a line with a link to the request of its chunk, and to the lines that come (docs/reference/list_reader.md)
 FIRST = 17  # a tile's first line beside two accesses
@@ -51,7 +51,7 @@ OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
-CACHE_SETS, CACHE_WAYS = 128, 8  # of the record cache, all banks
+CACHE_SETS, CACHE_WAYS = 256, 4  # of the record cache, all banks
 DEPTH, PLACES = 256, 128  # elements that wait in the cache, lines on their way
 FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
@@ -146,8 +146,9 @@ def _frame(
     """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
     of records in the order in which they are read.
 
-    Arrays over tiles in the order of the walk (T; `border` (T, 2), of `walk.borders`), their entries, the chunks of their lists (`lines_start`, entries of each), batches of their lists, and the
-    elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many elements of a tile. refresh: (period,
+    Arrays over tiles in the order of the walk (T; `border` (T, 2), of `walk.borders`), their entries, the chunks of their lists (`lines_start`, entries of
+    each), batches of their lists, and the elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core
+    has for so many elements of a tile. refresh: (period,
     length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
     behind a sorting unit, pairs of tiles in the frame writer.
@@ -577,9 +578,10 @@ def estimate(
         # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits.
         rate, later = (*memory[:-1], memory[-1] / (1.0 - busy)), round(LOADED * busy / (1.0 - busy))
         clock, misses, batches, given = _frame(
-            tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay, tables.batch_start, tables.batch_size,
-            tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op),
-            listed, RECORD_LINE // tables.frame.kind.bytes, CACHE_SETS, CACHE_WAYS, READ + list_latency, line_latency + later, refresh, reads, early,
+            tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
+            tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
+            tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, CACHE_SETS, CACHE_WAYS,
+            READ + list_latency, line_latency + later, refresh, reads, early,
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,

@@ -52,7 +52,7 @@ class RecordCache:
 
     TILES = 64
 
-    def __init__(self, banks: int = 4, sets: int = 32, ways: int = 8, record_bytes: int = 16) -> None:
+    def __init__(self, banks: int = 4, sets: int = 64, ways: int = 4, record_bytes: int = 16) -> None:
         self.banks, self.sets, self.ways, self.per_line = banks, sets, ways, LINE_BYTES // record_bytes
         self._held: list[list[int | None]] = [[None] * ways for _ in range(banks * sets)]
         self._until = [[0] * ways for _ in range(banks * sets)]
