@@ -329,21 +329,19 @@ module flk_record_cache #(
     end
 
     // A row that has been changed and is not in the memory as it is read.
+    logic [1:0] fresh, stored;
+
+    for (genvar o = 0; o < 2; o++) begin : gen_changed
+      assign fresh[o]  = changed[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]};
+      assign stored[o] = store_valid_q[o] &&
+                         {store_set_q[o], store_bank_q[o]} == {in_set[c], in_bank[c]};
+    end
+
     always_ff @(posedge clk_i) begin
       if (take[c]) begin
-        is_kept_q[c] <= 1'b0;
-        for (int unsigned o = 0; o < 2; o++) begin
-          if (store_valid_q[o] && {store_set_q[o], store_bank_q[o]} == {in_set[c], in_bank[c]}) begin
-            is_kept_q[c] <= 1'b1;
-            kept_q[c]    <= store_row_q[o];
-          end
-        end
-        for (int unsigned o = 0; o < 2; o++) begin
-          if (changed[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]}) begin
-            is_kept_q[c] <= 1'b1;
-            kept_q[c]    <= row_d[o];
-          end
-        end
+        is_kept_q[c] <= fresh != '0 || stored != '0;
+        kept_q[c]    <= fresh[0] ? row_d[0] : fresh[1] ? row_d[1]
+                        : store_row_q[stored[1]];
       end
     end
 
