@@ -22,7 +22,7 @@ from .chip_memory import TOP, memories
 from .common import Say
 
 BOARD_HZ = 150_000_000  # of a chip on an FPGA
-SIZES = ((320, 180), (1280, 720))
+SIZES = ((640, 360),)
 
 
 def parameters(say: Say) -> dict[str, str]:
