@@ -311,7 +311,7 @@ module fv_record_writer
         a_one: assert (((wants & in_ready) & ((wants & in_ready) - 1'b1)) == '0);
         a_apart: assert (!(dut.take && dut.beat.quarters[r*Quarters] && dut.written[r]) ||
                          dut.written_at[r] != dut.head_q);
-        l_first: assert (2'(dut.gen_record[r].i_arbiter.first_q) < 2'(LANES));
+        l_first: assert (2'(dut.gen_record[r].gen_turns.i_arbiter.first_q) < 2'(LANES));
       end
     end
   end
