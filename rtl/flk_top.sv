@@ -856,7 +856,7 @@ module flk_top
   assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
   assign to_host.capability.log2_beat.next   = 4'($clog2(PortBits / 8));
   assign to_host.capability_units.log2.next  =
-      {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'd2};  // four cores
+      {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'd2};
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;
   assign to_host.status.render_busy.next     = rendering_busy;
