@@ -1,9 +1,11 @@
-// flk_delivery, one core that finishes no tile early: every entry with the core's bit, and every end, reaches the core once,
-// unchanged, in order (fv_stream), whatever the other cores finish and whenever; the others do not. Of two elements that are given
+// flk_delivery, one sub-tile that is finished with no tile early: every entry with its bit, and every end, reaches its core for it once,
+// unchanged, in order (fv_stream), whatever the other sub-tiles are finished with and whenever; the others do not. Of two elements that are given
 // together the older is no end. The cache keeps the order and is arbitrary otherwise, the queues are stand-ins. The assertions l_* say what is where, for induction.
 module fv_delivery #(
-  parameter int unsigned Core    = 0,
-  parameter int unsigned InWidth = 1
+  parameter  int unsigned Core    = 0,  // sub-tile; of four cores the core
+  parameter  int unsigned InWidth = 1,
+  parameter  int unsigned Cores   = 4,
+  localparam int unsigned Own     = Core % Cores  // core that has it
 ) (
   input logic                 clk_i,
   input logic                 again_i,
@@ -12,7 +14,7 @@ module fv_delivery #(
   input logic [3:0][1:0]      some_valid_i,
   input logic [3:0][1:0]      in_end_i,
   input logic [3:0][1:0][4:0] in_entry_i,
-  input logic [3:0]           out_ready_i,
+  input logic [Cores-1:0]     out_ready_i,
   input logic [3:0]           finished_i
 );
 
@@ -22,12 +24,17 @@ module fv_delivery #(
   localparam int unsigned Held = Queued + Cached + 2;  // queue, cache, entries taken
 
   logic            rst_n;
+  localparam int unsigned Share = 4 / Cores;
+  localparam int unsigned WordBits = 2 + ((Share > 1) ? Share : 0);
+
   logic [3:0]      in_ready, finish, finished;
   logic [3:0][1:0] in_valid;
 
-  logic [3:0][InWidth-1:0] out_valid, out_end;
-  logic [3:0][InWidth-1:0] out_record;  // of one bit: its number
-  logic [InWidth-1:0][1:0] out_element;
+  logic [Cores-1:0][InWidth-1:0]      out_valid, out_end;
+  logic [Cores-1:0][InWidth-1:0]      out_record;  // of one bit: its number
+  logic [Cores-1:0][InWidth-1:0][1:0] out_subtile;
+  logic [InWidth-1:0]                 out_given;  // to the core, for the sub-tile
+  logic [InWidth-1:0][1:0]            out_element;
 
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
@@ -42,7 +49,8 @@ module fv_delivery #(
     .RecordBits(1),
     .NumberBits(1),
     .InWidth   (InWidth),
-    .Queue     (Queue)
+    .Queue     (Queue),
+    .Cores     (Cores)
   ) dut (
     .clk_i,
     .rst_ni       (rst_n),
@@ -58,10 +66,13 @@ module fv_delivery #(
     .in_end_i,
     .in_entry_i,
     .finish_o     (finish),
+    .border_i     ('0),
+    .taken_o      (),
     .out_valid_o  (out_valid),
     .out_ready_i,
     .out_end_o    (out_end),
     .out_record_o (out_record),
+    .out_subtile_o(out_subtile),
     .finished_i   (finished),
     .ar_valid_o   (),
     .ar_ready_i   (1'b0),
@@ -114,8 +125,8 @@ module fv_delivery #(
     .pick_i,
     .push_i     (wanted),
     .in_data_i  ({is_end[1], entry[1][4], is_end[0], entry[0][4]}),
-    .out_valid_i(out_valid[Core]),
-    .out_ready_i({InWidth{out_ready_i[Core]}}),
+    .out_valid_i(out_given),
+    .out_ready_i({InWidth{out_ready_i[Own]}}),
     .out_data_i (out_element),
     .inside_o   (count),
     .watching_o (watching),
@@ -123,17 +134,26 @@ module fv_delivery #(
     .watched_o  (watched)
   );
 
-  for (genvar w = 0; w < InWidth; w++) begin : gen_out
-    assign out_element[w] = {out_end[Core][w], out_record[Core][w]};
+  // What is for the sub-tile, the older lower.
+  always_comb begin
+    out_given   = '0;
+    out_element = '0;
+    for (int unsigned w = InWidth; w > 0; w--) begin
+      if (out_valid[Own][w-1] && (out_end[Own][w-1] || out_subtile[Own][w-1] == 2'(Core))) begin
+        out_given      = InWidth'({out_given, 1'b1});
+        out_element    = (2 * InWidth)'({out_element, 2'b0});
+        out_element[0] = {out_end[Own][w-1], out_record[Own][w-1]};
+      end
+    end
   end
 
   logic [4:0] queued;  // in the core's queue
   logic [1:0] push;
   logic [4:0] popped;  // in the cycle before
 
-  assign queued = 5'(dut.gen_core[Core].i_queue.used_q);
-  assign push   = dut.gen_core[Core].push;
-  assign popped = 5'(dut.pop_q[Core][0]) + 5'(dut.pop_q[Core][1]);
+  assign queued = 5'(dut.gen_core[Own].i_queue.used_q);
+  assign push   = dut.gen_core[Own].push;
+  assign popped = 5'(dut.pop_q[Own][0]) + 5'(dut.pop_q[Own][1]);
 
   // All that is inside, the oldest first, and which of it is the core's.
 
@@ -143,12 +163,35 @@ module fv_delivery #(
   logic [4:0]           at, ends, opened;
   logic                 found;  // the element that is watched, in its place
   logic [Cached-1:0]    right;
+  logic [Queued-1:0]    whole;  // what a word of the queue says of its sub-tiles is so
+  logic                 none;   // nothing was given of a word that is not there
 
   assign cached = dut.i_cache.used_q;
 
   for (genvar d = 0; d < Queued; d++) begin : gen_queued
-    assign present[d] = 5'(d) < queued;
-    assign item[d]    = dut.gen_core[Core].i_queue.words_q[d];
+    logic [WordBits-1:0] word;  // sub-tiles that want it where a core has several, end, record
+
+    assign word    = dut.gen_core[Own].i_queue.words_q[d];
+    assign item[d] = word[1:0];
+
+    if (Share == 1) begin : gen_one
+      assign present[d] = 5'(d) < queued;
+      assign whole[d]   = 1'b1;
+    end else begin : gen_several
+      logic [Share-1:0] wanted, given;
+
+      assign wanted     = word[WordBits-1-:Share];
+      assign given      = (d == 0) ? dut.gen_core[Own].gen_split.given_q : '0;
+      assign present[d] = 5'(d) < queued && wanted[Core/Cores] && !given[Core/Cores];
+      assign whole[d]   = 5'(d) >= queued || ((wanted & ~given) != '0 && (given & ~wanted) == '0 &&
+                                              (!word[1] || ((&wanted) && given == '0)));
+    end
+  end
+
+  if (Share == 1) begin : gen_never
+    assign none = 1'b1;
+  end else begin : gen_given
+    assign none = queued != '0 || dut.gen_core[Own].gen_split.given_q == '0;
   end
 
   for (genvar d = 0; d < Cached; d++) begin : gen_cached
@@ -186,22 +229,23 @@ module fv_delivery #(
       a_room: assert (queued + 5'(push[0]) + 5'(push[1]) <= 5'(Queue));
       l_inside: assert (5'(count) == at);
       l_cached: assert (cached <= 3'(Cached));
-      l_used: assert (5'(dut.used_q[Core]) == queued + popped && 5'(dut.used_q[Core]) <= 5'(Queue));
-      l_room: assert (!dut.room_q || 5'(dut.used_q[Core]) <= 5'(Queue - 4));
-      l_next: assert (!dut.i_cache.ready_q || 5'(dut.used_q[Core]) <= 5'(Queue - 2));
-      l_pop: assert (!dut.pop_end_q[Core] || dut.pop_q[Core][0]);
-      l_pops: assert (!dut.pop_q[Core][1] || (InWidth == 2 && dut.pop_q[Core][0]));
-      a_together: assert (!out_valid[Core][InWidth-1] || InWidth == 1 || !out_end[Core][0]);
-      l_ends: assert (5'(dut.ends_q[Core]) == ends + 5'(dut.pop_end_q[Core]));
-      l_opened: assert (5'(dut.opened_q[Core]) == opened + 5'(dut.pop_end_q[Core]));
+      l_used: assert (5'(dut.used_q[Own]) == queued + popped && 5'(dut.used_q[Own]) <= 5'(Queue));
+      l_room: assert (!dut.room_q || 5'(dut.used_q[Own]) <= 5'(Queue - 4));
+      l_next: assert (!dut.i_cache.ready_q || 5'(dut.used_q[Own]) <= 5'(Queue - 2));
+      l_pop: assert (!dut.pop_end_q[Own] || dut.pop_q[Own][0]);
+      l_pops: assert (!dut.pop_q[Own][1] || (InWidth == 2 && dut.pop_q[Own][0]));
+      l_whole: assert (whole == '1 && none);
+      a_together: assert (!out_valid[Own][InWidth-1] || InWidth == 1 || !out_end[Own][0]);
+      l_ends: assert (5'(dut.ends_q[Own]) == ends + 5'(dut.pop_end_q[Own]));
+      l_opened: assert (5'(dut.opened_q[Own]) == opened + 5'(dut.pop_end_q[Own]));
       l_finished: assert (!dut.finished_q[Core]);
       l_unit: assert (dut.unit_q == unit_q);
       l_pair: assert (!(dut.e_valid_q[1] && dut.e_valid_q[0] && dut.e_q[0].last));
       l_watched: assert (!watching || found);
       l_right: assert (right == '1);
       a_finish: assert (finish == '0);
-      c_end: cover (out_ready_i[Core] && (out_valid[Core] & out_end[Core]) != '0 && unit_q == 2'd3);
-      c_all: cover (out_ready_i[Core] && (&out_valid[Core]) && unit_q == 2'd3);
+      c_end: cover (out_ready_i[Own] && (out_valid[Own] & out_end[Own]) != '0 && unit_q == 2'd3);
+      c_all: cover (out_ready_i[Own] && (&out_valid[Own]) && unit_q == 2'd3);
       c_full: cover (!dut.room_q && dut.i_cache.ready_q);
     end
   end

@@ -42,6 +42,7 @@ module fv_lane_queue #(
     .push_i,
     .ready_o      (ready),
     .push_slot_i  (slot_i),
+    .push_subtile_i('0),
     .push_pixels_i(pixels_i),
     .alive_o      (alive),
     .empty_o      (empty),

@@ -1,7 +1,7 @@
 // Rendering: from tile lists and records in memory to a frame buffer in memory (docs/reference/rendering.md).
 //
 // What flk_preprocessing leaves is read back list by list: list readers and sorting units (SortUnits of each) take the tiles of the walk in turn,
-// delivery fetches records and gives them to four cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
+// delivery fetches records and gives them to the cores of the rendering stage that Stage chooses (flk_stage), and the frame writer
 // puts finished pixels together. The walk goes in pairs of tiles (flk_tile_walk); a tile that the picture lacks has an empty list.
 // A frame: start_i while idle_o, with registers_i, which stays until done_o, high for a cycle when all has been written and answered.
 // error_o, until the next start: bit 0 lists could not be read, break their layout or are longer than is sorted, bit 1 records could not be read, bit 2 a write
@@ -12,7 +12,7 @@
 // runs (write, 512 bits).
 // stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
 // nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.
-// A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four cores of a tile say so the
+// A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four of a tile say so the
 // sorting unit drops the list (not in the automatic mode, flk_render_stage).
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
 module flk_rendering
@@ -28,7 +28,8 @@ module flk_rendering
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
-  parameter  int unsigned Lanes          = 32,
+  parameter  int unsigned Cores          = CORES,  // 1, 2 or 4; of channels 4
+  parameter  int unsigned Lanes          = 32,     // of all cores
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,    // records a cycle of each core: 1, with lanes 2
@@ -167,10 +168,11 @@ module flk_rendering
   // ---- lists ----------------------------------------------------------------------------------------
 
   logic                        walk_done, walk_next, unused_second;
+  logic [1:0][3:0]             unused_border;
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
   logic [TurnBits-1:0]         turn_q;
   logic [SortUnits-1:0]        tile_ready, tile_valid;
-  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
+  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // lists, runs
   logic [SortUnits-1:0]               list_valid, list_ready;  // lines
   logic [Readers-1:0][AddrBits-1:0]   ask_addr;
   logic [Readers-1:0][7:0]            ask_len;
@@ -207,7 +209,8 @@ module flk_rendering
     .done_o  (walk_done),
     .tile_x_o(walk_x),
     .tile_y_o(walk_y),
-    .second_o(unused_second)
+    .second_o(unused_second),
+    .border_o(unused_border)
   );
 
   assign walk_next = !walk_done && tile_ready[turn_q];
@@ -370,11 +373,32 @@ module flk_rendering
 
   // ---- records --------------------------------------------------------------------------------------
 
-  logic [CORES-1:0]                              record_ready, finished;
-  logic [CORES-1:0][InWidth-1:0]                 record_valid, record_end;
-  logic [CORES-1:0][InWidth-1:0][RecordBits-1:0] record;
+  logic [CORES-1:0]                              finished;  // of each sub-tile
+  logic [Cores-1:0]                              record_ready;
+  logic [Cores-1:0][InWidth-1:0]                 record_valid, record_end;
+  logic [Cores-1:0][InWidth-1:0][RecordBits-1:0] record;
+  logic [Cores-1:0][InWidth-1:0][1:0]            record_subtile;
   logic [31:0]                                   cache_lines;
   logic [3:0]                                    delivery_waits;
+  logic [1:0][3:0]                               border;  // of the tile in turn
+  logic                                          taken, unused_taken_done, unused_taken_second;
+  logic [TILE_COORD_BITS-1:0]                    unused_taken_x, unused_taken_y;
+
+  flk_tile_walk #(
+    .CoordBits(TILE_COORD_BITS)
+  ) i_taken (
+    .clk_i,
+    .rst_ni,
+    .start_i (start),
+    .next_i  (taken),
+    .pairs_i (registers_i.pairs),
+    .rows_i  (registers_i.rows),
+    .done_o  (unused_taken_done),
+    .tile_x_o(unused_taken_x),
+    .tile_y_o(unused_taken_y),
+    .second_o(unused_taken_second),
+    .border_o(border)
+  );
 
   flk_delivery #(
     .Units     (SortUnits),
@@ -382,7 +406,8 @@ module flk_rendering
     .InWidth   (InWidth),
     .Queue     (Queue),
     .AddrBits  (AddrBits),
-    .IdBits    (IdBits)
+    .IdBits    (IdBits),
+    .Cores     (Cores)
   ) i_delivery (
     .clk_i,
     .rst_ni,
@@ -398,10 +423,13 @@ module flk_rendering
     .in_end_i     (entry_end),
     .in_entry_i   (entry),
     .finish_o     (finish),
+    .border_i     (border),
+    .taken_o      (taken),
     .out_valid_o  (record_valid),
     .out_ready_i  (record_ready),
     .out_end_o    (record_end),
     .out_record_o (record),
+    .out_subtile_o(record_subtile),
     .finished_i   (finished),
     .ar_valid_o   (record_ar_valid_o),
     .ar_ready_i   (record_ar_ready_i),
@@ -420,18 +448,27 @@ module flk_rendering
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
-  logic        [CORES-1:0]                              own_ready, own_finished, pixel_valid;
-  logic        [CORES-1:0][InWidth-1:0]                 own_valid, own_end;
-  logic        [CORES-1:0][InWidth-1:0][RecordBits-1:0] own_record;
-  subtile_t    [CORES-1:0]                              subtile;
+  // Elements of a core; a number of the sub-tile in its tile only where the core has several.
+  localparam int unsigned Share       = CORES / Cores;
+  localparam int unsigned NumberBits  = (Share == 1) ? 0 : 2 * InWidth;
+  localparam int unsigned ElementBits = InWidth * (2 + RecordBits);
+
+  logic        [CORES-1:0]                              own_finished;
+  logic        [Cores-1:0]                              own_ready, pixel_valid;
+  logic        [Cores-1:0][InWidth-1:0]                 own_valid, own_end;
+  logic        [Cores-1:0][InWidth-1:0][RecordBits-1:0] own_record;
+  subtile_t    [Cores-1:0][InWidth-1:0]                 subtile;
   logic                                                 pair_freed;
   // Of a core: it has a record; there is a place for what it gives.
-  logic        [CORES-1:0]                              has, open;
-  core_pixel_t [CORES-1:0]                              pixel;
+  logic        [Cores-1:0]                              has, open;
+  core_pixel_t [Cores-1:0]                              pixel;
 
-  for (genvar k = 0; k < CORES; k++) begin : gen_core
+  for (genvar k = 0; k < Cores; k++) begin : gen_core
     logic                       unused_done, next, second;
+    logic [1:0][3:0]            unused_here;
     logic [InWidth-1:0]         own, ends;
+    logic [InWidth-1:0][1:0]    number;
+    logic [NumberBits+ElementBits-1:0] held;
     logic [TILE_COORD_BITS-1:0] x, y;
     logic [$clog2(Pairs+1)-1:0] begun_q;  // pairs of tiles given whole and not freed
 
@@ -442,21 +479,27 @@ module flk_rendering
     assign next         = has[k] && open[k] && own_ready[k] && ends != '0;
 
     // The stage speaks of the elements that it takes, delivery of the one after them.
-    assign finished[k] = own_finished[k] && !(has[k] && ends != '0);
+    for (genvar m = 0; m < Share; m++) begin : gen_subtile
+      assign finished[Cores*m+k] = own_finished[Cores*m+k] && !(has[k] && ends != '0);
+    end
 
     flk_pipe_reg #(
-      .Width(InWidth * (2 + RecordBits))
+      .Width(NumberBits + ElementBits)
     ) i_record (
       .clk_i,
       .rst_ni,
       .clear_i    (1'b0),
       .in_valid_i (record_valid[k][0]),
       .in_ready_o (record_ready[k]),
-      .in_data_i  ({record_valid[k], record_end[k], record[k]}),
+      .in_data_i  ((NumberBits + ElementBits)'({
+          record_subtile[k], record_valid[k], record_end[k], record[k]})),
       .out_valid_o(has[k]),
       .out_ready_i(open[k] && own_ready[k]),
-      .out_data_o ({own, own_end[k], own_record[k]})
+      .out_data_o (held)
     );
+
+    assign {own, own_end[k], own_record[k]} = held[ElementBits-1:0];
+    assign number = (Share == 1) ? {InWidth{2'(k)}} : (2 * InWidth)'(held >> ElementBits);
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -479,11 +522,14 @@ module flk_rendering
       .done_o  (unused_done),
       .tile_x_o(x),
       .tile_y_o(y),
-      .second_o(second)
+      .second_o(second),
+      .border_o(unused_here)
     );
 
-    assign subtile[k].col = SUBTILE_COORD_BITS'({x, 1'(k)});
-    assign subtile[k].row = SUBTILE_COORD_BITS'({y, 1'(k / 2)});
+    for (genvar w = 0; w < InWidth; w++) begin : gen_way
+      assign subtile[k][w].col = SUBTILE_COORD_BITS'({x, number[w][0]});
+      assign subtile[k][w].row = SUBTILE_COORD_BITS'({y, number[w][1]});
+    end
   end
 
   flk_stage #(
@@ -494,6 +540,7 @@ module flk_rendering
     .CtuFifoDepth  (CtuFifoDepth),
     .VrusPerChannel(VrusPerChannel),
     .MaskGenerator (MaskGenerator),
+    .Cores         (Cores),
     .Lanes         (Lanes),
     .InWidth       (InWidth),
     .Slots         (Slots),
@@ -595,7 +642,8 @@ module flk_rendering
     .Pairs     (Pairs),
     .BeatBits  (BeatBits),
     .StrideBits(STRIDE_BITS),
-    .Lanes     (STAGE_LANE_ORDER[Stage] == '0 ? 0 : Lanes)
+    .Lanes     (STAGE_LANE_ORDER[Stage] == '0 ? 0 : Lanes),
+    .Cores     (Cores)
   ) i_frame (
     .clk_i,
     .rst_ni,
@@ -678,11 +726,14 @@ module flk_rendering
   logic [31:0]                       cycles_q;
   logic [RENDERING_EVENTS-1:0][3:0]  events;   // by sorting unit or core
   logic [RENDERING_EVENTS-1:0][31:0] totals;
-  logic [CORES-1:0]                  first_valid;
+  logic [Cores-1:0]                  first_valid, record_waits, pair_waits;
 
-  for (genvar k = 0; k < CORES; k++) begin : gen_first
+  for (genvar k = 0; k < Cores; k++) begin : gen_first
     assign first_valid[k] = record_valid[k][0];
   end
+
+  assign record_waits = first_valid & ~record_ready;
+  assign pair_waits   = has & ~open;
 
   logic running_q;  // a cycle ago, as what delivery tells
 
@@ -700,8 +751,8 @@ module flk_rendering
   assign events[RENDERING_EVENT_ENTRY_WAITS]   = 4'(delivery_waits[1]);
   assign events[RENDERING_EVENT_QUEUE_WAITS]   = 4'(delivery_waits[2]);
   assign events[RENDERING_EVENT_CACHE_WAITS]   = 4'(delivery_waits[3]);
-  assign events[RENDERING_EVENT_RECORD_WAITS]  = first_valid & ~record_ready;
-  assign events[RENDERING_EVENT_PAIR_WAITS]    = has & ~open;
+  assign events[RENDERING_EVENT_RECORD_WAITS]  = 4'(record_waits);
+  assign events[RENDERING_EVENT_PAIR_WAITS]    = 4'(pair_waits);
   assign events[RENDERING_EVENT_FRAME_WAITS]   = 4'(line_valid && !line_ready);
   assign events[RENDERING_EVENT_SORTED_AGAIN]  = 4'(again);
 

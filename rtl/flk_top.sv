@@ -27,7 +27,8 @@ module flk_top
   parameter  int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter  int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter  int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
-  parameter  int unsigned Lanes          = 32,
+  parameter  int unsigned Cores          = CORES,  // of lanes: 1, 2 or 4
+  parameter  int unsigned Lanes          = 32,     // of all cores
   parameter  int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter  int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,
   parameter  int unsigned InWidth        = 1,     // records a cycle of each core: 1, with lanes 2
@@ -698,6 +699,7 @@ module flk_top
     .CtuFifoDepth  (CtuFifoDepth),
     .VrusPerChannel(VrusPerChannel),
     .MaskGenerator (MaskGenerator),
+    .Cores         (Cores),
     .Lanes         (Lanes),
     .Slots         (Slots),
     .Depth         (Depth),
@@ -856,7 +858,7 @@ module flk_top
   assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
   assign to_host.capability.log2_beat.next   = 4'($clog2(PortBits / 8));
   assign to_host.capability_units.log2.next  =
-      {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'd2};
+      {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'($clog2(Cores))};
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;
   assign to_host.status.render_busy.next     = rendering_busy;

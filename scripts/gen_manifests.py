@@ -19,7 +19,7 @@ WAIVER = "lint/waiver.vlt"
 BENCH = "tb/top/flk_top_tb.sv"
 # Parameters of the targets, and what they are: those of lint are flk_top_axi's, those of sim the bench's, which hands them on.
 PARAMETERS = {
-    "Stage": "0: channels, 1: lanes", "Lanes": "of the stage of lanes: 32, 64 or 128", "IdWidth": "bits of AXI identifiers, 7 or more",
+    "Stage": "0: channels, 1: lanes", "Lanes": "of the stage of lanes: 16, 32, 64 or 128", "IdWidth": "bits of AXI identifiers, 7 or more",
     "ResetStages": "flip-flops of the reset synchroniser; 0: none",
 }
 NOTE = "# Written by scripts/gen_manifests.py from rtl/flk.f: do not edit."

@@ -11,6 +11,7 @@ module flk_top_axi
   parameter int unsigned CtuFifoDepth   = CTU_FIFO_DEPTH,
   parameter int unsigned VrusPerChannel = VRUS_PER_CHANNEL,
   parameter int unsigned MaskGenerator  = MASK_GENERATOR_CTU,
+  parameter int unsigned Cores          = CORES,
   parameter int unsigned Lanes          = 32,
   parameter int unsigned Slots          = flk_lane_pkg::LANE_SLOTS,
   parameter int unsigned Depth          = flk_lane_pkg::LANE_QUEUE_DEPTH,

@@ -4,12 +4,13 @@ module flk_lane
   import flk_pkg::*;
   import flk_lane_pkg::*;
 #(
-  parameter  int unsigned Lanes  = 8,
-  parameter  int unsigned Lane   = 0,
-  parameter  int unsigned Slots  = 20,
-  localparam int unsigned Pixels = 64 / Lanes,
-  localparam int unsigned PixelW = $clog2(Pixels),
-  localparam int unsigned SlotW  = $clog2(Slots)
+  parameter  int unsigned Lanes    = 8,
+  parameter  int unsigned Lane     = 0,
+  parameter  int unsigned Slots    = 20,
+  parameter  int unsigned Subtiles = 1,
+  localparam int unsigned Pixels   = Subtiles * 64 / Lanes,
+  localparam int unsigned PixelW   = $clog2(Pixels),
+  localparam int unsigned SlotW    = $clog2(Slots)
 ) (
   input  logic                        clk_i,
   input  logic                        rst_ni,

@@ -168,7 +168,9 @@ TRANSMITTANCE_MIN_BITS = fp16_bits_up(TRANSMITTANCE_MIN)
 
 MAX_FIFO_DEPTH = 128
 VRU_COUNTS = (1, 2, 4)  # VRUs per channel that the RTL can have
-LANE_COUNTS = (32, 64, 128)  # lanes of all cores
+LANE_COUNTS = (32, 64, 128)  # lanes of all of four cores
+CORE_COUNTS = (1, 2, 4)  # cores of the stage of lanes
+LANES_PER_CORE = (4, 8, 16, 32)
 UNIT_COUNTS = (1, 2, 4)  # sorting units, list writers, preprocessing lanes
 MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
@@ -255,15 +257,14 @@ CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 
 class RenderConfig:
     """One configuration of the rendering stage.
 
-    `cat` is a run-time input of the RTL; the others are elaboration parameters, except `coords`,
-    which concerns the unit that writes the records. `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output
-    is blocked; otherwise what is in flight goes on into an output FIFO of that depth, as in the paper. `vrus_per_channel`: the VRUs
-    of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture, depends on it.
-    mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `lanes` of all cores; `in_width` elements
-    that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a lane's queue. Of the whole chip: `delivered` records that a core gets
-    in a cycle there, and so takes, whatever `in_width`; `memories`, key of CHIP_MEMORIES; `port_bits` of the memory port; `sort_units`, with list
-    readers and buffers of their own; `list_writers`, which share the four banks of lists; `preproc_lanes`, preprocessing cores. No bit of records, lists
-    and pictures depends on their numbers.
+    `cat` is a run-time input of the RTL; the others are elaboration parameters, except `coords`, which concerns the unit that writes the records.
+    `ctu_fifo_depth` 0: the CTU's pipeline stands still while its output is blocked; otherwise what is in flight goes on into an output FIFO of that depth,
+    as in the paper. `vrus_per_channel`: the VRUs of a channel divide its mini-tile row by row; only the automatic mode's choice, and so only its picture,
+    depends on it. mask_generator, stage: keys of MASK_GENERATORS and STAGES. For the stage `lanes`, and no picture depends on them: `cores`, each with 4, 2
+    or 1 sub-tiles of a tile; `lanes` of all cores; `in_width` elements that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a
+    lane's queue. Of the whole chip: `delivered` records that a core gets in a cycle there, and so takes, whatever `in_width`; `memories`, key of
+    CHIP_MEMORIES; `port_bits` of the memory port; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of
+    lists; `preproc_lanes`, preprocessing cores. No bit of records, lists and pictures depends on their numbers.
     """
 
     form: Form = Form.FACTORED
@@ -276,6 +277,7 @@ class RenderConfig:
     mask_generator: str = "ctu"
     stage: str = "channels"
     lanes: int = LANE_COUNTS[0]
+    cores: int = CORES
     in_width: int = 2
     slots: int = 20
     delivered: int = 1
@@ -299,8 +301,10 @@ class RenderConfig:
             raise FlickerError(f"configuration: ctu_fifo_depth must be 0 to {MAX_FIFO_DEPTH}, not {self.ctu_fifo_depth}")
         if self.vrus_per_channel not in VRU_COUNTS:
             raise FlickerError(f"configuration: vrus_per_channel must be 1, 2 or 4, not {self.vrus_per_channel}")
-        if self.lanes not in LANE_COUNTS:
-            raise FlickerError(f"configuration: lanes must be {', '.join(map(str, LANE_COUNTS[:-1]))} or {LANE_COUNTS[-1]}, not {self.lanes}")
+        if self.cores not in (CORE_COUNTS if self.by_lanes else (CORES,)):
+            raise FlickerError(f"configuration: cores must be {'1, 2 or 4' if self.by_lanes else f'{CORES} with stage {self.stage}'}, not {self.cores}")
+        if self.lanes not in (counts := [self.cores * own for own in LANES_PER_CORE]):
+            raise FlickerError(f"configuration: lanes must be {', '.join(map(str, counts[:-1]))} or {counts[-1]} with cores {self.cores}, not {self.lanes}")
         if self.in_width not in (1, 2):
             raise FlickerError(f"configuration: in_width must be 1 or 2, not {self.in_width}")
         if self.delivered not in ((1, 2) if self.by_lanes else (1,)):
@@ -340,6 +344,7 @@ class RenderConfig:
             "CtuFifoDepth": self.ctu_fifo_depth,
             "VrusPerChannel": self.vrus_per_channel,
             "MaskGenerator": list(MASK_GENERATORS).index(self.mask_generator),
+            "Cores": self.cores,
             "Lanes": self.lanes,
             "InWidth": self.in_width,
             "Slots": self.slots,
@@ -441,7 +446,7 @@ RECORD_ELEMENT = "record_elem"
 # What a rendering stage can be built from, with default values: parameters of `flk_stage`, which instantiates the chosen one.
 STAGE_PARAMETERS = {
     "Form": "FORM_FACTORED", "Precision": "PRECISION_FIXED", "FifoDepth": "FIFO_DEPTH", "CtuFifoDepth": "CTU_FIFO_DEPTH",
-    "VrusPerChannel": "VRUS_PER_CHANNEL", "MaskGenerator": "MASK_GENERATOR_CTU", "Lanes": "32", "InWidth": "1", "Slots": "LANE_SLOTS",
+    "VrusPerChannel": "VRUS_PER_CHANNEL", "MaskGenerator": "MASK_GENERATOR_CTU", "Cores": "CORES", "Lanes": "32", "InWidth": "1", "Slots": "LANE_SLOTS",
     "Depth": "LANE_QUEUE_DEPTH",
 }
 
@@ -503,7 +508,7 @@ STAGES: dict[str, Stage] = {
         "mask generators and volume rendering units",
     ),
     "lanes": Stage(
-        "flk_lane_stage", RECORD_ELEMENT, "core_pixel", ("Lanes", "InWidth", "Slots", "Depth"), tuple(name for name, _ in LANE_COUNTERS),
+        "flk_lane_stage", RECORD_ELEMENT, "core_pixel", ("Cores", "Lanes", "InWidth", "Slots", "Depth"), tuple(name for name, _ in LANE_COUNTERS),
         "lanes in the log domain (docs/reference/lanes.md)", lane_order=True,
     ),
 }

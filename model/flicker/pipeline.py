@@ -120,7 +120,7 @@ def lane_rtl_stats(rtl: RtlFrame, config: RenderConfig) -> dict[str, Any]:
             "lanes": config.lanes, "visited": count["visits"], "skipped": count["skipped"], "blended": count["blended"],
             "waiting": {"no entry": count["starved"] / slots, "bank taken": count["bank_waits"] / slots},
         },
-        "cores": [{name: int(rtl.core_counter(name)[k]) for name in rtl.names} for k in range(CORES)],
+        "cores": [{name: int(rtl.core_counter(name)[k]) for name in rtl.names} for k in range(config.cores)],
     }
 
 

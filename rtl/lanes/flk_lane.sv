@@ -1,10 +1,11 @@
-// Lane: visits one pixel of a sub-tile in every cycle, in the log domain (docs/reference/lanes.md).
+// Lane: visits one pixel in every cycle, in the log domain (docs/reference/lanes.md). It has some pixels of each of its core's Subtiles sub-tiles;
+// number of a pixel: sub-tile, then pixel of that sub-tile.
 //
 // in  a visit (visit_valid_i): pixel and shape of a splat, only pixels of its mask (flk_row_mask); or with visit_eos_i the end of the list,
 //     when bank_free_o is high, with the sub-tile in the shape's low bits. The splat's colours are asked for in cycle 6: colour_slot_o is
 //     the visit's slot, colour_i its colours. visit_last_i, with a visit or without one: the lane needs the slot no more after that;
 //     release_o says so in cycle 6, about colour_slot_o.
-// out all Pixels of the sub-tile after its end, one per cycle, in order: place in the sub-tile, S as far as the result needs it, and colours.
+// out all Pixels of the list after its end, one per cycle, in order: sub-tile and place in it, S as far as the result needs it, and colours.
 //
 // | cycle | what |
 // |---|---|
@@ -19,7 +20,7 @@
 // | 8 = COLOUR | are shifted; colours of the pixel are read and written |
 //
 // The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token copies S at STATE and the
-// colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next sub-tile may follow at once.
+// colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next list may follow at once.
 // Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
@@ -29,12 +30,13 @@ module flk_lane
   import flk_pkg::*;
   import flk_lane_pkg::*;
 #(
-  parameter  int unsigned Lanes  = 8,  // of the core: 8, 16 or 32
-  parameter  int unsigned Lane   = 0,
-  parameter  int unsigned Slots  = 20,
-  localparam int unsigned Pixels = 64 / Lanes,
-  localparam int unsigned PixelW = $clog2(Pixels),
-  localparam int unsigned SlotW  = $clog2(Slots)
+  parameter  int unsigned Lanes    = 8,  // of the core: 4, 8, 16 or 32
+  parameter  int unsigned Lane     = 0,
+  parameter  int unsigned Slots    = 20,
+  parameter  int unsigned Subtiles = 1,  // of the core: 1, 2 or 4
+  localparam int unsigned Pixels   = Subtiles * 64 / Lanes,
+  localparam int unsigned PixelW   = $clog2(Pixels),
+  localparam int unsigned SlotW    = $clog2(Slots)
 ) (
   input  logic                        clk_i,
   input  logic                        rst_ni,
@@ -61,13 +63,18 @@ module flk_lane
   output lane_events_t                events_o
 );
 
-  if (Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
-    $error("flk_lane: Lanes must be 8, 16 or 32");
+  if (Lanes != 4 && Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
+    $error("flk_lane: Lanes must be 4, 8, 16 or 32");
+  end
+  if (Subtiles != 1 && Subtiles != 2 && Subtiles != 4) begin : gen_check_subtiles
+    $error("flk_lane: Subtiles must be 1, 2 or 4");
   end
   if (Lane >= Lanes) begin : gen_check_lane
     $error("flk_lane: Lane must be below Lanes");
   end
 
+  localparam int unsigned Own = 64 / Lanes;  // pixels of a sub-tile
+  localparam int unsigned OwnW = $clog2(Own);
   localparam int unsigned STATE = 5;
   localparam int unsigned FETCH = 6;  // of the splat's colours
   localparam int unsigned COLOUR = 8;
@@ -125,8 +132,8 @@ module flk_lane
   always_comb begin
     column = '0;
     row    = '0;
-    for (int unsigned p = 0; p < Pixels; p++) begin
-      if (visit_pixel_i == PixelW'(p)) begin
+    for (int unsigned p = 0; p < Own; p++) begin
+      if (visit_pixel_i[OwnW-1:0] == OwnW'(p)) begin
         column = lane_column(Lanes, Lane, p);
         row    = lane_row(Lanes, Lane, p);
       end
@@ -485,12 +492,27 @@ module flk_lane
   always_comb begin
     out_data_o = '0;
     for (int unsigned p = 0; p < Pixels; p++) begin
-      out_data_o.column |= lane_column(Lanes, Lane, p) & {3{place_q[p]}};
-      out_data_o.row    |= lane_row(Lanes, Lane, p) & {3{place_q[p]}};
+      out_data_o.column |= lane_column(Lanes, Lane, p % Own) & {3{place_q[p]}};
+      out_data_o.row    |= lane_row(Lanes, Lane, p % Own) & {3{place_q[p]}};
       out_data_o.s      |= s_out_q[p] & {RESULT_BITS{place_q[p]}};
       out_data_o.colour |= c_out_q[p] & {(3 * C_BITS) {place_q[p]}};
     end
     out_data_o.subtile = subtile_q;
+    // The list's sub-tiles lie one below the other, or fill a tile.
+    if (Subtiles > 1) begin
+      out_data_o.subtile.row[0] = 1'b0;
+    end
+    if (Subtiles > 2) begin
+      out_data_o.subtile.col[0] = 1'b0;
+    end
+    for (int unsigned p = 0; p < Pixels; p++) begin
+      if (Subtiles == 2) begin
+        out_data_o.subtile.row[0] |= place_q[p] && (p / Own) % 2 == 1;
+      end else if (Subtiles == 4) begin
+        out_data_o.subtile.col[0] |= place_q[p] && (p / Own) % 2 == 1;
+        out_data_o.subtile.row[0] |= place_q[p] && p / Own >= 2;
+      end
+    end
   end
 
 `ifndef SYNTHESIS

@@ -1,8 +1,9 @@
-// Core of the lanes: one 8x8 sub-tile after another, from records to finished pixels (docs/reference/lanes.md).
+// Core of the lanes: one list after another, from records to finished pixels (docs/reference/lanes.md). A list is of one 8x8 sub-tile, or, where the
+// core is shared by Subtiles sub-tiles of a tile, of two that lie one below the other, or of all four.
 //
 // in  up to InWidth elements in a cycle, the older lower; all that are valid are taken together. An element is a record of 16 bytes and the
-//     sub-tile whose list it is in, or the end of that list (eos).
-// out finished pixels, one per cycle, with sub-tile, mini-tile and pixel index, in any order; all pixels of a sub-tile before any of a later
+//     sub-tile that it is for, or the end of the list (eos), with any of its sub-tiles: a record that is for several is an element for each.
+// out finished pixels, one per cycle, with sub-tile, mini-tile and pixel index, in any order; all pixels of a list before any of a later
 //     one that the same lane has.
 //
 //     records ──► flk_splat_setup ──► flk_row_mask ──► dispatch ──► store of Slots splats ──► lanes ──► bank ──► flk_lane_result
@@ -13,37 +14,41 @@
 // cycle, and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it.
 // The end of a list goes through all queues in order.
 // clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no list and no pixel is inside.
-// finished_o is about the sub-tile of the element that in_* takes: all its pixels are finished, so that its splats change no pixel any
+// finished_o, of each sub-tile of the list that in_* takes: all its pixels are finished, so that its splats change no pixel any
 // more. It comes from a register, rises some cycles late and is low in the cycle after a token was taken.
 // in_ready_o comes from registers.
 module flk_lane_core
   import flk_pkg::*;
   import flk_lane_pkg::*;
 #(
-  parameter int unsigned Lanes   = 8,  // 8, 16 or 32
-  parameter int unsigned InWidth = 2,  // 1 or 2
-  parameter int unsigned Slots   = 20,
-  parameter int unsigned Depth   = 16  // of a lane's queue
+  parameter int unsigned Lanes    = 8,   // 4, 8, 16 or 32
+  parameter int unsigned InWidth  = 2,   // 1 or 2
+  parameter int unsigned Slots    = 20,
+  parameter int unsigned Depth    = 16,  // of a lane's queue
+  parameter int unsigned Subtiles = 1    // of a tile: 1, 2 or 4
 ) (
-  input  logic                       clk_i,
-  input  logic                       rst_ni,
-  input  logic                       clear_i,
-  output logic                       idle_o,
+  input  logic                        clk_i,
+  input  logic                        rst_ni,
+  input  logic                        clear_i,
+  output logic                        idle_o,
   // records
-  input  logic         [InWidth-1:0] in_valid_i,
-  output logic                       in_ready_o,
-  input  record_elem_t [InWidth-1:0] in_elem_i,
-  output logic                       finished_o,
+  input  logic         [InWidth-1:0]  in_valid_i,
+  output logic                        in_ready_o,
+  input  record_elem_t [InWidth-1:0]  in_elem_i,
+  output logic         [Subtiles-1:0] finished_o,
   // finished pixels
-  output logic                       out_valid_o,
-  input  logic                       out_ready_i,
-  output core_pixel_t                out_data_o,
+  output logic                        out_valid_o,
+  input  logic                        out_ready_i,
+  output core_pixel_t                 out_data_o,
   // counters
-  output lane_core_events_t          events_o
+  output lane_core_events_t           events_o
 );
 
-  if (Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
-    $error("flk_lane_core: Lanes must be 8, 16 or 32");
+  if (Lanes != 4 && Lanes != 8 && Lanes != 16 && Lanes != 32) begin : gen_check_lanes
+    $error("flk_lane_core: Lanes must be 4, 8, 16 or 32");
+  end
+  if (Subtiles != 1 && Subtiles != 2 && Subtiles != 4) begin : gen_check_subtiles
+    $error("flk_lane_core: Subtiles must be 1, 2 or 4");
   end
   if (InWidth != 1 && InWidth != 2) begin : gen_check_width
     $error("flk_lane_core: InWidth must be 1 or 2");
@@ -53,8 +58,9 @@ module flk_lane_core
   end
 
   localparam int unsigned STAGES = SETUP_STAGES + ROW_MASK_STAGES;
-  localparam int unsigned Pixels = 64 / Lanes;
-  localparam int unsigned PixelW = $clog2(Pixels);
+  localparam int unsigned Pixels = 64 / Lanes;  // of a sub-tile, that a lane has
+  localparam int unsigned PixelW = $clog2(Subtiles * Pixels);
+  localparam int unsigned SubtileW = (Subtiles > 1) ? $clog2(Subtiles) : 1;
   localparam int unsigned SlotW = $clog2(Slots);
 
   // ---- Setup and masks: index s holds what came s moves ago ----------------------------------------------------
@@ -65,6 +71,7 @@ module flk_lane_core
   lane_shape_t [InWidth-1:0] shape;
   lane_colour_t [InWidth-1:0] colour;
   logic [InWidth-1:0] in_eos;
+  logic [InWidth-1:0][SubtileW-1:0] member;  // which of the core's sub-tiles
 
   assign in_ready_o = move;
 
@@ -136,6 +143,12 @@ module flk_lane_core
         shape[w][$bits(subtile_t)-1:0] = subtile_q;
       end
       colour[w] = {splat_q.red, splat_q.green, splat_q.blue};
+      member[w] = '0;
+      if (Subtiles == 2) begin
+        member[w] = SubtileW'(subtile_q.row[0]);
+      end else if (Subtiles == 4) begin
+        member[w] = SubtileW'({subtile_q.row[0], subtile_q.col[0]});
+      end
     end
 
     // More of w and z than a lane takes matters to masks alone.
@@ -145,7 +158,7 @@ module flk_lane_core
 
   // ---- Dispatch --------------------------------------------------------------------------------------------------
 
-  logic [63:0] alive;  // pixel 16 m + i: not known to be finished
+  logic [Subtiles-1:0][63:0] alive;  // pixel 16 m + i: not known to be finished
   logic [InWidth-1:0][63:0] live;
   logic [InWidth-1:0] wanted, sent, sent_q, left;  // sent: with the one of this cycle
   logic [Lanes-1:0][Pixels-1:0] bits;
@@ -154,19 +167,24 @@ module flk_lane_core
   logic [SlotW-1:0] slot;
   logic slot_free, room, dispatch, choice, token;
   logic [63:0] chosen;
+  logic [SubtileW-1:0] chosen_member;
 
   always_comb begin
+    live = '0;
     for (int unsigned w = 0; w < InWidth; w++) begin
-      live[w] = mask[w] & alive;
+      for (int unsigned s = 0; s < Subtiles; s++) begin
+        live[w] |= mask[w] & alive[s] & {64{member[w] == SubtileW'(s)}};
+      end
     end
     if (InWidth == 2 && valid_q[STAGES][0] && eos_q[STAGES][0] && !sent_q[0]) begin
-      live[InWidth-1] = mask[InWidth-1];  // of the next sub-tile
+      live[InWidth-1] = mask[InWidth-1];  // of the next list
     end
     for (int unsigned w = 0; w < InWidth; w++) begin
       wanted[w] = valid_q[STAGES][w] && !sent_q[w] && (eos_q[STAGES][w] || live[w] != '0);
     end
     choice = InWidth == 2 && !wanted[0];
     chosen = live[choice];
+    chosen_member = member[choice];
     token  = eos_q[STAGES][choice];
   end
 
@@ -257,17 +275,18 @@ module flk_lane_core
 
   // ---- Lanes -------------------------------------------------------------------------------------------------------
 
-  logic [Lanes-1:0] lane_idle, lane_finished, starved, waits;
+  logic [Lanes-1:0] lane_idle, starved, waits;
+  logic [Subtiles-1:0][Lanes-1:0] lane_finished;
   logic [Lanes-1:0] pixel_valid, pixel_ready;
   lane_pixel_t [Lanes-1:0] pixel;
   lane_events_t [Lanes-1:0] lane_events;
-  logic [Lanes-1:0][Pixels-1:0] lane_alive;
+  logic [Lanes-1:0][Subtiles-1:0][Pixels-1:0] lane_alive;
 
   for (genvar l = 0; l < Lanes; l++) begin : gen_lane
     logic visit_valid, visit_eos, visit_last, bank_free, token_inside, token_done, queue_empty;
     logic [PixelW-1:0] visit_pixel;
     logic [SlotW-1:0] visit_slot;
-    logic [Pixels-1:0] finished;
+    logic [Subtiles-1:0][Pixels-1:0] finished;
     lane_shape_t visit_shape;
     lane_colour_t visit_colour;
 
@@ -282,36 +301,39 @@ module flk_lane_core
     end
 
     flk_lane_queue #(
-      .Pixels(Pixels),
-      .Slots (Slots),
-      .Depth (Depth)
+      .Pixels  (Pixels),
+      .Slots   (Slots),
+      .Depth   (Depth),
+      .Subtiles(Subtiles)
     ) i_queue (
       .clk_i,
       .rst_ni,
       .clear_i,
-      .push_i       (dispatch && need[l]),
-      .ready_o      (queue_ready[l]),
-      .push_slot_i  (slot),
-      .push_pixels_i(bits[l]),
-      .alive_o      (lane_alive[l]),
-      .empty_o      (queue_empty),
-      .finished_i   (finished),
-      .token_i      (token_inside),
-      .token_done_i (token_done),
-      .bank_free_i  (bank_free),
-      .visit_valid_o(visit_valid),
-      .visit_eos_o  (visit_eos),
-      .visit_last_o (visit_last),
-      .visit_pixel_o(visit_pixel),
-      .visit_slot_o (visit_slot),
-      .starved_o    (starved[l]),
-      .waits_o      (waits[l])
+      .push_i        (dispatch && need[l]),
+      .ready_o       (queue_ready[l]),
+      .push_slot_i   (slot),
+      .push_subtile_i(chosen_member),
+      .push_pixels_i (bits[l]),
+      .alive_o       (lane_alive[l]),
+      .empty_o       (queue_empty),
+      .finished_i    (finished),
+      .token_i       (token_inside),
+      .token_done_i  (token_done),
+      .bank_free_i   (bank_free),
+      .visit_valid_o (visit_valid),
+      .visit_eos_o   (visit_eos),
+      .visit_last_o  (visit_last),
+      .visit_pixel_o (visit_pixel),
+      .visit_slot_o  (visit_slot),
+      .starved_o     (starved[l]),
+      .waits_o       (waits[l])
     );
 
     flk_lane #(
-      .Lanes(Lanes),
-      .Lane (l),
-      .Slots(Slots)
+      .Lanes   (Lanes),
+      .Lane    (l),
+      .Slots   (Slots),
+      .Subtiles(Subtiles)
     ) i_lane (
       .clk_i,
       .rst_ni,
@@ -336,10 +358,13 @@ module flk_lane_core
     );
 
     assign lane_idle[l]     = queue_empty && bank_free;
-    assign lane_finished[l] = lane_alive[l] == '0;
 
-    for (genvar p = 0; p < Pixels; p++) begin : gen_pixel
-      assign alive[lane_pixel(Lanes, l, p)] = lane_alive[l][p];
+    for (genvar s = 0; s < Subtiles; s++) begin : gen_subtile
+      assign lane_finished[s][l] = lane_alive[l][s] == '0;
+
+      for (genvar p = 0; p < Pixels; p++) begin : gen_pixel
+        assign alive[s][lane_pixel(Lanes, l, p)] = lane_alive[l][s][p];
+      end
     end
   end
 
@@ -406,7 +431,8 @@ module flk_lane_core
 
   // ---- The whole core ----------------------------------------------------------------------------------------------
 
-  logic finished_q, token_in;
+  logic [Subtiles-1:0] finished_q;
+  logic token_in;
 
   assign token_in   = move && (in_valid_i & in_eos) != '0;
   assign finished_o = finished_q;
@@ -414,9 +440,11 @@ module flk_lane_core
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      finished_q <= 1'b0;
+      finished_q <= '0;
     end else begin
-      finished_q <= (&lane_finished) && (valid_q & eos_q) == '0 && !token_in && !clear_i;
+      for (int unsigned s = 0; s < Subtiles; s++) begin
+        finished_q[s] <= (&lane_finished[s]) && (valid_q & eos_q) == '0 && !token_in && !clear_i;
+      end
     end
   end
 

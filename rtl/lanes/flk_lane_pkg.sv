@@ -963,6 +963,7 @@ package flk_lane_pkg;
   // row and every column, of 16 one in every quarter of the sub-tile at the same place, of 32 one in the upper and one in the lower half.
   function automatic logic [2:0] lane_row(int unsigned lanes, int unsigned lane, int unsigned p);
     case (lanes)
+      4:       return 3'(p / 2);
       8:       return 3'(p);
       16:      return 3'(lane / 4 + 4 * (p / 2));
       default: return 3'(lane / 8 + 4 * p);
@@ -971,6 +972,7 @@ package flk_lane_pkg;
 
   function automatic logic [2:0] lane_column(int unsigned lanes, int unsigned lane, int unsigned p);
     case (lanes)
+      4:       return 3'(lane + 4 * (p % 2) + 5 * (p / 2));  // two of eight
       8:       return 3'(lane + 5 * p);  // column + 3 row is the lane, modulo 8
       16:      return 3'(lane % 4 + 4 * (p % 2));
       default: return 3'(lane % 8);
@@ -980,6 +982,7 @@ package flk_lane_pkg;
   // The lane that has a pixel.
   function automatic int unsigned lane_of(int unsigned lanes, logic [2:0] row, logic [2:0] column);
     case (lanes)
+      4:       return 32'(2'(column[1:0] - row[1:0]));
       8:       return 32'(3'(column + 3'(row << 1) + row));
       16:      return 32'({row[1:0], column[1:0]});
       default: return 32'({row[1:0], column});

@@ -1,7 +1,7 @@
-// Frame writer: finished pixels of four cores into lines of a frame buffer in memory (docs/reference/frame_writer.md).
+// Frame writer: finished pixels of Cores cores into lines of a frame buffer in memory (docs/reference/frame_writer.md).
 //
-// Core k sends the pixels of sub-tile k (column k % 2, row k / 2) of one tile after the other. Groups of its pixels go on by
-// themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any
+// Sub-tile s of a tile (column s % 2, row s / 2) is of core s mod Cores, which sends the pixels of its sub-tiles of one tile after the other. Groups
+// of its pixels go on by themselves: the four mini-tiles, or with Lanes each lane's pixels (flk_lane_pkg). All pixels of a group come, in any order, before any
 // of the next tile. All groups have the same order of tiles, which come in pairs: an even column and the one right of it. A pair of
 // tiles, 32 x 16 pixels, is written when all its pixels are there, row by row from the top: 96 bytes in RGB8, 256 in RGBA16F, whole
 // bursts of 32 bytes. Pixel formats: golden/frame_buffer.py.
@@ -22,7 +22,8 @@ module flk_frame_writer
   parameter int unsigned Pairs      = 4,   // of tiles that are held: 2, 4 or 8
   parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
   parameter int unsigned StrideBits = 12,
-  parameter int unsigned Lanes      = 0    // of all cores: 32, 64 or 128; 0: groups are mini-tiles
+  parameter int unsigned Lanes      = 0,   // of all cores, 4, 8, 16 or 32 of each; 0: groups are mini-tiles
+  parameter int unsigned Cores      = CORES  // 1, 2 or 4; 4 where groups are mini-tiles
 ) (
   input  logic                    clk_i,
   input  logic                    rst_ni,
@@ -41,8 +42,8 @@ module flk_frame_writer
   output logic                    stopped_o,
   output logic [15:0]             left_o,
   // Pixels
-  input  logic        [CORES-1:0] in_valid_i,
-  input  core_pixel_t [CORES-1:0] in_data_i,
+  input  logic        [Cores-1:0] in_valid_i,
+  input  core_pixel_t [Cores-1:0] in_data_i,
   // Lines
   output logic                    out_valid_o,
   input  logic                    out_ready_i,
@@ -54,8 +55,12 @@ module flk_frame_writer
   if (Pairs != 2 && Pairs != 4 && Pairs != 8) begin : gen_check_pairs
     $error("flk_frame_writer: Pairs must be 2, 4 or 8");
   end
-  if (Lanes != 0 && Lanes != 32 && Lanes != 64 && Lanes != 128) begin : gen_check_lanes
-    $error("flk_frame_writer: Lanes must be 0, 32, 64 or 128");
+  if (Cores != 1 && Cores != 2 && Cores != 4) begin : gen_check_cores
+    $error("flk_frame_writer: Cores must be 1, 2 or 4");
+  end
+  if (Lanes != 4 * Cores && Lanes != 8 * Cores && Lanes != 16 * Cores && Lanes != 32 * Cores &&
+      (Lanes != 0 || Cores != CORES)) begin : gen_check_lanes
+    $error("flk_frame_writer: Lanes must be 4, 8, 16 or 32 times Cores, or 0 with four cores");
   end
 
   localparam int unsigned PairBits = SUBTILE_COORD_BITS - 2;  // of a pair's column
@@ -68,24 +73,25 @@ module flk_frame_writer
 
   localparam int unsigned IndexBits = $clog2(Pairs);
   localparam int unsigned FullBits = $clog2(Pairs + 1);
-  localparam int unsigned Groups = (Lanes == 0) ? CHANNELS : Lanes / CORES;
+  localparam int unsigned Share = CORES / Cores;  // sub-tiles of a core
+  localparam int unsigned Groups = (Lanes == 0) ? CHANNELS : Lanes / Cores;
   localparam int unsigned GroupBits = $clog2(Groups);
-  localparam int unsigned CountBits = $clog2(2 * SUBTILE * SUBTILE / Groups);
+  localparam int unsigned CountBits = $clog2(2 * Share * SUBTILE * SUBTILE / Groups);
 
-  logic [CORES-1:0][Groups-1:0]     complete;  // by core and group: a whole pair is there
+  logic [Cores-1:0][Groups-1:0]     complete;  // by core and group: a whole pair is there
   logic [IndexBits-1:0]             from_q;    // buffer that leaves
   logic [IndexBits-1:0]             first_into;
   logic                             freed, running_q;
   logic [Pairs-1:0][PairBits-1:0]   columns_q;
   logic [Pairs-1:0][TileBits-1:0]   rows_q;
 
-  // Reads: 8 columns of each core's sub-tile, of which one core's four are used.
+  // Reads: 8 columns of each sub-tile, of which four of one are used.
   logic                             en, read;
   logic [3:0]                       line_q;   // row of pixels
   logic [2:0]                       group_q;  // four pixels of it
   pixel_t [CORES-1:0][7:0]          pixel;
 
-  for (genvar k = 0; k < CORES; k++) begin : gen_core
+  for (genvar k = 0; k < Cores; k++) begin : gen_core
     logic [Groups-1:0][CountBits-1:0] count_q;  // pixels of a group in the pair that comes
     logic [Groups-1:0][IndexBits-1:0] into_q;   // buffer that it goes to
     logic [Groups-1:0][FullBits-1:0]  full_q;   // pairs that are there
@@ -100,19 +106,26 @@ module flk_frame_writer
     // Buffer, tile of the pair, row.
     assign place  = {into_q[group], in_data_i[k].subtile.col[1], row};
 
-    for (genvar x = 0; x < 8; x++) begin : gen_column
-      flk_sram #(
-        .Width($bits(pixel_t)),
-        .Depth(16 * Pairs)
-      ) i_pixels (
-        .clk_i,
-        .wr_en_i  (in_valid_i[k] && column == 3'(x)),
-        .wr_addr_i(place),
-        .wr_data_i(in_data_i[k].pixel),
-        .rd_en_i  (en && read),
-        .rd_addr_i({from_q, group_q[2], line_q[2:0]}),
-        .rd_data_o(pixel[k][x])
-      );
+    for (genvar m = 0; m < Share; m++) begin : gen_subtile
+      logic hit;
+
+      assign hit = in_valid_i[k] && (Share == 1 || Cores * m + k == 32'({
+          in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}));
+
+      for (genvar x = 0; x < 8; x++) begin : gen_column
+        flk_sram #(
+          .Width($bits(pixel_t)),
+          .Depth(16 * Pairs)
+        ) i_pixels (
+          .clk_i,
+          .wr_en_i  (hit && column == 3'(x)),
+          .wr_addr_i(place),
+          .wr_data_i(in_data_i[k].pixel),
+          .rd_en_i  (en && read),
+          .rd_addr_i({from_q, group_q[2], line_q[2:0]}),
+          .rd_data_o(pixel[Cores*m+k][x])
+        );
+      end
     end
 
     for (genvar i = 0; i < Groups; i++) begin : gen_group
@@ -161,8 +174,7 @@ module flk_frame_writer
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        in_valid_i[k] |-> in_data_i[k].subtile.col[0] == 1'(k) &&
-                          in_data_i[k].subtile.row[0] == 1'(k / 2))
+        in_valid_i[k] |-> 32'({in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}) % Cores == k)
     else $error("flk_frame_writer: a sub-tile from another core");
 `endif
   end

@@ -8,7 +8,9 @@
 // (COUNTER_LATENCY 1).
 module flk_stage_control
   import flk_param_pkg::*;
-(
+#(
+  parameter int unsigned Cores = CORES
+) (
   input  logic                                clk_i,
   input  logic                                rst_ni,
   input  logic                                clear_i,
@@ -16,13 +18,13 @@ module flk_stage_control
   output logic [2:0]                          mode_o,
   output logic                                idle_o,
   // input streams of the stage
-  input  logic [CORES-1:0]                    in_valid_i,
-  output logic [CORES-1:0]                    in_ready_o,
-  input  logic [CORES-1:0]                    in_eos_i,
+  input  logic [Cores-1:0]                    in_valid_i,
+  output logic [Cores-1:0]                    in_ready_o,
+  input  logic [Cores-1:0]                    in_eos_i,
   // and of its cores
-  output logic [CORES-1:0]                    valid_o,
-  input  logic [CORES-1:0]                    ready_i,
-  input  logic [CORES-1:0]                    idle_i,
+  output logic [Cores-1:0]                    valid_o,
+  input  logic [Cores-1:0]                    ready_i,
+  input  logic [Cores-1:0]                    idle_i,
   // counters
   input  logic [$clog2(CORES)-1:0]            counter_core_i,
   input  logic [CORES-1:0][COUNTER_BITS-1:0]  counter_i,       // of each core, at one index
@@ -32,7 +34,7 @@ module flk_stage_control
   // ---- Frame -----------------------------------------------------------------------------------------------
 
   logic [2:0] mode_q;
-  logic [CORES-1:0] list_d, list_q;  // a list has begun whose token has not come
+  logic [Cores-1:0] list_d, list_q;  // a list has begun whose token has not come
   logic open;  // elements may be taken
 
   assign idle_o     = (&idle_i) && (list_q == '0);
@@ -43,7 +45,7 @@ module flk_stage_control
 
   always_comb begin
     list_d = clear_i ? '0 : list_q;
-    for (int unsigned k = 0; k < CORES; k++) begin
+    for (int unsigned k = 0; k < Cores; k++) begin
       if (valid_o[k] && ready_i[k]) begin
         list_d[k] = !in_eos_i[k];
       end

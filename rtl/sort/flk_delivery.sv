@@ -1,18 +1,22 @@
-// Delivery: sorted entries of the sorting units to records at four cores (docs/reference/delivery.md).
+// Delivery: sorted entries of the sorting units to records at Cores cores (docs/reference/delivery.md).
 //
+// Sub-tile s of a tile is of core s mod Cores, bit s of an entry's mask says whether it sees the record.
 // Tile i of the walk comes from unit i mod Units. Tiles go one after the other, two entries a cycle (pairs of
 // flk_entry_buffer, never beyond the end of a list). An entry's record is looked up in the cache
-// (flk_record_cache) and put into the queues of the cores in its mask; the end of a list goes to all four.
+// (flk_record_cache) and put into the queues of the cores of its mask; the end of a list goes to all of them.
+// From its queue it goes to the core as an element for each of the core's sub-tiles in the mask, the lowest first.
 // All is one stream in one order: what cannot go on holds up only what is behind it, so lookups run
 // ahead of the queues, as far as the cache has places, and the memory's latency is not waited for.
 // The head of the stream waits while any core's queue is nearly full.
 // in_*: of each unit, the oldest entry and the one behind it; in_ready_o takes all that is valid.
 // out_*: to each core, up to InWidth elements of one list, the older lower; out_ready_i takes all that are valid, and a second may join
-// the one that waits. The end of a list is the last of those that are given together.
-// finished_i of a core, a level, is about the tile whose elements it is taking, until it has taken its
-// end; in the cycle after that it is about the next tile. Records of such a tile that are not in its
-// queue yet do not come; an entry that no core wants is not looked up. When all four cores are finished
+// the one that waits. The end of a list is the last of those that are given together. out_subtile_o: for which, nothing at an end.
+// finished_i of a sub-tile, a level, is about the tile whose elements its core is taking, until that has taken its
+// end; in the cycle after that it is about the next tile. Records of such a sub-tile that are not in its
+// core's queue yet do not come; an entry that no sub-tile wants is not looked up. When all four are finished
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
+// border_i: sub-tiles of the tile in turn that touch the one after it (0) and the one behind that (1): an entry there is probably in
+// that one's list too, and its line stays in the cache until then (flk_record_cache). taken_o: its end is taken, the next tile is in turn.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
 // waits_o: a cycle ago an entry could be taken and the unit in turn had none (bit 0); it had one that could not be taken (1); the head
@@ -33,7 +37,8 @@ module flk_delivery #(
   parameter  int unsigned AddrBits   = 40,
   parameter  int unsigned IdBits     = 4,
   parameter  int unsigned Id         = 0,
-  localparam int unsigned Cores      = 4,
+  parameter  int unsigned Cores      = 4,    // 1, 2 or 4
+  localparam int unsigned Subtiles   = 4,    // of a tile
   localparam int unsigned Width      = 256,
   localparam int unsigned Shift      = $clog2(Width / 8)
 ) (
@@ -48,17 +53,21 @@ module flk_delivery #(
   output logic [3:0]                        waits_o,
   input  logic [AddrBits-Shift-1:0]         record_base_i,  // in 32 bytes
   // Sorting units
-  input  logic [Units-1:0][1:0]                       in_valid_i,
-  output logic [Units-1:0]                            in_ready_o,
-  input  logic [Units-1:0][1:0]                       in_end_i,
-  input  logic [Units-1:0][1:0][NumberBits+Cores-1:0] in_entry_i,
-  output logic [Units-1:0]                            finish_o,
+  input  logic [Units-1:0][1:0]                          in_valid_i,
+  output logic [Units-1:0]                               in_ready_o,
+  input  logic [Units-1:0][1:0]                          in_end_i,
+  input  logic [Units-1:0][1:0][NumberBits+Subtiles-1:0] in_entry_i,
+  output logic [Units-1:0]                               finish_o,
+  // Walk
+  input  logic [1:0][Subtiles-1:0]                       border_i,
+  output logic                                           taken_o,
   // Cores
   output logic [Cores-1:0][InWidth-1:0]                 out_valid_o,
   input  logic [Cores-1:0]                              out_ready_i,
   output logic [Cores-1:0][InWidth-1:0]                 out_end_o,
   output logic [Cores-1:0][InWidth-1:0][RecordBits-1:0] out_record_o,
-  input  logic [Cores-1:0]                              finished_i,
+  output logic [Cores-1:0][InWidth-1:0][1:0]            out_subtile_o,
+  input  logic [Subtiles-1:0]                           finished_i,
   // AXI4
   output logic                              ar_valid_o,
   input  logic                              ar_ready_i,
@@ -89,10 +98,15 @@ module flk_delivery #(
   if (InWidth != 1 && InWidth != 2) begin : gen_check_width
     $error("flk_delivery: InWidth must be 1 or 2");
   end
+  if (Cores != 1 && Cores != 2 && Cores != 4) begin : gen_check_cores
+    $error("flk_delivery: Cores must be 1, 2 or 4");
+  end
+
+  localparam int unsigned Share = Subtiles / Cores;  // sub-tiles of a core
 
   typedef struct packed {
-    logic             last;  // end of a list
-    logic [Cores-1:0] mask;
+    logic                last;  // end of a list
+    logic [Subtiles-1:0] mask;
   } what_t;
 
   logic stop;
@@ -105,18 +119,25 @@ module flk_delivery #(
   logic [1:0]                  e_valid_q, leaves, nothing, look, look_ready;
   what_t [1:0]                 e_q, what;
   logic [1:0][NumberBits-1:0]  e_record_q;
-  logic [1:0][Cores-1:0]       kept;
+  logic [5:0]                  tile_q, e_tile_q;    // of the walk, modulo 64
+  logic [1:0][5:0]             e_until_q;           // tile until which a line is kept
+  logic [1:0][Subtiles-1:0]    kept;
   logic                        e_move, e_ready, e_take, e_end_taken;
 
-  // Of a core: ends between the unit and it, and in its queue alone; it is finished with the tile that it takes, or took in the
-  // cycle before: an end that it took then still counts.
+  // Of a core: ends between the unit and it, and in its queue alone. Of a sub-tile: its core is finished with it in the tile that it takes, or
+  // took in the cycle before, where an end that it took then still counts; and in the one that is taken from a unit.
   logic [Cores-1:0][EndBits-1:0]  opened_q;
   logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
-  logic [Cores-1:0]               finished_q, unopened, unended;
+  logic [Cores-1:0]               unopened, unended;
+  logic [Subtiles-1:0]            finished_q, over;
   logic [Cores-1:0][1:0]          pop, pop_q;        // counted a cycle later: ready comes late
   logic [Cores-1:0]               pop_end_q;
   logic                           ready_q;           // the cache is
   logic [1:0]                     head_waits;
+
+  for (genvar s = 0; s < Subtiles; s++) begin : gen_over
+    assign over[s] = finished_q[s] && unopened[s%Cores];
+  end
 
   assign e_move      = (e_valid_q & ~leaves) == '0;
   assign e_ready     = ready_q && e_move;
@@ -125,11 +146,17 @@ module flk_delivery #(
 
   for (genvar k = 0; k < 2; k++) begin : gen_entry
     // The entries in the registers are before all ends taken after them: those in opened_q are of earlier tiles, or their own.
-    assign kept[k]    = e_q[k].last ? '1 : e_q[k].mask & ~(finished_q & unopened);
+    assign kept[k]    = e_q[k].last ? '1 : e_q[k].mask & ~over;
     assign nothing[k] = kept[k] == '0;
     assign look[k]    = e_valid_q[k] && !nothing[k] && !stop;
     assign leaves[k]  = nothing[k] || look_ready[k];
     assign what[k]    = '{last: e_q[k].last, mask: kept[k]};
+
+    logic [1:0] meets;
+
+    for (genvar n = 0; n < 2; n++) begin : gen_meets
+      assign meets[n] = (in_entry_i[unit_q][k][Subtiles-1:0] & border_i[n]) != '0;
+    end
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -144,8 +171,9 @@ module flk_delivery #(
     always_ff @(posedge clk_i) begin
       if (e_take) begin
         e_q[k].last   <= in_end_i[unit_q][k];
-        e_q[k].mask   <= in_entry_i[unit_q][k][Cores-1:0];
-        e_record_q[k] <= in_entry_i[unit_q][k][NumberBits+Cores-1:Cores];
+        e_q[k].mask   <= in_entry_i[unit_q][k][Subtiles-1:0];
+        e_record_q[k] <= in_entry_i[unit_q][k][NumberBits+Subtiles-1:Subtiles];
+        e_until_q[k]  <= tile_q + (meets[1] ? 6'd2 : meets[0] ? 6'd1 : '1);
       end
     end
   end
@@ -153,12 +181,23 @@ module flk_delivery #(
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       unit_q <= '0;
+      tile_q <= '0;
     end else if (stop) begin
       unit_q <= '0;
+      tile_q <= '0;
     end else begin
       unit_q <= (unit_q + UnitBits'(e_end_taken)) & UnitBits'(Units - 1);
+      tile_q <= tile_q + 6'(e_end_taken);
     end
   end
+
+  always_ff @(posedge clk_i) begin
+    if (e_take) begin
+      e_tile_q <= tile_q;
+    end
+  end
+
+  assign taken_o = e_end_taken;
 
   logic offered_q, taken_q;
 
@@ -174,7 +213,7 @@ module flk_delivery #(
 
   assign waits_o = {head_waits, offered_q && !taken_q, !offered_q && taken_q};
 
-  // All cores are finished with the tile that a unit gives.
+  // All sub-tiles are finished with the tile that a unit gives.
   logic [Units-1:0] finish_q;
 
   for (genvar u = 0; u < Units; u++) begin : gen_unit
@@ -185,7 +224,7 @@ module flk_delivery #(
       if (!rst_ni) begin
         finish_q[u] <= 1'b0;
       end else begin
-        finish_q[u] <= !stop && (&(finished_q & unopened)) && unit_q == UnitBits'(u) && !e_end_taken;
+        finish_q[u] <= !stop && (&over) && unit_q == UnitBits'(u) && !e_end_taken;
       end
     end
   end
@@ -224,6 +263,8 @@ module flk_delivery #(
     .in_skip_i   ({e_q[1].last, e_q[0].last}),
     .in_record_i (e_record_q),
     .in_tag_i    (what),
+    .in_tile_i   (e_tile_q),
+    .in_until_i  (e_until_q),
     .out_ready_i (room_q),
     .out_valid_o (found_valid),
     .out_record_o(found_record),
@@ -265,30 +306,104 @@ module flk_delivery #(
     end
   end
 
+  // Mask, where a core has several sub-tiles; end; record.
+  localparam int unsigned ElementBits = RecordBits + 1 + ((Share > 1) ? Share : 0);
+
   for (genvar s = 0; s < Cores; s++) begin : gen_core
-    logic [1:0]               push, ended, unused_ready, queue_valid, given;
-    logic [1:0][RecordBits:0] element;
+    logic [1:0]                  push, ended, unused_ready, queue_valid;
+    logic [1:0][Share-1:0]       wanted;  // sub-tiles that want what was found
+    logic [1:0][ElementBits-1:0] element;
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
     assign full[s]     = 32'(used_q[s]) > Queue - Margin;
     assign ended       = found_valid & {found[1].last, found[0].last};
-    assign given       = queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
-    assign pop[s]      = given & {2{out_ready_i[s]}};
-
-    for (genvar w = 0; w < InWidth; w++) begin : gen_way
-      assign out_valid_o[s][w] = given[w];
-      assign {out_end_o[s][w], out_record_o[s][w]} = element[w];
-    end
 
     // What is behind an end is not of the tile that the core takes.
-    assign push[0] = found_valid[0] && found[0].mask[s] &&
-                     (found[0].last || !(finished_q[s] && unended[s]));
-    assign push[1] = found_valid[1] && found[1].mask[s] &&
-                     (found[1].last || !(finished_q[s] && unended[s] && !ended[0]));
+    for (genvar m = 0; m < Share; m++) begin : gen_wanted
+      assign wanted[0][m] = found[0].mask[Cores*m+s] &&
+                            (found[0].last || !(finished_q[Cores*m+s] && unended[s]));
+      assign wanted[1][m] = found[1].mask[Cores*m+s] &&
+                            (found[1].last || !(finished_q[Cores*m+s] && unended[s] && !ended[0]));
+    end
+
+    assign push = found_valid & {wanted[1] != '0, wanted[0] != '0};
+
+    if (Share == 1) begin : gen_whole
+      logic [1:0] given;
+
+      assign given  = queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
+      assign pop[s] = given & {2{out_ready_i[s]}};
+
+      for (genvar w = 0; w < InWidth; w++) begin : gen_way
+        assign out_valid_o[s][w] = given[w];
+        assign {out_end_o[s][w], out_record_o[s][w]} = element[w];
+        assign out_subtile_o[s][w] = 2'(s);
+      end
+    end else begin : gen_split
+      // An element for each sub-tile: the lowest of the oldest record's and its next one, or the lowest of the next record's. A mask has bits.
+      logic [Share-1:0]      given_q, given_d;  // the oldest record was given for them
+      logic [1:0][Share-1:0] todo, rest, first;  // of the two oldest: all, without the lowest, it alone
+      logic [Share-1:0]      beyond;  // of the oldest, without the two lowest
+      logic [1:0]            is_end, goes;
+      logic                  same, next;  // what is given beside the lowest: of the same record, or of the next
+
+      for (genvar w = 0; w < 2; w++) begin : gen_element
+        assign todo[w]   = element[w][ElementBits-1-:Share] & ~(w == 0 ? given_q : '0);
+        assign rest[w]   = todo[w] & (todo[w] - 1'b1);
+        assign first[w]  = todo[w] & ~rest[w];
+        assign is_end[w] = element[w][RecordBits];
+      end
+
+      assign beyond = rest[0] & (rest[0] - 1'b1);
+      assign same   = InWidth == 2 && !is_end[0] && rest[0] != '0;
+      assign next   = InWidth == 2 && !is_end[0] && rest[0] == '0 && queue_valid[1];
+      assign pop[s] = goes & {2{out_ready_i[s]}};
+
+      always_comb begin
+        goes[0] = queue_valid[0] && (is_end[0] || (same ? beyond : rest[0]) == '0);
+        goes[1] = goes[0] && next && (is_end[1] || rest[1] == '0);
+        given_d = given_q | first[0];
+        if (same) begin
+          given_d |= rest[0] & ~beyond;
+        end
+        if (goes[0]) begin
+          given_d = (next && !goes[1]) ? first[1] : '0;
+        end
+      end
+
+      always_ff @(posedge clk_i or negedge rst_ni) begin
+        if (!rst_ni) begin
+          given_q <= '0;
+        end else if (stop) begin
+          given_q <= '0;
+        end else if (queue_valid[0] && out_ready_i[s]) begin
+          given_q <= given_d;
+        end
+      end
+
+      function automatic logic [1:0] number(logic [Share-1:0] one);
+        number = '0;
+        for (int unsigned m = 0; m < Share; m++) begin
+          number |= one[m] ? 2'(Cores * m + s) : '0;
+        end
+      endfunction
+
+      assign out_valid_o[s][0]   = queue_valid[0];
+      assign out_end_o[s][0]     = is_end[0];
+      assign out_record_o[s][0]  = element[0][RecordBits-1:0];
+      assign out_subtile_o[s][0] = number(first[0]);
+
+      if (InWidth == 2) begin : gen_second
+        assign out_valid_o[s][1]   = queue_valid[0] && (same || next);
+        assign out_end_o[s][1]     = !same && is_end[1];
+        assign out_record_o[s][1]  = element[!same][RecordBits-1:0];
+        assign out_subtile_o[s][1] = number(same ? rest[0] & ~beyond : first[1]);
+      end
+    end
 
     flk_pair_fifo #(
-      .Width(RecordBits + 1),
+      .Width(ElementBits),
       .Depth(Queue)
     ) i_queue (
       .clk_i,
@@ -296,7 +411,8 @@ module flk_delivery #(
       .clear_i    (stop),
       .in_valid_i (push),
       .in_ready_o (unused_ready),  // there is room
-      .in_data_i  ({found[1].last, found_record[1], found[0].last, found_record[0]}),
+      .in_data_i  ({ElementBits'({wanted[1], found[1].last, found_record[1]}),
+                    ElementBits'({wanted[0], found[0].last, found_record[0]})}),
       .out_valid_o(queue_valid),
       .out_ready_i(pop[s]),
       .out_data_o (element),
@@ -305,28 +421,25 @@ module flk_delivery #(
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
-        used_q[s]     <= '0;
-        opened_q[s]   <= '0;
-        ends_q[s]     <= '0;
-        finished_q[s] <= 1'b0;
-        pop_q[s]      <= '0;
-        pop_end_q[s]  <= 1'b0;
+        used_q[s]    <= '0;
+        opened_q[s]  <= '0;
+        ends_q[s]    <= '0;
+        pop_q[s]     <= '0;
+        pop_end_q[s] <= 1'b0;
       end else if (stop) begin
-        used_q[s]     <= '0;
-        opened_q[s]   <= '0;
-        ends_q[s]     <= '0;
-        finished_q[s] <= 1'b0;
-        pop_q[s]      <= '0;
-        pop_end_q[s]  <= 1'b0;
+        used_q[s]    <= '0;
+        opened_q[s]  <= '0;
+        ends_q[s]    <= '0;
+        pop_q[s]     <= '0;
+        pop_end_q[s] <= 1'b0;
       end else begin
-        pop_q[s]      <= pop[s];
-        pop_end_q[s]  <= (pop[s] & {element[1][RecordBits], element[0][RecordBits]}) != '0;
-        used_q[s]     <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1])
+        pop_q[s]     <= pop[s];
+        pop_end_q[s] <= (pop[s] & {element[1][RecordBits], element[0][RecordBits]}) != '0;
+        used_q[s]    <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1])
                          - FillBits'(pop_q[s][0]) - FillBits'(pop_q[s][1]);
-        opened_q[s]   <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
-        ends_q[s]     <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
+        opened_q[s]  <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
+        ends_q[s]    <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
                          - FillBits'(pop_end_q[s]);
-        finished_q[s] <= finished_i[s];
       end
     end
 
@@ -341,9 +454,17 @@ module flk_delivery #(
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
         out_valid_o[s][0] && !out_ready_i[s] && !stop |=>
-        out_valid_o[s][0] && $stable({out_end_o[s][0], out_record_o[s][0]}))
+        out_valid_o[s][0] && $stable({out_end_o[s][0], out_record_o[s][0], out_subtile_o[s][0]}))
     else $error("flk_delivery: output changed before its transfer");
 `endif
+  end
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      finished_q <= '0;
+    end else begin
+      finished_q <= stop ? '0 : finished_i;
+    end
   end
 
   assign idle_o = cache_idle && e_valid_q == '0 && (&queue_empty);

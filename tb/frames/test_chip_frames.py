@@ -3,9 +3,9 @@
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
 that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
-Parameter space: a stage of 32 lanes, with one sorting unit, list writer and preprocessing lane too; with SLOW=1 of channels too, with modes that travel with
-their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half with channels);
-ports of 128 and 256 bits. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
+Parameter space: a stage of 32 lanes; 8 in one core, with one sorting unit, list writer and preprocessing lane; with SLOW=1 of two cores, of channels too, with
+modes that travel with their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half
+with channels); ports of 128 and 256 bits. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
 
 from __future__ import annotations
@@ -56,7 +56,10 @@ CONFIG = RenderConfig(stage="lanes")
 CHANNELS_CONFIG = RenderConfig()
 ALL_CONFIGS = [
     pytest.param(config, id=name, marks=[pytest.mark.slow] * (config is not CONFIG))
-    for name, config in (("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL), ("small", CONFIG.with_(memories="small")))
+    for name, config in (
+        ("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL), ("small", CONFIG.with_(memories="small")),
+        ("two cores", CONFIG.with_(cores=2, lanes=16, delivered=2)),
+    )
 ]
 FEW = chip_of("tiny").config
 BLUE = (10, 20, 200)
@@ -101,10 +104,12 @@ def check(
     return done
 
 
-def of_cores(values: np.ndarray, cols: int) -> np.ndarray:
-    """Sums by core of what sub-tiles have: core k has column k % 2, row k / 2 of each tile."""
-    grid = values.reshape(-1, cols)
-    return np.array([grid[k // 2 :: 2, k % 2 :: 2].sum() for k in range(CORES)])
+def of_cores(values: np.ndarray, cols: int, cores: int) -> np.ndarray:
+    """Sums by core of what sub-tiles have, (4,): sub-tile s of a tile, in column s % 2, row s / 2, is of core s % cores."""
+    grid, sums = values.reshape(-1, cols), np.zeros(CORES, np.int64)
+    for s in range(CORES):
+        sums[s % cores] += grid[s // 2 :: 2, s % 2 :: 2].sum()
+    return sums
 
 
 def compare(
@@ -117,11 +122,11 @@ def compare(
     counts = {name: int(np.sum(value)) for name, value in done.front.items()}
     assert counts["entries"] == len(front.entry_tile)
     assert counts["culled_gaussians"] == front.outcomes.get(OUTCOMES[Outcome.CULLED], 0)
-    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat of up to four cores; tile i of the walk is
-    # of sorting unit i modulo their number, which delivers what the core that needs most of the tile's list needs.
+    # A core takes as many splats as its pixels need, and no more than its lists have. An entry of a tile is a splat for up to four sub-tiles; tile i of the
+    # walk is of sorting unit i modulo their number, which delivers what the sub-tile that needs most of the tile's list needs.
     counters = params.STAGES[config.stage].counters
     taken, of_frame = done.stage[:, counters.index("gaussians_in")], want.frame.lists
-    lengths, needed = (of_cores(values, of_frame.cols) for values in (np.diff(of_frame.start), want.frame.needed))
+    lengths, needed = (of_cores(values, of_frame.cols, config.cores) for values in (np.diff(of_frame.start), want.frame.needed))
     whole = config.cat == CatMode.AUTO and config.mask_generator == "ctu" and not config.by_lanes
     assert may_be_given(taken, lengths, needed, whole).all(), (taken, needed, lengths)
     delivered = np.asarray(done.rendering["entries"])
@@ -182,13 +187,19 @@ def test_narrow_port(bits: int) -> None:
 
 
 def test_few_units() -> None:
-    """The smallest chip, one sorting unit, list writer and preprocessing lane with small memories and a port of 128 bits: the picture of the default one."""
+    """The smallest chip, one core of 8 lanes, one sorting unit, list writer and preprocessing lane with small memories and a port of 128 bits: the picture of
+    the default one; the model of the rendering half. A second frame, of a picture that is no whole number of tiles."""
     view = load_view(DEMO, 0, (96, 54))
     packed = packed_scene(view, PackedFormat.CHUNK)
     with session(packed, config=FEW) as chip:
         done = check(chip, view.camera, config=FEW)
         assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
         assert not done.front["entries"][1:].any() and done.front["taken"].all()
+        assert done.stage[0].any() and not done.stage[1:].any()
+        front, sizes = run_front(packed, view.camera), FEW.chip_memories
+        tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
+        assert rendering.estimate(tables, FEW, None).cycles == pytest.approx(done.phases["rendering"], rel=0.15)
+        check(chip, replace(view.camera, width=40, height=24, cx=None, cy=None), PixelFormat.RGBA16F, FEW)
 
 
 @pytest.mark.parametrize("config", ALL_CONFIGS)

@@ -1,10 +1,10 @@
 """Whole frames through the lanes in the log domain: the verilated stage equals the golden model in every pixel, and without stalls the cycle model in
 cycles and every counter. The default build has its assertions.
 
-State space: the demo scene, random splats of many opacities, thousands to a sub-tile, hard families of the stability suite, random bits for records;
-lists read to their end and left, empty ones streamed and not; random idle and back-pressure; frames aborted at random times. Builds: 32 lanes; with SLOW=1
-64 and 128 lanes, and one element a cycle with the smallest store and queues. Real scenes at 320x180 when FLICKER_SCENES names their folder (one of them;
-with SLOW=1 all four, and view 0 of flowers at 1280x720).
+State space: the demo scene, random splats of many opacities, thousands to a sub-tile, hard families of the stability suite, random bits for records; lists
+read to their end and left, empty ones streamed and not; random idle and back-pressure; frames aborted at random times. Builds: 32 lanes, and one core of 8
+for all sub-tiles; with SLOW=1 64 and 128 lanes, one core of 4, two cores, and one element a cycle with the smallest store and queues. Real scenes at 320x180
+when FLICKER_SCENES names their folder (one of them; with SLOW=1 all four, and view 0 of flowers at 1280x720).
 Not covered: frames that follow each other without a pause.
 """
 
@@ -16,6 +16,7 @@ from zlib import crc32
 
 import numpy as np
 import pytest
+from flicker_tb.elaboration import refused
 
 from flicker.explore.stability import FAMILIES
 from flicker.front.lists import subtile_lists
@@ -29,7 +30,11 @@ from flicker.sim.render_stage import RtlFrame, render_rtl
 
 DEFAULT = RenderConfig(stage="lanes")
 SMALL = DEFAULT.with_(in_width=1, slots=2, fifo_depth=2)
-WIDE = [DEFAULT.with_(lanes=64), DEFAULT.with_(lanes=128)]
+ONE_CORE = DEFAULT.with_(cores=1, lanes=8)
+BUILDS = {
+    "small": SMALL, "64 lanes": DEFAULT.with_(lanes=64), "128 lanes": DEFAULT.with_(lanes=128), "one core of 4": DEFAULT.with_(cores=1, lanes=4),
+    "two cores of 4": DEFAULT.with_(cores=2, lanes=8, in_width=1), "two cores of 32": DEFAULT.with_(cores=2, lanes=64),
+}
 SLOW = pytest.mark.slow  # each is a build of its own, a minute or more
 FEEDS = ({}, {"leave": True}, {"leave": True, "empty": False})
 
@@ -176,10 +181,28 @@ def test_aborted_frames():
         compare(scene, DEFAULT, aborts=aborts, **stalls)
 
 
+def test_one_core():
+    """A core that is shared by four sub-tiles: the same picture, and cycles of the model; pictures that are no whole tiles."""
+    for scene in (demo(96, 54), random_splats(2, 4000, 24), random_bits(3, 300, 3)):
+        for feed in FEEDS:
+            rtl = compare(scene, ONE_CORE, checks=True, **feed)
+            assert len(rtl.counters) == 1
+    compare(demo(96, 54), ONE_CORE, checks=True, idle=0.2, stall=0.3, leave=True)
+    compare(random_splats(3, 400, 32), ONE_CORE, checks=True, aborts=[(20, 1), (300, 3)])
+
+
+@pytest.mark.parametrize(("module", "parameters", "message"), [
+    ("flk_lane_stage", {"Cores": 3}, "Cores must be 1, 2 or 4"), ("flk_lane_stage", {"Cores": 2, "Lanes": 128}, "Lanes must be 4, 8, 16 or 32 times Cores"),
+    ("flk_stage", {"Stage": 0, "Cores": 1}, "channels have 4 cores, so Cores must be 4"),
+])
+def test_illegal_cores(module, parameters, message):
+    refused(module, parameters, message)
+
+
 @SLOW
-@pytest.mark.parametrize("config", [SMALL, *WIDE], ids=["small", "64 lanes", "128 lanes"])
+@pytest.mark.parametrize("config", [pytest.param(config, id=name) for name, config in BUILDS.items()])
 def test_builds(config):
-    """Other numbers of lanes, and the smallest store: the same picture, and cycles of the model."""
+    """Other numbers of cores and lanes, and the smallest store: the same picture, and cycles of the model."""
     for scene in (demo(96, 54), random_splats(1, 200, 64), random_splats(2, 4000, 24), random_bits(3, 300, 3)):
         for feed in FEEDS:
             compare(scene, config, **feed)
@@ -188,7 +211,7 @@ def test_builds(config):
 
 
 @SLOW
-@pytest.mark.parametrize("config", [SMALL, *WIDE], ids=["small", "64 lanes", "128 lanes"])
+@pytest.mark.parametrize("config", [pytest.param(config, id=name) for name, config in BUILDS.items()])
 def test_assertions(config):
     """The other builds with their assertions."""
     compare(demo(96, 54), config, checks=True, idle=0.2, stall=0.3)

@@ -4,8 +4,8 @@ State space: the middle of the demo scene (the whole with SLOW=1), both pixel fo
 frames one after the other, an odd number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
 Parameter space: channels with every mode; with SLOW=1 one and two sorting units, small memories, one and four VRUs, no contribution test, and 32, 64 and 128
-lanes, which tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end makes. Not covered:
-resets within a frame.
+lanes, one core and two, which tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end
+makes. Not covered: resets within a frame.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ def test_small_memories() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [
     CONFIG.with_(vrus_per_channel=1), CONFIG.with_(vrus_per_channel=4), CONFIG.with_(mask_generator="all", cat=CatMode.OFF),
-    LANES, LANES.with_(lanes=64), LANES.with_(lanes=128),
+    LANES, LANES.with_(lanes=64), LANES.with_(lanes=128), LANES.with_(cores=1, lanes=8), LANES.with_(cores=2, lanes=16, delivered=2),
 ], ids=lambda c: "-".join(map(str, c.chip_parameters().values())))
 def test_stages(config: RenderConfig) -> None:
     """Other stages: pixels leave in another order, sub-tiles finish at other times."""

@@ -1,4 +1,4 @@
-"""cocotb tests of flk_lane_core; settings: Lanes, InWidth, Slots, Depth, passes (times that all lists are sent), aborts."""
+"""cocotb tests of flk_lane_core; settings: Lanes, InWidth, Slots, Depth, Subtiles, passes (times that all lists are sent), aborts."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ ELEM, OUT, PIXEL = (layout.fields(name) for name in ("record_elem", "core_pixel"
 ELEM_BITS = layout.bits("record_elem")
 STAGES = LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES
 COLS, ROWS = 97, 61  # sub-tiles of the picture
+SHARE = config().get("Subtiles", 1)  # sub-tiles of a list: one, two below each other, a tile
 KINDS = {"mixed": 12, "bits": 4, "closed": 12, "wide": 4, "narrow": 5, "far": 2, "empty": 8}  # sub-tiles of each
 
 
@@ -64,7 +65,7 @@ def record(rng, kind: str, col: int, row: int) -> int:
     return word
 
 
-class List:
+class Own:
     """A sub-tile's list with what the golden model says of it.
 
     items: elements without its end. words: 64 output elements, by lane and in each lane's order. counts: of golden.lanes.render. done: elements up to the one
@@ -96,10 +97,45 @@ class List:
         return sum(int(v) << place.at for v, place in zip(values, PIXEL.values()))
 
 
+class List:
+    """What a core takes as one list: those of several sub-tiles, mixed at random.
+
+    items, masked, lanes, needed: of each element, as in `Own`; member: its sub-tile. done: of each sub-tile, elements of the list up to the one that finishes
+    its last pixel. counts: sums.
+    """
+
+    def __init__(self, own: list[Own], rng) -> None:
+        left = [m for m, of in enumerate(own) for _ in of.items]
+        rng.shuffle(left)
+        at = [0] * len(own)
+        self.items, self.masked, self.lanes, self.needed, self.member = [], [], [], [], left
+        self.done = [1 << 30 if of.done else 0 for of in own]
+        for n, m in enumerate(left):
+            of, k = own[m], at[m]
+            at[m] += 1
+            self.items.append(of.items[k])
+            self.masked.append(of.masked[k])
+            self.lanes.append(of.lanes[k])
+            self.needed.append(of.needed[k])
+            if k + 1 == of.done:
+                self.done[m] = n + 1
+        self.end = rng.choice(own).end
+        self.words = [[word for of in own for word in of.words[l]] for l in range(len(own[0].words))]
+        self.counts = {name: sum(of.counts[name] for of in own) for name in own[0].counts}
+
+
 def make(rng, pixels: np.ndarray) -> list[List]:
     """Lists of every kind, all in one picture."""
     kinds = [kind for kind, count in KINDS.items() for _ in range(count)]
-    chosen = dict(zip(sorted(rng.sample(range(COLS * ROWS), len(kinds))), rng.sample(kinds, len(kinds))))
+    if SHARE == 1:
+        groups = [[s] for s in sorted(rng.sample(range(COLS * ROWS), len(kinds)))]
+        kinds = rng.sample(kinds, len(kinds))
+    else:  # tiles: some of which all finish, two without an element, the rest of all kinds
+        tiles = rng.sample([(y, x) for y in range(0, ROWS - 1, 2) for x in range(0, COLS - 1, 2)], 16)
+        members = ((0, 0), (0, 1), (1, 0), (1, 1)) if SHARE == 4 else ((0, 0), (1, 0))
+        groups = [[(y + j) * COLS + x + i for j, i in members] for y, x in tiles]
+        kinds = ["closed"] * 5 * SHARE + ["empty"] * 2 * SHARE + rng.choices(kinds, k=9 * SHARE)
+    chosen = dict(sorted(zip([s for group in groups for s in group], kinds)))
     records, start = [], np.zeros(COLS * ROWS + 1, np.int64)
     for s, kind in chosen.items():
         of = {"mixed": ["mixed"] * rng.randrange(1, 50), "bits": ["bits"] * rng.randrange(1, 20), "wide": ["wide"] * rng.randrange(1, 16),
@@ -113,7 +149,8 @@ def make(rng, pixels: np.ndarray) -> list[List]:
     words = np.array([[r & (1 << 64) - 1, r >> 64] for r in records], np.uint64).view(np.int64)
     lists = RecordLists(COLS * SUBTILE, ROWS * SUBTILE, words, start, np.arange(len(records), dtype=np.int32), COLS, ROWS, 0)
     frame, work = render_lanes(lists), lane_work(lists)
-    return [List(frame, s, work.mask, work.finish, pixels) for s in chosen]
+    of = {s: Own(frame, s, work.mask, work.finish, pixels) for s in chosen}
+    return [List([of[s] for s in group], rng) for group in groups]
 
 
 class Core:
@@ -143,8 +180,8 @@ class Core:
         self.expected: list[deque[int]] = [deque() for _ in range(self.lanes)]
         self.left = 0  # pixels of lists whose end was taken
         self.since = STAGES + 1  # cycles since the last element was taken
-        self.late = self.limit = 0  # cycles in which finished_o could have come, and the most of them
-        self.finished = False
+        self.late, self.limit = [0] * SHARE, [0] * SHARE  # cycles in which finished_o could have come, and the most of them
+        self.finished = [False] * SHARE
         self.held: int | None = None  # pixel that waits at the output
         self.total: Counter[str] = Counter()
         self.want: Counter[str] = Counter()
@@ -158,15 +195,17 @@ class Core:
                 port.value = values[i]
         self.driven = values
 
-    def form(self, both: float, leave: bool, finished: bool) -> None:
-        """The next beat. finished: finished_o about the next element."""
+    def form(self, both: float, leave: bool, finished: list[bool]) -> None:
+        """The next beat. finished: finished_o about the next element's list."""
         lists = self.lists
-        if leave and finished and lists and 0 < self.at < len(lists[0].items):
-            self.at = len(lists[0].items)
-            self.seen["list left early"] += 1
+        leaves = lists[0] if leave and lists and self.at > 0 else None
         for w in range(self.width):
             if not lists or (w > 0 and self.rng.random() >= both):
                 break
+            while lists[0] is leaves and self.at < len(leaves.items) and finished[leaves.member[self.at]]:
+                self.at += 1
+                self.seen["list left early"] += 1
+                self.seen["list left by some"] += not all(finished)
             if self.at == len(lists[0].items):
                 self.beat.append((lists.popleft(), None))
                 self.at = 0
@@ -205,16 +244,18 @@ class Core:
         assert idle_o or self.left > 0 or self.list is not None, "no list and no pixel is inside, but idle_o is low"
         seen["idle with a list open"] += idle_o and self.list is not None
         # finished_o
-        over = self.list is not None and self.taken >= self.list.done
-        assert not finished or over, "finished_o, but not all pixels of the sub-tile at the input are"
-        assert finished or not self.finished, "finished_o fell before its list's end"
-        if not over or finished:
-            self.late, self.limit = 0, 0
-        else:
-            self.limit = self.limit or self.finish_limit()
-            self.late += not valid or ready
-            self.most = max(self.most, self.late)
-            assert self.late <= self.limit, f"finished_o did not come in {self.late} cycles"
+        told = [bool(finished >> m & 1) for m in range(SHARE)]
+        for m in range(SHARE):
+            over = self.list is not None and self.taken >= self.list.done[m]
+            assert not told[m] or over, f"finished_o, but not all pixels of sub-tile {m} at the input are"
+            assert told[m] or not self.finished[m], f"finished_o of sub-tile {m} fell before its list's end"
+            if not over or told[m]:
+                self.late[m], self.limit[m] = 0, 0
+            else:
+                self.limit[m] = self.limit[m] or self.finish_limit()
+                self.late[m] += not valid or ready
+                self.most = max(self.most, self.late[m])
+                assert self.late[m] <= self.limit[m], f"finished_o of sub-tile {m} did not come in {self.late[m]} cycles"
         # Pixels
         assert valid or self.held is None, "out_valid_o fell"
         if valid:
@@ -228,12 +269,13 @@ class Core:
         for name in ("no_slot", "no_room", "waits", "starved", "dropped", "rejected", "stalled"):
             seen[name] += count[name] > 0
         seen["both dropped in one cycle"] += count["dropped"] == 2
-        seen["finished_o"] += finished
+        seen["finished_o"] += all(told)
+        seen["finished_o of some"] += any(told) and not all(told)
         seen["pixel waits"] += valid and not ready
         if clear:
             seen["clear with pixels owed"] += self.left > 0
             seen["clear with elements inside"] += self.since <= STAGES
-            seen["clear when finished"] += finished
+            seen["clear when finished"] += all(told)
             seen["clear while stalled"] += bool(self.beat) and not take
             seen["clear beside elements"] += take
             seen["clear with a pixel at the output"] += valid
@@ -249,7 +291,7 @@ class Core:
             self.expected[l].popleft()
             self.left -= 1
             self.held = None
-        self.finished = bool(finished)
+        self.finished = told
         self.first = False
         self.since += 1
         if take:
@@ -263,7 +305,7 @@ class Core:
         for (_, end), (second, k) in pairwise(self.beat):
             if end is None and k is not None:
                 # All pixels in its mask are known to be finished, but in the sub-tile before.
-                seen["known finished, and an element of the next list beside its end"] += self.finished and second.masked[k] > 0
+                seen["known finished, and an element of the next list beside its end"] += self.finished[second.member[k]] and second.masked[k] > 0
         for own, k in self.beat:
             if k is None:
                 want["tokens"] += 1
@@ -271,9 +313,9 @@ class Core:
                     want[name] += own.counts[name]
                 for l, words in enumerate(own.words):
                     self.expected[l].extend(words)
-                self.left += SUBTILE_PIXELS
+                self.left += SHARE * SUBTILE_PIXELS
                 seen["token of an empty list"] += not own.items
-                self.list, self.taken, self.finished, self.late, self.limit = None, 0, False, 0, 0
+                self.list, self.taken, self.finished, self.late, self.limit = None, 0, [False] * SHARE, [0] * SHARE, [0] * SHARE
             else:
                 want["splats"] += 1
                 want["rejected"] += own.masked[k] == 0
@@ -286,7 +328,7 @@ class Core:
 
     def finish_limit(self) -> int:
         """Cycles that finished_o may take while nothing waits for the output: what may lie before it in store, queues and bank."""
-        per_lane = SUBTILE_PIXELS // self.lanes
+        per_lane = SHARE * SUBTILE_PIXELS // self.lanes
         return 40 + self.width * STAGES * per_lane + per_lane * (self.depth + 2) + 80 * (self.left // SUBTILE_PIXELS + 1)
 
     def drained(self) -> None:
@@ -307,7 +349,7 @@ class Core:
         """All lists through the core; or until clear_i comes after so many cycles."""
         self.lists.extend(lists)
         pauses, stalls = bench.stall(idle), bench.stall(stall)
-        limit = 1000 + 200 * sum(len(own.items) + SUBTILE_PIXELS for own in lists)
+        limit = 1000 + 200 * sum(len(own.items) + SHARE * SUBTILE_PIXELS for own in lists)
         for n in range(limit):
             clear = n == abort
             await self.cycle(idle=next(pauses), ready=not next(stalls), both=both, leave=leave, clear=clear)
@@ -333,7 +375,7 @@ async def lists_and_pixels(dut):
     core = Core(dut, bench)
     rng, seen = core.rng, core.seen
     made = make(rng, pixels_of_lanes(core.lanes))
-    assert sum(own.counts["pixels_finished"] for own in made) > 300 and sum(own.done <= len(own.items) for own in made) >= 6
+    assert sum(own.counts["pixels_finished"] for own in made) > 300 and sum(max(own.done) <= len(own.items) for own in made) >= (6 if SHARE == 1 else 3)
     await bench.reset()
     await core.edge
     aborts = config()["aborts"]
@@ -350,7 +392,7 @@ async def lists_and_pixels(dut):
     for own in rng.sample(made, 6):  # one after the other
         await core.run([own], "half", "half", both=0.5, leave=False, bench=bench)
     dut._log.info("%s, finished_o after %d cycles", dict(seen), core.most)
-    cases = CASES + (TWO if core.width == 2 else ())
+    cases = CASES + (TWO if core.width == 2 else ()) + (SOME if SHARE > 1 else ())
     never = [name for name in cases if not seen[name]]
     assert not never, (never, {name: seen[name] for name in cases})
 
@@ -360,6 +402,7 @@ CASES = (
     "clear with pixels owed", "clear with elements inside", "clear while stalled", "clear beside elements",
     "clear with a pixel at the output", "element right behind clear", "token of an empty list", "visits of finished pixels", "idle with a list open",
 )
+SOME = ("finished_o of some", "list left by some")
 TWO = (
     "element element", "element end", "end element", "end end", "both dropped in one cycle", "clear in the middle of a beat",
     "known finished, and an element of the next list beside its end",

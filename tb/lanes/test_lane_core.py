@@ -2,10 +2,10 @@
 
 State space: lists of every kind (random splats about the sub-tile, random bits, opaque ones that finish it with many behind, faint ones over all pixels,
 single pixels, empty masks, no element); two elements a beat in every split, an end beside the next list's first element or end; lists left early; pauses and
-back-pressure of every pattern; clear_i at random times, elements beside and right behind it. Parameter space: few slots and queues of two; with SLOW=1 the
-default, one element a cycle, 16 and 32 lanes with few slots. Events in the input's cycles are exact, so are the sums that do not depend on timing;
-entries and visits lie between what the golden model needs and what the masks hold. Not covered: cycles (tb/frames/test_lane_frames.py), which compares them
-with the cycle model.
+back-pressure of every pattern; clear_i at random times, elements beside and right behind it. Parameter space: few slots and queues of two, of one sub-tile
+and of four; with SLOW=1 the default, one element a cycle, 4, 16 and 32 lanes with few slots, two sub-tiles. Events in the input's cycles are exact, so are
+the sums that do not depend on timing; entries and visits lie between what the golden model needs and what the masks hold. Not covered: cycles
+(tb/frames/test_lane_frames.py), which compares them with the cycle model.
 """
 
 from __future__ import annotations
@@ -20,15 +20,19 @@ ARGS = ["-Wno-UNOPTFLAT"]
 
 
 @pytest.mark.parametrize("numbers", [
-    (8, 2, 3, 2), *(pytest.param(numbers, marks=SLOW) for numbers in ((8, 2, 20, 16), (8, 1, 3, 2), (16, 2, 6, 4), (32, 1, 12, 8))),
+    (8, 2, 3, 2, 1), (8, 2, 5, 3, 4),
+    *(pytest.param(numbers, marks=SLOW) for numbers in (
+        (8, 2, 20, 16, 1), (8, 1, 3, 2, 1), (16, 2, 6, 4, 1), (32, 1, 12, 8, 1), (4, 2, 6, 4, 1), (8, 2, 6, 4, 2), (32, 1, 12, 8, 4), (4, 1, 4, 2, 4),
+    )),
 ], ids=lambda numbers: "-".join(map(str, numbers)))
 def test_lane_core(numbers: tuple[int, ...]) -> None:
-    parameters = dict(zip(("Lanes", "InWidth", "Slots", "Depth"), numbers))
+    parameters = dict(zip(("Lanes", "InWidth", "Slots", "Depth", "Subtiles"), numbers))
     build_and_test("flk_lane_core", "cocotb_lane_core", parameters=parameters, config={**parameters, "passes": 6, "aborts": 48}, args=ARGS)
 
 
 @pytest.mark.parametrize(("parameters", "message"), [
-    ({"Lanes": 4}, "Lanes must be"), ({"InWidth": 3}, "InWidth must be"), ({"Slots": 1}, "Slots and Depth must be"), ({"Depth": 65}, "Slots and Depth must be"),
+    ({"Lanes": 2}, "Lanes must be"), ({"Subtiles": 3}, "Subtiles must be 1, 2 or 4"),
+    ({"InWidth": 3}, "InWidth must be"), ({"Slots": 1}, "Slots and Depth must be"), ({"Depth": 65}, "Slots and Depth must be"),
 ])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
     refused("flk_lane_core", parameters, message)

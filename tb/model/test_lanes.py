@@ -498,8 +498,13 @@ def test_refused():
     ):
         with pytest.raises(FlickerError, match=f"lanes: {message}"):
             LaneFormats(**{name: value})
-    with pytest.raises(FlickerError, match="lanes must be 32, 64 or 128, not 48"):
-        RenderConfig(stage="lanes", lanes=48)
+    for changes, message in (
+        ({"lanes": 48}, "lanes must be 16, 32, 64 or 128 with cores 4, not 48"), ({"cores": 3}, "cores must be 1, 2 or 4, not 3"),
+        ({"cores": 1, "lanes": 64}, "lanes must be 4, 8, 16 or 32 with cores 1, not 64"),
+        ({"stage": "channels", "cores": 1}, "cores must be 4 with stage channels, not 1"),
+    ):
+        with pytest.raises(FlickerError, match=message):
+            RenderConfig(**{"stage": "lanes"} | changes)
     for changes in ({"form": Form.CONIC}, {"coords": Coords.ABSOLUTE}):
         with pytest.raises(FlickerError, match="stage lanes takes records of 16 bytes"):
             RenderConfig(stage="lanes", **changes)
@@ -542,13 +547,15 @@ def test_command(tmp_path):
         assert np.array_equal(stats["picture"], found[32]["picture"]) and stats["lanes"]["least_cycles"] == -(-visited // n)
         assert stats["lanes"] | {"lanes": 0, "least_cycles": 0} == found[32]["lanes"] | {"lanes": 0, "least_cycles": 0}
     assert f"{visited:,}" in found[32]["text"] and found[32]["formats"] == FORMATS.name
-    assert run()["lanes"]["lanes"] == 32 and run("--lanes", "64")["stage"] == "lanes"
+    assert run()["lanes"]["lanes"] == 32 and run("--lanes", "64")["stage"] == "lanes" and run("--cores", "1", "--lanes", "8")["lanes"]["lanes"] == 8
     assert all(run(*args)["stage"] == "channels" for args in (("--stage", "channels"), ("--cat", "off"), ("--faithful",), ("--form", "conic")))
     chip, golden = run("--stage", "lanes", "--engine", "chip-golden"), run("--stage", "lanes", "--front", "golden")
     assert chip["lanes"]["visited"] == golden["lanes"]["visited"] and np.array_equal(chip["picture"], golden["picture"])
     for args, named in (
         (("--stage", "channels", "--lanes", "32"), "--lanes: for --stage lanes only"), (("--lanes", "32", "--cat", "off"), "--cat"),
-        (("--stage", "lanes", "--lanes", "33"), "lanes must be 32, 64 or 128, not 33"),
+        (("--stage", "lanes", "--lanes", "33"), "lanes must be 16, 32, 64 or 128 with cores 4, not 33"),
+        (("--cores", "1", "--lanes", "33"), "lanes must be 4, 8, 16 or 32 with cores 1, not 33"), (("--cores", "3"), "cores must be 1, 2 or 4, not 3"),
+        (("--stage", "channels", "--cores", "1"), "--cores: for --stage lanes only"),
         (("--stage", "lanes", "--engine", "reference"), "not for --engine reference"),
         (("--stage", "lanes", "--cat", "off", "--precision", "fp8"), "--cat, --precision"),
         (("--stage", "lanes", "--form", "conic"), "--form conic"), (("--stage", "lanes", "--faithful"), "--faithful"),

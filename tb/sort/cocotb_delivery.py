@@ -7,14 +7,15 @@ from collections import deque
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench, rounds
+from flicker_tb.bench import Bench, config, rounds
 
 from flicker.chip.dram import DramConfig
-from flicker.golden.delivery import CORES, END, LINE_BYTES, core_records
+from flicker.golden.delivery import END, LINE_BYTES, SUBTILES, core_records
 from flicker.sim.memory import Memory, PortConfig
 
 BASE, RECORDS = 0x7_6543_2100 // LINE_BYTES * LINE_BYTES, 1 << 12
 Tile = list[tuple[int, int]]
+CORES = config().get("Cores", SUBTILES)
 
 
 class Unit:
@@ -44,7 +45,8 @@ class Unit:
 
 
 class Delivery:
-    """The design with its memory, units and cores. finish: share of the tiles that a core finishes early; pace: of each core, cycles from record to record.
+    """The design with its memory, units and cores. finish: share of the tiles of which a sub-tile finishes early; pace: of each core, cycles from record to
+    record.
     deaf: units give all, as their buffers do with what they hold of a finished list."""
 
     def __init__(self, dut, idle="never", stall="never", latency=5, pauses=0.0, finish=0.0, pace=(1, 1, 1, 1), perfect=True, deaf=False):
@@ -52,7 +54,7 @@ class Delivery:
         rng = self.rng = self.bench.rng
         self.count = int(dut.Units.value)  # sorting units
         self.width = len(dut.out_valid_o) // CORES  # elements that a core takes in a cycle
-        self.bytes = len(dut.out_record_o) // (32 * self.width)
+        self.bytes = len(dut.out_record_o) // (8 * CORES * self.width)
         memory = Memory(DramConfig().timing, perfect)
         memory.allocate(BASE, RECORDS * self.bytes, rng.getrandbits(30))
         data = memory.read(BASE, RECORDS * self.bytes)
@@ -71,13 +73,15 @@ class Delivery:
     def reset(self) -> None:
         self.tiles: list[Tile] = []
         self.units = [Unit() for _ in range(self.count)]
-        self.due: list[deque[int | None]] = [deque() for _ in range(CORES)]
+        self.due: list[deque[tuple[int, int] | None]] = [deque() for _ in range(CORES)]
         self.tile = [0] * CORES  # that the core is taking
-        self.got = [0] * CORES  # its records
         self.rest = [0] * CORES  # cycles until it takes the next one
-        self.finished = [False] * CORES
-        self.finishes: list[list[int | None]] = [[] for _ in range(CORES)]  # by tile: records after which the core is finished
-        self.after = [0] * CORES  # records since
+        # Of each sub-tile of the tile that its core is taking:
+        self.got = [0] * SUBTILES  # records
+        self.finished = [False] * SUBTILES
+        self.dropped = [False] * SUBTILES  # a record did not come
+        self.finishes: list[list[int | None]] = [[] for _ in range(SUBTILES)]  # by tile: records after which it is finished
+        self.after = [0] * SUBTILES  # records since
         self.finish_seen = 0
         self.records = 0
         self.late = 0
@@ -91,8 +95,9 @@ class Delivery:
         self.tiles += tiles
         for k, entries in enumerate(tiles):
             self.units[k % self.count].lists.append((first + k, deque(entries)))
-        for s in range(CORES):
-            self.due[s].extend(core_records(tiles, s))
+        for k in range(CORES):
+            self.due[k].extend(core_records(tiles, k, CORES))
+        for s in range(SUBTILES):
             self.finishes[s] += [self.rng.choice([0, 0, 1, self.rng.randrange(1, 60)]) if self.rng.random() < self.finish else None for _ in tiles]
 
     async def _run(self) -> None:
@@ -100,7 +105,9 @@ class Delivery:
         bits, number = 8 * self.bytes, len(dut.in_entry_i) // (2 * self.count)
         ready = 0
         turn, due = 0, 0  # unit that is taken from; waits_o of it in the next cycle
-        told: list[set[int]] = [set() for _ in range(CORES)]
+        step = 0  # of the walk
+        dut.border_i.value = 0
+        told: list[set[int]] = [set() for _ in range(SUBTILES)]
         while True:
             await edge
             if dut.rst_ni.value != 1:
@@ -108,7 +115,7 @@ class Delivery:
             if dut.r_valid_i.value == 1:
                 assert dut.r_ready_o.value == 1, "the port waits"
             if not self.tiles:
-                told = [set() for _ in range(CORES)]
+                told = [set() for _ in range(SUBTILES)]
             if dut.clear_i.value == 1:
                 ready = turn = due = 0
                 continue
@@ -120,13 +127,18 @@ class Delivery:
             self.waits = [n + (waits >> k & 1) for k, n in enumerate(self.waits)]
             if offered and taken and any(self.units[turn].item(k)[0] for k in range(offered)):
                 turn = (turn + 1) % self.count
+                assert dut.taken_o.value == 1
+                step += 1
+                dut.border_i.value = 91 * step % 256
+            else:
+                assert dut.taken_o.value == 0
             # Units
             moved, finish = int(dut.in_ready_o.value), int(dut.finish_o.value)
             for u, unit in enumerate(self.units):
                 if finish >> u & 1:
                     assert unit.lists, f"finish_o of unit {u}, which has no list"
                     tile = unit.lists[0][0]
-                    assert all(tile in told[s] for s in range(CORES)), f"finish_o of unit {u} for tile {tile}"
+                    assert all(tile in told[s] for s in range(SUBTILES)), f"finish_o of unit {u} for tile {tile}"
                     self.finish_seen += 1
                 if unit.offered and moved >> u & 1:
                     unit.move()
@@ -138,7 +150,7 @@ class Delivery:
                     unit.offered += 1
             # Cores
             valid, ends = int(dut.out_valid_o.value), int(dut.out_end_o.value)
-            record = int(dut.out_record_o.value) if valid and ready else 0
+            record, subtile = (int(port.value) if valid and ready else 0 for port in (dut.out_record_o, dut.out_subtile_o))
             for s in range(CORES):
                 if self.rest[s]:
                     self.rest[s] -= 1
@@ -149,13 +161,14 @@ class Delivery:
                 self.together += given == 3
                 for at in range(self.width * s, self.width * s + given.bit_length()):
                     tile = self.tile[s]
-                    self._element(s, bool(ends >> at & 1), record >> bits * at & (1 << bits) - 1)
+                    self._element(s, bool(ends >> at & 1), record >> bits * at & (1 << bits) - 1, subtile >> 2 * at & 3)
                 assert given == 1 or tile == self.tile[s] or ends >> at & 1, f"core {s}: elements of two lists together"
-                if not self.finished[s] and self.tile[s] < len(self.tiles):
-                    limit = self.finishes[s][self.tile[s]]
-                    self.finished[s] = limit is not None and self.got[s] >= limit
-                if self.finished[s]:
-                    told[s].add(self.tile[s])
+                for m in range(s, SUBTILES, CORES):
+                    if not self.finished[m] and self.tile[s] < len(self.tiles):
+                        limit = self.finishes[m][self.tile[s]]
+                        self.finished[m] = limit is not None and self.got[m] >= limit
+                    if self.finished[m]:
+                        told[m].add(self.tile[s])
             ready = sum((not self.rest[s] and not next(self.stall[s])) << s for s in range(CORES))
             dut.out_ready_i.value = ready
             dut.finished_i.value = sum(f << s for s, f in enumerate(self.finished))
@@ -165,27 +178,28 @@ class Delivery:
             dut.in_end_i.value = sum(item[0] << k for k, item in enumerate(items))
             dut.in_entry_i.value = sum((item[1] << 4 | item[2]) << number * k for k, item in enumerate(items))
 
-    def _element(self, s: int, end: bool, record: int) -> None:
-        due = self.due[s]
-        where = f"core {s}, tile {self.tile[s]}, record {self.got[s]}"
-        assert due, f"core {s}: an element too many"
+    def _element(self, k: int, end: bool, record: int, subtile: int) -> None:
+        due = self.due[k]
+        where = f"core {k}, tile {self.tile[k]}, records {self.got}"
+        assert due, f"core {k}: an element too many"
+        while due[0] is not END and (end or due[0][1] != subtile) and self.finished[due[0][1]]:
+            self.dropped[due.popleft()[1]] = True
         if end:
-            if self.finished[s]:
-                while due[0] is not END:
-                    due.popleft()
-            assert due[0] is END, f"{where}: end"
-            due.popleft()
-            self.tile[s], self.got[s], self.finished[s], self.after[s] = self.tile[s] + 1, 0, False, 0
+            assert due.popleft() is END, f"{where}: end"
+            self.tile[k] += 1
+            for s in range(k, SUBTILES, CORES):
+                self.got[s], self.finished[s], self.dropped[s], self.after[s] = 0, False, False, 0
             return
-        number = due.popleft()
-        assert number is not END, f"{where}: no end"
+        assert due[0] is not END, f"{where}: no end"
+        number, s = due.popleft()
+        assert s == subtile and not self.dropped[s], f"{where}: for sub-tile {subtile}, due is {s}"
         assert record == self.data[number], f"{where}: {record:#x}, due {number}: {self.data[number]:#x}"
         self.got[s] += 1
         self.records += 1
         self.after[s] += self.finished[s]
         self.late += self.finished[s]
-        assert self.after[s] <= int(self.dut.Queue.value) + 2, f"{where}: {self.after[s]} records since it is finished"
-        self.rest[s] = self.pace[s] - 1
+        assert self.after[s] <= int(self.dut.Queue.value) + 2, f"{where}: {self.after[s]} records since sub-tile {s} is finished"
+        self.rest[k] = self.pace[k] - 1
 
     async def ready(self) -> None:
         await self.bench.until(lambda: int(self.dut.idle_o.value) == 1, 2000, "idle")

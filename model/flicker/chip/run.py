@@ -90,9 +90,13 @@ SUMMED = {
 }
 
 
-def stall_shares(stalls: Mapping[str, int], cycles: int) -> dict[str, float]:
+def stall_shares(stalls: Mapping[str, int], cycles: int, cores: int = CORES) -> dict[str, float]:
     """Stalls as shares of the cycles of a frame, of all the units that wait."""
-    return {cause: count / (cycles * int(SUMMED.get(cause, "1").split()[0])) for cause, count in stalls.items()}
+    def units(cause: str) -> int:
+        number, _, unit = SUMMED.get(cause, "1 unit").partition(" ")
+        return cores if unit == "cores" else int(number)
+
+    return {cause: count / (cycles * units(cause)) for cause, count in stalls.items()}
 
 
 def counted(frame: ChipFrame, config: RenderConfig) -> dict[str, int]:
@@ -157,7 +161,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
         "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
-        "stalls": stalls, "stall_shares": stall_shares(stalls, cycles),
+        "stalls": stalls, "stall_shares": stall_shares(stalls, cycles, config.cores),
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
         "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},
         **stage,
@@ -189,7 +193,7 @@ def _lane_chip_stats(core: Mapping[str, np.ndarray], config: RenderConfig, cycle
     return {
         "pixel_pairs": count["visits"], "pairs_blended": count["blended"], "pixels_finished": count["pixels_finished"],
         "lanes": {"lanes": config.lanes, "visited": count["visits"], "skipped": count["skipped"], "blended": count["blended"]},
-        "busy": {"lanes": float(core["visits"].max() * CORES / (config.lanes * cycles))},
+        "busy": {"lanes": float(core["visits"].max() * config.cores / (config.lanes * cycles))},
         "stalls": {
             "no records for the lanes": count["idle"], "no slot in the lanes' store": count["no_slot"], "no room in a lane's queue": count["no_room"],
         },

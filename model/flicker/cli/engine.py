@@ -20,8 +20,9 @@ from ..chips import chip_of
 from ..errors import FlickerError
 from ..params import (
     CHIP_MEMORIES,
+    CORE_COUNTS,
     FAITHFUL,
-    LANE_COUNTS,
+    LANES_PER_CORE,
     MAX_FIFO_DEPTH,
     MAX_LANE_ENTRIES,
     PORT_WIDTHS,
@@ -106,16 +107,17 @@ class Chosen:
         return Drawing(Engine(self.engine.value), self.config, Front((self.front or FrontChoice.FLOAT).value), options, dram)
 
 
-def _stage(stage: Enum | None, engine: Enum, lanes: int | None, given: dict[str, object]) -> str:
-    """The stage that the options mean; raises where they contradict each other. given: options by name, None: not given."""
+def _stage(stage: Enum | None, engine: Enum, sizes: dict[str, int | None], given: dict[str, object]) -> str:
+    """The stage that the options mean; raises where they contradict each other. sizes: options of the lanes by name, given: others; None: not given."""
+    of_lanes = [f"--{name}" for name, value in sizes.items() if value is not None]
     of_channels = [f"--{k}" for k in ("cat", "precision", "faithful", "coords") if given[k] is not None]
     if given["form"] is FormChoice["CONIC"]:
         of_channels.append("--form conic")
     if stage is None:
-        stage = StageChoice.CHANNELS if lanes is None and (of_channels or engine is EngineChoice.REFERENCE) else StageChoice(RECOMMENDED.stage)
+        stage = StageChoice.CHANNELS if not of_lanes and (of_channels or engine is EngineChoice.REFERENCE) else StageChoice(RECOMMENDED.stage)
     if stage is not StageChoice.LANES:
-        if lanes is not None:
-            raise FlickerError("--lanes: for --stage lanes only")
+        if of_lanes:
+            raise FlickerError(f"{', '.join(of_lanes)}: for --stage lanes only")
     elif engine is EngineChoice.REFERENCE:
         raise FlickerError("--stage lanes: not for --engine reference, which has no stage")
     elif of_channels:
@@ -137,7 +139,10 @@ def engine_options(
         help="rendering stage: VRUs in channels behind a test, or lanes in the log domain "
              f"[default: {RECOMMENDED.stage}, but channels with an option that only they have]",
     )] = None,
-    lanes: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, LANE_COUNTS))} [default: {_default('lanes')}]")] = None,
+    cores: Annotated[int | None, typer.Option(help=f"with --stage lanes: {', '.join(map(str, CORE_COUNTS))} [default: {_default('cores')}]")] = None,
+    lanes: Annotated[int | None, typer.Option(
+        help=f"with --stage lanes: of all cores, {', '.join(map(str, LANES_PER_CORE))} of each [default: {_default('lanes')}]",
+    )] = None,
     cat: Annotated[CatChoice | None, typer.Option(help=f"contribution test [default: {_default('cat')}]")] = None,
     precision: Annotated[PrecisionChoice | None, typer.Option(help=f"number formats of the contribution test [default: {_default('precision')}]")] = None,
     form: Annotated[FormChoice | None, typer.Option(help=f"Gaussian weight in CTU and VRU, and of the chip's records [default: {_default('form')}]")] = None,
@@ -181,7 +186,7 @@ def engine_options(
         raise FlickerError("--chips: with --chip NAME only")
     if chip is not None:
         parts = {
-            "stage": stage, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
+            "stage": stage, "cores": cores, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
             "port-bits": port_bits, "sort-units": sort_units, "list-writers": list_writers, "preproc-lanes": preproc_lanes,
             "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
         }
@@ -200,7 +205,8 @@ def engine_options(
         form=Form[form.name] if form else base.form,
         fifo_depth=base.fifo_depth if fifo_depth is None else fifo_depth,
         coords=Coords[coords.name],
-        stage=_stage(stage, engine, lanes, of_stage),
+        stage=_stage(stage, engine, {"cores": cores, "lanes": lanes}, of_stage),
+        cores=base.cores if cores is None else cores,
         lanes=base.lanes if lanes is None else lanes,
         memories=base.memories if memories is None else memories.value,
         port_bits=base.port_bits if port_bits is None else port_bits,

@@ -16,12 +16,13 @@ import numpy as np
 
 from ..golden.lanes.lists import RecordLists
 from ..golden.lanes.render import finish_positions, lane_masks
-from ..golden.render import stream_order
+from ..golden.lanes.streams import core_streams, whole_tiles
 from ..params import (
     CORES,
     LANE_COUNTERS,
     LANE_ROW_MASK_STAGES,
     LANE_SETUP_STAGES,
+    LANES_PER_CORE,
     MINITILE,
     SUBTILE,
     SUBTILE_PIXELS,
@@ -47,7 +48,8 @@ class LaneWork:
 
     start: int64 (S + 1,), elements of sub-tile s, near to far. mask, passes: uint64 (E,), pixels (bit 16 m + i) of each element's mask, and those that pass the
     lane's own test; of those that are visited when they are finished it matters to one counter alone, `skipped`. finish: int64 (S, 64), position in the list of
-    the element that finishes the pixel; the list's length when none does. contributing: pairs that are blended or finish a pixel.
+    the element that finishes the pixel; the list's length when none does. contributing: pairs that are blended or finish a pixel. entry: int (E,), record of
+    each element, which matters to cores that several sub-tiles share; None: each element is of a record of its own.
     """
 
     cols: int
@@ -57,11 +59,12 @@ class LaneWork:
     passes: np.ndarray
     finish: np.ndarray
     contributing: int
+    entry: np.ndarray | None = None
 
 
 @dataclass
 class LaneCycles:
-    """Result: cycles of the frame; counters: int64 (4 cores, len(LANE_COUNTERS)); lanes: of all cores; subtile_end: int64 (S,), cycle in which the last pixel
+    """Result: cycles of the frame; counters: int64 (cores, len(LANE_COUNTERS)); lanes: of all cores; subtile_end: int64 (S,), cycle in which the last pixel
     of each sub-tile left, 0 where it was not streamed."""
 
     cycles: int
@@ -81,15 +84,17 @@ class LaneCycles:
     @property
     def stall_rate(self) -> float:
         """Share of the cycles in which a core has input but cannot take it."""
-        return self.total("stalled") / (self.cycles * CORES)
+        return self.total("stalled") / (self.cycles * len(self.counters))
 
 
 def pixels_of_lanes(lanes: int) -> np.ndarray:
-    """int64 (lanes, 64 / lanes): number 16 m + i of each pixel of each lane of a core (flk_lane_pkg, lane_row and lane_column)."""
-    if lanes not in (8, 16, 32):
-        raise ValueError(f"lanes of a core: 8, 16 or 32, not {lanes}")
+    """int64 (lanes, 64 / lanes): number 16 m + i of each pixel of each lane of a core in a sub-tile (flk_lane_pkg, lane_row and lane_column)."""
+    if lanes not in LANES_PER_CORE:
+        raise ValueError(f"lanes of a core: 4, 8, 16 or 32, not {lanes}")
     lane, p = np.arange(lanes)[:, None], np.arange(SUBTILE_PIXELS // lanes)[None, :]
-    if lanes == 8:
+    if lanes == 4:
+        row, column = p // 2 + 0 * lane, (lane + 4 * (p % 2) + 5 * (p // 2)) % SUBTILE
+    elif lanes == 8:
         row, column = p + 0 * lane, (lane + 5 * p) % SUBTILE
     elif lanes == 16:
         row, column = lane // 4 + 4 * (p // 2), lane % 4 + 4 * (p % 2)
@@ -100,10 +105,14 @@ def pixels_of_lanes(lanes: int) -> np.ndarray:
 
 
 @numba.njit(cache=True)
-def _core(order, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, count, subtile_end):
-    """One core: fills its counters and the end of each sub-tile; returns the cycles it was followed for, and that after its last pixel."""
+def _core(
+    order, start, element, member, subtile, position, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, count, subtile_end,
+):
+    """One core: fills its counters and the end of each sub-tile; returns the cycles it was followed for, and that after its last pixel. start, element,
+    member, subtile: of `CoreStreams`; position: of each element in its sub-tile's list."""
     lanes, per_lane = pixel.shape
-    n_sub = len(order)
+    share = subtile.shape[1]
+    n_sub = len(order)  # lists
     # Setup and masks: ring of groups, the youngest at `young`; the group at dispatch is `latency` moves old.
     pipe = np.full((latency, width), NOTHING, np.int64)
     pipe_tokens = 0
@@ -125,9 +134,9 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
     tokens = np.zeros(lanes, np.int64)
     # Lanes
     token_at = np.full(lanes, NOTHING, np.int64)  # of the last token
-    sub = np.zeros(lanes, np.int64)  # ordinal of the sub-tile that is visited
-    flags = np.zeros(lanes, np.int64)  # finished pixels, as the register has them
-    ending = np.zeros((STATE + 1, lanes), np.int64)  # flags that are set STATE cycles after a visit
+    sub = np.zeros(lanes, np.int64)  # ordinal of the list that is visited
+    flags = np.zeros((lanes, share), np.int64)  # finished pixels, as the register has them
+    ending = np.zeros((STATE + 1, lanes, share), np.int64)  # flags that are set STATE cycles after a visit
     bank = np.zeros(lanes, np.bool_)
     full_at = np.full(lanes, -NOTHING, np.int64)
     bank_left = np.zeros(lanes, np.int64)
@@ -139,23 +148,24 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
     at = start[order[0]] if n_sub else np.int64(0)
     held = np.full(width, NOTHING, np.int64)
     n_held = 0
-    sub_finished = False  # the register finished_o
-    pixels_left = 64 * n_sub
-    arrived = np.zeros(n_sub, np.int64)  # pixels of each sub-tile that have left
+    sub_finished = np.zeros(share, np.bool_)  # the register finished_o
+    pixels_left = SUBTILE_PIXELS * share * n_sub
+    arrived = np.zeros((n_sub, share), np.int64)  # pixels of each sub-tile that have left
     last_pixel = np.int64(0)
     t = np.int64(0)
     while pixels_left > 0:  # the last ones are on their way through the output's registers afterwards
         # ---- what this cycle sees
         for l in range(lanes):
             if token_at[l] + STATE + 1 == t:  # the token has passed
-                flags[l] = 0
+                flags[l, :] = 0
                 tokens[l] -= 1
             flags[l] |= ending[t % (STATE + 1), l]
-            ending[t % (STATE + 1), l] = 0
+            ending[t % (STATE + 1), l, :] = 0
         if n_held == 0 and sub_in < n_sub:
-            if leave and began and sub_finished:
-                at = start[order[sub_in] + 1]
+            leaves = sub_in if leave and began else -1
             while n_held < width and sub_in < n_sub:
+                while sub_in == leaves and at < start[order[sub_in] + 1] and sub_finished[member[at]]:
+                    at += 1
                 if at == start[order[sub_in] + 1]:
                     held[n_held] = TOKEN - sub_in
                     sub_in += 1
@@ -180,12 +190,12 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                 wanted[w] = True
                 after_token = True
             else:
-                m = mask[e]
+                m, own = mask[element[e]], member[e]
                 if not after_token:
                     for l in range(lanes):
-                        if tokens[l] == 0 and flags[l]:
+                        if tokens[l] == 0 and flags[l, own]:
                             for p in range(per_lane):
-                                if (flags[l] >> p) & 1:
+                                if (flags[l, own] >> p) & 1:
                                     m &= ~(np.uint64(1) << np.uint64(pixel[l, p]))
                 live[w] = m
                 wanted[w] = m != np.uint64(0)
@@ -235,10 +245,11 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
             first = (served + 1) % lanes
             pixels_left -= 1
             last_pixel = t
-            k = sub[served] - 1  # the bank holds the sub-tile before the one that is visited
-            arrived[k] += 1
-            if arrived[k] == SUBTILE_PIXELS:
-                subtile_end[order[k]] = t + OUTPUT
+            k = sub[served] - 1  # the bank holds the list before the one that is visited
+            own = share - 1 - (bank_left[served] - 1) // per_lane
+            arrived[k, own] += 1
+            if arrived[k, own] == SUBTILE_PIXELS:
+                subtile_end[subtile[order[k], own]] = t + OUTPUT
         # ---- lanes
         for l in range(lanes):
             taken = bank[l]
@@ -259,21 +270,22 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                 else:
                     pop = True
                     bank[l] = True
-                    bank_left[l] = per_lane
+                    bank_left[l] = per_lane * share
                     full_at[l] = t + COLOUR + 1
                     token_at[l] = t
                     sub[l] += 1
             else:
                 todo &= ~done[l]
+                own = member[slot_at[q_slot[l, r]]]
                 if t - token_at[l] > STATE:
-                    todo &= ~flags[l]
+                    todo &= ~flags[l, own]
                 if todo:
                     p = 0
                     while not (todo >> p) & 1:
                         p += 1
-                    e = slot_at[q_slot[l, r]]
-                    s = order[sub[l]]
-                    k = e - start[s]
+                    e = element[slot_at[q_slot[l, r]]]
+                    s = subtile[order[sub[l]], own]
+                    k = position[e]
                     end = finish[s, pixel[l, p]]
                     passed = (passes[e] >> np.uint64(pixel[l, p])) & np.uint64(1)
                     count[VISITS] += 1
@@ -283,7 +295,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                         count[BLENDED] += 1
                     elif k == end:
                         count[FINISHED] += 1
-                        ending[(t + STATE + 1) % (STATE + 1), l] |= 1 << p
+                        ending[(t + STATE + 1) % (STATE + 1), l, own] |= 1 << p
                     todo &= todo - 1
                     done[l] |= 1 << p
                 pop = todo == 0
@@ -296,11 +308,12 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
         for s in range(slots):
             pending[s] -= release[t % (RELEASE + 1), s]
             release[t % (RELEASE + 1), s] = 0
-        all_finished = True
-        for l in range(lanes):
-            if tokens[l] > 0 or flags[l] != (1 << per_lane) - 1:
-                all_finished = False
-        sub_finished = all_finished and pipe_tokens == 0
+        for own in range(share):
+            all_finished = pipe_tokens == 0
+            for l in range(lanes):
+                if tokens[l] > 0 or flags[l, own] != (1 << per_lane) - 1:
+                    all_finished = False
+            sub_finished[own] = all_finished
         for w in range(width):
             slot = going[w]
             if slot < 0:
@@ -322,7 +335,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
             for u in range(w):  # what was passed over is dropped, whatever its lanes say later
                 if not sent[u]:
                     sent[u] = True
-                    count[REJECTED if mask[pipe[old, u]] == np.uint64(0) else DROPPED] += 1
+                    count[REJECTED if mask[element[pipe[old, u]]] == np.uint64(0) else DROPPED] += 1
         if n_held == 0:
             count[IDLE] += 1
         elif not move:
@@ -337,7 +350,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                 if e <= TOKEN:
                     pipe_tokens -= 1
                 elif not sent[w]:
-                    if mask[e] == np.uint64(0):
+                    if mask[element[e]] == np.uint64(0):
                         count[REJECTED] += 1
                     else:
                         count[DROPPED] += 1
@@ -349,7 +362,7 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
                     if held[w] <= TOKEN:
                         count[SUBTILES] += 1
                         pipe_tokens += 1
-                        sub_finished = False
+                        sub_finished[:] = False
                     else:
                         count[GAUSSIANS_IN] += 1
             n_held = 0
@@ -358,17 +371,23 @@ def _core(order, start, mask, passes, finish, pixel, latency, width, slots, dept
 
 
 @numba.njit(parallel=True, cache=True)
-def _cores(order, core_start, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters, end, ends):
-    for k in numba.prange(CORES):
+def _cores(
+    order, core_start, start, element, member, subtile, position, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters, end,
+    ends,
+):
+    for k in numba.prange(len(counters)):
         own = order[core_start[k] : core_start[k + 1]]
-        ends[k, 0], ends[k, 1] = _core(own, start, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters[k], end)
+        ends[k, 0], ends[k, 1] = _core(
+            own, start, element, member, subtile, position, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, counters[k], end,
+        )
 
 
 def lane_work(lists: RecordLists) -> LaneWork:
     """What a frame makes the lanes do."""
     mask, passes = lane_masks(lists)
     finish, contributing = finish_positions(lists, mask, passes)
-    return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish, int(np.bitwise_count(contributing).sum(dtype=np.int64)))
+    total = int(np.bitwise_count(contributing).sum(dtype=np.int64))
+    return LaneWork(lists.cols, lists.rows, np.asarray(lists.start, np.int64), mask, passes, finish, total, lists.entry)
 
 
 def simulate_lanes(
@@ -379,17 +398,22 @@ def simulate_lanes(
     in_width, dispatch: elements that a core takes in a cycle (None: config's) and splats of these that get a slot and entries in queues. The RTL has 1 or 2,
     and 1; anything else is a core that was not built.
     """
-    lanes = config.lanes // CORES
-    order, core_start = stream_order(work, empty)
-    counters, ends = np.zeros((CORES, len(LANE_COUNTERS)), np.int64), np.zeros((CORES, 2), np.int64)
-    end = np.zeros(work.cols * work.rows, np.int64)
+    lanes = config.lanes // config.cores
+    streams = core_streams(work, np.arange(len(work.mask)) if work.entry is None else work.entry, config.cores, empty)
+    counters, ends = np.zeros((config.cores, len(LANE_COUNTERS)), np.int64), np.zeros((config.cores, 2), np.int64)
+    # A core that is shared has whole tiles.
+    number = np.arange(work.cols * work.rows) if config.cores == CORES else whole_tiles(work.cols, work.rows)[2]
+    finish, end = np.zeros((streams.cols * streams.rows, SUBTILE_PIXELS), np.int64), np.zeros(streams.cols * streams.rows, np.int64)
+    finish[number] = work.finish
+    position = np.arange(len(work.mask)) - np.repeat(work.start[:-1], np.diff(work.start))
     _cores(
-        order, core_start, work.start, work.mask, work.passes, work.finish, pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES,
-        in_width or config.in_width, config.slots, config.fifo_depth, leave, dispatch, counters, end, ends,
+        streams.order, streams.core_start, streams.start, streams.element, streams.member, streams.subtile, position, work.mask, work.passes, finish,
+        pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, in_width or config.in_width, config.slots, config.fifo_depth, leave, dispatch,
+        counters, end, ends,
     )
     cycles = int(ends[:, 1].max())
     # A core that has ended goes on counting: no input, no entry in any queue.
     counters[:, CYCLES] = cycles
     counters[:, IDLE] += cycles - ends[:, 0]
     counters[:, STARVED] += (cycles - ends[:, 0]) * lanes
-    return LaneCycles(cycles, counters, config.lanes, end)
+    return LaneCycles(cycles, counters, config.lanes, end[number])

@@ -11,7 +11,8 @@
 
 namespace {
 
-constexpr int UNITS = 4, CORES = 4, NUMBER_BITS = 24, ENTRY_BITS = NUMBER_BITS + CORES;
+// Sub-tile s of a tile is of core s mod FLK_CORES.
+constexpr int UNITS = 4, SUBTILES = 4, NUMBER_BITS = 24, ENTRY_BITS = NUMBER_BITS + SUBTILES;
 
 // Bits of a port that Verilator makes of 32-bit words.
 void put(WData* words, int low, int bits, uint64_t value) {
@@ -31,18 +32,19 @@ struct Lists {
   int64_t tiles, limit;
   const int64_t* start;      // of each tile of the walk, and behind the last: its entries
   const uint32_t* entry;     // record number above mask
-  const int32_t* finished;   // tiles x cores: records after which a core is finished with a tile, -1: never
+  const int32_t* finished;   // tiles x sub-tiles: records after which a sub-tile is finished, -1: never
+  const uint8_t* borders;    // tiles x 2: sub-tiles that touch the next tile, and the one behind it
   int64_t records;           // in memory
 };
 
 struct Result {
   int64_t cycles, lines;
-  int64_t given[CORES];
+  int64_t given[SUBTILES];
 };
 
 const char* delivery_error() { return g_error.c_str(); }
 
-// Until every core has its last end. 1: done; 0: not within `limit` cycles; -1: something is wrong.
+// Until every core has taken its last end. 1: done; 0: not within `limit` cycles; -1: something is wrong.
 int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiConfig* config, const Lists* lists, uint64_t seed, Result* result) {
   g_error.clear();
   auto fail = [&](const std::string& text) {
@@ -80,24 +82,25 @@ int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiCon
     units[u].tile = u;
     if (u < lists->tiles) units[u].at = lists->start[u], units[u].end = lists->start[u + 1];
   }
-  struct Core {
-    int64_t tile = 0, at, got = 0;  // at: entry that the next record is of, or one behind it
+  struct Subtile {
+    int64_t tile = 0, at, got = 0;  // at: entry that the next record is of, or one before it
   };
-  std::vector<Core> cores(CORES);
-  for (Core& core : cores) core.at = lists->start[0];
+  std::vector<Subtile> subtiles(SUBTILES);
+  for (Subtile& of : subtiles) of.at = lists->start[0];
   *result = {};
 
   constexpr int BEFORE = 100;  // cycles until the start: reset, tags are cleared
   bool ready = false;
+  int64_t turn = 0;  // tile whose entries are taken
   int64_t cycle = -BEFORE;
   for (; cycle < lists->limit; ++cycle) {
     const bool reset = cycle < 4 - BEFORE;
     bool over = true;
-    for (const Core& core : cores) over = over && core.tile == lists->tiles;
+    for (const Subtile& of : subtiles) over = over && of.tile == lists->tiles;
     if (over) break;
     top->rst_ni = !reset;
     top->start_i = cycle == 0;
-    top->out_ready_i = ready ? 15 : 0;
+    top->out_ready_i = ready ? (1 << FLK_CORES) - 1 : 0;
     int valid = 0, end = 0, finished = 0;
     for (int u = 0; u < UNITS && ready; ++u) {
       Unit& unit = units[u];
@@ -109,19 +112,21 @@ int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiCon
         put(&top->in_entry_i[0], ENTRY_BITS * (2 * u + k), ENTRY_BITS, last ? 0 : lists->entry[unit.at + k]);
       }
     }
-    for (int s = 0; s < CORES; ++s) {
-      if (cores[s].tile == lists->tiles) continue;
-      const int32_t limit = lists->finished[CORES * cores[s].tile + s];
-      if (limit >= 0 && cores[s].got >= limit) finished |= 1 << s;
+    for (int s = 0; s < SUBTILES; ++s) {
+      if (subtiles[s].tile == lists->tiles) continue;
+      const int32_t limit = lists->finished[SUBTILES * subtiles[s].tile + s];
+      if (limit >= 0 && subtiles[s].got >= limit) finished |= 1 << s;
     }
     top->in_valid_i = valid;
     top->in_end_i = end;
     top->finished_i = finished;
+    top->border_i = turn < lists->tiles ? lists->borders[2 * turn] | lists->borders[2 * turn + 1] << 4 : 0;
     FLK_AXI_DRIVE_READ(port.reply(), *top, );
     top->clk_i = 0;
     top->eval();
     FLK_AXI_SAMPLE_READ(request, *top, );
     if (cycle == 0 && !top->idle_o) fail("not idle at the start");
+    if (!reset && top->taken_o) ++turn;
     for (int u = 0; u < UNITS; ++u) {
       Unit& unit = units[u];
       if (unit.offered && (top->in_ready_o >> u & 1)) {
@@ -134,27 +139,33 @@ int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiCon
         unit.end = std::min(unit.end, unit.at + unit.offered);  // the rest of the list is dropped, but for what is offered
       }
     }
-    for (int s = 0; s < CORES && !reset; ++s) {
-      Core& core = cores[s];
-      if (!(top->out_valid_o >> s & 1) || !(top->out_ready_i >> s & 1)) continue;
-      if (core.tile == lists->tiles) {
+    for (int k = 0; k < FLK_CORES && !reset; ++k) {
+      if (!(top->out_valid_o >> k & 1) || !(top->out_ready_i >> k & 1)) continue;
+      if (subtiles[k].tile == lists->tiles) {
         fail("more than the last end");
         break;
       }
-      const int64_t stop = lists->start[core.tile + 1];
-      const int32_t limit = lists->finished[CORES * core.tile + s];
-      while (core.at < stop && !(lists->entry[core.at] >> s & 1)) ++core.at;
-      if (top->out_end_o >> s & 1) {
-        if (core.at < stop && (limit < 0 || core.got < limit)) fail("core " + std::to_string(s) + " lacks records of tile " + std::to_string(core.tile));
-        ++core.tile;
-        core.at = stop;
-        core.got = 0;
-      } else {
-        const uint32_t number = top->out_record_o[4 * s];
-        if (core.at == stop || number != lists->entry[core.at] >> CORES) fail("core " + std::to_string(s) + ": record " + std::to_string(number) + " in tile " + std::to_string(core.tile));
-        ++core.at;
-        ++core.got;
-        ++result->given[s];
+      const bool end = top->out_end_o >> k & 1;
+      const int for_subtile = top->out_subtile_o >> 2 * k & 3;
+      if (!end && for_subtile % FLK_CORES != k) fail("core " + std::to_string(k) + " gets a record for sub-tile " + std::to_string(for_subtile));
+      for (int s = k; s < SUBTILES; s += FLK_CORES) {
+        if (!end && s != for_subtile) continue;
+        Subtile& of = subtiles[s];
+        const int64_t stop = lists->start[of.tile + 1];
+        const int32_t limit = lists->finished[SUBTILES * of.tile + s];
+        while (of.at < stop && !(lists->entry[of.at] >> s & 1)) ++of.at;
+        if (end) {
+          if (of.at < stop && (limit < 0 || of.got < limit)) fail("sub-tile " + std::to_string(s) + " lacks records of tile " + std::to_string(of.tile));
+          ++of.tile;
+          of.at = stop;
+          of.got = 0;
+        } else {
+          const uint32_t number = top->out_record_o[4 * k];
+          if (of.at == stop || number != lists->entry[of.at] >> SUBTILES) fail("sub-tile " + std::to_string(s) + ": record " + std::to_string(number) + " in tile " + std::to_string(of.tile));
+          ++of.at;
+          ++of.got;
+          ++result->given[s];
+        }
       }
     }
     ready = cycle > 0 && (ready || top->idle_o);

@@ -113,17 +113,20 @@ struct Sim {
   }
 
 #ifdef FLK_RENDERING
-  // Records that delivery gives to each core, FLK_RENDERING at a time at most, by sub-tile (rendering_watched.vlt).
+  // Records that delivery gives for each sub-tile of a tile, FLK_RENDERING a core at a time at most, by tile (rendering_watched.vlt). Sub-tile s is of core
+  // s mod FLK_CORES.
   void count_records() {
     const auto& root = *top->rootp;
     for (int e = 0; root.flk_rendering__DOT__record_valid >> e; ++e) {
       const int k = e / FLK_RENDERING;
       if (!(root.flk_rendering__DOT__record_valid >> e & root.flk_rendering__DOT__record_ready >> k & 1)) continue;
       if (root.flk_rendering__DOT__record_end >> e & 1) {
-        given[k].push_back(records[k]);
-        records[k] = 0;
+        for (int s = k; s < SUBTILES; s += FLK_CORES) {
+          given[s].push_back(records[s]);
+          records[s] = 0;
+        }
       } else {
-        ++records[k];
+        ++records[root.flk_rendering__DOT__record_subtile >> 2 * e & 3];
       }
     }
   }
@@ -138,7 +141,7 @@ struct Sim {
 #ifdef FLK_RENDERING
 #define FLK_OF(name) root.flk_rendering__DOT__##name
     unsigned first = 0;
-    for (int k = 0; k < CORES; ++k) first |= (FLK_OF(record_valid) >> k * FLK_RENDERING & 1) << k;
+    for (int k = 0; k < FLK_CORES; ++k) first |= (FLK_OF(record_valid) >> k * FLK_RENDERING & 1) << k;
     const unsigned valid = FLK_OF(entry_valid) >> 2 * turn & 3, ready = FLK_OF(entry_ready) >> turn & 1;
     const int now[WAITS] = {
         ones(FLK_OF(list_valid) & ~FLK_OF(list_ready)), ones(FLK_OF(sorted_valid) & ~FLK_OF(sorted_ready)), ready && !valid && !FLK_OF(pixels_done),
@@ -175,9 +178,9 @@ struct Sim {
   std::unique_ptr<flk::AxiPort> ports[PORTS];
   flk::AxiRequest requests[PORTS] = {};
   std::unique_ptr<Vtop> top;
-  static constexpr int CORES = 4;
-  std::vector<uint32_t> given[CORES];  // in this frame, of each list that has ended
-  uint32_t records[CORES] = {};
+  static constexpr int SUBTILES = 4;      // of a tile
+  std::vector<uint32_t> given[SUBTILES];  // in this frame, of each list that has ended
+  uint32_t records[SUBTILES] = {};
 #ifdef FLK_RENDERING
   static constexpr int WAITS = 9;
   int turn = 0;  // sorting unit that delivery takes from
@@ -360,9 +363,9 @@ int flk_half_frame(Sim* sim, const uint32_t* registers, int words, uint64_t limi
     std::memcpy(&sim->top->registers_i[0], registers, sizeof(uint32_t) * words);
     const uint64_t begin = sim->memory.cycle;
     while (!sim->top->idle_o && sim->memory.cycle - begin < limit) sim->cycle(false);
-    for (int k = 0; k < Sim::CORES; ++k) {
-      sim->given[k].clear();
-      sim->records[k] = 0;
+    for (int s = 0; s < Sim::SUBTILES; ++s) {
+      sim->given[s].clear();
+      sim->records[s] = 0;
     }
     sim->top->start_i = 1;
     sim->cycle(false);
@@ -397,9 +400,9 @@ int flk_half_waits(Sim* sim, int64_t* out) {
 }
 #endif
 
-// Records that a core got of each list of the last frame; at most `size` lists. How many lists there were.
-int flk_half_given(Sim* sim, int core, uint32_t* out, int size) {
-  const auto& lists = sim->given[core];
+// Records that a core got for a sub-tile of each list of the last frame; at most `size` lists. How many lists there were.
+int flk_half_given(Sim* sim, int subtile, uint32_t* out, int size) {
+  const auto& lists = sim->given[subtile];
   std::copy_n(lists.begin(), std::min<size_t>(lists.size(), size), out);
   return static_cast<int>(lists.size());
 }

@@ -18,7 +18,7 @@ TOP = "flk_sim_top"
 HEADER = "flk_sim_layout.h"
 
 
-def top_text(stage: Stage, width: int) -> str:
+def top_text(stage: Stage, width: int, cores: int) -> str:
     """SystemVerilog of the simulation top; width: elements that a core takes in a cycle."""
     element, pixel = layout.bits(stage.element), layout.bits(stage.pixel)
     element_words, pixel_words = 32 * layout.words(stage.element), 32 * layout.words(stage.pixel)
@@ -26,7 +26,7 @@ def top_text(stage: Stage, width: int) -> str:
     parameters = f" #(\n{declared}\n)" if stage.parameters else ""
     passed = ",\n".join(f"    .{name}({name})" for name in stage.parameters)
     settings = f" #(\n{passed}\n  )" if stage.parameters else ""
-    unused = f"  logic [CORES*{width}-1:0][{element_words - element - 1}:0] unused_elem;\n" if element_words > element else ""
+    unused = f"  logic [{cores}*{width}-1:0][{element_words - element - 1}:0] unused_elem;\n" if element_words > element else ""
     taken = "{unused_elem[k], elem[k]}" if unused else "elem[k]"
     return f"""// Simulation top of {stage.module}: elements and pixels in whole 32-bit words.
 module {TOP}
@@ -37,26 +37,26 @@ module {TOP}
   input  logic clear_i,
   output logic idle_o,
   input  logic [2:0] mode_i,
-  input  logic [CORES*{width}-1:0] in_valid_i,
-  output logic [CORES-1:0] in_ready_o,
-  input  logic [CORES*{width}-1:0][{element_words - 1}:0] in_elem_i,
+  input  logic [{cores}*{width}-1:0] in_valid_i,
+  output logic [{cores}-1:0] in_ready_o,
+  input  logic [{cores}*{width}-1:0][{element_words - 1}:0] in_elem_i,
   output logic [CORES-1:0] finished_o,
-  output logic [CORES-1:0] out_valid_o,
-  input  logic [CORES-1:0] out_ready_i,
-  output logic [CORES-1:0][{pixel_words - 1}:0] out_data_o,
+  output logic [{cores}-1:0] out_valid_o,
+  input  logic [{cores}-1:0] out_ready_i,
+  output logic [{cores}-1:0][{pixel_words - 1}:0] out_data_o,
   input  logic clear_counters_i,
   input  logic hold_counters_i,
   input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
   output logic [COUNTER_BITS-1:0] counter_data_o
 );
 
-  logic [CORES*{width}-1:0][{element - 1}:0] elem;
-  logic [CORES-1:0][{pixel - 1}:0] pixel;
+  logic [{cores}*{width}-1:0][{element - 1}:0] elem;
+  logic [{cores}-1:0][{pixel - 1}:0] pixel;
 {unused}
-  for (genvar k = 0; k < CORES * {width}; k++) begin : gen_in
+  for (genvar k = 0; k < {cores} * {width}; k++) begin : gen_in
     assign {taken} = in_elem_i[k];
   end
-  for (genvar k = 0; k < CORES; k++) begin : gen_out
+  for (genvar k = 0; k < {cores}; k++) begin : gen_out
     assign out_data_o[k] = {pixel_words}'(pixel[k]);
   end
 
@@ -83,10 +83,11 @@ endmodule
 """
 
 
-def header_text(stage: Stage, width: int) -> str:
+def header_text(stage: Stage, width: int, cores: int) -> str:
     """C++ of sizes and bit positions."""
     sizes = {
-        "CORES": params.CORES,
+        "CORES": cores,
+        "SHARE": params.CORES // cores,  # sub-tiles of a core
         "SUBTILE_PIXELS": params.SUBTILE_PIXELS,
         "MINITILE_PIXELS": params.SUBTILE_PIXELS // params.CHANNELS,
         "ELEM_WORDS": layout.words(stage.element),
@@ -126,7 +127,7 @@ def write(config: RenderConfig) -> tuple[Path, Path]:
     """Files of top and header."""
     stage = STAGES[config.stage]
     width = config.in_width if "InWidth" in stage.parameters else 1
-    texts = {f"{TOP}.sv": top_text(stage, width), HEADER: header_text(stage, width)}
+    texts = {f"{TOP}.sv": top_text(stage, width, config.cores), HEADER: header_text(stage, width, config.cores)}
     folder = BUILD / "sim-generated" / hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():

@@ -157,11 +157,11 @@ class Half:
             out[name] = counts
         return out
 
-    def given(self, core: int, lists: int) -> np.ndarray:
-        """int64 (lists,): records that delivery gave to a core in the last frame, by sub-tile. Only flk_rendering has it."""
+    def given(self, subtile: int, lists: int) -> np.ndarray:
+        """int64 (lists,): records that delivery gave for one of the four sub-tiles of each tile in the last frame. Only flk_rendering has it."""
         out = np.zeros(lists, np.uint32)
-        if self._lib.flk_half_given(self._sim, core, out.ctypes.data, lists) != lists:
-            raise self._failure(f"core {core} did not get {lists} lists")
+        if self._lib.flk_half_given(self._sim, subtile, out.ctypes.data, lists) != lists:
+            raise self._failure(f"sub-tile {subtile} did not get {lists} lists")
         return out.astype(np.int64)
 
     def waits(self, counters: Sequence[Counter]) -> dict[str, int]:

@@ -19,12 +19,16 @@ namespace {
 
 using namespace layout;
 constexpr uint64_t HANG_CYCLES = 100000;
+constexpr int64_t LIST_PIXELS = SHARE * SUBTILE_PIXELS;
 std::string g_fatal;  // message of a failed assertion
 
 struct Frame {
   const uint32_t* element;    // (E, ELEM_WORDS), packed, not tokens
-  const int64_t* start;       // (S + 1), of each sub-tile's list
-  const int64_t* order;       // sub-tiles core by core
+  const int64_t* which;       // (E), of these, in the order of the lists
+  const int64_t* member;      // (E), which sub-tile of the list each is for
+  const int64_t* start;       // (L + 1), of each list
+  const int64_t* subtile;     // (L, SHARE), sub-tiles of each list
+  const int64_t* order;       // lists core by core
   const int64_t* core_start;  // (CORES + 1)
   int64_t cols;
   int64_t subtiles;
@@ -57,7 +61,7 @@ struct Random {
   }
 };
 
-// A place in a core's stream: sub-tile (index in the order) and element of its list, or the token behind the last one.
+// A place in a core's stream: list (index in the order) and element of it, or the token behind the last one.
 struct Cursor {
   int64_t next, item;
 };
@@ -72,8 +76,10 @@ class Simulation {
     context_.randSeed(static_cast<int>(seed & 0x7fffffff) + 1);
     top_ = std::make_unique<Vtop>(&context_);
     for (int k = 0; k < CORES; ++k) {
-      for (int64_t i = frame.core_start[k]; i < frame.core_start[k + 1]; ++i) owner_[frame.order[i]] = k;
-      expected_ += SUBTILE_PIXELS * (frame.core_start[k + 1] - frame.core_start[k]);
+      for (int64_t i = frame.core_start[k]; i < frame.core_start[k + 1]; ++i) {
+        for (int m = 0; m < SHARE; ++m) owner_[frame.subtile[frame.order[i] * SHARE + m]] = k;
+      }
+      expected_ += LIST_PIXELS * (frame.core_start[k + 1] - frame.core_start[k]);
     }
     begin();
     top_->mode_i = mode;
@@ -180,10 +186,11 @@ class Simulation {
       std::memset(w, 0, ELEM_WORDS * sizeof(uint32_t));
       put(w, ELEM_EOS, 1);
     } else {
-      std::memcpy(w, &frame_.element[c.item * ELEM_WORDS], ELEM_WORDS * sizeof(uint32_t));
+      std::memcpy(w, &frame_.element[frame_.which[c.item] * ELEM_WORDS], ELEM_WORDS * sizeof(uint32_t));
     }
     if (token || ELEM_SUBTILE) {
-      const int64_t s = frame_.order[c.next];
+      // A token may name any of them.
+      const int64_t s = frame_.subtile[frame_.order[c.next] * SHARE + (token ? cycles_ % SHARE : frame_.member[c.item])];
       put(w, ELEM_COL, static_cast<uint32_t>(s % frame_.cols));
       put(w, ELEM_ROW, static_cast<uint32_t>(s / frame_.cols));
     }
@@ -198,12 +205,19 @@ class Simulation {
     if (more(k, c)) c.item = frame_.start[frame_.order[c.next]];
   }
 
+  // Elements of the list that is open at c go on to the first that is for a sub-tile that is not finished.
+  void skip(int k, Cursor& c) const {
+    if (c.next != at_[k].next) return;
+    while (!at_token(c) && (top_->finished_o >> (frame_.member[c.item] * CORES + k) & 1)) ++c.item;
+  }
+
   void accepted(int k) {
-    for (; holding_[k] > 0; --holding_[k]) {
-      open_[k] = !at_token(at_[k]);
-      if (!open_[k]) owed_ += SUBTILE_PIXELS;
-      step(k, at_[k]);
+    for (int w = 0; w < holding_[k]; ++w) {
+      open_[k] = !at_token(held_[k][w]);
+      if (!open_[k]) owed_ += LIST_PIXELS;
     }
+    at_[k] = after_[k];
+    holding_[k] = 0;
   }
 
   void pixel(int k) {
@@ -233,8 +247,15 @@ class Simulation {
     valid_ = ready_ = 0;
     for (int k = 0; k < CORES; ++k) {
       if (!holding_[k]) {
-        if (frame_.leave && open_[k] && (top_->finished_o >> k & 1)) at_[k].item = frame_.start[frame_.order[at_[k].next] + 1];
-        for (Cursor c = at_[k]; holding_[k] < IN_WIDTH && more(k, c) && !random_(idle_); step(k, c)) load(k, holding_[k]++, c);
+        Cursor c = at_[k];
+        const bool leaves = frame_.leave && open_[k];
+        while (holding_[k] < IN_WIDTH && more(k, c) && !random_(idle_)) {
+          if (leaves) skip(k, c);
+          load(k, holding_[k], c);
+          held_[k][holding_[k]++] = c;
+          step(k, c);
+        }
+        after_[k] = c;
       }
       valid_ |= ((1 << holding_[k]) - 1) << (k * IN_WIDTH);
       ready_ |= !random_(stall_) << k;
@@ -312,6 +333,7 @@ class Simulation {
   uint8_t valid_, ready_;
   int64_t owed_;  // pixels of lists that were taken as a whole
   Cursor at_[CORES];         // the oldest element that has not been taken
+  Cursor held_[CORES][IN_WIDTH], after_[CORES];  // those that are offered, and the one behind
   int holding_[CORES];       // elements that are offered
   bool open_[CORES];
   uint64_t last_transfer_ = 0;

@@ -14,7 +14,8 @@ from .. import layout, params
 from ..errors import FlickerError
 from ..front.records import SubtileLists
 from ..golden.lanes.lists import RecordLists
-from ..golden.render import assemble, stream_order
+from ..golden.lanes.streams import core_streams, whole_tiles
+from ..golden.render import assemble
 from ..params import CHANNELS, CORES, FP16_ONE_BITS, STAGES, SUBTILE_PIXELS, RenderConfig
 from ..toolchain import sources_of, verilate
 from . import generate
@@ -25,8 +26,9 @@ CHUNK_CYCLES = 5000  # cycles between two calls of the progress function
 
 class _Frame(ctypes.Structure):
     _fields_ = [
-        ("element", ctypes.c_void_p), ("start", ctypes.c_void_p), ("order", ctypes.c_void_p), ("core_start", ctypes.c_void_p),
-        ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p), ("leave", ctypes.c_int64),
+        ("element", ctypes.c_void_p), ("which", ctypes.c_void_p), ("member", ctypes.c_void_p), ("start", ctypes.c_void_p), ("subtile", ctypes.c_void_p),
+        ("order", ctypes.c_void_p), ("core_start", ctypes.c_void_p), ("cols", ctypes.c_int64), ("subtiles", ctypes.c_int64), ("pixels", ctypes.c_void_p),
+        ("leave", ctypes.c_int64),
     ]
 
 
@@ -34,7 +36,7 @@ class _Frame(ctypes.Structure):
 class RtlFrame:
     """Result of a simulated frame.
 
-    pixels as in `golden.render.Frame`; counters: uint32 (4 cores, those that `names` names); seconds of simulation alone.
+    pixels as in `golden.render.Frame`; counters: uint32 (cores, those that `names` names); seconds of simulation alone.
     """
 
     lists: SubtileLists | RecordLists
@@ -49,7 +51,7 @@ class RtlFrame:
         return assemble(self.lists, self.pixels, background)
 
     def core_counter(self, name: str) -> np.ndarray:
-        """int64 (4,): a counter of each core."""
+        """int64 (cores,): a counter of each core."""
         return self.counters[:, self.names.index(name)].astype(np.int64)
 
     def channel_counter(self, name: str) -> np.ndarray:
@@ -146,16 +148,16 @@ def render_rtl(
     if config.form != lists.form:
         raise ValueError(f"lists are in {lists.form.name} form, the configuration in {config.form.name}")
     lib = _library(library or build(config, checks=checks))
-    order, core_start = stream_order(lists, empty)
-    subtiles = lists.cols * lists.rows
+    streams = core_streams(lists, lists.entry, config.cores, empty)
+    subtiles = streams.cols * streams.rows
     arrays = {
         "element": elements(lists, STAGES[config.stage].element),
-        "start": np.ascontiguousarray(lists.start, np.int64),
-        "order": np.ascontiguousarray(order, np.int64),
-        "core_start": np.ascontiguousarray(core_start, np.int64),
+        **{name: np.ascontiguousarray(getattr(streams, field), np.int64) for name, field in (
+            ("which", "element"), ("member", "member"), ("start", "start"), ("subtile", "subtile"), ("order", "order"), ("core_start", "core_start"),
+        )},
         "pixels": np.tile(np.array([FP16_ONE_BITS, 0, 0, 0], np.uint16), (subtiles, SUBTILE_PIXELS, 1)),
     }
-    frame = _Frame(cols=lists.cols, subtiles=subtiles, leave=leave, **{k: a.ctypes.data for k, a in arrays.items()})
+    frame = _Frame(cols=streams.cols, subtiles=subtiles, leave=leave, **{k: a.ctypes.data for k, a in arrays.items()})
     sim = lib.flk_sim_new(ctypes.byref(frame), int(config.cat), seed, round(idle * 256), round(stall * 256))
     try:
         begin = time.perf_counter()
@@ -166,13 +168,14 @@ def render_rtl(
         while state == 0:
             state = lib.flk_sim_run(sim, CHUNK_CYCLES)
             if progress is not None:
-                progress(lib.flk_sim_received(sim), len(order) * SUBTILE_PIXELS)
+                progress(lib.flk_sim_received(sim), streams.subtile[streams.order].size * SUBTILE_PIXELS)
         seconds = time.perf_counter() - begin
         cycles = lib.flk_sim_cycles(sim)
         if state < 0:
             raise FlickerError(f"RTL simulation: cycle {cycles}: {lib.flk_sim_error(sim).decode()}")
-        counters = np.zeros((CORES, len(STAGES[config.stage].counters)), np.uint32)
+        counters = np.zeros((config.cores, len(STAGES[config.stage].counters)), np.uint32)
         lib.flk_sim_counters(sim, counters.ctypes.data)
     finally:
         lib.flk_sim_delete(sim)
-    return RtlFrame(lists, arrays["pixels"], counters, int(cycles), seconds, STAGES[config.stage].counters)
+    pixels = arrays["pixels"] if config.cores == CORES else arrays["pixels"][whole_tiles(lists.cols, lists.rows)[2]]
+    return RtlFrame(lists, pixels, counters, int(cycles), seconds, STAGES[config.stage].counters)

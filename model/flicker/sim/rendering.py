@@ -53,7 +53,8 @@ def build(config: RenderConfig, parameters: Mapping[str, int] | None = None) -> 
     """Shared library of the simulator, with the design's assertions; cached by content. parameters: of `flk_rendering`, further ones."""
     settings = [half.HERE / f"{name}.vlt" for name in ("render_stage", "lanes", "rendering", "rendering_watched")]
     values = {"InWidth": 1} | config.chip_parameters() | dict(parameters or {})
-    return half.build("flk_rendering", values, settings, define=f"-DFLK_RENDERING={values['InWidth']} -DFLK_SORT_UNITS={config.sort_units}")
+    define = f"-DFLK_RENDERING={values['InWidth']} -DFLK_CORES={config.cores} -DFLK_SORT_UNITS={config.sort_units}"
+    return half.build("flk_rendering", values, settings, define=define)
 
 
 def rendering_rtl(

@@ -12,7 +12,7 @@ from ..explore.facts import MAPS, Scale, imbalance, pixel_grid, visited_counts
 from ..explore.machine import Counters, subtile_cycles
 from ..front.binning import bin_boxes, pixel_boxes
 from ..front.projection import Projected
-from ..params import CHANNELS, CORES, SUBTILE, TILE, RenderConfig
+from ..params import CHANNELS, SUBTILE, TILE, RenderConfig
 from ..perf.lanes import pixels_of_lanes
 from ..perf.work import Work
 from ..scene.camera import Camera
@@ -57,7 +57,7 @@ def imbalance_map(work: Work, config: RenderConfig) -> np.ndarray:
     """(rows, columns) of sub-tiles: pixels of the busiest channel, or of the busiest lane of a core, over the mean."""
     count = visited_counts(work)
     if config.by_lanes:
-        slots = count[:, pixels_of_lanes(config.lanes // CORES)].sum(axis=2)
+        slots = count[:, pixels_of_lanes(config.lanes // config.cores)].sum(axis=2)
     else:
         slots = count.reshape(len(count), CHANNELS, -1).sum(axis=2)
     return imbalance(slots).reshape(work.rows, work.cols)

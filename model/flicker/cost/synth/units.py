@@ -379,13 +379,14 @@ def _lanes() -> list[Unit]:
     """Units of the lanes in the log domain."""
     units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_counters")]
     for config in lane_builds():
-        ports, count, pixels = config.rtl_parameters(), config.lanes // CORES, SUBTILE_PIXELS * CORES // config.lanes
+        ports, count, pixels = config.rtl_parameters(), config.lanes // config.cores, SUBTILE_PIXELS * config.cores // config.lanes
         if config.in_width == RenderConfig().in_width or config.lanes != LANE_COUNTS[0]:
             units += [
                 unit("flk_lane", f"{pixels} pixels", Lanes=count, Lane=0, Slots=config.slots),
                 unit("flk_lane_queue", f"{pixels} pixels", Pixels=pixels, Slots=config.slots, Depth=config.fifo_depth),
             ]
-        units += [unit("flk_lane_core", lane_config(config), **ports | {"Lanes": count}), unit("flk_lane_stage", lane_config(config), **ports)]
+        own = {name: value for name, value in ports.items() if name != "Cores"}  # of a core
+        units += [unit("flk_lane_core", lane_config(config), **own | {"Lanes": count}), unit("flk_lane_stage", lane_config(config), **ports)]
     return units
 
 

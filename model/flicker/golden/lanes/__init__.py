@@ -5,5 +5,6 @@
 `mask`    row intervals: the pixels that can contribute
 `lane`    one pixel-Gaussian pair, and the result of a pixel
 `lists`   records and sub-tile lists
+`streams` lists of the cores, each of one or several sub-tiles
 `render`  whole frames
 """
