@@ -40,10 +40,12 @@ def tables(say: Say) -> dict[str, str]:
         order = sorted(data["units"].items(), key=lambda item: -item[1][1]["lut"])
         units += [[f"`{chip}`", family, f"`{module}`", str(number), *_row(Resources(**own))] for module, (number, own) in order]
         units.append([f"`{chip}`", family, "all", "", *_row(all_)])
-    head, none = ["LUT", "memory in LUTs", "FF", "DSP", "BRAM"], f"None is mapped with its present parameters: {NEXT}."
+    if not kept:  # said rather than left empty
+        full, units = [[f"none mapped with its present parameters: {NEXT}", *[""] * 6]], [["none mapped", *[""] * 8]]
+    head = ["LUT", "memory in LUTs", "FF", "DSP", "BRAM"]
     return {
-        "boards": markdown.table(["chip", "board", "LUT with memory", "FF", "DSP", "BRAM", "fits"], full) if kept else none,
-        "units": markdown.table(["chip", "family", "unit", "number", *head], units) if kept else none,
+        "boards": markdown.table(["chip", "board", "LUT with memory", "FF", "DSP", "BRAM", "fits"], full),
+        "units": markdown.table(["chip", "family", "unit", "number", *head], units),
         "known": markdown.table(["board", "LUT", "FF", "DSP", "BRAM", "source"], [
             [b.name, f"{b.lut:,}", f"{b.ff:,}", f"{b.dsp:,}", str(b.bram), b.source] for b in known.values()
         ]),
