@@ -66,6 +66,8 @@ module fv_delivery #(
     .in_end_i,
     .in_entry_i,
     .finish_o     (finish),
+    .border_i     ('0),
+    .taken_o      (),
     .out_valid_o  (out_valid),
     .out_ready_i,
     .out_end_o    (out_end),

@@ -168,10 +168,11 @@ module flk_rendering
   // ---- lists ----------------------------------------------------------------------------------------
 
   logic                        walk_done, walk_next, unused_second;
+  logic [1:0][3:0]             unused_border;
   logic [TILE_COORD_BITS-1:0]  walk_x, walk_y;
   logic [TurnBits-1:0]         turn_q;
   logic [SortUnits-1:0]        tile_ready, tile_valid;
-  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // of lists, of runs
+  logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // lists, runs
   logic [SortUnits-1:0]               list_valid, list_ready;  // lines
   logic [Readers-1:0][AddrBits-1:0]   ask_addr;
   logic [Readers-1:0][7:0]            ask_len;
@@ -208,7 +209,8 @@ module flk_rendering
     .done_o  (walk_done),
     .tile_x_o(walk_x),
     .tile_y_o(walk_y),
-    .second_o(unused_second)
+    .second_o(unused_second),
+    .border_o(unused_border)
   );
 
   assign walk_next = !walk_done && tile_ready[turn_q];
@@ -378,6 +380,25 @@ module flk_rendering
   logic [Cores-1:0][InWidth-1:0][1:0]            record_subtile;
   logic [31:0]                                   cache_lines;
   logic [3:0]                                    delivery_waits;
+  logic [1:0][3:0]                               border;  // of the tile in turn
+  logic                                          taken, unused_taken_done, unused_taken_second;
+  logic [TILE_COORD_BITS-1:0]                    unused_taken_x, unused_taken_y;
+
+  flk_tile_walk #(
+    .CoordBits(TILE_COORD_BITS)
+  ) i_taken (
+    .clk_i,
+    .rst_ni,
+    .start_i (start),
+    .next_i  (taken),
+    .pairs_i (registers_i.pairs),
+    .rows_i  (registers_i.rows),
+    .done_o  (unused_taken_done),
+    .tile_x_o(unused_taken_x),
+    .tile_y_o(unused_taken_y),
+    .second_o(unused_taken_second),
+    .border_o(border)
+  );
 
   flk_delivery #(
     .Units     (SortUnits),
@@ -402,6 +423,8 @@ module flk_rendering
     .in_end_i     (entry_end),
     .in_entry_i   (entry),
     .finish_o     (finish),
+    .border_i     (border),
+    .taken_o      (taken),
     .out_valid_o  (record_valid),
     .out_ready_i  (record_ready),
     .out_end_o    (record_end),
@@ -442,6 +465,7 @@ module flk_rendering
 
   for (genvar k = 0; k < Cores; k++) begin : gen_core
     logic                       unused_done, next, second;
+    logic [1:0][3:0]            unused_here;
     logic [InWidth-1:0]         own, ends;
     logic [InWidth-1:0][1:0]    number;
     logic [NumberBits+ElementBits-1:0] held;
@@ -498,7 +522,8 @@ module flk_rendering
       .done_o  (unused_done),
       .tile_x_o(x),
       .tile_y_o(y),
-      .second_o(second)
+      .second_o(second),
+      .border_o(unused_here)
     );
 
     for (genvar w = 0; w < InWidth; w++) begin : gen_way

@@ -857,10 +857,8 @@ module flk_top
   assign to_host.capability.log2_lanes.next  = 4'($clog2(Lanes));
   assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
   assign to_host.capability.log2_beat.next   = 4'($clog2(PortBits / 8));
-  assign to_host.capability_units.log2_cores.next         = 4'($clog2(Cores));
-  assign to_host.capability_units.log2_preproc_lanes.next = 4'($clog2(PreprocLanes));
-  assign to_host.capability_units.log2_list_writers.next  = 4'($clog2(ListWriters));
-  assign to_host.capability_units.log2_sort_units.next    = 4'($clog2(SortUnits));
+  assign to_host.capability_units.log2.next  =
+      {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'($clog2(Cores))};
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;
   assign to_host.status.render_busy.next     = rendering_busy;

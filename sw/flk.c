@@ -456,10 +456,10 @@ flk_status_t flk_probe(flk_device_t *device, const flk_bus_t *bus)
   device->beat = (uint32_t)1 << GET(FLK_CAPABILITY_LOG2_BEAT, capability);
   /* Chips of before have four of each. */
   const uint32_t units = device->minor < 4 ? 0x2222 : get(device, FLK_CAPABILITY_UNITS_OFFSET);
-  device->cores = (uint32_t)1 << GET(FLK_CAPABILITY_UNITS_LOG2_CORES, units);
-  device->preproc_lanes = (uint32_t)1 << GET(FLK_CAPABILITY_UNITS_LOG2_PREPROC_LANES, units);
-  device->list_writers = (uint32_t)1 << GET(FLK_CAPABILITY_UNITS_LOG2_LIST_WRITERS, units);
-  device->sort_units = (uint32_t)1 << GET(FLK_CAPABILITY_UNITS_LOG2_SORT_UNITS, units);
+  device->cores = (uint32_t)1 << (units & 15);
+  device->preproc_lanes = (uint32_t)1 << (units >> 4 & 15);
+  device->list_writers = (uint32_t)1 << (units >> 8 & 15);
+  device->sort_units = (uint32_t)1 << (units >> 12 & 15);
   device->started = (uint16_t)GET(FLK_FRAMES_STARTED, get(device, FLK_FRAMES_OFFSET));
   return FLK_OK;
 }

@@ -28,6 +28,8 @@ module flk_record_cache #(
   input  logic [1:0]                  in_skip_i,
   input  logic [1:0][NumberBits-1:0]  in_record_i,
   input  logic [1:0][TagBits-1:0]     in_tag_i,
+  input  logic [5:0]                  in_tile_i,
+  input  logic [1:0][5:0]             in_until_i,
   input  logic                        out_ready_i,
   output logic [1:0]                  out_valid_o,
   output logic [1:0][RecordBits-1:0]  out_record_o,

@@ -71,7 +71,7 @@ module flk_list_writer #(
   // Frame
   input  logic                   start_i,
   output logic                   idle_o,
-  input  logic [1:0]             writer_i,         // its first bank: parity of the tiles, row and column
+  input  logic [1:0]             writer_i,         // first bank: parity of tiles, row and column
   input  logic [CoordBits:0]     columns_i,        // tiles of a bank in a row
   input  logic [LinesBits-1:0]   pointer_lines_i,  // lines of pointers of a bank
   input  logic [ChunkBits:0]     chunks_i,         // a bank may take

@@ -143,6 +143,7 @@ module flk_preprocessing
   localparam int unsigned Records = 4 / Quarters;
   localparam int unsigned InBeatBits = $clog2(Records);
 
+  localparam int unsigned Most = (PreprocLanes + Records - 1) / Records + 2;  // see record_room
   localparam int unsigned Turns = LANES / PreprocLanes;  // of a group, at most
   localparam int unsigned TurnShift = $clog2(Turns);
   localparam int unsigned TurnBits = Turns > 1 ? TurnShift : 1;
@@ -508,7 +509,7 @@ module flk_preprocessing
 
   // So many beats may be needed at most: those of a record a lane, the open one, and one that is told in this cycle.
   // Behind two full beats a third one may still have to be told.
-  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - ((PreprocLanes + Records - 1) / Records + 2)) &&
+  assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - Most) &&
                         (Quarters == 1 || !left_q);
   assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
   assign front_en     = !exit_valid || go;

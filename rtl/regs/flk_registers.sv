@@ -2600,10 +2600,7 @@ module flk_registers (
             readback_data_var[15:0] = hwif_in.progress.pairs.next;
         end
         if(rd_mux_addr == 10'h34) begin
-            readback_data_var[3:0] = hwif_in.capability_units.log2_cores.next;
-            readback_data_var[7:4] = hwif_in.capability_units.log2_preproc_lanes.next;
-            readback_data_var[11:8] = hwif_in.capability_units.log2_list_writers.next;
-            readback_data_var[15:12] = hwif_in.capability_units.log2_sort_units.next;
+            readback_data_var[15:0] = hwif_in.capability_units.log2.next;
         end
         if(rd_mux_addr == 10'h100) begin
             readback_data_var[15:0] = field_storage.frame.tag.value;

@@ -153,26 +153,11 @@ package flk_registers_pkg;
     } flk_registers__progress__in_t;
 
     typedef struct packed {
-        logic [3:0] next;
-    } flk_registers__capability_units__log2_cores__in_t;
+        logic [15:0] next;
+    } flk_registers__capability_units__log2__in_t;
 
     typedef struct packed {
-        logic [3:0] next;
-    } flk_registers__capability_units__log2_preproc_lanes__in_t;
-
-    typedef struct packed {
-        logic [3:0] next;
-    } flk_registers__capability_units__log2_list_writers__in_t;
-
-    typedef struct packed {
-        logic [3:0] next;
-    } flk_registers__capability_units__log2_sort_units__in_t;
-
-    typedef struct packed {
-        flk_registers__capability_units__log2_cores__in_t log2_cores;
-        flk_registers__capability_units__log2_preproc_lanes__in_t log2_preproc_lanes;
-        flk_registers__capability_units__log2_list_writers__in_t log2_list_writers;
-        flk_registers__capability_units__log2_sort_units__in_t log2_sort_units;
+        flk_registers__capability_units__log2__in_t log2;
     } flk_registers__capability_units__in_t;
 
     typedef struct packed {

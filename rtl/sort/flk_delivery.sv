@@ -15,6 +15,8 @@
 // end; in the cycle after that it is about the next tile. Records of such a sub-tile that are not in its
 // core's queue yet do not come; an entry that no sub-tile wants is not looked up. When all four are finished
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
+// border_i: sub-tiles of the tile in turn that touch the one after it (0) and the one behind that (1): an entry there is probably in
+// that one's list too, and its line stays in the cache until then (flk_record_cache). taken_o: its end is taken, the next tile is in turn.
 // start_i (while idle_o) and clear_i (at any time) forget all, cached lines too; no entries may come,
 // and out_ready_i must be low, until idle_o. error_o: the memory answered with an error; until then.
 // waits_o: a cycle ago an entry could be taken and the unit in turn had none (bit 0); it had one that could not be taken (1); the head
@@ -56,6 +58,9 @@ module flk_delivery #(
   input  logic [Units-1:0][1:0]                          in_end_i,
   input  logic [Units-1:0][1:0][NumberBits+Subtiles-1:0] in_entry_i,
   output logic [Units-1:0]                               finish_o,
+  // Walk
+  input  logic [1:0][Subtiles-1:0]                       border_i,
+  output logic                                           taken_o,
   // Cores
   output logic [Cores-1:0][InWidth-1:0]                 out_valid_o,
   input  logic [Cores-1:0]                              out_ready_i,
@@ -114,6 +119,8 @@ module flk_delivery #(
   logic [1:0]                  e_valid_q, leaves, nothing, look, look_ready;
   what_t [1:0]                 e_q, what;
   logic [1:0][NumberBits-1:0]  e_record_q;
+  logic [5:0]                  tile_q, e_tile_q;    // of the walk, modulo 64
+  logic [1:0][5:0]             e_until_q;           // tile until which a line is kept
   logic [1:0][Subtiles-1:0]    kept;
   logic                        e_move, e_ready, e_take, e_end_taken;
 
@@ -145,6 +152,12 @@ module flk_delivery #(
     assign leaves[k]  = nothing[k] || look_ready[k];
     assign what[k]    = '{last: e_q[k].last, mask: kept[k]};
 
+    logic [1:0] meets;
+
+    for (genvar n = 0; n < 2; n++) begin : gen_meets
+      assign meets[n] = (in_entry_i[unit_q][k][Subtiles-1:0] & border_i[n]) != '0;
+    end
+
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
         e_valid_q[k] <= 1'b0;
@@ -160,6 +173,7 @@ module flk_delivery #(
         e_q[k].last   <= in_end_i[unit_q][k];
         e_q[k].mask   <= in_entry_i[unit_q][k][Subtiles-1:0];
         e_record_q[k] <= in_entry_i[unit_q][k][NumberBits+Subtiles-1:Subtiles];
+        e_until_q[k]  <= tile_q + (meets[1] ? 6'd2 : meets[0] ? 6'd1 : '1);
       end
     end
   end
@@ -167,12 +181,23 @@ module flk_delivery #(
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       unit_q <= '0;
+      tile_q <= '0;
     end else if (stop) begin
       unit_q <= '0;
+      tile_q <= '0;
     end else begin
       unit_q <= (unit_q + UnitBits'(e_end_taken)) & UnitBits'(Units - 1);
+      tile_q <= tile_q + 6'(e_end_taken);
     end
   end
+
+  always_ff @(posedge clk_i) begin
+    if (e_take) begin
+      e_tile_q <= tile_q;
+    end
+  end
+
+  assign taken_o = e_end_taken;
 
   logic offered_q, taken_q;
 
@@ -238,6 +263,8 @@ module flk_delivery #(
     .in_skip_i   ({e_q[1].last, e_q[0].last}),
     .in_record_i (e_record_q),
     .in_tag_i    (what),
+    .in_tile_i   (e_tile_q),
+    .in_until_i  (e_until_q),
     .out_ready_i (room_q),
     .out_valid_o (found_valid),
     .out_record_o(found_record),

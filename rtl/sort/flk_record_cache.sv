@@ -8,7 +8,10 @@
 // a line that is still needed is never lost, and a lookup that finds its tag finds its data.
 // Elements with in_skip_i look nothing up and keep their place in the order. What comes out must be
 // taken, output 0 before output 1; none comes in the cycle after one with out_ready_i low.
-// Memory of Banks x Sets x Ways lines of 32 bytes; the way that is replaced is the oldest of its set.
+// Memory of Banks x Sets x Ways lines of 32 bytes. A line is wanted until a tile, as its last lookup says (in_until_i, a number modulo
+// 64; in_tile_i is that of the present tile, of both lookups): so long it is not replaced while its set has another. The way that is replaced
+// is the first one, from the one behind the last one replaced, that is empty or wanted no more; that first one where all are wanted. A line is
+// wanted where in_until_i - in_tile_i is 0 to 2.
 // start_i (while idle_o) and clear_i (at any time) forget all; idle_o rises when what was asked for has
 // come and the tags are cleared (Sets cycles). error_o: the memory answered with an error; until then.
 // Throughput: two elements a cycle, one where both are of the same bank (at the data: if both read, or both write, or
@@ -28,6 +31,7 @@ module flk_record_cache #(
   parameter  int unsigned AddrBits    = 40,
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
+  localparam int unsigned UntilBits   = 6,
   localparam int unsigned Width       = 256,
   localparam int unsigned Shift       = $clog2(Width / 8)
 ) (
@@ -47,6 +51,8 @@ module flk_record_cache #(
   input  logic [1:0]                      in_skip_i,
   input  logic [1:0][NumberBits-1:0]      in_record_i,
   input  logic [1:0][TagBits-1:0]         in_tag_i,
+  input  logic [UntilBits-1:0]            in_tile_i,
+  input  logic [1:0][UntilBits-1:0]       in_until_i,
   // Records
   input  logic                            out_ready_i,
   output logic [1:0]                      out_valid_o,
@@ -92,8 +98,9 @@ module flk_record_cache #(
   end
 
   typedef struct packed {
-    logic               valid;
-    logic [KeyBits-1:0] key;
+    logic                 valid;
+    logic [UntilBits-1:0] keep;  // until which it is wanted
+    logic [KeyBits-1:0]   key;
   } way_t;
 
   typedef struct packed {
@@ -159,6 +166,8 @@ module flk_record_cache #(
   logic [1:0]                   b_valid_q, b_skip_q, b_part_q;
   logic [1:0][LineBits-1:0]     b_line_q;
   logic [1:0][TagBits-1:0]      b_tag_q;
+  logic [1:0][UntilBits-1:0]    b_until_q;
+  logic [2:0][UntilBits-1:0]    b_tiles_q;  // the present one, the next, the one behind
   logic [1:0][BankBits-1:0]     b_bank;
   logic [1:0][SetBits-1:0]      b_set;
 
@@ -191,40 +200,65 @@ module flk_record_cache #(
         b_skip_q[c] <= in_skip_i[c];
         b_part_q[c] <= in_part[c];
         b_line_q[c] <= in_line[c];
-        b_tag_q[c]  <= in_tag_i[c];
+        b_tag_q[c]   <= in_tag_i[c];
+        b_until_q[c] <= in_until_i[c];
       end
+    end
+    if (take != '0) begin
+      b_tiles_q <= {in_tile_i + UntilBits'(2), in_tile_i + UntilBits'(1), in_tile_i};
     end
   end
 
   // ---- B: tags --------------------------------------------------------------------------------------
 
-  logic [Banks-1:0]         row_write;
   row_t [Banks-1:0]         row_read;
   row_t [1:0]               row, row_d, kept_q;
-  logic [1:0]               is_kept_q, miss;
+  logic [1:0]               is_kept_q, miss, changed;  // changed: the row
   logic [1:0][Ways-1:0]     hits;
   logic [1:0][WayBits-1:0]  way;
   element_t [1:0]           pushed, head;
   miss_t [1:0]              missed, next;
+
+  // Rows that a lookup has changed are written in the cycle after it.
+  logic [1:0]               store_valid_q;
+  logic [1:0][BankBits-1:0] store_bank_q;
+  logic [1:0][SetBits-1:0]  store_set_q;
+  row_t [1:0]               store_row_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      store_valid_q <= '0;
+    end else begin
+      store_valid_q <= (advance && !stop) ? changed : '0;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    for (int unsigned c = 0; c < 2; c++) begin
+      if (advance) begin
+        store_bank_q[c] <= b_bank[c];
+        store_set_q[c]  <= b_set[c];
+        store_row_q[c]  <= row_d[c];
+      end
+    end
+  end
 
   for (genvar b = 0; b < Banks; b++) begin : gen_bank
     logic [1:0] reads, writes;
 
     for (genvar c = 0; c < 2; c++) begin : gen_port
       assign reads[c]  = take[c] && !in_skip_i[c] && in_bank[c] == BankBits'(b);
-      assign writes[c] = miss[c] && b_bank[c] == BankBits'(b);
+      assign writes[c] = store_valid_q[c] && store_bank_q[c] == BankBits'(b);
     end
-
-    assign row_write[b] = advance && writes != '0;
 
     flk_sram #(
       .Width($bits(row_t)),
       .Depth(Sets)
     ) i_rows (
       .clk_i,
-      .wr_en_i  (clearing || row_write[b]),
-      .wr_addr_i(clearing ? step_q : writes[1] ? b_set[1] : b_set[0]),
-      .wr_data_i(clearing ? '0 : writes[1] ? row_d[1] : row_d[0]),
+      .wr_en_i  (clearing || writes != '0),
+      .wr_addr_i(clearing ? step_q : writes[1] ? store_set_q[1] : store_set_q[0]),
+      .wr_data_i(clearing ? '0 : writes[1] ? store_row_q[1] : store_row_q[0]),
       .rd_en_i  (reads != '0),
       .rd_addr_i(reads[1] ? in_set[1] : in_set[0]),
       .rd_data_o(row_read[b])
@@ -241,33 +275,73 @@ module flk_record_cache #(
 
     assign miss[c] = b_valid_q[c] && !b_skip_q[c] && hits[c] == '0;
 
+    // The first way that may go from the one in turn on; else the first of all that may; else the one in turn. One-hot.
+    logic [Ways-1:0]    keeps, behind, late, early, turn, victim;
+    logic [WayBits-1:0] found, leaves;
+
+    for (genvar w = 0; w < Ways; w++) begin : gen_keeps
+      logic [2:0] same;  // wanted until this tile, the next, the one behind
+
+      for (genvar t = 0; t < 3; t++) begin : gen_same
+        assign same[t] = row[c].way[w].keep == b_tiles_q[t];
+      end
+
+      assign keeps[w]  = row[c].way[w].valid && same != '0;
+      assign turn[w]   = WayBits'(w) == row[c].turn;
+    end
+
+    assign behind = {Ways{1'b1}} << row[c].turn;
+
     always_comb begin
-      way[c] = row[c].turn;
-      if (hits[c] != '0) begin
-        way[c] = '0;
+      late   = ~keeps & behind;
+      early  = ~keeps;
+      late  &= ~(late - 1'b1);
+      early &= ~(early - 1'b1);
+      victim = late != '0 ? late : early != '0 ? early : turn;
+      found  = '0;
+      leaves = '0;
+      for (int unsigned w = 0; w < Ways; w++) begin
+        found  |= hits[c][w] ? WayBits'(w) : '0;
+        leaves |= victim[w] ? WayBits'(w) : '0;
+      end
+      way[c] = hits[c] != '0 ? found : leaves;
+    end
+
+    always_comb begin
+      row_d[c]   = row[c];
+      changed[c] = miss[c];
+      if (miss[c]) begin
+        row_d[c].turn = '0;
         for (int unsigned w = 0; w < Ways; w++) begin
-          way[c] |= hits[c][w] ? WayBits'(w) : '0;
+          row_d[c].turn |= victim[w] ? WayBits'(w + 1) : '0;
         end
       end
-      row_d[c]      = row[c];
-      row_d[c].turn = row[c].turn + 1'b1;
       for (int unsigned w = 0; w < Ways; w++) begin
-        if (row[c].turn == WayBits'(w)) begin
-          row_d[c].way[w] = {1'b1, b_line_q[c][LineBits-1:BankBits+SetBits]};
+        if (miss[c] && victim[w]) begin
+          row_d[c].way[w] = {1'b1, b_until_q[c], b_line_q[c][LineBits-1:BankBits+SetBits]};
+        end
+        if (b_valid_q[c] && !b_skip_q[c] && hits[c][w] &&
+            row[c].way[w].keep != b_until_q[c]) begin
+          row_d[c].way[w].keep = b_until_q[c];
+          changed[c]           = 1'b1;
         end
       end
     end
 
-    // A row that is written as it is read.
+    // A row that has been changed and is not in the memory as it is read.
+    logic [1:0] fresh, stored;
+
+    for (genvar o = 0; o < 2; o++) begin : gen_changed
+      assign fresh[o]  = changed[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]};
+      assign stored[o] = store_valid_q[o] &&
+                         {store_set_q[o], store_bank_q[o]} == {in_set[c], in_bank[c]};
+    end
+
     always_ff @(posedge clk_i) begin
       if (take[c]) begin
-        is_kept_q[c] <= 1'b0;
-        for (int unsigned o = 0; o < 2; o++) begin
-          if (miss[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]}) begin
-            is_kept_q[c] <= 1'b1;
-            kept_q[c]    <= row_d[o];
-          end
-        end
+        is_kept_q[c] <= fresh != '0 || stored != '0;
+        kept_q[c]    <= fresh[0] ? row_d[0] : fresh[1] ? row_d[1]
+                        : store_row_q[stored[1]];
       end
     end
 

@@ -4,7 +4,8 @@
 // of it), the first one downward, then upward and downward in turn; in a column pairs with the left or the right tile first in turn,
 // beginning with the one that the band comes from.
 // start_i: the next tile is the first one. next_i: go on to the tile behind; after the last one done_o is high and tile_*_o mean
-// nothing. pairs_i and rows_i stay from start_i on; both are at least 1. No combinational path.
+// nothing. border_o: sub-tiles of the tile (bit k: column k % 2, row k / 2) that touch the next tile (0) and the one behind it (1), where
+// these are in the same column of pairs. pairs_i and rows_i stay from start_i on; both are at least 1. No combinational path.
 module flk_tile_walk #(
   parameter  int unsigned CoordBits = 8,
   localparam int unsigned BandBits  = 3
@@ -18,7 +19,8 @@ module flk_tile_walk #(
   output logic                 done_o,
   output logic [CoordBits-1:0] tile_x_o,
   output logic [CoordBits-1:0] tile_y_o,
-  output logic                 second_o   // of its pair
+  output logic                 second_o,  // of its pair
+  output logic [1:0][3:0]      border_o
 );
 
   if (CoordBits <= BandBits) begin : gen_check
@@ -85,6 +87,14 @@ module flk_tile_walk #(
   assign tile_x_o = {pair_q, half_q};
   assign tile_y_o = y_q;
   assign second_o = second_q;
+
+  // The first tile of a pair has the second beside it, the second one the first of the next pair above or below.
+  logic [3:0] side, row;
+
+  assign side        = half_q ? 4'b0101 : 4'b1010;
+  assign row         = up_q ? 4'b0011 : 4'b1100;
+  assign border_o[0] = !second_q ? side : last_row ? '0 : row;
+  assign border_o[1] = last_row ? '0 : side & row;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) next_i |-> !done_q)

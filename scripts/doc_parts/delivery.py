@@ -10,6 +10,7 @@ from flicker.chip.tile_lists import TileLists
 from flicker.golden.front.frame import run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.render import render_golden
+from flicker.golden.walk import borders
 from flicker.markdown import table
 from flicker.params import RenderConfig
 from flicker.perf.long_lists import BEGIN, MEMORY
@@ -41,8 +42,9 @@ def tables(say: Say) -> dict[str, str]:
         say(f"{title}: what cores take")
         finished = lists.by_tile(render_golden(lists.lists, RenderConfig()).needed)
         say(f"{title}: delivery")
-        arrays = lists.start, lists.record, lists.mask
-        whole, until, slow = deliver(*arrays), deliver(*arrays, finished), deliver(*arrays, finished, timing=DramConfig().timing)
+        arrays, touching = (lists.start, lists.record, lists.mask), borders(lists.cols // 2, lists.rows)
+        whole, until = deliver(*arrays, borders=touching), deliver(*arrays, finished, borders=touching)
+        slow = deliver(*arrays, finished, borders=touching, timing=DramConfig().timing)
         rows.append((title, len(lists.record), int((np.diff(lists.start) > lists.capacity).sum()), _sorting(lists), whole.cycles, whole.lines, until.cycles,
                      until.lines, slow.cycles))
     return {"alone": table(

@@ -1,14 +1,15 @@
-"""`make docs PART=record_cache`: lines that the record cache reads for whole lists, by its size and by the order of the tiles, in
-docs/results/delivery.md."""
+"""`make docs PART=record_cache`: lines that the record cache reads for whole lists, by its size, by what it replaces and by the order of the tiles,
+in docs/results/delivery.md."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
+from flicker.chip.rendering import cache_lookup
 from flicker.golden.delivery import LINE_BYTES
 from flicker.golden.front.frame import FrontFrame, run_front
-from flicker.golden.walk import BAND, tile_walk
+from flicker.golden.walk import BAND, borders, tile_walk
 from flicker.markdown import table
 from flicker.params import TILE
 from flicker.pipeline import packed_scene
@@ -21,17 +22,14 @@ SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (2048, 4))
 
 
 @numba.njit(cache=True)
-def _lines(line, sets, ways):
-    """Lines read: as `flicker.golden.delivery.RecordCache`, whose banks are low bits of the set."""
+def _lines(line, tile, until, sets, ways):
+    """Lines read. tile: of each lookup, number in the walk; until: tiles after it for which the line is wanted."""
     held = np.full((sets, ways), -1, np.int64)
+    marks = np.zeros((sets, ways), np.int64)
     turn = np.zeros(sets, np.int64)
     n = 0
     for k in range(len(line)):
-        s = line[k] % sets
-        if not (held[s] == line[k]).any():
-            held[s, turn[s]] = line[k]
-            turn[s] = (turn[s] + 1) % ways
-            n += 1
+        n += cache_lookup(line[k], tile[k], until[k], held, marks, turn, ways)
     return n
 
 
@@ -52,6 +50,16 @@ def _walks(cols: int, rows: int) -> dict[str, np.ndarray]:
     }
 
 
+def _wanted(tile: np.ndarray, mask: np.ndarray, cols: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of each entry the number of its tile in the chip's walk, and for how many tiles after it the cache keeps its line."""
+    x, y = tile_walk(-(-cols // 2), rows)
+    place = np.empty((rows, x.max() + 1), np.int64)
+    place[y, x] = np.arange(len(x))
+    at = place[tile // cols, tile % cols]
+    touching = borders(-(-cols // 2), rows)[at]
+    return at, np.where(mask & touching[:, 1], 2, np.where(mask & touching[:, 0], 1, -1))
+
+
 def sorted_entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Record number, tile and mask of every list entry, lists sorted."""
     number = front.number[front.entry_splat]
@@ -60,12 +68,12 @@ def sorted_entries(front: FrontFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def tables(say: Say) -> dict[str, str]:
-    sizes: dict[tuple[int, int], list[str]] = {key: [] for key in SIZES}
+    sizes: dict[tuple[int, int, bool], list[str]] = {(*key, wanted): [] for key in SIZES for wanted in (False, True)}
     walks: dict[str, list[str]] = {}
     titles = []
     for title, view in titled_views(say):
         front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
-        number, tile, _ = sorted_entries(front)
+        number, tile, mask = sorted_entries(front)
         per_line = LINE_BYTES // front.kind.bytes
         cores = np.bitwise_count(front.entry_mask).mean()
         titles.append(f"{title}: {len(number):,} entries, {cores:.2f} cores each, {len(np.unique(number // per_line)):,} lines")
@@ -73,11 +81,16 @@ def tables(say: Say) -> dict[str, str]:
         for name, walk in _walks(cols, rows).items():
             order = np.argsort(np.argsort(walk)[tile], kind="stable")
             line = number[order] // per_line
-            walks.setdefault(name, []).append(f"{_lines(line, DEFAULT[0] // DEFAULT[1], DEFAULT[1]):,}")
+            never = np.full(len(line), -1)
+            walks.setdefault(name, []).append(f"{_lines(line, never, never, DEFAULT[0] // DEFAULT[1], DEFAULT[1]):,}")
             if name.endswith("(the chip)"):
-                for lines, ways in SIZES:
-                    sizes[lines, ways].append(f"{_lines(line, lines // ways, ways):,}")
+                at, until = _wanted(tile[order], mask[order], cols, rows)
+                for lines, ways, wanted in sizes:
+                    sizes[lines, ways, wanted].append(f"{_lines(line, at, until if wanted else never, lines // ways, ways):,}")
     return {
-        "sizes": table(["lines", "ways", *titles], [[f"{lines:,}", str(ways), *cells] for (lines, ways), cells in sizes.items()]),
+        "sizes": table(
+            ["lines", "ways", "replaced", *titles],
+            [[f"{lines:,}", str(ways), "wanted no more" if wanted else "oldest", *cells] for (lines, ways, wanted), cells in sizes.items()],
+        ),
         "walks": table(["tiles", *titles], [[name, *cells] for name, cells in walks.items()]),
     }

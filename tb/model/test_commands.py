@@ -69,6 +69,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make check(?: BASE=.*)?", "tb/test_selection.py::test_plan"),
     (r"make record(?: REASON=.*)?", "tb/model/test_gates.py::test_holding"),
     (r"make site", "tb/test_pages.py::test_site_is_built"),
+    (r"make fpga(?: .*)?", "tb/model/test_fpga.py::test_unit"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),
     (r"scripts/gen_\w+.py --check", "tb/common/test_arithmetic.py::test_generated_packages"),

@@ -105,6 +105,8 @@ class Delivery:
         bits, number = 8 * self.bytes, len(dut.in_entry_i) // (2 * self.count)
         ready = 0
         turn, due = 0, 0  # unit that is taken from; waits_o of it in the next cycle
+        step = 0  # of the walk
+        dut.border_i.value = 0
         told: list[set[int]] = [set() for _ in range(SUBTILES)]
         while True:
             await edge
@@ -125,6 +127,11 @@ class Delivery:
             self.waits = [n + (waits >> k & 1) for k, n in enumerate(self.waits)]
             if offered and taken and any(self.units[turn].item(k)[0] for k in range(offered)):
                 turn = (turn + 1) % self.count
+                assert dut.taken_o.value == 1
+                step += 1
+                dut.border_i.value = 91 * step % 256
+            else:
+                assert dut.taken_o.value == 0
             # Units
             moved, finish = int(dut.in_ready_o.value), int(dut.finish_o.value)
             for u, unit in enumerate(self.units):

@@ -16,7 +16,7 @@ from flicker.sim.memory import Memory, PortConfig
 RECORDS = 1 << 13
 LAST = (1 << 24) - 64  # the last numbers that there are
 BASE = (1 << 40) - (1 << 29) - 0xABC0  # the sum of an address carries far up, behind a sixth or a third of the records
-Element = tuple[int, int, int]  # skip, record, tag
+Element = tuple[int, int, int, int, int]  # skip, record, tag, tile, tiles after it for which the line is wanted
 
 
 class Cache:
@@ -65,7 +65,7 @@ class Cache:
             stopped = int(dut.start_i.value) | int(dut.clear_i.value)
             for c in range(2):
                 if offered[c] is not None and taken >> c & 1:
-                    skip, record, _ = element = offered[c]
+                    skip, record, _, tile, until = element = offered[c]
                     offered[c] = None
                     self.queue.popleft()
                     if stopped:
@@ -73,7 +73,7 @@ class Cache:
                     self.taken += 1
                     self.due.append(element)
                     if not skip:
-                        line, miss = self.golden.lookup(record)
+                        line, miss = self.golden.lookup(record, tile, until)
                         self.hits += not miss
                         if miss:
                             self.lines.append(line)
@@ -85,14 +85,18 @@ class Cache:
             if len(left) == 1 and self.rng.random() < 0.5:
                 offered = [None, *left]  # what waited stays where it was, or moves up
             else:
-                while len(left) < min(2, len(self.queue)) and not next(self.idle):
+                while len(left) < min(2, len(self.queue)) and self.queue[len(left)][3] == self.queue[0][3] and not next(self.idle):
                     left.append(self.queue[len(left)])
                 offered = [*left, None, None][:2]
-            heads = [element or (self.rng.getrandbits(1), self.rng.getrandbits(number_bits), 0) for element in offered]
+            heads = [element or (self.rng.getrandbits(1), self.rng.getrandbits(number_bits), 0, 0, self.rng.getrandbits(6)) for element in offered]
+            tiles = {element[3] for element in offered if element} or {self.rng.getrandbits(6)}
+            assert len(tiles) == 1
             dut.in_valid_i.value = sum((element is not None) << c for c, element in enumerate(offered))
             dut.in_skip_i.value = sum(heads[c][0] << c for c in range(2))
             dut.in_record_i.value = sum(heads[c][1] << number_bits * c for c in range(2))
             dut.in_tag_i.value = sum(heads[c][2] << tag_bits * c for c in range(2))
+            dut.in_tile_i.value = (tile := tiles.pop()) % 64
+            dut.in_until_i.value = sum((tile + heads[c][4]) % 64 << 6 * c for c in range(2))
             dut.out_ready_i.value = not next(self.stall)
 
     def forget(self) -> None:
@@ -124,7 +128,7 @@ class Cache:
         for c in range(2):
             if valid >> c & 1:
                 assert self.due, f"output {c}: an element too many"
-                skip, record, tag = self.due.popleft()
+                skip, record, tag, _, _ = self.due.popleft()
                 got = int(dut.out_tag_o.value) >> tag_bits * c & (1 << tag_bits) - 1
                 assert got == tag, f"output {c}: tag {got}, due {tag}"
                 if not skip and not self.wrong:
@@ -145,8 +149,9 @@ class Cache:
 
 
 def elements(rng, count: int, tag_bits: int) -> list[Element]:
-    """Runs of records: one line, one set, neighbours, anywhere; some again soon."""
+    """Runs of records: one line, one set, neighbours, anywhere; some again soon. Tiles of 1 to 60 of them, lines that are wanted for none to two more."""
     out: list[int] = []
+    tile = rng.randrange(100)
     while len(out) < count:
         first, n = rng.randrange(RECORDS), rng.randrange(1, 20)
         kind = rng.randrange(6)
@@ -162,7 +167,12 @@ def elements(rng, count: int, tag_bits: int) -> list[Element]:
             out += [LAST + rng.choice((63, rng.randrange(64))) if rng.random() < 0.7 else first for _ in range(n)]
         else:
             out += [rng.randrange(RECORDS) for _ in range(n)]
-    return [(int(rng.random() < 0.05), record, rng.getrandbits(tag_bits)) for record in out[:count]]
+    made: list[Element] = []
+    share = rng.choice((0.03, 0.2, 0.8))
+    for record in out[:count]:
+        tile += rng.random() < share
+        made.append((int(rng.random() < 0.05), record, rng.getrandbits(tag_bits), tile, rng.choice((-1, 1, 2))))
+    return made
 
 
 def fill(cache: Cache, count: int) -> None:
@@ -192,11 +202,11 @@ async def rate(dut):
     await cache.ready()
     step = 32 // cache.bytes
     banks = int(dut.Banks.value)
-    warm = [(0, step * k, 0) for k in range(banks)]
+    warm = [(0, step * k, 0, 0, -1) for k in range(banks)]
     cache.queue.extend(warm)
     await cache.through()
     for shift, limit in ((1, 0.55), (0, 1.05)):
-        cache.queue.extend((0, step * (shift * k % banks), k % 4) for k in range(800))
+        cache.queue.extend((0, step * (shift * k % banks), k % 4, 0, -1) for k in range(800))
         cycles = await cache.through()
         assert cycles < 800 * limit + 20, f"{cycles} cycles"
 
@@ -207,9 +217,9 @@ async def latency(dut):
     cache = Cache(dut)
     await cache.bench.reset()
     await cache.ready()
-    cache.queue.append((0, 7, 1))
+    cache.queue.append((0, 7, 1, 0, -1))
     await cache.through()
-    cache.queue.append((0, 7, 2))
+    cache.queue.append((0, 7, 2, 0, -1))
     edge = RisingEdge(dut.clk_i)
     while not int(dut.in_valid_i.value):
         await edge
@@ -219,6 +229,34 @@ async def latency(dut):
         await edge
         cycles += 1
     assert cycles == 4, f"{cycles} cycles"
+    await cache.through()
+
+
+@cocotb.test()
+async def wanted(dut):
+    """A wanted line outlives as many others of its set as there are ways; one that is not goes in its turn; wanted lines alone do not stop others."""
+    cache = Cache(dut)
+    await cache.bench.reset()
+    await cache.ready()
+    ways, step = int(dut.Ways.value), 32 // cache.bytes * int(dut.Banks.value) * int(dut.Sets.value)
+    limit = RECORDS // step
+    for until, lines, again in ((2, ways + 1, False), (-1, ways + 1, True), (2, 2 * ways, False)):
+        if lines >= limit:
+            continue
+        dut.start_i.value = 1
+        await RisingEdge(dut.clk_i)
+        dut.start_i.value = 0
+        cache.forget()
+        await RisingEdge(dut.clk_i)
+        await cache.ready()
+        others = [(0, step * k, 0, 1, -1) for k in range(1, lines)]
+        cache.queue.extend([(0, 0, 0, 0, until), *others])
+        await cache.through()
+        asked = cache.asked
+        cache.queue.append((0, 0, 0, 2, -1))
+        await cache.through()
+        assert (cache.asked > asked) == again, f"wanted for {until} tiles, {lines} lines"
+    cache.queue.extend((0, step * (k % limit), 0, 2, 2) for k in range(3 * limit))
     await cache.through()
 
 
@@ -271,10 +309,10 @@ async def errors(dut):
     await cache.bench.reset()
     await cache.ready()
     per = 32 // cache.bytes
-    cache.queue.extend((0, per * k, 0) for k in range(5))
+    cache.queue.extend((0, per * k, 0, 0, -1) for k in range(5))
     await cache.through()
     assert dut.error_o.value == 0
-    cache.queue.extend((0, per * k, 0) for k in range(8))
+    cache.queue.extend((0, per * k, 0, 0, -1) for k in range(8))
     await cache.through()
     assert dut.error_o.value == 1
     dut.start_i.value = 1

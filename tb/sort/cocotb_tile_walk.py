@@ -6,7 +6,7 @@ import cocotb
 from cocotb.triggers import FallingEdge
 from flicker_tb.bench import Bench
 
-from flicker.golden.walk import tile_walk
+from flicker.golden.walk import borders, tile_walk
 
 
 class Walk:
@@ -34,6 +34,7 @@ class Walk:
         """From the first tile on; to the end, or `steps` steps."""
         dut, idle = self.dut, self.bench.stall(pause)
         tiles = list(zip(*(v.tolist() for v in tile_walk(pairs, rows)), strict=True))
+        border = [int(a) | int(b) << 4 for a, b in borders(pairs, rows)]
         for k, tile in enumerate(tiles[:steps]):
             while True:
                 stay = next(idle)
@@ -42,6 +43,7 @@ class Walk:
                 seen = int(dut.tile_x_o.value), int(dut.tile_y_o.value)
                 assert seen == tile, f"{pairs} x {rows}: tile {k} is {seen}, due {tile}"
                 assert int(dut.second_o.value) == k % 2
+                assert int(dut.border_o.value) == border[k], f"{pairs} x {rows}: tile {k}: borders {int(dut.border_o.value):#x}, due {border[k]:#x}"
                 await FallingEdge(dut.clk_i)
                 if not stay:
                     break

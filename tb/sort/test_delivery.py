@@ -14,7 +14,7 @@ from flicker_tb.elaboration import refused
 from flicker_tb.runner import build_and_test, seed
 
 from flicker.chip.dram import DramConfig
-from flicker.golden.delivery import RecordCache
+from flicker.golden.delivery import RecordCache, wanted_until
 from flicker.sim.delivery import deliver
 
 SMALL = {"Units": 2, "Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
@@ -47,9 +47,10 @@ def test_alone() -> None:
     lengths = rng.integers(0, 600, 40)
     start = np.concatenate([[0], np.cumsum(lengths)])
     record, mask = rng.integers(0, 4000, start[-1]), rng.integers(0, 16, start[-1])
-    whole = deliver(start, record, mask, seed=seed())
+    border, tile = rng.integers(0, 16, (40, 2)) * rng.integers(0, 2, (40, 2)), np.repeat(np.arange(40), lengths)
+    whole = deliver(start, record, mask, borders=border, seed=seed())
     cache = RecordCache()
-    assert whole.lines == sum(cache.lookup(int(r))[1] for r, m in zip(record, mask) if m)
+    assert whole.lines == sum(cache.lookup(int(r), int(t), wanted_until(int(m), border[t]))[1] for r, m, t in zip(record, mask, tile) if m)
     given = np.array([(mask >> s & 1).sum() for s in range(4)])
     assert whole.given == tuple(given) and whole.cycles >= max(given)
     most = np.add.reduceat(np.stack([mask >> s & 1 for s in range(4)], axis=1), start[:-1][lengths > 0])

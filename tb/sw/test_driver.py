@@ -395,7 +395,7 @@ class Chip:
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
         self.set("version", 3 | 4 << 8)
-        self.field("capability_units", log2_cores=1, log2_preproc_lanes=0, log2_list_writers=2, log2_sort_units=1)
+        self.set("capability_units", 0x1201)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)

@@ -29,6 +29,7 @@ from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.lanes.lists import front_lists
 from ..golden.masked import render_masked
 from ..golden.render import stream_order
+from ..golden.walk import borders
 from ..params import CORES, LANE_ROW_MASK_STAGES, LANE_SETUP_STAGES, LINE_BITS, TILE, CatMode, RenderConfig, vru_stages
 from ..perf.lanes import COLOUR, STATE, lane_work, simulate_lanes
 from ..perf.long_lists import BEGIN
@@ -49,6 +50,7 @@ OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 64, 6  # records of each core; places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
+CACHE_SETS, CACHE_WAYS = 256, 4  # of the record cache, all banks
 DEPTH, PLACES = 256, 128  # elements that wait in the cache, lines on their way
 FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
@@ -69,14 +71,23 @@ NEVER = np.int64(1) << 60
 
 
 @numba.njit(cache=True)
-def _lookup(line, held, turn, ways):
-    """Whether the cache has to read a line; it has it then (`golden.delivery.RecordCache`)."""
+def cache_lookup(line, tile, until, held, marks, turn, ways):
+    """Whether the cache has to read a line; it has it then (`golden.delivery.RecordCache`). held, marks: int64 (sets, ways), lines (-1: none) and the tiles
+    until which they are wanted; turn: int64 (sets,)."""
     at = line % held.shape[0]
     for w in range(ways):
         if held[at, w] == line:
+            marks[at, w] = tile + until
             return False
-    held[at, turn[at]] = line
-    turn[at] = (turn[at] + 1) % ways
+    way = turn[at]
+    for k in range(ways):
+        w = (turn[at] + k) % ways
+        if held[at, w] < 0 or (marks[at, w] - tile) % 64 > 2:
+            way = w
+            break
+    held[at, way] = line
+    marks[at, way] = tile + until
+    turn[at] = (way + 1) % ways
     return True
 
 
@@ -127,17 +138,17 @@ def _issue(t, k, depth, recent, arrived, left, count, written, popped, entries):
 
 @numba.njit(cache=True)
 def _frame(
-    tile_start, record, mask, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
+    tile_start, record, mask, border, lines_start, chunk_entries, sort_delay, batch_start, batch_size, batch_given, batch_delay, element_start, element_mask,
     element_cycles, finish, finish_op, listed, per_line, sets, ways, read_latency, line_latency, refresh, reads, early, ctu_latency, ctu_fifo, one_token,
     depth, blend, out_delay, served, needed, base, memory, gap, sizes, cores, missed,
 ):
     """Cycles of a frame; lines of records; batches of each list that are given (T,); records given to each core of each tile (T, 4). missed: takes the lines
     of records in the order in which they are read.
 
-    Arrays over tiles in the order of the walk (T), their entries, the chunks of their lists (`lines_start`, entries of each), batches of their lists, and the
-    elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many elements of a tile. refresh: (period,
-    length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one without banks. gap: cycles from line to
-    line of records at the port. sizes: entries in a
+    Arrays over tiles in the order of the walk (T; `border` (T, 2), of `walk.borders`), their entries, the chunks of their lists (`lines_start`, entries of
+    each), batches of their lists, and the elements of the cores' streams (`element_start` (T, 4)). served, needed (T, 4): cycles that a core has for so many
+    elements of a tile. refresh: (period, length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one
+    without banks. gap: cycles from line to line of records at the port. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
     behind a sorting unit, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
     """
@@ -171,6 +182,7 @@ def _frame(
     # Cache
     held = np.full((sets, ways), -1, np.int64)
     turn = np.zeros(sets, np.int64)
+    marks = np.zeros((sets, ways), np.int64)
     channels, banks = memory[0], memory[3]
     open_row, activated = np.full((channels, banks), -1, np.int64), np.full((channels, banks), -1e9)
     last_activated, bus = np.full(channels, -1e9), np.full(channels, -1e9)
@@ -388,7 +400,8 @@ def _frame(
             come = t + FOUND
             if not is_end:
                 line = record[at] // per_line
-                if _lookup(line, held, turn, ways):
+                until = 2 if mask[at] & border[t_c, 1] else 1 if mask[at] & border[t_c, 0] else -1  # `golden.delivery.wanted_until`
+                if cache_lookup(line, t_c, until, held, marks, turn, ways):
                     ask = max(t + 2, last_ask + 1)
                     if misses >= PLACES:
                         ask = max(ask, line_used[misses % PLACES])
@@ -567,9 +580,10 @@ def estimate(
         # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits.
         rate, later = (*memory[:-1], memory[-1] / (1.0 - busy)), round(LOADED * busy / (1.0 - busy))
         clock, misses, batches, given = _frame(
-            tables.start, tables.record, tables.mask, tables.chunk_start, chunk_entries, delay, tables.batch_start, tables.batch_size,
-            tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles, tables.by_tile(finish), tables.by_tile(finish_op),
-            listed, RECORD_LINE // tables.frame.kind.bytes, 256, 4, READ + list_latency, line_latency + later, refresh, reads, early,
+            tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
+            tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
+            tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, CACHE_SETS, CACHE_WAYS,
+            READ + list_latency, line_latency + later, refresh, reads, early,
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,

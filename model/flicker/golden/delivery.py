@@ -38,23 +38,42 @@ def may_be_given(records: np.ndarray, lengths: np.ndarray, needed: np.ndarray, w
     return (records <= lengths) & (records >= (lengths if whole else needed))
 
 
+def wanted_until(mask: int, borders: Sequence[int]) -> int:
+    """Tiles for which the cache keeps the line of an entry after its own tile: 2 or 1 where its mask touches a tile that comes so soon
+    (`walk.borders`), so that the splat is probably in that one's list too; -1: not even for the own tile."""
+    return 2 if mask & borders[1] else 1 if mask & borders[0] else -1
+
+
 class RecordCache:
-    """Lines held. banks, sets (of a bank), ways: powers of two. A line that is not there takes the way whose turn it is in its set: the oldest one goes."""
+    """Lines held. banks, sets (of a bank), ways: powers of two.
+
+    Each line held is wanted until a tile of the walk, as its last lookup says (`wanted_until`). A line that is not there takes the first way, from the one
+    behind the way taken last in its set, that is empty or whose line is wanted no more; the first of all where there is none. Tiles are compared modulo
+    TILES, by the difference to the present one: 0 to 2 is wanted.
+    """
+
+    TILES = 64
 
     def __init__(self, banks: int = 4, sets: int = 64, ways: int = 4, record_bytes: int = 16) -> None:
         self.banks, self.sets, self.ways, self.per_line = banks, sets, ways, LINE_BYTES // record_bytes
         self._held: list[list[int | None]] = [[None] * ways for _ in range(banks * sets)]
+        self._until = [[0] * ways for _ in range(banks * sets)]
         self._turn = [0] * (banks * sets)
 
     def bank(self, record: int) -> int:
         return record // self.per_line % self.banks
 
-    def lookup(self, record: int) -> tuple[int, bool]:
-        """The line of a record, and whether it has to be read."""
+    def lookup(self, record: int, tile: int = 0, until: int = -1) -> tuple[int, bool]:
+        """The line of a record, and whether it has to be read. tile: number in the walk; until: tiles after it for which the line is wanted."""
         line = record // self.per_line
         at = line % (self.banks * self.sets)
-        if line in self._held[at]:
-            return line, False
-        self._held[at][self._turn[at]] = line
-        self._turn[at] = (self._turn[at] + 1) % self.ways
-        return line, True
+        held, marks = self._held[at], self._until[at]
+        missed = line not in held
+        if missed:
+            order = [(self._turn[at] + w) % self.ways for w in range(self.ways)]
+            free = [w for w in order if held[w] is None or (marks[w] - tile) % self.TILES > 2]
+            way = (free or order)[0]
+            held[way] = line
+            self._turn[at] = (way + 1) % self.ways
+        marks[held.index(line)] = (tile + until) % self.TILES
+        return line, missed

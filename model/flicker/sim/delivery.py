@@ -20,7 +20,7 @@ PORT = PortConfig(data_bits=256, max_reads=256, max_beats=1, latency=20)
 class _Lists(ctypes.Structure):
     _fields_ = [
         ("tiles", ctypes.c_int64), ("limit", ctypes.c_int64), ("start", ctypes.c_void_p), ("entry", ctypes.c_void_p), ("finished", ctypes.c_void_p),
-        ("records", ctypes.c_int64),
+        ("borders", ctypes.c_void_p), ("records", ctypes.c_int64),
     ]
 
 
@@ -38,14 +38,14 @@ class Delivered:
 
 
 def deliver(
-    start: np.ndarray, record: np.ndarray, mask: np.ndarray, finished: np.ndarray | None = None, *, timing: Timing | None = None,
-    parameters: Mapping[str, int] | None = None, seed: int = 1,
+    start: np.ndarray, record: np.ndarray, mask: np.ndarray, finished: np.ndarray | None = None, *, borders: np.ndarray | None = None,
+    timing: Timing | None = None, parameters: Mapping[str, int] | None = None, seed: int = 1,
 ) -> Delivered:
     """Deliver sorted lists; each record is compared with the one that is due.
 
     start: int (T + 1,), of each tile of the walk. record, mask: int (E,). finished: int (T, 4), records after which a sub-tile is finished; -1, or
-    None for all: never. timing: of the DRAM, 20 cycles on top; None: a perfect memory of that latency. FlickerError for a wrong record, an assertion of the
-    design or a broken rule of AXI.
+    None for all: never. borders: int (T, 2), of `golden.walk.borders`; None: no tile touches the next. timing: of the DRAM, 20 cycles on top; None: a
+    perfect memory of that latency. FlickerError for a wrong record, an assertion of the design or a broken rule of AXI.
     """
     library = ctypes.CDLL(str(verilate(
         "flk_delivery", parameters=parameters or {}, args=["--assert", "--x-assign", "unique", "--x-initial", "unique"],
@@ -59,7 +59,13 @@ def deliver(
     until = np.ascontiguousarray(np.full((tiles, SUBTILES), -1) if finished is None else finished, np.int32)
     if until.shape != (tiles, SUBTILES):
         raise ValueError(f"finished: {until.shape}, not {(tiles, SUBTILES)}")
-    lists = _Lists(tiles, 100 * (len(entry) + tiles) + 10_000, begin.ctypes.data, entry.ctypes.data, until.ctypes.data, int(np.max(record, initial=0)) + 1)
+    touching = np.ascontiguousarray(np.zeros((tiles, 2)) if borders is None else borders, np.uint8)
+    if touching.shape != (tiles, 2):
+        raise ValueError(f"borders: {touching.shape}, not {(tiles, 2)}")
+    lists = _Lists(
+        tiles, 100 * (len(entry) + tiles) + 10_000, begin.ctypes.data, entry.ctypes.data, until.ctypes.data, touching.ctypes.data,
+        int(np.max(record, initial=0)) + 1,
+    )
     result = _Result()
     done = library.delivery_run(
         ctypes.byref(timing or Timing(*[1] * len(Timing._fields_))), timing is None, ctypes.byref(PORT.structure()), ctypes.byref(lists),

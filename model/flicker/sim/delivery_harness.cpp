@@ -33,6 +33,7 @@ struct Lists {
   const int64_t* start;      // of each tile of the walk, and behind the last: its entries
   const uint32_t* entry;     // record number above mask
   const int32_t* finished;   // tiles x sub-tiles: records after which a sub-tile is finished, -1: never
+  const uint8_t* borders;    // tiles x 2: sub-tiles that touch the next tile, and the one behind it
   int64_t records;           // in memory
 };
 
@@ -90,6 +91,7 @@ int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiCon
 
   constexpr int BEFORE = 100;  // cycles until the start: reset, tags are cleared
   bool ready = false;
+  int64_t turn = 0;  // tile whose entries are taken
   int64_t cycle = -BEFORE;
   for (; cycle < lists->limit; ++cycle) {
     const bool reset = cycle < 4 - BEFORE;
@@ -118,11 +120,13 @@ int delivery_run(const flk::dram::Timing* timing, int perfect, const flk::AxiCon
     top->in_valid_i = valid;
     top->in_end_i = end;
     top->finished_i = finished;
+    top->border_i = turn < lists->tiles ? lists->borders[2 * turn] | lists->borders[2 * turn + 1] << 4 : 0;
     FLK_AXI_DRIVE_READ(port.reply(), *top, );
     top->clk_i = 0;
     top->eval();
     FLK_AXI_SAMPLE_READ(request, *top, );
     if (cycle == 0 && !top->idle_o) fail("not idle at the start");
+    if (!reset && top->taken_o) ++turn;
     for (int u = 0; u < UNITS; ++u) {
       Unit& unit = units[u];
       if (unit.offered && (top->in_ready_o >> u & 1)) {
