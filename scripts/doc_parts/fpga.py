@@ -7,11 +7,11 @@ import json
 from flicker import markdown
 from flicker.chips import chips
 from flicker.cost.fpga import COMMANDS, FOLDER, Resources, boards
-from flicker.errors import FlickerError
 
 from .common import Say
 
 WANTED = ("tiny", "small", "default")
+NEXT = "`make fpga CHIP=tiny`, then `make docs PART=fpga`"
 
 
 def _kept() -> dict[tuple[str, str], dict]:
@@ -24,18 +24,12 @@ def _kept() -> dict[tuple[str, str], dict]:
     return found
 
 
-def missing() -> str | None:
-    return None if ("tiny", "xcup") in _kept() else "no results of make fpga CHIP=tiny"
-
-
 def _row(of: Resources) -> list[str]:
     return [f"{of.lut:,}", f"{of.lutram:,}", f"{of.ff:,}", f"{of.dsp:,}", f"{of.bram:,.1f}"]
 
 
 def tables(say: Say) -> dict[str, str]:
     kept, known = _kept(), boards()
-    if not kept:
-        raise FlickerError("fpga: no results of make fpga")
     full, units = [], []
     for (chip, family), data in kept.items():
         all_ = Resources(**data["all"])
@@ -46,6 +40,8 @@ def tables(say: Say) -> dict[str, str]:
         order = sorted(data["units"].items(), key=lambda item: -item[1][1]["lut"])
         units += [[f"`{chip}`", family, f"`{module}`", str(number), *_row(Resources(**own))] for module, (number, own) in order]
         units.append([f"`{chip}`", family, "all", "", *_row(all_)])
+    if not kept:  # said rather than left empty
+        full, units = [[f"none mapped with its present parameters: {NEXT}", *[""] * 6]], [["none mapped", *[""] * 8]]
     head = ["LUT", "memory in LUTs", "FF", "DSP", "BRAM"]
     return {
         "boards": markdown.table(["chip", "board", "LUT with memory", "FF", "DSP", "BRAM", "fits"], full),

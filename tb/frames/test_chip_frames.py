@@ -61,7 +61,7 @@ ALL_CONFIGS = [
         ("two cores", CONFIG.with_(cores=2, lanes=16, delivered=2)),
     )
 ]
-FEW = chip_of("tiny").config.with_(cores=1, lanes=8)
+FEW = chip_of("tiny").config
 BLUE = (10, 20, 200)
 LARGE = [(real, (320, 180)) for real in REAL_VIEWS] + [
     (real, size) for size, folders in (((640, 360), ("guitar", "stpeter")), ((1280, 720), ("flowers",))) for real in REAL_VIEWS if real.folder in folders

@@ -50,7 +50,7 @@ def test_own_file(tmp_path: Path) -> None:
     ("[mine]", "own.toml: chip mine: purpose must be a text"),
     ('[mine]\npurpose = "x"\nstatus = "good"', "own.toml: chip mine: status must be verified, built or untested, not good"),
     (LINE + "lane = 32", "own.toml: chip mine: unknown field lane, is lanes meant?"),
-    (LINE + "lanes = 48", "own.toml: chip mine: lanes must be 32, 64 or 128, not 48"),
+    (LINE + "lanes = 48", "own.toml: chip mine: lanes must be 16, 32, 64 or 128 with cores 4, not 48"),
     (LINE + 'lanes = "32"', "own.toml: chip mine: lanes must be a whole number, not '32'"),
     (LINE + "lanes = true", "own.toml: chip mine: lanes must be a whole number, not True"),
     (LINE + "port_bits = 64", "own.toml: chip mine: port_bits must be 128, 256 or 512, not 64"),

@@ -27,7 +27,7 @@ def test_boards() -> None:
         Fpga("ice40")
 
 
-@pytest.mark.parametrize("family", COMMANDS)
+@pytest.mark.parametrize("family", [pytest.param("xcup", marks=pytest.mark.slow), "ecp5"])
 def test_unit(family: str) -> None:
     """Multipliers become DSPs, a memory blocks or LUTs; parts are counted once for each instance."""
     found = Fpga(family)

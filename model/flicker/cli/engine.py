@@ -186,7 +186,7 @@ def engine_options(
         raise FlickerError("--chips: with --chip NAME only")
     if chip is not None:
         parts = {
-            "stage": stage, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
+            "stage": stage, "cores": cores, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
             "port-bits": port_bits, "sort-units": sort_units, "list-writers": list_writers, "preproc-lanes": preproc_lanes,
             "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
         }
