@@ -27,10 +27,10 @@ module flk_lane_queue #(
   input  logic [SubtileW-1:0]             push_subtile_i,  // 0 where there is one
   input  logic [Pixels-1:0]               push_pixels_i,
   output logic [Subtiles-1:0][Pixels-1:0] alive_o,
-  output logic                            empty_o,         // no entry, no token on its way to the lane's state
+  output logic                            empty_o,         // no entry, no token on its way
   // the lane
   input  logic [Subtiles-1:0][Pixels-1:0] finished_i,
-  input  logic                            token_i,         // a token is between cycle 0 and the lane's state
+  input  logic                            token_i,         // one is between cycle 0 and the lane's state
   input  logic                            token_done_i,    // it has come there
   input  logic                            bank_free_i,
   output logic                            visit_valid_o,

@@ -22,7 +22,7 @@ module flk_frame_writer
   parameter int unsigned Pairs      = 4,   // of tiles that are held: 2, 4 or 8
   parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
   parameter int unsigned StrideBits = 12,
-  parameter int unsigned Lanes      = 0,   // of all cores, 4, 8, 16 or 32 of each; 0: groups are mini-tiles
+  parameter int unsigned Lanes      = 0,   // of all cores, 4 to 32 of each; 0: groups are mini-tiles
   parameter int unsigned Cores      = CORES  // 1, 2 or 4; 4 where groups are mini-tiles
 ) (
   input  logic                    clk_i,
@@ -174,7 +174,8 @@ module flk_frame_writer
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        in_valid_i[k] |-> 32'({in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}) % Cores == k)
+        in_valid_i[k] |->
+        32'({in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}) % Cores == k)
     else $error("flk_frame_writer: a sub-tile from another core");
 `endif
   end

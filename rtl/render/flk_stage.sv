@@ -112,7 +112,8 @@ module flk_stage
     always_comb begin
       for (int unsigned k = 0; k < Cores; k++) begin
         for (int unsigned w = 0; w < InWidth; w++) begin
-          elem[k][w] = '{eos: in_end_i[k][w], record: in_record_i[k][w], subtile: in_subtile_i[k][w]};
+          elem[k][w] = '{eos: in_end_i[k][w], record: in_record_i[k][w],
+                         subtile: in_subtile_i[k][w]};
         end
       end
     end

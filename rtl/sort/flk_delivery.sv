@@ -343,10 +343,12 @@ module flk_delivery #(
     end else begin : gen_split
       // An element for each sub-tile: the lowest of the oldest record's and its next one, or the lowest of the next record's. A mask has bits.
       logic [Share-1:0]      given_q, given_d;  // the oldest record was given for them
-      logic [1:0][Share-1:0] todo, rest, first;  // of the two oldest: all, without the lowest, it alone
+      // Of the two oldest: all, without the lowest, it alone.
+      logic [1:0][Share-1:0] todo, rest, first;
       logic [Share-1:0]      beyond;  // of the oldest, without the two lowest
       logic [1:0]            is_end, goes;
-      logic                  same, next;  // what is given beside the lowest: of the same record, or of the next
+      // What is given beside the lowest: of the same record, or of the next.
+      logic                  same, next;
 
       for (genvar w = 0; w < 2; w++) begin : gen_element
         assign todo[w]   = element[w][ElementBits-1-:Share] & ~(w == 0 ? given_q : '0);
