@@ -22,7 +22,7 @@ module flk_frame_writer
   parameter int unsigned Pairs      = 4,   // of tiles that are held: 2, 4 or 8
   parameter int unsigned BeatBits   = 34,  // addresses in 64 bytes
   parameter int unsigned StrideBits = 12,
-  parameter int unsigned Lanes      = 0,   // of all cores, 4 to 32 of each; 0: groups are mini-tiles
+  parameter int unsigned Lanes      = 0,   // of all cores, 4 to 32 each; 0: groups are mini-tiles
   parameter int unsigned Cores      = CORES  // 1, 2 or 4; 4 where groups are mini-tiles
 ) (
   input  logic                    clk_i,
