@@ -167,12 +167,14 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
             f"in_data_i[{layout.place('core_pixel', 'subtile').at + bit + k * layout.bits('core_pixel')}]"
             for k in range(CORES) for bit in range(2 * SUBTILE_COORD_BITS) if bit != 1 and (k or bit in (0, SUBTILE_COORD_BITS))
         ],
+        "flk_entry_merge": [f"progress_i[{bit}]" for bit in range(12)] if parameters.get("Lanes", 4) == 1 else [],  # one lane is in order
+        "flk_list_writer": ["in_bank_i[0]"] if parameters.get("Banks", 1) == 1 else [],
         # Words are addressed; protection means nothing here.
         "flk_registers": [f"s_axil_{channel}{name}[{bit}]" for channel in ("aw", "ar") for name, bits in (("addr", 2), ("prot", 3)) for bit in range(bits)],
         "flk_top_axi": ["m_axi_buser[0]", "m_axi_ruser[0]"],  # answers carry nothing beside them
         "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
-        # Bits of identifiers that are not in use; no part is narrower than the port.
-        "flk_axi_downsizer": ["r_id_i[3]"],
+        # Bits of identifiers that are not in use; no part is narrower than the port. Wires alone where the port is as wide.
+        "flk_axi_downsizer": ["clk_i[0]", "rst_ni[0]", "clear_i[0]"] if parameters.get("PortBits", 128) == 512 else ["r_id_i[3]"],
         "flk_axi_lane": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
