@@ -30,7 +30,7 @@ module flk_lane_queue #(
   output logic                            empty_o,         // no entry, no token on its way
   // the lane
   input  logic [Subtiles-1:0][Pixels-1:0] finished_i,
-  input  logic                            token_i,         // one is between cycle 0 and the lane's state
+  input  logic                            token_i,         // one is on its way to the state
   input  logic                            token_done_i,    // it has come there
   input  logic                            bank_free_i,
   output logic                            visit_valid_o,
