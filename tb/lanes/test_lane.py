@@ -24,7 +24,7 @@ def test_lane(parameters: dict[str, int], sweep: float) -> None:
     build_and_test("flk_lane", "cocotb_lane", parameters=parameters, config={**parameters, "sweep": sweep})
 
 
-@pytest.mark.parametrize(("parameters", "message"), [({"Lanes": 4}, "Lanes must be"), ({"Lanes": 16, "Lane": 16}, "Lane must be")])
+@pytest.mark.parametrize(("parameters", "message"), [({"Lanes": 2}, "Lanes must be 4, 8, 16 or 32"), ({"Lanes": 16, "Lane": 16}, "Lane must be")])
 def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
     refused("flk_lane", parameters, message)
 
