@@ -86,7 +86,7 @@ def tables(say: Say) -> dict[str, str]:
             if name.endswith("(the chip)"):
                 at, until = _wanted(tile[order], mask[order], cols, rows)
                 for lines, ways, wanted in sizes:
-                    sizes[lines, ways, wanted].append(f"{_lines(line, at, until if wanted else never, lines // ways, ways):,}")
+                    sizes[lines, ways, wanted].append(f"{_lines(line, *((at, until) if wanted else (never, never)), lines // ways, ways):,}")
     return {
         "sizes": table(
             ["lines", "ways", "replaced", *titles],
