@@ -196,9 +196,13 @@ def test_few_units() -> None:
         assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
         assert not done.front["entries"][1:].any() and done.front["taken"].all()
         assert done.stage[0].any() and not done.stage[1:].any()
+        stats = chip_stats(chip, done, FEW, DramConfig())
+        tested = chip.scene.gaussians - int(np.sum(done.front["culled_gaussians"]))
+        assert stats["busy"]["front end"]["lanes"] == pytest.approx(2 * tested / done.phases["front end"]) and stats["busy"]["front end"]["lanes"] <= 1.0
+        assert stats["stall_shares"]["sorted entries for buffers"] == stats["stalls"]["sorted entries for buffers"] / stats["cycles"]
         front, sizes = run_front(packed, view.camera), FEW.chip_memories
         tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
-        assert rendering.estimate(tables, FEW, None).cycles == pytest.approx(done.phases["rendering"], rel=0.15)
+        assert rendering.estimate(tables, FEW, None).cycles == pytest.approx(done.phases["rendering"], rel=0.1)
         check(chip, replace(view.camera, width=40, height=24, cx=None, cy=None), PixelFormat.RGBA16F, FEW)
 
 
@@ -376,7 +380,7 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     # The model of the rendering half is that of this chip.
     tables, cycles = TileLists.of(front, front_memory(front)), stats["phases"]["rendering"]
     modelled = rendering.estimate(tables, CONFIG, dram).cycles
-    assert modelled == pytest.approx(cycles, rel=0.15)
+    assert modelled == pytest.approx(cycles, rel=0.1)
     if seed() == 1:
         figures.hold(f"RTL, {part}, cycles of the rendering half", cycles)
         figures.hold(f"model over RTL, {part}, cycles of the rendering half", modelled / cycles)

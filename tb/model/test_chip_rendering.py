@@ -18,7 +18,7 @@ from flicker.chip.tile_lists import TileLists, tile_lists
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
-from flicker.golden.delivery import may_be_given
+from flicker.golden.delivery import TILES, may_be_given
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import FrontImage, front_memory
 from flicker.golden.long_lists import RUNS
@@ -80,6 +80,10 @@ def test_sizes() -> None:
         return int(found[1])
 
     sizes = ChipMemories()
+    assert (model.CACHE_SETS, model.CACHE_WAYS) == (4 * default("sort/flk_record_cache", "Sets"), default("sort/flk_record_cache", "Ways"))
+    assert (default("sort/flk_delivery", "Sets"), default("sort/flk_delivery", "Ways")) == (model.CACHE_SETS // 4, model.CACHE_WAYS)
+    until = re.search(r"UntilBits\s*= (\d+)", (ROOT / "rtl/sort/flk_record_cache.sv").read_text())
+    assert until and TILES == 1 << int(until[1])
     assert RenderConfig().sort_units == default("flk_rendering", "SortUnits") == default("flk_top", "SortUnits") == default("sort/flk_delivery", "Units")
     for top in ("flk_top", "flk_top_axi", "preproc/flk_preprocessing"):
         assert RenderConfig().list_writers == default(top, "ListWriters") == preprocessing.LIST_WRITERS

@@ -21,8 +21,6 @@ from . import constants as c
 
 __all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Refresh", "Stream", "interleave", "port_config", "simulate"]
 
-PORT_EFFICIENCY = 0.94  # of the port's cycles where it is what a frame waits for; fitted to the demo scene on a chip with 128 bits (test_chip_frames.py)
-
 
 class Refresh(StrEnum):
     """Whom a refresh command stops: nobody, as there is none; all banks of a channel for tRFCab every tREFI; one bank for tRFCpb every tREFI / banks."""
@@ -99,7 +97,7 @@ class DramConfig:
 
     def port_cycles(self, read_bytes: int, written_bytes: int) -> int:
         """Cycles of the chip that the port takes: reads and writes go side by side."""
-        return math.ceil(8 * max(read_bytes, written_bytes) / (PORT_EFFICIENCY * self.port_bits))
+        return math.ceil(8 * max(read_bytes, written_bytes) / self.port_bits)
 
     @property
     def timing(self) -> Timing:

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..explore.generators.contribution import cat_masks
 from ..golden.chip import chip_walk, whole_pairs
+from ..golden.delivery import TILES
 from ..golden.frame_buffer import PAIR, PixelFormat, least_stride
 from ..golden.lanes.lists import front_lists
 from ..golden.masked import render_masked
@@ -82,7 +83,7 @@ def cache_lookup(line, tile, until, held, marks, turn, ways):
     way = turn[at]
     for k in range(ways):
         w = (turn[at] + k) % ways
-        if held[at, w] < 0 or (marks[at, w] - tile) % 64 > 2:
+        if held[at, w] < 0 or (marks[at, w] - tile) % TILES > 2:
             way = w
             break
     held[at, way] = line

@@ -90,11 +90,13 @@ SUMMED = {
 }
 
 
-def stall_shares(stalls: Mapping[str, int], cycles: int, cores: int = CORES) -> dict[str, float]:
-    """Stalls as shares of the cycles of a frame, of all the units that wait."""
+def stall_shares(stalls: Mapping[str, int], cycles: int, config: RenderConfig = RenderConfig()) -> dict[str, float]:
+    """Stalls as shares of the cycles of a frame, of all the units that wait, as many as the chip has."""
+    built = {"cores": config.cores, "lanes": config.preproc_lanes, "list writers": config.list_writers, "sorting units": config.sort_units}
+
     def units(cause: str) -> int:
         number, _, unit = SUMMED.get(cause, "1 unit").partition(" ")
-        return cores if unit == "cores" else int(number)
+        return built.get(unit, int(number))
 
     return {cause: count / (cycles * units(cause)) for cause, count in stalls.items()}
 
@@ -129,11 +131,11 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     tested = chip.scene.gaussians - count("culled_gaussians")
     # Entries of all sorting units, and lines of those that they do not hold and sort a second time: of the one with most the same share.
     given = int(np.sum(rendering["entries"]))
-    # Share of the cycles in which each part does what it is there for: Gaussians two a cycle, entries of four list writers or sorting units one a cycle each,
-    # in delivery two.
+    # Share of the cycles in which each part does what it is there for: a Gaussian in two cycles each lane, entries of list writers or sorting units one a
+    # cycle each, in delivery two.
     busy = {
         "front end": {
-            "lanes": tested / (2 * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
+            "lanes": 2 * tested / (config.preproc_lanes * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
@@ -161,7 +163,7 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
         },
         "adjusted": {text: count(name) for text, name in (("mean beyond 2^22 pixels", "saturated"), ("colour above 2 clipped", "clipped")) if count(name)},
         "cycles": cycles, "phases": phases, "refresh": dram.refresh.value, "dram_bytes": traffic, "dram_efficiency": efficiency,
-        "stalls": stalls, "stall_shares": stall_shares(stalls, cycles, config.cores),
+        "stalls": stalls, "stall_shares": stall_shares(stalls, cycles, config),
         "busy": busy, "bottleneck": f"{longest}: {part}, busy {busy[longest][part]:.0%}",
         "counters": {"front": _plain(front), "rendering": _plain(rendering), "live": live},
         **stage,

@@ -17,6 +17,7 @@ import numpy as np
 SUBTILES, UNITS = 4, 4
 LINE_BYTES = 32
 END = None  # of a list
+TILES = 64  # numbers of tiles that the record cache tells apart
 
 
 def core_records(tiles: Iterable[Sequence[tuple[int, int]]], core: int, cores: int = SUBTILES) -> list[tuple[int, int] | None]:
@@ -52,8 +53,6 @@ class RecordCache:
     TILES, by the difference to the present one: 0 to 2 is wanted.
     """
 
-    TILES = 64
-
     def __init__(self, banks: int = 4, sets: int = 64, ways: int = 4, record_bytes: int = 16) -> None:
         self.banks, self.sets, self.ways, self.per_line = banks, sets, ways, LINE_BYTES // record_bytes
         self._held: list[list[int | None]] = [[None] * ways for _ in range(banks * sets)]
@@ -71,9 +70,9 @@ class RecordCache:
         missed = line not in held
         if missed:
             order = [(self._turn[at] + w) % self.ways for w in range(self.ways)]
-            free = [w for w in order if held[w] is None or (marks[w] - tile) % self.TILES > 2]
+            free = [w for w in order if held[w] is None or (marks[w] - tile) % TILES > 2]
             way = (free or order)[0]
             held[way] = line
             self._turn[at] = (way + 1) % self.ways
-        marks[held.index(line)] = (tile + until) % self.TILES
+        marks[held.index(line)] = (tile + until) % TILES
         return line, missed
