@@ -184,7 +184,9 @@ def test_narrow_port(bits: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bits", [128, pytest.param(256, marks=pytest.mark.xfail(reason="docs/reference/chips.md: the front end's model is early", strict=True))])
+@pytest.mark.parametrize("bits", [
+    128, pytest.param(256, marks=pytest.mark.xfail(reason="docs/reference/chips.md: the front end's model is early", strict=True)),
+])
 def test_cycles_of_a_narrow_port(bits: int) -> None:
     """As the model has them, within a tenth."""
     config = CONFIG.with_(port_bits=bits)
