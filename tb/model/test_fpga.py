@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+
 import pytest
 
 from flicker.cost.fpga import COMMANDS, Fpga, Resources, boards, count
 from flicker.errors import FlickerError
+from flicker.toolchain import ROOT
 
 
 def test_count() -> None:
@@ -39,3 +42,12 @@ def test_unit(family: str) -> None:
     found.found["two"] = {"top": "x", "key": "two", "own": Resources(lut=1), "parts": [down["key"], down["key"]]}
     assert found.total("two") == Resources(lut=1) + down["own"].times(2)
     assert found.by_unit("two")["flk_axi_downsizer"] == (2, down["own"].times(2))
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    ("BOARD=nope", "fpga: BOARD: one of kv260, zcu104, zcu102, vcu118, ulx3s, not nope"),
+    ("CHIP=nope", "fpga: chip: one of tiny, small, default, wide, max, channels, faithful, not nope"),
+])
+def test_refused(words: str, message: str) -> None:
+    done = subprocess.run(["make", "fpga", words], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode and message in done.stderr and "Traceback" not in done.stderr
