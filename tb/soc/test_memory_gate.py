@@ -1,8 +1,8 @@
 """`MemoryGate` of soc/litex_flicker.py in migen's simulator: a chip is reset while the memory owes it responses.
 
-Random traffic of a manager with single-beat writes and bursts of reads, a memory that takes and responds when it likes, holds at random times. Checked at the
-memory: offered addresses and data stay; one beat of data for each address, with its own data or without strobes. At the chip: nothing comes in a hold; what was
-asked behind one is answered, each once. Not covered: more than 20 transactions under way.
+Random traffic of a manager that writes lines, of a beat or of several, and reads bursts, a memory that takes and responds when it likes, holds at random
+times. Checked at the memory: offered addresses and data stay; the beats of a line for each address, with their own data or without strobes. At the chip:
+nothing comes in a hold; what was asked behind one is answered, each once. Not covered: more than 20 transactions under way.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ from litex.soc.interconnect import axi  # noqa: E402
 from litex_flicker import MemoryGate  # noqa: E402
 from migen import run_simulation  # noqa: E402
 
-CYCLES, HOLDS = 2500, 12
+LINE = 512
+CYCLES, HOLDS = {512: 2500, 256: 4000, 128: 6000}, 12  # by bits of the port
 
 
 class Bench:
-    def __init__(self, number: int) -> None:
-        self.rng = random.Random(f"{seed()} {number}")
-        self.chip, self.memory = (axi.AXIInterface(data_width=32, address_width=16, id_width=7) for _ in range(2))
+    def __init__(self, number: int, width: int) -> None:
+        self.rng = random.Random(f"{seed()} {number} {width}")
+        self.parts, self.strobes, self.length = LINE // width, (1 << width // 8) - 1, CYCLES[width]
+        self.chip, self.memory = (axi.AXIInterface(data_width=width, address_width=16, id_width=7) for _ in range(2))
         self.gate = MemoryGate(self.chip, self.memory)
         self.dropped = self.answered = self.held = 0
 
@@ -40,14 +42,14 @@ class Bench:
     def cycles(self):
         rng, chip, memory, gate = self.rng, self.chip, self.memory, self.gate
         epoch, tag = 0, 0
-        to_send: list[int] = []  # tags of writes whose data the chip has not sent
+        to_send: list[tuple[int, int]] = []  # beats that the chip has not sent: tag of the write, last
         asked = {"b": [], "r": []}  # tags under way, of this life of the chip
-        owed: list[tuple[int, int]] = []  # at the memory: addresses without data
+        owed: list[list[int]] = []  # at the memory: [address, beats without data]
         written: list[int] = []  # at the memory: writes to answer
         reads: list[list[int]] = []  # at the memory: [address, beats left]
         offered: dict[str, tuple | None] = {"aw": None, "ar": None, "w": None}
         hold_for = -1
-        for cycle in range(CYCLES):
+        for _ in range(self.length):
             # What there is in this cycle.
             at = {}
             for name in ("aw", "ar", "w", "b", "r"):
@@ -77,13 +79,16 @@ class Bench:
                 if reads[0][1] == 0:
                     reads.pop(0)
             if "w" in moved:
-                address, _ = owed.pop(0)
+                address, left = owed[0]
                 data, strobes, last = payload["w"]
-                assert last and (strobes == 0 or (strobes == 15 and data == address)), (data, address)
+                assert last == (left == 1) and (strobes == 0 or (strobes == self.strobes and data == address)), (data, address, left)
                 self.dropped += strobes == 0
-                written.append(address)
+                owed[0][1] -= 1
+                if left == 1:
+                    owed.pop(0)
+                    written.append(address)
             if "aw" in moved:
-                owed.append((payload["aw"][0], cycle))
+                owed.append([payload["aw"][0], self.parts])
             if "ar" in moved:
                 reads.append([payload["ar"][0], payload["ar"][1] + 1])
             # Transfers at the chip.
@@ -104,7 +109,7 @@ class Bench:
             if idle:
                 assert holding and not owed and not written and not reads and not any(offered.values()), "idle, and something is under way"
             # The next cycle: the chip.
-            if hold_for < 0 and not holding and rng.random() < HOLDS / CYCLES:
+            if hold_for < 0 and not holding and rng.random() < HOLDS / self.length:
                 yield gate.hold.eq(1)
                 hold_for = 400
             elif holding and idle:
@@ -129,16 +134,16 @@ class Bench:
                     tag = (tag + 1) % 30_000
                     yield getattr(chip, name).addr.eq(tag)
                     yield getattr(chip, name).id.eq(tag % 128)
-                    yield getattr(chip, name).len.eq(rng.randrange(4) if name == "ar" else 0)
+                    yield getattr(chip, name).len.eq(rng.randrange(4) if name == "ar" else self.parts - 1)
                     if name == "aw":
-                        to_send.append(tag)
+                        to_send += [(tag, part == self.parts - 1) for part in range(self.parts)]
             valid, ready = at["chip", "w"]
             if to_send and not (valid and not ready):
                 go = rng.random() < 0.5
                 yield chip.w.valid.eq(go)
-                yield chip.w.data.eq(to_send[0])
-                yield chip.w.strb.eq(15)
-                yield chip.w.last.eq(1)
+                yield chip.w.data.eq(to_send[0][0])
+                yield chip.w.strb.eq(self.strobes)
+                yield chip.w.last.eq(to_send[0][1])
             elif not (valid and not ready):
                 yield chip.w.valid.eq(0)
             yield chip.b.ready.eq(1)
@@ -160,8 +165,8 @@ class Bench:
             yield
 
 
-@pytest.mark.parametrize("number", range(3))
-def test_holds(number: int) -> None:
-    bench = Bench(number)
+@pytest.mark.parametrize(("number", "width"), [(0, 512), (1, 512), (2, 128), (3, 128), (4, 256)])
+def test_holds(number: int, width: int) -> None:
+    bench = Bench(number, width)
     bench.run()
     assert bench.held > 3 and bench.dropped > 0 and bench.answered > 300, (bench.held, bench.dropped, bench.answered)

@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 from flicker import toolchain
+from flicker.chips import chip_of
 from flicker.toolchain import ROOT, filelist
 
 SOC = ROOT / "soc"
@@ -122,7 +123,7 @@ def test_guide_example() -> None:
     soc = names["MySoC"](cpu_type="vexriscv", integrated_rom_size=0x8000)
     soc.finalize()
     assert soc.flicker.chip == "small" and soc.bus.regions["flicker"].origin == 0xA000_0000 and soc.irq.locs["flicker"] is not None
-    assert len(soc.flicker.memory.r.data) == 512
+    assert len(soc.flicker.memory.r.data) == chip_of("small").config.port_bits == 256
 
 
 def test_ip_folder(tmp_path: Path) -> None:
