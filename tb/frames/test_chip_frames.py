@@ -392,7 +392,7 @@ def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, c
     # The model of the rendering half is that of this chip.
     tables, cycles = TileLists.of(front, front_memory(front)), stats["phases"]["rendering"]
     modelled = rendering.estimate(tables, CONFIG, dram).cycles
-    assert modelled == pytest.approx(cycles, rel=0.1)
+    assert modelled == pytest.approx(cycles, rel=0.15)
     if seed() == 1:
         figures.hold(f"RTL, {part}, cycles of the rendering half", cycles)
         figures.hold(f"model over RTL, {part}, cycles of the rendering half", modelled / cycles)
