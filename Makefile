@@ -15,7 +15,7 @@ FRESH  ?=
 BASE   ?=
 REASON ?=
 LIBERTY ?=
-CHIP   ?= small
+CHIP   ?= tiny
 KEYS   ?=
 
 # What make itself was told must not reach the makes that the builds start.
@@ -79,12 +79,12 @@ synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG=
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
 fpga: $(STAMP) ## what a chip takes on an FPGA: make fpga [CHIP=tiny] [BOARD=kv260]
-	@$(BIN)/python scripts/fpga.py --chip "$(if $(filter file,$(origin CHIP)),tiny,$(CHIP))" $(if $(BOARD),--board "$(BOARD)")
+	@$(BIN)/python scripts/fpga.py --chip "$(CHIP)" $(if $(BOARD),--board "$(BOARD)")
 
 formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))
 
-soc: $(SOC) ## a processor boots and renders frames with the chip, simulated: make soc [CHIP=small] [KEYS=1]
+soc: $(SOC) ## a processor boots and renders frames with the chip, simulated: make soc [CHIP=tiny] [KEYS=1]
 	@$(BIN)/python soc/run.py --chip "$(CHIP)" $(if $(KEYS),--keys)
 
 # LiteX and what comes with it: the lines of the lock file that name the extra.

@@ -1,6 +1,6 @@
 """SoCs with the chip for boards of litex-boards. None has been run on a board, nor been through a vendor's tools.
 
-    python soc/boards.py kcu105 --chip small --out build/soc/kcu105
+    python soc/boards.py zcu104 --chip tiny --out build/soc/zcu104
 
 writes Verilog, the list of sources with the chip's, constraints and the script of the board's tool chain. With a vendor's tools installed, LiteX's own
 steps follow in that folder (docs/guide/soc.md). The CPU has no second cache: what the chip writes to memory is seen once its data cache is emptied.
@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from litex_flicker import ROOT, add_flicker  # noqa: E402
+from litex_flicker import CHIP, ROOT, add_flicker  # noqa: E402
 from soc import write_headers  # noqa: E402
 
 from flicker.chips import chips  # noqa: E402  (litex_flicker makes it known)
@@ -50,7 +50,7 @@ def emit_board(board: str, chip: str, folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("board", choices=BOARDS)
-    parser.add_argument("--chip", choices=chips(), default="small")
+    parser.add_argument("--chip", choices=chips(), default=CHIP)
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
     out = options.out or ROOT / "build" / "soc" / options.board

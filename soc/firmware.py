@@ -1,6 +1,6 @@
 """Builds the firmware (docs/reference/soc.md): the driver of sw/ as it is, the C of firmware/, and of picolibc what they call.
 
-    python soc/firmware.py build/soc/small                             # a folder of soc.py, with the SoC's headers
+    python soc/firmware.py build/soc/tiny                              # a folder of soc.py, with the SoC's headers
     python soc/firmware.py build/soc/zcu104 --ram build/firmware.bin    # for a board, whose boot loader puts it into RAM
 """
 

@@ -8,12 +8,13 @@ import yaml
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import pythondata_cpu_vexriscv  # noqa: E402
+from litex_flicker import CHIP  # noqa: E402
 from soc import SimSoC, emit  # noqa: E402
 
 
 def main() -> None:
     given = yaml.safe_load(Path(sys.argv[1]).read_text())
-    emit(SimSoC(given.get("parameters", {}).get("chip", "small")), Path.cwd())
+    emit(SimSoC(given.get("parameters", {}).get("chip", CHIP)), Path.cwd())
     cpu = Path(pythondata_cpu_vexriscv.data_location) / "VexRiscv_IMAC.v"
     Path(cpu.name).write_text(cpu.read_text())
     memories = "".join(f"      - {path.name}: {{file_type: user, copyto: {path.name}}}\n" for path in sorted(Path.cwd().glob("*.init")))

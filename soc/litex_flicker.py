@@ -22,6 +22,7 @@ if str(ROOT / "model") not in sys.path:
 
 from flicker.chips import chip_of  # noqa: E402  (nothing but the standard library)
 
+CHIP = "tiny"  # where none is named
 ORIGIN = 0xA000_0000  # of the registers, where LiteX's CPUs do not cache
 REGISTER_BYTES = 1024
 LINE_BITS, ADDRESS_BITS, ID_BITS = 512, 40, 7  # a line is what the chip writes at once
@@ -96,7 +97,7 @@ class Flicker(LiteXModule):
     CSRs: `hold`, `idle`, `fail` of the MemoryGate, the first two for a reset of the chip after a time-out.
     """
 
-    def __init__(self, platform=None, chip: str = "small", clock_domain: str = "sys", chips: str | Path | None = None) -> None:
+    def __init__(self, platform=None, chip: str = CHIP, clock_domain: str = "sys", chips: str | Path | None = None) -> None:
         self.chip = chip
         found = chip_of(chip, chips)
         self.parameters, data_bits = found.parameters, found.config.port_bits
@@ -158,7 +159,7 @@ class Flicker(LiteXModule):
 
 
 def add_flicker(
-    soc, chip: str = "small", name: str = "flicker", origin: int = ORIGIN, clock_domain: str = "sys", chips: str | Path | None = None,
+    soc, chip: str = CHIP, name: str = "flicker", origin: int = ORIGIN, clock_domain: str = "sys", chips: str | Path | None = None,
 ) -> Flicker:
     """The chip in a SoC: registers at `origin`, interrupt, memory port at the crossbar of `soc.sdram` where there is one. chip, chips: as of Flicker.
 

@@ -1,6 +1,6 @@
 """`make soc`: a processor boots, drives the chip, and a picture appears (docs/guide/soc.md).
 
-    python soc/run.py [--chip small] [--scene demo] [--size 160x90] [--frames 3] [--keys]
+    python soc/run.py [--chip tiny] [--scene demo] [--size 160x90] [--frames 3] [--keys]
 
 Simulates the SoC with the scene in RAM, renders the first camera of a path and then frames back to back, compares each with the golden model's picture, bit for
 bit, and writes them as PNG with the measured numbers to build/soc/. With --keys the terminal's keys go to the firmware; Ctrl-C ends.
@@ -92,7 +92,7 @@ def terminal(soc: simulation.Soc) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--chip", default="small", help="name of the table of litex_flicker.py")
+    parser.add_argument("--chip", default=CHIP, help="a name of chips.toml")
     parser.add_argument("--scene", default="demo", help="a scene file with cameras, or demo")
     parser.add_argument("--size", default="160x90", help="WxH of the pictures")
     parser.add_argument("--keys", action="store_true", help="then give the terminal to the firmware")

@@ -1,6 +1,6 @@
 """A SoC for simulation: VexRiscv, ROM, RAM, UART, timer, interrupts and the chip (docs/reference/soc.md).
 
-    python soc/soc.py --chip small --out build/soc/small
+    python soc/soc.py --chip tiny --out build/soc/tiny
 
 writes the Verilog, the ROM's contents and the headers for the firmware. Two things are pins, and a harness serves both from one memory: the chip's
 AXI4 port, and the CPU's port to the RAM at 0x40000000 (Wishbone, 32 bits, byte addresses 31:2).
@@ -21,7 +21,7 @@ from litex.soc.integration import export  # noqa: E402
 from litex.soc.integration.soc import SoCRegion  # noqa: E402
 from litex.soc.integration.soc_core import SoCCore  # noqa: E402
 from litex.soc.interconnect import wishbone  # noqa: E402
-from litex_flicker import ROOT, add_flicker  # noqa: E402
+from litex_flicker import CHIP, ROOT, add_flicker  # noqa: E402
 from migen import ClockDomain, ClockSignal, ResetSignal  # noqa: E402
 
 from flicker.chips import chips  # noqa: E402  (litex_flicker makes it known)
@@ -60,7 +60,7 @@ class _Crg:
 class SimSoC(SoCCore):
     """chip: name in chips.toml. crossing: the chip has a clock domain of its own, with the same clock, behind LiteX' crossings."""
 
-    def __init__(self, chip: str = "small", crossing: bool = False) -> None:
+    def __init__(self, chip: str = CHIP, crossing: bool = False) -> None:
         platform = SimPlatform("SIM", list(IO), name="flk_soc")
         self.crg = _Crg(platform)
         super().__init__(
@@ -112,7 +112,7 @@ def write_headers(soc: SoCCore, folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--chip", choices=chips(), default="small")
+    parser.add_argument("--chip", choices=chips(), default=CHIP)
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "soc" / "emitted")
     options = parser.parse_args()
     print(emit(SimSoC(options.chip), options.out))

@@ -406,7 +406,7 @@ def _frame(
                     ask = max(t + 2, last_ask + 1)
                     if misses >= PLACES:
                         ask = max(ask, line_used[misses % PLACES])
-                    if misses >= reads:
+                    if reads < PLACES and misses >= reads:
                         ask = max(ask, line_at[(misses - reads) % PLACES])
                     last_ask = ask
                     if refresh[0] and ask >= refresh[0] and ask % refresh[0] < refresh[1]:
