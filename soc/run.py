@@ -26,6 +26,7 @@ sys.path.insert(0, str(HERE))
 import firmware  # noqa: E402
 import pictures  # noqa: E402
 import simulation  # noqa: E402
+from litex_flicker import CHIP  # noqa: E402
 
 from flicker.chip.dram import DramConfig  # noqa: E402
 from flicker.chips import chip_of  # noqa: E402

@@ -112,6 +112,14 @@ def test_boards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert 20_000 < (tmp_path / "firmware.bin").stat().st_size <= 32_768
 
 
+@pytest.mark.parametrize("script", ["soc.py", "boards.py", "run.py"])
+def test_chip_by_default(script: str) -> None:
+    """Scripts begin, and refuse a chip that the table lacks by naming it."""
+    litex()
+    done = subprocess.run([sys.executable, SOC / script, *(["zcu104"] if script == "boards.py" else []), "--chip", "huge"], capture_output=True, text=True)
+    assert done.returncode and "huge" in done.stderr.splitlines()[-1] and "tiny" in done.stderr, done.stderr
+
+
 def test_guide_example() -> None:
     """At most 10 lines of Python add the chip to a SoC of one's own."""
     litex()
