@@ -15,7 +15,7 @@ from flicker_tb.command import flicker
 from flicker.chip.dram import DramConfig
 from flicker.chips import STATUS, TABLE, chip_of, chips, name_of
 from flicker.errors import FlickerError
-from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, RenderConfig
+from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, Form, RenderConfig
 
 LINE = '[mine]\npurpose = "x"\nstatus = "untested"\nstage = "lanes"\n'
 
@@ -86,10 +86,14 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize("arguments, says", [
     (["render", "demo", "--chip", "huge"], "chip: one of tiny"),
     (["render", "demo", "--chips", str(TABLE)], "--chips: with --chip NAME only"),
+    (["cost", "demo", "--fps", "0"], "--fps: more than 0, not 0"),
+    (["cost", "demo", "--fps", "nan"], "--fps: more than 0, not nan"),
+    (["cost", "demo", "--clock", "0.2"], "--clock: with --fps only"),
+    (["cost", "demo", "--fps", "90", "--clock", "-1"], "--clock: more than 0, not -1"),
     (["render", "demo", "--engine", "chip", "--chip", "tiny", "--lanes", "64", "--port-bits", "128"], "so it cannot be combined with --lanes, --port-bits"),
     (["render", "demo", "--chip", "tiny", "--engine", "reference"], "--chip: not for --engine reference"),
     (["cost", "demo", "--chip", "faithful"], "--chip faithful: has records of 32 bytes"),
-    (["cost", "demo", "--chips", str(TABLE)], "--chips: with --chip NAME only"),
+    (["cost", "demo", "--chips", str(TABLE)], "--chips: with --chip NAME or --fps only"),
 ])
 def test_commands_refuse(arguments: list[str], says: str) -> None:
     ended = flicker(*arguments)
@@ -105,3 +109,29 @@ def test_commands_take_a_name(tmp_path: Path) -> None:
         assert found["chip"] == name
         cycles.append(found["views"][0]["interval"])
     assert cycles[0] > 1.5 * cycles[1]
+
+
+def test_smallest_chip(tmp_path: Path) -> None:
+    """flicker cost --fps names the chip of the least area that makes the rate in every view, and what it waits for; chips of a file of one's own take part."""
+    own = tmp_path / "own.toml"
+    own.write_text('[mine]\npurpose = "board"\nstatus = "untested"\nstage = "lanes"\nlanes = 64\nport_bits = 128\n')
+
+    def cost(*options: str) -> tuple[dict, str]:
+        done = flicker("cost", "demo", "--size", "64x48", "--views", "2", "--chips", own, *options, "--json", tmp_path / "cost.json")
+        assert done.returncode == 0, done.stderr
+        return json.loads((tmp_path / "cost.json").read_text()), done.stdout
+
+    found, text = cost("--fps", "1")
+    rows = found["chips"]
+    assert found["smallest_chip"] == "tiny" and "smallest chip for 1 frames a second: tiny, which waits for: " in text
+    assert {row["chip"] for row in rows} == {name for name, chip in chips().items() if chip.config.form is Form.FACTORED} | {"mine"}
+    areas = [row["ge"] for row in rows]
+    assert areas[:-1] == sorted(areas[:-1]) and areas[-1] is None and rows[-1]["chip"] == "mine"
+    between = (rows[0]["frames_per_second"] + rows[1]["frames_per_second"]) / 2  # of tiny and small
+    assert cost("--fps", str(between))[0]["smallest_chip"] == "small"
+    slow, text = cost("--fps", str(between), "--clock", "0.001")
+    assert slow["smallest_chip"] is None and "no chip makes" in text
+    assert slow["chips"][0]["frames_per_second"] == pytest.approx(rows[0]["frames_per_second"] / 1000)
+    done = flicker("cost", "demo", "--size", "64x48", "--views", "2", "--chip", "small", "--quiet", "--json", tmp_path / "small.json")
+    views = json.loads((tmp_path / "small.json").read_text())["views"]
+    assert not done.returncode and max(view["interval"] for view in views) == rows[1]["interval"]

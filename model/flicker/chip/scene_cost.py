@@ -22,7 +22,6 @@ from ..golden.chip import chip_walk, whole_pairs
 from ..golden.front.blend import alpha_at
 from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame, run_front
-from ..golden.front.memory import front_memory
 from ..golden.front.setup import MEAN_FRACTION, FrameSetup
 from ..golden.render import stream_order
 from ..params import ALPHA_MIN, CORES, LINE_BITS, SUBTILE, TILE, TRANSMITTANCE_MIN, RenderConfig, SortOrder
@@ -32,11 +31,9 @@ from ..scene.camera import Camera
 from ..scene.gaussians import Scene
 from ..scene.packed import PackedFormat, decode
 from ..scene.packing import Packing
-from . import preprocessing, rendering
 from .constants import CLOCK_HZ
 from .dram import DramConfig
-from .tile_lists import TileLists
-from .whole import whole_frame
+from .whole import halves, whole_frame
 
 CONFIG = RenderConfig()  # of the stage by whose visits Gaussians are judged, and of the chip unless another is asked for
 ENTRY_BYTES = 64 / 14  # most lines of 64 bytes have fourteen or fifteen entries
@@ -259,9 +256,7 @@ class SceneCost:
 
 def frame_cost(front: FrontFrame, dram: DramConfig, config: RenderConfig = CONFIG) -> tuple[dict[str, int], dict[str, int]]:
     """Cycles of each half of a chip, bytes of both by purpose."""
-    image, sizes = front_memory(front), config.chip_memories
-    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers)
-    second = rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
+    first, second = halves(front, config, dram)
     bytes_ = dict(first.bytes)
     for name, more in second.bytes.items():
         bytes_[name] = bytes_.get(name, 0) + more

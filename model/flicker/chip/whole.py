@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..golden.front.frame import FrontFrame
+from ..golden.front.memory import front_memory
+from ..params import RenderConfig
 from . import constants as c
+from . import preprocessing, rendering
 from .dram import READ, DramConfig, interleave, simulate
 from .preprocessing import Preprocessing, in_order
 from .rendering import Rendering
+from .tile_lists import TileLists
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,13 @@ class WholeFrame:
     def bottleneck(self) -> str:
         """What sets the interval."""
         return {self.dram_cycles: "DRAM", self.back.cycles: "rendering", self.front.cycles: "front end"}[self.interval]
+
+
+def halves(front: FrontFrame, config: RenderConfig, dram: DramConfig) -> tuple[Preprocessing, Rendering]:
+    """Both halves of a chip for what its front end makes of a frame, each with the memory to itself."""
+    image, sizes = front_memory(front), config.chip_memories
+    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers)
+    return first, rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
 
 
 def whole_frame(front: Preprocessing, back: Rendering, dram: DramConfig) -> WholeFrame:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
-from ..chips import chip_of
+from ..chips import chip_of, chips
 from ..errors import FlickerError
 from ..output import json_text, write_text
 from ..params import Form, RenderConfig
@@ -66,6 +67,24 @@ def _show(cost, numbers: list[int]) -> None:
     console.print(table)
 
 
+def _show_chips(found, fps: float, clock_hz: float, best, numbers: list[int]) -> None:
+    table = Table(title=f"chips for {fps:g} frames a second at {clock_hz / 1e9:g} GHz, by the slowest view", title_justify="left")
+    for name in ("chip", "GE", "view", "cycles a frame", "frames a second", "", "waits for"):
+        table.add_column(name, justify="left" if name in ("chip", "", "waits for") else "right")
+    for rate in found:
+        per_second = rate.per_second(clock_hz)
+        table.add_row(
+            rate.chip.name, "not synthesised" if rate.ge is None else f"{rate.ge:,.0f}", str(numbers[rate.view]), f"{rate.cycles:,}", f"{per_second:,.1f}",
+            "yes" if per_second >= fps else "no", rate.waits,
+        )
+    console.print(table)
+    if best is None:
+        fastest = min(found, key=lambda rate: rate.cycles)
+        console.print(f"no chip makes {fps:g} frames a second; the fastest, {fastest.chip.name}, waits for: {fastest.waits}", soft_wrap=True)
+    else:
+        console.print(f"smallest chip for {fps:g} frames a second: {best.chip.name}, which waits for: {best.waits}", soft_wrap=True)
+
+
 def cost(
     scene: Annotated[str, typer.Argument(help="scene as for flicker render, or demo")],
     cameras: Annotated[Path | None, typer.Option(help=CAMERAS_HELP)] = None,
@@ -76,6 +95,8 @@ def cost(
     form: Annotated[FormatChoice | None, typer.Option("--format", help="of the scene in memory [default: chunk or as packed]")] = None,
     chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml [default: that of the stage of channels]")] = None,
     chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
+    fps: Annotated[float | None, typer.Option(help="frames a second: name the smallest chip of the table that makes them in every view")] = None,
+    clock: Annotated[float, typer.Option(help="of the chip, GHz, for --fps; the memory's cycles stay those at 1 GHz")] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="picture: Gaussians visited per pixel of the dearest view")] = None,
     json_: Annotated[Path | None, typer.Option("--json", help="everything as JSON; -: printed, and nothing else")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print nothing but errors")] = False,
@@ -86,8 +107,14 @@ def cost(
         raise FlickerError("--json -: not with --quiet")
     writable(out, "--out")
     writable(None if printed else json_, "--json")
-    if chips_file is not None and chip is None:
-        raise FlickerError("--chips: with --chip NAME only")
+    if chips_file is not None and chip is None and fps is None:
+        raise FlickerError("--chips: with --chip NAME or --fps only")
+    for name, value in (("--fps", fps), ("--clock", clock)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise FlickerError(f"{name}: more than 0, not {value:g}")
+    if clock != 1.0 and fps is None:
+        raise FlickerError("--clock: with --fps only")
+    table = chips() | (chips(chips_file) if chips_file is not None else {})
     config = RenderConfig() if chip is None else chip_of(chip, chips_file).config
     if config.form is not Form.FACTORED:
         raise FlickerError(f"--chip {chip}: has records of 32 bytes; costs are counted for those of 16")
@@ -110,6 +137,13 @@ def cost(
         dearest = max(range(len(result.views)), key=lambda k: result.views[k].interval)
         _picture(result, dearest, out)
     everything = {"scene": scene, "chip": chip, "cameras": source.cameras_from, "numbers": numbers} | result.summary()
+    if fps is not None:
+        from ..chip.sizing import rates, smallest
+
+        found_rates = rates(result.packing, [of.camera for of in chosen], table.values(), Steps() if printed or quiet else RichSteps())
+        best, clock_hz = smallest(found_rates, fps, 1e9 * clock), 1e9 * clock
+        everything |= {"fps": fps, "chips": [rate.summary(clock_hz) | {"view": numbers[rate.view]} for rate in found_rates],
+                       "smallest_chip": best.chip.name if best else None}
     if printed:
         say(everything, True, False, Table)
     elif json_ is not None:
@@ -124,5 +158,7 @@ def cost(
         if not found_of.recorded.any() and (nothing := why_empty(of)):
             console.print(f"view {of.number}: {nothing}", highlight=False, soft_wrap=True)
     _show(result, numbers)
+    if fps is not None:
+        _show_chips(found_rates, fps, clock_hz, best, numbers)
     if out is not None:
         console.print(f"view {numbers[dearest]}: {out}")
