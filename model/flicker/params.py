@@ -194,7 +194,7 @@ class ChipMemories:
     """
 
     sorted_entries: int = 2048
-    list_chunks: int = 14
+    list_chunks: int = 9
     sorted_ahead: int = 512
     pairs: int = 4
     survivors: int = 128

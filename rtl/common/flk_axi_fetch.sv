@@ -16,6 +16,7 @@ module flk_axi_fetch #(
   parameter  int unsigned Width    = 512,
   parameter  int unsigned MaxBeats = 16,  // of a piece
   parameter  int unsigned Bursts   = 8,   // under way
+  parameter  bit          Listed   = 1'b1, // requests have tags; else out_tag_o is 0 (flk_axi_read)
   parameter  int unsigned IdBits   = 4,
   parameter  int unsigned Id       = 0,
   localparam int unsigned Shift    = $clog2(Width / 8)
@@ -139,6 +140,7 @@ module flk_axi_fetch #(
     .Width   (Width),
     .MaxBeats(MaxBeats),
     .Bursts  (Bursts),
+    .Listed  (Listed),
     .IdBits  (IdBits),
     .Id      (Id)
   ) i_read (

@@ -6,7 +6,7 @@
 module flk_axi_lane #(
   parameter int unsigned Width    = 256,
   parameter int unsigned AddrBits = 40,
-  parameter int unsigned Bursts   = 128
+  parameter int unsigned Bursts   = 256
 ) (
   input  logic                clk_i,
   input  logic                rst_ni,

@@ -7,7 +7,8 @@
 // combinationally: r_valid_i and r_data_i to the output, out_ready_i to r_ready_o. Nothing is
 // stored of them: where the port is shared, the consumer has room for what it asked for. ar_tag_o: tag
 // of the address that is offered, for a user that wants less than a whole beat of it. idle_o:
-// no request inside, no beat to come. No clear: what was asked for comes.
+// no request inside, no beat to come. No clear: what was asked for comes. Requests of one burst
+// without tags (Listed 0) are counted instead of listed, so that Bursts may be large.
 module flk_axi_read #(
   parameter  int unsigned AddrBits = 40,
   parameter  int unsigned BeatBits = 16,
@@ -15,6 +16,7 @@ module flk_axi_read #(
   parameter  int unsigned Width    = 512,
   parameter  int unsigned MaxBeats = 16,
   parameter  int unsigned Bursts   = 8,   // under way
+  parameter  bit          Listed   = 1'b1, // requests have tags, or several bursts; else out_tag_o is 0
   parameter  int unsigned IdBits   = 4,
   parameter  int unsigned Id       = 0,
   localparam int unsigned Bytes    = Width / 8
@@ -80,27 +82,61 @@ module flk_axi_read #(
 
   // What is under way: only addresses enter, so that there is room until the one offered is taken.
 
-  logic room, known, known_last, pop, empty, unused_full;
-  logic [$clog2(Bursts+1)-1:0] unused_usage;
+  logic room, known, known_last, pop, empty;
   logic [TagBits-1:0] known_tag;
 
-  flk_fifo #(
-    .Width(TagBits + 1),
-    .Depth(Bursts)
-  ) i_under_way (
-    .clk_i,
-    .rst_ni,
-    .clear_i    (1'b0),
-    .in_valid_i (ar_valid_o && ar_ready_i),
-    .in_ready_o (room),
-    .in_data_i  ({split_last, split_tag}),
-    .out_valid_o(known),
-    .out_ready_i(pop),
-    .out_data_o ({known_last, known_tag}),
-    .usage_o    (unused_usage),
-    .full_o     (unused_full),
-    .empty_o    (empty)
-  );
+  if (Listed) begin : gen_listed
+    logic unused_full;
+    logic [$clog2(Bursts+1)-1:0] unused_usage;
+
+    flk_fifo #(
+      .Width(TagBits + 1),
+      .Depth(Bursts)
+    ) i_under_way (
+      .clk_i,
+      .rst_ni,
+      .clear_i    (1'b0),
+      .in_valid_i (ar_valid_o && ar_ready_i),
+      .in_ready_o (room),
+      .in_data_i  ({split_last, split_tag}),
+      .out_valid_o(known),
+      .out_ready_i(pop),
+      .out_data_o ({known_last, known_tag}),
+      .usage_o    (unused_usage),
+      .full_o     (unused_full),
+      .empty_o    (empty)
+    );
+  end else begin : gen_counted
+    localparam int unsigned CountBits = $clog2(Bursts + 1);
+
+    logic push, full_q, some_q;
+    logic [CountBits-1:0] count_d, count_q;
+
+    assign push       = ar_valid_o && ar_ready_i;
+    assign count_d    = count_q + CountBits'(push) - CountBits'(pop);
+    assign room       = !full_q;
+    assign known      = some_q;
+    assign empty      = !some_q;
+    assign known_last = 1'b1;
+    assign known_tag  = '0;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        count_q <= '0;
+        full_q  <= 1'b0;
+        some_q  <= 1'b0;
+      end else begin
+        count_q <= count_d;
+        full_q  <= count_d == CountBits'(Bursts);
+        some_q  <= count_d != '0;
+      end
+    end
+
+`ifndef SYNTHESIS
+    assert property (@(posedge clk_i) disable iff (!rst_ni) split_valid |-> split_last && split_tag == '0)
+    else $error("flk_axi_read: what is counted has a tag or several bursts");
+`endif
+  end
 
   assign ar_valid_o  = split_valid && room;
   assign split_ready = ar_ready_i && room;

@@ -30,8 +30,8 @@ module flk_fifo #(
   if (Width < 1) begin : gen_check_width
     $error("flk_fifo: Width must be at least 1");
   end
-  if (Depth < 1 || Depth > 128) begin : gen_check_depth
-    $error("flk_fifo: Depth must be 1 to 128 (storage is flip-flops)");
+  if (Depth < 1 || Depth > 256) begin : gen_check_depth
+    $error("flk_fifo: Depth must be 1 to 256 (storage is flip-flops)");
   end
 
   // Pointers and fill level

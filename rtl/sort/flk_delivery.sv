@@ -28,12 +28,12 @@ module flk_delivery #(
   parameter  int unsigned RecordBits = 128,
   parameter  int unsigned NumberBits = 24,
   parameter  int unsigned InWidth    = 1,    // elements that a core takes in a cycle, 1 or 2
-  parameter  int unsigned Queue      = 64,   // records, of each core
+  parameter  int unsigned Queue      = 128,  // records, of each core
   parameter  int unsigned Banks      = 4,    // of the cache
   parameter  int unsigned Sets       = 64,
   parameter  int unsigned Ways       = 4,
-  parameter  int unsigned Depth      = 256,
-  parameter  int unsigned Places     = 128,
+  parameter  int unsigned Depth      = 512,
+  parameter  int unsigned Places     = 256,
   parameter  int unsigned AddrBits   = 40,
   parameter  int unsigned IdBits     = 4,
   parameter  int unsigned Id         = 0,

@@ -26,8 +26,8 @@ module flk_record_cache #(
   parameter  int unsigned Banks       = 4,
   parameter  int unsigned Sets        = 64,   // of a bank
   parameter  int unsigned Ways        = 4,
-  parameter  int unsigned Depth       = 256,  // elements that wait
-  parameter  int unsigned Places      = 128,  // lines on their way
+  parameter  int unsigned Depth       = 512,  // elements that wait
+  parameter  int unsigned Places      = 256,  // lines on their way
   parameter  int unsigned AddrBits    = 40,
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
@@ -452,6 +452,7 @@ module flk_record_cache #(
     .Width   (Width),
     .MaxBeats(2),
     .Bursts  (Places),
+    .Listed  (1'b0),
     .IdBits  (IdBits),
     .Id      (Id)
   ) i_fetch (

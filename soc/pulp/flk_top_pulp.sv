@@ -22,7 +22,7 @@ module flk_top_pulp
   parameter int unsigned SortStages     = 7,
   parameter int unsigned SortWays       = 8,
   parameter int unsigned MergeLines     = 128,
-  parameter int unsigned Chunks         = 14,
+  parameter int unsigned Chunks         = 9,
   parameter int unsigned Entries        = 512,
   parameter int unsigned Pairs          = 4,
   parameter int unsigned PreprocLanes   = 4,

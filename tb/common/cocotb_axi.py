@@ -32,7 +32,7 @@ class Anything:
 def requests(dut, rng, count, base=BASE, longest=40, apart=False):
     """Random requests inside of the memory; apart: none overlaps another."""
     width = int(dut.Width.value) // 8 if hasattr(dut, "Width") else int(dut.Bytes.value)
-    tags = len(dut.in_tag_i)
+    tags = len(dut.in_tag_i) if not hasattr(dut, "Listed") or int(dut.Listed.value) else 0
     lines = SIZE // width
     made, at = [], 0
     for _ in range(count):

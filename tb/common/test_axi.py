@@ -24,6 +24,7 @@ def test_axi_split(parameters):
 
 @pytest.mark.parametrize("parameters", [
     {}, {"Width": 64, "MaxBeats": 64, "TagBits": 8, "Bursts": 3}, ONE_BURST,
+    {"Width": 64, "MaxBeats": 1, "BeatBits": 1, "Listed": 0, "Bursts": 5},
 ])
 def test_axi_read(parameters):
     rate = [] if not parameters else ["read", "read_other_memory", "no_answer"]

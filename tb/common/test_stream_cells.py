@@ -3,7 +3,7 @@
 State space: every pair of idle and back-pressure patterns (flicker_tb.stalls), random payloads,
 random initial register values, blocked output, reset in mid-traffic. Parameter space: registers
 of one bit and of more than a machine word; FIFO depths 1, 2, 3, 17; 3 and 4 arbiter inputs. With
-SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 128, 2 and 6 inputs, registers of 8 bits.
+SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 256, 2 and 6 inputs, registers of 8 bits.
 Not covered: other depths and widths (the code has no case for them).
 """
 
@@ -15,7 +15,7 @@ from flicker_tb.runner import build_and_test
 
 SLOW = pytest.mark.slow  # the same with other numbers
 FIFO_SIZES = [  # width, depth
-    (8, 1), (1, 2), (8, 3), (8, 17), *(pytest.param(*size, marks=SLOW) for size in ((146, 5), (8, 16), (70, 128))),
+    (8, 1), (1, 2), (8, 3), (8, 17), *(pytest.param(*size, marks=SLOW) for size in ((146, 5), (8, 16), (70, 256))),
 ]
 
 
@@ -75,8 +75,8 @@ def test_random_start() -> None:
     [
         ("flk_pipe_reg", {"Width": 0}, "Width must be at least 1"),
         ("flk_skid_buffer", {"Width": 0}, "Width must be at least 1"),
-        ("flk_fifo", {"Depth": 0}, "Depth must be 1 to 128"),
-        ("flk_fifo", {"Depth": 129}, "Depth must be 1 to 128"),
+        ("flk_fifo", {"Depth": 0}, "Depth must be 1 to 256"),
+        ("flk_fifo", {"Depth": 257}, "Depth must be 1 to 256"),
         ("flk_stream_arbiter", {"Inputs": 1}, "Inputs must be at least 2"),
     ],
 )
