@@ -20,7 +20,7 @@ from .common import SIZE, Say, folder_of_scenes
 from .scale import CONFIG, point
 
 # Folder, times, size: small pictures have the longest lists.
-VIEWS = (("flowers", 1, (320, 178)), ("playbot", 1, (320, 178)), ("flowers", 2, SIZE))
+VIEWS = (("flowers", 1, (320, 178)), ("playbot", 1, (320, 178)), ("playbot", 1, (640, 360)), ("flowers", 1, SIZE), ("flowers", 2, SIZE))
 CHUNKS = 64_000  # of a list writer: enough for all of them
 
 
