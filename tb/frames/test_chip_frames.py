@@ -378,7 +378,7 @@ def specks(count: int, size: float, spread: float) -> PackedScene:
 
 
 @pytest.mark.parametrize(("part", "count", "size", "width", "channels"), [
-    ("rendering: sorting units", 5000, 0.001, 16, 64), ("rendering: delivery", 6000, 0.006, 64, 64), ("rendering: lanes", 400, 0.2, 64, 64),
+    ("rendering: sorting units", 5000, 0.001, 16, 64), ("rendering: delivery", 6000, 0.01, 64, 64), ("rendering: lanes", 400, 0.2, 64, 64),
     ("front end: DRAM", 3000, 0.001, 64, 1),
 ])
 def test_what_holds_a_frame_up(part: str, count: int, size: float, width: int, channels: int) -> None:
