@@ -29,7 +29,7 @@ from flicker.scene.real import REAL_VIEWS, RealView
 from .common import SIZE, Say, folder_of_scenes, save_charts
 
 FOLDERS = ("flowers", "playbot")
-TIMES = (1, 2, 4)
+TIMES = (1, 2, 4, 8)
 DEGREES = (0, 1, 2, 3)
 SIZES = ((320, 178), (640, 360), SIZE, (1920, 1080))
 CONFIG = RenderConfig(stage="lanes")
