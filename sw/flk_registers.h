@@ -425,16 +425,16 @@
 #define FLK_COUNTER_STAMP_FRONT_DONE 49  /* cycle in which it left the front end */
 #define FLK_COUNTER_STAMP_RENDERING_START 50  /* cycle in which it entered the rendering half */
 #define FLK_COUNTER_STAMP_RENDERING_DONE 51  /* cycle in which it left the rendering half */
-#define FLK_COUNTER_LIST_LINE_WAITS 52  /* cycles in which a line of a list waits for its sorting unit, of all four */
-#define FLK_COUNTER_SORTED_WAITS 53  /* cycles in which a sorted entry waits for its buffer, of all four sorting units */
+#define FLK_COUNTER_LIST_LINE_WAITS 52  /* cycles in which a line of a list waits for its sorting unit, summed over the units */
+#define FLK_COUNTER_SORTED_WAITS 53  /* cycles in which a sorted entry waits for its buffer, summed over the sorting units */
 #define FLK_COUNTER_ENTRY_MISSING 54  /* cycles in which delivery waits for an entry, until all pixels are there */
 #define FLK_COUNTER_ENTRY_WAITS 55  /* cycles in which an entry waits for delivery */
 #define FLK_COUNTER_QUEUE_WAITS 56  /* cycles in which a record waits for room in the cores' queues */
 #define FLK_COUNTER_CACHE_WAITS 57  /* cycles in which a record waits for its line */
-#define FLK_COUNTER_RECORD_WAITS 58  /* cycles in which a record at the end of its queue waits for its core, of all four */
-#define FLK_COUNTER_PAIR_WAITS 59  /* cycles in which a core waits for a place in the frame writer, of all four */
+#define FLK_COUNTER_RECORD_WAITS 58  /* cycles in which a record at the end of its queue waits for its core, summed over the cores */
+#define FLK_COUNTER_PAIR_WAITS 59  /* cycles in which a core waits for a place in the frame writer, summed over the cores */
 #define FLK_COUNTER_FRAME_WAITS 60  /* cycles in which a line of the frame buffer waits for its write */
-#define FLK_COUNTER_SORTED_AGAIN 61  /* entries of lists that are sorted twice, of all four sorting units */
+#define FLK_COUNTER_SORTED_AGAIN 61  /* entries of lists that are sorted twice, summed over the sorting units */
 #define FLK_COUNTER_LIVE_CYCLES 64  /* cycles */
 #define FLK_COUNTER_LIVE_RECORD_BEATS 65  /* beats read, of 32 bytes: records */
 #define FLK_COUNTER_LIVE_LIST_BEATS 66  /* beats read: lists and pointers */
@@ -460,11 +460,11 @@
 #define FLK_COUNTER_FRONT_LANE_WAITS 98  /* cycles in which projected Gaussians wait for the lanes */
 #define FLK_COUNTER_FRONT_PLACE_WAITS 99  /* cycles in which they wait for places of records */
 #define FLK_COUNTER_FRONT_REQUEST_WAITS 100  /* cycles in which they wait for the fetch of colours */
-#define FLK_COUNTER_FRONT_COLOUR_WAITS 101  /* cycles in which colours wait for a lane, of all four */
-#define FLK_COUNTER_FRONT_RECORD_WAITS 102  /* cycles in which a record waits for its queue, of all four lanes */
-#define FLK_COUNTER_FRONT_ENTRY_WAITS 103  /* cycles in which an entry waits for the merge, of all four lanes */
-#define FLK_COUNTER_FRONT_MERGED_WAITS 104  /* cycles in which an entry waits for its list writer, of all four */
-#define FLK_COUNTER_FRONT_LINE_WAITS 105  /* cycles in which a line of a list waits for its write, of all four list writers */
+#define FLK_COUNTER_FRONT_COLOUR_WAITS 101  /* cycles in which colours wait for a preprocessing core, summed over the cores */
+#define FLK_COUNTER_FRONT_RECORD_WAITS 102  /* cycles in which a record waits for its queue, summed over the preprocessing cores */
+#define FLK_COUNTER_FRONT_ENTRY_WAITS 103  /* cycles in which an entry waits for the merge, summed over the preprocessing cores */
+#define FLK_COUNTER_FRONT_MERGED_WAITS 104  /* cycles in which an entry waits for its list writer, summed over the writers */
+#define FLK_COUNTER_FRONT_LINE_WAITS 105  /* cycles in which a line of a list waits for its write, summed over the list writers */
 #define FLK_COUNTER_FRONT_BEAT_WAITS 106  /* cycles in which a line of records waits for its write */
 #define FLK_COUNTER_STAGE 128  /* rendering stage: 32 words of each core, in the order of CNT_* (docs/reference/render_stage.md) or LANE_CNT_* (docs/reference/lane_stage.md) */
 

@@ -89,15 +89,15 @@ package flk_counter_pkg;
     logic [31:0] place_waits;
     // cycles in which they wait for the fetch of colours
     logic [31:0] request_waits;
-    // cycles in which colours wait for a lane, of all four
+    // cycles in which colours wait for a preprocessing core, summed over the cores
     logic [31:0] colour_waits;
-    // cycles in which a record waits for its queue, of all four lanes
+    // cycles in which a record waits for its queue, summed over the preprocessing cores
     logic [31:0] record_waits;
-    // cycles in which an entry waits for the merge, of all four lanes
+    // cycles in which an entry waits for the merge, summed over the preprocessing cores
     logic [31:0] entry_waits;
-    // cycles in which an entry waits for its list writer, of all four
+    // cycles in which an entry waits for its list writer, summed over the writers
     logic [31:0] merged_waits;
-    // cycles in which a line of a list waits for its write, of all four list writers
+    // cycles in which a line of a list waits for its write, summed over the list writers
     logic [31:0] line_waits;
     // cycles in which a line of records waits for its write
     logic [31:0] beat_waits;
@@ -152,9 +152,9 @@ package flk_counter_pkg;
     logic [3:0][31:0] dropped;
     // lines of 32 bytes that the record cache read
     logic [31:0] lines;
-    // cycles in which a line of a list waits for its sorting unit, of all four
+    // cycles in which a line of a list waits for its sorting unit, summed over the units
     logic [31:0] list_waits;
-    // cycles in which a sorted entry waits for its buffer, of all four sorting units
+    // cycles in which a sorted entry waits for its buffer, summed over the sorting units
     logic [31:0] sorted_waits;
     // cycles in which delivery waits for an entry, until all pixels are there
     logic [31:0] entry_missing;
@@ -164,13 +164,13 @@ package flk_counter_pkg;
     logic [31:0] queue_waits;
     // cycles in which a record waits for its line
     logic [31:0] cache_waits;
-    // cycles in which a record at the end of its queue waits for its core, of all four
+    // cycles in which a record at the end of its queue waits for its core, summed over the cores
     logic [31:0] record_waits;
-    // cycles in which a core waits for a place in the frame writer, of all four
+    // cycles in which a core waits for a place in the frame writer, summed over the cores
     logic [31:0] pair_waits;
     // cycles in which a line of the frame buffer waits for its write
     logic [31:0] frame_waits;
-    // entries of lists that are sorted twice, of all four sorting units
+    // entries of lists that are sorted twice, summed over the sorting units
     logic [31:0] sorted_again;
   } rendering_counters_t;
 
