@@ -16,7 +16,7 @@ module flk_axi_read #(
   parameter  int unsigned Width    = 512,
   parameter  int unsigned MaxBeats = 16,
   parameter  int unsigned Bursts   = 8,   // under way
-  parameter  bit          Listed   = 1'b1, // requests have tags, or several bursts; else out_tag_o is 0
+  parameter  bit          Listed   = 1'b1, // requests have tags or several bursts; 0: no tags
   parameter  int unsigned IdBits   = 4,
   parameter  int unsigned Id       = 0,
   localparam int unsigned Bytes    = Width / 8
@@ -132,8 +132,12 @@ module flk_axi_read #(
       end
     end
 
+    logic unused_split;
+    assign unused_split = ^{split_last, split_tag};
+
 `ifndef SYNTHESIS
-    assert property (@(posedge clk_i) disable iff (!rst_ni) split_valid |-> split_last && split_tag == '0)
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        split_valid |-> split_last && split_tag == '0)
     else $error("flk_axi_read: what is counted has a tag or several bursts");
 `endif
   end
