@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..chips import Chip
+from ..chips import Chip, chips
 from ..cost.area import parts
 from ..cost.synth.units import chip_row
 from ..golden.front.frame import run_front
@@ -63,7 +63,8 @@ def rates(packing: Packing, cameras: Sequence[Camera], table: Iterable[Chip], st
                     worst[chip.name] = frame.interval, k, frame.bottleneck
     found = []
     for chip in those:
-        part, (cycles, view, waits) = parts().get(chip_row(chip)), worst[chip.name]
+        cycles, view, waits = worst[chip.name]
+        part = parts().get(chip_row(chip)) if chips().get(chip.name) == chip else None  # another of that name is not the one that was synthesised
         found.append(Rate(chip, part.ge if part else None, view, cycles, waits))
     return sorted(found, key=lambda rate: (rate.ge is None, rate.ge or 0.0))
 
