@@ -50,7 +50,7 @@ generate: $(STAMP) ## write the generated sources (registers, packages, mask gen
 	@$(BIN)/python scripts/gen_manifests.py
 	@$(BIN)/python scripts/gen_figures.py
 
-test: $(STAMP) $(if $(shell command -v riscv64-unknown-elf-gcc),$(SOC)) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
+test: $(STAMP) $(if $(shell sh -c 'command -v riscv64-unknown-elf-gcc'),$(SOC)) lint ## lint, all tests, the fast proofs; SLOW=1: also those that take long; FRESH=1: also those that passed on the same inputs
 	@SLOW="$(SLOW)" FRESH="$(FRESH)" $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --cached tb
 	@$(BIN)/python scripts/formal.py --fast --jobs $(JOBS)
 

@@ -367,7 +367,7 @@ module fv_axi_fetch #(
 
   for (genvar k = 0; k < Bursts; k++) begin : gen_entry
     assign list[k]    = under_q[k].tag;
-    assign storage[k] = 2'(dut.i_read.i_under_way.storage_q[k]);
+    assign storage[k] = 2'(dut.i_read.gen_listed.i_under_way.storage_q[k]);
     always_comb begin
       if (rst_n && UnderBits'(k) < count_q) begin
         l_length: assert (under_q[k].len < 8'(MaxBeats));
@@ -382,9 +382,9 @@ module fv_axi_fetch #(
     .rst_ni   (rst_n),
     .count_i  (count_q),
     .list_i   (list),
-    .usage_i  (dut.i_read.i_under_way.usage_q),
-    .read_i   (dut.i_read.i_under_way.read_q),
-    .write_i  (dut.i_read.i_under_way.write_q),
+    .usage_i  (dut.i_read.gen_listed.i_under_way.usage_q),
+    .read_i   (dut.i_read.gen_listed.i_under_way.read_q),
+    .write_i  (dut.i_read.gen_listed.i_under_way.write_q),
     .storage_i(storage)
   );
 

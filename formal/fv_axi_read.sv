@@ -17,6 +17,7 @@ module fv_axi_read #(
   parameter  int unsigned Width     = 512,
   parameter  int unsigned MaxBeats  = 4,
   parameter  int unsigned Bursts    = 2,
+  parameter  bit          Listed    = 1'b1,
   parameter  int unsigned Id        = 1,
   localparam int unsigned UnderBits = $clog2(Bursts + 1)
 ) (
@@ -57,6 +58,7 @@ module fv_axi_read #(
     .Width   (Width),
     .MaxBeats(MaxBeats),
     .Bursts  (Bursts),
+    .Listed  (Listed),
     .IdBits  (2),
     .Id      (Id)
   ) dut (
@@ -164,6 +166,7 @@ module fv_axi_read #(
   // ---- claims ---------------------------------------------------------------------------------------
 
   always_comb begin
+    m_tag: assume (Listed || in_tag_i == '0);
     m_beat: assume (!r_valid_i || (count_q != '0 && r_last_i == (beat_q == under_q[0].len)));
 
     if (rst_n) begin
@@ -195,24 +198,44 @@ module fv_axi_read #(
     end
   end
 
-  logic [Bursts-1:0][2:0] list, storage;
+  if (Listed) begin : gen_listed
+    logic [Bursts-1:0][2:0] list, storage;
 
-  for (genvar k = 0; k < Bursts; k++) begin : gen_entry
-    assign list[k]    = {under_q[k].last, under_q[k].tag};
-    assign storage[k] = dut.i_under_way.storage_q[k];
+    for (genvar k = 0; k < Bursts; k++) begin : gen_entry
+      assign list[k]    = {under_q[k].last, under_q[k].tag};
+      assign storage[k] = dut.gen_listed.i_under_way.storage_q[k];
+    end
+
+    fv_fifo_list #(
+      .Width(3),
+      .Depth(Bursts)
+    ) i_list (
+      .rst_ni   (rst_n),
+      .count_i  (count_q),
+      .list_i   (list),
+      .usage_i  (dut.gen_listed.i_under_way.usage_q),
+      .read_i   (dut.gen_listed.i_under_way.read_q),
+      .write_i  (dut.gen_listed.i_under_way.write_q),
+      .storage_i(storage)
+    );
+  end else begin : gen_counted
+    logic whole;  // all bursts under way are the only ones of their requests, without tags
+
+    always_comb begin
+      whole = 1'b1;
+      for (int unsigned k = 0; k < Bursts; k++) begin
+        whole &= UnderBits'(k) >= count_q || (under_q[k].last && under_q[k].tag == '0);
+      end
+      if (rst_n) begin
+        l_count: assert (dut.gen_counted.count_q == count_q &&
+                         dut.gen_counted.full_q == (count_q == UnderBits'(Bursts)) &&
+                         dut.gen_counted.some_q == (count_q != '0) &&
+                         count_q <= UnderBits'(Bursts));
+        l_split: assert ((!dut.i_split.out_valid_q || dut.i_split.out_tag_q == '0) &&
+                         (!dut.i_split.left_valid_q || dut.i_split.tag_q == '0));
+        l_whole: assert (whole);
+      end
+    end
   end
-
-  fv_fifo_list #(
-    .Width(3),
-    .Depth(Bursts)
-  ) i_list (
-    .rst_ni   (rst_n),
-    .count_i  (count_q),
-    .list_i   (list),
-    .usage_i  (dut.i_under_way.usage_q),
-    .read_i   (dut.i_under_way.read_q),
-    .write_i  (dut.i_under_way.write_q),
-    .storage_i(storage)
-  );
 
 endmodule

@@ -67,12 +67,13 @@ async def capacity(dut):
     test = StreamTest(dut, echo)
     test.sink.stall = iter(lambda: gate[0], None)
     await test.bench.reset()
-    test.source.send(random_items(test))
+    count = ITEMS + config()["capacity"]
+    test.source.send(random_items(test, count))
     await test.bench.cycles(config()["capacity"] * 2 + 20)
     assert test.input.count == config()["capacity"], f"{test.input.count} elements taken"
     gate[0] = False
-    await test.bench.until(lambda: test.checker.checked == ITEMS, 10 * ITEMS, "last element")
-    test.checker.finish(ITEMS)
+    await test.bench.until(lambda: test.checker.checked == count, 10 * count, "last element")
+    test.checker.finish(count)
 
 
 @cocotb.test()

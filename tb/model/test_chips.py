@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 from flicker_tb.command import flicker
+from test_scene_cost import camera, some
 
 from flicker.chip.dram import DramConfig
-from flicker.chip.sizing import Rate, smallest
+from flicker.chip.scene_cost import packed_for_cost
+from flicker.chip.sizing import Rate, rates, smallest
 from flicker.chips import STATUS, TABLE, chip_of, chips, name_of
 from flicker.errors import FlickerError
 from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, Form, RenderConfig
@@ -110,6 +112,14 @@ def test_commands_take_a_name(tmp_path: Path) -> None:
         assert found["chip"] == name
         cycles.append(found["views"][0]["interval"])
     assert cycles[0] > 1.5 * cycles[1]
+
+
+def test_rate_of_the_slowest_view() -> None:
+    """Whatever the order of the cameras."""
+    packing, near, far = packed_for_cost(some())[1], camera(), camera(-3.0)
+    one, other, both, turned = (rates(packing, cameras, [chip_of("tiny")])[0] for cameras in ([near], [far], [near, far], [far, near]))
+    assert one.cycles > 1.1 * other.cycles and both.cycles == turned.cycles == one.cycles
+    assert (both.view, turned.view, both.waits) == (0, 1, one.waits) and both.per_second(2e9) == 2e9 / one.cycles
 
 
 def test_smallest_chip(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def test_illegal_parameters(parameters: dict[str, int], message: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slots", [16, 24, 32])
+@pytest.mark.parametrize("slots", [9, 16, 24, 32])
 @pytest.mark.parametrize("scene", ["demo", "flowers"])
 def test_frame(scene: str, slots: int, tmp_path: Path) -> None:
     """Four readers at a memory with DRAM timing, latency 100: the lists of a frame of 1280x720 in at most half a million cycles; how many stands in the log."""
