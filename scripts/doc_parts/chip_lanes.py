@@ -76,7 +76,7 @@ RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
 DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": QUEUE, "Pairs": ChipMemories().pairs, "InWidth": 1}
 # Entries that each sorting unit's buffer holds, records that each core's queue holds, pairs of tiles in the frame writer, records a cycle; the memory.
 HELD: tuple[tuple[dict[str, int], DramConfig | None], ...] = (
-    ({"Entries": 4}, None), ({}, None), ({"InWidth": 2}, None), ({"Queue": 128}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None),
+    ({"Entries": 4}, None), ({}, None), ({"InWidth": 2}, None), ({"Queue": 64}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None),
     ({}, MEMORIES["51.2 GB/s"]),
 )
 
