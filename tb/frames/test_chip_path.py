@@ -125,7 +125,7 @@ def rows(file: str = "a.csv") -> list[dict[str, str]]:
 
 def near_model(scene: str | Path, view: int, size: str, motion: tuple, frames: int, say: bool = False) -> None:
     """A path through the chip: no picture differs (an error of the command); of every frame what is listed is the golden front end's, bytes are within 10 %
-    of the model's and the interval within 20 %, all intervals together within 10 %. In smaller pictures how the halves meet in the memory moves single frames
+    of the model's and the interval within 15 %, all intervals together within 10 %. In smaller pictures how the halves meet in the memory moves single frames
     by more."""
     words = (scene, "--view", view, "--size", size, *motion, "--frames", frames, "--engine", "chip", "-o", "out")
     done = path(*words, "--stats", "a.csv", "--chart", "a.png", "--save-cameras", "along.json")
@@ -148,7 +148,7 @@ def near_model(scene: str | Path, view: int, size: str, motion: tuple, frames: i
             assert int(row_["late"]) == (int(row_["cycles"]) > 1e9 / 90)
         if say:
             print(f"frame {number}: {row_['cycles']} cycles, " + ", ".join(f"{name} {value:+.1%}" for name, value in off.items()))
-        assert all(abs(value) <= (0.2 if name == "interval" else 0.1) for name, value in off.items()), (number, off)
+        assert all(abs(value) <= (0.15 if name == "interval" else 0.1) for name, value in off.items()), (number, off)
         assert int(row_["latency_cycles"]) >= int(row_["render_cycles"])
     assert sum(int(row_["cycles"]) for row_ in found[1:]) == pytest.approx(modelled, rel=0.1)
 
