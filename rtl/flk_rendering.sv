@@ -37,8 +37,8 @@ module flk_rendering
   parameter  int unsigned SortStages     = 7,    // a sorting unit takes 16 << this
   parameter  int unsigned SortWays       = 8,    // runs that its last step merges
   parameter  int unsigned MergeLines     = 128,  // for lists that do not fit; half as many runs
-  parameter  int unsigned Chunks         = 9,   // in a list reader's memory
-  parameter  int unsigned Entries        = 512,  // of each sorting unit, that wait for delivery
+  parameter  int unsigned Chunks         = 8,   // in a list reader's memory
+  parameter  int unsigned Entries        = 704,  // of each sorting unit, that wait for delivery
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds

@@ -36,8 +36,8 @@ module flk_top
   parameter  int unsigned SortStages     = 7,     // sizes of memories: flk_rendering
   parameter  int unsigned SortWays       = 8,
   parameter  int unsigned MergeLines     = 128,
-  parameter  int unsigned Chunks         = 9,
-  parameter  int unsigned Entries        = 512,
+  parameter  int unsigned Chunks         = 8,
+  parameter  int unsigned Entries        = 704,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
   parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists

@@ -18,7 +18,8 @@
 #define TILE 16u
 #define PAIR (2u * TILE)
 #define MINOR_DEADLINE 1u /* of the version: since then there are deadlines, */
-#define MINOR_BY_DISTANCE 2u /* and frames by distance */
+#define MINOR_BY_DISTANCE 2u /* frames by distance, */
+#define MINOR_SH_BITS 5u     /* and SH codes of fewer than 8 bits */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -49,6 +50,7 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_CHUNKS] = "frame: chunks not 1 to 2^24",
     [FLK_FRAME_DEADLINE] = "frame: the chip has no deadlines",
     [FLK_FRAME_ORDER] = "frame: the chip does not sort by distance",
+    [FLK_FRAME_SH_BITS] = "frame: the chip takes SH codes of 8 bits alone",
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
@@ -74,7 +76,7 @@ static uint32_t blocks(uint32_t count, uint32_t size)
 /* Byte places of the image header. */
 enum { AT_VERSION = 8, AT_FORMAT = 10, AT_DEGREE = 12, AT_GAUSSIANS = 16, AT_CLUSTERS = 20, AT_SLOTS = 24, AT_BEATS = 28, AT_PARTS = 32 };
 enum { AT_LOW = 80, AT_HIGH = 92, AT_SIGMA = 104, AT_FLAGS = 108, AT_RESERVED = 112, AT_CRC = 252, HEADER_BYTES = 256 };
-enum { VERSION = 1, SLOT_STEP = 16, SLOT_LIMIT = 1 << 24, CLUSTER_LIMIT = 256, MAX_DEGREE = 3, TABLE_BYTES = 32 };
+enum { VERSION = 1, VERSION_SH_BITS = 2, SLOT_STEP = 16, SLOT_LIMIT = 1 << 24, CLUSTER_LIMIT = 256, MAX_DEGREE = 3, TABLE_BYTES = 32 };
 
 static uint32_t read16(const uint8_t *at)
 {
@@ -121,11 +123,12 @@ flk_status_t flk_scene_open(flk_scene_t *scene, const void *image, size_t size, 
     return FLK_IMAGE_SHORT;
   if (memcmp(data, "FLKSCENE", 8) != 0)
     return FLK_IMAGE_MAGIC;
-  if (read16(data + AT_VERSION) != VERSION)
+  if (read16(data + AT_VERSION) != VERSION && read16(data + AT_VERSION) != VERSION_SH_BITS)
     return FLK_IMAGE_VERSION;
   if (crc32(data, AT_CRC) != read32(data + AT_CRC))
     return FLK_IMAGE_HEADER_CRC;
   memset(&found, 0, sizeof found);
+  found.sh_bits = read16(data + AT_VERSION) == VERSION_SH_BITS;
   found.format = read16(data + AT_FORMAT);
   if (found.format > FLK_FORMAT_FP16)
     return FLK_IMAGE_FORMAT;
@@ -484,6 +487,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
     status = FLK_FRAME_DEADLINE;
   if (status == FLK_OK && frame->by_distance != 0 && device->minor < MINOR_BY_DISTANCE)
     status = FLK_FRAME_ORDER;
+  if (status == FLK_OK && scene->sh_bits != 0 && device->minor < MINOR_SH_BITS)
+    status = FLK_FRAME_SH_BITS;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)

@@ -49,6 +49,7 @@ typedef enum {
   FLK_FRAME_LISTS,   /* more tiles than the chip has lists */
   FLK_FRAME_DEADLINE, /* a deadline, on a chip of version 3.0, which has none */
   FLK_FRAME_ORDER,    /* by distance, on a chip older than version 3.2, which sorts by depth alone */
+  FLK_FRAME_SH_BITS,  /* a scene with SH codes of fewer than 8 bits, on a chip older than version 3.5 */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -76,6 +77,7 @@ typedef struct {
   float low[3], high[3];       /* box of the means */
   float sigma;                 /* largest standard deviation */
   int antialiased;             /* drawn with the opacities of Mip-Splatting */
+  int sh_bits;                 /* SH codes of some cluster have fewer than 8 bits */
 } flk_scene_t;
 
 #define FLK_NO_PART_CRC 1u /* flag: the parts' checksums are not computed, so that only the image header is read */

@@ -194,8 +194,8 @@ class ChipMemories:
     """
 
     sorted_entries: int = 2048
-    list_chunks: int = 9
-    sorted_ahead: int = 512
+    list_chunks: int = 8
+    sorted_ahead: int = 704
     pairs: int = 4
     survivors: int = 128
     sort_ways: int = 8

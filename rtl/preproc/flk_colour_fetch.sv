@@ -68,12 +68,22 @@ module flk_colour_fetch
     logic [AT_BITS-1:0] at;  // beat of the cluster's colours
   } mark_t;
 
-  function automatic logic [6:0] stride(input logic chunked, input logic [1:0] degree);
+  // Bytes of a Gaussian: whole words with codes of 8 bits and in FP16.
+  function automatic logic [6:0] stride(input logic chunked, input sh_bits_t bits,
+                                        input logic [1:0] degree);
     unique case (degree)
       2'd0: return chunked ? 7'd4 : 7'd8;
-      2'd1: return chunked ? 7'd16 : 7'd28;
-      2'd2: return chunked ? 7'd28 : 7'd56;
-      default: return chunked ? 7'd52 : 7'd100;
+      2'd1: return !chunked ? 7'd28 : bits == 4'd8 ? 7'd16 : 7'd5 + 7'(bits);
+      2'd2: return !chunked ? 7'd56 : 7'd4 + 7'(6'd3 * bits);
+      default: begin
+        unique case (bits)
+          4'd3: return chunked ? 7'd21 : 7'd100;
+          4'd4: return chunked ? 7'd27 : 7'd100;
+          4'd5: return chunked ? 7'd33 : 7'd100;
+          4'd6: return chunked ? 7'd38 : 7'd100;
+          default: return chunked ? 7'd52 : 7'd100;
+        endcase
+      end
     endcase
   endfunction
 
@@ -82,6 +92,7 @@ module flk_colour_fetch
   logic                              a_valid_q, a_move;
   cluster_index_t                    a_cluster_q;
   logic [31:0]                       a_colour_q;
+  sh_bits_t                          a_bits_q;
   logic [1:0]                        a_degree_q;
   logic [Lanes-1:0]                  a_alive_q;
   logic [Lanes-1:0][BYTE_BITS-1:0]   a_start_q;
@@ -95,7 +106,7 @@ module flk_colour_fetch
   logic [AT_BITS-1:0]                b_first_q;  // beats that hold colours of survivors
   logic [AT_BITS-1:0]                b_last_q;
 
-  assign in_stride  = stride(chunked_i, in_data_i.degree);
+  assign in_stride  = stride(chunked_i, in_data_i.bits, in_data_i.degree);
   assign in_ready_o = !a_valid_q;
 
   always_comb begin
@@ -121,6 +132,7 @@ module flk_colour_fetch
     if (in_ready_o) begin  // in_valid_i comes late
       a_cluster_q <= in_data_i.cluster;
       a_colour_q  <= in_data_i.colour;
+      a_bits_q    <= in_data_i.bits;
       a_degree_q  <= in_data_i.degree;
       a_alive_q   <= in_alive;
       a_stride_q  <= in_stride;
@@ -360,6 +372,7 @@ module flk_colour_fetch
 
   typedef struct packed {
     cluster_index_t       cluster;
+    sh_bits_t             bits;
     logic [1:0]           degree;
     logic [BYTE_BITS-1:0] start;
   } item_t;
@@ -383,7 +396,7 @@ module flk_colour_fetch
       .clear_i    (1'b0),
       .in_valid_i (a_move && a_alive_q[k]),
       .in_ready_o (lane_ready[k]),
-      .in_data_i  ({a_cluster_q, a_degree_q, a_start_q[k]}),
+      .in_data_i  ({a_cluster_q, a_bits_q, a_degree_q, a_start_q[k]}),
       .out_valid_o(item_valid),
       .out_ready_i(next_free),
       .out_data_o (item),
@@ -404,26 +417,29 @@ module flk_colour_fetch
     always_ff @(posedge clk_i) begin
       if (next_free && item_valid) begin
         next_q      <= item;
-        next_last_q <= AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.degree)) - 1'b1)
-                                >> 6);
+        next_last_q <= AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.bits, item.degree))
+                                 - 1'b1) >> 6);
       end
     end
 
     // The part that is wanted now
 
+    // It begins as far in front of its coefficients as the Gaussian in front of the first ones: with 4 bytes, 8 in FP16, of which the first part's alone
+    // mean anything. Places of parts count half bytes.
     logic                 want_d, want_q;
     cluster_index_t       cluster_q;
+    sh_bits_t             bits_q;
     logic [1:0]           degree_q, part_q;
-    logic [BYTE_BITS-1:0] from_q;  // first byte of the part
-    logic [AT_BITS-1:0]   last_q;  // beat of the Gaussian's last byte
-    logic [BYTE_BITS-1:0] further;
+    logic [BYTE_BITS:0]   from_q, further;
+    logic [AT_BITS-1:0]   at, last_q;  // beats of the part's first byte, of the Gaussian's last
     logic                 more, fire, straddles, final_part;
 
     assign final_part = degree_q == 2'd3 ? part_q == 2'd3 : degree_q != 2'd2 || part_q == 2'd1;
     assign more       = fire && !final_part;
     assign next_take  = !want_q || (fire && final_part);
     assign want_d     = next_take ? next_valid_q : want_q;
-    assign further    = from_q + (chunked_i ? BYTE_BITS'(12) : BYTE_BITS'(24));
+    assign further    = from_q + (chunked_i ? (BYTE_BITS + 1)'(6'd3 * bits_q) : (BYTE_BITS + 1)'(48));
+    assign at         = from_q[BYTE_BITS:7];
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -436,9 +452,10 @@ module flk_colour_fetch
     always_ff @(posedge clk_i) begin
       if (next_take) begin
         cluster_q <= next_q.cluster;
+        bits_q    <= next_q.bits;
         degree_q  <= next_q.degree;
         part_q    <= '0;
-        from_q    <= next_q.start;
+        from_q    <= {next_q.start, 1'b0};
         last_q    <= next_last_q;
       end else if (more) begin
         part_q <= part_q + 1'b1;
@@ -453,11 +470,10 @@ module flk_colour_fetch
     logic [31:0][31:0]     window_q;  // words of both
     logic                  here, needed, passed, shift, second, take, has, drop;
 
-    // It reaches 16 bytes of a chunk's Gaussian, 32 of FP16's, or to the Gaussian's end; it begins at a word.
-    assign straddles = (chunked_i ? from_q[5:4] == '1 && from_q[3:2] != '0
-                                  : from_q[5] && from_q[4:2] != '0) &&
-                       from_q[BYTE_BITS-1:6] != last_q;
-    assign here      = l0_q == {cluster_q, from_q[BYTE_BITS-1:6]};
+    // It lies in 4 words of a chunk's Gaussian, 8 of FP16's, or ends with the Gaussian.
+    assign straddles = (chunked_i ? from_q[6:5] == '1 && from_q[4:3] != '0
+                                  : from_q[6] && from_q[5:3] != '0) && at != last_q;
+    assign here      = l0_q == {cluster_q, at};
     assign fire      = want_q && l0_valid_q && here && (!straddles || l1_valid_q) &&
                        (!out_valid_o[k] || out_ready_i[k]);
 
@@ -472,7 +488,7 @@ module flk_colour_fetch
       if (!want_q) begin
         passed = none;
       end else if (later(cluster_q, seen_q.cluster) ||
-                   (cluster_q == seen_q.cluster && seen_q.at < from_q[BYTE_BITS-1:6])) begin
+                   (cluster_q == seen_q.cluster && seen_q.at < at)) begin
         passed = 1'b1;
       end else if (cluster_q == seen_q.cluster && seen_q.at <= last_q) begin
         needed = 1'b1;
@@ -500,13 +516,13 @@ module flk_colour_fetch
     logic  other, idle_other, fire_other;
 
     assign then_at     = {next_q.cluster, next_q.start[BYTE_BITS-1:6]};
-    assign beyond     = {cluster_q, further[BYTE_BITS-1:6]};
+    assign beyond     = {cluster_q, further[BYTE_BITS:7]};
     assign other      = next_valid_q && l0_q != then_at;
     assign idle_other = want_q ? !here : other;
     assign fire_other = final_part ? other : l0_q != beyond;
     assign shift      = l0_valid_q && (fire ? fire_other : idle_other);
     assign second     = l1_valid_q && l1_q == (more ? beyond : next_take ? then_at
-                                               : {cluster_q, from_q[BYTE_BITS-1:6]});
+                                               : {cluster_q, at});
 
     always_comb begin
       l0_valid_d = l0_valid_q;
@@ -549,14 +565,30 @@ module flk_colour_fetch
     assign lane_busy[k]    = want_q || out_valid_o[k];
     assign lane_cluster[k] = out_valid_o[k] ? out_data_o[k].cluster : cluster_q;
 
-    // The bytes from there on
+    // The bits from there on; a chunk's SH codes
 
-    logic [255:0]        words;
-    colour_part_t        part;
+    logic [255:0]          words;
+    logic [127:0]          chunk;
+    logic [3:0][2:0][7:0]  codes;
+    colour_part_t          part;
 
     always_comb begin
       for (int unsigned i = 0; i < 8; i++) begin
-        words[32*i+:32] = window_q[5'(from_q[5:2])+5'(i)];
+        words[32*i+:32] = window_q[5'(from_q[6:3])+5'(i)];
+      end
+    end
+
+    assign chunk = words[127:0] >> {from_q[2:0], 2'b00};
+
+    always_comb begin
+      for (int unsigned i = 0; i < 12; i++) begin
+        unique case (bits_q)
+          4'd3: codes[i/3][i%3] = 8'(chunk[32+3*i+:3]);
+          4'd4: codes[i/3][i%3] = 8'(chunk[32+4*i+:4]);
+          4'd5: codes[i/3][i%3] = 8'(chunk[32+5*i+:5]);
+          4'd6: codes[i/3][i%3] = 8'(chunk[32+6*i+:6]);
+          default: codes[i/3][i%3] = chunk[32+8*i+:8];
+        endcase
       end
     end
 
@@ -573,10 +605,10 @@ module flk_colour_fetch
         default: part.used = part_q == 2'd3 ? 4'b0111 : 4'b1111;
       endcase
       if (chunked_i) begin
-        part.opacity = 16'(words[7:0]);
-        part.dc[0]   = 16'(words[31:24]);
-        part.dc[1]   = 16'(words[23:16]);
-        part.dc[2]   = 16'(words[15:8]);
+        part.opacity = 16'(chunk[7:0]);
+        part.dc[0]   = 16'(chunk[31:24]);
+        part.dc[1]   = 16'(chunk[23:16]);
+        part.dc[2]   = 16'(chunk[15:8]);
       end else begin
         part.opacity = words[15:0];
         part.dc[0]   = words[31:16];
@@ -585,7 +617,7 @@ module flk_colour_fetch
       end
       for (int unsigned i = 0; i < 4; i++) begin
         for (int unsigned c = 0; c < 3; c++) begin
-          part.raw[i][c] = chunked_i ? 16'(words[8*(4+3*i+c)+:8]) : words[16*(4+3*i+c)+:16];
+          part.raw[i][c] = chunked_i ? 16'(codes[i][c]) : words[16*(4+3*i+c)+:16];
         end
       end
     end
@@ -612,8 +644,7 @@ module flk_colour_fetch
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        fire && straddles |-> l1_q == {cluster_q,
-        AT_BITS'(from_q[BYTE_BITS-1:6] + 1'b1)})
+        fire && straddles |-> l1_q == {cluster_q, AT_BITS'(at + 1'b1)})
     else $error("flk_colour_fetch: a part that ends in another beat than the next one kept");
 `endif
   end

@@ -79,10 +79,24 @@ package flk_preproc_pkg;
     colour_t [2:0][2:0] sh_step;  // by degree, channel
   } colour_header_t;
 
+  // Bits of a chunk's SH codes: 8 and, by the value of zero, in half codes, that has their bits (8, 16, 32, 64), 3 to 6.
+  typedef logic [3:0] sh_bits_t;
+
+  function automatic sh_bits_t sh_bits(input logic [8:0] zero);
+    unique case (zero)
+      9'd8: return 4'd3;
+      9'd16: return 4'd4;
+      9'd32: return 4'd5;
+      9'd64: return 4'd6;
+      default: return 4'd8;
+    endcase
+  endfunction
+
   // Survivors of a group, for their colours.
   typedef struct packed {
     cluster_index_t cluster;
     logic [31:0]    colour;  // first beat of the cluster's colours, from the colour array's first
+    sh_bits_t       bits;    // of SH codes
     logic [1:0]     degree;
     logic [5:0]     group;
     logic [3:0]     alive;

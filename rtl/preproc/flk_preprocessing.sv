@@ -306,6 +306,7 @@ module flk_preprocessing
   typedef struct packed {
     logic [31:0] colour;
     logic [19:0] first;
+    sh_bits_t    bits;
     logic [1:0]  degree;
   } place_of_cluster_t;
 
@@ -395,7 +396,7 @@ module flk_preprocessing
   always_ff @(posedge clk_i) begin
     if (enter && turn_first) begin
       clusters_q[cluster[HeaderBits-1:0]] <= {group.header.colour, group.cluster.first,
-                                              group.cluster.degree};
+                                              sh_bits(group.header.sh_zero), group.cluster.degree};
     end
   end
 
@@ -519,6 +520,7 @@ module flk_preprocessing
 
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
+  assign survivors.bits    = of.bits;
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
   assign survivors.alive   = 4'(alive) << (PreprocLanes * (32'(side.group) % Turns));

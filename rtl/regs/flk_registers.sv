@@ -2546,7 +2546,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h4;
+            readback_data_var[15:8] = 8'h5;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;

@@ -10,7 +10,7 @@
 // Latency 2. in_ready_o, out_* and empty_o come from registers through a multiplexer, finish_o from registers and finish_i.
 module flk_entry_buffer #(
   parameter int unsigned Width = 28,
-  parameter int unsigned Depth = 512
+  parameter int unsigned Depth = 704
 ) (
   input  logic                  clk_i,
   input  logic                  rst_ni,

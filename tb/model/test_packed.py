@@ -28,7 +28,20 @@ from flicker.scene.clusters import build_clusters, cut_clusters, morton_order, r
 from flicker.scene.files import Scene, half_turn, load_scene, save_ply
 from flicker.scene.memory import MemoryFormat, decode_chunks, encode_chunks, load_chunks, rotation_of, save_chunks, through_memory
 from flicker.scene.metrics import psnr
-from flicker.scene.packed import PackedFormat, PackedScene, bounds, chunk_codes, decode, fp16_bits, load_packed, parse, too_long, upper_half, values
+from flicker.scene.packed import (
+    SH_BITS,
+    PackedFormat,
+    PackedScene,
+    bounds,
+    chunk_codes,
+    decode,
+    fp16_bits,
+    load_packed,
+    parse,
+    too_long,
+    upper_half,
+    values,
+)
 from flicker.scene.packing import Packing, Recipe, ShSteps, pack, pack_chunks, pack_file
 from flicker.scene.real import REAL_VIEWS, real_scenes
 from flicker.view.frames import largest
@@ -60,7 +73,7 @@ def fields(word: int, *widths: int) -> list[int]:
 def read_image(data: bytes) -> list[dict]:
     """Every Gaussian of an image: slot, mean, scale, quat, opacity, sh; box and sigma of its cluster."""
     magic, version, form, degree, gaussians, clusters, slots, beats = struct.unpack_from("<8sHHIIIII", data, 0)
-    assert (magic, version) == (b"FLKSCENE", 1) and beats * 64 == len(data) and zlib.crc32(data[:252]) == struct.unpack_from("<I", data, 252)[0]
+    assert magic == b"FLKSCENE" and version in (1, 2) and beats * 64 == len(data) and zlib.crc32(data[:252]) == struct.unpack_from("<I", data, 252)[0]
     places = {}
     for k, name in enumerate(("table", "headers", "geometry", "colour")):
         offset, size, crc = struct.unpack_from("<III", data, 32 + 12 * k)
@@ -78,16 +91,19 @@ def read_image(data: bytes) -> list[dict]:
             slot = 16 * first + rank
             if form == 0:
                 position, rotation, scale = struct.unpack_from("<III", data, places["geometry"] + 12 * slot)
-                stride = -(-(4 + 3 * (k - 1)) // 4) * 4
+                zero = struct.unpack_from("<I", data, header + 28)[0]
+                bits = {8: 3, 16: 4, 32: 5, 64: 6}[zero] if version == 2 and zero < 255 else 8
+                stride = 4 + math.ceil(3 * (k - 1) * bits / 8)
+                stride += -stride % 4 if bits == 8 else 0
                 at = colours + stride * rank
                 r, g, b, a = fields(struct.unpack_from("<I", data, at)[0], 8, 8, 8, 8)
                 largest, *three = fields(rotation, 2, 10, 10, 10)
                 three = [(code / 1023 - 0.5) * math.sqrt(2) for code in three]
                 three.insert(largest, math.sqrt(1 - sum(x * x for x in three)))
-                zero = struct.unpack_from("<I", data, header + 28)[0]
+                rest = int.from_bytes(data[at + 4 : at + stride], "little")
                 sh = [[(low + step * code - 0.5) * 2 * math.sqrt(math.pi) for low, step, code in zip(floats[16:19], floats[20:23], (r, g, b))]]
                 for n in range(1, k):
-                    codes = data[at + 4 + 3 * (n - 1) :][:3]
+                    codes = [rest >> bits * (3 * (n - 1) + channel) & (1 << bits) - 1 for channel in range(3)]
                     steps = floats[23 + 3 * (math.isqrt(n) - 1) :][:3]
                     sh.append([(2 * code - zero) * step for code, step in zip(codes, steps)])
                 found.append({
@@ -127,6 +143,40 @@ def test_image_means_what_the_page_says(form: PackedFormat, degree: int) -> None
     for g in wanted:
         assert all(low <= x <= high for low, x, high in zip(g["box"][:3], g["means"], g["box"][3:])) and max(g["scales"]) <= g["sigma"]
     assert set(packed.degrees.tolist()) == set(range(degree + 1))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_sh_codes_of_fewer_bits(degree: int) -> None:
+    """Clusters of each number of bits: values as the page says, within half a step of the scene's; no more bytes than the codes take."""
+    scene = random_scene(seed(), 256 * 2 * len(SH_BITS), degree)
+    result = pack(scene, recipe=Recipe(cuts=0, sh_bits=lambda scene, start: np.resize(SH_BITS, len(start))))
+    image = result.packed.image()
+    loaded = parse(image, Path("a.flk"))
+    assert loaded.image() == image and loaded.sh_bits.tolist() == [*SH_BITS, *SH_BITS]
+    wanted, got = np.array([g["sh"] for g in read_image(image)]), values(loaded).sh
+    assert np.allclose(got, wanted, rtol=1e-12, atol=1e-12)
+    bits = loaded.sh_bits[loaded.cluster]
+    for k in range(1, wanted.shape[1]):
+        largest = np.maximum.reduceat(np.abs(reorder(scene, result.order).sh[:, k]), loaded.start[:-1])[loaded.cluster]
+        degree_step = loaded.headers["sh_step"][loaded.cluster, math.isqrt(k) - 1]
+        assert (np.abs(got[:, k] - reorder(scene, result.order).sh[:, k]) <= degree_step * 1.001).all() and (largest <= degree_step * (2.0 ** bits - 2)[:, None] * 1.001).all()
+    size = [64 * math.ceil(256 * (4 + math.ceil(3 * ((degree + 1) ** 2 - 1) * b / 8)) / 64) for b in SH_BITS if b < 8]
+    assert len(loaded.colour) == 2 * (sum(size) + 256 * PackedFormat.CHUNK.colour_stride(degree))
+    one = pack(scene, recipe=Recipe(sh_bits=SH_BITS[0])).packed
+    assert (one.sh_bits == SH_BITS[0]).all() and parse(one.image(), Path("a.flk")).image()[8] == 2
+
+
+def test_image_of_version_1() -> None:
+    """Where all codes have 8 bits the image is of version 1; narrower ones under its number are refused."""
+    assert pack(mixed_scene()).packed.image()[8] == 1
+    narrow = pack(mixed_scene(), recipe=Recipe(sh_bits=4)).packed.image()
+    with pytest.raises(FlickerError, match="cluster 0: sh_zero: none of 255, 256"):
+        parse(sealed(at(8, "<H", 1)(narrow)), Path("a"))
+    for wrong in (2, 7, 9):
+        with pytest.raises(FlickerError, match=f"SH bits: {wrong}, not 3, 4, 5, 6 or 8"):
+            pack(mixed_scene(), recipe=Recipe(sh_bits=wrong))
+    with pytest.raises(FlickerError, match="SH bits: 4"):
+        pack(mixed_scene(), recipe=Recipe(sh=ShSteps.PLAYCANVAS, sh_bits=4))
 
 
 # ---- what packing may change ---------------------------------------------------------------------------------------------------------
@@ -450,7 +500,7 @@ SOUND = {  # what is wrong with an image whose checksums are right: change, form
     "steps of SH": (at(CHUNK_HEADERS + 124, "<f", np.nan), "chunk", "cluster 0: sh_step: not finite"),
     "colours outside": (at(CHUNK_HEADERS + 12 + 5 * 128, "<I", 0xFFFFFFFF), "chunk", "cluster 5: colour: ends outside"),
     "colours elsewhere": (at(CHUNK_HEADERS + 12 + 128, "<I", 0), "chunk", "cluster 1: colour: not where"),
-    "zero of SH": (at(CHUNK_HEADERS + 28, "<I", 254), "chunk", "cluster 0: sh_zero: neither 255 nor 256"),
+    "zero of SH": (at(CHUNK_HEADERS + 28, "<I", 254), "chunk", "cluster 0: sh_zero: none of 255, 256"),
     "reserved word": (at(CHUNK_HEADERS + 44, "<I", 1), "chunk", "cluster 0: reserved_0: not zero"),
     "position outside the box": (at(CHUNK_HEADERS + 16, "<f", 1.0), "chunk", "cluster 0: low, high: a mean lies outside"),
     "scale above sigma": (at(CHUNK_HEADERS + 32, "<f", 1.0), "chunk", "cluster 0: sigma: below a standard deviation"),
@@ -474,8 +524,8 @@ BROKEN = {  # changes that the checksums or the first look find
     "cut": (lambda image: image[:-1], "truncated: the file has"),
     "cut by a beat": (lambda image: image[:-64], "truncated: the file has"),
     "longer": (lambda image: image + bytes(64), "beats: the file has"),
-    "version": (lambda image: sealed(at(8, "<H", 2)(image)), "version: 2, not 1"),
-    "version, unsealed": (at(8, "<H", 9), "version: 9, not 1"),
+    "version": (lambda image: sealed(at(8, "<H", 3)(image)), "version: 3, not 1 or 2"),
+    "version, unsealed": (at(8, "<H", 9), "version: 9, not 1 or 2"),
     "bit in the image header": (at(17, "<B", 77), "image header: checksum is"),
     "bit in the table": (at(260, "<B", 77), "table: checksum is"),
     "bit in the headers": (at(CHUNK_HEADERS + 5, "<B", 77), "headers: checksum is"),

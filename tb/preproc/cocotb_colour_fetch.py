@@ -9,7 +9,7 @@ from flicker_tb.bench import Bench
 from flicker_tb.streams import Stream, StreamSource
 
 from flicker.chip.dram import DramConfig
-from flicker.scene.packed import PackedFormat
+from flicker.scene.packed import FULL_SH_BITS, SH_BITS, PackedFormat
 from flicker.sim.memory import Memory, PortConfig
 
 BASE, SIZE = 0x7F_F000, 0x8_0000  # beats from below a multiple of 2^17, where the halves of an address meet
@@ -18,15 +18,23 @@ PART = (("cluster", 4), ("first", 1), ("last", 1), ("part", 2), ("used", 4), ("o
 USED = {0: [0], 1: [7], 2: [15, 15], 3: [15, 15, 15, 7]}
 
 
+def stride_of(chunked: bool, of: Survivors) -> int:
+    """Bytes of a Gaussian."""
+    return (PackedFormat.CHUNK if chunked else PackedFormat.FP16).colour_stride(of.degree, of.sh_bits)
+
+
 class Survivors:
     """A group of survivors as the design takes it."""
 
-    def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int):
-        self.cluster, self.colour, self.degree, self.group, self.alive = cluster, colour, degree, group, alive
+    def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int, sh_bits: int = 8):
+        self.cluster, self.colour, self.degree, self.group, self.alive, self.sh_bits = cluster, colour, degree, group, alive, sh_bits
 
     @property
-    def bits(self) -> int:
-        return (self.cluster % 16) << 44 | self.colour << 12 | self.degree << 10 | self.group << 4 | self.alive
+    def word(self) -> int:
+        return (self.cluster % 16) << 48 | self.colour << 16 | self.sh_bits << 12 | self.degree << 10 | self.group << 4 | self.alive
+
+    def with_(self, **fields: int) -> Survivors:
+        return Survivors(**{**vars(self), **fields})
 
 
 class Fetch:
@@ -69,38 +77,42 @@ class Fetch:
     def turns(self, g: Survivors) -> list[Survivors]:
         """A group as it comes: the survivors of as many neighbours as there are lanes, one part after the other."""
         mask = (1 << self.lanes) - 1
-        return [Survivors(g.cluster, g.colour, g.degree, g.group, g.alive & mask << k) for k in range(0, 4, self.lanes)]
+        return [g.with_(alive=g.alive & mask << k) for k in range(0, 4, self.lanes)]
 
     def due(self, groups: list[Survivors]) -> list[list[dict[str, int]]]:
         """Parts of each lane."""
-        form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
         lanes: list[list[dict[str, int]]] = [[] for _ in range(self.lanes)]
         size = 1 if self.chunked else 2
         number = lambda at: int.from_bytes(self.data[at : at + size], "little")  # noqa: E731
         for g in groups:
-            stride = form.colour_stride(g.degree)
             for k in range(4):
                 if not g.alive >> k & 1:
                     continue
-                at = (g.colour - self.first) * 64 + (4 * g.group + k) * stride
+                at = (g.colour - self.first) * 64 + (4 * g.group + k) * stride_of(self.chunked, g)
                 head = [number(at + size * i) for i in range(4)]
                 opacity, dc = (head[0], head[:0:-1]) if self.chunked else (head[0], head[1:])
                 for part, used in enumerate(USED[g.degree]):
-                    raw = {(i, c): number(at + size * (4 + 12 * part + 3 * i + c)) for i in range(4) for c in range(3) if used >> i & 1}
+                    raw = {(i, c): self.code(at, 12 * part + 3 * i + c, g.sh_bits) for i in range(4) for c in range(3) if used >> i & 1}
                     lanes[k % self.lanes].append({
                         "cluster": g.cluster % 16, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
                         "opacity": opacity, "dc": dc, "raw": raw,
                     })
         return lanes
 
+    def code(self, at: int, number: int, bits: int) -> int:
+        """Of SH: the one of that number of the Gaussian at byte `at`."""
+        if not self.chunked:
+            return int.from_bytes(self.data[at + 8 + 2 * number :][:2], "little")
+        first = 8 * (at + 4) + bits * number
+        return int.from_bytes(self.data[first // 8 :][:2], "little") >> first % 8 & (1 << bits) - 1
+
     def beats(self, groups: list[Survivors]) -> int:
         """Beats from the first survivor of those that come together to the last one, each once."""
-        form = PackedFormat.CHUNK if self.chunked else PackedFormat.FP16
         found = set()
         for g in groups:
             alive = [4 * g.group + k for k in range(4) if g.alive >> k & 1]
             if alive:
-                stride = form.colour_stride(g.degree)
+                stride = stride_of(self.chunked, g)
                 first, last = alive[0] * stride // 64, (alive[-1] * stride + stride - 1) // 64
                 found |= {(g.cluster, b) for b in range(first, last + 1)}
         return len(found)
@@ -121,7 +133,7 @@ class Fetch:
         for g in groups:  # a cluster enters when there is room for it, as in flk_preprocessing
             await self.bench.until(lambda g=g: (g.cluster - int(dut.oldest_o.value)) % 16 < CLUSTERS, 20_000, "room for a cluster")
             dut.exit_i.value = g.cluster % 16
-            self.source.send([g.bits])
+            self.source.send([g.word])
             await self.bench.until(lambda: not self.source.pending, 20_000, "a group")
         count = sum(map(len, due))
         await self.bench.until(lambda: sum(map(len, self.parts)) >= count, 50_000, "last part")
@@ -145,20 +157,20 @@ class Fetch:
         return cycles
 
 
-def frame(rng, chunked: bool, clusters: int, degree: int | None = None, full: bool = False, first: int = 0) -> list[Survivors]:
-    """Groups of clusters of any size and degree; some clusters and some stretches without survivors."""
+def frame(rng, chunked: bool, clusters: int, degree: int | None = None, full: bool = False, first: int = 0, bits: int | None = None) -> list[Survivors]:
+    """Groups of clusters of any size, degree and, of chunks, bits of SH codes; some clusters and some stretches without survivors."""
     groups, colour = [], first + rng.randrange(4)
     for cluster in range(clusters):
         d = rng.randrange(4) if degree is None else degree
+        b = bits or (rng.choice(SH_BITS) if chunked else FULL_SH_BITS)
         size = 256 if full else rng.choice([1, 2, 5, rng.randint(1, 64), 64])
         dead = not full and rng.random() < 0.2
         share = rng.choice([0.1, 0.5, 0.9, 1.0])
         for group in range(-(-size // 4)):
             exist = (1 << min(4, size - 4 * group)) - 1
             alive = exist if full else sum((rng.random() < share) << k for k in range(4)) & exist
-            groups.append(Survivors(cluster, colour, d, group, 0 if dead else alive))
-        stride = (PackedFormat.CHUNK if chunked else PackedFormat.FP16).colour_stride(d)
-        colour += -(-size * stride // 64)
+            groups.append(Survivors(cluster, colour, d, group, 0 if dead else alive, b))
+        colour += -(-size * stride_of(chunked, groups[-1]) // 64)
     return groups
 
 
@@ -181,7 +193,7 @@ async def last_colours(dut, chunked):
     await fetch.bench.reset()
     groups = frame(fetch.bench.rng, chunked, 6, 3, full=True, first=first)
     last = max(g.colour for g in groups)
-    await fetch.run([Survivors(g.cluster, g.colour + (1 << 32) - 1 - last, g.degree, g.group, g.alive) for g in groups])
+    await fetch.run([g.with_(colour=g.colour + (1 << 32) - 1 - last) for g in groups])
 
 
 @cocotb.test()
@@ -207,12 +219,22 @@ async def clusters_without_survivors(dut, gap):
 
 
 @cocotb.test()
+@cocotb.parametrize(bits=SH_BITS)
+async def codes_of_fewer_bits(dut, bits):
+    """Every Gaussian of clusters of each degree."""
+    fetch = Fetch(dut, True, True)
+    await fetch.bench.reset()
+    for degree in range(4):
+        await fetch.run(frame(fetch.bench.rng, True, 2, degree, full=True, bits=bits))
+
+
+@cocotb.test()
 @cocotb.parametrize(degree=[0, 1, 2, 3])
 async def rates(dut, degree):
     """With every Gaussian alive: as fast as groups come, beats or the lanes' parts allow, nearly."""
     fetch = Fetch(dut, True, True, latency=40)
     await fetch.bench.reset()
-    groups = frame(fetch.bench.rng, True, 4, degree, full=True)
+    groups = frame(fetch.bench.rng, True, 4, degree, full=True, bits=FULL_SH_BITS)
     cycles = await fetch.run(groups)
     dut._log.info("degree %d: %d cycles for %d Gaussians", degree, cycles, 4 * len(groups))
     limit = max(2 * len(groups), len(groups) * len(USED[degree]), fetch.beats(groups))

@@ -29,8 +29,8 @@ from flicker.pipeline import packed_scene
 from flicker.scene import packing
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
-from flicker.scene.packed import HEADER_BYTES, PackedFormat, PackedScene, decode
-from flicker.scene.packing import pack
+from flicker.scene.packed import HEADER_BYTES, SH_BITS, PackedFormat, PackedScene, decode
+from flicker.scene.packing import Recipe, pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import PortConfig
@@ -129,8 +129,23 @@ def some(count: int, **changes) -> Scene:
     return Scene(**values)
 
 
+def mixed_bits(scene: Scene, start: np.ndarray) -> np.ndarray:
+    """Bits of SH codes by cluster: all that there are, in turn."""
+    return np.resize(SH_BITS, len(start))
+
+
 def plain_camera(width: int = 200, height: int = 120) -> Camera:
     return Camera(width, height, 150.0, 150.0, np.zeros(3), np.eye(3))
+
+
+@pytest.mark.parametrize("coefficients", [4, 9, 16])
+def test_sh_codes_of_fewer_bits(coefficients: int) -> None:
+    """Clusters of each number of bits, in the same picture."""
+    scene = some(256 * 2 * len(SH_BITS))
+    packed = pack(dataclasses.replace(scene, sh=scene.sh[:, :coefficients]), recipe=Recipe(cuts=0, sh_bits=mixed_bits)).packed
+    assert set(packed.sh_bits) == set(SH_BITS) and (packed.degrees == int(coefficients**0.5) - 1).all()
+    golden, _ = check(packed, plain_camera(), memory=lpddr4())
+    assert len(golden.gaussian) > 1000
 
 
 def turned(camera: Camera, degrees: float) -> Camera:

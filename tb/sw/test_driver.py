@@ -176,7 +176,7 @@ def test_each_fault_of_an_image(lib: ctypes.CDLL, packed: PackedScene, guarded: 
     first = np.frombuffer(image, IMAGE_HEADER, 1)[0]
     header = {name: int(first[name]) for name in IMAGE_HEADER.names if first[name].ndim == 0 and IMAGE_HEADER[name].kind == "u"}
     faults: list[tuple[str, bytes]] = [
-        ("IMAGE_MAGIC", b"FLKSCENF" + image[8:]), ("IMAGE_VERSION", changed(image, version=2)), ("IMAGE_VERSION", changed(image, version=0)),
+        ("IMAGE_MAGIC", b"FLKSCENF" + image[8:]), ("IMAGE_VERSION", changed(image, version=3)), ("IMAGE_VERSION", changed(image, version=0)),
         ("IMAGE_FORMAT", changed(image, format=3)), ("IMAGE_FORMAT", changed(image, format=0x100)),
         ("IMAGE_COUNTS", changed(image, degree=4)), ("IMAGE_COUNTS", changed(image, gaussians=0)), ("IMAGE_COUNTS", changed(image, clusters=0)),
         ("IMAGE_COUNTS", changed(image, slots=header["slots"] + 1)), ("IMAGE_COUNTS", changed(image, slots=(1 << 24) + 16, clusters=1 << 17)),
@@ -394,7 +394,7 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3 | 4 << 8)
+        self.set("version", 3 | 5 << 8)
         self.set("capability_units", 0x1201)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
         self.field("status", ready=1)
@@ -616,6 +616,9 @@ def test_descriptor_is_not_written(lib: ctypes.CDLL, chunk: PackedScene, chip: C
     frame.camera.fx = 1.0
     frame.by_distance, chip.device.minor = 1, 1
     assert write() == "FRAME_ORDER"
+    frame.by_distance, chip.device.minor, scene.sh_bits = 0, 4, 1
+    assert write() == "FRAME_SH_BITS"
+    chip.device.minor = 5
     chip.device.lists = 8
     assert write() == "FRAME_LISTS"
     assert not chip.writes
@@ -658,7 +661,7 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (4, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (5, 1, 1, 2, 2, 3, 32)
     assert (device.lists, device.beat) == (16384, 64)
     assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (2, 1, 4, 2)
     assert device.started == 0xFFFF and not chip.writes

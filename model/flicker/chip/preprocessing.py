@@ -96,8 +96,7 @@ def traffic(frame: FrontFrame, image: FrontImage, lanes: int = LANES) -> list[Be
     slot = np.searchsorted(keep, cluster)
     within = frame.gaussian - packed.start[cluster]
     place = before[slot] + within
-    beat, due = _colour_beats(cluster, within, place, packed.headers["colour"].astype(np.int64), np.array([packed.format.colour_stride(d) for d in range(4)]),
-                              packed.degrees, lanes)
+    beat, due = _colour_beats(cluster, within, place, packed.headers["colour"].astype(np.int64), packed.colour_strides, lanes)
     out.append(Beats("colour", base["colour"] + beat, due, False))
     record = np.unique(regions.records + frame.number * frame.kind.bytes) // BEAT
     last = np.concatenate([record[1:] != record[:-1], [True]]) if len(record) else np.zeros(0, np.bool_)
@@ -128,7 +127,7 @@ def traffic(frame: FrontFrame, image: FrontImage, lanes: int = LANES) -> list[Be
 
 
 @numba.njit(cache=True)
-def _colour_beats(cluster, within, place, colour, stride, degree, lanes):
+def _colour_beats(cluster, within, place, colour, stride, lanes):
     """Beats with colours of survivors, each once, from the first survivor of `lanes` neighbours to the last; and when."""
     beat = np.empty(len(cluster) * 4 + 4, np.int64)
     due = np.empty(len(beat))
@@ -140,7 +139,7 @@ def _colour_beats(cluster, within, place, colour, stride, degree, lanes):
         j = i
         while j + 1 < len(cluster) and cluster[j + 1] == k and within[j + 1] // lanes == within[i] // lanes:
             j += 1
-        size = stride[degree[k]]
+        size = stride[k]
         low = colour[k] + within[i] * size // 64
         high = colour[k] + ((within[j] + 1) * size - 1) // 64
         for b in range(max(low, last + 1) if last >= colour[k] else low, high + 1):

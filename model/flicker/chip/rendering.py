@@ -11,7 +11,7 @@ Lanes have as many cycles for a sub-tile as in the stage alone, shared out evenl
 them goes through the pass as if it had a core, but for its elements: those of a core are blended one after the other, and share the cycles of the tile.
 
 Left out: conflicts of banks in the cache; in the memory, when records wait for anything but each other (their lines go to channels and banks, what else moves
-takes its share of the rate, lists have the latency of a lone access, and all together the peak rate); the order of entries within a merge, arbitration between
+takes its share of the rate and makes lists and records wait, and all together the peak rate); the order of entries within a merge, arbitration between
 list readers.
 """
 
@@ -63,9 +63,9 @@ ROUNDS = 12  # of a frame, at most: each with the share of the memory's time tha
 SETTLED = 0.005
 EFFICIENCY = 0.8  # of the memory's peak rate, for that
 MOST_BUSY = 0.9
-# Cycles by which a line of records comes later at the chip's port where what else moves takes half of the memory's time: fitted to its frames with 32 lanes
-# (`make docs PART=scale_hardware`).
-LOADED = 200
+# Cycles by which a line of records or lists comes later at the chip's port where what else moves takes half of the memory's time: fitted to its frames with
+# 32 lanes (`make docs PART=scale_hardware`).
+LOADED = 170
 END = 60  # from the last line of a picture to its answer, beside the memory's latency
 
 NEVER = np.int64(1) << 60
@@ -584,7 +584,7 @@ def estimate(
             tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
             tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
             tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, CACHE_SETS, CACHE_WAYS,
-            READ + list_latency, line_latency + later, refresh, reads, early,
+            READ + list_latency + later, line_latency + later, refresh, reads, early,
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,

@@ -162,9 +162,8 @@ class SceneCost:
     @cached_property
     def moved(self) -> np.ndarray:
         """float64 (N,): bytes that each Gaussian moves in a frame, mean over the views: geometry, colour; record and list entries, written and read once."""
-        form = self.packing.packed.format
-        kind, words = form.geometry
-        colour = np.array([form.colour_stride(d) for d in range(4)])[self.degree]
+        kind, words = self.packing.packed.format.geometry
+        colour = self.colour_bytes
         total = np.zeros(len(colour))
         for view in self.views:
             total += view.fetched * float(kind.itemsize * words) + view.recorded * (colour + 32.0) + 2 * ENTRY_BYTES * view.tiles
@@ -181,6 +180,14 @@ class SceneCost:
         degree = np.zeros(len(self.scene.opacities), np.int64)
         degree[self.packing.order] = (self.packing.packed.table["flags"] & 3)[self.packing.packed.cluster]
         return degree
+
+    @cached_property
+    def colour_bytes(self) -> np.ndarray:
+        """int64 (N,): of each Gaussian's opacity and colour in memory; for what is not packed those without SH."""
+        packed = self.packing.packed
+        found = np.full(len(self.scene.opacities), packed.format.colour_stride(0))
+        found[self.packing.order] = packed.colour_strides[packed.cluster]
+        return found
 
     def sh_change(self) -> np.ndarray:
         """float64 (N,): the most that coefficients beyond degree 0 can add to a colour channel, over all directions."""
@@ -201,7 +208,7 @@ class SceneCost:
             self._finding("enormous", f"in more than {ENORMOUS:.0%} of a view's tiles", enormous),
         ]
         mute = packed_ & (self.degree > 0) & (self.sh_change() < LEAST_COLOUR)
-        saved = np.array([form.colour_stride(d) - form.colour_stride(0) for d in range(4)])[self.degree]
+        saved = self.colour_bytes - form.colour_stride(0)
         colour = float(np.mean([saved[mute & view.recorded].sum() for view in self.views]))
         found.append(Finding("SH says nothing", "coefficients change no channel by 1/255", int(mute.sum()), colour, 0.0, 0.0))
         cluster = np.zeros(len(packed_), np.int64)

@@ -8,7 +8,7 @@ behind its last Gaussian are zero. Its colours begin with a beat too and take as
 
 | format | meaning |
 |---|---|
-| chunk | codes; low ends and steps in the cluster header: position 11-10-11, rotation 2-10-10-10, log2 scale 11-10-11, colour 8-8-8, opacity 8, SH 8 |
+| chunk | codes; low ends and steps in the cluster header: position 11-10-11, rotation 2-10-10-10, log2 scale 11-10-11, colour 8-8-8, opacity 8, SH 3 to 8 |
 | fp16-local | FP16; means relative to the origin in the cluster header |
 | fp16 | FP16; the origins are zero |
 """
@@ -30,13 +30,16 @@ from .memory import rotation_of
 BEAT = 64  # bytes
 HEADER_BYTES = 256
 MAGIC = b"FLKSCENE"
-VERSION = 1
+VERSION = 1  # of images whose SH codes all have 8 bits
+VERSION_SH_BITS = 2  # of others
 CLUSTER_LIMIT = 256  # Gaussians
 SLOT_STEP = 16  # slots of a cluster begin at a multiple
 SLOT_LIMIT = 1 << 24  # a record's number has 24 bits
 POSITION_BITS = SCALE_BITS = (11, 10, 11)
 ROTATION_BITS = (2, 10, 10, 10)
 DC_BITS = (8, 8, 8)
+SH_BITS = (3, 4, 5, 6, 8)  # of a cluster's SH codes; `sh_zero` says which
+FULL_SH_BITS = SH_BITS[-1]
 _TINY = 2.0**-24  # opacity of a code of 0, which is never seen, in a Scene, whose opacities are positive
 _SECTIONS = ("table", "headers", "geometry", "colour")
 
@@ -63,14 +66,15 @@ class PackedFormat(str, Enum):
         """Type and number of a Gaussian's words."""
         return (np.dtype("<u4"), 3) if self is PackedFormat.CHUNK else (np.dtype("<u2"), 10)
 
-    def colour_bytes(self, degree: int) -> int:
-        """Of opacity and colour of a Gaussian, without padding."""
+    def colour_bytes(self, degree: int, sh_bits: int = FULL_SH_BITS) -> int:
+        """Of opacity and colour of a Gaussian, without padding. sh_bits: of a code of chunks."""
         k = (degree + 1) ** 2
-        return 4 + 3 * (k - 1) if self is PackedFormat.CHUNK else 2 * (1 + 3 * k)
+        return 4 - (-3 * (k - 1) * sh_bits // 8) if self is PackedFormat.CHUNK else 2 * (1 + 3 * k)
 
-    def colour_stride(self, degree: int) -> int:
-        """The same, padded to a multiple of 4."""
-        return -(-self.colour_bytes(degree) // 4) * 4
+    def colour_stride(self, degree: int, sh_bits: int = FULL_SH_BITS) -> int:
+        """Bytes from a Gaussian to the next: padded to a multiple of 4, not where SH codes have fewer than 8 bits."""
+        size = self.colour_bytes(degree, sh_bits)
+        return size if sh_bits < FULL_SH_BITS else -(-size // 4) * 4
 
 
 def _record(size: int, *fields: tuple) -> np.dtype:
@@ -111,7 +115,7 @@ CHUNK_HEADER = _record(
     ("position_low", "<f4", 3),
     ("colour", "<u4"),  # beats from the colour array's first
     ("position_step", "<f4", 3),
-    ("sh_zero", "<u4"),  # half codes of 0: 256, or 255 for bins without a zero
+    ("sh_zero", "<u4"),  # half codes of 0: 2 to the power of the codes' bits, or 255 for 8 bits and bins without a zero
     ("scale_low", "<f4", 3),
     ("reserved_0", "<u4"),
     ("scale_step", "<f4", 3),
@@ -127,6 +131,29 @@ FP16_HEADER = _record(64, ("origin", "<f4", 3), ("colour", "<u4"), ("reserved", 
 def _padded(data: np.ndarray) -> bytes:
     raw = data.tobytes()
     return raw + bytes(-len(raw) % BEAT)
+
+
+def sh_bits_of(sh_zero: np.ndarray) -> np.ndarray:
+    """int64: bits of SH codes by the headers' `sh_zero`, as the chip takes it: 8 for what is none of 8, 16, 32 and 64."""
+    narrow = {1 << bits: bits for bits in SH_BITS}
+    return np.array([narrow.get(zero, FULL_SH_BITS) for zero in np.asarray(sh_zero).tolist()], np.int64)
+
+
+def _unpacked(raw: np.ndarray, bits: int, size: int) -> np.ndarray:
+    """uint8 (n, size): colours of which each SH code has a byte. raw: uint8 (n, stride), SH codes of `bits`, the first in the lowest bits behind byte 4."""
+    codes = size - 4
+    flat = np.unpackbits(np.ascontiguousarray(raw[:, 4:]), axis=1, bitorder="little")[:, : codes * bits].reshape(len(raw), codes, bits)
+    return np.concatenate([raw[:, :4], np.packbits(flat, axis=2, bitorder="little")[:, :, 0]], axis=1) if codes else raw[:, :size]
+
+
+def narrowed(rows: np.ndarray, bits: int, stride: int) -> np.ndarray:
+    """uint8 (n, stride): the opposite of what the reader makes of a cluster's colours. rows: uint8 (n, size), an SH code a byte."""
+    out = np.zeros((len(rows), stride), np.uint8)
+    out[:, :4] = rows[:, :4]
+    flat = np.unpackbits(np.ascontiguousarray(rows[:, 4:, None]), axis=2, bitorder="little")[:, :, :bits].reshape(len(rows), -1)
+    words = np.packbits(flat, axis=1, bitorder="little")
+    out[:, 4 : 4 + words.shape[1]] = words
+    return out
 
 
 def coefficients(degree: int) -> int:
@@ -194,20 +221,32 @@ class PackedScene:
         """int64 (N,): slot of each Gaussian, ascending."""
         return np.arange(len(self)) + np.repeat(self.first - self.start[:-1], self.counts)
 
+    @property
+    def sh_bits(self) -> np.ndarray:
+        """int64 (C,): bits of each cluster's SH codes; 8 in FP16, which has none."""
+        return sh_bits_of(self.headers["sh_zero"]) if self.format is PackedFormat.CHUNK else np.full(len(self.table), FULL_SH_BITS)
+
+    @property
+    def colour_strides(self) -> np.ndarray:
+        """int64 (C,): bytes of opacity and colour of each cluster's Gaussians."""
+        return np.array([self.format.colour_stride(d, b) for d, b in zip(self.degrees.tolist(), self.sh_bits.tolist())], np.int64)
+
     def colour_span(self, cluster: int) -> tuple[int, int, int]:
         """First byte in the colour array, one past the last, and bytes a Gaussian."""
-        stride = self.format.colour_stride(int(self.table["flags"][cluster] & 3))
+        bits = int(sh_bits_of(self.headers["sh_zero"][cluster : cluster + 1])[0]) if self.format is PackedFormat.CHUNK else FULL_SH_BITS
+        stride = self.format.colour_stride(int(self.table["flags"][cluster] & 3), bits)
         first = int(self.headers["colour"][cluster]) * BEAT
         return first, first + stride * (int(self.table["last"][cluster]) + 1), stride
 
     @cached_property
     def colour_rows(self) -> np.ndarray:
-        """uint8 (N, bytes of the largest degree): each Gaussian's opacity and colour; zero where its cluster has fewer coefficients."""
+        """uint8 (N, bytes of the largest degree): each Gaussian's opacity and colour, an SH code a byte; zero where its cluster has fewer coefficients."""
         rows = np.zeros((len(self), self.format.colour_bytes(self.degree)), np.uint8)
-        for k, degree in enumerate(self.degrees.tolist()):
-            first, last, stride = self.colour_span(k)
-            used = self.format.colour_bytes(degree)
-            rows[self.start[k] : self.start[k + 1], :used] = self.colour[first:last].reshape(-1, stride)[:, :used]
+        begin = self.headers["colour"].astype(np.int64) * BEAT
+        for k, (degree, bits, stride) in enumerate(zip(self.degrees.tolist(), self.sh_bits.tolist(), self.colour_strides.tolist())):
+            used, count = self.format.colour_bytes(degree), int(self.counts[k])
+            raw = self.colour[begin[k] : begin[k] + stride * count].reshape(count, stride)
+            rows[self.start[k] : self.start[k + 1], :used] = raw[:, :used] if bits == FULL_SH_BITS else _unpacked(raw, bits, used)
         return rows
 
     def sections(self) -> dict[str, bytes]:
@@ -217,7 +256,8 @@ class PackedScene:
     def image(self) -> bytes:
         """The whole image. Raises FlickerError where a field is too narrow for the scene."""
         header = np.zeros((), IMAGE_HEADER)
-        header["magic"], header["version"], header["format"], header["degree"] = MAGIC, VERSION, self.format.code, self.degree
+        header["magic"], header["format"], header["degree"] = MAGIC, self.format.code, self.degree
+        header["version"] = VERSION if (self.sh_bits == FULL_SH_BITS).all() else VERSION_SH_BITS
         header["gaussians"], header["clusters"], header["slots"] = len(self), len(self.table), len(self.geometry)
         header["low"], header["high"] = self.table["low"].min(axis=0), self.table["high"].max(axis=0)
         header["sigma"] = self.sigma.max()
@@ -401,7 +441,7 @@ def parse(data: bytes, path: Path) -> PackedScene:
         bool(header["flags"] & 1),
     )
     _check_table(packed, header, path)
-    _check_headers(packed, path)
+    _check_headers(packed, int(header["version"]), path)
     _check_gaussians(packed, path)
     return packed
 
@@ -412,8 +452,8 @@ def _image_header(data: bytes, path: Path) -> tuple[np.ndarray, PackedFormat]:
     if len(data) < HEADER_BYTES:
         raise FlickerError(f"{path}: truncated: {len(data)} bytes, the image header has {HEADER_BYTES}")
     header = np.frombuffer(data, IMAGE_HEADER, 1)[0]
-    if header["version"] != VERSION:
-        raise FlickerError(f"{path}: version: {header['version']}, not {VERSION}")
+    if header["version"] not in (VERSION, VERSION_SH_BITS):
+        raise FlickerError(f"{path}: version: {header['version']}, not {VERSION} or {VERSION_SH_BITS}")
     if (found := zlib.crc32(data[: HEADER_BYTES - 4])) != header["crc"]:
         raise FlickerError(f"{path}: image header: checksum is {found:08x}, not {header['crc']:08x}")
     if header["format"] >= len(PackedFormat):
@@ -472,7 +512,7 @@ def _check_table(packed: PackedScene, header: np.ndarray, path: Path) -> None:
             raise FlickerError(f"{path}: {name}: {header[name]}, the cluster table says {value}")
 
 
-def _check_headers(packed: PackedScene, path: Path) -> None:
+def _check_headers(packed: PackedScene, version: int, path: Path) -> None:
     headers = packed.headers
     for name in headers.dtype.names or ():
         kind = headers.dtype[name].base.kind
@@ -484,11 +524,11 @@ def _check_headers(packed: PackedScene, path: Path) -> None:
             raw = np.ascontiguousarray(headers[name]).view(np.uint8).reshape(len(headers), -1)
             _refuse(path, raw != 0, name, "not zero")
     if packed.format is PackedFormat.CHUNK:
-        _refuse(path, (headers["sh_zero"] != 255) & (headers["sh_zero"] != 256), "sh_zero", "neither 255 nor 256")
+        legal = (255, *(1 << bits for bits in SH_BITS if version == VERSION_SH_BITS or bits == FULL_SH_BITS))
+        _refuse(path, ~np.isin(headers["sh_zero"], legal), "sh_zero", f"none of {', '.join(map(str, sorted(legal)))}")
     if packed.format is PackedFormat.FP16:
         _refuse(path, headers["origin"] != 0, "origin", "not zero")
-    strides = np.array([packed.format.colour_stride(d) for d in range(4)])[packed.degrees]
-    end = headers["colour"].astype(np.int64) * BEAT + strides * packed.counts
+    end = headers["colour"].astype(np.int64) * BEAT + packed.colour_strides * packed.counts
     _refuse(path, end > len(packed.colour), "colour", "ends outside the colour array")
     _refuse(path, headers["colour"] != np.concatenate([[0], -(-end[:-1] // BEAT)]), "colour", "not where the colours of the cluster before end")
     if -(-end[-1] // BEAT) * BEAT != len(packed.colour):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -19,9 +20,11 @@ from .packed import (
     BEAT,
     CLUSTER_LIMIT,
     DC_BITS,
+    FULL_SH_BITS,
     POSITION_BITS,
     ROTATION_BITS,
     SCALE_BITS,
+    SH_BITS,
     SLOT_LIMIT,
     SLOT_STEP,
     TABLE_ENTRY,
@@ -30,6 +33,7 @@ from .packed import (
     bounds,
     coefficients,
     load_packed,
+    narrowed,
     split,
     too_long,
 )
@@ -53,10 +57,21 @@ class ShSteps(str, Enum):
 
 @dataclass(frozen=True)
 class Recipe:
-    """Choices in making chunks. cuts: bytes that may be spent on cutting clusters further, as a share of the Gaussians' bytes. sh: steps of SH codes."""
+    """Choices in making chunks. cuts: bytes that may be spent on cutting clusters further, as a share of the Gaussians' bytes. sh: steps of SH codes. sh_bits:
+    of a code, in all clusters (one of `SH_BITS`); or what chooses them, int64 (C,), for a scene whose Gaussians are in the clusters' order, from the number of
+    each cluster's first one."""
 
     cuts: float = CUTS
     sh: ShSteps = ShSteps.CHANNEL
+    sh_bits: int | Callable[[Scene, np.ndarray], np.ndarray] = FULL_SH_BITS
+
+    def bits(self, scene: Scene, start: np.ndarray) -> np.ndarray:
+        """int64 (C,): those of the clusters, which begin with Gaussians `start`."""
+        found = np.asarray(self.sh_bits(scene, start)) if callable(self.sh_bits) else np.full(len(start), self.sh_bits)
+        wrong = ~np.isin(found, SH_BITS if self.sh is not ShSteps.PLAYCANVAS else (FULL_SH_BITS,))
+        if wrong.any():
+            raise FlickerError(f"SH bits: {found[wrong][0]}, not {', '.join(map(str, SH_BITS[:-1]))} or {FULL_SH_BITS}")
+        return found
 
 
 @dataclass(eq=False)
@@ -106,24 +121,27 @@ def _quantised(values: np.ndarray, start: np.ndarray, counts: np.ndarray, bits: 
     return low32, step, np.clip(np.floor(codes + 0.5), 0, most).astype(np.int64)
 
 
-def _sh_codes(rest: np.ndarray, start: np.ndarray, counts: np.ndarray, steps: ShSteps, path: Path | None) -> tuple[np.ndarray, np.ndarray]:
-    """step: float32 (C, 3, 3) of half a code, codes: uint8 (N, K - 1, 3), 128 for zero."""
+def _sh_codes(
+    rest: np.ndarray, start: np.ndarray, counts: np.ndarray, steps: ShSteps, bits: np.ndarray, path: Path | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """step: float32 (C, 3, 3) of half a code, codes: uint8 (N, K - 1, 3), 2 to the power of bits - 1 for zero. bits: int64 (C,)."""
     step = np.zeros((len(start), 3, 3), np.float32)
     if steps is ShSteps.PLAYCANVAS:
         step[:, : SH_DEGREES[rest.shape[1] + 1]] = 1 / 64
         return step, np.clip(np.floor(rest * 32.0 + 128.0), 0, 255).astype(np.uint8)
-    codes = np.full(rest.shape, 128, np.uint8)
+    zero = np.repeat(1 << bits - 1, counts)[:, None, None]
+    codes = np.broadcast_to(zero, rest.shape).astype(np.uint8)
     parts = [slice(coefficients(d - 1) - 1, coefficients(d) - 1) for d in range(1, SH_DEGREES[rest.shape[1] + 1] + 1)]
     for degree, of in enumerate(parts):
         largest = np.maximum.reduceat(np.abs(rest[:, of]).max(axis=1), start)
-        step[:, degree] = _float32(largest / 254, "sh_step", path)
+        step[:, degree] = _float32(largest / ((1 << bits) - 2)[:, None], "sh_step", path)
     if steps is not ShSteps.CHANNEL:
         step[:] = step.max(axis=2 if steps is ShSteps.DEGREE else (1, 2), keepdims=True)
     for degree, of in enumerate(parts):
         wide = 2 * np.repeat(step[:, degree].astype(np.float64), counts, axis=0)[:, None]
         part = rest[:, of]
         scaled = np.divide(part, wide, out=np.zeros_like(part), where=wide > 0)
-        codes[:, of] = np.clip(np.floor(scaled + 128.5), 1, 255)
+        codes[:, of] = np.clip(np.floor(scaled + zero + 0.5), 1, 2 * zero - 1)
     step[:, len(parts) :] = 0
     return step, codes
 
@@ -149,16 +167,18 @@ def _assemble(
         raise FlickerError(f"{path or 'scene'}: {slots} slots, more than {SLOT_LIMIT}: a record's number has 24 bits")
     table = np.zeros(len(start), TABLE_ENTRY)
     table["last"], table["flags"], table["first"] = counts - 1, degrees, np.cumsum(used) - used
-    strides = np.array([form.colour_stride(d) for d in range(4)])[degrees]
+    kind, words = form.geometry
+    packed = PackedScene(form, table, headers, np.zeros((slots, words), kind), np.zeros(0, np.uint8), path)
+    strides, bits = packed.colour_strides, packed.sh_bits
     beats = -(-strides * counts // BEAT)
     headers["colour"] = np.cumsum(beats) - beats
-    kind, words = form.geometry
-    packed = PackedScene(form, table, headers, np.zeros((slots, words), kind), np.zeros(int(beats.sum()) * BEAT, np.uint8), path)
+    packed.colour = np.zeros(int(beats.sum()) * BEAT, np.uint8)
     packed.geometry[packed.slot] = geometry
     for k, degree in enumerate(degrees.tolist()):
         first, last, stride = packed.colour_span(k)
-        size = form.colour_bytes(degree)
-        packed.colour[first:last].reshape(-1, stride)[:, :size] = rows[start[k] : start[k] + counts[k], :size]
+        here, size = rows[start[k] : start[k] + counts[k]], form.colour_bytes(degree)
+        out = packed.colour[first:last].reshape(-1, stride)
+        out[:, : min(size, stride)] = here[:, :size] if bits[k] == FULL_SH_BITS else narrowed(here[:, :size], int(bits[k]), stride)
     low, high, sigma = bounds(packed)
     for name, box in (("low", low), ("high", high)):
         table[name] = _float32(box, name, path)
@@ -248,10 +268,11 @@ def _chunks(scene: Scene, start: np.ndarray, counts: np.ndarray, recipe: Recipe)
     geometry = np.stack([_join(codes["position"], POSITION_BITS), rotation_word(scene.quats), _join(codes["scale"], SCALE_BITS)], axis=1)
     opacity = np.floor(scene.opacities.astype(np.float64).clip(0, 1) * 255 + 0.5).astype(np.int64)
     playcanvas = recipe.sh is ShSteps.PLAYCANVAS
-    headers["sh_zero"] = 255 if playcanvas else 256
-    headers["sh_step"], sh = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, recipe.sh, path)
+    sh_bits = recipe.bits(scene, start)
+    headers["sh_zero"] = 255 if playcanvas else 1 << sh_bits
+    headers["sh_step"], sh = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, recipe.sh, sh_bits, path)
     rows = _colour_rows(_join(np.column_stack([codes["dc"], opacity]), (*DC_BITS, 8)), sh)
-    degrees = np.full(len(start), scene.sh_degree) if playcanvas else _degrees((sh != 128).any(axis=2), start)
+    degrees = np.full(len(start), scene.sh_degree) if playcanvas else _degrees((sh != np.repeat(1 << sh_bits - 1, counts)[:, None, None]).any(axis=2), start)
     clamped = {}
     for reason, values in (("log2 of a scale beyond -30 to 30", np.abs(logs) > _LOG2_LIMIT), ("opacity above 1", scene.opacities > 1)):
         if count := int(values.sum()):

@@ -22,7 +22,7 @@ class CScene(ctypes.Structure):
     _fields_ = [
         ("address", u64), ("bytes", u64), ("format", u32), ("degree", u32), ("gaussians", u32), ("clusters", u32), ("slots", u32), ("part", u64 * 4),
         ("low", ctypes.c_float * 3), ("high", ctypes.c_float * 3), ("sigma", ctypes.c_float),
-        ("antialiased", ctypes.c_int),
+        ("antialiased", ctypes.c_int), ("sh_bits", ctypes.c_int),
     ]
 
 
