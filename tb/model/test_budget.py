@@ -25,6 +25,7 @@ from flicker.budget.merge import COLOUR, loss, merge, united
 from flicker.budget.reduce import Options, Phase, Reducer, Row, sound
 from flicker.budget.refit import ViewMatrix, refit
 from flicker.budget.score import Score, scores
+from flicker.budget.sh_bits import choose
 from flicker.budget.tune import Rates, quality
 from flicker.budget.views import HOLD_EVERY, cameras_of, machine_psnr, reference_psnr
 from flicker.budget.write import save
@@ -35,10 +36,11 @@ from flicker.fit.parameters import LOGIT, QUAT, SCALE, SH, Parameters
 from flicker.fit.render import render
 from flicker.front.projection import colours
 from flicker.scene.camera import Camera, cameras_text, orbit_camera
+from flicker.scene.clusters import cluster_order, reorder
 from flicker.scene.files import Scene, load_scene, save_ply
 from flicker.scene.gaussians import SH_C0
 from flicker.scene.packed import PackedFormat, load_packed
-from flicker.scene.packing import pack
+from flicker.scene.packing import coded_sh, pack
 
 FRAME = (96, 64)
 
@@ -266,6 +268,31 @@ def test_cuts() -> None:
     assert np.bincount(coefficients).tolist() == [0, 256, 0, 0, 444]
     again = cuts(parameters, coefficients, losses(parameters, look(scene, 4)), np.ones(700))
     assert again.degree.tolist() == [0, 0] and [len(m) for m in again.members] == [256, 188]
+
+
+# -- bits of SH codes -----------------------------------------------------------------------------------------------------------------
+
+
+def test_bits_by_cluster() -> None:
+    """Pictures lose no more than is stated, and bytes fall with what they may lose; where coefficients say nothing bits go first, what no camera sees keeps 8."""
+    scene = small(1200, 2)
+    order, begin = cluster_order(scene.means, 100, np.inf)[:2]
+    scene = reorder(scene, order)
+    scene.sh[:100, 1:] *= np.float32(1e-4)
+    scene.opacities[-100:] = 1e-3
+    cameras = look(scene, 6)
+    sizes = []
+    for decibels in (75.0, 55.0, 40.0):
+        found = choose(scene, begin, cameras, decibels)
+        assert found.views == 6 and decibels <= found.decibels and found.bits[-1] == 8
+        base, drawn = (Parameters.of(replace(scene, sh=coded_sh(scene, begin, bits)[0])) for bits in (np.full(len(begin), 8), found.bits))
+        lost = np.mean([((np.clip(render(base, c).image, 0, 1) - np.clip(render(drawn, c).image, 0, 1)) ** 2).mean() for c in cameras])
+        assert -10 * np.log10(lost) == pytest.approx(found.decibels, abs=1e-6)
+        sizes.append(int(found.bits.sum()))
+        if decibels < 75:
+            assert found.bits[0] == 3
+    assert sizes[0] > sizes[1] > sizes[2]
+    assert set(choose(scene, begin, cameras, 400.0).bits) == {8}
 
 
 # -- reductions -----------------------------------------------------------------------------------------------------------------------

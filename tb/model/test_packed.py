@@ -152,7 +152,7 @@ def test_sh_codes_of_fewer_bits(degree: int) -> None:
     result = pack(scene, recipe=Recipe(cuts=0, sh_bits=lambda scene, start: np.resize(SH_BITS, len(start))))
     image = result.packed.image()
     loaded = parse(image, Path("a.flk"))
-    assert loaded.image() == image and loaded.sh_bits.tolist() == [*SH_BITS, *SH_BITS]
+    assert loaded.image() == image and loaded.sh_bits.tolist() == ([*SH_BITS, *SH_BITS] if degree else [8] * 2 * len(SH_BITS))
     wanted, got = np.array([g["sh"] for g in read_image(image)]), values(loaded).sh
     assert np.allclose(got, wanted, rtol=1e-12, atol=1e-12)
     bits = loaded.sh_bits[loaded.cluster]
@@ -163,7 +163,7 @@ def test_sh_codes_of_fewer_bits(degree: int) -> None:
     size = [64 * math.ceil(256 * (4 + math.ceil(3 * ((degree + 1) ** 2 - 1) * b / 8)) / 64) for b in SH_BITS if b < 8]
     assert len(loaded.colour) == 2 * (sum(size) + 256 * PackedFormat.CHUNK.colour_stride(degree))
     one = pack(scene, recipe=Recipe(sh_bits=SH_BITS[0])).packed
-    assert (one.sh_bits == SH_BITS[0]).all() and parse(one.image(), Path("a.flk")).image()[8] == 2
+    assert (one.sh_bits == (SH_BITS[0] if degree else 8)).all() and parse(one.image(), Path("a.flk")).image()[8] == (2 if degree else 1)
 
 
 def test_image_of_version_1() -> None:
@@ -646,6 +646,10 @@ def test_command(tmp_path: Path) -> None:
         for word in ("fp16-local", "599", "608", "9 unused", f"{len(packed.image()):,} bytes", "SH degree 2", "SH degree 0", "geometry"):
             assert word in out, (word, out)
     assert "opacity below 1/255" in run.stdout and "left out" in run.stdout
+    narrow = flicker("pack", tmp_path / "a.ply", "-o", tmp_path / "n.flk", "--sh-bits", "5")
+    assert narrow.returncode == 0 and "SH codes of 5 bits" in narrow.stdout, narrow.stderr
+    again = flicker("pack", tmp_path / "n.flk", "-o", tmp_path / "m.flk", "--sh-bits", "auto", "--db", "60", "--rechunk")
+    assert again.returncode == 0 and "to 8 bits, in 8 views" in again.stdout, again.stderr
     (tmp_path / "b.flk").write_bytes((tmp_path / "a.flk").read_bytes()[:-5])
     before = sorted(tmp_path.iterdir())
     for args, named in (
@@ -653,6 +657,12 @@ def test_command(tmp_path: Path) -> None:
         (("--info", tmp_path / "b.flk"), "b.flk: truncated"), (("--info", tmp_path / "a.ply"), "a.ply: magic"),
         (("--info", tmp_path / "a.flk", "--format", "fp16"), "--format"), ((tmp_path / "b.flk", "-o", tmp_path / "c.flk"), "b.flk: truncated"),
         ((tmp_path / "a.ply", "-o", tmp_path / "no" / "c.flk"), "no such folder"),
+        ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--sh-bits", "7"), "--sh-bits: 3, 4, 5, 6, 8 or auto, not 7"),
+        ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--sh-bits", "4", "--format", "fp16"), "--sh-bits: of --format chunk alone"),
+        ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--db", "50"), "--db: of --sh-bits auto alone"),
+        ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--sh-bits", "auto", "--db", "nan"), "--db: 20 to 120, not nan"),
+        ((tmp_path / "n.flk", "-o", tmp_path / "c.flk", "--sh-bits", "4"), "n.flk: brings its own SH codes"),
+        (("--info", tmp_path / "n.flk", "--sh-bits", "4"), "--info: reads an image, so it cannot be combined with --sh-bits"),
     ):
         bad = flicker("pack", *args)
         assert bad.returncode == 2 and bad.stderr.count("\n") == 1 and named in bad.stderr, bad.stderr

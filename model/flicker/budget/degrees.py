@@ -23,6 +23,43 @@ from .score import COLUMNS, SQUARE, score_frame
 
 
 @dataclass(eq=False)
+class Changes:
+    """What A other sets of SH coefficients change in pictures. square: float64 (N, A), of the pictures, squared; sum: float64 (N, A, 3), of colours, by weight;
+    weight: float64 (N,), of squares of alpha T; views: int64 (N,), that show the Gaussian."""
+
+    square: np.ndarray
+    sum: np.ndarray
+    weight: np.ndarray
+    views: np.ndarray
+
+
+def changes(
+    parameters: Parameters, others: Sequence[np.ndarray], cameras: Sequence[Camera], steps: Steps | None = None, draw: Draw = render,
+) -> Changes:
+    """Gaussian by Gaussian, the others being as they are, in the cameras' pictures, made by `draw`. others: as `parameters.sh`."""
+    n = len(parameters)
+    found = Changes(np.zeros((n, len(others))), np.zeros((n, len(others), 3)), np.zeros(n), np.zeros(n, np.int64))
+    with (steps or Steps()).bar("SH coefficients") as report:
+        for k, camera in enumerate(cameras):
+            report(k, len(cameras))
+            frame = draw(parameters, camera)
+            total, unused_tiles, unused_frames = np.zeros((n, COLUMNS)), np.zeros(n, np.int64), np.zeros(n, np.int64)
+            score_frame(frame, total, unused_tiles, unused_frames)
+            index = frame.index[total[frame.index, SQUARE] > 0]
+            of = total[index, SQUARE]
+            found.weight[index] += of
+            found.views[index] += 1
+            now, then = np.empty((2, len(index), 3))
+            colours(parameters.means, parameters.sh, index, camera.position, now)
+            for other, sh in enumerate(others):
+                colours(parameters.means, sh, index, camera.position, then)
+                change = now - then
+                found.square[index, other] += of * (change**2).sum(axis=1)
+                found.sum[index, other] += of[:, None] * change
+    return found
+
+
+@dataclass(eq=False)
 class Losses:
     """Of N Gaussians and D smaller SH degrees 0 to D - 1. error: float64 (N, D), squared change of the pictures with no more than that degree; shift: float32
     (N, D, 3), what the constant coefficients then gain."""
@@ -33,29 +70,12 @@ class Losses:
 
 def losses(parameters: Parameters, cameras: Sequence[Camera], steps: Steps | None = None, draw: Draw = render) -> Losses:
     """What every Gaussian's degrees are worth in the cameras' pictures, made by `draw`, the others being as they are."""
-    n, degrees = len(parameters), parameters.degree
-    square, sum_, weight = np.zeros((n, degrees)), np.zeros((n, degrees, 3)), np.zeros(n)
-    cut = [parameters.sh.copy() for _ in range(degrees)]
+    cut = [parameters.sh.copy() for _ in range(parameters.degree)]
     for degree, sh in enumerate(cut):
         sh[:, (degree + 1) ** 2 :] = 0.0
-    with (steps or Steps()).bar("SH coefficients") as report:
-        for k, camera in enumerate(cameras):
-            report(k, len(cameras))
-            frame = draw(parameters, camera)
-            total, unused_tiles, unused_frames = np.zeros((n, COLUMNS)), np.zeros(n, np.int64), np.zeros(n, np.int64)
-            score_frame(frame, total, unused_tiles, unused_frames)
-            index = frame.index[total[frame.index, SQUARE] > 0]
-            of = total[index, SQUARE]
-            weight[index] += of
-            now, then = np.empty((2, len(index), 3))
-            colours(parameters.means, parameters.sh, index, camera.position, now)
-            for degree, sh in enumerate(cut):
-                colours(parameters.means, sh, index, camera.position, then)
-                change = now - then
-                square[index, degree] += of * (change**2).sum(axis=1)
-                sum_[index, degree] += of[:, None] * change
-    mean = sum_ / np.maximum(weight, 1e-30)[:, None, None]
-    error = np.maximum(square - (mean * sum_).sum(axis=2), 0.0)
+    found = changes(parameters, cut, cameras, steps, draw)
+    mean = found.sum / np.maximum(found.weight, 1e-30)[:, None, None]
+    error = np.maximum(found.square - (mean * found.sum).sum(axis=2), 0.0)
     return Losses(error, (mean / SH_C0).astype(np.float32))
 
 

@@ -16,17 +16,48 @@ from ..errors import FlickerError, FlickerWarning
 from .options import RichSteps, check_apart, check_scene, console, writable, write_atomically
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from ..budget.sh_bits import Choice
+    from ..scene.gaussians import Scene
     from ..scene.packed import PackedScene
-    from ..scene.packing import Packing
+    from ..scene.packing import Packing, Recipe
 
 FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local", "FP16": "fp16"}, type=str)
+
+
+DECIBELS = 50.0
+
+
+def _recipe(sh_bits: str, decibels: float | None, path: Path, steps: RichSteps, told: list[Choice]) -> Recipe:
+    """What the options say. told: takes what `auto` chooses."""
+    from ..scene.packed import FULL_SH_BITS, SH_BITS
+    from ..scene.packing import Recipe
+
+    if decibels is not None and sh_bits != "auto":
+        raise FlickerError("--db: of --sh-bits auto alone")
+    if sh_bits != "auto":
+        if sh_bits not in map(str, SH_BITS):
+            raise FlickerError(f"--sh-bits: {', '.join(map(str, SH_BITS[:-1]))}, {FULL_SH_BITS} or auto, not {sh_bits}")
+        return Recipe(sh_bits=int(sh_bits))
+    if decibels is not None and not 20.0 <= decibels <= 120.0:
+        raise FlickerError(f"--db: 20 to 120, not {decibels:g}")
+
+    def bits(scene: Scene, start: np.ndarray) -> np.ndarray:
+        from ..budget.sh_bits import choose
+        from ..scene.steps import scene_views
+
+        told.append(choose(scene, start, scene_views(scene, path), DECIBELS if decibels is None else decibels, steps))
+        return told[-1].bits
+
+    return Recipe(sh_bits=bits)
 
 
 def _contents(packed: PackedScene, title: str) -> Table:
     """Where the bytes are, and what is in the clusters."""
     import numpy as np
 
-    from ..scene.packed import HEADER_BYTES
+    from ..scene.packed import FULL_SH_BITS, HEADER_BYTES
 
     table = Table(show_header=False, title=title)
     table.add_column(style="bold")
@@ -47,6 +78,10 @@ def _contents(packed: PackedScene, title: str) -> Table:
         if count:
             inside = int(packed.counts[packed.degrees == degree].sum())
             table.add_row(f"SH degree {degree}", f"{count:,} clusters", f"{inside:,} Gaussians")
+    coded = np.where(packed.degrees > 0, packed.sh_bits, FULL_SH_BITS)
+    for bits, count in enumerate(np.bincount(coded).tolist()):
+        if count and bits < FULL_SH_BITS:
+            table.add_row(f"SH codes of {bits} bits", f"{count:,} clusters", f"{int(packed.counts[coded == bits].sum()):,} Gaussians")
     for name, corner in (("lowest mean", packed.table["low"].min(axis=0)), ("highest mean", packed.table["high"].max(axis=0))):
         table.add_row(name, " ".join(f"{x:.4g}" for x in corner))
     table.add_row("largest deviation", f"{packed.sigma.max():.4g}")
@@ -58,20 +93,10 @@ def _contents(packed: PackedScene, title: str) -> Table:
 def _measured(table: Table, packed: PackedScene, path: Path, brought: bool) -> None:
     """How coarse positions are, in the scene's own views or an orbit; warns where that is a loss to be seen. brought: the clusters are the
     file's own."""
-    from ..scene.camera import find_cameras
-    from ..scene.demo import demo_cameras
     from ..scene.packed import decode
-    from ..scene.sources import DEMO
-    from ..scene.steps import chosen_views, measure_steps
+    from ..scene.steps import measure_steps, scene_views
 
-    scene = replace(decode(packed), path=path)
-    try:
-        cameras = demo_cameras() if str(path) == DEMO else find_cameras(scene)
-    except FlickerError as error:
-        warnings.warn(FlickerWarning(f"{error}; steps are measured in an orbit"), stacklevel=2)
-        cameras = find_cameras(replace(scene, path=None))
-    cameras = chosen_views(cameras)
-    steps = measure_steps(packed, cameras)
+    steps = measure_steps(packed, scene_views(replace(decode(packed), path=path), path))
     table.add_row("steps of positions", f"{steps.mean:.2g}, largest {steps.largest:.2g}", "units of the scene")
     table.add_row("", f"{steps.mean_px:.2g}, largest {steps.largest_px:.2g}", f"pixels, in {steps.views} views")
     if steps.coarse:
@@ -92,12 +117,14 @@ def pack(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="memory image (.flk)")] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="how Gaussians lie in memory [default: chunk]")] = None,
     info: Annotated[bool, typer.Option("--info", help="check a memory image and say what is in it")] = False,
+    sh_bits: Annotated[str | None, typer.Option("--sh-bits", metavar="3|4|5|6|8|auto", help="bits of SH codes; auto: by cluster, for --db [default: 8]")] = None,
+    decibels: Annotated[float | None, typer.Option("--db", help="least PSNR of the scene's views to those with 8 bits, with --sh-bits auto [default: 50]")] = None,
     rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own: compressed .ply, .flk")] = False,
 ) -> None:
     """Pack a scene into the image that the chip's memory holds."""
     steps = RichSteps()
     if info:
-        for name, value in (("--out", out), ("--format", form), ("--rechunk", rechunk or None)):
+        for name, value in (("--out", out), ("--format", form), ("--sh-bits", sh_bits), ("--db", decibels), ("--rechunk", rechunk or None)):
             if value is not None:
                 raise FlickerError(f"--info: reads an image, so it cannot be combined with {name}")
         from ..scene.packed import load_packed
@@ -122,17 +149,23 @@ def pack(
         from ..scene.packing import pack_file
         from ..scene.sources import DEMO, read_scene, scene_path
     chosen, file = PackedFormat(form.value if form else "chunk"), scene_path(scene)
+    if sh_bits is not None and chosen is not PackedFormat.CHUNK:
+        raise FlickerError(f"--sh-bits: of --format chunk alone, not {chosen.value}")
+    told: list[Choice] = []
+    recipe = _recipe("8" if sh_bits is None else sh_bits, decibels, Path(file), steps, told)
     if str(scene) == DEMO:
         with steps.step("making the demo scene"):
             made = read_scene(scene)
-        packing, title = pack_scene(made, chosen, steps=steps), DEMO
+        packing, title = pack_scene(made, chosen, recipe, steps), DEMO
     else:
-        packing, title = pack_file(file, chosen, steps=steps, rechunk=rechunk), str(file) if file is not scene else scene_title(scene)
+        packing, title = pack_file(file, chosen, recipe, steps, rechunk), str(file) if file is not scene else scene_title(scene)
     with steps.step(f"writing {out.name}"):
         image = packing.packed.image()
         write_atomically(out, lambda path: path.write_bytes(image))
     table = _contents(packing.packed, f"{title} in {out.name}, {chosen.value}")
     with steps.step("measuring"):
         _measured(table, packing.packed, Path(file), packing.brought)
+    for choice in told:
+        table.add_row("SH codes", f"{choice.decibels:.1f} dB", f"to 8 bits, in {choice.views} views")
     _history(table, packing)
     console.print(table)

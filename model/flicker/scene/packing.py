@@ -146,6 +146,18 @@ def _sh_codes(
     return step, codes
 
 
+def coded_sh(scene: Scene, start: np.ndarray, bits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """float32 (N, K, 3): `scene.sh` as codes of int64 (C,) bits have it, in clusters that begin at `start`; int64 (C,): their degrees."""
+    counts = np.diff(np.append(start, len(scene)))
+    step, codes = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, ShSteps.CHANNEL, bits, scene.path)
+    half = 2 * codes.astype(np.int16) - np.repeat(1 << bits, counts).astype(np.int16)[:, None, None]
+    sh = scene.sh.astype(np.float32, copy=True)
+    for degree in range(1, SH_DEGREES[sh.shape[1]] + 1):
+        of = slice(coefficients(degree - 1), coefficients(degree))
+        sh[:, of] = half[:, of.start - 1 : of.stop - 1] * np.repeat(step[:, degree - 1], counts, axis=0)[:, None]
+    return sh, _degrees((half != 0).any(axis=2), start)
+
+
 def _degrees(used: np.ndarray, start: np.ndarray) -> np.ndarray:
     """int64 (C,): smallest degree that keeps every coefficient in use. used: bool (N, K - 1)."""
     degrees = np.zeros(len(start), np.int64)
@@ -230,23 +242,30 @@ def pack(scene: Scene, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe =
 def pack_file(
     path: str | Path, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None, rechunk: bool = False,
 ) -> Packing:
-    """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is; rechunk: both
-    are decoded and their clusters made anew.
+    """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is, and both
+    refuse other SH bits than 8; rechunk: both are decoded and their clusters made anew.
 
     Raises FlickerError naming file and field.
     """
     path, steps = Path(path), steps or Steps()
+
+    def kept() -> None:
+        if recipe.sh_bits != FULL_SH_BITS:
+            raise FlickerError(f"{path}: brings its own SH codes: other bits need clusters that are made anew (--rechunk)")
+
     title = scene_title(path)
     kind = "decoded" if rechunk else scene_kind(path)
     if kind == "image":
         with steps.step(f"loading {title}"):
             packed = load_packed(path)
         if packed.format is form:
+            kept()
             return Packing(packed, np.arange(len(packed)), brought=True)
     if kind == "PLY" and form is PackedFormat.CHUNK:
         with steps.step(f"loading {title}"):
             chunks = load_chunks(path) if has_chunks(path) else None
         if chunks is not None:
+            kept()
             with steps.step("codes"):
                 return pack_chunks(chunks, path)
     with steps.step(f"loading {title}"):
@@ -269,10 +288,10 @@ def _chunks(scene: Scene, start: np.ndarray, counts: np.ndarray, recipe: Recipe)
     opacity = np.floor(scene.opacities.astype(np.float64).clip(0, 1) * 255 + 0.5).astype(np.int64)
     playcanvas = recipe.sh is ShSteps.PLAYCANVAS
     sh_bits = recipe.bits(scene, start)
-    headers["sh_zero"] = 255 if playcanvas else 1 << sh_bits
     headers["sh_step"], sh = _sh_codes(scene.sh[:, 1:].astype(np.float64), start, counts, recipe.sh, sh_bits, path)
     rows = _colour_rows(_join(np.column_stack([codes["dc"], opacity]), (*DC_BITS, 8)), sh)
     degrees = np.full(len(start), scene.sh_degree) if playcanvas else _degrees((sh != np.repeat(1 << sh_bits - 1, counts)[:, None, None]).any(axis=2), start)
+    headers["sh_zero"] = 255 if playcanvas else np.where(degrees > 0, 1 << sh_bits, 1 << FULL_SH_BITS)
     clamped = {}
     for reason, values in (("log2 of a scale beyond -30 to 30", np.abs(logs) > _LOG2_LIMIT), ("opacity above 1", scene.opacities > 1)):
         if count := int(values.sum()):

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from .camera import Camera
+from ..errors import FlickerError, FlickerWarning
+from .camera import Camera, find_cameras
+from .gaussians import Scene
 from .packed import POSITION_BITS, PackedFormat, PackedScene, means_and_scales, split
+from .sources import DEMO
 
 # Steps over the sizes of Gaussians on the screen (root mean square) from which on there is a warning (docs/reference/memory_image.md). Ordinary scenes have
 # up to 0.1; what packing alone leaves of pictures is in docs/results/memory_formats.md.
@@ -72,6 +77,18 @@ def in_picture(means: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarra
         inside = (z >= _NEAR) & (np.abs(camera.fx * x / z + camera.cx - 0.5 * (camera.width - 1)) <= 0.5 * camera.width)
         inside &= np.abs(camera.fy * y / z + camera.cy - 0.5 * (camera.height - 1)) <= 0.5 * camera.height
     return inside, z[inside]
+
+
+def scene_views(scene: Scene, path: Path) -> list[Camera]:
+    """At most `VIEWS` cameras of the scene at `path`, evenly from its own; with a warning those of an orbit, where it has none."""
+    from .demo import demo_cameras
+
+    try:
+        cameras = demo_cameras() if str(path) == DEMO else find_cameras(scene)
+    except FlickerError as error:
+        warnings.warn(FlickerWarning(f"{error}; an orbit is measured"), stacklevel=2)
+        cameras = find_cameras(replace(scene, path=None))
+    return chosen_views(cameras)
 
 
 def chosen_views(cameras: Sequence[Camera]) -> list[Camera]:

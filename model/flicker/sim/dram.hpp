@@ -49,9 +49,12 @@ struct Place {
   int64_t channel, bank, row;
 };
 
+// Of a channel's clocks up to its last column command each is one of: data (a burst's tCCD), nothing waits, the bus turns between reads and writes, a refresh
+// holds the banks, or the rest: rows are opened, a masked write's bank.
 struct Counts {
   int64_t clocks = 0;  // until the last data
   int64_t activates = 0, refreshes = 0, bursts = 0;
+  int64_t data = 0, idle = 0, turning = 0, refreshing = 0, rows = 0;
 };
 
 // Where a burst (address / burst_bytes) lies.
@@ -121,6 +124,7 @@ class Channel {
       bank.column = activate_ + t_.rcd;
       bank.precharge = activate_ + t_.ras;
     }
+    account(burst.kind);
     const bool read = burst.kind == READ;
     bank.precharge = std::max(bank.precharge, column_ + (read ? t_.rtp : t_.write_pre));
     if (!read) bank.wrote = column_;
@@ -170,6 +174,24 @@ class Channel {
     int64_t passed_over = 0;
   };
 
+  // What the clocks since the last column command went to, before the one of a burst of this kind.
+  void account(int8_t kind) {
+    int64_t from = std::max<int64_t>(last_column_ + t_.ccd, 0), arrived = NEVER;
+    for (const Queue& q : queue_) {
+      if (q.waiting > 0) arrived = std::min(arrived, q.burst[q.head].arrived);
+    }
+    const auto until = [&](int64_t clock, int64_t& sum) {
+      clock = std::min(clock, column_);
+      sum += std::max<int64_t>(clock - from, 0);
+      from = std::max(from, clock);
+    };
+    until(arrived, counts.idle);
+    if ((kind == READ) != (last_kind_ == READ)) until(last_column_ + (kind == READ ? t_.write_read : t_.read_write), counts.turning);
+    until(refreshed_, counts.refreshing);
+    until(column_, counts.rows);
+    counts.data += t_.ccd;
+  }
+
   // Whether writes or reads move next.
   void turn() {
     const int reads = queue_[0].waiting, writes = queue_[1].waiting;
@@ -197,6 +219,7 @@ class Channel {
       bank.row = -1;
       bank.activate = start + t_.rp_all + t_.rfc;
     }
+    refreshed_ = start + t_.rp_all + t_.rfc;
     next_refresh_ += t_.refi;
   }
 
@@ -267,6 +290,7 @@ class Channel {
   int64_t activates_[4] = {FAR, FAR, FAR, FAR};  // the last four
   int64_t last_column_ = FAR, next_refresh_;
   int64_t round_ = 0;                            // of refreshes, every bank once
+  int64_t refreshed_ = FAR;                      // the last one of all banks ends
   int8_t last_kind_ = READ;
   bool chosen_ = false;  // the next command is known: that of the served queue's entry `best_`
   int best_ = 0;
@@ -361,6 +385,11 @@ class Engine {
       sum.activates += lane.channel.counts.activates;
       sum.refreshes += lane.channel.counts.refreshes;
       sum.bursts += lane.channel.counts.bursts;
+      sum.data += lane.channel.counts.data;
+      sum.idle += lane.channel.counts.idle;
+      sum.turning += lane.channel.counts.turning;
+      sum.refreshing += lane.channel.counts.refreshing;
+      sum.rows += lane.channel.counts.rows;
     }
     return sum;
   }

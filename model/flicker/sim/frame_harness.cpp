@@ -407,6 +407,9 @@ int flk_half_given(Sim* sim, int subtile, uint32_t* out, int size) {
   return static_cast<int>(lists.size());
 }
 
+// Of all frames until now.
+void flk_half_dram(Sim* sim, flk::dram::Counts* out) { *out = sim->memory.engine.counts(); }
+
 double flk_half_efficiency(Sim* sim) { return sim->memory.efficiency(); }
 
 // AxiCounts of a purpose over all ports, as uint64.

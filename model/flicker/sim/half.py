@@ -14,7 +14,7 @@ import numpy as np
 from ..chip_counters import Counter
 from ..errors import FlickerError
 from ..toolchain import verilate
-from .memory import HEADERS, PortConfig, PurposeCounts, Timing, _Config
+from .memory import HEADERS, Counts, PortConfig, PurposeCounts, Timing, _Config
 
 HERE = Path(__file__).parent
 BEAT = 64
@@ -67,6 +67,7 @@ def _library(path: Path) -> ctypes.CDLL:
         ("mend", None, pointer),
         ("given", ctypes.c_int, pointer, ctypes.c_int, pointer, ctypes.c_int),
         ("efficiency", ctypes.c_double, pointer),
+        ("dram", None, pointer, pointer),
         ("counts", None, pointer, ctypes.c_uint32, pointer),
     ):
         function = getattr(lib, f"flk_half_{name}")
@@ -171,6 +172,12 @@ class Half:
         if self._lib.flk_half_waits(self._sim, out.ctypes.data) != len(names):
             raise self._failure(f"not {len(names)} counters of waits")
         return {name: int(value) for name, value in zip(names, out) if value >= 0}
+
+    def dram_counts(self) -> Counts:
+        """Of the DRAM, all frames until now."""
+        counts = Counts()
+        self._lib.flk_half_dram(self._sim, ctypes.byref(counts))
+        return counts
 
     @property
     def efficiency(self) -> float:

@@ -36,9 +36,10 @@ class Timing(ctypes.Structure):
 
 
 class Counts(ctypes.Structure):
-    """Of the DRAM. clocks: until the last data. row_hits: bursts that found their row open."""
+    """Of the DRAM. clocks: until the last data. row_hits: bursts that found their row open. data to rows: clocks of all channels up to their last column
+    commands, by what they went to: data, nothing that waits, turns between reads and writes, refreshes of all banks, the rest (rows)."""
 
-    _fields_ = [(name, c_int64) for name in ("clocks", "activates", "refreshes", "bursts")]
+    _fields_ = [(name, c_int64) for name in ("clocks", "activates", "refreshes", "bursts", "data", "idle", "turning", "refreshing", "rows")]
 
     @property
     def row_hits(self) -> int:
@@ -202,7 +203,7 @@ def library() -> ctypes.CDLL:
 
 
 def run_bursts(timing: Timing, burst: np.ndarray, kind: np.ndarray) -> np.ndarray:
-    """Clocks, activates, refreshes and bursts of every channel, int64 (channels, 4).
+    """`Counts` of every channel, int64 (channels, fields).
 
     burst: int64 (B,), address / burst_bytes, not negative; kind: int8 (B,), READ, WRITE or MASKED_WRITE. All wait from clock 0 on, in this order.
     """
