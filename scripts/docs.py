@@ -159,7 +159,7 @@ PARTS = (
     Part("lists", "layouts of tile lists in DRAM", ("entries", "formats", "layouts", "flight"), lists.tables, scenes_missing),
     Part("long_lists", "ways to sort lists longer than a sorting unit", ("sizes", "early", "real", "means"), long_lists.tables, scenes_missing),
     Part("scale", "how a frame grows with the scene and the picture, with the chart", ("scene", "degree", "picture"), scale.tables, scenes_missing),
-    Part("scale_hardware", "long lists and grown scenes in the whole chip's RTL; half an hour", ("",), scale_hardware.tables, scenes_missing),
+    Part("scale_hardware", "long lists and grown scenes in the whole chip's RTL; half an hour", ("", "spent"), scale_hardware.tables, scenes_missing),
     Part("motion", "speed against stability: what pictures do from frame to frame, with chart, strip and clip; half an hour, can be interrupted",
          ("cycles", "pan", "shake", "walk"), motion.tables, scenes_missing, before=motion.draw),
     Part("late", "frames that miss their slot, and enormous Gaussians near the camera; half an hour, can be interrupted", ("paths", "giants"), late.tables,

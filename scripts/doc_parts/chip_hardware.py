@@ -34,7 +34,7 @@ from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
 from flicker.sim.chip import PORT, ChipFrame, ChipSession, build
 from flicker.sim.half import MemoryOptions
-from flicker.sim.row import back_to_back
+from flicker.sim.row import RowFrame, back_to_back
 
 from .common import Say, folder_of_scenes
 
@@ -51,9 +51,9 @@ BUILDS = {
 PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame")
 
 
-def four_frames(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE) -> list[ChipFrame]:
+def four_frames(chip: ChipSession, camera: Camera, chunks: int = CHUNKS, lists: ListKind = ListKind.ELLIPSE) -> list[RowFrame]:
     """Of one view, back to back: while the last but one is rendered the front end works on the last, as in a longer row of frames. chunks: of a list writer."""
-    return [done.frame for done in back_to_back(chip, [camera] * 4, chunks=chunks, lists=lists)]
+    return list(back_to_back(chip, [camera] * 4, chunks=chunks, lists=lists))
 
 
 def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, str, Refresh]]:
@@ -70,7 +70,7 @@ def _places() -> list[tuple[str, str | Path, int, tuple[int, int] | None, int, s
 @dataclass(frozen=True, eq=False)
 class Measured:
     """A view in the verilated chip and in the model. alone, done: a frame alone and four back to back; simulated: cycles of the first, seconds: of the
-    processor; moved: bytes of the DRAM by purpose."""
+    processor; moved: bytes of the DRAM by purpose. spent: shares of its clocks between the second frame and the third, by what they went to."""
 
     model: WholeFrame
     lists: TileLists
@@ -79,6 +79,7 @@ class Measured:
     moved: dict[str, int]
     simulated: int
     seconds: float
+    spent: dict[str, float]
 
     @property
     def halves(self) -> tuple[int, int]:
@@ -133,11 +134,12 @@ def measure(
             raise FlickerError(f"{title}: {purpose}: the chip moves {moved[purpose]:,} bytes, the chip model {due:,}")
     say(f"{title}: four frames back to back")
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
-        done = four_frames(chip, camera, chunks, lists)
+        row = four_frames(chip, camera, chunks, lists)
+    done, spent = [frame.frame for frame in row], row[2].spent
     for frame in (alone, *done):
         if frame.error or not np.array_equal(frame.buffer, golden.buffer):
             raise FlickerError(f"{title}: the picture differs from the golden model's")
-    found = Measured(model, lists_there, alone, done, moved, simulated, seconds)
+    found = Measured(model, lists_there, alone, done, moved, simulated, seconds, {name: clocks / sum(spent.values()) for name, clocks in spent.items()})
     if abs(found.off[2]) > LIMIT:
         raise FlickerError(f"{title}: the chip model's cycles are {found.off[2]:+.1%} off")
     return found

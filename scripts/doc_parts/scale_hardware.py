@@ -33,7 +33,7 @@ def _views() -> Iterator[tuple[str, View]]:
 
 
 def tables(say: Say) -> dict[str, str]:
-    rows = []
+    rows, spent = [], []
     for name, view in _views():
         model = point(name, view)
         found = measure(say, name, view, CONFIG, PackedFormat.CHUNK, ListKind.ELLIPSE, CHUNKS, DramConfig())
@@ -42,7 +42,8 @@ def tables(say: Say) -> dict[str, str]:
             name, f"{model.longest:,}", f"{front:,}", f"{found.off[0]:+.1%}", f"{back:,}", f"{found.off[1]:+.1%}", f"{back / model.bound:.2f}",
             f"{found.interval:,}", f"{found.off[3]:+.1%}", f"{sum(found.moved.values()) / 1e6:.1f}", found.model.bottleneck,
         ))
+        spent.append((name, *(f"{share:.1%}" for share in found.spent.values())))
     return {"": table(
         ["view", "longest list", "front end, cycles", "model off by", "rendering, cycles", "model off by", "over the bound", "interval back to back",
          "model off by", "MB", "what the model says it waits for"], rows,
-    )}
+    ), "spent": table(["view", "data", "nothing waits", "turns between reads and writes", "refresh of all banks", "rows"], spent, numbers=True)}

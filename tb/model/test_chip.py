@@ -239,6 +239,42 @@ DRAM_RESULTS = {
 }
 
 
+def spent(config: DramConfig, burst: np.ndarray, kind: np.ndarray | int = READ) -> dict[str, int]:
+    """What a channel's clocks go to, all bursts at hand."""
+    dram = Dram(config.timing)
+    for b, k in zip(burst, np.broadcast_to(kind, burst.shape)):
+        dram.push(0, int(b) * config.burst_bytes, int(k))
+    dram.advance(1 << 40)
+    return dram.counts().spent
+
+
+def test_what_clocks_go_to():
+    """In closed forms; and every clock up to the last column command once."""
+    d = ONE
+    nothing = dict.fromkeys(("data", "idle", "turning", "refreshing", "rows"), 0)
+    assert spent(d, np.arange(PAGE)) == nothing | {"data": PAGE * d.tccd, "rows": d.trcd}
+    to_write, to_read = d.rl + d.tdqsck + d.burst_clocks + 1 - d.wl, d.wl + d.burst_clocks + d.twtr + 1
+    turns = spent(replace(d, window=1, write_places=0), np.arange(4), np.array([READ, WRITE, READ, WRITE]))
+    assert turns == nothing | {"data": 4 * d.tccd, "rows": d.trcd, "turning": 2 * to_write + to_read - 3 * d.tccd}
+    dram = Dram(d.timing)
+    dram.push(0, 0, READ)
+    dram.advance(5000)
+    dram.push(5000, 32, READ)
+    dram.advance(1 << 40)
+    assert dram.counts().spent == nothing | {"data": 2 * d.tccd, "rows": d.trcd, "idle": 5000 - d.trcd - d.tccd}
+    whole = replace(d, refresh=Refresh.ALL_BANKS)
+    stopped, refreshes = spent(whole, np.arange(40 * PAGE)), simulate(np.arange(40 * PAGE), config=whole).refreshes
+    assert refreshes * d.trfc <= stopped["refreshing"] <= refreshes * (d.trfc + d.trp_all + d.tras) and stopped["idle"] == 0
+    rng = np.random.default_rng(seed())
+    for config in (d, whole, replace(whole, write_places=0), replace(d, refresh=Refresh.PER_BANK)):
+        burst = rng.integers(0, 1 << 16, 4000)
+        clocks = spent(config, burst)
+        assert sum(clocks.values()) == simulate(burst, config=config).clocks - d.rl - d.burst_clocks + d.tccd
+        assert clocks["data"] == 4000 * d.tccd and clocks["turning"] == 0 and clocks["rows"] > 0
+        mixed = spent(config, burst, rng.choice([READ, WRITE, MASKED_WRITE], 4000))
+        assert mixed["turning"] > 0 and mixed["data"] == clocks["data"]
+
+
 def test_dram_results_are_kept():
     for name, (burst, kind, config) in dram_streams().items():
         r = simulate(burst, kind, config)

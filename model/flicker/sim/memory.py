@@ -46,6 +46,11 @@ class Counts(ctypes.Structure):
         """Bursts that found their row open."""
         return self.bursts - self.activates
 
+    @property
+    def spent(self) -> dict[str, int]:
+        """Clocks of all channels by what they went to."""
+        return {name: getattr(self, name) for name in ("data", "idle", "turning", "refreshing", "rows")}
+
 
 class _Address(ctypes.Structure):
     _fields_ = [("addr", c_uint64), ("id", c_uint32), ("valid", c_uint8), ("len", c_uint8), ("size", c_uint8), ("burst", c_uint8), ("qos", c_uint8)]

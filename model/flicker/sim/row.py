@@ -30,12 +30,13 @@ TAGS, CYCLES = 1 << 16, 1 << 32  # that there are: tags of frames, cycles in a s
 @dataclass(frozen=True, eq=False)
 class RowFrame:
     """A frame of a row. number: in the row. moved: bytes of the DRAM, read and written, by purpose. interval: cycles since the frame before it ended; None of
-    the first one."""
+    the first one. spent: clocks of the DRAM's channels since then, or since the row began, by what they went to (`Counts`)."""
 
     number: int
     frame: ChipFrame
     moved: dict[str, int]
     interval: int | None
+    spent: dict[str, int]
 
 
 class _Counted:
@@ -67,7 +68,7 @@ def back_to_back(
     row goes on with the frame before that one, which is not given again: every interval is one of a row. limit: cycles until the next frame ends.
     FlickerError, naming the frame, for any other fault.
     """
-    given = 0
+    given, before = 0, chip.dram_counts().spent
     while given < len(cameras):
         first = max(given - 1, 0)
         places = [chip.place(cameras[0], format_, chunks=chunks, number=1 + k) for k in range(2)]
@@ -95,9 +96,11 @@ def back_to_back(
             end, moved = done.stamps["rendering_done"], counted.of(done, places[k % 2])
             interval: int | None = None if ended is None else (end - ended) % CYCLES
             ended = end
+            now = chip.dram_counts().spent
+            spent, before = {name: value - before[name] for name, value in now.items()}, now
             if number == given:
                 given += 1
-                yield RowFrame(number, done, moved, interval)
+                yield RowFrame(number, done, moved, interval, spent)
 
 
 def differs(image: np.ndarray, want: np.ndarray) -> str | None:
