@@ -386,6 +386,7 @@ module flk_colour_fetch
     logic                 next_take, next_free, next_valid_q, none;
     item_t                next_q;
     logic [AT_BITS-1:0]   next_last_q;  // beat of its last byte
+    logic [5:0]           next_step_q;  // half bytes from a part to the next
 
     flk_sram_fifo #(
       .Width($bits(item_t)),
@@ -419,6 +420,7 @@ module flk_colour_fetch
         next_q      <= item;
         next_last_q <= AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.bits, item.degree))
                                  - 1'b1) >> 6);
+        next_step_q <= chunked_i ? 6'd3 * item.bits : 6'd48;
       end
     end
 
@@ -430,7 +432,8 @@ module flk_colour_fetch
     cluster_index_t       cluster_q;
     sh_bits_t             bits_q;
     logic [1:0]           degree_q, part_q;
-    logic [BYTE_BITS:0]   from_q, further;
+    logic [BYTE_BITS:0]   from_q, further_q;  // this one, the next
+    logic [5:0]           step_q;
     logic [AT_BITS-1:0]   at, last_q;  // beats of the part's first byte, of the Gaussian's last
     logic                 more, fire, straddles, final_part;
 
@@ -438,7 +441,6 @@ module flk_colour_fetch
     assign more       = fire && !final_part;
     assign next_take  = !want_q || (fire && final_part);
     assign want_d     = next_take ? next_valid_q : want_q;
-    assign further    = from_q + (chunked_i ? (BYTE_BITS + 1)'(6'd3 * bits_q) : (BYTE_BITS + 1)'(48));
     assign at         = from_q[BYTE_BITS:7];
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -456,10 +458,13 @@ module flk_colour_fetch
         degree_q  <= next_q.degree;
         part_q    <= '0;
         from_q    <= {next_q.start, 1'b0};
+        further_q <= {next_q.start, 1'b0} + (BYTE_BITS + 1)'(next_step_q);
+        step_q    <= next_step_q;
         last_q    <= next_last_q;
       end else if (more) begin
-        part_q <= part_q + 1'b1;
-        from_q <= further;
+        part_q    <= part_q + 1'b1;
+        from_q    <= further_q;
+        further_q <= further_q + (BYTE_BITS + 1)'(step_q);
       end
     end
 
@@ -516,7 +521,7 @@ module flk_colour_fetch
     logic  other, idle_other, fire_other;
 
     assign then_at     = {next_q.cluster, next_q.start[BYTE_BITS-1:6]};
-    assign beyond     = {cluster_q, further[BYTE_BITS:7]};
+    assign beyond     = {cluster_q, further_q[BYTE_BITS:7]};
     assign other      = next_valid_q && l0_q != then_at;
     assign idle_other = want_q ? !here : other;
     assign fire_other = final_part ? other : l0_q != beyond;
