@@ -20,13 +20,14 @@ from flicker.golden.lanes.render import render_lanes
 from flicker.markdown import table
 from flicker.params import RECOMMENDED, Form
 from flicker.perf.lanes import lane_work, simulate_lanes
+from flicker.report.moving import FPS
 from flicker.scene.real import REAL_VIEWS
 from flicker.scene.sources import Source, open_scene
 from flicker.scene.temporal import Change, TemporalError, summarise
 
 from .common import SIZE, Say, folder_of_scenes
 from .lanes import unrounded
-from .motion import FPS, FRAMES, figures
+from .motion import FRAMES, figures
 from .motion import SIZE as SMALL
 
 FIRST, SQUARES, ALL = "boxes of 3 sigma on 8x8, as they are", "the reference's squares on 16x16", "all of alpha 1/255 and more"

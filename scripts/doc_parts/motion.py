@@ -6,11 +6,8 @@ a sequence at most. Pictures in the pages are of the demo scene.
 
 from __future__ import annotations
 
-import math
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -24,33 +21,27 @@ from flicker.explore.digest import code_digest, file_digest, key
 from flicker.explore.store import Store
 from flicker.front.paths import Asked, path_of
 from flicker.front.view import View
-from flicker.motion.record import composed, eight_bits
-from flicker.motion.video import write_video
-from flicker.params import RECOMMENDED, RenderConfig
+from flicker.motion.strip import CHANNELS, LANES, SPARSE, STRIP, clip, filmed, strip, write_clip
+from flicker.params import RECOMMENDED
 from flicker.pipeline import Engine, FrontOptions
 from flicker.report.figures import Figure
+from flicker.report.moving import MOTIONS, Sample, decibels_text, jumps_text, speed_stability
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS, RealView
 from flicker.scene.sources import Source, open_scene
 from flicker.scene.temporal import Change, TemporalError, TemporalSummary, summarise
-from flicker.toolchain import BUILD
+from flicker.toolchain import BUILD, ROOT
 
 from .common import IMAGES, Say, folder_of_scenes, save_charts, significant
 
-SIZE, FRAMES, FPS = (480, 270), 6, 90.0
-MOTIONS = {
-    "pan": ("pan of 0.25 pixels a frame", Asked("pan", 0.25, size=SIZE, frames=FRAMES, fps=FPS)),
-    "shake": ("head shake", Asked("shake", size=SIZE, frames=FRAMES, fps=FPS)),
-    "walk": ("walk", Asked("walk", size=SIZE, frames=FRAMES, fps=FPS)),
-}
+SIZE, FRAMES = (480, 270), 6
 # Whole chips, beside the stages: the picture has the bit-true front end and frame buffer of 8 bits, too.
 CHIPS = {
     "chip, `chunk`": Drawing(Engine.CHIP_GOLDEN, RECOMMENDED, options=FrontOptions(PackedFormat.CHUNK)),
     "chip, `fp16-local`": Drawing(Engine.CHIP_GOLDEN, RECOMMENDED, options=FrontOptions(PackedFormat.FP16_LOCAL)),
 }
 TIMED = "pan"
-STRIP, CROP, ENLARGED = 6, 40, 3  # frames of the strip, pixels of a side, times
-CLIP = (320, 180)
+CLIP, CLIP_FRAMES = (320, 180), 24
 
 
 def _plain(summary: TemporalSummary, cycles: Sequence[int]) -> dict:
@@ -88,7 +79,7 @@ def _sequence(source: Source, asked: Asked, names: Sequence[str], say: Say, titl
 def measured(view: RealView, motion: str, say: Say) -> dict[str, dict]:
     """`_sequence` of a real view, out of the store where it is there."""
     names, (title, asked) = group("stability in time"), MOTIONS[motion]
-    asked = replace(asked, view=view.number)
+    asked = replace(asked, view=view.number, size=SIZE, frames=FRAMES)
     file = view.path(folder_of_scenes())
     store = Store(BUILD / "motion")
     of = key("motion", code_digest(), file_digest(file), asked, *names, *CHIPS)
@@ -107,23 +98,13 @@ def results(say: Say) -> Results:
     return {motion: {view.title: measured(view, motion, say) for view in REAL_VIEWS} for motion in MOTIONS}
 
 
-def _decibels(value: float | None) -> str:
-    return "equal" if value is None or math.isinf(value) else f"{value:.1f}"
-
-
-def _jumps(share: float) -> str:
-    """Per cent of the pixels; a share that would be rounded to none is told as such."""
-    percent = 100 * share
-    return "0" if share == 0 else "< 0.001" if percent < 0.001 else f"{percent:.3f}" if percent < 0.1 else f"{percent:.2f}"
-
-
 def figures(summary: TemporalSummary) -> str:
     """A cell: PSNR of the stills / temporal PSNR / jumps in per cent."""
     return _cell(asdict(summary))
 
 
 def _cell(row: dict) -> str:
-    return f"{_decibels(row['psnr_db'])} / {_decibels(row['temporal_psnr_db'])} / {_jumps(row['jumps'])}"
+    return f"{decibels_text(row['psnr_db'])} / {decibels_text(row['temporal_psnr_db'])} / {jumps_text(row['jumps'])}"
 
 
 def stability(found: dict[str, dict[str, dict]]) -> str:
@@ -146,96 +127,36 @@ def cycles(everything: Results) -> str:
 
 
 def _chart(everything: Results) -> Figure:
-    """Cycles against temporal PSNR, and against jumps, a column a motion; a point a view."""
-    from matplotlib.figure import Figure as Plot
+    """The report's figure; cycles of every motion are those of the pan."""
+    def sample(row: dict, name: str, title: str) -> Sample:
+        return Sample(float(np.mean(everything[TIMED][title][name]["cycles"])), row["psnr_db"], row["temporal_psnr_db"], row["jumps"])
 
-    names = [name for name in next(iter(next(iter(everything.values())).values())) if name not in CHIPS]
-    plot = Plot(figsize=(11, 7), layout="constrained")
-    axes = plot.subplots(2, len(everything), sharex=True, sharey="row")
-    rows = []
-    for column, (motion, views) in enumerate(everything.items()):
-        for k, name in enumerate(names):
-            counts = [float(np.mean(found[name]["cycles"])) / 1e6 for found in everything[TIMED].values()]
-            points = [(count, row[name]["temporal_psnr_db"], 100 * row[name]["jumps"]) for count, row in zip(counts, views.values())]
-            style = {"marker": "o^sDvP*Xd<>"[k % 11], "linestyle": "none", "label": name, "color": f"C{k % 10}", "markersize": 5}
-            axes[0, column].plot([p[0] for p in points], [p[1] for p in points], **style)
-            axes[1, column].plot([p[0] for p in points], [p[2] for p in points], **style)
-            rows += [[motion, title, name, *point] for title, point in zip(views, points)]
-        axes[0, column].set_title(MOTIONS[motion][0], fontsize=10)
-        axes[1, column].set_xlabel("million cycles a frame")
-        axes[1, column].set_xscale("log")
-        axes[1, column].set_yscale("symlog", linthresh=1e-3)
-        for row in range(2):
-            axes[row, column].grid(alpha=0.3)
-    axes[1, 0].set_ylim(0.0, 30.0)
-    axes[0, 0].set_ylabel("temporal PSNR, dB")
-    axes[1, 0].set_ylabel("jumps, % of the pixels a frame")
-    plot.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
-    return Figure(
-        "speed_stability", "Speed against stability", "", "Cycles of the rendering stage against the change of its error from frame to frame.",
-        ["motion", "view", "configuration", "million_cycles", "temporal_psnr_db", "jumps_percent"], rows, plot,
-    )
+    return speed_stability({
+        motion: {title: {name: sample(row, name, title) for name, row in rows.items() if name not in CHIPS} for title, rows in views.items()}
+        for motion, views in everything.items()
+    })
 
 
-def _flickering(pictures: Sequence[np.ndarray], references: Sequence[np.ndarray]) -> tuple[int, int]:
-    """Left and upper edge of the square of `CROP` pixels in which errors change most."""
-    errors = [p - r for p, r in zip(pictures, references)]
-    change = np.mean([np.abs(b - a).max(axis=2) for a, b in zip(errors, errors[1:])], axis=0)
-    sums = np.pad(change, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    inside = sums[CROP:, CROP:] - sums[:-CROP, CROP:] - sums[CROP:, :-CROP] + sums[:-CROP, :-CROP]
-    y, x = np.unravel_index(int(inside.argmax()), inside.shape)
-    return int(x), int(y)
+def _demo(frames: int, size: tuple[int, int], say: Say, what: str) -> Iterator[View]:
+    """Views of a pan in the demo scene."""
+    source = open_scene("demo")
+    for n, camera in enumerate(path_of(source, replace(MOTIONS["pan"][1], size=size, frames=frames))[0]):
+        say(f"{what}, frame {n + 1}")
+        yield View(camera, source.scene)
 
 
-def _strip(source: Source, say: Say) -> None:
-    """Consecutive frames of a pan, enlarged where the default channels flicker most: reference, channels, lanes, and the errors of both."""
-    cameras, _ = path_of(source, Asked("pan", 0.25, size=SIZE, frames=STRIP))
-    drawings = {"channels": Drawing(config=RenderConfig()), "lanes": Drawing(config=RECOMMENDED)}
-    frames: dict[str, list[np.ndarray]] = {name: [] for name in ("reference", *drawings)}
-    for n, camera in enumerate(cameras):
-        say(f"strip, frame {n + 1}")
-        view = View(camera, source.scene)
-        frames["reference"].append(view.reference)
-        for name, drawing in drawings.items():
-            frames[name].append(drawing.render(view).image.astype(np.float64))
-    x, y = _flickering(frames["channels"], frames["reference"])
-    lines = [[each[y : y + CROP, x : x + CROP] for each in frames[name]] for name in frames]
-    lines += [[8 * np.abs(a - b) for a, b in zip(lines[k], lines[0])] for k in (1, 2)]
-    gap = 2
-    out = Image.new("RGB", (STRIP * (CROP * ENLARGED + gap) - gap, len(lines) * (CROP * ENLARGED + gap) - gap), "white")
-    for row, line in enumerate(lines):
-        for column, picture in enumerate(line):
-            tile = Image.fromarray(eight_bits(picture)).resize((CROP * ENLARGED, CROP * ENLARGED), Image.Resampling.NEAREST)
-            out.paste(tile, (column * (CROP * ENLARGED + gap), row * (CROP * ENLARGED + gap)))
-    out.save(IMAGES / "flicker_strip.png", optimize=True)
-
-
-def _clip(source: Source, say: Say) -> None:
-    """A short clip of the demo scene: sparse channels, lanes, and the error of each, a pan of 0.25 pixels a frame, slowly."""
-    cameras, _ = path_of(source, Asked("pan", 0.25, size=CLIP, frames=24))
-    drawings = {"channels, sparse": Drawing(config=RenderConfig(cat=RenderConfig().cat.SPARSE)), "lanes": Drawing(config=RECOMMENDED)}
-    with tempfile.TemporaryDirectory() as folder:
-        files = []
-        for n, camera in enumerate(cameras):
-            say(f"clip, frame {n + 1}")
-            view = View(camera, source.scene)
-            panels = []
-            for name, drawing in drawings.items():
-                image = np.clip(drawing.render(view).image, 0.0, 1.0)
-                panels += [(name, image), ("error x 8", 8 * np.abs(image - np.clip(view.reference, 0.0, 1.0)))]
-            picture = np.concatenate([composed(panels[:2]), composed(panels[2:])], axis=0)
-            files.append(Path(folder) / f"{n:03d}.png")
-            Image.fromarray(picture).save(files[-1])
-        write_video(IMAGES / "flicker_clip.webp", files, 12.0)
+def pictures(say: Say) -> str:
+    """The strip and the clip, of the demo scene; the files that were written."""
+    shown, files = (CHANNELS, LANES), (IMAGES / "flicker_strip.png", IMAGES / "flicker_clip.webp")
+    Image.fromarray(strip(filmed(_demo(STRIP, SIZE, say, "strip"), shown), shown)).save(files[0], optimize=True)
+    slow = (SPARSE, LANES)
+    write_clip(files[1], clip(filmed(_demo(CLIP_FRAMES, CLIP, say, "clip"), slow), slow))
+    return ", ".join(str(file.relative_to(ROOT)) for file in files)
 
 
 def draw(say: Say) -> str:
     """The chart, the strip and the clip."""
-    charts = save_charts([_chart(results(say))])
-    source = open_scene("demo")
-    _strip(source, say)
-    _clip(source, say)
-    return f"{charts}, docs/images/flicker_strip.png, docs/images/flicker_clip.webp"
+    return f"{save_charts([_chart(results(say))])}, {pictures(say)}"
 
 
 def tables(say: Say) -> dict[str, str]:

@@ -6,32 +6,45 @@ pictures, 1 for plain green against plain blue, the largest distance of colours 
 
 from __future__ import annotations
 
+import base64
 import csv
 import json
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
+from inspect import signature
 
 import numpy as np
 import pytest
 from flicker_tb.runner import seed
+from PIL import Image
 from scene_samples import random_scene
 from scipy.signal import convolve2d
 from typer.testing import CliRunner
 
+from flicker.chip.drawing import Drawing
 from flicker.cli.main import app
+from flicker.cli.report import report
 from flicker.errors import FlickerError
 from flicker.explore import facts
+from flicker.explore.configurations import group
 from flicker.explore.evaluate import evaluate
 from flicker.explore.points import SceneFile, Target
 from flicker.explore.store import Store
 from flicker.explore.sweep import load_sweep, run_sweep
-from flicker.front.view import DEMO, load_view
-from flicker.params import Form
-from flicker.report import claims, collect, figures, page
+from flicker.front.paths import path_of
+from flicker.front.view import DEMO, View, load_view
+from flicker.motion import strip as shown
+from flicker.motion.frames import Wanted
+from flicker.motion.keep import Kept
+from flicker.motion.record import Recording, record, summary_of
+from flicker.params import FAITHFUL, RECOMMENDED, Form
+from flicker.report import claims, collect, figures, moving, page
 from flicker.report.write import SUMMARY, check, write_report
 from flicker.scene import metrics
 from flicker.scene.files import save_ply
+from flicker.scene.sources import open_scene
 
 SIZE = 160, 90
 NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "lanes"] + [
@@ -46,7 +59,7 @@ def made(tmp_path_factory):
     cost = {"cycles": 1e6, "lane_cycles": 3e5, "bytes": 2e7, "picture_bytes": 3e6, "image_bytes": 1000}
     steps = [{"step": "", "gaussians": n, "coefficients": 4.0, "decibels": dB, "cost": cost} for n, dB in ((100, None), (50, 40.0), (25, 30.0))]
     (folder / "budget.json").write_text(json.dumps({"scene": "a/demo.ply", "gaussians": [100, 25], "steps": steps}))
-    job = check([], folder / "out", SIZE, NAMES, folder / "store", budgets=[folder / "budget.json"])
+    job = check([], folder / "out", SIZE, NAMES, folder / "store", budgets=[folder / "budget.json"], frames=2)
     calls = []
     return job, write_report(job, seed(), lambda *call: calls.append(call)), calls
 
@@ -190,9 +203,9 @@ def test_page_is_self_contained(made):
         assert link[1:] in parsed.ids if link.startswith("#") else (job.folder / link).is_file(), link
     assert not re.search(r"(@import|fetch\(|XMLHttpRequest|<script src|url\(http)", text)
     for name in ("fig3a_modes", "fig4_intersection", "fig7c_precision", "fig8_rendering_stage", "fig9_fifo_depth", "fig10_whole_system",
-                 "table1_contribution_test", "table2_area", "heat_demo_0", "stability", "budget"):
+                 "table1_contribution_test", "table2_area", "heat_demo_0", "stability", "budget", "speed_stability"):
         assert name in parsed.ids and (job.folder / "figures" / f"{name}.csv").stat().st_size > 30, name
-    for name in ("fig8_rendering_stage", "speed_accuracy", "heat_demo_0"):
+    for name in ("fig8_rendering_stage", "speed_accuracy", "heat_demo_0", "speed_stability"):
         assert all((job.folder / "figures" / f"{name}.{kind}").stat().st_size > 5000 for kind in ("png", "svg"))
     points = json.loads(re.search(r"const DATA = (.*);\n", text).group(1))["demo 0"]
     for point, row in zip(points, _rows(written.summary), strict=True):
@@ -233,21 +246,111 @@ def test_resumed_in_seconds(made):
     again = write_report(job, seed())
     assert {p.name: p.read_bytes() for p in (again.page, again.summary)} == before
     assert {p: p.stat().st_mtime_ns for p in job.store.iterdir()} == stored
-    lost = next(p for p in stored if p.suffix == ".json" and json.loads(p.read_text()).get("config") == "faithful")
-    lost.write_text("{")  # a torn file counts as lost
-    collect.collect(job.targets, NAMES, Store(job.store))
-    changed = {p for p in job.store.iterdir() if p.stat().st_mtime_ns != stored.get(p)}
-    assert lost in changed and changed <= {lost, lost.with_suffix(".npz")}
+    rows = {p: json.loads(p.read_text()) for p in stored if p.suffix == ".json"}
+    for path, run in (
+        (None, lambda: collect.collect(job.targets, NAMES, Store(job.store))),
+        ("shake", lambda: moving.collect_moving(job.targets, job.moving, job.frames, Store(job.store))),
+    ):
+        lost = next(p for p, row in rows.items() if row.get("config") == "faithful" and row.get("path") == path)
+        lost.write_text("{")  # a torn file counts as lost
+        before = {p: p.stat().st_mtime_ns for p in job.store.iterdir()}
+        run()
+        changed = {p for p in job.store.iterdir() if p.stat().st_mtime_ns != before.get(p)}
+        assert lost in changed and changed <= {lost, lost.with_suffix(".npz")} and json.loads(lost.read_text()) == rows[lost]
+
+
+# -- stability over time --------------------------------------------------------------------------------------------------------------
+
+DRAWN = {"faithful": FAITHFUL, "log-lanes": RECOMMENDED}
+
+
+@pytest.mark.parametrize("motion", moving.MOTIONS)
+def test_figures_in_motion(made, motion, tmp_path):
+    """Temporal figures are those that `flicker.motion` finds along the same path, cycles the mean of those of the frames."""
+    job, _, _ = made
+    source = open_scene(DEMO)
+    cameras = path_of(source, replace(moving.MOTIONS[motion][1], size=SIZE, frames=2))[0]
+    rows = {row["config"]: row for row in _rows(job.folder / "figures" / "speed_stability.csv") if row["motion"] == motion}
+    assert list(rows) == NAMES and {row["view"] for row in rows.values()} == {"demo 0"}
+    for name, config in DRAWN.items():
+        kept = Kept(tmp_path / name, whole=True)
+        kept.begin({"frames": 2}, resume=False)
+        wanted = Wanted(Drawing(config=config), reference=True)
+        record(Recording(source.scene, DEMO, cameras, moving.FPS, 1e9, wanted, name), kept, 1, lambda n: None, pytest.fail)
+        found = summary_of(kept.rows, moving.FPS)
+        row = {key: float(value) for key, value in rows[name].items() if key not in ("motion", "view", "config")}
+        cycles = np.mean([evaluate(View(camera, source.scene), name).row["cycles"] for camera in cameras])
+        assert row == pytest.approx({
+            "million_cycles": cycles / 1e6, "psnr_db": found.psnr_db, "temporal_psnr_db": found.temporal_psnr_db, "jumps_percent": 100 * found.jumps,
+        }, rel=1e-5)
+
+
+def test_page_in_motion(made):
+    """The table has the numbers of the CSV; the strip and the clip are there, whole, and in the page."""
+    job, written, _ = made
+    text, folder = written.page.read_text(), job.folder / "figures"
+    table = re.search(r'<table class="moving">.*?</table>', text).group(0)
+    lines = [re.findall(r"<t[hd]>(.*?)</t[hd]>", line) for line in re.findall(r"<tr>(.*?)</tr>", table.split("<tbody>")[1])]
+    rows = _rows(folder / "speed_stability.csv")
+    expected = {name: [name] for name in NAMES}
+    for row in rows:
+        jumps = moving.jumps_text(float(row["jumps_percent"]) / 100).replace("<", "&lt;")
+        expected[row["config"]] += [f"{float(row['temporal_psnr_db']):.1f}", jumps, f"{float(row['million_cycles']):.3g}"]
+    assert lines == list(expected.values()) and len(rows) == 3 * len(NAMES)
+    assert "2 frames a motion at 90 Hz, 160x90" in text and "<a href='#motion'>" in text
+    for name, suffix in (("flicker_strip_demo_0", "png"), ("flicker_clip_demo_0", "webp")):
+        data = (folder / f"{name}.{suffix}").read_bytes()
+        assert f'<section id="{name}">' in text and f"data:image/{suffix};base64,{base64.b64encode(data).decode()}" in text
+    with Image.open(folder / "flicker_strip_demo_0.png") as picture:
+        assert picture.height == 7 * (40 * 3 + 2) - 2 and picture.width > 6 * (40 * 3 + 2)
+    with Image.open(folder / "flicker_clip_demo_0.webp") as film:
+        assert (film.n_frames, film.size) == (moving.FILM, (2 * SIZE[0], 2 * SIZE[1]))
+
+
+def test_strip_shows_what_flickers():
+    """The square is where errors change, not where they are largest; rows are the reference, pictures, errors."""
+    rng = np.random.default_rng(seed())
+    references = [rng.random((60, 90, 3)) * 0.5 for _ in range(4)]
+    still, blinking = (np.zeros((60, 90, 3)) for _ in range(2))
+    still[5:15, 5:15], blinking[15:55, 45:85] = 0.4, 0.01
+    bad = [reference + still + (n % 2) * blinking for n, reference in enumerate(references)]
+    assert shown.flickering(bad, references, 40) == (45, 15)
+    film = {shown.REFERENCE: references, "bad": bad, "good": references}
+    picture = shown.strip(film, ("bad", "good"))
+    step, left = 40 * 3 + 2, picture.shape[1] - (4 * (40 * 3 + 2) - 2)
+    rows = [[picture[y : y + 120 : 3, left + x : left + x + 120 : 3] for x in range(0, 4 * step, step)] for y in range(0, 5 * step, step)]
+    for n, reference in enumerate(references):
+        square = reference[15:55, 45:85]
+        for row, expected in zip(rows, (square, square + (n % 2) * 0.01, square, np.full_like(square, (n % 2) * 0.08), np.zeros_like(square)), strict=True):
+            assert np.abs(row[n] / 255 - expected).max() < 0.003
+    assert [frame.shape for frame in shown.clip(film, ("bad", "good"))] == [(120, 180, 3)] * 4
+
+
+def test_what_moves(scene, tmp_path):
+    """Configurations: those that are named, else the group; of each scene the first view; pictures no larger than asked for."""
+    assert check([], tmp_path / "a", SIZE, NAMES, tmp_path / "store").moving == tuple(NAMES)
+    usual = check([f"{scene}:3-4", "demo"], tmp_path / "a", (1000, 250), None, tmp_path / "store")
+    assert (usual.moving, usual.frames) == (tuple(group("stability in time")), moving.FRAMES)
+    assert signature(report).parameters["frames"].default == moving.FRAMES
+    assert check([], tmp_path / "a", SIZE, None, tmp_path / "store", frames=0).moving == ()
+    found = moving.collect_moving([replace(t, size=(64, 48)) for t in usual.targets], ["flicker"], 2, Store(tmp_path / "store"))
+    assert [(m.target.title, m.size, m.filmed) for m in found] == [("small 3", (64, 48), (64, 48)), ("demo 0", (64, 48), (64, 48))]
+    path = moving._path(usual.targets[0], moving.MOTIONS["walk"][1], 5, moving.MEASURED)
+    assert (path.size, path.path.view, path.path.frames, path.view) == ((480, 120), 3, 5, 3)
+    figure = moving.moving_figure(found)
+    assert [row[:3] for row in figure.rows[:3]] == [["pan", "small 3", "flicker"], ["pan", "demo 0", "flicker"], ["shake", "small 3", "flicker"]]
+    figure.write(tmp_path)
 
 
 def test_sweeps_rows_are_read(scene, tmp_path):
-    """What a sweep has computed is not computed again; what only the report shows of it is."""
+    """What a sweep has computed is not computed again, along paths too; what only the report shows of it is."""
     out = tmp_path / "sweep"
-    (tmp_path / "sweep.yaml").write_text(f"scenes: [{scene}]\nsize: 64x48\nconfigurations: [flicker, gscore]\nout: {out}\n")
+    views = "[0, {pan: 0.25, frames: 2}, {shake: true, frames: 2}, {walk: true, frames: 2}]"
+    (tmp_path / "sweep.yaml").write_text(f"scenes: [{scene}]\nviews: {views}\nsize: 64x48\nconfigurations: [flicker, gscore]\nout: {out}\n")
     run_sweep(load_sweep(tmp_path / "sweep.yaml"))
     rows = {p: p.stat().st_mtime_ns for p in (out / "points").glob("*.json")}
-    assert len(rows) == 2
-    write_report(check([str(scene)], tmp_path / "out", (64, 48), ["flicker", "gscore"], out / "points"), seed())
+    assert len(rows) == 8
+    write_report(check([str(scene)], tmp_path / "out", (64, 48), ["flicker", "gscore"], out / "points", frames=2), seed())
     again = {p.name: p.stat().st_mtime_ns for p in rows}
     before = {p.name: t for p, t in rows.items()}
     assert sum(again[name] != before[name] for name in before) == 1  # flicker, for its maps
@@ -369,11 +472,12 @@ def scene(tmp_path_factory):
 
 
 def test_few_configurations(scene, tmp_path):
-    """A run without the paper's configurations still gives a page, and says what is missing."""
-    job = check([f"{scene}:1"], tmp_path / "out", (64, 48), ["flicker"], tmp_path / "store")
+    """A run without the paper's configurations and without motion still gives a page, and says what is missing."""
+    job = check([f"{scene}:1"], tmp_path / "out", (64, 48), ["flicker"], tmp_path / "store", frames=0)
     written = write_report(job, seed())
     assert [r["view"] for r in _rows(written.summary)] == ["1"]
     assert any(v.verdict == "not evaluated: this run has no flicker-dense-mixed-conic" for v in written.verdicts)
+    assert "#motion" not in written.page.read_text() and not [*(job.folder / "figures").glob("flicker_*"), *(job.folder / "figures").glob("speed_stab*")]
 
 
 @pytest.mark.parametrize("arguments, message", [
@@ -384,6 +488,7 @@ def test_few_configurations(scene, tmp_path):
     (["NOTES"], "unknown format"),
     (["SCENE", "--configs", "faithfull"], "configuration 'faithfull' is unknown; close names: faithful"),
     (["SCENE", "--configs", "faithful,,"], "an empty name"),
+    (["SCENE", "--frames", "1"], "--frames 1: a change takes two frames; 0: no section on stability over time"),
     (["SCENE", "--size", "12"], "expected WxH"),
     (["SCENE", "--size", "0x90"], "0"),
     (["SCENE", "--out", "NOTES"], "no folder can be made there"),

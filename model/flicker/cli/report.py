@@ -26,6 +26,7 @@ def report(
     configs: Annotated[str | None, typer.Option(help="configurations, or patterns, separated by commas [default: those of the report]")] = None,
     store: Annotated[Path | None, typer.Option(help="results of single points, shared with sweeps [default: build/sweep/points]")] = None,
     budget: Annotated[list[Path] | None, typer.Option(help="what flicker budget --json wrote, for the figure of budgets; may be repeated")] = None,
+    frames: Annotated[int, typer.Option(min=0, metavar="N", help="of each motion, in the section on stability over time; 0: without that section")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="seed of the stability suite")] = 1,
     show: Annotated[bool, typer.Option("--list", help="list the configurations, run nothing")] = False,
 ) -> None:
@@ -55,7 +56,7 @@ def report(
         behind = parse_background(background)
     except FlickerError as error:
         raise FlickerError(f"--{error}") from None
-    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind, budget or ())
+    job = check(scenes or [], out, wanted, names, store or DEFAULT, photos, behind, budget or (), frames)
     for line in dict.fromkeys(f"{target.scene.path}: cameras: {target.scene.cameras_from}" for target in job.targets):
         console.print(line, highlight=False, soft_wrap=True)
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

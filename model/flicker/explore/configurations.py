@@ -68,7 +68,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "vanilla*", "no-ctu-32*", "gscore*", "seele*", "faithful", "flicker", "flicker-*-*-factored", "flicker-*-*-conic", "exact-*",
         "rows", "rows-f*", "rows-ellipse-acc*", "log-lanes", "pixels*", "oracle-minitile*", "oracle", "oracle-conic",
     ),
-    # docs/results/motion.md: every mode of FLICKER, GSCore's test, none, lanes
+    # docs/results/motion.md, flicker report over time: every mode of FLICKER, GSCore's test, none, lanes
     "stability in time": (
         "gscore", "no-ctu-32", "faithful", "flicker", "flicker-dense-fixed-factored", "flicker-sparse-fixed-factored", "flicker-spiky-fixed-factored",
         "flicker-auto-fixed-factored", "flicker-dense-fp16-factored", "log-lanes", "log-lanes-128", "log-lanes-squares",

@@ -16,6 +16,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.colors import LogNorm, Normalize  # noqa: E402
 from matplotlib.figure import Figure as Canvas  # noqa: E402
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
@@ -459,6 +460,13 @@ def _cycles_area(point: dict) -> float:
     return point["cycles"] * point["area_ge"] / 1e6
 
 
+def logarithmic_ticks(axes: Axes, unit: float = 1.0) -> None:
+    """Labels at 1, 2 and 5 of each decade of a logarithmic x axis, in units of `unit`."""
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / unit:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
 def _cloud(views: Sequence[ViewResult], name: str, title: str, note: str, cost: Callable[[dict], float], label: str) -> Figure:
     """Every configuration a point: a cost against accuracy, Pareto fronts of everything and of what exists as RTL, per view and over all.
 
@@ -488,9 +496,7 @@ def _cloud(views: Sequence[ViewResult], name: str, title: str, note: str, cost: 
         for config, i in named.items():
             a.annotate(config, values[i], fontsize=6, xytext=(3, 4 if i == front[0] else -7), textcoords="offset points")
         a.set(xscale="log", xlabel=label, ylabel="PSNR against float64, dB", title=head)
-        a.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        a.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 1e6:g}"))
-        a.xaxis.set_minor_formatter(NullFormatter())
+        logarithmic_ticks(a, 1e6)
         rows += [[head, p["config"], p["cycles"], p["psnr_db"], p["ssim"], p["flip"], p["area_ge"], p["energy_uj"], p["model_only"], i in front, i in real_front]
                  for i, p in enumerate(points)]
     grid.flat[0].legend(fontsize=6)

@@ -6,12 +6,14 @@ import html
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..explore.stability.run import BROKEN_ERROR, BROKEN_PSNR, Stability
 from .claims import Verdict
 from .collect import ViewResult
 from .figures import Figure, is_bound, overall
+from .moving import MOTIONS, Moving, Picture, decibels_text, jumps_text
 
 _MARKS = {"yes": "holds", "no": "does not hold here", "partly": "holds in part", "open": "open"}
 _FOLDER = Path(__file__).resolve().parent
@@ -94,11 +96,48 @@ def _stability(result: Stability, figure: Figure) -> str:
     )
 
 
+@dataclass(frozen=True)
+class InMotion:
+    """The section on stability over time. pictures: strips and clips of the views in `moving`. note: what is assumed."""
+
+    moving: Sequence[Moving]
+    figure: Figure
+    pictures: Sequence[Picture]
+    note: str
+
+
+def _moving_table(moving: Moving) -> str:
+    """A row a configuration, three columns a motion."""
+    heads = "".join(f'<th colspan="3">{_e(MOTIONS[motion][0])}</th>' for motion in moving.samples)
+    columns = "<th>temporal PSNR, dB</th><th>jumps, %</th><th>million cycles</th>" * len(moving.samples)
+    rows = []
+    for name in next(iter(moving.samples.values())):
+        cells = []
+        for of in moving.samples.values():
+            cells += [decibels_text(of[name].temporal_psnr_db), jumps_text(of[name].jumps), f"{of[name].cycles / 1e6:.3g}"]
+        rows.append(f"<tr><th>{_e(name)}</th>{''.join(f'<td>{_e(cell)}</td>' for cell in cells)}</tr>")
+    return (f'<div class="wide"><table class="moving"><thead><tr><th rowspan="2">configuration</th>{heads}</tr><tr>{columns}</tr></thead>'
+            f"<tbody>{''.join(rows)}</tbody></table></div>")
+
+
+def _in_motion(section: InMotion) -> str:
+    figure = section.figure
+    links = " ".join(f'<a href="figures/{figure.name}.{kind}">{kind.upper()}</a>' for kind in ("csv", *figure.written))
+    parts = [f"<p>{_e(section.note)}</p>", f'<section id="{figure.name}"><h3>{_e(figure.title)}</h3><p>{_e(figure.note)} {links}</p>'
+             f'<img alt="{_e(figure.title)}" src="{figure.image}"></section>']
+    parts += [f"<h3>{_e(moving.target.title)} in motion</h3>{_moving_table(moving)}" for moving in section.moving]
+    parts += [
+        f'<section id="{p.name}"><h3>{_e(p.title)}</h3><p>{_e(p.note)} <a href="figures/{p.name}.{p.suffix}">{p.suffix.upper()}</a></p>'
+        f'<img alt="{_e(p.title)}" src="{p.image}"></section>' for p in section.pictures
+    ]
+    return "".join(parts)
+
+
 def page(
     views: Sequence[ViewResult], verdicts: Sequence[Verdict], paper: Sequence[Figure], charts: Sequence[Figure], heats: Sequence[Figure],
-    budgets: Sequence[Figure], stability: tuple[Stability, Figure], about: dict[str, str],
+    budgets: Sequence[Figure], stability: tuple[Stability, Figure], about: dict[str, str], motion: InMotion | None = None,
 ) -> str:
-    """The whole page. charts: of all configurations. about: facts of the run, by name."""
+    """The whole page. charts: of all configurations. about: facts of the run, by name. motion: None: without that section."""
     counts = {kind: sum(v.kind == kind for v in verdicts) for kind in _MARKS}
     tally = ", ".join(f"{count} {_MARKS[kind]}" for kind, count in counts.items())
     facts = "".join(f"<dt>{_e(k)}</dt><dd>{_e(v)}</dd>" for k, v in about.items())
@@ -115,7 +154,7 @@ def page(
         "<h1>FLICKER: speed, accuracy, area, energy</h1>",
         f"<p>Written by <code>flicker report</code>. Numbers in <a href='summary.csv'>summary.csv</a> and beside every figure.</p><dl>{facts}</dl>",
         "<nav><a href='#chart'>speed against accuracy</a> <a href='#claims'>claims of the paper</a> <a href='#paper'>figures of the paper</a> "
-        "<a href='#heat'>heat maps</a> <a href='#fail'>where configurations fail</a></nav>",
+        "<a href='#heat'>heat maps</a> " + ("<a href='#motion'>stability over time</a> " if motion else "") + "<a href='#fail'>where configurations fail</a></nav>",
         "<h2 id='chart'>Speed against accuracy</h2>",
         "<p>Every configuration is a point; the line is the Pareto front of the two axes shown. Point at one to read it, click to keep it. "
         "FPS are those of the rendering stage at 1 GHz; cycles times area lets builds of different size compare.</p>",
@@ -127,6 +166,7 @@ def page(
         *(_figure(f, of_figure[f.name]) for f in paper),
         "<h2 id='heat'>Heat maps</h2>",
         *(_figure(f) for f in heats),
+        *(["<h2 id='motion'>Stability over time</h2>", _in_motion(motion)] if motion else []),
         *(["<h2>Scenes to a budget</h2>", *map(_figure, budgets)] if budgets else []),
         "<h2 id='fail'>Where configurations fail</h2>", _stability(*stability),
         f"<script>const DATA = {_points(views)};\n{(_FOLDER / 'page.js').read_text()}</script></body></html>\n",

@@ -25,21 +25,25 @@ from ..scene.photos import BLACK
 from .claims import Verdict, all_verdicts
 from .collect import collect
 from .figures import budget_curves, own_figures, paper_figures, stability_table
+from .moving import FRAMES, GROUP, assumptions, collect_moving, moving_figure, moving_pictures
 from .named import named, view_numbers
-from .page import page
+from .page import InMotion, page
 
 SUMMARY = ("scene", "view", "config", "cycles", "psnr_db", "ssim", "flip", "photo_psnr_db", "photo_ssim", "area_ge", "energy_uj", "model_only")
 
 
 @dataclass(frozen=True)
 class Job:
-    """A checked request. store: folder of results, shared with sweeps. curves: of `flicker budget`."""
+    """A checked request. store: folder of results, shared with sweeps. curves: of `flicker budget`. moving: configurations of the section on stability over
+    time; frames: of each of its motions, 0: no such section."""
 
     targets: tuple[Target, ...]
     configurations: tuple[str, ...]
     folder: Path
     store: Path
     curves: tuple[Curve, ...] = ()
+    moving: tuple[str, ...] = ()
+    frames: int = 0
 
 
 @dataclass(frozen=True)
@@ -67,12 +71,16 @@ def parse_targets(text: str, size: tuple[int, int] | None, photos: str | None = 
 def check(
     scenes: Sequence[str], folder: Path, size: tuple[int, int] | None = None, configurations: Sequence[str] | None = None, store: Path = DEFAULT,
     photos: str | None = None, background: tuple[float, float, float] = BLACK, budgets: Sequence[Path] = (),
+    frames: int = FRAMES,
 ) -> Job:
     """All that can be wrong is found here, before any work; FlickerError. Without scenes the demo scene is taken.
 
     size: None: every camera's own where there is a photograph, else `explore.points.SIZE`. photos, background: as in `SceneFile`. budgets: files of
-    `flicker budget --json`.
+    `flicker budget --json`. frames: of each motion in the section on stability over time; 0: without it. It has the configurations that are named, else the
+    group `GROUP`.
     """
+    if frames < 0 or frames == 1:
+        raise FlickerError(f"--frames {frames}: a change takes two frames; 0: no section on stability over time")
     if size is not None:
         Camera(size[0], size[1], 1.0, 1.0, np.zeros(3), np.eye(3))  # raises for a size out of range
     targets = [target for text in scenes for target in parse_targets(text, size, photos, background)]
@@ -90,7 +98,8 @@ def check(
     for name in ("index.html", "summary.csv"):
         if (folder / name).is_dir():
             raise FlickerError(f"{folder / name}: is a folder")
-    return Job(tuple(targets), tuple(names), folder, store, tuple(map(Curve.load, budgets)))
+    moving = group(GROUP) if configurations is None else names
+    return Job(tuple(targets), tuple(names), folder, store, tuple(map(Curve.load, budgets)), tuple(moving) if frames else (), frames)
 
 
 def _stability(store: Store, seed: int) -> Stability:
@@ -104,10 +113,23 @@ def _stability(store: Store, seed: int) -> Stability:
     return Stability(tuple(Point(**p) for p in stored["points"]), seed)
 
 
+def _in_motion(job: Job, store: Store, progress: Callable[[int, int, str], None]) -> InMotion | None:
+    """The section on stability over time, its files written; None: none is wanted."""
+    if not job.frames:
+        return None
+    moving = collect_moving(job.targets, job.moving, job.frames, store, progress)
+    section = InMotion(moving, moving_figure(moving), [picture for each in moving for picture in moving_pictures(each)], assumptions(moving, job.frames))
+    section.figure.write(job.folder / "figures")
+    for picture in section.pictures:
+        picture.write(job.folder / "figures")
+    return section
+
+
 def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], None] = lambda done, total, text: None) -> Written:
     """Measure, draw, write. What is measured stays in the store, also after an interruption."""
     store = Store(job.store)
     views = collect(job.targets, job.configurations, store, progress)
+    motion = _in_motion(job, store, progress)
     progress(1, 1, "stability suite")
     stability = _stability(store, seed)
     progress(1, 1, "figures")
@@ -127,7 +149,7 @@ def write_report(job: Job, seed: int = 1, progress: Callable[[int, int, str], No
         "accuracy": "PSNR, SSIM and FLIP (67 pixels per degree) of unquantised pictures against the float64 reference",
         "code": code_digest()[:16], "areas": f"{TABLE.name}, of RTL {stamp_of(TABLE.read_text())}",
     }
-    text = page(views, verdicts, paper, charts, heats, budgets, (stability, table), about)
+    text = page(views, verdicts, paper, charts, heats, budgets, (stability, table), about, motion)
     rows = [view.rows[name] for view in views for name in view.rows]
     index, summary = job.folder / "index.html", job.folder / "summary.csv"
     write_records(summary, SUMMARY, rows)  # stages differ in the parts that their energy has
