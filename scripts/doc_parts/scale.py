@@ -74,11 +74,11 @@ def _views(real: RealView) -> Iterator[tuple[str, View]]:
     """Larger scenes, other degrees of harmonics, larger pictures."""
     view = load_view(real.path(folder_of_scenes()), real.number, SIZE)
     for times in TIMES:
-        yield "scene", View(view.camera, grown(view.scene, times), f"{real.folder} x {times}")
+        yield "scene", View(view.camera, grown(view.scene, times), name=f"{real.folder} x {times}")
     for degree in DEGREES:
-        yield "degree", View(view.camera, with_degree(view.scene, degree), real.folder)
+        yield "degree", View(view.camera, with_degree(view.scene, degree), name=real.folder)
     for size in SIZES:
-        yield "picture", View(view.camera.resized(*size), view.scene, real.folder)
+        yield "picture", View(view.camera.resized(*size), view.scene, name=real.folder)
 
 
 def _row(p: Point) -> tuple[str, ...]:

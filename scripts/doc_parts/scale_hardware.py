@@ -29,7 +29,7 @@ def _views() -> Iterator[tuple[str, View]]:
         real = next(view for view in REAL_VIEWS if view.folder == folder)
         view = load_view(real.path(folder_of_scenes()), real.number, SIZE)
         name = f"{folder} x {times}, {size[0]}x{size[1]}"
-        yield name, View(view.camera.resized(*size), view.scene if times == 1 else grown(view.scene, times), name)
+        yield name, View(view.camera.resized(*size), view.scene if times == 1 else grown(view.scene, times), name=name)
 
 
 def tables(say: Say) -> dict[str, str]:

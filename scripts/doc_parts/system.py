@@ -24,8 +24,8 @@ def _views() -> Iterator[tuple[str, View]]:
     for real in REAL_VIEWS:
         yield real.title, load(real)
     view = load(REAL_VIEWS[0])
-    yield f"{REAL_VIEWS[0].title}, {SMALL_PICTURE[0]}x{SMALL_PICTURE[1]}", View(view.camera.resized(*SMALL_PICTURE), view.scene, view.name)
-    yield f"{REAL_VIEWS[0].title}, twice the Gaussians", View(view.camera, grown(view.scene, 2), view.name)
+    yield f"{REAL_VIEWS[0].title}, {SMALL_PICTURE[0]}x{SMALL_PICTURE[1]}", View(view.camera.resized(*SMALL_PICTURE), view.scene, name=view.name)
+    yield f"{REAL_VIEWS[0].title}, twice the Gaussians", View(view.camera, grown(view.scene, 2), name=view.name)
 
 
 def tables(say: Say) -> dict[str, str]:

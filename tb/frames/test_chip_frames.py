@@ -44,8 +44,8 @@ from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig, SortOrd
 from flicker.pipeline import Engine, FrontOptions, packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
-from flicker.scene.packed import PackedFormat, PackedScene, decode
-from flicker.scene.packing import pack
+from flicker.scene.packed import SH_BITS, PackedFormat, PackedScene, decode
+from flicker.scene.packing import Recipe, pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
 from flicker.sim.chip import PORT, ChipFrame, ChipSession
 from flicker.sim.half import MemoryOptions
@@ -74,12 +74,12 @@ def camera(width: int = 96, height: int = 54, x: float = 0.0, away: bool = False
 
 
 @cache
-def small(count: int = 500) -> PackedScene:
+def small(count: int = 500, recipe: Recipe | None = None) -> PackedScene:
     rng = np.random.default_rng(seed())
     return pack(Scene(
         means=np.stack([*rng.uniform(-1.5, 1.5, (2, count)), rng.uniform(1.0, 6.0, count)], axis=1), scales=rng.uniform(0.01, 0.1, (count, 3)),
         quats=rng.normal(size=(count, 4)), opacities=rng.uniform(0.01, 1.0, count), sh=rng.normal(scale=0.3, size=(count, 4, 3)),
-    ), PackedFormat.CHUNK).packed
+    ), PackedFormat.CHUNK, recipe or Recipe()).packed
 
 
 def golden(
@@ -252,6 +252,14 @@ def live_beats(done: ChipFrame, traffic: dict[str, PurposeCounts]) -> None:
 def large() -> Camera:
     """A picture with more lists than pointers are held."""
     return Camera(2080, 1440, 900.0, 900.0, np.zeros(3), np.eye(3))
+
+
+def test_sh_codes_of_fewer_bits() -> None:
+    """Clusters of each number of bits, through the driver."""
+    packed = small(256 * len(SH_BITS), Recipe(cuts=0, sh_bits=lambda scene, start: np.resize(SH_BITS, len(start))))
+    with session(packed) as chip:
+        check(chip, camera())
+    assert set(packed.sh_bits) == set(SH_BITS)
 
 
 def test_pointers_beyond_those_held() -> None:

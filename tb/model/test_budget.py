@@ -274,7 +274,8 @@ def test_cuts() -> None:
 
 
 def test_bits_by_cluster() -> None:
-    """Pictures lose no more than is stated, and bytes fall with what they may lose; where coefficients say nothing bits go first, what no camera sees keeps 8."""
+    """Pictures lose no more than is stated, and bytes fall with what they may lose; bits go first where coefficients say nothing, and what no camera sees
+    keeps 8."""
     scene = small(1200, 2)
     order, begin = cluster_order(scene.means, 100, np.inf)[:2]
     scene = reorder(scene, order)

@@ -117,8 +117,8 @@ def pack(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="memory image (.flk)")] = None,
     form: Annotated[FormatChoice | None, typer.Option("--format", help="how Gaussians lie in memory [default: chunk]")] = None,
     info: Annotated[bool, typer.Option("--info", help="check a memory image and say what is in it")] = False,
-    sh_bits: Annotated[str | None, typer.Option("--sh-bits", metavar="3|4|5|6|8|auto", help="bits of SH codes; auto: by cluster, for --db [default: 8]")] = None,
-    decibels: Annotated[float | None, typer.Option("--db", help="least PSNR of the scene's views to those with 8 bits, with --sh-bits auto [default: 50]")] = None,
+    sh_bits: Annotated[str | None, typer.Option("--sh-bits", metavar="N|auto", help="bits of SH codes, 3 to 6 or 8; auto: by cluster [default: 8]")] = None,
+    decibels: Annotated[float | None, typer.Option("--db", help="of --sh-bits auto: least PSNR of views to those with 8 bits [default: 50]")] = None,
     rechunk: Annotated[bool, typer.Option("--rechunk", help="make clusters anew of a file that brings its own: compressed .ply, .flk")] = False,
 ) -> None:
     """Pack a scene into the image that the chip's memory holds."""
