@@ -68,35 +68,16 @@ module flk_colour_fetch
     logic [AT_BITS-1:0] at;  // beat of the cluster's colours
   } mark_t;
 
-  // Bytes of a Gaussian: whole words with codes of 8 bits and in FP16.
-  function automatic logic [6:0] stride(input logic chunked, input sh_bits_t bits,
-                                        input logic [1:0] degree);
-    unique case (degree)
-      2'd0: return chunked ? 7'd4 : 7'd8;
-      2'd1: return !chunked ? 7'd28 : bits == 4'd8 ? 7'd16 : 7'd5 + 7'(bits);
-      2'd2: return !chunked ? 7'd56 : 7'd4 + 7'(6'd3 * bits);
-      default: begin
-        unique case (bits)
-          4'd3: return chunked ? 7'd21 : 7'd100;
-          4'd4: return chunked ? 7'd27 : 7'd100;
-          4'd5: return chunked ? 7'd33 : 7'd100;
-          4'd6: return chunked ? 7'd38 : 7'd100;
-          default: return chunked ? 7'd52 : 7'd100;
-        endcase
-      end
-    endcase
-  endfunction
-
   // ---- groups: where their colours lie --------------------------------------------------------------
 
   logic                              a_valid_q, a_move;
   cluster_index_t                    a_cluster_q;
   logic [31:0]                       a_colour_q;
-  sh_bits_t                          a_bits_q;
+  colour_step_t                      a_step_q;
   logic [1:0]                        a_degree_q;
   logic [Lanes-1:0]                  a_alive_q;
   logic [Lanes-1:0][BYTE_BITS-1:0]   a_start_q;
-  logic [6:0]                        in_stride, a_stride_q;
+  logic [6:0]                        a_stride_q;
   logic [1:0]                        in_at;     // place in the group of those that come
   logic [Lanes-1:0]                  in_alive;
   logic                              b_valid_q, b_move;
@@ -106,7 +87,6 @@ module flk_colour_fetch
   logic [AT_BITS-1:0]                b_first_q;  // beats that hold colours of survivors
   logic [AT_BITS-1:0]                b_last_q;
 
-  assign in_stride  = stride(chunked_i, in_data_i.bits, in_data_i.degree);
   assign in_ready_o = !a_valid_q;
 
   always_comb begin
@@ -132,12 +112,12 @@ module flk_colour_fetch
     if (in_ready_o) begin  // in_valid_i comes late
       a_cluster_q <= in_data_i.cluster;
       a_colour_q  <= in_data_i.colour;
-      a_bits_q    <= in_data_i.bits;
+      a_step_q    <= in_data_i.step;
       a_degree_q  <= in_data_i.degree;
       a_alive_q   <= in_alive;
-      a_stride_q  <= in_stride;
+      a_stride_q  <= in_data_i.stride;
       for (int unsigned k = 0; k < Lanes; k++) begin
-        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_at | 2'(k)}) * BYTE_BITS'(in_stride);
+        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_at | 2'(k)}) * BYTE_BITS'(in_data_i.stride);
       end
     end
   end
@@ -372,7 +352,7 @@ module flk_colour_fetch
 
   typedef struct packed {
     cluster_index_t       cluster;
-    sh_bits_t             bits;
+    colour_step_t         step;
     logic [1:0]           degree;
     logic [BYTE_BITS-1:0] start;
   } item_t;
@@ -386,7 +366,6 @@ module flk_colour_fetch
     logic                 next_take, next_free, next_valid_q, none;
     item_t                next_q;
     logic [AT_BITS-1:0]   next_last_q;  // beat of its last byte
-    logic [5:0]           next_step_q;  // half bytes from a part to the next
 
     flk_sram_fifo #(
       .Width($bits(item_t)),
@@ -397,7 +376,7 @@ module flk_colour_fetch
       .clear_i    (1'b0),
       .in_valid_i (a_move && a_alive_q[k]),
       .in_ready_o (lane_ready[k]),
-      .in_data_i  ({a_cluster_q, a_bits_q, a_degree_q, a_start_q[k]}),
+      .in_data_i  ({a_cluster_q, a_step_q, a_degree_q, a_start_q[k]}),
       .out_valid_o(item_valid),
       .out_ready_i(next_free),
       .out_data_o (item),
@@ -418,9 +397,8 @@ module flk_colour_fetch
     always_ff @(posedge clk_i) begin
       if (next_free && item_valid) begin
         next_q      <= item;
-        next_last_q <= AT_BITS'((item.start + BYTE_BITS'(stride(chunked_i, item.bits, item.degree))
-                                 - 1'b1) >> 6);
-        next_step_q <= chunked_i ? 6'd3 * item.bits : 6'd48;
+        next_last_q <= AT_BITS'((item.start + BYTE_BITS'(colour_stride(item.step, item.degree)) - 1'b1)
+                                >> 6);
       end
     end
 
@@ -430,10 +408,9 @@ module flk_colour_fetch
     // mean anything. Places of parts count half bytes.
     logic                 want_d, want_q;
     cluster_index_t       cluster_q;
-    sh_bits_t             bits_q;
     logic [1:0]           degree_q, part_q;
     logic [BYTE_BITS:0]   from_q, further_q;  // this one, the next
-    logic [5:0]           step_q;
+    colour_step_t         step_q;
     logic [AT_BITS-1:0]   at, last_q;  // beats of the part's first byte, of the Gaussian's last
     logic                 more, fire, straddles, final_part;
 
@@ -454,12 +431,11 @@ module flk_colour_fetch
     always_ff @(posedge clk_i) begin
       if (next_take) begin
         cluster_q <= next_q.cluster;
-        bits_q    <= next_q.bits;
         degree_q  <= next_q.degree;
         part_q    <= '0;
         from_q    <= {next_q.start, 1'b0};
-        further_q <= {next_q.start, 1'b0} + (BYTE_BITS + 1)'(next_step_q);
-        step_q    <= next_step_q;
+        further_q <= {next_q.start, 1'b0} + (BYTE_BITS + 1)'(next_q.step);
+        step_q    <= next_q.step;
         last_q    <= next_last_q;
       end else if (more) begin
         part_q    <= part_q + 1'b1;
@@ -587,11 +563,11 @@ module flk_colour_fetch
 
     always_comb begin
       for (int unsigned i = 0; i < 12; i++) begin
-        unique case (bits_q)
-          4'd3: codes[i/3][i%3] = 8'(chunk[32+3*i+:3]);
-          4'd4: codes[i/3][i%3] = 8'(chunk[32+4*i+:4]);
-          4'd5: codes[i/3][i%3] = 8'(chunk[32+5*i+:5]);
-          4'd6: codes[i/3][i%3] = 8'(chunk[32+6*i+:6]);
+        unique case (step_q)
+          6'd9: codes[i/3][i%3] = 8'(chunk[32+3*i+:3]);
+          6'd12: codes[i/3][i%3] = 8'(chunk[32+4*i+:4]);
+          6'd15: codes[i/3][i%3] = 8'(chunk[32+5*i+:5]);
+          6'd18: codes[i/3][i%3] = 8'(chunk[32+6*i+:6]);
           default: codes[i/3][i%3] = chunk[32+8*i+:8];
         endcase
       end

@@ -79,16 +79,45 @@ package flk_preproc_pkg;
     colour_t [2:0][2:0] sh_step;  // by degree, channel
   } colour_header_t;
 
-  // Bits of a chunk's SH codes: 8 and, by the value of zero, in half codes, that has their bits (8, 16, 32, 64), 3 to 6.
-  typedef logic [3:0] sh_bits_t;
+  // Half bytes from four SH coefficients of a Gaussian to the next four: of a chunk with codes of 3 to 6 or 8 bits, by the half codes of zero (8, 16, 32,
+  // 64 of fewer than 8); of FP16.
+  typedef logic [5:0] colour_step_t;
 
-  function automatic sh_bits_t sh_bits(input logic [8:0] zero);
+  function automatic colour_step_t colour_step(input logic chunked, input logic [8:0] zero);
     unique case (zero)
-      9'd8: return 4'd3;
-      9'd16: return 4'd4;
-      9'd32: return 4'd5;
-      9'd64: return 4'd6;
-      default: return 4'd8;
+      9'd8: return chunked ? 6'd9 : 6'd48;
+      9'd16: return chunked ? 6'd12 : 6'd48;
+      9'd32: return chunked ? 6'd15 : 6'd48;
+      9'd64: return chunked ? 6'd18 : 6'd48;
+      default: return chunked ? 6'd24 : 6'd48;
+    endcase
+  endfunction
+
+  // Bytes from a Gaussian's colour to the next: whole words with codes of 8 bits and in FP16.
+  function automatic logic [6:0] colour_stride(input colour_step_t step, input logic [1:0] degree);
+    unique case (degree)
+      2'd0: return step == 6'd48 ? 7'd8 : 7'd4;
+      2'd1: begin
+        unique case (step)
+          6'd9: return 7'd8;
+          6'd12: return 7'd9;
+          6'd15: return 7'd10;
+          6'd18: return 7'd11;
+          6'd24: return 7'd16;
+          default: return 7'd28;
+        endcase
+      end
+      2'd2: return step == 6'd48 ? 7'd56 : 7'd4 + 7'(step);
+      default: begin
+        unique case (step)
+          6'd9: return 7'd21;
+          6'd12: return 7'd27;
+          6'd15: return 7'd33;
+          6'd18: return 7'd38;
+          6'd24: return 7'd52;
+          default: return 7'd100;
+        endcase
+      end
     endcase
   endfunction
 
@@ -96,7 +125,8 @@ package flk_preproc_pkg;
   typedef struct packed {
     cluster_index_t cluster;
     logic [31:0]    colour;  // first beat of the cluster's colours, from the colour array's first
-    sh_bits_t       bits;    // of SH codes
+    logic [6:0]     stride;  // of the cluster's Gaussians
+    colour_step_t   step;
     logic [1:0]     degree;
     logic [5:0]     group;
     logic [3:0]     alive;

@@ -306,7 +306,8 @@ module flk_preprocessing
   typedef struct packed {
     logic [31:0] colour;
     logic [19:0] first;
-    sh_bits_t    bits;
+    logic [6:0]  stride;
+    colour_step_t step;
     logic [1:0]  degree;
   } place_of_cluster_t;
 
@@ -320,6 +321,7 @@ module flk_preprocessing
   logic                   front_en, front_phase_q, enter, room, beyond, beyond_q, take_end, opens;
   cluster_index_t         cluster_q, cluster, oldest, exit, exit_q;
   place_of_cluster_t [COLOUR_CLUSTERS-1:0] clusters_q;
+  colour_step_t           entering_step;
   side_t                  side_in, side;
   logic [Latency-1:0]     front_valid_q;
   logic                   exit_valid, go;
@@ -393,10 +395,13 @@ module flk_preprocessing
     end
   end
 
+  assign entering_step = colour_step(registers_i.lane.chunked, group.header.sh_zero);
+
   always_ff @(posedge clk_i) begin
     if (enter && turn_first) begin
       clusters_q[cluster[HeaderBits-1:0]] <= {group.header.colour, group.cluster.first,
-                                              sh_bits(group.header.sh_zero), group.cluster.degree};
+                                              colour_stride(entering_step, group.cluster.degree),
+                                              entering_step, group.cluster.degree};
     end
   end
 
@@ -520,7 +525,8 @@ module flk_preprocessing
 
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
-  assign survivors.bits    = of.bits;
+  assign survivors.stride  = of.stride;
+  assign survivors.step    = of.step;
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
   assign survivors.alive   = 4'(alive) << (PreprocLanes * (32'(side.group) % Turns));

@@ -29,9 +29,10 @@ class Survivors:
     def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int, sh_bits: int = 8):
         self.cluster, self.colour, self.degree, self.group, self.alive, self.sh_bits = cluster, colour, degree, group, alive, sh_bits
 
-    @property
-    def word(self) -> int:
-        return (self.cluster % 16) << 48 | self.colour << 16 | self.sh_bits << 12 | self.degree << 10 | self.group << 4 | self.alive
+    def word(self, chunked: bool) -> int:
+        """With the stride, and the half bytes of four coefficients, of chunks or of FP16."""
+        stride, step = stride_of(chunked, self), 3 * self.sh_bits if chunked else 48
+        return (self.cluster % 16) << 57 | self.colour << 25 | stride << 18 | step << 12 | self.degree << 10 | self.group << 4 | self.alive
 
     def with_(self, **fields: int) -> Survivors:
         return Survivors(**{**vars(self), **fields})
@@ -133,7 +134,7 @@ class Fetch:
         for g in groups:  # a cluster enters when there is room for it, as in flk_preprocessing
             await self.bench.until(lambda g=g: (g.cluster - int(dut.oldest_o.value)) % 16 < CLUSTERS, 20_000, "room for a cluster")
             dut.exit_i.value = g.cluster % 16
-            self.source.send([g.word])
+            self.source.send([g.word(self.chunked)])
             await self.bench.until(lambda: not self.source.pending, 20_000, "a group")
         count = sum(map(len, due))
         await self.bench.until(lambda: sum(map(len, self.parts)) >= count, 50_000, "last part")
