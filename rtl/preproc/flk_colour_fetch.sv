@@ -78,7 +78,6 @@ module flk_colour_fetch
   logic [Lanes-1:0]                  a_alive_q;
   logic [Lanes-1:0][BYTE_BITS-1:0]   a_start_q;
   logic [6:0]                        a_stride_q;
-  logic [1:0]                        in_at;     // place in the group of those that come
   logic [Lanes-1:0]                  in_alive;
   logic                              b_valid_q, b_move;
   cluster_index_t                    b_cluster_q;
@@ -89,16 +88,7 @@ module flk_colour_fetch
 
   assign in_ready_o = !a_valid_q;
 
-  always_comb begin
-    in_at    = '0;
-    in_alive = Lanes'(in_data_i.alive);
-    for (int unsigned at = Lanes; at < LANES; at += Lanes) begin
-      if (Lanes'(in_data_i.alive >> at) != '0) begin
-        in_at    = 2'(at);
-        in_alive = Lanes'(in_data_i.alive >> at);
-      end
-    end
-  end
+  assign in_alive   = Lanes'(in_data_i.alive >> in_data_i.at);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -117,7 +107,7 @@ module flk_colour_fetch
       a_alive_q   <= in_alive;
       a_stride_q  <= in_data_i.stride;
       for (int unsigned k = 0; k < Lanes; k++) begin
-        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_at | 2'(k)}) * BYTE_BITS'(in_data_i.stride);
+        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_data_i.at | 2'(k)}) * BYTE_BITS'(in_data_i.stride);
       end
     end
   end
@@ -683,7 +673,7 @@ module flk_colour_fetch
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      in_valid_i |-> 4'({in_alive}) << in_at == in_data_i.alive)
+      in_valid_i |-> 4'({in_alive}) << in_data_i.at == in_data_i.alive)
   else $error("flk_colour_fetch: survivors that are no neighbours");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o && !in_valid_i)

@@ -614,6 +614,7 @@ module flk_list_writer #(
   logic                failed_d;
   logic [Banks-1:0]    failed_q;
   logic [Banks-1:0][ChunkBits:0] taken_q;
+  logic [Banks-1:0]    spent_q;  // no chunk is left: taken_q is chunks_q
 
   logic [BankBits-1:0] d_bank, walk_bank;
   logic [1:0]          d_writer;  // the bank's number among all
@@ -790,7 +791,7 @@ module flk_list_writer #(
   assign walk_clear    = advance && walk_q && !large_q;
   assign begins        = pointer.used == '0 || pointer.used == UsedBits'(ChunkLines);
   assign taken         = taken_q[d_bank];
-  assign enough        = !begins || taken != chunks_q;
+  assign enough        = !begins || !spent_q[d_bank];
   assign sends         = d_event_q && enough && !failed_q[d_bank];
   assign pointer_write = advance && sends;
   assign failed_d      = failed_q[d_bank] || (d_event_q && !enough);
@@ -1078,14 +1079,19 @@ module flk_list_writer #(
       done_q   <= 1'b0;
       failed_q <= '0;
       taken_q  <= '0;
+      spent_q  <= '0;
     end else begin
       done_q <= state_q == LAST && !busy;
       if (start) begin
         failed_q <= '0;
         taken_q  <= '0;
+        spent_q  <= {Banks{chunks_i == '0}};
       end else if (advance) begin
         failed_q[d_bank] <= failed_d;
         taken_q[d_bank]  <= taken_d;
+        if (sends && begins) begin
+          spent_q[d_bank] <= taken_more == chunks_q;
+        end
       end
     end
   end
@@ -1121,6 +1127,12 @@ module flk_list_writer #(
   assign taken_o   = taken_q;
 
 `ifndef SYNTHESIS
+  for (genvar k = 0; k < Banks; k++) begin : gen_spent
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
+        state_q != IDLE |-> spent_q[k] == (taken_q[k] == chunks_q))
+    else $error("flk_list_writer: chunks that are left");
+  end
+
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> state_q == IDLE)
   else $error("flk_list_writer: start while a frame is under way");
 

@@ -129,6 +129,7 @@ package flk_preproc_pkg;
     colour_step_t   step;
     logic [1:0]     degree;
     logic [5:0]     group;
+    logic [1:0]     at;      // place in it of the first of those that come together
     logic [3:0]     alive;
   } survivors_t;
 

@@ -529,7 +529,8 @@ module flk_preprocessing
   assign survivors.step    = of.step;
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
-  assign survivors.alive   = 4'(alive) << (PreprocLanes * (32'(side.group) % Turns));
+  assign survivors.at      = 2'(PreprocLanes * (32'(side.group) % Turns));
+  assign survivors.alive   = 4'(alive) << survivors.at;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -26,13 +26,14 @@ def stride_of(chunked: bool, of: Survivors) -> int:
 class Survivors:
     """A group of survivors as the design takes it."""
 
-    def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int, sh_bits: int = 8):
-        self.cluster, self.colour, self.degree, self.group, self.alive, self.sh_bits = cluster, colour, degree, group, alive, sh_bits
+    def __init__(self, cluster: int, colour: int, degree: int, group: int, alive: int, sh_bits: int = 8, at: int = 0):
+        """at: place in the group of the first of those that come together."""
+        self.cluster, self.colour, self.degree, self.group, self.alive, self.sh_bits, self.at = cluster, colour, degree, group, alive, sh_bits, at
 
     def word(self, chunked: bool) -> int:
         """With the stride, and the half bytes of four coefficients, of chunks or of FP16."""
         stride, step = stride_of(chunked, self), 3 * self.sh_bits if chunked else 48
-        return (self.cluster % 16) << 57 | self.colour << 25 | stride << 18 | step << 12 | self.degree << 10 | self.group << 4 | self.alive
+        return (self.cluster % 16) << 59 | self.colour << 27 | stride << 20 | step << 14 | self.degree << 12 | self.group << 6 | self.at << 4 | self.alive
 
     def with_(self, **fields: int) -> Survivors:
         return Survivors(**{**vars(self), **fields})
@@ -78,7 +79,7 @@ class Fetch:
     def turns(self, g: Survivors) -> list[Survivors]:
         """A group as it comes: the survivors of as many neighbours as there are lanes, one part after the other."""
         mask = (1 << self.lanes) - 1
-        return [g.with_(alive=g.alive & mask << k) for k in range(0, 4, self.lanes)]
+        return [g.with_(alive=g.alive & mask << k, at=k) for k in range(0, 4, self.lanes)]
 
     def due(self, groups: list[Survivors]) -> list[list[dict[str, int]]]:
         """Parts of each lane."""
