@@ -501,6 +501,7 @@ module fv_list_writer #(
       // The chosen list's lines in stages E and F, and its pointer.
       if (frame) begin
         l_chunks: assert (dut.chunks_q <= 3'd4);
+        l_spent: assert (dut.spent_q == (taken == dut.chunks_q));
         l_taken: assert (taken == begun_q + 3'(out_list && first) + 3'(dut.e_sends_q && dut.e_begins_q));
         l_begun: assert (chain_q == 4'd0 ||
                          (chain_q[3:2] != 2'd0 && chain_q[3:2] <= 2'd2 && 3'(chain_q[1:0]) < begun_q));
