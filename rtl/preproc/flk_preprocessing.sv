@@ -459,6 +459,7 @@ module flk_preprocessing
   place_t [PreprocLanes-1:0]         place;
   logic [PreprocLanes-1:0][SEQ_BITS-1:0]    seq;
   survivors_t                        survivors;
+  logic [1:0]                        turn_at;
 
   assign exit_valid = front_valid_q[Latency-1];
   assign alive      = side.used & ~lane_near & ~lane_outside;
@@ -523,14 +524,15 @@ module flk_preprocessing
   // Groups end within a cluster where its geometry could not be read: the beat that it leaves open is told.
   assign cut          = ended_q && front_valid_q == '0 && !telling && !gone_q && rank_q != '0;
 
+  assign turn_at           = 2'(PreprocLanes * (32'(side.group) % Turns));
   assign survivors.cluster = side.cluster;
   assign survivors.colour  = of.colour;
   assign survivors.stride  = of.stride;
   assign survivors.step    = of.step;
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
-  assign survivors.at      = 2'(PreprocLanes * (32'(side.group) % Turns));
-  assign survivors.alive   = 4'(alive) << survivors.at;
+  assign survivors.at      = turn_at;
+  assign survivors.alive   = 4'(alive) << turn_at;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -51,7 +51,7 @@ static void images(void)
   static const struct {
     uint8_t at, change, sealed, parts;
   } fault[] = {
-      {0, 1, 0, 0},  {8, 1, 0, 0},  {12, 1, 0, 0},  {10, 1, 1, 0}, {16, 255, 1, 0}, {28, 1, 1, 0}, {32, 1, 1, 0},
+      {0, 1, 0, 0},  {8, 2, 0, 0},  {12, 1, 0, 0},  {10, 1, 1, 0}, {16, 255, 1, 0}, {28, 1, 1, 0}, {32, 1, 1, 0},
       {36, 1, 1, 0}, {112, 1, 1, 0}, {40, 1, 1, 1}, {52, 1, 1, 1},  {64, 1, 1, 1}, {76, 1, 1, 1},
   };
   static uint8_t image[IMAGE_BYTES];
@@ -140,6 +140,11 @@ static void frames(void)
   say_status(flk_frame_write(&old, &f, NULL));
   f = good;
   f.by_distance = 1;
+  say_status(flk_frame_write(&old, &f, NULL));
+  flk_scene_t narrow = *good.scene;
+  narrow.sh_bits = 1;
+  f = good;
+  f.scene = &narrow;
   say_status(flk_frame_write(&old, &f, NULL));
 }
 
