@@ -107,7 +107,8 @@ module flk_colour_fetch
       a_alive_q   <= in_alive;
       a_stride_q  <= in_data_i.stride;
       for (int unsigned k = 0; k < Lanes; k++) begin
-        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_data_i.at | 2'(k)}) * BYTE_BITS'(in_data_i.stride);
+        a_start_q[k] <= BYTE_BITS'({in_data_i.group, in_data_i.at | 2'(k)})
+                      * BYTE_BITS'(in_data_i.stride);
       end
     end
   end
