@@ -19,8 +19,9 @@ from typing import Any, NoReturn
 
 from .errors import FlickerError
 from .params import CHIP_MEMORIES, CatMode, ChipMemories, Coords, Form, Precision, RenderConfig
+from .toolchain import ROOT
 
-TABLE = Path(__file__).resolve().parents[2] / "chips.toml"
+TABLE = ROOT / "chips.toml"
 STATUS = ("verified", "built", "untested")
 _ENUMS: dict[str, type[Enum]] = {"form": Form, "precision": Precision, "cat": CatMode, "coords": Coords}
 

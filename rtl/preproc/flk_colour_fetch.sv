@@ -2,7 +2,7 @@
 //
 // Survivors of a group of four, or of Lanes neighbours of one, come in the order of the scene, Gaussian n for lane n modulo
 // Lanes; of their colours the beats from the first one's to the last one's are read, each once. All lanes see one beat at a time; a lane keeps the two that its Gaussians
-// need next and takes them apart (colour_part_t), in order, SH codes of 3 to 8 bits; the beat goes on when no lane needs it.
+// need next and takes them apart (colour_part_t), in order, SH codes of 3 to 6 or 8 bits; the beat goes on when no lane needs it.
 // oldest_o: no part of a cluster before it will be given any more (a running number, modulo); while
 // nothing is under way it follows exit_i, the cluster whose groups are coming now.
 // A frame: start_i while idle_o; registers stay until idle_o after the last survivors. An error of

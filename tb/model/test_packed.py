@@ -649,6 +649,9 @@ def test_command(tmp_path: Path) -> None:
     assert "opacity below 1/255" in run.stdout and "left out" in run.stdout
     narrow = flicker("pack", tmp_path / "a.ply", "-o", tmp_path / "n.flk", "--sh-bits", "5")
     assert narrow.returncode == 0 and "SH codes of 5 bits" in narrow.stdout, narrow.stderr
+    for same in ((), ("--sh-bits", "5")):
+        assert flicker("pack", tmp_path / "n.flk", "-o", tmp_path / "m.flk", *same).returncode == 0
+        assert (tmp_path / "m.flk").read_bytes() == (tmp_path / "n.flk").read_bytes()
     again = flicker("pack", tmp_path / "n.flk", "-o", tmp_path / "m.flk", "--sh-bits", "auto", "--db", "60", "--rechunk")
     assert again.returncode == 0 and "to 8 bits, in 8 views" in again.stdout, again.stderr
     (tmp_path / "b.flk").write_bytes((tmp_path / "a.flk").read_bytes()[:-5])
@@ -662,7 +665,7 @@ def test_command(tmp_path: Path) -> None:
         ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--sh-bits", "4", "--format", "fp16"), "--sh-bits: of --format chunk alone"),
         ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--db", "50"), "--db: of --sh-bits auto alone"),
         ((tmp_path / "a.ply", "-o", tmp_path / "c.flk", "--sh-bits", "auto", "--db", "nan"), "--db: 20 to 120, not nan"),
-        ((tmp_path / "n.flk", "-o", tmp_path / "c.flk", "--sh-bits", "4"), "n.flk: brings its own SH codes"),
+        *(((tmp_path / "n.flk", "-o", tmp_path / "c.flk", "--sh-bits", bits), "n.flk: brings its own SH codes") for bits in ("4", "8", "auto")),
         (("--info", tmp_path / "n.flk", "--sh-bits", "4"), "--info: reads an image, so it cannot be combined with --sh-bits"),
     ):
         bad = flicker("pack", *args)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..fit.parameters import Parameters
-from ..fit.render import Draw, render
+from ..fit.render import render
 from ..progress import Steps
 from ..scene.camera import Camera
 from ..scene.gaussians import Scene
@@ -53,23 +53,23 @@ def _narrowings(error: np.ndarray, bytes_: np.ndarray) -> tuple[np.ndarray, np.n
     return np.array(cluster, np.int64)[order], np.array(column, np.int64)[order], np.array(added)[order]
 
 
-def choose(scene: Scene, start: np.ndarray, cameras: Sequence[Camera], decibels: float, steps: Steps | None = None, draw: Draw = render) -> Choice:
-    """Bits of clusters that begin with Gaussians `start`, such that the cameras' pictures, made by `draw` and no wider than `WIDEST`, are at
-    least `decibels` from those with 8 bits. Clusters that no camera sees keep 8."""
+def choose(scene: Scene, start: np.ndarray, cameras: Sequence[Camera], decibels: float, steps: Steps | None = None) -> Choice:
+    """Bits of clusters that begin with Gaussians `start`, such that the cameras' pictures, no wider than `WIDEST`, are at least `decibels` from those with 8
+    bits; 8 everywhere, where that is not found in `_ROUNDS` steps. Clusters that no camera sees keep 8."""
     steps = steps or Steps()
     cameras = [c if c.width <= WIDEST else c.resized(WIDEST, max(1, round(c.height * WIDEST / c.width))) for c in cameras]
     full = np.full(len(start), FULL_SH_BITS)
     sh, degrees = coded_sh(scene, start, full)
     base = Parameters.of(replace(scene, sh=sh))
     others = [coded_sh(scene, start, np.full(len(start), bits))[0] for bits in SH_BITS[:-1]]
-    found = changes(base, others, cameras, steps, draw)
+    found = changes(base, others, cameras, steps)
     error = np.column_stack([np.add.reduceat(found.square, start), np.zeros(len(start))])
     reads = np.add.reduceat(found.views, start)
     strides = np.array([[PackedFormat.CHUNK.colour_stride(d, bits) for bits in SH_BITS] for d in range(4)])[degrees]
     seen = np.flatnonzero((reads > 0) & (degrees > 0))
     cluster, column, added = _narrowings(error[seen], (strides * reads[:, None])[seen].astype(np.float64))
     allowed = sum(3 * c.width * c.height for c in cameras) * 10.0 ** (-decibels / 10)
-    pictures = [np.clip(draw(base, camera).image, 0, 1) for camera in cameras]
+    pictures = [np.clip(render(base, camera).image, 0, 1) for camera in cameras]
     counts, aim = np.diff(np.append(start, len(scene))), allowed
     for _ in range(_ROUNDS):
         bits = full.copy()
@@ -83,7 +83,7 @@ def choose(scene: Scene, start: np.ndarray, cameras: Sequence[Camera], decibels:
         with steps.bar("pictures") as report:
             for k, (camera, picture) in enumerate(zip(cameras, pictures)):
                 report(k, len(cameras))
-                lost += float(((np.clip(draw(drawn, camera).image, 0, 1) - picture) ** 2).sum())
+                lost += float(((np.clip(render(drawn, camera).image, 0, 1) - picture) ** 2).sum())
         if lost <= allowed:
             break
         aim *= _TIGHTER * allowed / lost

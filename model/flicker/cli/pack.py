@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import replace
 from enum import Enum
@@ -29,13 +30,15 @@ FormatChoice = Enum("FormatChoice", {"CHUNK": "chunk", "FP16_LOCAL": "fp16-local
 DECIBELS = 50.0
 
 
-def _recipe(sh_bits: str, decibels: float | None, path: Path, steps: RichSteps, told: list[Choice]) -> Recipe:
+def _recipe(sh_bits: str | None, decibels: float | None, path: Path, steps: RichSteps, told: list[Choice]) -> Recipe:
     """What the options say. told: takes what `auto` chooses."""
     from ..scene.packed import FULL_SH_BITS, SH_BITS
     from ..scene.packing import Recipe
 
     if decibels is not None and sh_bits != "auto":
         raise FlickerError("--db: of --sh-bits auto alone")
+    if sh_bits is None:
+        return Recipe()
     if sh_bits != "auto":
         if sh_bits not in map(str, SH_BITS):
             raise FlickerError(f"--sh-bits: {', '.join(map(str, SH_BITS[:-1]))}, {FULL_SH_BITS} or auto, not {sh_bits}")
@@ -152,7 +155,7 @@ def pack(
     if sh_bits is not None and chosen is not PackedFormat.CHUNK:
         raise FlickerError(f"--sh-bits: of --format chunk alone, not {chosen.value}")
     told: list[Choice] = []
-    recipe = _recipe("8" if sh_bits is None else sh_bits, decibels, Path(file), steps, told)
+    recipe = _recipe(sh_bits, decibels, Path(file), steps, told)
     if str(scene) == DEMO:
         with steps.step("making the demo scene"):
             made = read_scene(scene)
@@ -166,6 +169,6 @@ def pack(
     with steps.step("measuring"):
         _measured(table, packing.packed, Path(file), packing.brought)
     for choice in told:
-        table.add_row("SH codes", f"{choice.decibels:.1f} dB", f"to 8 bits, in {choice.views} views")
+        table.add_row("SH codes", "equal" if math.isinf(choice.decibels) else f"{choice.decibels:.1f} dB", f"to 8 bits, in {choice.views} views")
     _history(table, packing)
     console.print(table)

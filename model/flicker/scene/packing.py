@@ -59,15 +59,15 @@ class ShSteps(str, Enum):
 class Recipe:
     """Choices in making chunks. cuts: bytes that may be spent on cutting clusters further, as a share of the Gaussians' bytes. sh: steps of SH codes. sh_bits:
     of a code, in all clusters (one of `SH_BITS`); or what chooses them, int64 (C,), for a scene whose Gaussians are in the clusters' order, from the number of
-    each cluster's first one."""
+    each cluster's first one; None: 8, or those of a file that brings its own."""
 
     cuts: float = CUTS
     sh: ShSteps = ShSteps.CHANNEL
-    sh_bits: int | Callable[[Scene, np.ndarray], np.ndarray] = FULL_SH_BITS
+    sh_bits: int | Callable[[Scene, np.ndarray], np.ndarray] | None = None
 
     def bits(self, scene: Scene, start: np.ndarray) -> np.ndarray:
         """int64 (C,): those of the clusters, which begin with Gaussians `start`."""
-        found = np.asarray(self.sh_bits(scene, start)) if callable(self.sh_bits) else np.full(len(start), self.sh_bits)
+        found = np.asarray(self.sh_bits(scene, start)) if callable(self.sh_bits) else np.full(len(start), self.sh_bits or FULL_SH_BITS)
         wrong = ~np.isin(found, SH_BITS if self.sh is not ShSteps.PLAYCANVAS else (FULL_SH_BITS,))
         if wrong.any():
             raise FlickerError(f"SH bits: {found[wrong][0]}, not {', '.join(map(str, SH_BITS[:-1]))} or {FULL_SH_BITS}")
@@ -243,15 +243,17 @@ def pack_file(
     path: str | Path, form: PackedFormat = PackedFormat.CHUNK, recipe: Recipe = Recipe(), steps: Steps | None = None, rechunk: bool = False,
 ) -> Packing:
     """Pack what `load_scene` reads. A compressed PLY keeps its chunks in the chunk format, an image that has the format already stays as it is, and both
-    refuse other SH bits than 8; rechunk: both are decoded and their clusters made anew.
+    refuse other SH bits than their own; rechunk: both are decoded and their clusters made anew.
 
     Raises FlickerError naming file and field.
     """
     path, steps = Path(path), steps or Steps()
 
-    def kept() -> None:
-        if recipe.sh_bits != FULL_SH_BITS:
+    def kept(packing: Packing) -> Packing:
+        own = packing.packed.sh_bits[packing.packed.degrees > 0]
+        if recipe.sh_bits is not None and (callable(recipe.sh_bits) or (own != recipe.sh_bits).any()):
             raise FlickerError(f"{path}: brings its own SH codes: other bits need clusters that are made anew (--rechunk)")
+        return packing
 
     title = scene_title(path)
     kind = "decoded" if rechunk else scene_kind(path)
@@ -259,15 +261,13 @@ def pack_file(
         with steps.step(f"loading {title}"):
             packed = load_packed(path)
         if packed.format is form:
-            kept()
-            return Packing(packed, np.arange(len(packed)), brought=True)
+            return kept(Packing(packed, np.arange(len(packed)), brought=True))
     if kind == "PLY" and form is PackedFormat.CHUNK:
         with steps.step(f"loading {title}"):
             chunks = load_chunks(path) if has_chunks(path) else None
         if chunks is not None:
-            kept()
             with steps.step("codes"):
-                return pack_chunks(chunks, path)
+                return kept(pack_chunks(chunks, path))
     with steps.step(f"loading {title}"):
         scene = load_scene(path)
     return pack(scene, form, recipe, steps)
