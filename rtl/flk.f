@@ -121,7 +121,12 @@ preproc/flk_colour_basis.sv
 preproc/flk_colour_constant.sv
 preproc/flk_colour_fetch.sv
 preproc/flk_colour_group.sv
+preproc/flk_colour_heads.sv
+preproc/flk_colour_keeper.sv
+preproc/flk_colour_rows.sv
+preproc/flk_colour_store.sv
 preproc/flk_colour_term.sv
+preproc/flk_colours_last.sv
 preproc/flk_entry_merge.sv
 preproc/flk_geometry_decode.sv
 preproc/flk_geometry_fetch.sv

@@ -43,6 +43,7 @@ module flk_cluster_cull
   input  logic                 out_ready_i,
   output logic                 out_end_o,
   output kept_t                out_cluster_o,
+  output boxed_t               out_box_o,
   // AXI4
   output logic                 ar_valid_o,
   input  logic                 ar_ready_i,
@@ -203,7 +204,7 @@ module flk_cluster_cull
   // As it lies in the table.
   typedef struct packed {
     logic [31:0]      first;
-    logic [5:0]       reserved;
+    logic [5:0]       slope;
     logic [1:0]       degree;
     logic [7:0]       last;
     logic [15:0]      sigma;  // upper half of a float32
@@ -227,6 +228,7 @@ module flk_cluster_cull
   logic [23:0]    loads_q;  // entries still to be loaded
   cluster_t [2:0] low_q, high_q;
   cluster_t       sigma_q;
+  logic [5:0]     slope_q;
   about_t         about_q;
 
   assign entry         = line[half_q];
@@ -276,12 +278,13 @@ module flk_cluster_cull
         high_q[k] <= number(entry.high[k]);
       end
       sigma_q <= number({entry.sigma, 16'b0});
+      slope_q <= entry.slope;
       about_q <= '{first: entry.first[19:0], last: entry.last, degree: entry.degree};
     end
   end
 
   logic unused_entry;
-  assign unused_entry = ^{entry.first[31:20], entry.reserved};
+  assign unused_entry = ^entry.first[31:20];
 
   // ---- test -----------------------------------------------------------------------------------------
 
@@ -317,6 +320,21 @@ module flk_cluster_cull
     .en_i(move && phase_q == '0),
     .d_i (about_q),
     .q_o (about)
+  );
+
+  // For the colour store
+  cluster_t [2:0] low, high;
+  logic [5:0]     slope;
+
+  flk_delay_ram #(
+    .Width(6 + $bits(low) + $bits(high)),
+    .Depth(Inside)
+  ) i_box (
+    .clk_i,
+    .rst_ni,
+    .en_i(move && phase_q == '0),
+    .d_i ({slope_q, low_q, high_q}),
+    .q_o ({slope, low, high})
   );
 
   flk_cluster_test i_test (
@@ -401,12 +419,14 @@ module flk_cluster_cull
   logic       unused_full;
   logic [1:0] unused_usage;
   kept_t      cluster;
+  boxed_t     box;
 
   assign move    = out_room;
   assign cluster = '{index: tested_q, first: about.first, last: about.last, degree: about.degree};
+  assign box     = '{index: tested_q, low: low, high: high, slope: slope};
 
   flk_fifo #(
-    .Width(1 + $bits(kept_t)),
+    .Width(1 + $bits(kept_t) + $bits(boxed_t)),
     .Depth(2)
   ) i_out (
     .clk_i,
@@ -414,10 +434,10 @@ module flk_cluster_cull
     .clear_i    (1'b0),
     .in_valid_i ((state_q == TEST && at_output && kept) || state_q == LAST),
     .in_ready_o (out_room),
-    .in_data_i  ({state_q == LAST, cluster}),
+    .in_data_i  ({state_q == LAST, cluster, box}),
     .out_valid_o,
     .out_ready_i,
-    .out_data_o ({out_end_o, out_cluster_o}),
+    .out_data_o ({out_end_o, out_cluster_o, out_box_o}),
     .usage_o    (unused_usage),
     .full_o     (unused_full),
     .empty_o    (out_empty)

@@ -43,6 +43,14 @@ package flk_preproc_pkg;
     logic [1:0]  degree;  // of spherical harmonics
   } kept_t;
 
+  // The same for the colour store: its box and the code of its colours' slope.
+  typedef struct packed {
+    logic [23:0]    index;
+    cluster_t [2:0] low;
+    cluster_t [2:0] high;
+    logic [5:0]     slope;
+  } boxed_t;
+
   // What the lanes take of a cluster's header, and where its colours lie.
   typedef struct packed {
     logic [31:0]               colour;      // first beat of its colours in their array
@@ -137,6 +145,7 @@ package flk_preproc_pkg;
   // coefficients. Codes of a chunk, or FP16.
   typedef struct packed {
     cluster_index_t          cluster;
+    logic                    stored;   // dc holds a record's codes, in 10 bits each; there are no coefficients
     logic                    first;
     logic                    last;
     logic [1:0]              part;
@@ -145,6 +154,42 @@ package flk_preproc_pkg;
     logic [2:0][15:0]        dc;
     logic [3:0][2:0][15:0]   raw;      // by coefficient, channel
   } colour_part_t;
+
+  // The colour store (docs/reference/colour_store.md): 24 beats a cluster, of which the first is the head and 22 are rows of 12 entries.
+  localparam int unsigned STORE_ROW = 12;
+  localparam int unsigned STORE_ROWS = 22;
+
+  // Registers of a frame.
+  typedef struct packed {
+    logic                 enable;
+    logic [BEAT_BITS-1:0] beat;        // where the store begins
+    logic [31:0]          generation;
+    cluster_t             limit;       // square of what colours may differ by
+  } store_setup_t;
+
+  typedef struct packed {
+    logic [3:0][63:0] there;       // colours that are stored, by Gaussian of the cluster
+    logic [127:0]     zero;
+    logic [31:0]      generation;
+    logic [2:0][31:0] position;    // of the camera that they are for
+  } store_head_t;
+
+  typedef struct packed {
+    logic [7:0]      opacity;
+    logic [2:0][9:0] colour;  // as in a record
+  } store_entry_t;
+
+  // A cluster with what may be shown of it.
+  typedef struct packed {
+    logic [BEAT_BITS-1:0] beat;     // of its head
+    logic                 storing;  // this frame's colours are stored
+    logic [3:0][63:0]     there;
+  } stored_t;
+
+  // Row of a group's Gaussians: a third of its number.
+  function automatic logic [4:0] store_row(input logic [5:0] group);
+    return 5'((12'(group) * 12'd43) >> 7);
+  endfunction
 
   // Bits of a record that are not always zero: all of 16 bytes in factored form, the lowest of 32 in conic form.
   localparam int unsigned FACTORED_RECORD_BITS = 128;
@@ -196,6 +241,7 @@ package flk_preproc_pkg;
   typedef struct packed {
     cull_setup_t          cull;
     lane_setup_t          lane;
+    store_setup_t         store;
     logic [BEAT_BITS-1:0] table_beat;     // where the image's parts begin
     logic [BEAT_BITS-1:0] headers_beat;
     logic [BEAT_BITS-1:0] geometry_beat;

@@ -142,6 +142,7 @@ module flk_preprocessing
   localparam int unsigned Quarters = (Form == FORM_FACTORED) ? 1 : 2;
   localparam int unsigned Records = 4 / Quarters;
   localparam int unsigned InBeatBits = $clog2(Records);
+  localparam int unsigned KeptBits = RecordBits + (Form == FORM_FACTORED ? 8 : 0);  // with the image's opacity
 
   localparam int unsigned Most = (PreprocLanes + Records - 1) / Records + 2;  // see record_room
   localparam int unsigned Turns = LANES / PreprocLanes;  // of a group, at most
@@ -194,8 +195,8 @@ module flk_preprocessing
         end
       end
       default: begin  // lists are closed, all is written
-        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && arbiter_empty &&
-            write_idle) begin
+        if (merge_idle && (&list_idle) && (&queued_empty) && records_idle && store_idle &&
+            arbiter_empty && write_idle) begin
           state_d = IDLE;
         end
       end
@@ -224,6 +225,8 @@ module flk_preprocessing
   kept_t             kept;
   logic              group_valid, group_ready, group_end;
   group_t            group;
+  boxed_t            kept_box;
+  logic              cull_ready, cull_valid, store_kept;
   logic              cull_error, geometry_error, colour_error, cull_damaged, geometry_damaged;
   logic [31:0]       culled_clusters, culled_gaussians, header_beats, geometry_beats, colour_beats;
   logic              unused_cull_done, unused_geometry_done;
@@ -243,10 +246,11 @@ module flk_preprocessing
     .damaged_o         (cull_damaged),
     .culled_clusters_o (culled_clusters),
     .culled_gaussians_o(culled_gaussians),
-    .out_valid_o       (kept_valid),
-    .out_ready_i       (kept_ready),
+    .out_valid_o       (cull_valid),
+    .out_ready_i       (cull_ready),
     .out_end_o         (kept_end),
     .out_cluster_o     (kept),
+    .out_box_o         (kept_box),
     .ar_valid_o        (table_ar_valid_o),
     .ar_ready_i        (table_ar_ready_i),
     .ar_id_o           (table_ar_id_o),
@@ -261,6 +265,10 @@ module flk_preprocessing
     .r_resp_i          (table_r_resp_i),
     .r_last_i          (table_r_last_i)
   );
+
+  // The geometry and the colour store take a cluster together.
+  assign kept_valid = cull_valid && (store_kept || kept_end);
+  assign cull_ready = kept_ready && (store_kept || kept_end);
 
   flk_geometry_fetch #(
     .IdBits(IdBits)
@@ -446,7 +454,8 @@ module flk_preprocessing
   logic [8:0]                        rank_q;  // survivors of the cluster so far
   logic [PLACE_BEAT_BITS-1:0]        ring_q;  // beat that is open
   logic [PLACE_BEAT_BITS:0]          taken_q; // beats told to the writer and not freed
-  logic                              freed, partial, colour_room, record_room;
+  logic                              freed, partial, colour_room, record_room, store_room;
+  logic [PreprocLanes-1:0]           there;   // colours that are stored
   logic [3:0]                        fill;   // records of the open beat and of those behind it
   logic [Quarters-1:0]               full;   // beats
   logic                              beat_valid, beat_ready, telling;
@@ -518,7 +527,7 @@ module flk_preprocessing
   // Behind two full beats a third one may still have to be told.
   assign record_room  = taken_q <= (PLACE_BEAT_BITS + 1)'(RING - Most) &&
                         (Quarters == 1 || !left_q);
-  assign go           = exit_valid && (&lane_ready) && record_room && colour_room;
+  assign go           = exit_valid && (&lane_ready) && record_room && store_room && colour_room;
   assign front_en     = !exit_valid || go;
   assign front_idle   = front_valid_q == '0 && !telling && !gone_q && rank_q == '0;
   // Groups end within a cluster where its geometry could not be read: the beat that it leaves open is told.
@@ -532,7 +541,7 @@ module flk_preprocessing
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
   assign survivors.at      = turn_at;
-  assign survivors.alive   = 4'(alive) << turn_at;
+  assign survivors.alive   = 4'(alive & ~there) << turn_at;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -626,8 +635,16 @@ module flk_preprocessing
 
   // ---- colours --------------------------------------------------------------------------------------
 
-  logic         [PreprocLanes-1:0] part_valid, part_ready;
-  colour_part_t [PreprocLanes-1:0] part;
+  logic         [PreprocLanes-1:0] made_valid, made_ready, part_valid, part_ready;
+  colour_part_t [PreprocLanes-1:0] made, part;
+
+  // Both read at one port: computed colours' data, and stored ones.
+  logic [1:0]               shared_ar_valid, shared_ar_ready, shared_r_valid, shared_r_ready;
+  logic [1:0][AddrBits-1:0] shared_ar_addr;
+  logic [1:0][7:0]          shared_ar_len;
+  logic [1:0][2:0]          shared_ar_size;
+  logic [1:0][1:0]          shared_ar_burst;
+  logic [1:0][IdBits-1:0]   unused_id;
 
   flk_colour_fetch #(
     .Lanes      (PreprocLanes),
@@ -642,27 +659,116 @@ module flk_preprocessing
     .colours_i  (registers_i.colours_beat),
     .error_o    (colour_error),
     .beats_o    (colour_beats),
-    .in_valid_i (exit_valid && (&lane_ready) && record_room),
+    .in_valid_i (exit_valid && (&lane_ready) && record_room && store_room),
     .in_ready_o (colour_room),
     .in_data_i  (survivors),
     .exit_i     (exit),
     .oldest_o   (oldest),
-    .out_valid_o(part_valid),
-    .out_ready_i(part_ready),
-    .out_data_o (part),
-    .ar_valid_o (colour_ar_valid_o),
-    .ar_ready_i (colour_ar_ready_i),
-    .ar_id_o    (colour_ar_id_o),
-    .ar_addr_o  (colour_ar_addr_o),
-    .ar_len_o   (colour_ar_len_o),
-    .ar_size_o  (colour_ar_size_o),
-    .ar_burst_o (colour_ar_burst_o),
-    .r_valid_i  (colour_r_valid_i),
-    .r_ready_o  (colour_r_ready_o),
+    .out_valid_o(made_valid),
+    .out_ready_i(made_ready),
+    .out_data_o (made),
+    .ar_valid_o (shared_ar_valid[0]),
+    .ar_ready_i (shared_ar_ready[0]),
+    .ar_id_o    (unused_id[0]),
+    .ar_addr_o  (shared_ar_addr[0]),
+    .ar_len_o   (shared_ar_len[0]),
+    .ar_size_o  (shared_ar_size[0]),
+    .ar_burst_o (shared_ar_burst[0]),
+    .r_valid_i  (shared_r_valid[0]),
+    .r_ready_o  (shared_r_ready[0]),
     .r_id_i     (colour_r_id_i),
     .r_data_i   (colour_r_data_i),
     .r_resp_i   (colour_r_resp_i),
     .r_last_i   (colour_r_last_i)
+  );
+
+  // ---- colours that are stored ----------------------------------------------------------------------
+
+  logic                 store_idle, store_error, keep_valid, keep_ready, keep_room;
+  logic                 keep_record;
+  store_entry_t [3:0]   kept_record;
+  logic [31:0]          store_beats;
+  logic [BEAT_BITS-1:0] keep_beat;
+  logic [Width-1:0]     keep_data;
+
+  flk_colour_store #(
+    .Lanes  (PreprocLanes),
+    .Waiting(Waiting),
+    .IdBits (IdBits),
+    .Id     (1)
+  ) i_store (
+    .clk_i,
+    .rst_ni,
+    .start_i       (start),
+    .flush_i       (state_q != FRONT),
+    .idle_o        (store_idle),
+    .setup_i       (registers_i.store),
+    .position_i    (registers_i.cull.position),
+    .error_o       (store_error),
+    .beats_o       (store_beats),
+    .kept_valid_i  (cull_valid && !kept_end && kept_ready),
+    .kept_ready_o  (store_kept),
+    .kept_i        (kept_box),
+    .ready_o       (store_room),
+    .there_o       (there),
+    .go_i          (go),
+    .alive_i       (alive),
+    .group_i       (6'(side.group >> TurnShift)),
+    .at_i          (turn_at),
+    .last_i        (side.last),
+    .in_valid_i    (made_valid),
+    .in_ready_o    (made_ready),
+    .in_data_i     (made),
+    .out_valid_o   (part_valid),
+    .out_ready_i   (part_ready),
+    .out_data_o    (part),
+    .record_valid_i(keep_record),
+    .record_ready_o(keep_room),
+    .record_i      (kept_record),
+    .line_valid_o  (keep_valid),
+    .line_ready_i  (keep_ready),
+    .line_beat_o   (keep_beat),
+    .line_o        (keep_data),
+    .ar_valid_o    (shared_ar_valid[1]),
+    .ar_ready_i    (shared_ar_ready[1]),
+    .ar_id_o       (unused_id[1]),
+    .ar_addr_o     (shared_ar_addr[1]),
+    .ar_len_o      (shared_ar_len[1]),
+    .ar_size_o     (shared_ar_size[1]),
+    .ar_burst_o    (shared_ar_burst[1]),
+    .r_valid_i     (shared_r_valid[1]),
+    .r_ready_o     (shared_r_ready[1]),
+    .r_id_i        (colour_r_id_i),
+    .r_data_i      (colour_r_data_i),
+    .r_resp_i      (colour_r_resp_i),
+    .r_last_i      (colour_r_last_i)
+  );
+
+  flk_axi_read_mux #(
+    .Managers(2),
+    .AddrBits(AddrBits),
+    .IdBits  (IdBits)
+  ) i_shared (
+    .clk_i,
+    .rst_ni,
+    .ar_valid_i(shared_ar_valid),
+    .ar_ready_o(shared_ar_ready),
+    .ar_addr_i (shared_ar_addr),
+    .ar_len_i  (shared_ar_len),
+    .ar_size_i (shared_ar_size),
+    .ar_burst_i(shared_ar_burst),
+    .r_valid_o (shared_r_valid),
+    .r_ready_i (shared_r_ready),
+    .ar_valid_o(colour_ar_valid_o),
+    .ar_ready_i(colour_ar_ready_i),
+    .ar_id_o   (colour_ar_id_o),
+    .ar_addr_o (colour_ar_addr_o),
+    .ar_len_o  (colour_ar_len_o),
+    .ar_size_o (colour_ar_size_o),
+    .ar_burst_o(colour_ar_burst_o),
+    .r_valid_i (colour_r_valid_i),
+    .r_ready_o (colour_r_ready_o),
+    .r_id_i    (colour_r_id_i)
   );
 
   // ---- lanes ----------------------------------------------------------------------------------------
@@ -670,6 +776,7 @@ module flk_preprocessing
   logic   [PreprocLanes-1:0]               record_valid, record_ready, entry_valid, entry_ready;
   place_t [PreprocLanes-1:0]               record_place;
   logic   [PreprocLanes-1:0][RecordBits-1:0] record;
+  logic   [PreprocLanes-1:0][7:0]            record_opacity;
   entry_t [PreprocLanes-1:0]               entry;
   logic   [PreprocLanes-1:0][SEQ_BITS-1:0] progress;
   logic   [PreprocLanes-1:0]               saturated, clipped, faint, unlisted;
@@ -706,6 +813,7 @@ module flk_preprocessing
       .record_valid_o(record_valid[k]),
       .record_ready_i(record_ready[k]),
       .record_place_o(record_place[k]),
+      .record_opacity_o(record_opacity[k]),
       .record_o      (record[k]),
       .entry_valid_o (entry_valid[k]),
       .entry_ready_i (entry_ready[k]),
@@ -725,20 +833,20 @@ module flk_preprocessing
   logic [BEAT_BITS-1:0] line_beat;
   logic [Width-1:0]     line_data;
   logic [3:0]           line_strobe;
-  logic [Records-1:0][RecordBits-1:0] line_record;
+  logic [Records-1:0][KeptBits-1:0] line_record;
 
   // Lanes that want the same quarter take turns; two records of each wait, so that no lane's colours stand for
   // another's record, nor for the time of that choice.
   logic   [PreprocLanes-1:0] queued_valid, queued_ready;
   place_t [PreprocLanes-1:0] queued_place;
-  logic   [PreprocLanes-1:0][RecordBits-1:0] queued_record;
+  logic   [PreprocLanes-1:0][KeptBits-1:0] queued_record;
 
   for (genvar k = 0; k < PreprocLanes; k++) begin : gen_records
     logic       unused_full;
     logic [1:0] unused_usage;
 
     flk_fifo #(
-      .Width($bits(place_t) + RecordBits),
+      .Width($bits(place_t) + KeptBits),
       .Depth(2)
     ) i_queue (
       .clk_i,
@@ -746,7 +854,7 @@ module flk_preprocessing
       .clear_i    (1'b0),
       .in_valid_i (record_valid[k]),
       .in_ready_o (record_ready[k]),
-      .in_data_i  ({record_place[k], record[k]}),
+      .in_data_i  ({record_place[k], KeptBits'({record_opacity[k], record[k]})}),
       .out_valid_o(queued_valid[k]),
       .out_ready_i(queued_ready[k]),
       .out_data_o ({queued_place[k], queued_record[k]}),
@@ -758,7 +866,7 @@ module flk_preprocessing
 
   flk_record_writer #(
     .Lanes     (PreprocLanes),
-    .RecordBits(RecordBits),
+    .RecordBits(KeptBits),
     .Quarters  (Quarters)
   ) i_records (
     .clk_i,
@@ -780,7 +888,17 @@ module flk_preprocessing
   );
 
   for (genvar r = 0; r < Records; r++) begin : gen_line
-    assign line_data[r*(Width/Records)+:Width/Records] = (Width / Records)'(line_record[r]);
+    assign line_data[r*(Width/Records)+:Width/Records] =
+        (Width / Records)'(line_record[r][RecordBits-1:0]);
+  end
+
+  // Colours of records that leave go to the store too.
+  if (Form == FORM_FACTORED) begin : gen_kept
+    for (genvar r = 0; r < 4; r++) begin : gen_record
+      assign kept_record[r] = {line_record[r][RecordBits+:8], line_record[r][97+:30]};
+    end
+  end else begin : gen_none
+    assign kept_record = '0;
   end
 
   // ---- lists ----------------------------------------------------------------------------------------
@@ -819,8 +937,8 @@ module flk_preprocessing
     logic [Width-1:0]     data;
   } line_t;
 
-  logic  [ListWriters:0]        out_valid, out_ready;  // of records, the last one
-  line_t [ListWriters:0]        out;
+  logic  [ListWriters+1:0]      out_valid, out_ready;  // of records, the last but one, of the colour store, the last one
+  line_t [ListWriters+1:0]      out;
   logic [ListWriters-1:0][31:0] list_entries, list_lines, list_evicted;
   logic [3:0][24:0]             list_taken;            // by bank
   logic [ListWriters-1:0]       unused_done;
@@ -954,18 +1072,22 @@ module flk_preprocessing
     .b_resp_i     (pointer_b_resp_i)
   );
 
-  assign out_valid[ListWriters] = line_valid;
-  assign line_ready             = out_ready[ListWriters];
-  assign out[ListWriters]       = {line_beat, line_strobe, line_data};
+  assign out_valid[ListWriters]   = line_valid && keep_room;
+  assign line_ready               = out_ready[ListWriters] && keep_room;
+  assign keep_record              = line_valid && out_ready[ListWriters];
+  assign out[ListWriters]         = {line_beat, line_strobe, line_data};
+  assign out_valid[ListWriters+1] = keep_valid;
+  assign keep_ready               = out_ready[ListWriters+1];
+  assign out[ListWriters+1]       = {keep_beat, 4'hf, keep_data};
 
   // ---- writes ---------------------------------------------------------------------------------------
 
   logic       chosen_valid, chosen_ready, lines_empty, write_failed;
   line_t      chosen;
-  logic [$clog2(ListWriters+1)-1:0] unused_index;
+  logic [$clog2(ListWriters+2)-1:0] unused_index;
 
   flk_stream_arbiter #(
-    .Inputs(ListWriters + 1),
+    .Inputs(ListWriters + 2),
     .Width ($bits(line_t))
   ) i_arbiter (
     .clk_i,
@@ -1074,7 +1196,7 @@ module flk_preprocessing
     group_valid_q  <= group_valid;
     lanes_q        <= lane_ready;
     places_q       <= record_room;
-    colours_q      <= colour_room;
+    colours_q      <= colour_room && store_room;
     part_ready_q   <= part_ready;
     record_ready_q <= record_ready;
     entry_ready_q  <= entry_ready;
@@ -1132,7 +1254,7 @@ module flk_preprocessing
     counters_o.culled_gaussians = culled_gaussians;
     counters_o.header_beats     = header_beats;
     counters_o.geometry_beats   = geometry_beats;
-    counters_o.colour_beats     = colour_beats;
+    counters_o.colour_beats     = colour_beats + store_beats;
     counters_o.entries          = 128'(list_entries);
     counters_o.lines            = 128'(list_lines);
     counters_o.evicted          = 128'(list_evicted);
@@ -1143,11 +1265,12 @@ module flk_preprocessing
 
   assign error_o = {geometry_damaged, cull_damaged, |list_failed, beyond_q,
                     write_error_q || pointer_write_error,
-                    cull_error || geometry_error || colour_error || pointer_read_error};
+                    cull_error || geometry_error || colour_error || store_error || pointer_read_error};
 
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,
-                    unused_cull_done, unused_geometry_done, unused_done, unused_index, fill[3]};
+                    unused_cull_done, unused_geometry_done, unused_done, unused_index, unused_id,
+                    fill[3]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) start_i |-> idle_o)

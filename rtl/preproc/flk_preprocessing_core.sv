@@ -57,6 +57,7 @@ module flk_preprocessing_core
   output logic                        record_valid_o,
   input  logic                        record_ready_i,
   output place_t                      record_place_o,
+  output logic [7:0]                  record_opacity_o,  // code in the image, of chunks
   output logic [RecordBits-1:0]       record_o,
   // Entries
   output logic                        entry_valid_o,
@@ -439,8 +440,8 @@ module flk_preprocessing_core
     .rd_data_o(header)
   );
 
-  logic unused_cluster;
-  assign unused_cluster = ^part_q.cluster;
+  logic unused;
+  assign unused = ^{part_q.cluster, codes_empty};
 
   // Its first part takes a survivor out of the queue, its last one the spherical harmonics.
   assign part_go        = held_q && (!part_q.first || (survivor_valid && side_room && record_room &&
@@ -460,6 +461,26 @@ module flk_preprocessing_core
       default: part_step = header.sh_step[2];
     endcase
   end
+
+  // Stored colours go round their own parts' arithmetic.
+  logic            codes_room, codes_valid, codes_take, codes_empty;
+  logic [2:0][9:0] codes;
+
+  flk_sram_fifo #(
+    .Width(30),
+    .Depth(16)
+  ) i_stored (
+    .clk_i,
+    .rst_ni,
+    .clear_i    (1'b0),
+    .in_valid_i (part_move && part_q.stored),
+    .in_ready_o (codes_room),
+    .in_data_i  ({part_q.dc[2][9:0], part_q.dc[1][9:0], part_q.dc[0][9:0]}),
+    .out_valid_o(codes_valid),
+    .out_ready_i(codes_take),
+    .out_data_o (codes),
+    .empty_o    (codes_empty)
+  );
 
   group_first_t [2:0]  first;
   group_fourth_t [2:0] fourth;
@@ -533,6 +554,7 @@ module flk_preprocessing_core
   // what comes before waits for it.
   typedef struct packed {
     logic       valid;
+    logic       stored;
     logic       first;
     logic       last;
     logic [1:0] part;
@@ -564,7 +586,8 @@ module flk_preprocessing_core
       tag_q <= '0;
     end else if (colour_en) begin
       tag_q <= {tag_q[COLOUR_GROUP_LATENCY-2:0],
-                part_valid_q && part_go, part_q.first, part_q.last, part_q.part};
+                part_valid_q && part_go, part_q.stored, part_q.first, part_q.last,
+                part_q.part};
     end
   end
 
@@ -583,7 +606,8 @@ module flk_preprocessing_core
   localparam int unsigned ColourBits = (Form == FORM_FACTORED) ? 10 : 16;
 
   typedef struct packed {
-    logic term;   // a degree has ended
+    logic term;    // a degree has ended
+    logic stored;
     logic first;
     logic last;
   } end_t;
@@ -609,7 +633,8 @@ module flk_preprocessing_core
     .q_o (constant_late)
   );
 
-  assign ended = end_q[TermCycles-1];
+  assign ended      = end_q[TermCycles-1];
+  assign codes_take = colour_en && ended.term && ended.stored;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -618,7 +643,7 @@ module flk_preprocessing_core
       rgb_valid_q   <= 1'b0;
     end else if (colour_en) begin
       end_q         <= {end_q[TermCycles-2:0],
-                        tag.valid && tag.part != 2'd2, tag.first, tag.last};
+                        tag.valid && tag.part != 2'd2, tag.stored, tag.first, tag.last};
       total_valid_q <= ended.term && ended.last;
       rgb_valid_q   <= total_valid_q;
     end
@@ -626,6 +651,7 @@ module flk_preprocessing_core
 
   for (genvar c = 0; c < 3; c++) begin : gen_channels
     term_t                       term;
+    constant_t                   begins;  // constant part, or the stored colour
     logic signed [TotalBits-1:0] total_q;
     logic [ColourBits-1:0]       code_d, code_q;
     logic                        clipped_d, clipped_q;
@@ -673,9 +699,12 @@ module flk_preprocessing_core
       );
     end
 
+    assign begins = ended.stored ? constant_t'(codes[c]) <<< (TERM_FRACTION - 9)
+                                 : constant_late[c];
+
     always_ff @(posedge clk_i) begin
       if (colour_en && ended.term) begin
-        total_q <= (ended.first ? TotalBits'($signed(constant_late[c])) : total_q)
+        total_q <= (ended.first ? TotalBits'($signed(begins)) : total_q)
                  + TotalBits'(term);
       end
       if (colour_en) begin
@@ -932,6 +961,7 @@ module flk_preprocessing_core
   typedef struct packed {
     place_t               place;
     logic                 spiky;
+    logic [7:0]           opacity;
     logic [ShapeBits-1:0] shape;
     logic [MeanBits-1:0]  y;
     logic [MeanBits-1:0]  x;
@@ -941,6 +971,7 @@ module flk_preprocessing_core
   typedef struct packed {
     place_t             place;
     logic               spiky;
+    logic [7:0]         opacity;
     logic signed [30:0] x;
     logic signed [30:0] y;
     shape_t [2:0]       shape;
@@ -962,7 +993,8 @@ module flk_preprocessing_core
   always_ff @(posedge clk_i) begin
     if (survivor_ready) begin
       recorded_q <= '{
-        place: survivor.place, spiky: survivor.spiky, x: survivor.x, y: survivor.y,
+        place: survivor.place, spiky: survivor.spiky, opacity: part_q.opacity[7:0],
+        x: survivor.x, y: survivor.y,
         shape: recorded_shape
       };
     end
@@ -972,6 +1004,7 @@ module flk_preprocessing_core
 
   assign fields_in.place = recorded_q.place;
   assign fields_in.spiky = recorded_q.spiky;
+  assign fields_in.opacity = recorded_q.opacity;
 
   flk_sram_fifo #(
     .Width($bits(fields_t)),
@@ -1081,6 +1114,7 @@ module flk_preprocessing_core
   assign record_valid_o = rgb_valid && fields_valid && code_valid;
   assign rgb_ready      = record_ready_i && fields_valid && code_valid;
   assign record_place_o = fields.place;
+  assign record_opacity_o = fields.opacity;
   assign clipped_o      = record_valid_o && record_ready_i && colour_clipped;
 
   assign idle_o = survivors_empty && directions_empty && !part_valid_q && fields_empty &&
@@ -1091,6 +1125,10 @@ module flk_preprocessing_core
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) push_i |-> ready_o)
   else $error("flk_preprocessing_core: a survivor without a place");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      (part_move && part_q.stored |-> codes_room) and (codes_take |-> codes_valid))
+  else $error("flk_preprocessing_core: a stored colour is lost");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) walked |-> seq_valid)
   else $error("flk_preprocessing_core: a splat is finished that was not waited for");

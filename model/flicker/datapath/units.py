@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..arithmetic.ff import ff_round, ff_sub
-from ..golden.front import colour, cull, frame, reach, splat
+from ..golden.front import colour, cull, frame, reach, reuse, splat
 from ..golden.front.setup import CLUSTER_M, MAX_PICTURE, MIDDLE_INTEGER, FrontFormats
 from ..params import SUBTILE, Form
+from ..scene.slopes import CODE_BITS
 from .graph import BOOL, Ff, Graph, Int, Operator, Value, retrace
 
 WORD, HALF = Int(0, (1 << 32) - 1), Int(0, (1 << 16) - 1)
@@ -87,6 +88,15 @@ def cluster_test(formats: FrontFormats) -> Graph:
     normal = _Matrix(g.inputs("normal", kind, (5, 3), register=True))
     offset, far = (g.inputs(n, kind, (5,), register=True) for n in ("offset", "reach"))
     g.output("keep", retrace(cull.test_cluster)(low, high, sigma, position, normal, offset, far))
+    return g
+
+
+def colours_last(formats: FrontFormats) -> Graph:
+    g, kind = Graph(), Ff(CLUSTER_M)
+    low, high, then = (g.inputs(name, kind, (3,)) for name in ("low", "high", "then"))
+    code = g.input("slope", Int(0, (1 << CODE_BITS) - 1))
+    position, limit = g.inputs("position", kind, (3,), register=True), g.input("limit", kind, register=True)
+    g.output("last", retrace(reuse.colours_last)(low, high, code, then, position, limit))
     return g
 
 
@@ -297,6 +307,7 @@ def constant_range(formats: FrontFormats) -> Int:
 
 PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
+    Pipeline("flk_colours_last", 4, colours_last, "Whether a cluster's stored colours may be shown."),
     Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
     Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, key, what its bounds need."),

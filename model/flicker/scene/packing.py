@@ -37,6 +37,7 @@ from .packed import (
     split,
     too_long,
 )
+from .slopes import slope_codes
 
 VISIBLE = 1.0 / 255.0  # opacity below which a Gaussian never is: pixels skip alphas below
 CUTS = 0.015
@@ -197,6 +198,7 @@ def _assemble(
     if (sigma >= 0x7F80).any() or (sigma == 0).any():
         raise FlickerError(f"{path or 'scene'}: sigma: not a positive float32 number")
     table["sigma"] = sigma
+    table["flags"] |= slope_codes(packed) << 2
     return packed
 
 

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from ..errors import FlickerError
 from ..golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome
 from ..golden.front.memory import SLOTS_PER_STEP
 from ..golden.front.record import RecordKind
+from ..golden.front.reuse import CLUSTER_BEATS, limit_of
 from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..golden.long_lists import region_bytes
@@ -28,7 +30,7 @@ from .half import BEAT, PAGE, Fields, Half, MemoryOptions
 from .memory import PortConfig, PurposeCounts
 
 PORTS = ("table", "geometry", "colour", "pointer", "write")
-PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers")
+PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "store")
 ERRORS = ("a read failed", "a write failed", "a cluster's records lie beyond their region", "out of list memory",
           "the cluster table is damaged", "a cluster's header is damaged")
 LIST_ERROR = 3  # bit of the last
@@ -58,8 +60,10 @@ class Regions:
         return Regions(image, records, slots * kind.bytes, lists, chunks, pointers, pointer_lines(cols, rows) * LINE_BYTES)
 
 
-def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int, order: SortOrder = SortOrder.DEPTH) -> Fields:
-    """The fields of front_registers_t."""
+def registers(
+    packed: PackedScene, camera: Camera, lists: ListKind, regions: Regions, chunks: int, order: SortOrder = SortOrder.DEPTH, store: StoreSetup | None = None,
+) -> Fields:
+    """The fields of front_registers_t. store: None: no colours are kept."""
     setup = FrameSetup.of(camera)
     f = setup.formats
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
@@ -81,6 +85,11 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
         numbers(values, f.shape)
     middle_bits = MIDDLE_INTEGER + f.mean
     bits += [(int(v) & (1 << middle_bits) - 1, middle_bits) for v in setup.middle[::-1]]
+    if store is None:
+        bits += [(0, 1), (0, 34), (0, 32), (0, 32)]
+    else:
+        bits += [(1, 1), (store.address // BEAT, 34), (store.generation, 32)]
+        numbers(np.array([limit_of(store.epsilon)]), CLUSTER_M)
     offset = regions.image // BEAT + HEADER_BYTES // BEAT
     for part in packed.sections().values():
         bits.append((offset, 34))
@@ -92,13 +101,22 @@ def registers(packed: PackedScene, camera: Camera, lists: ListKind, regions: Reg
     return bits
 
 
+@dataclass(frozen=True)
+class StoreSetup:
+    """Of a frame that keeps colours (`golden.front.reuse`). address: of the store, bytes, a multiple of 64."""
+
+    address: int
+    epsilon: float
+    generation: int = 1
+
+
 @dataclass(eq=False)
 class RtlFront:
     """What a frame left. records: uint8 (slots, bytes of a record). memory, pointers: as in golden.lists.ListImage. Bytes that the frame did not write hold
     noise, that of `before`: records and memory as they were.
 
     counters: by name; of the list writers int64 (4,), `taken` of the banks. traffic: by purpose. efficiency: share of the memory's peak rate. waits: of those
-    with a stall, as the harness counts them, those that it can.
+    with a stall, as the harness counts them, those that it can. store: uint8, the colour store's bytes.
     """
 
     records: np.ndarray
@@ -110,6 +128,7 @@ class RtlFront:
     efficiency: float
     before: tuple[np.ndarray, np.ndarray]
     waits: dict[str, int]
+    store: np.ndarray | None = None
 
     @property
     def error(self) -> int:
@@ -158,29 +177,72 @@ def front_rtl(
     many times; what the last leaves counts. order: of the keys. lanes, writers: of the RTL, preprocessing lanes and list writers.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails, a rule of AXI is broken or the scene is no longer what it was.
     """
+    run = _Run(packed, kind, lists, chunks, order, frames, limit)
     regions = regions or Regions.of(packed, camera, chunks, kind)
     with Half("front end", build(kind, lanes, writers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
-        data = image or packed.image()
-        at = regions.image
-        sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
-        purposes = [len(PURPOSES), 0, 1, 2, 3]  # the image header has none
-        scene = []
-        for size, purpose in zip(sizes, purposes):
-            offset = at - regions.image
-            scene.append((at, data[offset : offset + size]))
-            sim.load(at, size, scene[-1][1], purpose)
-            at += size
-        for base, size, purpose in (
-            (regions.records, regions.record_bytes, 4), (regions.lists, max(regions.chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES, 5),
-            (regions.pointers, regions.pointer_bytes, 6),
-        ):
-            sim.load(base, size, b"", purpose)
-        before = _records(sim, regions, kind), _lines(sim, regions)
-        counters, errors = sim.run(registers(packed, camera, lists, regions, chunks, order), FRONT, frames, limit)
+        scene = _load(sim, packed, regions, image)
+        return run.frame(sim, camera, regions, scene)
+
+
+def front_path(
+    packed: PackedScene, cameras: Sequence[Camera], epsilon: float, *, chunks: int, memory: MemoryOptions | None = None, seed: int = 1,
+    limit: int = 20_000_000, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], generations: Sequence[int] | None = None,
+) -> Iterator[RtlFront]:
+    """Frames of a path one after the other, with a colour store that is zero at first. generations: of each frame [1]. Raises as `front_rtl`."""
+    run = _Run(packed, RecordKind.FACTORED16, ListKind.ELLIPSE, chunks, SortOrder.DEPTH, 1, limit)
+    regions = Regions.of(packed, cameras[0], chunks)
+    address = -(-(regions.pointers + regions.pointer_bytes) // PAGE) * PAGE
+    size = len(packed.table) * CLUSTER_BEATS * BEAT
+    with Half("front end", build(lanes=lanes, writers=writers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+        scene = _load(sim, packed, regions, None)
+        sim.load(address, size, bytes(size), PURPOSES.index("store"))
+        for number, camera in enumerate(cameras):
+            setup = StoreSetup(address, epsilon, generations[number] if generations else 1)
+            found = run.frame(sim, camera, regions, scene, setup)
+            found.store = sim.read(address, size).copy()
+            yield found
+
+
+def _load(sim: Half, packed: PackedScene, regions: Regions, image: bytes | None) -> list[tuple[int, bytes]]:
+    """The scene and where a frame writes; address and bytes of each part of the scene."""
+    data = image or packed.image()
+    at = regions.image
+    sizes = [HEADER_BYTES, *map(len, packed.sections().values())]
+    purposes = [len(PURPOSES), 0, 1, 2, 3]  # the image header has none
+    scene = []
+    for size, purpose in zip(sizes, purposes):
+        offset = at - regions.image
+        scene.append((at, data[offset : offset + size]))
+        sim.load(at, size, scene[-1][1], purpose)
+        at += size
+    for base, size, purpose in (
+        (regions.records, regions.record_bytes, 4), (regions.lists, max(regions.chunks, 1) * WRITERS * CHUNK_LINES * LINE_BYTES, 5),
+        (regions.pointers, regions.pointer_bytes, 6),
+    ):
+        sim.load(base, size, b"", purpose)
+    return scene
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What frames have in common."""
+
+    packed: PackedScene
+    kind: RecordKind
+    lists: ListKind
+    chunks: int
+    order: SortOrder
+    frames: int
+    limit: int
+
+    def frame(self, sim: Half, camera: Camera, regions: Regions, scene: list[tuple[int, bytes]], store: StoreSetup | None = None) -> RtlFront:
+        before = _records(sim, regions, self.kind), _lines(sim, regions)
+        fields = registers(self.packed, camera, self.lists, regions, self.chunks, self.order, store)
+        counters, errors = sim.run(fields, FRONT, self.frames, self.limit)
         if any(sim.read(base, len(part)).tobytes() != part for base, part in scene):
-            raise FlickerError(f"front end: it has written over the scene (seed {seed})")
+            raise FlickerError(f"front end: it has written over the scene (seed {sim.seed})")
         return RtlFront(
-            _records(sim, regions, kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
+            _records(sim, regions, self.kind), _lines(sim, regions), sim.read(regions.pointers, regions.pointer_bytes).view(np.uint32), counters, errors,
             sim.traffic(PURPOSES), sim.efficiency, before,
             sim.waits(FRONT),
         )

@@ -16,6 +16,7 @@ import numba
 import numpy as np
 
 from ...arithmetic.ff import ff_bits, ff_exp2_fixed, ff_mul, ff_round, ff_sub, ff_to_fixed_round, pick
+from ...errors import FlickerError
 from ...front.pops import Seen
 from ...front.records import SubtileLists
 from ...params import SUBTILE, TILE, Form, SortOrder
@@ -23,6 +24,7 @@ from ...scene.camera import Camera
 from ...scene.packed import PackedFormat, PackedScene, chunk_codes, fp16_bits
 from .colour import (
     COEFFICIENT_FRACTION,
+    COLOUR_FRACTION,
     COLOUR_LIMIT,
     TERM_INTEGER,
     basis_functions,
@@ -36,6 +38,7 @@ from .colour import (
 from .cull import cull
 from .reach import Reach, reach_one, reach_tables, steady_one, tiles_of
 from .record import RecordKind, Splats, decode_records, encode_mean, encode_shape, fp16_features, fp16_means, to_fp16
+from .reuse import COLOUR_BITS, Reuse, Reused, limit_of
 from .setup import CLUSTER_M, FORMATS, KEY_BITS, MEAN_FRACTION, FrameSetup, FrontFormats, image_floats
 from .splat import conic_one, constants, largest_component, pixels, place_largest, project_one
 
@@ -233,9 +236,10 @@ def colour_lane(i, lanes, values, p, factor, M, w, basis, coefficient, rgb):
 @numba.njit(parallel=True, cache=True)
 def _splats(
     index, lanes, values, view, focal, row_x, row_x_z, row_y, row_y_z, least, limit, middle, antialiased, const, width, height, by_distance, factor, logs,
-    sigmas, cut, inverse, box, conic, P, S, C, w, outcome, key, words, unrounded, entries, flags, places, numbers,
+    sigmas, cut, inverse, box, conic, P, S, C, w, given, outcome, key, words, unrounded, entries, flags, places, numbers,
 ):
-    """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them."""
+    """The Gaussians `index` (of kept clusters): their outcome, key, record, number of entries, and what `_entries` needs of them. given: int64 (n,), colours of
+    records that are known, -1: to be computed; (0,): none is."""
     cols = (width + TILE - 1) // TILE
     none = np.empty(0, np.int32)
     for j in numba.prange(len(index)):
@@ -260,7 +264,12 @@ def _splats(
         key[j] = sort_key(by_distance, p.t2, p.square, P, w.key)
         flags[j, 0] = p.far
         rgb = np.empty(3, np.int64)
-        colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
+        known = given[j] if len(given) else -1
+        if known >= 0:
+            for k in range(3):
+                rgb[k] = (known >> 10 * k & COLOUR_LIMIT) << w.term - COLOUR_FRACTION
+        else:
+            colour_lane(i, lanes, values, p, factor, C, w, np.empty(17, np.int64), np.empty(17, np.int64), rgb)
         unrounded[j, 0], unrounded[j, 1], unrounded[j, 2] = conic_one(p, S) if conic else (p.l0, p.l1, p.l2)
         unrounded[j, 3] = code / 255.0 if lanes.chunked or antialiased else lanes.opacity[i]
         for k in range(3):
@@ -303,7 +312,8 @@ class FrontFrame:
     key: uint32 (R,), of depths or distances (`sort_key`). entry_splat: int32 (E,), record of each entry; entry_tile: int32 (E,), row by row; entry_mask: uint8
     (E,), bits 2 row + column of the sub-tiles.
     clusters_kept: of the cluster test. outcomes: Gaussians by what became of them. adjusted: records with a value that did not fit, by reason.
-    unrounded: float64 (R, 7), what shape (3), opacity and colour (3) of the records are rounded from; None where the RTL made the frame.
+    unrounded: float64 (R, 7), what shape (3), opacity and colour (3) of the records are rounded from; None where the RTL made the frame. reused: what was read
+    from the colour store and written to it; None where no colours are kept.
     """
 
     camera: Camera
@@ -321,6 +331,7 @@ class FrontFrame:
     adjusted: dict[str, int]
     unrounded: np.ndarray | None = None
     formats: FrontFormats = FORMATS
+    reused: Reused | None = None
 
     def splats(self) -> Splats:
         """What the records mean. Means are float64 where the format has other than 1/128 pixel."""
@@ -380,14 +391,21 @@ def _subtiles(splat, tile, mask, tile_cols, cols, rows):
 
 def run_front(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, formats: FrontFormats = FORMATS,
-    order: SortOrder = SortOrder.DEPTH,
+    order: SortOrder = SortOrder.DEPTH, reuse: Reuse | None = None,
 ) -> FrontFrame:
-    """Cull, project, colour, record and list a packed scene; order: what keys are of. FlickerError for pictures beyond 4096x4096."""
+    """Cull, project, colour, record and list a packed scene; order: what keys are of; reuse: keep colours, and show those of frames before. FlickerError for
+    pictures beyond 4096x4096, and records of 32 bytes with reuse."""
     setup = FrameSetup.of(camera, formats)
     keep = cull(packed, setup)
+    if reuse is not None and kind is not RecordKind.FACTORED16:
+        raise FlickerError("records of 32 bytes: colours are kept as records of 16 bytes have them")
     lanes, values = lanes_of(packed), cluster_values(packed, setup)
     index = np.flatnonzero(keep[packed.cluster])
     n = len(index)
+    given = np.empty(0, np.int64)
+    if reuse is not None:
+        lasting = reuse.store.lasting(setup, limit_of(reuse.epsilon), reuse.generation)
+        given = np.where(reuse.store.there & lasting[packed.cluster], reuse.store.entry & (1 << COLOUR_BITS) - 1, -1)[index]
     outcome, key, words = np.zeros(n, np.int8), np.zeros(n, np.uint32), np.zeros((n, 2), np.int64)
     conic = kind is RecordKind.CONIC32
     unrounded, entries, flags = np.zeros((n, 7)), np.zeros(n, np.int64), np.zeros((n, 3), np.bool_)
@@ -399,7 +417,7 @@ def run_front(
     tables, box = reach_tables(formats), lists is ListKind.BOX
     P, S, C = formats.position, formats.shape, formats.colour
     _splats(
-        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, P, S, C, formats.widths,
+        index, lanes, values, *registers, constant_factor(formats), *tables, box, conic, P, S, C, formats.widths, given,
         outcome, key, words, unrounded, entries, flags, places, numbers,
     )
     kept = np.flatnonzero(outcome >= Outcome.FAINT)
@@ -414,9 +432,13 @@ def run_front(
     outcomes |= {OUTCOMES[k]: int((outcome == k).sum()) for k in range(1, 6)}
     unrounded = unrounded[kept]
     records, adjusted = _records(kind, words[kept], unrounded, flags[kept])
+    reused = None
+    if reuse is not None:
+        entry = words[kept, 1] >> 33 & (1 << COLOUR_BITS) - 1 | lanes.opacity[gaussian].astype(np.int64) << COLOUR_BITS
+        reused = reuse.store.step(setup, keep, lasting, gaussian, entry, reuse.generation)
     return FrontFrame(
         camera, packed, kind, int(keep.sum()), gaussian, number, records, key[kept],
-        np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted, unrounded, formats,
+        np.repeat(np.arange(len(kept), dtype=np.int32), entries[kept]), tile, mask, outcomes, adjusted, unrounded, formats, reused,
     )
 
 
