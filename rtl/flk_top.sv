@@ -41,6 +41,7 @@ module flk_top
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
   parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists
+  parameter  bit          ColourStore    = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
   parameter  int unsigned Gather         = 256,   // of flk_preprocessing
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
@@ -111,6 +112,7 @@ module flk_top
 );
 
   localparam int unsigned Width = 512;  // of a line, which units read and write
+  localparam bit Keeps = ColourStore && Form == FORM_FACTORED;
 
   if (PortBits != 128 && PortBits != 256 && PortBits != Width) begin : gen_check_port
     $error("flk_top: PortBits must be 128, 256 or 512");
@@ -266,7 +268,8 @@ module flk_top
   end
 
   flk_frame_control #(
-    .Lists(Lists)
+    .Lists      (Lists),
+    .ColourStore(Keeps)
   ) i_control (
     .clk_i,
     .rst_ni,
@@ -591,6 +594,7 @@ module flk_top
     .Form        (Form),
     .PreprocLanes(PreprocLanes),
     .ListWriters (ListWriters),
+    .ColourStore (ColourStore),
     .Pointers    (Pointers),
     .Lists       (Lists),
     .Gather      (Gather),
@@ -857,6 +861,7 @@ module flk_top
   assign to_host.capability.log2_lanes.next  = 4'($clog2(Lanes));
   assign to_host.capability.log2_lists.next  = 4'($clog2(Lists));
   assign to_host.capability.log2_beat.next   = 4'($clog2(PortBits / 8));
+  assign to_host.capability.colour_store.next = Keeps;
   assign to_host.capability_units.log2.next  =
       {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'($clog2(Cores))};
   assign to_host.status.ready.next           = !locked && state_q == RUN;

@@ -25,6 +25,7 @@ module flk_top_axi
   parameter int unsigned Pairs          = 4,
   parameter int unsigned PreprocLanes   = 4,
   parameter int unsigned ListWriters    = 4,
+  parameter bit          ColourStore    = 1'b1,
   parameter int unsigned Waiting        = 128,
   parameter int unsigned Gather         = 256,
   parameter int unsigned Pointers       = 2048,

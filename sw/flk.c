@@ -17,9 +17,11 @@
 #define ADDRESS_END ((uint64_t)1 << 40)
 #define TILE 16u
 #define PAIR (2u * TILE)
+#define STORE_SHARE 1.0125 /* of an angle's sine and of rounding, in the tolerance of kept colours */
 #define MINOR_DEADLINE 1u /* of the version: since then there are deadlines, */
 #define MINOR_BY_DISTANCE 2u /* frames by distance, */
-#define MINOR_SH_BITS 5u     /* and SH codes of fewer than 8 bits */
+#define MINOR_SH_BITS 5u     /* SH codes of fewer than 8 bits, */
+#define MINOR_STORE 6u       /* and kept colours */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -51,6 +53,9 @@ static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_FRAME_DEADLINE] = "frame: the chip has no deadlines",
     [FLK_FRAME_ORDER] = "frame: the chip does not sort by distance",
     [FLK_FRAME_SH_BITS] = "frame: the chip takes SH codes of 8 bits alone",
+    [FLK_FRAME_STORE] = "frame: region of kept colours too small, or generation 0",
+    [FLK_FRAME_TOLERANCE] = "frame: tolerance of kept colours not 0 to 1",
+    [FLK_FRAME_KEEPS] = "frame: colours are kept of scenes in chunks, on chips that can",
     [FLK_FRAME_STRIDE] = "frame: stride too small, too large or not a multiple of 32",
     [FLK_FRAME_OVERLAP] = "frame: regions overlap",
     [FLK_FRAME_LISTS] = "frame: more tiles than the chip has lists",
@@ -300,6 +305,7 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
 enum { FACTORED_RECORD_BYTES = 16, CONIC_RECORD_BYTES = 32 };
 /* Runs of lists that the chip's sorting units do not hold: four units, 64 runs of 228 lines. */
 enum { RUN_BYTES = 4 * 64 * 228 * 64 };
+enum { STORE_BYTES = 24 * 64 }; /* of kept colours, a cluster */
 enum { WRITERS = 4, CHUNK_BYTES = 512, CHUNK_ENTRIES = 72, POINTERS_PER_LINE = 16, MAX_CHUNKS = 1 << 24 };
 
 /* Lists of each writer: every other tile in both directions. */
@@ -339,6 +345,11 @@ uint64_t flk_frame_bytes(uint32_t height, uint32_t stride)
   return (uint64_t)blocks(height, TILE) * TILE * stride;
 }
 
+uint64_t flk_store_bytes(const flk_scene_t *scene)
+{
+  return (uint64_t)scene->clusters * STORE_BYTES;
+}
+
 void flk_frame_fill(const flk_frame_t *frame, void *buffer)
 {
   const uint32_t bytes = flk_least_stride(frame->camera.width, frame->pixel_format);
@@ -356,7 +367,7 @@ typedef struct {
   uint64_t base, size;
 } span_t;
 
-enum { RECORDS, LISTS, POINTERS, OWN, FRAME_BUFFER = OWN, SCENE, SPANS };
+enum { RECORDS, LISTS, POINTERS, OWN, FRAME_BUFFER = OWN, STORE, SCENE, SPANS };
 
 static void spans_of(span_t span[SPANS], const flk_frame_t *frame)
 {
@@ -365,6 +376,7 @@ static void spans_of(span_t span[SPANS], const flk_frame_t *frame)
   span[LISTS] = (span_t){region->lists, flk_list_bytes(region->chunks)};
   span[POINTERS] = (span_t){region->pointers, flk_pointer_bytes(frame->camera.width, frame->camera.height)};
   span[FRAME_BUFFER] = (span_t){frame->frame_buffer, flk_frame_bytes(frame->camera.height, frame->stride)};
+  span[STORE] = frame->store != NULL ? (span_t){frame->store->address, flk_store_bytes(frame->scene)} : (span_t){0, 0};
   span[SCENE] = (span_t){frame->scene->address, frame->scene->bytes};
 }
 
@@ -392,6 +404,14 @@ flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other,
     return FLK_FRAME_STRIDE;
   if (lists != 0 && lists_of(camera->width, camera->height) > lists)
     return FLK_FRAME_LISTS;
+  if (frame->store != NULL) {
+    if (frame->scene->format != FLK_FORMAT_CHUNK || form != FLK_FORM_FACTORED)
+      return FLK_FRAME_KEEPS;
+    if (frame->store->generation == 0 || frame->store->bytes < flk_store_bytes(frame->scene))
+      return FLK_FRAME_STORE;
+    if (!(frame->store->tolerance >= 0.0 && frame->store->tolerance <= 1.0))
+      return FLK_FRAME_TOLERANCE;
+  }
   spans_of(span, frame);
   for (unsigned i = 0; i < SCENE; i++) {
     if (span[i].base % BEAT != 0 || (i == RECORDS && span[i].size % BEAT != 0))
@@ -407,7 +427,7 @@ flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other,
     spans_of(others, other);
     for (unsigned i = 0; i < SPANS; i++)
       for (unsigned k = 0; k < SPANS; k++)
-        /* Two frames may share scene and frame buffer. */
+        /* Two frames may share scene, frame buffer and kept colours. */
         if ((i < OWN || i != k) && overlap(&span[i], &others[k]))
           return FLK_FRAME_OVERLAP;
   }
@@ -463,6 +483,7 @@ flk_status_t flk_probe(flk_device_t *device, const flk_bus_t *bus)
   device->preproc_lanes = (uint32_t)1 << (units >> 4 & 15);
   device->list_writers = (uint32_t)1 << (units >> 8 & 15);
   device->sort_units = (uint32_t)1 << (units >> 12 & 15);
+  device->colour_store = device->minor >= MINOR_STORE && GET(FLK_CAPABILITY_COLOUR_STORE, capability) != 0;
   device->started = (uint16_t)GET(FLK_FRAMES_STARTED, get(device, FLK_FRAMES_OFFSET));
   return FLK_OK;
 }
@@ -489,6 +510,8 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
     status = FLK_FRAME_ORDER;
   if (status == FLK_OK && scene->sh_bits != 0 && device->minor < MINOR_SH_BITS)
     status = FLK_FRAME_SH_BITS;
+  if (status == FLK_OK && frame->store != NULL && !device->colour_store)
+    status = FLK_FRAME_KEEPS;
   if (status == FLK_OK)
     status = flk_ready(device);
   if (status != FLK_OK)
@@ -519,6 +542,14 @@ flk_status_t flk_frame_write(flk_device_t *device, const flk_frame_t *frame, con
   put(device, FLK_STRIDE_OFFSET, frame->stride);
   if (device->minor >= MINOR_DEADLINE)
     put(device, FLK_DEADLINE_OFFSET, frame->deadline);
+  if (frame->store != NULL) {
+    const double share = frame->store->tolerance / STORE_SHARE;
+    put_address(device, FLK_STORE_LOW_OFFSET, FLK_STORE_HIGH_OFFSET, frame->store->address);
+    put(device, FLK_STORE_BEATS_OFFSET, (uint32_t)(flk_store_bytes(scene) / BEAT));
+    put(device, FLK_TOLERANCE_OFFSET, flk_ff_bits(share * share, CLUSTER_M));
+  }
+  if (device->colour_store)
+    put(device, FLK_GENERATION_OFFSET, frame->store != NULL ? frame->store->generation : 0);
   put_all(device, FLK_POSITION_OFFSET, camera.position, FLK_POSITION_COUNT);
   put_all(device, FLK_NORMAL_OFFSET, camera.normal, FLK_NORMAL_COUNT);
   put_all(device, FLK_OFFSET_OFFSET, camera.offset, FLK_OFFSET_COUNT);

@@ -50,6 +50,9 @@ typedef enum {
   FLK_FRAME_DEADLINE, /* a deadline, on a chip of version 3.0, which has none */
   FLK_FRAME_ORDER,    /* by distance, on a chip older than version 3.2, which sorts by depth alone */
   FLK_FRAME_SH_BITS,  /* a scene with SH codes of fewer than 8 bits, on a chip older than version 3.5 */
+  FLK_FRAME_STORE,     /* region of kept colours too small for the scene, or generation 0 */
+  FLK_FRAME_TOLERANCE, /* tolerance of kept colours not 0 to 1 */
+  FLK_FRAME_KEEPS,     /* kept colours of a scene that is not in chunks, or on a chip that keeps none */
   /* the chip */
   FLK_DEVICE_ID,      /* no FLICKER at this address */
   FLK_DEVICE_VERSION, /* registers of another major version */
@@ -125,6 +128,7 @@ uint64_t flk_list_bytes(uint32_t chunks);
 uint64_t flk_pointer_bytes(uint32_t width, uint32_t height);
 uint32_t flk_least_stride(uint32_t width, unsigned pixel_format);
 uint64_t flk_frame_bytes(uint32_t height, uint32_t stride); /* of a frame buffer: whole rows of tiles */
+uint64_t flk_store_bytes(const flk_scene_t *scene);         /* of kept colours */
 
 /* ---- frame ------------------------------------------------------------------------------------------------------------------------------ */
 
@@ -135,6 +139,14 @@ typedef struct {
   uint32_t chunks; /* of each list writer */
   uint64_t pointers;
 } flk_region_t;
+
+/* Colours that are kept from frame to frame (docs/reference/colour_store.md). All frames of a scene may name the same one, those under way too. Its memory holds zeros before
+ * its first frame, or what frames of other generations have left. After a frame with FLK_ERROR_FRONT_READ or FLK_ERROR_FRONT_WRITE, take another generation. */
+typedef struct {
+  uint64_t address, bytes;
+  uint32_t generation; /* 1 to 2^32 - 1: another one for another scene */
+  double tolerance;    /* by how much a channel may differ from what the camera would show, 0 to 1, such as 2.0 / 255; 0: of a camera that does not move alone */
+} flk_store_t;
 
 typedef struct {
   const flk_scene_t *scene;
@@ -149,6 +161,7 @@ typedef struct {
   uint16_t tag;          /* comes back in the result */
   uint32_t deadline;     /* cycles from the start, after which the frame ends as it is, with FLK_ERROR_LATE; 0: none */
   int by_distance;       /* sorted by distance to the camera; else by depth along its axis */
+  const flk_store_t *store; /* colours are kept there; NULL: none are */
 } flk_frame_t;
 
 /* What would make a wrong picture or write beyond regions. other: frame that may be under way beside this one, whose region this one must not touch; or NULL.
@@ -173,6 +186,7 @@ typedef struct {
   uint32_t lists;                        /* of a list writer: pictures have at most 4 as many tiles, whole pairs in each direction */
   uint32_t beat;                         /* bytes of the memory port's data */
   uint32_t cores, preproc_lanes, list_writers, sort_units; /* units of a kind */
+  int colour_store;                      /* colours can be kept */
   uint16_t started;                      /* number of the frame that was started last, modulo 2^16 */
   unsigned region;                       /* 0 or 1 */
 } flk_device_t;

@@ -14,7 +14,7 @@
 #define FLK_VERSION_MAJOR_RESET 0x3u
 #define FLK_VERSION_MINOR_MASK 0x0000ff00u
 #define FLK_VERSION_MINOR_SHIFT 8
-#define FLK_VERSION_MINOR_RESET 0x5u
+#define FLK_VERSION_MINOR_RESET 0x6u
 
 #define FLK_CAPABILITY_OFFSET 0x008u
 #define FLK_CAPABILITY_STAGE_MASK 0x0000000fu
@@ -33,6 +33,8 @@
 #define FLK_CAPABILITY_LOG2_BEAT_SHIFT 20
 #define FLK_CAPABILITY_LOG2_LANES_MASK 0x0f000000u
 #define FLK_CAPABILITY_LOG2_LANES_SHIFT 24
+#define FLK_CAPABILITY_COLOUR_STORE_MASK 0x10000000u
+#define FLK_CAPABILITY_COLOUR_STORE_SHIFT 28
 
 #define FLK_CONTROL_OFFSET 0x00cu
 #define FLK_CONTROL_START_MASK 0x00000001u
@@ -275,6 +277,31 @@
 #define FLK_FRAME_BUFFER_HIGH_VALUE_SHIFT 0
 #define FLK_FRAME_BUFFER_HIGH_VALUE_RESET 0x0u
 
+#define FLK_STORE_LOW_OFFSET 0x160u
+#define FLK_STORE_LOW_VALUE_MASK 0xffffffffu
+#define FLK_STORE_LOW_VALUE_SHIFT 0
+#define FLK_STORE_LOW_VALUE_RESET 0x0u
+
+#define FLK_STORE_HIGH_OFFSET 0x164u
+#define FLK_STORE_HIGH_VALUE_MASK 0x000000ffu
+#define FLK_STORE_HIGH_VALUE_SHIFT 0
+#define FLK_STORE_HIGH_VALUE_RESET 0x0u
+
+#define FLK_STORE_BEATS_OFFSET 0x168u
+#define FLK_STORE_BEATS_VALUE_MASK 0x1fffffffu
+#define FLK_STORE_BEATS_VALUE_SHIFT 0
+#define FLK_STORE_BEATS_VALUE_RESET 0x0u
+
+#define FLK_GENERATION_OFFSET 0x16cu
+#define FLK_GENERATION_VALUE_MASK 0xffffffffu
+#define FLK_GENERATION_VALUE_SHIFT 0
+#define FLK_GENERATION_VALUE_RESET 0x0u
+
+#define FLK_TOLERANCE_OFFSET 0x170u
+#define FLK_TOLERANCE_VALUE_MASK 0xffffffffu
+#define FLK_TOLERANCE_VALUE_SHIFT 0
+#define FLK_TOLERANCE_VALUE_RESET 0x0u
+
 #define FLK_POSITION_OFFSET 0x180u
 #define FLK_POSITION_COUNT 3u
 #define FLK_POSITION_VALUE_MASK 0xffffffffu
@@ -414,6 +441,8 @@
 #define FLK_COUNTER_LIST_LINES 18  /* lines written, of each of 4 list writers */
 #define FLK_COUNTER_LIST_EVICTED 22  /* lines written for another tile's sake, of each of 4 list writers */
 #define FLK_COUNTER_LIST_TAKEN 26  /* chunks taken, of each of 4 list writers */
+#define FLK_COUNTER_STORE_BEATS 30  /* beats of kept colours read */
+#define FLK_COUNTER_STORE_LINES 31  /* beats of kept colours written */
 #define FLK_COUNTER_POINTERS_SPILLED 32  /* lines of list pointers written to make room for others, of all list writers */
 #define FLK_COUNTER_POINTERS_FETCHED 33  /* lines of list pointers read back */
 #define FLK_COUNTER_RENDERING_CYCLES 34  /* cycles of the rendering half, start to end */

@@ -39,6 +39,8 @@ FRONT = (
     Counter("lines", 18, 4, 32, "", 1, "", "lines written, of each of 4 list writers"),
     Counter("evicted", 22, 4, 32, "", 1, "", "lines written for another tile's sake, of each of 4 list writers"),
     Counter("taken", 26, 4, 25, "", 1, "", "chunks taken, of each of 4 list writers"),
+    Counter("store_beats", 30, 1, 32, "", 1, "", "beats of kept colours read"),
+    Counter("store_lines", 31, 1, 32, "", 1, "", "beats of kept colours written"),
     Counter("spilled", 32, 1, 32, "", 1, "", "lines of list pointers written to make room for others, of all list writers"),
     Counter("fetched", 33, 1, 32, "", 1, "", "lines of list pointers read back"),
     Counter("cluster_waits", 96, 1, 32, "front end, cluster for its geometry", 1, "", "cycles in which a cluster waits for the fetch of its geometry"),

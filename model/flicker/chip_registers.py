@@ -22,7 +22,7 @@ REGISTERS = {
     "capability": Register(
         0x008, 1, {
             "stage": (0, 4), "form": (4, 2), "precision": (6, 2), "vrus": (8, 4), "mask_generator": (12, 4), "log2_lists": (16, 4), "log2_beat": (20, 4),
-            "log2_lanes": (24, 4)
+            "log2_lanes": (24, 4), "colour_store": (28, 1)
         },
     ),
     "control": Register(0x00C, 1, {"start": (0, 1), "abort": (1, 1), "reset": (2, 1)}),
@@ -65,6 +65,11 @@ REGISTERS = {
     "pointers_high": Register(0x154, 1, {"value": (0, 8)}),
     "frame_buffer_low": Register(0x158, 1, {"value": (0, 32)}),
     "frame_buffer_high": Register(0x15C, 1, {"value": (0, 8)}),
+    "store_low": Register(0x160, 1, {"value": (0, 32)}),
+    "store_high": Register(0x164, 1, {"value": (0, 8)}),
+    "store_beats": Register(0x168, 1, {"value": (0, 29)}),
+    "generation": Register(0x16C, 1, {"value": (0, 32)}),
+    "tolerance": Register(0x170, 1, {"value": (0, 32)}),
     "position": Register(0x180, 3, {"value": (0, 32)}),
     "normal": Register(0x190, 15, {"value": (0, 32)}),
     "offset": Register(0x1D0, 5, {"value": (0, 32)}),
@@ -120,6 +125,8 @@ class ChipCounter(IntEnum):
     LIST_LINES = 18  # lines written, of each of 4 list writers
     LIST_EVICTED = 22  # lines written for another tile's sake, of each of 4 list writers
     LIST_TAKEN = 26  # chunks taken, of each of 4 list writers
+    STORE_BEATS = 30  # beats of kept colours read
+    STORE_LINES = 31  # beats of kept colours written
     POINTERS_SPILLED = 32  # lines of list pointers written to make room for others, of all list writers
     POINTERS_FETCHED = 33  # lines of list pointers read back
     RENDERING_CYCLES = 34  # cycles of the rendering half, start to end

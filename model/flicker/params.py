@@ -264,7 +264,8 @@ class RenderConfig:
     or 1 sub-tiles of a tile; `lanes` of all cores; `in_width` elements that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a
     lane's queue. Of the whole chip: `delivered` records that a core gets in a cycle there, and so takes, whatever `in_width`; `memories`, key of
     CHIP_MEMORIES; `port_bits` of the memory port; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of
-    lists; `preproc_lanes`, preprocessing cores. No bit of records, lists and pictures depends on their numbers.
+    lists; `preproc_lanes`, preprocessing cores. No bit of records, lists and pictures depends on their numbers. `colour_store`: colours can be kept from
+    frame to frame, in factored form alone.
     """
 
     form: Form = Form.FACTORED
@@ -286,6 +287,7 @@ class RenderConfig:
     sort_units: int = UNIT_COUNTS[-1]
     list_writers: int = UNIT_COUNTS[-1]
     preproc_lanes: int = UNIT_COUNTS[-1]
+    colour_store: bool = True
 
     def __post_init__(self) -> None:
         for field, table in (("mask_generator", MASK_GENERATORS), ("stage", STAGES), ("memories", CHIP_MEMORIES)):
@@ -363,7 +365,8 @@ class RenderConfig:
     def front_parameters(self) -> dict[str, int]:
         """Module parameters of the front end and the chip: what is not the default."""
         units = {"PreprocLanes": self.preproc_lanes, "ListWriters": self.list_writers}
-        return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]}
+        store = {} if self.colour_store else {"ColourStore": 0}
+        return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]} | store
 
     def top_parameters(self) -> dict[str, int]:
         """Of the whole chip, flk_top and what wraps it: `chip_parameters`, `front_parameters`, the port; those that are not the default."""

@@ -17,7 +17,7 @@ package flk_counter_pkg;
   localparam int unsigned STAMP_WORDS = 4;
 
   // Places of the front events in their flk_event_counters.
-  localparam int unsigned FRONT_EVENTS = 19;
+  localparam int unsigned FRONT_EVENTS = 20;
   localparam int unsigned FRONT_EVENT_TOO_NEAR = 0;
   localparam int unsigned FRONT_EVENT_OUTSIDE = 1;
   localparam int unsigned FRONT_EVENT_SURVIVORS = 2;
@@ -26,17 +26,18 @@ package flk_counter_pkg;
   localparam int unsigned FRONT_EVENT_SATURATED = 5;
   localparam int unsigned FRONT_EVENT_CLIPPED = 6;
   localparam int unsigned FRONT_EVENT_RECORD_BEATS = 7;
-  localparam int unsigned FRONT_EVENT_CLUSTER_WAITS = 8;
-  localparam int unsigned FRONT_EVENT_GROUP_MISSING = 9;
-  localparam int unsigned FRONT_EVENT_LANE_WAITS = 10;
-  localparam int unsigned FRONT_EVENT_PLACE_WAITS = 11;
-  localparam int unsigned FRONT_EVENT_REQUEST_WAITS = 12;
-  localparam int unsigned FRONT_EVENT_COLOUR_WAITS = 13;
-  localparam int unsigned FRONT_EVENT_RECORD_WAITS = 14;
-  localparam int unsigned FRONT_EVENT_ENTRY_WAITS = 15;
-  localparam int unsigned FRONT_EVENT_MERGED_WAITS = 16;
-  localparam int unsigned FRONT_EVENT_LINE_WAITS = 17;
-  localparam int unsigned FRONT_EVENT_BEAT_WAITS = 18;
+  localparam int unsigned FRONT_EVENT_STORE_LINES = 8;
+  localparam int unsigned FRONT_EVENT_CLUSTER_WAITS = 9;
+  localparam int unsigned FRONT_EVENT_GROUP_MISSING = 10;
+  localparam int unsigned FRONT_EVENT_LANE_WAITS = 11;
+  localparam int unsigned FRONT_EVENT_PLACE_WAITS = 12;
+  localparam int unsigned FRONT_EVENT_REQUEST_WAITS = 13;
+  localparam int unsigned FRONT_EVENT_COLOUR_WAITS = 14;
+  localparam int unsigned FRONT_EVENT_RECORD_WAITS = 15;
+  localparam int unsigned FRONT_EVENT_ENTRY_WAITS = 16;
+  localparam int unsigned FRONT_EVENT_MERGED_WAITS = 17;
+  localparam int unsigned FRONT_EVENT_LINE_WAITS = 18;
+  localparam int unsigned FRONT_EVENT_BEAT_WAITS = 19;
 
   typedef struct packed {
     // cycles of the front end, start to end
@@ -75,6 +76,10 @@ package flk_counter_pkg;
     logic [3:0][31:0] evicted;
     // chunks taken, of each of 4 list writers
     logic [3:0][24:0] taken;
+    // beats of kept colours read
+    logic [31:0] store_beats;
+    // beats of kept colours written
+    logic [31:0] store_lines;
     // lines of list pointers written to make room for others, of all list writers
     logic [31:0] spilled;
     // lines of list pointers read back
@@ -115,6 +120,7 @@ package flk_counter_pkg;
     front_events.saturated = totals[FRONT_EVENT_SATURATED];
     front_events.clipped = totals[FRONT_EVENT_CLIPPED];
     front_events.record_beats = totals[FRONT_EVENT_RECORD_BEATS];
+    front_events.store_lines = totals[FRONT_EVENT_STORE_LINES];
     front_events.cluster_waits = totals[FRONT_EVENT_CLUSTER_WAITS];
     front_events.group_missing = totals[FRONT_EVENT_GROUP_MISSING];
     front_events.lane_waits = totals[FRONT_EVENT_LANE_WAITS];
@@ -225,6 +231,8 @@ package flk_counter_pkg;
     front_counter_words[27] = 32'(counters.taken[1]);
     front_counter_words[28] = 32'(counters.taken[2]);
     front_counter_words[29] = 32'(counters.taken[3]);
+    front_counter_words[30] = counters.store_beats;
+    front_counter_words[31] = counters.store_lines;
     front_counter_words[32] = counters.spilled;
     front_counter_words[33] = counters.fetched;
     front_counter_words[34] = counters.cluster_waits;

@@ -4,6 +4,7 @@
 // the cluster's last. So do the records of the survivors, in beats of four of which a cluster begins a new one. Of a cluster
 // whose colours are stored, a row of 12 leaves where a survivor has no stored colour and every stored one is a survivor's; behind the rows
 // the head, with the bits of what is there now. Entries of a row without a survivor are zero.
+// drop_i, until the next start_i: turns and records that wait are forgotten, and none come; a line that is offered leaves.
 // start_i forgets what an earlier frame has left. idle_o: no turn waits and no line is to leave.
 // Throughput: a turn a cycle, and a cycle for a line. Combinational: line_ready_i to the state alone.
 module flk_colour_keeper
@@ -18,6 +19,7 @@ module flk_colour_keeper
   input  logic                     clk_i,
   input  logic                     rst_ni,
   input  logic                     start_i,
+  input  logic                     drop_i,
   output logic                     idle_o,
   input  store_setup_t             setup_i,
   input  cluster_t [2:0]           position_i,
@@ -87,7 +89,7 @@ module flk_colour_keeper
   ) i_turns (
     .clk_i,
     .rst_ni,
-    .clear_i    (start_i),
+    .clear_i    (start_i || drop_i),
     .in_valid_i (turn_valid_i),
     .in_ready_o (turn_ready_o),
     .in_data_i  ({turn_last_i, turn_there_i, turn_alive_i}),
@@ -103,7 +105,7 @@ module flk_colour_keeper
   ) i_records (
     .clk_i,
     .rst_ni,
-    .clear_i    (start_i),
+    .clear_i    (start_i || drop_i),
     .in_valid_i (record_valid_i),
     .in_ready_o (record_ready_o),
     .in_data_i  (record_i),

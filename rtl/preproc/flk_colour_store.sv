@@ -6,7 +6,8 @@
 // are stored leave as lines, in an order in which every prefix leaves the store without a wrong colour (flk_colour_keeper, flk_colour_heads).
 // Without setup_i.enable nothing is read or written, and parts pass.
 // A frame: start_i while idle_o; registers stay until idle_o. flush_i, from the front's end on: clusters whose turns do not come
-// any more go. An error of the memory: error_o rises and stays until the next start; colours then mean nothing.
+// any more go. failing_i, until the frame's end: it will end with an error, and turns of some clusters do not come; nothing is shown or
+// kept any more. An error of the memory: error_o rises and stays until the next start; colours then mean nothing.
 // Combinational: out_ready_i to in_ready_o, in_* to out_*; ar_ready_i to the requests, r_*_i to the buffer's write port.
 module flk_colour_store
   import flk_front_pkg::*;
@@ -26,6 +27,7 @@ module flk_colour_store
   // Frame
   input  logic                     start_i,
   input  logic                     flush_i,
+  input  logic                     failing_i,
   output logic                     idle_o,
   input  store_setup_t             setup_i,
   input  cluster_t [2:0]           position_i,  // of the camera
@@ -81,13 +83,16 @@ module flk_colour_store
     logic [BEAT_BITS-1:0] beat;
   } ask_t;
 
-  logic enable_q;
+  logic enable_q;  // heads are read
+  logic shown_q;   // colours are shown and kept
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       enable_q <= 1'b0;
+      shown_q  <= 1'b0;
     end else begin
       enable_q <= setup_i.enable;
+      shown_q  <= setup_i.enable && !failing_i;
     end
   end
 
@@ -107,7 +112,7 @@ module flk_colour_store
   flk_colour_heads i_heads (
     .clk_i,
     .rst_ni,
-    .flush_i,
+    .flush_i      (flush_i || !shown_q),
     .idle_o       (heads_idle),
     .setup_i,
     .position_i,
@@ -138,9 +143,9 @@ module flk_colour_store
   logic [Lanes-1:0] there;
 
   assign there       = Lanes'(stored.there[group_i[5:4]] >> {group_i[3:0], at_i});
-  assign there_o     = enable_q ? there : '0;
-  assign ready_o     = rows_ready && (!enable_q || (stored_valid && keeper_ready && about_ready));
-  assign turn        = go_i && enable_q;
+  assign there_o     = shown_q ? there : '0;
+  assign ready_o     = rows_ready && (!shown_q || (stored_valid && keeper_ready && about_ready));
+  assign turn        = go_i && shown_q;
   assign stored_take = turn && last_i;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -297,6 +302,7 @@ module flk_colour_store
     .clk_i,
     .rst_ni,
     .start_i,
+    .drop_i           (!shown_q),
     .idle_o           (keeper_idle),
     .setup_i,
     .position_i,
@@ -309,7 +315,7 @@ module flk_colour_store
     .turn_alive_i     (alive_i),
     .turn_there_i     (there),
     .turn_last_i      (last_i),
-    .record_valid_i   (record_valid_i && enable_q),
+    .record_valid_i   (record_valid_i && shown_q),
     .record_ready_o   (record_ready),
     .record_i,
     .line_valid_o     (keep_valid),
@@ -318,7 +324,7 @@ module flk_colour_store
     .line_o           (keep)
   );
 
-  assign record_ready_o = record_ready || !enable_q;
+  assign record_ready_o = record_ready || !shown_q;
 
   // A cleared head goes first: its cluster's rows come later in any case. A line that is offered stays.
   logic keeping_q;  // the keeper's is offered

@@ -22,6 +22,7 @@ module flk_preprocessing
   parameter  int unsigned Form         = FORM_FACTORED,
   parameter  int unsigned PreprocLanes = 4,     // 1, 2 or 4
   parameter  int unsigned ListWriters  = 4,     // 1, 2 or 4
+  parameter  bit          ColourStore  = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Pointers     = 2048,  // of a bank of lists, held on the chip
   parameter  int unsigned Lists        = 16384, // of a bank, at most
   parameter  int unsigned Gather       = 256,   // lines that are written together
@@ -142,7 +143,8 @@ module flk_preprocessing
   localparam int unsigned Quarters = (Form == FORM_FACTORED) ? 1 : 2;
   localparam int unsigned Records = 4 / Quarters;
   localparam int unsigned InBeatBits = $clog2(Records);
-  localparam int unsigned KeptBits = RecordBits + (Form == FORM_FACTORED ? 8 : 0);  // with the image's opacity
+  localparam bit Keeps = ColourStore && Form == FORM_FACTORED;
+  localparam int unsigned KeptBits = RecordBits + (Keeps ? 8 : 0);  // with the image's opacity
 
   localparam int unsigned Most = (PreprocLanes + Records - 1) / Records + 2;  // see record_room
   localparam int unsigned Turns = LANES / PreprocLanes;  // of a group, at most
@@ -691,85 +693,115 @@ module flk_preprocessing
   logic [BEAT_BITS-1:0] keep_beat;
   logic [Width-1:0]     keep_data;
 
-  flk_colour_store #(
-    .Lanes  (PreprocLanes),
-    .Waiting(Waiting),
-    .IdBits (IdBits),
-    .Id     (1)
-  ) i_store (
-    .clk_i,
-    .rst_ni,
-    .start_i       (start),
-    .flush_i       (state_q != FRONT),
-    .idle_o        (store_idle),
-    .setup_i       (registers_i.store),
-    .position_i    (registers_i.cull.position),
-    .error_o       (store_error),
-    .beats_o       (store_beats),
-    .kept_valid_i  (cull_valid && !kept_end && kept_ready),
-    .kept_ready_o  (store_kept),
-    .kept_i        (kept_box),
-    .ready_o       (store_room),
-    .there_o       (there),
-    .go_i          (go),
-    .alive_i       (alive),
-    .group_i       (6'(side.group >> TurnShift)),
-    .at_i          (turn_at),
-    .last_i        (side.last),
-    .in_valid_i    (made_valid),
-    .in_ready_o    (made_ready),
-    .in_data_i     (made),
-    .out_valid_o   (part_valid),
-    .out_ready_i   (part_ready),
-    .out_data_o    (part),
-    .record_valid_i(keep_record),
-    .record_ready_o(keep_room),
-    .record_i      (kept_record),
-    .line_valid_o  (keep_valid),
-    .line_ready_i  (keep_ready),
-    .line_beat_o   (keep_beat),
-    .line_o        (keep_data),
-    .ar_valid_o    (shared_ar_valid[1]),
-    .ar_ready_i    (shared_ar_ready[1]),
-    .ar_id_o       (unused_id[1]),
-    .ar_addr_o     (shared_ar_addr[1]),
-    .ar_len_o      (shared_ar_len[1]),
-    .ar_size_o     (shared_ar_size[1]),
-    .ar_burst_o    (shared_ar_burst[1]),
-    .r_valid_i     (shared_r_valid[1]),
-    .r_ready_o     (shared_r_ready[1]),
-    .r_id_i        (colour_r_id_i),
-    .r_data_i      (colour_r_data_i),
-    .r_resp_i      (colour_r_resp_i),
-    .r_last_i      (colour_r_last_i)
-  );
+  if (Keeps) begin : gen_store
+    flk_colour_store #(
+      .Lanes  (PreprocLanes),
+      .Waiting(Waiting),
+      .IdBits (IdBits),
+      .Id     (1)
+    ) i_store (
+      .clk_i,
+      .rst_ni,
+      .start_i       (start),
+      .flush_i       (state_q != FRONT),
+      .failing_i     (geometry_error || geometry_damaged),
+      .idle_o        (store_idle),
+      .setup_i       (registers_i.store),
+      .position_i    (registers_i.cull.position),
+      .error_o       (store_error),
+      .beats_o       (store_beats),
+      .kept_valid_i  (cull_valid && !kept_end && kept_ready),
+      .kept_ready_o  (store_kept),
+      .kept_i        (kept_box),
+      .ready_o       (store_room),
+      .there_o       (there),
+      .go_i          (go),
+      .alive_i       (alive),
+      .group_i       (6'(side.group >> TurnShift)),
+      .at_i          (turn_at),
+      .last_i        (side.last),
+      .in_valid_i    (made_valid),
+      .in_ready_o    (made_ready),
+      .in_data_i     (made),
+      .out_valid_o   (part_valid),
+      .out_ready_i   (part_ready),
+      .out_data_o    (part),
+      .record_valid_i(keep_record),
+      .record_ready_o(keep_room),
+      .record_i      (kept_record),
+      .line_valid_o  (keep_valid),
+      .line_ready_i  (keep_ready),
+      .line_beat_o   (keep_beat),
+      .line_o        (keep_data),
+      .ar_valid_o    (shared_ar_valid[1]),
+      .ar_ready_i    (shared_ar_ready[1]),
+      .ar_id_o       (unused_id[1]),
+      .ar_addr_o     (shared_ar_addr[1]),
+      .ar_len_o      (shared_ar_len[1]),
+      .ar_size_o     (shared_ar_size[1]),
+      .ar_burst_o    (shared_ar_burst[1]),
+      .r_valid_i     (shared_r_valid[1]),
+      .r_ready_o     (shared_r_ready[1]),
+      .r_id_i        (colour_r_id_i),
+      .r_data_i      (colour_r_data_i),
+      .r_resp_i      (colour_r_resp_i),
+      .r_last_i      (colour_r_last_i)
+    );
 
-  flk_axi_read_mux #(
-    .Managers(2),
-    .AddrBits(AddrBits),
-    .IdBits  (IdBits)
-  ) i_shared (
-    .clk_i,
-    .rst_ni,
-    .ar_valid_i(shared_ar_valid),
-    .ar_ready_o(shared_ar_ready),
-    .ar_addr_i (shared_ar_addr),
-    .ar_len_i  (shared_ar_len),
-    .ar_size_i (shared_ar_size),
-    .ar_burst_i(shared_ar_burst),
-    .r_valid_o (shared_r_valid),
-    .r_ready_i (shared_r_ready),
-    .ar_valid_o(colour_ar_valid_o),
-    .ar_ready_i(colour_ar_ready_i),
-    .ar_id_o   (colour_ar_id_o),
-    .ar_addr_o (colour_ar_addr_o),
-    .ar_len_o  (colour_ar_len_o),
-    .ar_size_o (colour_ar_size_o),
-    .ar_burst_o(colour_ar_burst_o),
-    .r_valid_i (colour_r_valid_i),
-    .r_ready_o (colour_r_ready_o),
-    .r_id_i    (colour_r_id_i)
-  );
+    flk_axi_read_mux #(
+      .Managers(2),
+      .AddrBits(AddrBits),
+      .IdBits  (IdBits)
+    ) i_shared (
+      .clk_i,
+      .rst_ni,
+      .ar_valid_i(shared_ar_valid),
+      .ar_ready_o(shared_ar_ready),
+      .ar_addr_i (shared_ar_addr),
+      .ar_len_i  (shared_ar_len),
+      .ar_size_i (shared_ar_size),
+      .ar_burst_i(shared_ar_burst),
+      .r_valid_o (shared_r_valid),
+      .r_ready_i (shared_r_ready),
+      .ar_valid_o(colour_ar_valid_o),
+      .ar_ready_i(colour_ar_ready_i),
+      .ar_id_o   (colour_ar_id_o),
+      .ar_addr_o (colour_ar_addr_o),
+      .ar_len_o  (colour_ar_len_o),
+      .ar_size_o (colour_ar_size_o),
+      .ar_burst_o(colour_ar_burst_o),
+      .r_valid_i (colour_r_valid_i),
+      .r_ready_o (colour_r_ready_o),
+      .r_id_i    (colour_r_id_i)
+    );
+  end else begin : gen_no_store
+    assign store_idle         = 1'b1;
+    assign store_error        = 1'b0;
+    assign store_beats        = '0;
+    assign store_kept         = 1'b1;
+    assign store_room         = 1'b1;
+    assign there              = '0;
+    assign part_valid         = made_valid;
+    assign made_ready         = part_ready;
+    assign part               = made;
+    assign keep_room          = 1'b1;
+    assign keep_valid         = 1'b0;
+    assign keep_beat          = '0;
+    assign keep_data          = '0;
+    assign colour_ar_valid_o  = shared_ar_valid[0];
+    assign shared_ar_ready[0] = colour_ar_ready_i;
+    assign colour_ar_id_o     = '0;
+    assign colour_ar_addr_o   = shared_ar_addr[0];
+    assign colour_ar_len_o    = shared_ar_len[0];
+    assign colour_ar_size_o   = shared_ar_size[0];
+    assign colour_ar_burst_o  = shared_ar_burst[0];
+    assign shared_r_valid[0]  = colour_r_valid_i;
+    assign colour_r_ready_o   = shared_r_ready[0];
+
+    logic unused_store;
+    assign unused_store = ^{registers_i.store, kept_box, keep_record, kept_record, keep_ready,
+                            record_opacity};
+  end
 
   // ---- lanes ----------------------------------------------------------------------------------------
 
@@ -893,7 +925,7 @@ module flk_preprocessing
   end
 
   // Colours of records that leave go to the store too.
-  if (Form == FORM_FACTORED) begin : gen_kept
+  if (Keeps) begin : gen_kept
     for (genvar r = 0; r < 4; r++) begin : gen_record
       assign kept_record[r] = {line_record[r][RecordBits+:8], line_record[r][97+:30]};
     end
@@ -1160,6 +1192,7 @@ module flk_preprocessing
   assign events[FRONT_EVENT_FAINT]         = LANES'(faint);
   assign events[FRONT_EVENT_UNLISTED]      = LANES'(unlisted);
   assign events[FRONT_EVENT_RECORD_BEATS]  = LANES'(line_valid && line_ready);
+  assign events[FRONT_EVENT_STORE_LINES]   = LANES'(keep_valid && keep_ready);
 
   // Waits: where a projected group has several reasons, the first one. What comes late in its cycle is looked at in the next.
   logic             front_q, group_valid_q, exit_valid_q, places_q, colours_q;
@@ -1254,7 +1287,8 @@ module flk_preprocessing
     counters_o.culled_gaussians = culled_gaussians;
     counters_o.header_beats     = header_beats;
     counters_o.geometry_beats   = geometry_beats;
-    counters_o.colour_beats     = colour_beats + store_beats;
+    counters_o.colour_beats     = colour_beats;
+    counters_o.store_beats      = store_beats;
     counters_o.entries          = 128'(list_entries);
     counters_o.lines            = 128'(list_lines);
     counters_o.evicted          = 128'(list_evicted);

@@ -266,6 +266,11 @@ module flk_registers (
         logic pointers_high;
         logic frame_buffer_low;
         logic frame_buffer_high;
+        logic store_low;
+        logic store_high;
+        logic store_beats;
+        logic generation;
+        logic tolerance;
         logic position[3];
         logic normal[15];
         logic offset[5];
@@ -369,6 +374,16 @@ module flk_registers (
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h158);
         decoded_reg_strb.frame_buffer_high = cpuif_req_masked & (cpuif_addr == 10'h15c);
         is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h15c);
+        decoded_reg_strb.store_low = cpuif_req_masked & (cpuif_addr == 10'h160);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h160);
+        decoded_reg_strb.store_high = cpuif_req_masked & (cpuif_addr == 10'h164);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h164);
+        decoded_reg_strb.store_beats = cpuif_req_masked & (cpuif_addr == 10'h168);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h168);
+        decoded_reg_strb.generation = cpuif_req_masked & (cpuif_addr == 10'h16c);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h16c);
+        decoded_reg_strb.tolerance = cpuif_req_masked & (cpuif_addr == 10'h170);
+        is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h170);
         for(int i0=0; i0<3; i0++) begin
             decoded_reg_strb.position[i0] = cpuif_req_masked & (cpuif_addr == 10'h180 + (10)'(i0) * 10'h4);
             is_valid_addr |= cpuif_req_masked & (cpuif_addr == 10'h180 + (10)'(i0) * 10'h4);
@@ -694,6 +709,36 @@ module flk_registers (
                 logic [31:0] next;
                 logic load_next;
             } value;
+        } store_low;
+        struct {
+            struct {
+                logic [7:0] next;
+                logic load_next;
+            } value;
+        } store_high;
+        struct {
+            struct {
+                logic [28:0] next;
+                logic load_next;
+            } value;
+        } store_beats;
+        struct {
+            struct {
+                logic [31:0] next;
+                logic load_next;
+            } value;
+        } generation;
+        struct {
+            struct {
+                logic [31:0] next;
+                logic load_next;
+            } value;
+        } tolerance;
+        struct {
+            struct {
+                logic [31:0] next;
+                logic load_next;
+            } value;
         } position[3];
         struct {
             struct {
@@ -976,6 +1021,31 @@ module flk_registers (
                 logic [7:0] value;
             } value;
         } frame_buffer_high;
+        struct {
+            struct {
+                logic [31:0] value;
+            } value;
+        } store_low;
+        struct {
+            struct {
+                logic [7:0] value;
+            } value;
+        } store_high;
+        struct {
+            struct {
+                logic [28:0] value;
+            } value;
+        } store_beats;
+        struct {
+            struct {
+                logic [31:0] value;
+            } value;
+        } generation;
+        struct {
+            struct {
+                logic [31:0] value;
+            } value;
+        } tolerance;
         struct {
             struct {
                 logic [31:0] value;
@@ -2195,6 +2265,121 @@ module flk_registers (
         end
     end
     assign hwif_out.frame_buffer_high.value.value = field_storage.frame_buffer_high.value.value;
+    // Field: flk_registers.store_low.value
+    always_comb begin
+        automatic logic [31:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.store_low.value.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.store_low && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.store_low.value.value & ~decoded_wr_biten[31:0]) | (decoded_wr_data[31:0] & decoded_wr_biten[31:0]);
+            load_next_c = '1;
+        end
+        field_combo.store_low.value.next = next_c;
+        field_combo.store_low.value.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.store_low.value.value <= 32'h0;
+        end else begin
+            if(field_combo.store_low.value.load_next) begin
+                field_storage.store_low.value.value <= field_combo.store_low.value.next;
+            end
+        end
+    end
+    assign hwif_out.store_low.value.value = field_storage.store_low.value.value;
+    // Field: flk_registers.store_high.value
+    always_comb begin
+        automatic logic [7:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.store_high.value.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.store_high && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.store_high.value.value & ~decoded_wr_biten[7:0]) | (decoded_wr_data[7:0] & decoded_wr_biten[7:0]);
+            load_next_c = '1;
+        end
+        field_combo.store_high.value.next = next_c;
+        field_combo.store_high.value.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.store_high.value.value <= 8'h0;
+        end else begin
+            if(field_combo.store_high.value.load_next) begin
+                field_storage.store_high.value.value <= field_combo.store_high.value.next;
+            end
+        end
+    end
+    assign hwif_out.store_high.value.value = field_storage.store_high.value.value;
+    // Field: flk_registers.store_beats.value
+    always_comb begin
+        automatic logic [28:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.store_beats.value.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.store_beats && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.store_beats.value.value & ~decoded_wr_biten[28:0]) | (decoded_wr_data[28:0] & decoded_wr_biten[28:0]);
+            load_next_c = '1;
+        end
+        field_combo.store_beats.value.next = next_c;
+        field_combo.store_beats.value.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.store_beats.value.value <= 29'h0;
+        end else begin
+            if(field_combo.store_beats.value.load_next) begin
+                field_storage.store_beats.value.value <= field_combo.store_beats.value.next;
+            end
+        end
+    end
+    assign hwif_out.store_beats.value.value = field_storage.store_beats.value.value;
+    // Field: flk_registers.generation.value
+    always_comb begin
+        automatic logic [31:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.generation.value.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.generation && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.generation.value.value & ~decoded_wr_biten[31:0]) | (decoded_wr_data[31:0] & decoded_wr_biten[31:0]);
+            load_next_c = '1;
+        end
+        field_combo.generation.value.next = next_c;
+        field_combo.generation.value.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.generation.value.value <= 32'h0;
+        end else begin
+            if(field_combo.generation.value.load_next) begin
+                field_storage.generation.value.value <= field_combo.generation.value.next;
+            end
+        end
+    end
+    assign hwif_out.generation.value.value = field_storage.generation.value.value;
+    // Field: flk_registers.tolerance.value
+    always_comb begin
+        automatic logic [31:0] next_c;
+        automatic logic load_next_c;
+        next_c = field_storage.tolerance.value.value;
+        load_next_c = '0;
+        if(decoded_reg_strb.tolerance && decoded_req_is_wr && !(hwif_in.descriptor_locked)) begin // SW write
+            next_c = (field_storage.tolerance.value.value & ~decoded_wr_biten[31:0]) | (decoded_wr_data[31:0] & decoded_wr_biten[31:0]);
+            load_next_c = '1;
+        end
+        field_combo.tolerance.value.next = next_c;
+        field_combo.tolerance.value.load_next = load_next_c;
+    end
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+        if(~rst_ni) begin
+            field_storage.tolerance.value.value <= 32'h0;
+        end else begin
+            if(field_combo.tolerance.value.load_next) begin
+                field_storage.tolerance.value.value <= field_combo.tolerance.value.next;
+            end
+        end
+    end
+    assign hwif_out.tolerance.value.value = field_storage.tolerance.value.value;
     for(genvar i0=0; i0<3; i0++) begin : gen_array_0
         // Field: flk_registers.position[].value
         always_comb begin
@@ -2546,7 +2731,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h5;
+            readback_data_var[15:8] = 8'h6;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2557,6 +2742,7 @@ module flk_registers (
             readback_data_var[19:16] = hwif_in.capability.log2_lists.next;
             readback_data_var[23:20] = hwif_in.capability.log2_beat.next;
             readback_data_var[27:24] = hwif_in.capability.log2_lanes.next;
+            readback_data_var[28] = hwif_in.capability.colour_store.next;
         end
         if(rd_mux_addr == 10'h10) begin
             readback_data_var[0] = hwif_in.status.ready.next;
@@ -2683,6 +2869,21 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h15c) begin
             readback_data_var[7:0] = field_storage.frame_buffer_high.value.value;
+        end
+        if(rd_mux_addr == 10'h160) begin
+            readback_data_var[31:0] = field_storage.store_low.value.value;
+        end
+        if(rd_mux_addr == 10'h164) begin
+            readback_data_var[7:0] = field_storage.store_high.value.value;
+        end
+        if(rd_mux_addr == 10'h168) begin
+            readback_data_var[28:0] = field_storage.store_beats.value.value;
+        end
+        if(rd_mux_addr == 10'h16c) begin
+            readback_data_var[31:0] = field_storage.generation.value.value;
+        end
+        if(rd_mux_addr == 10'h170) begin
+            readback_data_var[31:0] = field_storage.tolerance.value.value;
         end
         for(int i0=0; i0<3; i0++) begin
             if(rd_mux_addr == 10'h180 + (10)'(i0) * 10'h4) begin

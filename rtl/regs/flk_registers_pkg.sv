@@ -43,6 +43,10 @@ package flk_registers_pkg;
     } flk_registers__capability__log2_lanes__in_t;
 
     typedef struct packed {
+        logic next;
+    } flk_registers__capability__colour_store__in_t;
+
+    typedef struct packed {
         flk_registers__capability__stage__in_t stage;
         flk_registers__capability__form__in_t form;
         flk_registers__capability__precision__in_t precision;
@@ -51,6 +55,7 @@ package flk_registers_pkg;
         flk_registers__capability__log2_lists__in_t log2_lists;
         flk_registers__capability__log2_beat__in_t log2_beat;
         flk_registers__capability__log2_lanes__in_t log2_lanes;
+        flk_registers__capability__colour_store__in_t colour_store;
     } flk_registers__capability__in_t;
 
     typedef struct packed {
@@ -459,6 +464,46 @@ package flk_registers_pkg;
 
     typedef struct packed {
         logic [31:0] value;
+    } flk_registers__store_low__value__out_t;
+
+    typedef struct packed {
+        flk_registers__store_low__value__out_t value;
+    } flk_registers__store_low__out_t;
+
+    typedef struct packed {
+        logic [7:0] value;
+    } flk_registers__store_high__value__out_t;
+
+    typedef struct packed {
+        flk_registers__store_high__value__out_t value;
+    } flk_registers__store_high__out_t;
+
+    typedef struct packed {
+        logic [28:0] value;
+    } flk_registers__store_beats__value__out_t;
+
+    typedef struct packed {
+        flk_registers__store_beats__value__out_t value;
+    } flk_registers__store_beats__out_t;
+
+    typedef struct packed {
+        logic [31:0] value;
+    } flk_registers__generation__value__out_t;
+
+    typedef struct packed {
+        flk_registers__generation__value__out_t value;
+    } flk_registers__generation__out_t;
+
+    typedef struct packed {
+        logic [31:0] value;
+    } flk_registers__tolerance__value__out_t;
+
+    typedef struct packed {
+        flk_registers__tolerance__value__out_t value;
+    } flk_registers__tolerance__out_t;
+
+    typedef struct packed {
+        logic [31:0] value;
     } flk_registers__positionx__value__out_t;
 
     typedef struct packed {
@@ -590,6 +635,11 @@ package flk_registers_pkg;
         flk_registers__pointers_high__out_t pointers_high;
         flk_registers__frame_buffer_low__out_t frame_buffer_low;
         flk_registers__frame_buffer_high__out_t frame_buffer_high;
+        flk_registers__store_low__out_t store_low;
+        flk_registers__store_high__out_t store_high;
+        flk_registers__store_beats__out_t store_beats;
+        flk_registers__generation__out_t generation;
+        flk_registers__tolerance__out_t tolerance;
         flk_registers__positionx__out_t [2:0] position;
         flk_registers__normalx__out_t [14:0] normal;
         flk_registers__offsetx__out_t [4:0] offset;

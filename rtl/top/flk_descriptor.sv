@@ -39,6 +39,12 @@ module flk_descriptor
   assign descriptor_o.frame_buffer = {registers_i.frame_buffer_high.value.value,
                                       registers_i.frame_buffer_low.value.value};
 
+  assign descriptor_o.store        = {registers_i.store_high.value.value,
+                                      registers_i.store_low.value.value};
+  assign descriptor_o.store_beats  = registers_i.store_beats.value.value;
+  assign descriptor_o.generation   = registers_i.generation.value.value;
+  assign descriptor_o.tolerance    = registers_i.tolerance.value.value;
+
   assign descriptor_o.lane.chunked = registers_i.frame.chunked.value;
   assign descriptor_o.lane.box     = registers_i.frame.box.value;
   assign descriptor_o.lane.antialiased = registers_i.frame.antialiased.value;

@@ -21,8 +21,9 @@
 // way: it stays, with its bank, until it is acknowledged; aborted_i adds its bit to error_o. aborted_i, timed_out_i, with clear_i:
 // once no posted frame waits, error_o is that bit alone until the next post. reset_i, with clear_i or in the cycle before it: the posted frame is forgotten too, frames count from 0.
 // A descriptor is refused where an address is no multiple of 64, the stride no multiple of 32 or less than a row of whole
-// pairs of tiles, a side 0 or beyond 4096, the mode not one of CAT_*, there is no cluster, or a list writer would have
-// more lists than Lists.
+// pairs of tiles, a side 0 or beyond 4096, the mode not one of CAT_*, there is no cluster, a list writer would have
+// more lists than Lists, or colours are to be kept where the chip cannot (ColourStore), of an image that is not in chunks, or in a region
+// that is too small.
 // Combinational: start_i to locked_o and refused_o, *_idle_i to *_start_o, copy_front_done_i to front_done_o, reset_i to post_o;
 // all else depends on registers alone.
 module flk_frame_control
@@ -31,7 +32,8 @@ module flk_frame_control
   import flk_rendering_pkg::*;
   import flk_top_pkg::*;
 #(
-  parameter int unsigned Lists = 16384
+  parameter int unsigned Lists       = 16384,
+  parameter bit          ColourStore = 1'b1   // colours can be kept
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
@@ -113,7 +115,8 @@ module flk_frame_control
   logic [15:0]  all_pairs_q;
   logic [10:0]  pointer_lines;
   logic [16:0]  row_bytes;
-  logic         misaligned_q, unfit_q;
+  logic         misaligned_q, unfit_q, unkept_q;
+  logic [25:0]  triple_q;              // three times the clusters
 
   assign pairs         = 8'((cols_q + 1'b1) >> 1);
   assign half_rows     = 8'((rows_q + 1'b1) >> 1);
@@ -203,14 +206,18 @@ module flk_frame_control
     misaligned_q <= (frame_q.scene_table[5:0] | frame_q.headers[5:0] | frame_q.geometry[5:0] |
                      frame_q.colours[5:0] | frame_q.records[5:0] | frame_q.lists[5:0] |
                      frame_q.pointers[5:0] | frame_q.frame_buffer[5:0] |
+                     (frame_q.store[5:0] & {6{frame_q.generation != '0}}) |
                      {1'b0, frame_q.stride[4:0]}) != '0;
     unfit_q      <= frame_q.lane.width == '0 || frame_q.lane.width > 13'd4096 ||
                     frame_q.lane.height == '0 || frame_q.lane.height > 13'd4096 ||
                     frame_q.mode > CAT_AUTO || frame_q.clusters == '0;
+    triple_q     <= {1'b0, frame_q.clusters, 1'b0} + 26'(frame_q.clusters);
+    unkept_q     <= frame_q.generation != '0 && (!ColourStore || !frame_q.lane.chunked ||
+                                                 {triple_q, 3'b0} > frame_q.store_beats);
     if (take) begin
       front_error_q <= '0;
     end else if (front_q == CHECK && check_q == 2'd2) begin
-      front_error_q.descriptor <= misaligned_q || unfit_q || 32'(lists_q) > Lists ||
+      front_error_q.descriptor <= misaligned_q || unfit_q || unkept_q || 32'(lists_q) > Lists ||
                                   frame_q.stride < row_bytes;
     end else if ((front_q == RUN || front_q == STOP) && front_done_i) begin
       front_error_q.front_read    <= front_error_i[FRONT_ERROR_READ];
@@ -224,6 +231,8 @@ module flk_frame_control
 
   assign front_o.cull          = frame_q.cull;
   assign front_o.lane          = frame_q.lane;
+  assign front_o.store         = '{enable: frame_q.generation != '0, beat: beat(frame_q.store),
+                                   generation: frame_q.generation, limit: frame_q.tolerance};
   assign front_o.table_beat    = beat(frame_q.scene_table);
   assign front_o.headers_beat  = beat(frame_q.headers);
   assign front_o.geometry_beat = beat(frame_q.geometry);

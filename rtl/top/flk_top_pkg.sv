@@ -21,6 +21,10 @@ package flk_top_pkg;
     address_t        lists;
     address_t        pointers;
     address_t        frame_buffer;
+    address_t        store;        // of kept colours
+    logic [28:0]     store_beats;
+    logic [31:0]     generation;   // 0: no colours are kept
+    logic [31:0]     tolerance;    // square of what kept colours may differ by
     logic [23:0]     clusters;
     logic [22:0]     record_beats;
     logic [24:0]     chunks;       // of a list writer

@@ -16,7 +16,7 @@ module cluster_cull_bench
   input  logic [95:0]     in_data_i,
   output logic            out_valid_o,
   input  logic            out_ready_i,
-  output logic [95:0]     out_data_o,
+  output logic [287:0]    out_data_o,
   output logic            mem_ar_valid_o,
   input  logic            mem_ar_ready_i,
   output logic [3:0]      mem_ar_id_o,
@@ -35,13 +35,14 @@ module cluster_cull_bench
   logic error, damaged, out_end, unused;
   logic [31:0] clusters, gaussians;
   kept_t cluster;
+  boxed_t box;
 
   assign in_ready_o = 1'b0;
   assign unused = ^{in_valid_i, in_data_i, registers_i[959:954]};
 
   // Word by word: error and damaged, culled clusters and Gaussians.
   assign status_o = 192'({gaussians, clusters, 30'b0, damaged, error});
-  assign out_data_o = 96'({out_end, cluster});
+  assign out_data_o = 288'({box, 9'b0, out_end, cluster});
 
   flk_cluster_cull #(
     .BufferBeats(BufferBeats)
@@ -62,6 +63,7 @@ module cluster_cull_bench
     .out_ready_i,
     .out_end_o         (out_end),
     .out_cluster_o     (cluster),
+    .out_box_o         (box),
     .ar_valid_o        (mem_ar_valid_o),
     .ar_ready_i        (mem_ar_ready_i),
     .ar_id_o           (mem_ar_id_o),

@@ -18,7 +18,7 @@ from flicker_tb.runner import seed
 from flicker.arithmetic.ff import ff_round, ff_value
 from flicker.datapath.units import SCALE_HEADER, SCALE_STEP, degree_sum
 from flicker.front.view import DEMO, load_view
-from flicker.golden.front import colour, cull, frame, reach, splat
+from flicker.golden.front import colour, cull, frame, reach, reuse, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
 from flicker.golden.front.setup import CLUSTER_M, FORMATS, FrameSetup
 from flicker.params import Form, SortOrder
@@ -97,6 +97,35 @@ def test_cluster_test() -> None:
     assert keep[: len(table)].any() and not keep[: len(table)].all()
     got = bench("flk_cluster_test")(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
     same(got, {"keep": keep.astype(np.int64)})
+
+
+def test_colours_last() -> None:
+    """Clusters of the demo scene from positions that move by all shares of the distance, and numbers of all sizes: both answers, and each condition alone
+    decides some."""
+    s, rng = demo(PackedFormat.CHUNK), random(3)
+    table, n = s.packed.table, 6
+    position = s.setup.position
+    low, high = (np.repeat(table[name].astype(np.float64), n, axis=0) for name in ("low", "high"))
+    code = np.repeat(s.packed.slopes.astype(np.int64), n)
+    away = np.linalg.norm(np.maximum(np.maximum(low - position, position - high), 0.0), axis=1)
+    move = rng.normal(size=low.shape)
+    move *= (away * 2.0 ** rng.uniform(-9, -1, len(low)) / np.linalg.norm(move, axis=1))[:, None]
+    move[::10] = 0.0
+    then = np.array([ff_round(v, CLUSTER_M) for v in (position + move).ravel().tolist()]).reshape(-1, 3)
+    code[::7], code[3::7] = rng.integers(0, 64, len(code[::7])), rng.integers(0, 24, len(code[3::7]))
+    few = 400
+    numbers = lambda: np.stack([wild(rng, few, CLUSTER_M) for _ in range(3)], 1)  # noqa: E731
+    low, high, then = (np.concatenate([a, numbers()]) for a in (low, high, then))
+    code = np.concatenate([code, rng.integers(0, 64, few)])
+    limit = reuse.limit_of(4 / 255)
+    last = np.zeros(len(low), np.bool_)
+    reuse._last(low, high, code.astype(np.uint8), then, position, limit, last)
+    some = last[: -few]
+    assert 0.2 < some.mean() < 0.8 and some[::10].all()
+    got = bench("flk_colours_last")(
+        {f"position_{k}": position[k] for k in range(3)} | {"limit": limit}, **of("low", low), **of("high", high), **of("then", then), slope=code,
+    )
+    same(got, {"last": last.astype(np.int64)})
 
 
 def test_cluster_header() -> None:
@@ -397,5 +426,5 @@ def test_units_are_named_in_this_file() -> None:
     from flicker.datapath.units import PIPELINES
 
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
-        "cluster_test", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis", "colour_group",
+        "cluster_test", "colours_last", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis", "colour_group",
         "colour_constant", "colour_term")}

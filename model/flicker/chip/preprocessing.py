@@ -17,6 +17,7 @@ import numpy as np
 from ..golden.front.cull import cull
 from ..golden.front.frame import FrontFrame
 from ..golden.front.memory import FrontImage
+from ..golden.front.reuse import CLUSTER_BEATS, ROW, Reused
 from ..golden.front.setup import FrameSetup
 from ..golden.lists import COMBINER_SETS, COMBINER_WAYS, ENTRY_BITS, POINTERS_PER_LINE, WRITERS, pointer_lines
 from ..params import CHIP_MEMORIES, TILE, UNIT_COUNTS, ChipMemories
@@ -96,8 +97,13 @@ def traffic(frame: FrontFrame, image: FrontImage, lanes: int = LANES) -> list[Be
     slot = np.searchsorted(keep, cluster)
     within = frame.gaussian - packed.start[cluster]
     place = before[slot] + within
-    beat, due = _colour_beats(cluster, within, place, packed.headers["colour"].astype(np.int64), packed.colour_strides, lanes)
+    computed = np.ones(len(place), np.bool_) if frame.reused is None else ~frame.reused.stored
+    beat, due = _colour_beats(
+        cluster[computed], within[computed], place[computed], packed.headers["colour"].astype(np.int64), packed.colour_strides, lanes,
+    )
     out.append(Beats("colour", base["colour"] + beat, due, False))
+    if frame.reused is not None:
+        out += _store_beats(frame.reused, regions.store // BEAT, keep, before)
     record = np.unique(regions.records + frame.number * frame.kind.bytes) // BEAT
     last = np.concatenate([record[1:] != record[:-1], [True]]) if len(record) else np.zeros(0, np.bool_)
     out.append(Beats("records", record[last], place[last].astype(np.float64), True))
@@ -124,6 +130,30 @@ def traffic(frame: FrontFrame, image: FrontImage, lanes: int = LANES) -> list[Be
         if write or len(pointers):
             out.append(Beats("pointers", regions.pointers // BEAT + pointers[order], due[order], write))
     return out
+
+
+def _store_beats(reused: Reused, base: int, keep: np.ndarray, before: np.ndarray) -> list[Beats]:
+    """Heads and rows of kept colours, read and written. base: beat of the store. keep: int64 (K,), clusters; before: Gaussians of those before each."""
+    def moved(clusters: np.ndarray, rows: np.ndarray, last: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Beats and when: with the cluster's first Gaussian, with the row's, behind its last one. rows: 0 for the head."""
+        slot = np.searchsorted(keep, clusters)
+        due = before[slot + 1] if last else before[slot] + ROW * np.maximum(rows - 1, 0)
+        return base + CLUSTER_BEATS * clusters + rows, due.astype(np.float64)
+
+    def stream(write: bool, *parts: tuple[np.ndarray, np.ndarray]) -> Beats:
+        beat, due = (np.concatenate(both) for both in zip(*parts))
+        order = np.argsort(due, kind="stable")
+        return Beats("store", beat[order], due[order], write)
+
+    head = lambda clusters: np.zeros(len(clusters), np.int64)  # noqa: E731
+    rows = lambda found: (found[:, 0], found[:, 1] + 1)  # noqa: E731
+    return [
+        stream(False, moved(reused.kept, head(reused.kept), False), moved(*rows(reused.rows_read), False)),
+        stream(
+            True, moved(reused.cleared, head(reused.cleared), False), moved(*rows(reused.rows_written), False),
+            moved(reused.heads_written, head(reused.heads_written), True),
+        ),
+    ]
 
 
 @numba.njit(cache=True)

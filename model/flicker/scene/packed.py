@@ -30,8 +30,8 @@ from .memory import rotation_of
 BEAT = 64  # bytes
 HEADER_BYTES = 256
 MAGIC = b"FLKSCENE"
-VERSION = 1  # of images whose SH codes all have 8 bits and whose tables have no slopes
-VERSION_2 = 2  # of others, and of those that say how fast colours turn
+VERSION = 1  # of images whose SH codes all have 8 bits
+VERSION_SH_BITS = 2  # of others
 CLUSTER_LIMIT = 256  # Gaussians
 SLOT_STEP = 16  # slots of a cluster begin at a multiple
 SLOT_LIMIT = 1 << 24  # a record's number has 24 bits
@@ -107,7 +107,7 @@ TABLE_ENTRY = _record(
     ("high", "<f4", 3),
     ("sigma", "<u2"),  # upper half of a float32
     ("last", "u1"),  # Gaussians - 1
-    ("flags", "u1"),  # bits 1:0: SH degree; bits 7:2: slope of the colours (`scene.slopes`), 0 in version 1
+    ("flags", "u1"),  # bits 1:0: SH degree; bits 7:2: slope of the colours (`scene.slopes`)
     ("first", "<u4"),  # slot / 16
 )
 CHUNK_HEADER = _record(
@@ -262,7 +262,7 @@ class PackedScene:
         """The whole image. Raises FlickerError where a field is too narrow for the scene."""
         header = np.zeros((), IMAGE_HEADER)
         header["magic"], header["format"], header["degree"] = MAGIC, self.format.code, self.degree
-        header["version"] = VERSION if (self.sh_bits == FULL_SH_BITS).all() and not self.slopes.any() else VERSION_2
+        header["version"] = VERSION if (self.sh_bits == FULL_SH_BITS).all() else VERSION_SH_BITS
         header["gaussians"], header["clusters"], header["slots"] = len(self), len(self.table), len(self.geometry)
         header["low"], header["high"] = self.table["low"].min(axis=0), self.table["high"].max(axis=0)
         header["sigma"] = self.sigma.max()
@@ -457,8 +457,8 @@ def _image_header(data: bytes, path: Path) -> tuple[np.ndarray, PackedFormat]:
     if len(data) < HEADER_BYTES:
         raise FlickerError(f"{path}: truncated: {len(data)} bytes, the image header has {HEADER_BYTES}")
     header = np.frombuffer(data, IMAGE_HEADER, 1)[0]
-    if header["version"] not in (VERSION, VERSION_2):
-        raise FlickerError(f"{path}: version: {header['version']}, not {VERSION} or {VERSION_2}")
+    if header["version"] not in (VERSION, VERSION_SH_BITS):
+        raise FlickerError(f"{path}: version: {header['version']}, not {VERSION} or {VERSION_SH_BITS}")
     if (found := zlib.crc32(data[: HEADER_BYTES - 4])) != header["crc"]:
         raise FlickerError(f"{path}: image header: checksum is {found:08x}, not {header['crc']:08x}")
     if header["format"] >= len(PackedFormat):
@@ -505,7 +505,7 @@ def _check_table(packed: PackedScene, header: np.ndarray, path: Path) -> None:
         _refuse(path, ~np.isfinite(table[name]), name, "not finite")
     _refuse(path, table["low"] > table["high"], "low", "above high")
     _refuse(path, (table["sigma"] == 0) | (table["sigma"] >= 0x7F80), "sigma", "not a positive number")
-    if header["version"] == VERSION or packed.format is not PackedFormat.CHUNK:
+    if packed.format is not PackedFormat.CHUNK:
         _refuse(path, table["flags"] > 3, "flags", "reserved bits are not zero")
     used = -(-packed.counts // SLOT_STEP)
     _refuse(path, packed.table["first"] != np.cumsum(used) - used, "first", "not where the slots of the cluster before end")
@@ -530,7 +530,7 @@ def _check_headers(packed: PackedScene, version: int, path: Path) -> None:
             raw = np.ascontiguousarray(headers[name]).view(np.uint8).reshape(len(headers), -1)
             _refuse(path, raw != 0, name, "not zero")
     if packed.format is PackedFormat.CHUNK:
-        legal = (255, *(1 << bits for bits in SH_BITS if version == VERSION_2 or bits == FULL_SH_BITS))
+        legal = (255, *(1 << bits for bits in SH_BITS if version == VERSION_SH_BITS or bits == FULL_SH_BITS))
         _refuse(path, ~np.isin(headers["sh_zero"], legal), "sh_zero", f"none of {', '.join(map(str, sorted(legal)))}")
     if packed.format is PackedFormat.FP16:
         _refuse(path, headers["origin"] != 0, "origin", "not zero")

@@ -27,7 +27,7 @@ from .memory import Order, PortConfig, PurposeCounts
 
 # The memory's controller gives bursts once they are whole, and serves the two highest qualities of service first (docs/reference/memory_port.md).
 PORT = PortConfig(id_bits=7, max_reads=256, max_writes=256, latency=20, hazards=False, order=Order.WHOLE, urgent=14)
-PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header")
+PURPOSES = ("table", "headers", "geometry", "colour", "records", "lists", "pointers", "frame", "image header", "store")
 OF_PLACE = ("records", "lists", "pointers", "frame")  # in the order of a `Place`
 IMAGE = 1 << 28  # address of the scene
 ENTRIES = 2  # of lists expected for each Gaussian; list memory grows when there are more
@@ -214,13 +214,14 @@ class ChipSession(Half):
         )
         return Place(driver.CRegion(records, record_bytes, lists, chunks, pointers), picture, stride, number)
 
+    def store(self, tolerance: float, generation: int = 1) -> driver.CStore:
+        """Memory for kept colours, zeros, for frames that follow each other."""
+        size = self.driver.flk_store_bytes(ctypes.byref(self.scene))
+        return driver.CStore(self.allocate(size, "store", bytes(size)), size, generation, tolerance)
+
     def fail(self, base: int, size: int, writes: bool = True) -> None:
         """Bursts that touch a range, or reads alone, are answered with an error from now on."""
         self._lib.flk_half_fail(self._sim, base, size, writes)
-
-    def mend(self) -> None:
-        """No range fails any more, and channels that had stopped go on."""
-        self._lib.flk_half_mend(self._sim)
 
     def hold_memory(self, hold: bool) -> None:
         """The memory's side of the port is in reset, or no more."""
@@ -236,11 +237,13 @@ class ChipSession(Half):
     def frame(
         self, camera: Camera, place: Place, format_: PixelFormat = PixelFormat.RGB8, *, background: Sequence[int] = (0, 0, 0),
         lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH, tag: int = 0, deadline: int = 0,
+        store: driver.CStore | None = None,
     ) -> driver.CFrame:
-        """The driver's description of a frame."""
+        """The driver's description of a frame. store: kept colours, of `store`."""
         return driver.CFrame(
             ctypes.pointer(self.scene), driver.CCamera.of(camera), place.region, place.frame_buffer, place.stride, int(format_),
             (ctypes.c_uint8 * 3)(*background), int(self.config.cat), lists is ListKind.BOX, tag, deadline, order is SortOrder.DISTANCE,
+            None if store is None else ctypes.pointer(store),
         )
 
     def start(self, frame: driver.CFrame, other: driver.CFrame | None = None) -> int:

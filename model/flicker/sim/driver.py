@@ -51,10 +51,15 @@ class CRegion(ctypes.Structure):
     _fields_ = [("records", u64), ("record_bytes", u64), ("lists", u64), ("chunks", u32), ("pointers", u64)]
 
 
+class CStore(ctypes.Structure):
+    _fields_ = [("address", u64), ("bytes", u64), ("generation", u32), ("tolerance", double)]
+
+
 class CFrame(ctypes.Structure):
     _fields_ = [
         ("scene", ctypes.POINTER(CScene)), ("camera", CCamera), ("region", CRegion), ("frame_buffer", u64), ("stride", u32), ("pixel_format", ctypes.c_uint),
         ("background", u8 * 3), ("mode", ctypes.c_uint), ("box", ctypes.c_int), ("tag", u16), ("deadline", u32), ("by_distance", ctypes.c_int),
+        ("store", ctypes.POINTER(CStore)),
     ]
 
 
@@ -66,7 +71,8 @@ class CDevice(ctypes.Structure):
     _fields_ = [
         ("bus", CBus), ("minor", u32), ("stage", u32), ("form", u32), ("precision", u32), ("vrus", u32), ("mask_generator", u32), ("lanes", u32),
         ("lists", u32), ("beat", u32),
-        ("cores", u32), ("preproc_lanes", u32), ("list_writers", u32), ("sort_units", u32), ("started", u16), ("region", ctypes.c_uint),
+        ("cores", u32), ("preproc_lanes", u32), ("list_writers", u32), ("sort_units", u32), ("colour_store", ctypes.c_int), ("started", u16),
+        ("region", ctypes.c_uint),
     ]
 
 
@@ -89,7 +95,7 @@ def library() -> ctypes.CDLL:
     )))
     for name in ("flk_status_text", "flk_error_text"):
         getattr(lib, name).restype = ctypes.c_char_p
-    for name in ("flk_record_bytes", "flk_list_bytes", "flk_pointer_bytes", "flk_frame_bytes"):
+    for name in ("flk_record_bytes", "flk_list_bytes", "flk_pointer_bytes", "flk_frame_bytes", "flk_store_bytes"):
         getattr(lib, name).restype = u64
     for name in ("flk_ff_bits", "flk_list_chunks", "flk_least_stride", "flk_counter", "flk_interrupt_pending"):
         getattr(lib, name).restype = u32

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Self
@@ -118,6 +118,11 @@ class Half:
             raise self._failure(f"{size} bytes at {base:#x} are not there")
         return out
 
+    def mend(self) -> None:
+        """No range fails any more, and channels that had stopped go on."""
+        self.memory = replace(self.memory, fail=[], fail_reads=[])
+        self._lib.flk_half_mend(self._sim)
+
     def run(
         self, registers: Fields, counters: Sequence[Counter], frames: int, limit: int,
     ) -> tuple[dict[str, int | np.ndarray], list[int]]:
@@ -140,7 +145,7 @@ class Half:
         errors = []
         for frame in range(frames):
             if self.memory.mended and frame == frames - 1:
-                self._lib.flk_half_mend(self._sim)
+                self.mend()
             done = self._lib.flk_half_frame(self._sim, given.ctypes.data, count, limit, out.ctypes.data, len(out), ctypes.byref(error))
             if done < 0:
                 raise self._failure()

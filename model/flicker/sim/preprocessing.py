@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +47,11 @@ class Regions:
     chunks: int
     pointers: int
     pointer_bytes: int
+
+    @property
+    def store(self) -> int:
+        """Of kept colours, behind the pointers."""
+        return -(-(self.pointers + self.pointer_bytes) // PAGE) * PAGE
 
     @staticmethod
     def of(packed: PackedScene, camera: Camera, chunks: int, kind: RecordKind = RecordKind.FACTORED16) -> Regions:
@@ -188,18 +193,22 @@ def front_path(
     packed: PackedScene, cameras: Sequence[Camera], epsilon: float, *, chunks: int, memory: MemoryOptions | None = None, seed: int = 1,
     limit: int = 20_000_000, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], generations: Sequence[int] | None = None,
 ) -> Iterator[RtlFront]:
-    """Frames of a path one after the other, with a colour store that is zero at first. generations: of each frame [1]. Raises as `front_rtl`."""
+    """Frames of a path one after the other, with a colour store that is zero at first. generations: of each frame [1]. memory.mended: from the second one on.
+    Raises as `front_rtl`."""
     run = _Run(packed, RecordKind.FACTORED16, ListKind.ELLIPSE, chunks, SortOrder.DEPTH, 1, limit)
     regions = Regions.of(packed, cameras[0], chunks)
-    address = -(-(regions.pointers + regions.pointer_bytes) // PAGE) * PAGE
     size = len(packed.table) * CLUSTER_BEATS * BEAT
-    with Half("front end", build(lanes=lanes, writers=writers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+    memory = memory or MemoryOptions()
+    options = replace(memory, mended=False)
+    with Half("front end", build(lanes=lanes, writers=writers), dict.fromkeys(PORTS, PORT), options, seed) as sim:
         scene = _load(sim, packed, regions, None)
-        sim.load(address, size, bytes(size), PURPOSES.index("store"))
+        sim.load(regions.store, size, bytes(size), PURPOSES.index("store"))
         for number, camera in enumerate(cameras):
-            setup = StoreSetup(address, epsilon, generations[number] if generations else 1)
+            if number and memory.mended:
+                sim.mend()
+            setup = StoreSetup(regions.store, epsilon, generations[number] if generations else 1)
             found = run.frame(sim, camera, regions, scene, setup)
-            found.store = sim.read(address, size).copy()
+            found.store = sim.read(regions.store, size).copy()
             yield found
 
 

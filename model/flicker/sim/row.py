@@ -20,6 +20,7 @@ from ..golden.front.frame import ListKind
 from ..params import SortOrder
 from ..scene.camera import Camera
 from .chip import LIMIT, OF_PLACE, ChipFrame, ChipSession, Place
+from .driver import CStore
 from .half import BEAT
 
 POLL = 20  # cycles between polls of `flk_ready`
@@ -55,17 +56,19 @@ class _Counted:
         before, now = self.before[place.number], self._now(place)
         self.before[place.number] = now
         beats = {"table": self.table} | {name: int(frame.front[f"{name.removesuffix('s')}_beats"]) for name in ("headers", "geometry", "colour")}
+        beats["store"] = int(frame.front["store_beats"]) + int(frame.front["store_lines"])
         return {name: BEAT * count for name, count in beats.items()} | {name: now[name] - before[name] for name in OF_PLACE}
 
 
 def back_to_back(
     chip: ChipSession, cameras: Sequence[Camera], format_: PixelFormat = PixelFormat.RGB8, *, chunks: int | None = None,
     background: Sequence[int] = (0, 0, 0), lists: ListKind = ListKind.ELLIPSE, order: SortOrder = SortOrder.DEPTH, limit: int = LIMIT,
+    store: CStore | None = None,
 ) -> Iterator[RowFrame]:
     """A frame for each camera, all of one size, each started as soon as the chip takes it: while one is rendered, the front end works on the next.
 
     The session has no other frames. chunks: of a list writer; None: as many as are expected. Where they do not suffice there are four times as many, and the
-    row goes on with the frame before that one, which is not given again: every interval is one of a row. limit: cycles until the next frame ends.
+    row goes on with the frame before that one, which is not given again: every interval is one of a row. limit: cycles until the next frame ends. store: of `ChipSession.store`, colours that frames keep.
     FlickerError, naming the frame, for any other fault.
     """
     given, before = 0, chip.dram_counts().spent
@@ -73,7 +76,7 @@ def back_to_back(
         first = max(given - 1, 0)
         places = [chip.place(cameras[0], format_, chunks=chunks, number=1 + k) for k in range(2)]
         row = [
-            chip.frame(camera, places[k % 2], format_, background=background, lists=lists, order=order, tag=(first + k) % TAGS)
+            chip.frame(camera, places[k % 2], format_, background=background, lists=lists, order=order, tag=(first + k) % TAGS, store=store)
             for k, camera in enumerate(cameras[first:])
         ]
         counted = _Counted(chip, places)
