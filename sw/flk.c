@@ -305,7 +305,7 @@ flk_status_t flk_camera_registers(flk_camera_registers_t *registers, const flk_c
 enum { FACTORED_RECORD_BYTES = 16, CONIC_RECORD_BYTES = 32 };
 /* Runs of lists that the chip's sorting units do not hold: four units, 64 runs of 228 lines. */
 enum { RUN_BYTES = 4 * 64 * 228 * 64 };
-enum { STORE_BYTES = 24 * 64 }; /* of kept colours, a cluster */
+enum { STORE_BYTES = 32 * 64 }; /* of kept colours, a cluster */
 enum { WRITERS = 4, CHUNK_BYTES = 512, CHUNK_ENTRIES = 72, POINTERS_PER_LINE = 16, MAX_CHUNKS = 1 << 24 };
 
 /* Lists of each writer: every other tile in both directions. */
@@ -409,6 +409,8 @@ flk_status_t flk_frame_check(const flk_frame_t *frame, const flk_frame_t *other,
       return FLK_FRAME_KEEPS;
     if (frame->store->generation == 0 || frame->store->bytes < flk_store_bytes(frame->scene))
       return FLK_FRAME_STORE;
+    if (frame->store->address % STORE_BYTES != 0)
+      return FLK_FRAME_ALIGN;
     if (!(frame->store->tolerance >= 0.0 && frame->store->tolerance <= 1.0))
       return FLK_FRAME_TOLERANCE;
   }

@@ -40,7 +40,7 @@ typedef enum {
   FLK_CAMERA_CENTRE,   /* principal point not finite, or beyond 32767 pixels */
   /* flk_frame_check */
   FLK_FRAME_MODE,    /* unknown mode of the contribution test, or unknown pixel format */
-  FLK_FRAME_ALIGN,   /* an address or a size that is no multiple of 64 */
+  FLK_FRAME_ALIGN,   /* an address or a size that is no multiple of 64, or kept colours' of 2048 */
   FLK_FRAME_RANGE,   /* a region that ends beyond 40 bits */
   FLK_FRAME_RECORDS, /* region of records too small for the scene, or the scene too large for the chip's records */
   FLK_FRAME_CHUNKS,  /* chunks not 1 to 2^24 */
@@ -143,7 +143,7 @@ typedef struct {
 /* Colours that are kept from frame to frame (docs/reference/colour_store.md). All frames of a scene may name the same one, those under way too. Its memory holds zeros before
  * its first frame, or what frames of other generations have left. After a frame with FLK_ERROR_FRONT_READ or FLK_ERROR_FRONT_WRITE, take another generation. */
 typedef struct {
-  uint64_t address, bytes;
+  uint64_t address, bytes; /* address: a multiple of 2048 */
   uint32_t generation; /* 1 to 2^32 - 1: another one for another scene */
   double tolerance;    /* by how much a channel may differ from what the camera would show, 0 to 1, such as 2.0 / 255; 0: of a camera that does not move alone */
 } flk_store_t;

@@ -18,6 +18,7 @@ from .front.view import View
 from .golden.front.blend import blend_records
 from .golden.front.frame import FrontFrame, ListKind, run_front
 from .golden.front.record import RecordKind
+from .golden.front.reuse import Reuse
 from .golden.lanes.formats import FORMATS as LANE_FORMATS
 from .golden.lanes.lists import RecordLists, float_lists, front_lists
 from .golden.lanes.render import COUNTS as LANE_COUNTS
@@ -166,9 +167,9 @@ def packed_for_picture(view: View, options: FrontOptions) -> tuple[PackedScene, 
     return packed, {"position_steps": found.as_dict()}
 
 
-def golden_front(view: View, packed: PackedScene, lists: ListKind, kind: RecordKind) -> FrontFrame:
-    """`run_front` of a view and its packed scene, kept by the view: the picture and what it costs need the same."""
-    return view.keep(("front", packed.format, lists, kind), lambda: run_front(packed, view.camera, lists, kind, order=view.order))
+def golden_front(view: View, packed: PackedScene, lists: ListKind, kind: RecordKind, reuse: Reuse | None = None) -> FrontFrame:
+    """`run_front` of a view and its packed scene, kept by the view: the picture and what it costs need the same. reuse: of the first call alone."""
+    return view.keep(("front", packed.format, lists, kind), lambda: run_front(packed, view.camera, lists, kind, order=view.order, reuse=reuse))
 
 
 def bit_true_front(view: View, config: RenderConfig, front: Front, options: FrontOptions, steps: Steps) -> tuple[FrontFrame, dict[str, Any]]:

@@ -5,20 +5,21 @@
 // the store, the bits of what is stored (none where colours do not last), and whether this frame's colours are stored. A head that is
 // about to become wrong leaves without bits (clear_*) before its cluster does.
 // Ahead clusters at most are inside; what was asked for always has room, so that heads never stand in front of rows for long.
-// flush_i: no one takes clusters any more, all go. start_i (while idle_o) begins a frame; setup_i and position_i stay in it.
-// Throughput: a cluster every COLOURS_LAST_LATENCY + 8 cycles. No combinational path from ready to ready.
+// flush_i: no one takes clusters any more, all go. Registers of a frame stay until idle_o.
+// Throughput: a cluster every COLOURS_LAST_LATENCY + 5 cycles. No combinational path from ready to ready.
 module flk_colour_heads
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned Ahead = 8,
-  localparam int unsigned Width = 512
+  parameter int unsigned Ahead = 8
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
   input  logic                 flush_i,
   output logic                 idle_o,
-  input  store_setup_t         setup_i,
+  input  store_place_t         first_i,       // of the store's first cluster
+  input  logic [31:0]          generation_i,
+  input  cluster_t             limit_i,
   input  cluster_t [2:0]       position_i,
   // Clusters
   input  logic                 in_valid_i,
@@ -27,7 +28,7 @@ module flk_colour_heads
   // Requests for heads, in order
   output logic                 ask_valid_o,
   input  logic                 ask_ready_i,
-  output logic [BEAT_BITS-1:0] ask_beat_o,
+  output store_place_t         ask_o,
   // Heads
   input  logic                 head_valid_i,
   output logic                 head_ready_o,
@@ -35,7 +36,7 @@ module flk_colour_heads
   // Heads without bits
   output logic                 clear_valid_o,
   input  logic                 clear_ready_i,
-  output logic [BEAT_BITS-1:0] clear_beat_o,
+  output store_place_t         clear_place_o,
   output store_head_t          clear_o,
   // Clusters, with what is stored
   output logic                 out_valid_o,
@@ -44,56 +45,59 @@ module flk_colour_heads
 );
 
   localparam int unsigned COUNT_BITS = $clog2(Ahead + 1);
-  localparam int unsigned Interval = 4;  // of flk_colours_last
+  localparam int unsigned PlaceBits = $bits(store_place_t);
+  localparam int unsigned LowBits = PlaceBits / 2;
+  localparam int unsigned HighBits = PlaceBits - LowBits;
+  localparam int unsigned Interval = 16;  // of flk_colours_last
   localparam int unsigned STEP_BITS = $clog2(COLOURS_LAST_LATENCY + 1);
 
   typedef struct packed {
-    logic [BEAT_BITS-1:0] beat;
-    cluster_t [2:0]       low;
-    cluster_t [2:0]       high;
-    logic [5:0]           slope;
+    store_place_t   place;
+    cluster_t [2:0] low;
+    cluster_t [2:0] high;
+    logic [5:0]     slope;
   } placed_t;
 
   // ---- clusters -------------------------------------------------------------------------------------
 
-  // A cluster takes 24 beats: its number is multiplied by 3 on the way in, and added behind.
   logic [COUNT_BITS-1:0] inside_q;
-  logic                  in_move, out_move, triple_valid_q, triple_move, ask_valid_q;
-  logic [25:0]           triple_q;
-  boxed_t                boxed_q;
-  logic [BEAT_BITS-1:0]  ask_beat_q, beat;
+  logic                  in_move, out_move, box_valid_q, box_move, ask_valid_q;
+  boxed_t                box_q;
+  store_place_t          ask_q, place;
+  logic [LowBits:0]      low_q;  // of the place, which is added up in two halves
   placed_t               placed;
   logic                  placed_room, placed_valid, placed_take, placed_empty;
 
-  assign in_ready_o  = inside_q < COUNT_BITS'(Ahead) && (!triple_valid_q || triple_move);
-  assign in_move     = in_valid_i && in_ready_o;
-  assign triple_move = triple_valid_q && (!ask_valid_q || ask_ready_i);
-  assign beat        = setup_i.beat + BEAT_BITS'({triple_q, 3'b0});
+  assign in_ready_o = inside_q < COUNT_BITS'(Ahead) && (!box_valid_q || box_move);
+  assign in_move    = in_valid_i && in_ready_o;
+  assign box_move   = box_valid_q && (!ask_valid_q || ask_ready_i);
+  assign place      = {first_i[PlaceBits-1:LowBits] + HighBits'(box_q.index[23:LowBits]) +
+                       HighBits'(low_q[LowBits]), low_q[LowBits-1:0]};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      inside_q       <= '0;
-      triple_valid_q <= 1'b0;
-      ask_valid_q    <= 1'b0;
+      inside_q    <= '0;
+      box_valid_q <= 1'b0;
+      ask_valid_q <= 1'b0;
     end else begin
-      inside_q       <= inside_q + COUNT_BITS'(in_move) - COUNT_BITS'(out_move);
-      triple_valid_q <= in_move || (triple_valid_q && !triple_move);
-      ask_valid_q    <= triple_move || (ask_valid_q && !ask_ready_i);
+      inside_q    <= inside_q + COUNT_BITS'(in_move) - COUNT_BITS'(out_move);
+      box_valid_q <= in_move || (box_valid_q && !box_move);
+      ask_valid_q <= box_move || (ask_valid_q && !ask_ready_i);
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (in_move) begin
-      triple_q <= {1'b0, in_data_i.index, 1'b0} + 26'(in_data_i.index);
-      boxed_q  <= in_data_i;
+      box_q <= in_data_i;
+      low_q <= {1'b0, first_i[LowBits-1:0]} + {1'b0, in_data_i.index[LowBits-1:0]};
     end
-    if (triple_move) begin
-      ask_beat_q <= beat;
+    if (box_move) begin
+      ask_q <= place;
     end
   end
 
   assign ask_valid_o = ask_valid_q;
-  assign ask_beat_o  = ask_beat_q;
+  assign ask_o       = ask_q;
 
   flk_sram_fifo #(
     .Width($bits(placed_t)),
@@ -102,9 +106,9 @@ module flk_colour_heads
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
-    .in_valid_i (triple_move),
+    .in_valid_i (box_move),
     .in_ready_o (placed_room),
-    .in_data_i  ({beat, boxed_q.low, boxed_q.high, boxed_q.slope}),
+    .in_data_i  ({place, box_q.low, box_q.high, box_q.slope}),
     .out_valid_o(placed_valid),
     .out_ready_i(placed_take),
     .out_data_o (placed),
@@ -120,9 +124,8 @@ module flk_colour_heads
   endfunction
 
   state_e               state_d, state_q;
-  logic [1:0]           phase_q;
-  logic [STEP_BITS-1:0] step_q;      // cycles that the cluster has been in the test
-  logic                 testing_q;   // it is in it
+  logic [3:0]           phase_q;     // of the test: 0 with the cluster that has been loaded
+  logic [STEP_BITS-1:0] step_q;      // cycles that it has been in it
   logic                 ours_q;      // generation and a finite position
   logic [3:0]           some_q;      // bits, by quarter
   logic                 last, last_q, same_q, old, lasting, load;
@@ -140,7 +143,7 @@ module flk_colour_heads
         end
       end
       TEST: begin
-        if (testing_q && step_q == STEP_BITS'(COLOURS_LAST_LATENCY)) begin
+        if (step_q == STEP_BITS'(COLOURS_LAST_LATENCY)) begin
           state_d = DECIDE;
         end
       end
@@ -156,21 +159,19 @@ module flk_colour_heads
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      state_q   <= WAIT;
-      phase_q   <= '0;
-      testing_q <= 1'b0;
-      step_q    <= '0;
+      state_q <= WAIT;
+      phase_q <= '0;
+      step_q  <= '0;
     end else begin
-      state_q   <= state_d;
-      phase_q   <= phase_q == 2'(Interval - 1) ? '0 : phase_q + 1'b1;
-      testing_q <= state_q == TEST && (testing_q || phase_q == '0);
-      step_q    <= testing_q ? step_q + 1'b1 : STEP_BITS'(1);
+      state_q <= state_d;
+      phase_q <= load || phase_q == 4'(Interval - 1) ? '0 : phase_q + 1'b1;
+      step_q  <= load ? '0 : step_q + 1'b1;
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (load) begin
-      ours_q <= head_i.generation == setup_i.generation;
+      ours_q <= head_i.generation == generation_i;
       bits_q <= head_i.there;
       for (int unsigned k = 0; k < 3; k++) begin
         then_q[k] <= number(head_i.position[k]);
@@ -203,7 +204,7 @@ module flk_colour_heads
     .position_0_i(position_i[0]),
     .position_1_i(position_i[1]),
     .position_2_i(position_i[2]),
-    .limit_i     (setup_i.limit),
+    .limit_i     (limit_i),
     .last_o      (last)
   );
 
@@ -212,9 +213,8 @@ module flk_colour_heads
   assign old           = ours_q && some_q != '0;
   assign lasting       = old && last_q;
   assign clear_valid_o = state_q == CLEAR;
-  assign clear_beat_o  = placed.beat;
-  assign clear_o       = '{there: '0, zero: '0, generation: setup_i.generation,
-                           position: position_i};
+  assign clear_place_o = placed.place;
+  assign clear_o       = '{there: '0, generation: generation_i, position: position_i};
 
   // ---- what is stored -------------------------------------------------------------------------------
 
@@ -231,7 +231,7 @@ module flk_colour_heads
   stored_t given;
   logic    out_take;
 
-  assign given    = '{beat: placed.beat, storing: storing_q, there: lasting_q ? bits_q : '0};
+  assign given    = '{place: placed.place, storing: storing_q, there: lasting_q ? bits_q : '0};
   assign out_take = out_ready_i || flush_i;
   assign out_move = out_valid_o && out_take;
 
@@ -254,17 +254,17 @@ module flk_colour_heads
   assign idle_o = inside_q == '0;
 
   logic unused;
-  assign unused = ^{placed_empty, out_empty, head_i.zero, Width};
+  assign unused = ^{placed_empty, out_empty};
 
 `ifndef SYNTHESIS
-  assert property (@(posedge clk_i) disable iff (!rst_ni) triple_move |-> placed_room)
+  assert property (@(posedge clk_i) disable iff (!rst_ni) box_move |-> placed_room)
   else $error("flk_colour_heads: a cluster without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) state_q == GIVE |-> out_room)
   else $error("flk_colour_heads: a tested cluster without a place");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      inside_q != '0 |-> $stable({setup_i, position_i}))
+      inside_q != '0 |-> $stable({first_i, generation_i, limit_i, position_i}))
   else $error("flk_colour_heads: registers changed in a frame");
 `endif
 

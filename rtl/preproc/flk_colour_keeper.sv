@@ -21,12 +21,12 @@ module flk_colour_keeper
   input  logic                     start_i,
   input  logic                     drop_i,
   output logic                     idle_o,
-  input  store_setup_t             setup_i,
+  input  logic [31:0]              generation_i,
   input  cluster_t [2:0]           position_i,
   // Clusters
   input  logic                     cluster_valid_i,
   output logic                     cluster_ready_o,
-  input  logic [BEAT_BITS-1:0]     cluster_beat_i,
+  input  store_place_t             cluster_place_i,
   input  logic                     cluster_storing_i,
   // Turns
   input  logic                     turn_valid_i,
@@ -49,8 +49,8 @@ module flk_colour_keeper
   localparam int unsigned CountBits = 3;  // 0 to 4
 
   typedef struct packed {
-    logic [BEAT_BITS-1:0] beat;
-    logic                 storing;
+    store_place_t place;
+    logic         storing;
   } about_t;
 
   typedef struct packed {
@@ -62,10 +62,11 @@ module flk_colour_keeper
   // ---- what waits -----------------------------------------------------------------------------------
 
   about_t             about;
-  turn_t              turn;
+  turn_t              turn, waiting;
   store_entry_t [3:0] next;
   logic               about_valid, about_take, about_empty;
   logic               turn_valid, turn_take, turns_empty, next_valid, next_take, records_empty;
+  logic               waiting_valid, waiting_take;
 
   flk_sram_fifo #(
     .Width($bits(about_t)),
@@ -76,7 +77,7 @@ module flk_colour_keeper
     .clear_i    (start_i),
     .in_valid_i (cluster_valid_i),
     .in_ready_o (cluster_ready_o),
-    .in_data_i  ({cluster_beat_i, cluster_storing_i}),
+    .in_data_i  ({cluster_place_i, cluster_storing_i}),
     .out_valid_o(about_valid),
     .out_ready_i(about_take),
     .out_data_o (about),
@@ -93,11 +94,44 @@ module flk_colour_keeper
     .in_valid_i (turn_valid_i),
     .in_ready_o (turn_ready_o),
     .in_data_i  ({turn_last_i, turn_there_i, turn_alive_i}),
-    .out_valid_o(turn_valid),
-    .out_ready_i(turn_take),
-    .out_data_o (turn),
+    .out_valid_o(waiting_valid),
+    .out_ready_i(waiting_take),
+    .out_data_o (waiting),
     .empty_o    (turns_empty)
   );
+
+  // The turn in work, with the number of its records.
+  logic                 turn_valid_q;
+  turn_t                turn_q;
+  logic [CountBits-1:0] waiting_count, count_q;
+
+  always_comb begin
+    waiting_count = '0;
+    for (int unsigned k = 0; k < Lanes; k++) begin
+      waiting_count = waiting_count + CountBits'(waiting.alive[k]);
+    end
+  end
+
+  assign waiting_take = !turn_valid_q || turn_take;
+  assign turn_valid   = turn_valid_q;
+  assign turn         = turn_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      turn_valid_q <= 1'b0;
+    end else if (start_i || drop_i) begin
+      turn_valid_q <= 1'b0;
+    end else if (waiting_take) begin
+      turn_valid_q <= waiting_valid;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (waiting_take) begin
+      turn_q  <= waiting;
+      count_q <= waiting_count;
+    end
+  end
 
   flk_sram_fifo #(
     .Width(4 * $bits(store_entry_t)),
@@ -122,18 +156,17 @@ module flk_colour_keeper
   logic                             open_valid_q, take, both, refill, drop;
   logic [1:0]                       gone_q;
   logic [Lanes-1:0][CountBits-1:0]  ahead;
-  logic [CountBits-1:0]             count;
   logic [3:0]                       behind;  // gone with this turn's
   store_entry_t [Lanes-1:0]         found;
 
   always_comb begin
-    count = '0;
-    for (int unsigned k = 0; k < Lanes; k++) begin
-      ahead[k] = count;
-      count    = count + CountBits'(turn.alive[k]);
+    ahead = '0;
+    for (int unsigned k = 1; k < Lanes; k++) begin
+      ahead[k] = ahead[k-1] + CountBits'(turn.alive[k-1]);
     end
-    behind = 4'(gone_q) + 4'(count);
   end
+
+  assign behind = 4'(gone_q) + 4'(count_q);
 
   for (genvar k = 0; k < Lanes; k++) begin : gen_found
     logic [2:0] at;
@@ -152,10 +185,9 @@ module flk_colour_keeper
   logic [4:0]                   row_q;
   logic                         row_end, last_q, wanted, written_q, row_done;
   logic [Rows-1:0][STORE_ROW-1:0] bits_q;
-  logic [BEAT_BITS-1:0]         row_beat_q;
 
   assign turn_take = state_q == FILL && turn_valid && about_valid &&
-                     (count == '0 || (open_valid_q && (behind <= 4'd4 || next_valid)));
+                     (count_q == '0 || (open_valid_q && (behind <= 4'd4 || next_valid)));
   assign row_end   = turn.last || place_q == 4'(STORE_ROW - Lanes);
   // It leaves: a survivor's colour is new, and no stored one would be lost.
   assign wanted    = about.storing && (alive_q & ~there_q) != '0 && (there_q & ~alive_q) == '0;
@@ -241,8 +273,7 @@ module flk_colour_keeper
       open_q <= next;
     end
     if (turn_take) begin
-      last_q     <= turn.last;
-      row_beat_q <= about.beat + BEAT_BITS'(row_q) + 1'b1;
+      last_q <= turn.last;
       for (int unsigned p = 0; p < STORE_ROW; p++) begin
         if (4'(p - p % Lanes) == place_q) begin
           entry_q[p] <= found[p%Lanes];
@@ -265,8 +296,7 @@ module flk_colour_keeper
   store_head_t      head;
   logic [Width-1:0] row_line;
 
-  assign head = '{there: 256'({bits_q}), zero: '0, generation: setup_i.generation,
-                  position: position_i};
+  assign head = '{there: 256'({bits_q}), generation: generation_i, position: position_i};
 
   always_comb begin
     row_line = '0;
@@ -275,16 +305,17 @@ module flk_colour_keeper
     end
   end
 
-  assign line_beat_o = state_q == HEAD ? about.beat : row_beat_q;
-  assign line_o      = state_q == HEAD ? head : row_line;
-  assign idle_o      = turns_empty && state_q == FILL;
+  assign line_beat_o = {about.place, state_q == HEAD ? 5'd0 : row_q + 1'b1};
+  assign line_o      = state_q == HEAD ? {head.there, 128'b0, head.generation, head.position}
+                                       : row_line;
+  assign idle_o      = turns_empty && !turn_valid_q && state_q == FILL;
 
   logic unused;
   assign unused = ^{about_empty, records_empty, bits_q[Rows-1][STORE_ROW-1:4]};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni || start_i)
-      turn_take |-> (open_valid_q || count == '0))
+      turn_take |-> (open_valid_q || count_q == '0))
   else $error("flk_colour_keeper: records that are not there");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni || start_i)

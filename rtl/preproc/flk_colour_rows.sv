@@ -9,10 +9,9 @@
 module flk_colour_rows
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned Lanes   = LANES,  // 1, 2 or 4
-  parameter  int unsigned Waiting = 128,
-  parameter  int unsigned Items   = 64,     // turns whose rows are under way
-  localparam int unsigned Width   = 512
+  parameter int unsigned Lanes   = LANES,  // 1, 2 or 4
+  parameter int unsigned Waiting = 128,
+  parameter int unsigned Items   = 64      // turns whose rows are under way
 ) (
   input  logic                     clk_i,
   input  logic                     rst_ni,
@@ -25,7 +24,7 @@ module flk_colour_rows
   input  logic [Lanes-1:0]         turn_stored_i,  // of the alive ones
   input  logic [5:0]               turn_group_i,
   input  logic [1:0]               turn_at_i,      // place in the group of the first lane's
-  input  logic [BEAT_BITS-1:0]     turn_beat_i,    // of the cluster in the store
+  input  store_place_t             turn_place_i,   // of the cluster
   // Requests for rows, in order
   output logic                     ask_valid_o,
   input  logic                     ask_ready_i,
@@ -33,7 +32,7 @@ module flk_colour_rows
   // Rows
   input  logic                     row_valid_i,
   output logic                     row_ready_o,
-  input  logic [Width-1:0]         row_i,
+  input  store_entry_t [STORE_ROW-1:0] row_i,
   // Computed colours
   input  logic         [Lanes-1:0] in_valid_i,
   output logic         [Lanes-1:0] in_ready_o,
@@ -54,17 +53,17 @@ module flk_colour_rows
 
   logic                 a_valid_q, a_move, known_q, same, item_room, asking;
   logic [Lanes-1:0]     a_stored_q;
-  logic [4:0]           row, a_row_q, row_q;
+  logic [4:0]           row, a_row_q, row_q;  // the latter two: of the cluster's beats
   logic [3:0]           a_place_q;
-  logic [BEAT_BITS-1:0] a_beat_q, beat_q;
+  store_place_t         a_cluster_q, cluster_q;
 
   assign row          = store_row(turn_group_i);
   assign turn_ready_o = !a_valid_q;
-  assign same         = known_q && row_q == a_row_q && beat_q == a_beat_q;
+  assign same         = known_q && row_q == a_row_q && cluster_q == a_cluster_q;
   assign asking       = a_valid_q && !same && item_room;
   assign a_move       = a_valid_q && item_room && (same || ask_ready_i);
   assign ask_valid_o  = asking;
-  assign ask_beat_o   = a_beat_q + BEAT_BITS'(a_row_q) + 1'b1;
+  assign ask_beat_o   = {a_cluster_q, a_row_q};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -78,14 +77,14 @@ module flk_colour_rows
 
   always_ff @(posedge clk_i) begin
     if (turn_ready_o) begin  // turn_stored_i comes late
-      a_stored_q <= turn_stored_i;
-      a_row_q    <= row;
-      a_place_q  <= 4'({turn_group_i - 6'(6'(row) * 6'd3), 2'b0}) | 4'(turn_at_i);
-      a_beat_q   <= turn_beat_i;
+      a_stored_q  <= turn_stored_i;
+      a_row_q     <= row + 1'b1;
+      a_place_q   <= 4'({turn_group_i - 6'(6'(row) * 6'd3), 2'b0}) | 4'(turn_at_i);
+      a_cluster_q <= turn_place_i;
     end
     if (a_move) begin
-      row_q  <= a_row_q;
-      beat_q <= a_beat_q;
+      row_q     <= a_row_q;
+      cluster_q <= a_cluster_q;
     end
   end
 
@@ -94,7 +93,7 @@ module flk_colour_rows
   logic                        item_valid, item_move, items_empty, loaded_q, load;
   item_t                       item;
   logic [Lanes-1:0]            entry_room;
-  logic [STORE_ROW-1:0][39:0]  entries_q;
+  store_entry_t [STORE_ROW-1:0] entries_q;
 
   flk_sram_fifo #(
     .Width($bits(item_t)),
@@ -127,7 +126,7 @@ module flk_colour_rows
 
   always_ff @(posedge clk_i) begin
     if (load) begin
-      entries_q <= row_i[40*STORE_ROW-1:0];
+      entries_q <= row_i;
     end
   end
 
@@ -160,10 +159,10 @@ module flk_colour_rows
 
     // Lanes follow each other in a row: this one's are at every Lanes-th place.
     always_comb begin
-      entry_in = store_entry_t'(entries_q[k][37:0]);
+      entry_in = entries_q[k];
       for (int unsigned p = k; p < STORE_ROW; p += Lanes) begin
         if (item.place == 4'(p - k)) begin
-          entry_in = store_entry_t'(entries_q[p][37:0]);
+          entry_in = entries_q[p];
         end
       end
     end
@@ -207,14 +206,6 @@ module flk_colour_rows
         turn_valid_i && turn_ready_o && turn_alive_i[k] |-> order_room)
     else $error("flk_colour_rows: a survivor more than a lane holds");
 `endif
-  end
-
-  logic unused_spare;
-  always_comb begin
-    unused_spare = ^row_i[Width-1:40*STORE_ROW];
-    for (int unsigned p = 0; p < STORE_ROW; p++) begin
-      unused_spare = unused_spare ^ (^entries_q[p][39:38]);
-    end
   end
 
   assign idle_o = !a_valid_q && items_empty && !loaded_q && (&order_empty) && (&entry_empty);

@@ -102,9 +102,9 @@ module flk_colour_store
   logic [1:0]           ask_valid, ask_ready;
   ask_t [1:0]           asks;
   logic                 clear_valid, clear_ready, stored_valid, stored_take;
-  logic [BEAT_BITS-1:0] clear_beat;
+  store_place_t         ask_head, clear_place;
   logic [Width-1:0]     beat_data;
-  store_head_t          clear;
+  store_head_t          head, clear;
   stored_t              stored;
 
   assign kept_ready_o = heads_ready || !enable_q;
@@ -114,26 +114,30 @@ module flk_colour_store
     .rst_ni,
     .flush_i      (flush_i || !shown_q),
     .idle_o       (heads_idle),
-    .setup_i,
+    .first_i      (setup_i.first),
+    .generation_i (setup_i.generation),
+    .limit_i      (setup_i.limit),
     .position_i,
     .in_valid_i   (kept_valid_i && enable_q),
     .in_ready_o   (heads_ready),
     .in_data_i    (kept_i),
     .ask_valid_o  (ask_valid[0]),
     .ask_ready_i  (ask_ready[0]),
-    .ask_beat_o   (asks[0].beat),
+    .ask_o        (ask_head),
     .head_valid_i (beat_valid && beat_is_head),
     .head_ready_o (head_ready),
-    .head_i       (beat_data),
+    .head_i       (head),
     .clear_valid_o(clear_valid),
     .clear_ready_i(clear_ready),
-    .clear_beat_o (clear_beat),
+    .clear_place_o(clear_place),
     .clear_o      (clear),
     .out_valid_o  (stored_valid),
     .out_ready_i  (stored_take),
     .out_data_o   (stored)
   );
 
+  assign head         = {beat_data[511:256], beat_data[127:0]};
+  assign asks[0].beat = {ask_head, 5'd0};
   assign asks[0].head = 1'b1;
   assign asks[1].head = 1'b0;
 
@@ -160,7 +164,12 @@ module flk_colour_store
 
   // ---- rows -----------------------------------------------------------------------------------------
 
-  logic rows_idle;
+  logic                         rows_idle;
+  store_entry_t [STORE_ROW-1:0] row;
+
+  for (genvar p = 0; p < STORE_ROW; p++) begin : gen_row
+    assign row[p] = beat_data[40*p+:38];
+  end
 
   flk_colour_rows #(
     .Lanes  (Lanes),
@@ -176,13 +185,13 @@ module flk_colour_store
     .turn_stored_i(alive_i & there_o),
     .turn_group_i (group_i),
     .turn_at_i    (at_i),
-    .turn_beat_i  (stored.beat),
+    .turn_place_i (stored.place),
     .ask_valid_o  (ask_valid[1]),
     .ask_ready_i  (ask_ready[1]),
     .ask_beat_o   (asks[1].beat),
     .row_valid_i  (beat_valid && !beat_is_head),
     .row_ready_o  (row_ready),
-    .row_i        (beat_data),
+    .row_i        (row),
     .in_valid_i,
     .in_ready_o,
     .in_data_i,
@@ -304,11 +313,11 @@ module flk_colour_store
     .start_i,
     .drop_i           (!shown_q),
     .idle_o           (keeper_idle),
-    .setup_i,
+    .generation_i     (setup_i.generation),
     .position_i,
     .cluster_valid_i  (turn && !opened_q),
     .cluster_ready_o  (about_ready),
-    .cluster_beat_i   (stored.beat),
+    .cluster_place_i  (stored.place),
     .cluster_storing_i(stored.storing),
     .turn_valid_i     (turn),
     .turn_ready_o     (keeper_ready),
@@ -340,8 +349,9 @@ module flk_colour_store
   assign clear_ready  = line_ready_i && !keeping_q;
   assign keep_ready   = line_ready_i && (keeping_q || !clear_valid);
   assign line_valid_o = clear_valid || keep_valid;
-  assign line_beat_o  = clear_valid && !keeping_q ? clear_beat : keep_beat;
-  assign line_o       = clear_valid && !keeping_q ? clear : keep;
+  assign line_beat_o  = clear_valid && !keeping_q ? {clear_place, 5'd0} : keep_beat;
+  assign line_o       = clear_valid && !keeping_q
+                      ? {clear.there, 128'b0, clear.generation, clear.position} : keep;
 
   assign error_o = error_q;
   assign idle_o  = heads_idle && rows_idle && fetch_idle && buffer_empty && keeper_idle;

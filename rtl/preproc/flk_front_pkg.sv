@@ -23,7 +23,7 @@ package flk_front_pkg;
 
   // Cycles from an element to its outputs
   localparam int unsigned CLUSTER_TEST_LATENCY = 36;
-  localparam int unsigned COLOURS_LAST_LATENCY = 32;
+  localparam int unsigned COLOURS_LAST_LATENCY = 48;
   localparam int unsigned CLUSTER_HEADER_LATENCY = 8;
   localparam int unsigned GEOMETRY_DECODE_LATENCY = 14;
   localparam int unsigned PROJECTION_LATENCY = 72;

@@ -155,21 +155,24 @@ package flk_preproc_pkg;
     logic [3:0][2:0][15:0]   raw;      // by coefficient, channel
   } colour_part_t;
 
-  // The colour store (docs/reference/colour_store.md): 24 beats a cluster, of which the first is the head and 22 are rows of 12 entries.
+  // The colour store (docs/reference/colour_store.md): 32 beats a cluster, of which the first is the head and 22 are rows of 12 entries.
   localparam int unsigned STORE_ROW = 12;
   localparam int unsigned STORE_ROWS = 22;
+  localparam int unsigned STORE_LINE_BITS = 5;
+  typedef logic [BEAT_BITS-STORE_LINE_BITS-1:0] store_place_t;  // of a cluster: its first beat / 32
 
   // Registers of a frame.
   typedef struct packed {
     logic                 enable;
-    logic [BEAT_BITS-1:0] beat;        // where the store begins
+    store_place_t         first;       // of the first cluster
     logic [31:0]          generation;
     cluster_t             limit;       // square of what colours may differ by
   } store_setup_t;
 
+  // A head: bits 255:0 of its beat are zero but for generation and position, which lie lowest.
+
   typedef struct packed {
     logic [3:0][63:0] there;       // colours that are stored, by Gaussian of the cluster
-    logic [127:0]     zero;
     logic [31:0]      generation;
     logic [2:0][31:0] position;    // of the camera that they are for
   } store_head_t;
@@ -181,7 +184,7 @@ package flk_preproc_pkg;
 
   // A cluster with what may be shown of it.
   typedef struct packed {
-    logic [BEAT_BITS-1:0] beat;     // of its head
+    store_place_t         place;
     logic                 storing;  // this frame's colours are stored
     logic [3:0][63:0]     there;
   } stored_t;

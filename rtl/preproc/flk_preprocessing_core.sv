@@ -440,8 +440,8 @@ module flk_preprocessing_core
     .rd_data_o(header)
   );
 
-  logic unused;
-  assign unused = ^{part_q.cluster, codes_empty};
+  logic unused_cluster;
+  assign unused_cluster = ^part_q.cluster;
 
   // Its first part takes a survivor out of the queue, its last one the spherical harmonics.
   assign part_go        = held_q && (!part_q.first || (survivor_valid && side_room && record_room &&
@@ -481,6 +481,9 @@ module flk_preprocessing_core
     .out_data_o (codes),
     .empty_o    (codes_empty)
   );
+
+  logic unused_codes;
+  assign unused_codes = codes_empty;
 
   group_first_t [2:0]  first;
   group_fourth_t [2:0] fourth;

@@ -116,7 +116,6 @@ module flk_frame_control
   logic [10:0]  pointer_lines;
   logic [16:0]  row_bytes;
   logic         misaligned_q, unfit_q, unkept_q;
-  logic [25:0]  triple_q;              // three times the clusters
 
   assign pairs         = 8'((cols_q + 1'b1) >> 1);
   assign half_rows     = 8'((rows_q + 1'b1) >> 1);
@@ -206,14 +205,13 @@ module flk_frame_control
     misaligned_q <= (frame_q.scene_table[5:0] | frame_q.headers[5:0] | frame_q.geometry[5:0] |
                      frame_q.colours[5:0] | frame_q.records[5:0] | frame_q.lists[5:0] |
                      frame_q.pointers[5:0] | frame_q.frame_buffer[5:0] |
-                     (frame_q.store[5:0] & {6{frame_q.generation != '0}}) |
                      {1'b0, frame_q.stride[4:0]}) != '0;
     unfit_q      <= frame_q.lane.width == '0 || frame_q.lane.width > 13'd4096 ||
                     frame_q.lane.height == '0 || frame_q.lane.height > 13'd4096 ||
                     frame_q.mode > CAT_AUTO || frame_q.clusters == '0;
-    triple_q     <= {1'b0, frame_q.clusters, 1'b0} + 26'(frame_q.clusters);
     unkept_q     <= frame_q.generation != '0 && (!ColourStore || !frame_q.lane.chunked ||
-                                                 {triple_q, 3'b0} > frame_q.store_beats);
+                                                 frame_q.store[10:0] != '0 ||
+                                                 {frame_q.clusters, 5'b0} > frame_q.store_beats);
     if (take) begin
       front_error_q <= '0;
     end else if (front_q == CHECK && check_q == 2'd2) begin
@@ -231,7 +229,7 @@ module flk_frame_control
 
   assign front_o.cull          = frame_q.cull;
   assign front_o.lane          = frame_q.lane;
-  assign front_o.store         = '{enable: frame_q.generation != '0, beat: beat(frame_q.store),
+  assign front_o.store         = '{enable: frame_q.generation != '0, first: frame_q.store[39:11],
                                    generation: frame_q.generation, limit: frame_q.tolerance};
   assign front_o.table_beat    = beat(frame_q.scene_table);
   assign front_o.headers_beat  = beat(frame_q.headers);

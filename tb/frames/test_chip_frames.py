@@ -39,6 +39,7 @@ from flicker.golden.frame_buffer import PixelFormat, late_frame_buffer, least_st
 from flicker.golden.front.frame import OUTCOMES, FrontFrame, ListKind, Outcome, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
+from flicker.golden.front.reuse import CLUSTER_BEATS, ColourStore, Reuse
 from flicker.golden.lanes.lists import front_lists
 from flicker.params import CORES, FAITHFUL, CatMode, Form, RenderConfig, SortOrder
 from flicker.pipeline import Engine, FrontOptions, packed_scene
@@ -47,9 +48,11 @@ from flicker.scene.files import Scene
 from flicker.scene.packed import SH_BITS, PackedFormat, PackedScene, decode
 from flicker.scene.packing import Recipe, pack
 from flicker.scene.real import REAL_VIEWS, RealView, real_scenes
+from flicker.sim import driver
 from flicker.sim.chip import PORT, ChipFrame, ChipSession
 from flicker.sim.half import MemoryOptions
 from flicker.sim.memory import CHANNELS, Order, PortConfig, PurposeCounts, WriteOrder
+from flicker.sim.row import back_to_back
 
 LIMIT = 1_000_000  # cycles: a chip that hangs says so within minutes
 CONFIG = RenderConfig(stage="lanes")
@@ -646,6 +649,100 @@ def test_refused_descriptors() -> None:
             assert done.error == 1 << ResultError.DESCRIPTOR and np.array_equal(before, done.buffer), register
             assert not any(np.any(value) for value in done.front.values()) and not any(np.any(value) for value in done.rendering.values())
         check(chip, view)
+
+
+KEPT_PATH = [camera(), camera(), camera(x=0.003), camera(x=0.006), camera(x=0.3), camera(away=True), camera(), camera(x=0.001)]
+
+
+@pytest.mark.parametrize("config", [CONFIG, pytest.param(CHANNELS_CONFIG, marks=pytest.mark.slow)], ids=["lanes", "channels"])
+def test_kept_colours(config: RenderConfig) -> None:
+    """Frames back to back, two under way, that keep colours and show those of frames before: each as in the golden model, with what it moves, and the store
+    behind the last one."""
+    epsilon = 4 / 255
+    with session(config=config, port=replace(PORT, stall={name: 0.2 for name in CHANNELS}, seed=seed())) as chip:
+        assert chip.device.colour_store
+        store, kept = chip.store(epsilon, 7), ColourStore(chip.packed)
+        stored = []
+        for done, view in zip(back_to_back(chip, KEPT_PATH, background=BLUE, store=store), KEPT_PATH, strict=True):
+            front = run_front(chip.packed, view, kind=RecordKind.of(config.form), reuse=Reuse(kept, epsilon, 7))
+            want = render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config, PixelFormat.RGB8, BLUE)
+            assert np.array_equal(done.frame.buffer, want.buffer)
+            found = front.reused
+            assert (done.frame.front["store_beats"], done.frame.front["store_lines"]) == (found.read_beats, found.written_beats)
+            assert done.moved["store"] == 64 * (found.read_beats + found.written_beats)
+            stored.append(found.stored.mean() if len(found.stored) else 0.0)
+        assert stored[0] == 0.0 and stored[1] == 1.0 and any(0.0 < s < 1.0 for s in stored)
+        assert np.array_equal(chip.read(store.address, store.bytes), kept.image())
+        # Frames that keep none, between.
+        check(chip, camera(x=0.1), config=config)
+
+
+def test_kept_colours_behind_aborts() -> None:
+    """Frames that are aborted or late at random times leave no colour that is not its position's: with a tolerance of 0, what follows is what it is without a store,
+    from the same position, the one before and another one. Behind a reset it is so in another generation."""
+    rng = random.Random(f"{seed()} kept")
+    port = replace(PORT, stall={name: 0.2 for name in CHANNELS}, seed=seed())
+    with session(port=port) as chip:
+        views = [camera(), camera(x=0.05), camera(x=-0.4)]
+        pictures = {k: render_chip(front_lists(run_front(chip.packed, view)), CONFIG, PixelFormat.RGB8, BLUE).buffer for k, view in enumerate(views)}
+        place, store = chip.place(views[0]), chip.store(0.0)
+        cut = 0
+        for turn in range(14):
+            frame = chip.frame(views[turn % 3], place, background=BLUE, tag=turn, store=store)
+            late = turn % 2 == 0
+            frame.deadline = rng.randint(800, 5000) if late else 0
+            chip.start(frame)
+            if late:
+                cut += chip.finish(frame, LIMIT).error == 1 << ResultError.LATE
+            else:
+                chip.step(rng.randint(1000, 8000))
+                chip.driver.flk_abort(ctypes.byref(chip.device))
+                while chip.field("status", "aborting"):
+                    chip.step(10)
+                chip.set_register("interrupt", 31)
+            for k in rng.sample(range(3), 2):
+                after = chip.frame(views[k], place, background=BLUE, tag=100 + k, store=store)
+                chip.start(after)
+                done = chip.finish(after, LIMIT)
+                assert done.error == 0 and np.array_equal(done.buffer, pictures[k]), (turn, k)
+        assert cut > 3
+        chip.start(chip.frame(views[0], place, background=BLUE, store=store))
+        chip.step(5000)
+        chip.hold_memory(True)
+        chip.driver.flk_reset(ctypes.byref(chip.device))
+        chip.step(20)
+        chip.hold_memory(False)
+        store.generation += 1
+        frame = chip.frame(views[0], place, background=BLUE, store=store)
+        chip.start(frame)
+        assert np.array_equal(chip.finish(frame, LIMIT).buffer, pictures[0])
+
+
+def test_kept_colours_refused() -> None:
+    """By the driver with a code, and past it by the chip; nothing is written."""
+    packed, view = small(), camera()
+    with session() as chip:
+        place, good = chip.place(view), chip.store(0.1)
+        write = lambda store: chip.call("flk_frame_write", ctypes.byref(chip.device), ctypes.byref(chip.frame(view, place, store=store)), None)  # noqa: E731
+        bad = lambda **fields: driver.CStore(**{name: fields.get(name, getattr(good, name)) for name, _ in driver.CStore._fields_})  # noqa: E731
+        for status, store in (
+            ("FRAME_STORE", bad(bytes=good.bytes - 64)), ("FRAME_STORE", bad(generation=0)), ("FRAME_ALIGN", bad(address=good.address + 1024)),
+            ("FRAME_TOLERANCE", bad(tolerance=-0.1)), ("FRAME_TOLERANCE", bad(tolerance=1.5)), ("FRAME_TOLERANCE", bad(tolerance=float("nan"))),
+            ("FRAME_OVERLAP", bad(address=place.region.records)), ("FRAME_OVERLAP", bad(address=int(chip.scene.address))),
+            ("FRAME_RANGE", bad(address=(1 << 40) - 2048)), ("OK", good),
+        ):
+            assert write(store) == status, (status, store.address, store.bytes, store.tolerance)
+        before = chip.read(good.address, good.bytes).copy()
+        for register, value in (("store_low", good.address + 1024), ("store_beats", CLUSTER_BEATS * len(packed.table) - 1), ("frame", 0)):
+            assert write(good) == "OK"
+            chip.set_register(register, value)
+            chip._check(chip.call("flk_start", ctypes.byref(chip.device), None))
+            assert chip.finish(chip.frame(view, place), LIMIT).error == 1 << ResultError.DESCRIPTOR, register
+        assert np.array_equal(chip.read(good.address, good.bytes), before)
+        check(chip, view)
+    with session(pack(decode(packed), PackedFormat.FP16).packed) as chip:
+        store = chip.store(0.1)
+        assert chip.call("flk_frame_write", ctypes.byref(chip.device), ctypes.byref(chip.frame(view, chip.place(view), store=store)), None) == "FRAME_KEEPS"
 
 
 def test_damaged_images() -> None:

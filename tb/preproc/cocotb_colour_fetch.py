@@ -14,7 +14,7 @@ from flicker.sim.memory import Memory, PortConfig
 
 BASE, SIZE = 0x7F_F000, 0x8_0000  # beats from below a multiple of 2^17, where the halves of an address meet
 CLUSTERS = 8  # whose colours may be under way
-PART = (("cluster", 4), ("first", 1), ("last", 1), ("part", 2), ("used", 4), ("opacity", 16), ("dc", 48), ("raw", 192))
+PART = (("cluster", 4), ("stored", 1), ("first", 1), ("last", 1), ("part", 2), ("used", 4), ("opacity", 16), ("dc", 48), ("raw", 192))
 USED = {0: [0], 1: [7], 2: [15, 15], 3: [15, 15, 15, 7]}
 
 
@@ -96,7 +96,7 @@ class Fetch:
                 for part, used in enumerate(USED[g.degree]):
                     raw = {(i, c): self.code(at, 12 * part + 3 * i + c, g.sh_bits) for i in range(4) for c in range(3) if used >> i & 1}
                     lanes[k % self.lanes].append({
-                        "cluster": g.cluster % 16, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
+                        "cluster": g.cluster % 16, "stored": 0, "first": part == 0, "last": part == len(USED[g.degree]) - 1, "part": part, "used": used,
                         "opacity": opacity, "dc": dc, "raw": raw,
                     })
         return lanes
@@ -150,7 +150,7 @@ class Fetch:
                 for name, width in reversed(PART):
                     fields[name] = word & (1 << width) - 1
                     word >>= width
-                for name in ("cluster", "first", "last", "part", "used") + (("opacity",) if part["first"] else ()):
+                for name in ("cluster", "stored", "first", "last", "part", "used") + (("opacity",) if part["first"] else ()):
                     assert fields[name] == part[name], f"lane {k}, part {i}: {name} {fields[name]}, due {part[name]}"
                 if part["first"]:
                     assert [fields["dc"] >> 16 * c & 0xFFFF for c in range(3)] == part["dc"], f"lane {k}, part {i}: dc"

@@ -11,8 +11,8 @@ from rich.table import Table
 from ..errors import FlickerError, FlickerWarning, Interrupted
 from ..front.path_rules import kind_of
 from ..output import write_text
-from ..params import Coords, SortOrder
-from .engine import Chosen, EngineChoice, parse_engine, takes_engine
+from ..params import Coords, Form, SortOrder
+from .engine import Chosen, EngineChoice, FormatChoice, parse_engine, takes_engine
 from .kept import command_line, printed
 from .options import (
     BACKGROUND_HELP,
@@ -62,6 +62,9 @@ def path(
     background: Annotated[str, typer.Option(help=BACKGROUND_HELP)] = "black",
     order: Annotated[SortOrder, typer.Option(help=ORDER_HELP)] = SortOrder.DEPTH,
     chosen: Chosen,
+    keep_colours: Annotated[str | None, typer.Option(
+        "--keep-colours", help="show colours of frames before while no channel differs by more than this, such as 2/255; of bit-true front ends",
+    )] = None,
     side_by_side: Annotated[str | None, typer.Option(
         "--side-by-side", help="reference, or options of a second configuration such as '--stage channels --cat sparse': it and the error stand beside",
     )] = None,
@@ -88,6 +91,7 @@ def path(
         raise FlickerError("--workers: not with --engine chip, whose frames go through one simulation")
     if cycles and chosen.config.coords is Coords.ABSOLUTE:
         raise FlickerError("--cycles: not with --coords absolute, of which no chip has records")
+    tolerance = None if keep_colours is None else _tolerance(keep_colours, chosen, workers, resume)
     second = None if side_by_side in (None, REFERENCE) else parse_engine(side_by_side, "--side-by-side")  # type: ignore[arg-type]
     video = out.suffix.lower() in VIDEOS
     if not video and out.suffix and not out.is_dir():
@@ -129,7 +133,7 @@ def path(
         along, what = path_of(source, Asked(kind, pan or orbit or 0.0, view, wanted_size, frames, fps, **given))  # type: ignore[arg-type]
     judged = stats is not None or chart is not None or warping
     wanted = Wanted(
-        drawing, None if second is None else second.drawing(), judged or side_by_side == REFERENCE, judged, warping, cycles, behind, order, judged,
+        drawing, None if second is None else second.drawing(), judged or side_by_side == REFERENCE, judged, warping, cycles, behind, order, judged, tolerance,
     )
     beside = None if side_by_side is None else record.Beside("reference" if second is None else _short(second), 8.0 if amplify is None else amplify)
     recording = record.Recording(source.scene, source.file or str(scene), along, fps, clock * 1e9, wanted, _short(chosen), beside)
@@ -141,12 +145,13 @@ def path(
     settings = {
         "drawing": repr(wanted.drawing), "side-by-side": f"{wanted.beside!r} {beside!r}", "background": list(behind), "order": order.value,
         "figures": [judged, warping, cycles],
+        **({} if tolerance is None else {"keep-colours": tolerance}),
         **simulator,
     }
     if said := kept.begin(keep.about(source.file or str(scene), along, fps, settings), resume):
         printed(said)
     printed(f"{source.file or scene}: {what}, {len(along)} frames of {along[0].width}x{along[0].height} at {fps:g} frames a second")
-    count = workers or (1 if len(along) - len(kept.rows) < MANY else _cores())
+    count = workers or (1 if tolerance is not None or len(along) - len(kept.rows) < MANY else _cores())
 
     def finish() -> None:
         with steps.step(f"writing {out}"):
@@ -177,6 +182,28 @@ def path(
         raise FlickerError(f"{error}; {len(kept.rows)} frames are kept in {folder}, --resume writes it") from None
     kept.finish()
     _show(recording, kept.rows, out, seconds / max(len(kept.rows) - before, 1))
+
+
+def _tolerance(text: str, chosen: Chosen, workers: int | None, resume: bool) -> float:
+    """Of --keep-colours, a number or a share."""
+    from fractions import Fraction
+
+    drawn = chosen.engine
+    try:
+        value = float(Fraction(text))
+    except (ValueError, ZeroDivisionError):
+        value = -1.0
+    if not 0.0 <= value <= 1.0:
+        raise FlickerError(f"--keep-colours: {text}: not 0 to 1, such as 2/255")
+    if drawn in (EngineChoice.REFERENCE, EngineChoice.RTL) or (drawn is EngineChoice.GOLDEN and (chosen.front is None or chosen.front.value != "golden")):
+        raise FlickerError("--keep-colours: for --engine golden with --front golden, chip-golden and chip")
+    if chosen.config.form is not Form.FACTORED or chosen.memory not in (None, FormatChoice.CHUNK):
+        raise FlickerError("--keep-colours: of scenes in chunks, in records of 16 bytes")
+    if workers not in (None, 1):
+        raise FlickerError("--keep-colours: --workers must be 1, as every frame needs those before it")
+    if resume and drawn is EngineChoice.CHIP:
+        raise FlickerError("--keep-colours: no --resume with --engine chip, whose memory is gone")
+    return value
 
 
 def _cores() -> int:
@@ -244,6 +271,8 @@ def _show(recording: Recording, rows: list[dict], out: Path, seconds: float) -> 
                               ("warping_error_reference", "warping error of the reference", ".3e")):
         if (value := mean_of(rows, name)) is not None:
             table.add_row(label, format(value, form))
+    if (value := mean_of(rows, "kept_colours")) is not None:
+        table.add_row("colours of frames before", f"{value:.1%}")
     if (value := mean_of(rows, "pops")) is not None:
         table.add_row("pops a frame", f"{value:,.1f} pairs, {mean_of(rows, 'popped') or 0.0:.4%} of the pixels")
     timing = timing_of(rows, recording.slot)

@@ -307,7 +307,7 @@ def constant_range(formats: FrontFormats) -> Int:
 
 PIPELINES = [
     Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
-    Pipeline("flk_colours_last", 4, colours_last, "Whether a cluster's stored colours may be shown."),
+    Pipeline("flk_colours_last", 16, colours_last, "Whether a cluster's stored colours may be shown."),
     Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
     Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, key, what its bounds need."),

@@ -23,7 +23,9 @@ from ..errors import FlickerError, FlickerWarning
 from ..front.pops import Seen, seen_in
 from ..front.reference import expected_depth
 from ..front.view import View
+from ..golden.front.frame import FrontFrame
 from ..golden.front.record import RecordKind
+from ..golden.front.reuse import ColourStore, Reuse
 from ..params import SortOrder
 from ..pipeline import Front, golden_front, packed_scene
 from ..scene import Scene
@@ -37,7 +39,8 @@ AHEAD = 2  # frames that wait for their turn, for each process
 @dataclass(frozen=True)
 class Wanted:
     """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference.
-    cycles: what the frame costs on the chip, by its models. order: what splats are sorted by. pops: what is needed to count them."""
+    cycles: what the frame costs on the chip, by its models. order: what splats are sorted by. pops: what is needed to count them. tolerance: by how much colours
+    that are kept from frame to frame may differ, of the drawing's bit-true front end; None: none are kept."""
 
     drawing: Drawing
     beside: Drawing | None = None
@@ -48,6 +51,7 @@ class Wanted:
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     order: SortOrder = SortOrder.DEPTH
     pops: bool = False
+    tolerance: float | None = None
 
 
 @dataclass
@@ -82,15 +86,38 @@ def seen_by(view: View, drawing: Drawing) -> Seen:
     return golden_front(view, packed, options.lists, RecordKind.of(drawing.config.form)).seen()
 
 
-def make(scene: Scene, wanted: Wanted, number: int, camera: Camera) -> Made:
-    """Frame `number` of a path."""
+class KeptColours:
+    """Colours that frames of a path keep, in their order."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        self._reuse: Reuse | None = None
+
+    def front(self, view: View) -> FrontFrame | None:
+        """The front end of a frame, by the golden model, from which all that is made of the view goes on; None where no colours are kept."""
+        drawing, tolerance = self.wanted.drawing, self.wanted.tolerance
+        if tolerance is None:
+            return None
+        packed = packed_scene(view, drawing.options.format, drawing.options.rechunk)
+        if self._reuse is None:
+            self._reuse = Reuse(ColourStore(packed), tolerance)
+        return golden_front(view, packed, drawing.options.lists, RecordKind.of(drawing.config.form), self._reuse)
+
+
+def make(scene: Scene, wanted: Wanted, number: int, camera: Camera, kept: KeptColours | None = None) -> Made:
+    """Frame `number` of a path. kept: of the frames before it."""
     began = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FlickerWarning)
         view = View(camera, scene, number=number, background=wanted.background, order=wanted.order)
+        front = None if kept is None else kept.front(view)
         rendered = wanted.drawing.render(view)
         facts = _counts(rendered.stats)
-        beside = None if wanted.beside is None else wanted.beside.render(view).image
+        if front is not None and front.reused is not None:
+            facts["kept_colours"] = float(front.reused.stored.mean()) if len(front.reused.stored) else 0.0
+        # What stands beside it keeps none.
+        other = view if front is None else View(camera, scene, number=number, background=wanted.background, order=wanted.order)
+        beside = None if wanted.beside is None else wanted.beside.render(other).image
         reference = view.reference if wanted.reference else None
         if wanted.quality:
             facts |= {"ssim": ssim(rendered.image, view.reference), "flip": flip(rendered.image, view.reference)}
@@ -126,10 +153,15 @@ def _make(number: int, camera: Camera) -> Made:
 
 
 def frames(scene: Scene, file: str | Path, cameras: Sequence[Camera], wanted: Wanted, first: int = 0, workers: int = 1) -> Iterator[Made]:
-    """Frames `first` to the last one of a path, in order. file: of the scene, for the processes; workers: of them, 1: none, all is made here."""
+    """Frames `first` to the last one of a path, in order. file: of the scene, for the processes; workers: of them, 1: none, all is made here, as it must be where
+    colours are kept."""
     if workers == 1:
+        kept = KeptColours(wanted)
+        if wanted.tolerance is not None:  # those that are there have left their colours
+            for number in range(first):
+                kept.front(View(cameras[number], scene, order=wanted.order))
         for number in range(first, len(cameras)):
-            yield make(scene, wanted, number, cameras[number])
+            yield make(scene, wanted, number, cameras[number], kept)
         return
     before = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(

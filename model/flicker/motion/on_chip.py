@@ -17,7 +17,7 @@ from ..scene.camera import Camera
 from ..sim.chip import ChipSession
 from ..sim.half import MemoryOptions
 from ..sim.row import RowFrame, back_to_back, differs
-from .frames import Made, Wanted, make
+from .frames import KeptColours, Made, Wanted, make
 
 
 def _facts(done: RowFrame, config: RenderConfig) -> dict[str, Any]:
@@ -39,9 +39,11 @@ def chip_frames(scene: Scene, cameras: Sequence[Camera], wanted: Wanted, first: 
     packed = packed_scene(View(cameras[first], scene), drawing.options.format, drawing.options.rechunk)
     with ChipSession(packed, drawing.config, memory=MemoryOptions(drawing.dram.timing)) as chip:
         background = [round(255 * float(v)) for v in wanted.background]
-        row = back_to_back(chip, cameras[first:], background=background, lists=drawing.options.lists, order=wanted.order)
+        store = None if wanted.tolerance is None else chip.store(wanted.tolerance)
+        kept = KeptColours(golden)
+        row = back_to_back(chip, cameras[first:], background=background, lists=drawing.options.lists, order=wanted.order, store=store)
         for number in range(first, len(cameras)):
-            made = make(scene, golden, number, cameras[number])
+            made = make(scene, golden, number, cameras[number], kept)
             began = time.perf_counter()
             done = next(row)
             image = frame_image(done.frame.buffer, cameras[number])

@@ -25,7 +25,7 @@ from .keep import Kept
 
 COLUMNS = (
     "frame", "time_s", "visible", "tile_entries", "subtile_entries", "psnr_db", "temporal_psnr_db", "jumps", "ssim", "flip", "warping_error",
-    "warping_error_reference", "pops", "popped", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
+    "warping_error_reference", "pops", "popped", "kept_colours", "cycles", "latency_cycles", "front_cycles", "render_cycles", "stage_cycles", "late", "bytes",
 )
 
 

@@ -91,9 +91,9 @@ def registers(
     middle_bits = MIDDLE_INTEGER + f.mean
     bits += [(int(v) & (1 << middle_bits) - 1, middle_bits) for v in setup.middle[::-1]]
     if store is None:
-        bits += [(0, 1), (0, 34), (0, 32), (0, 32)]
+        bits += [(0, 1), (0, 29), (0, 32), (0, 32)]
     else:
-        bits += [(1, 1), (store.address // BEAT, 34), (store.generation, 32)]
+        bits += [(1, 1), (store.address // (BEAT * CLUSTER_BEATS), 29), (store.generation, 32)]
         numbers(np.array([limit_of(store.epsilon)]), CLUSTER_M)
     offset = regions.image // BEAT + HEADER_BYTES // BEAT
     for part in packed.sections().values():
@@ -108,7 +108,7 @@ def registers(
 
 @dataclass(frozen=True)
 class StoreSetup:
-    """Of a frame that keeps colours (`golden.front.reuse`). address: of the store, bytes, a multiple of 64."""
+    """Of a frame that keeps colours (`golden.front.reuse`). address: of the store, bytes, a multiple of 2048."""
 
     address: int
     epsilon: float

@@ -72,16 +72,23 @@ COMPOSED: dict[str, list[str]] = {
     "flk_run_merge": [MEMORY, "flk_axi_read"],
     "flk_list_sorter": ["flk_sorting_unit", "flk_run_writer", "flk_run_merge"],
     "flk_axi_fetch": ["flk_axi_read"],
-    "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
+    "flk_cluster_cull": ["flk_cluster_test", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo", "flk_delay_ram"],
     "flk_geometry_fetch": ["flk_cluster_header", "flk_axi_fetch", "flk_sram_fifo", "flk_fifo"],
     "flk_colour_fetch": ["flk_axi_fetch", "flk_sram_fifo"],
+    "flk_colour_heads": ["flk_colours_last", "flk_sram_fifo"],
+    "flk_colour_rows": ["flk_sram_fifo", "flk_fifo"],
+    "flk_colour_keeper": ["flk_sram_fifo"],
+    "flk_colour_store": [
+        "flk_colour_heads", "flk_colour_rows", "flk_colour_keeper", "flk_axi_fetch", "flk_sram_fifo", "flk_stream_arbiter", "flk_event_counter",
+    ],
     "flk_preprocessing_core": [
         MEMORY, "flk_geometry_decode", "flk_projection", "flk_projection_conic", "flk_sram_fifo", "flk_fifo", "flk_colour_basis",
         "flk_colour_group", "flk_colour_constant", "flk_colour_term", "flk_splat_bounds", "flk_tile_walker", "flk_mean_field", "flk_shape_field",
         "flk_opacity_to_fp16", "flk_ff_to_fp16",
     ],
     "flk_preprocessing": [
-        "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_preprocessing_core", "flk_record_writer", "flk_entry_merge", "flk_list_writer",
+        "flk_cluster_cull", "flk_geometry_fetch", "flk_colour_fetch", "flk_colour_store", "flk_axi_read_mux", "flk_preprocessing_core", "flk_record_writer",
+        "flk_entry_merge", "flk_list_writer",
         "flk_stream_arbiter", "flk_fifo", "flk_sram_fifo", "flk_line_writer", "flk_delay", "flk_event_counters",
     ],
     "flk_line_writer": ["flk_sram_fifo", "flk_axi_write"],
@@ -157,7 +164,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
             for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))
         ],
         "flk_pointer_port": [f"{channel}_{name}" for channel in "rb" for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))],
-        "flk_preprocessing_core": ["part_i[267]"],  # of eight clusters the low bits tell
+        "flk_preprocessing_core": ["part_i[268]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
         # Zeros fill a record of 32 bytes.
@@ -340,10 +347,11 @@ def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
     return [unit(p.module) for p in PIPELINES] + [
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_opacity_to_fp16"),
-        unit("flk_coefficient"), unit("flk_event_counter"), unit("flk_event_counters", "19 x 4", Counters=19, Sources=4),
+        unit("flk_coefficient"), unit("flk_event_counter"), unit("flk_event_counters", "20 x 4", Counters=20, Sources=4),
         unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
         unit("flk_delay_ram", "60 x 30", Width=60, Depth=30),
         unit("flk_cluster_cull"), unit("flk_geometry_fetch"), unit("flk_colour_fetch"), unit("flk_tile_walker"),
+        unit("flk_colour_heads"), unit("flk_colour_rows"), unit("flk_colour_keeper"), unit("flk_colour_store"),
         unit("flk_entry_merge", "queues of 32", Depth=32),
         unit("flk_entry_near"), unit("flk_line_entry"), unit("flk_sort_runs", "16 cells", Cells=16), unit("flk_sort_memory", "512 x 52", Depth=512),
         unit("flk_sort_merge", "runs of 512", Run=512, Lists=8),

@@ -8,7 +8,7 @@ slope of at most s (`scene.slopes`) no colour differs by more than s asin(|move|
 
 in ff numbers of 23 bits, whose rounding is within what 1.0125 is larger. Where the position is the stored one, always.
 
-The store: 24 beats a cluster. Beat 0, the head: position (3 x float32), generation (uint32), 16 bytes of zeros, and a bit for each of the cluster's
+The store: 32 beats a cluster, at a multiple of 2048 bytes. Beat 0, the head: position (3 x float32), generation (uint32), 16 bytes of zeros, and a bit for each of the cluster's
 Gaussians whose colour is there. Beats 1 to 22, the rows: 12 Gaussians each, 5 bytes a Gaussian: bits 29:0 colour as in a record, 37:30 opacity code.
 
 A frame, cluster by cluster of those that pass the cull. Its colours last where the head has the frame's generation, a bit at least, and the test holds. Of a
@@ -31,7 +31,7 @@ from ...scene.packed import BEAT, CLUSTER_LIMIT, PackedFormat, PackedScene
 from ...scene.slopes import CODE_ONE, CODE_SHIFT
 from .setup import CLUSTER_M, FrameSetup, image_floats, rounded
 
-CLUSTER_BEATS = 24  # of the store, a cluster
+CLUSTER_BEATS = 32  # of the store, a cluster; those behind the rows are not used
 ROW = 12  # Gaussians of a row
 ROWS = -(-CLUSTER_LIMIT // ROW)
 ENTRY_BYTES = 5
