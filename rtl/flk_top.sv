@@ -43,7 +43,7 @@ module flk_top
   parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists
   parameter  bit          ColourStore    = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
-  parameter  int unsigned Gather         = 256,   // of flk_preprocessing
+  parameter  int unsigned Gather         = 216,   // of flk_preprocessing
   parameter  int unsigned Pointers       = 2048,  // of a list writer on the chip: up to 1920x1088
   parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters

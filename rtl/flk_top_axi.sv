@@ -33,7 +33,7 @@ module flk_top_axi
   parameter int unsigned ListWriters    = 4,
   parameter bit          ColourStore    = 1'b1,
   parameter int unsigned Waiting        = 128,
-  parameter int unsigned Gather         = 256,
+  parameter int unsigned Gather         = 216,
   parameter int unsigned Pointers       = 2048,
   parameter int unsigned Lists          = 16384,
   parameter int unsigned Patience       = 16,

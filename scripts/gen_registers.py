@@ -162,7 +162,19 @@ def access(field: FieldNode) -> str:
 
 def markdown(top: AddrmapNode, enums: dict[str, Any]) -> str:
     rows = []
+    halves = {reg.inst_name: reg for reg in registers(top)}
     for reg in registers(top):
+        stem, _, half = reg.inst_name.rpartition("_")
+        if half == "high" and f"{stem}_low" in halves:
+            continue
+        if half == "low" and (high := halves.get(f"{stem}_high")) is not None:  # of an address: both in one row
+            text = reg.get_property("desc", default="").removesuffix(".")
+            bits = " and ".join(f"{field.high}:{field.low}" for field in (*fields(reg), *fields(high)))
+            rows.append([
+                f"0x{offset(reg):03X}, 0x{offset(high):03X}", f"`{stem}_low`, `{stem}_high`", bits, "`value`", access(fields(reg)[0]), "0x0",
+                f"{text}; byte address, bits 31:0 and 39:32",
+            ])
+            continue
         place = f"0x{offset(reg):03X}"
         name = f"`{reg.inst_name}`"
         if count(reg) > 1:

@@ -199,7 +199,7 @@ class ChipMemories:
     pairs: int = 4
     survivors: int = 128
     sort_ways: int = 8
-    gathered_lines: int = 256
+    gathered_lines: int = 216
     merge_lines: int = 128
 
     def __post_init__(self) -> None:

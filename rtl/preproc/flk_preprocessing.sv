@@ -25,7 +25,7 @@ module flk_preprocessing
   parameter  bit          ColourStore  = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Pointers     = 2048,  // of a bank of lists, held on the chip
   parameter  int unsigned Lists        = 16384, // of a bank, at most
-  parameter  int unsigned Gather       = 256,   // lines that are written together
+  parameter  int unsigned Gather       = 216,   // lines that are written together
   parameter  int unsigned Waiting      = 128,   // survivors of a lane that wait for colours
   parameter  int unsigned IdBits       = 4,
   localparam int unsigned Width    = 512,
@@ -170,7 +170,7 @@ module flk_preprocessing
 
   state_e state_d, state_q;
   logic   start, cull_idle, geometry_idle, front_idle, back_idle;
-  logic   merge_idle, records_idle, write_idle;
+  logic   merge_idle, records_idle, write_idle, store_idle;
   logic   colour_idle, ended_q, lists_end, arbiter_empty;
   logic [PreprocLanes-1:0] lane_idle, queued_empty;
   logic [ListWriters-1:0]  list_idle, list_failed;
@@ -650,7 +650,7 @@ module flk_preprocessing
 
   flk_colour_fetch #(
     .Lanes      (PreprocLanes),
-    .BufferBeats(128),
+    .BufferBeats(112),
     .IdBits     (IdBits)
   ) i_colours (
     .clk_i,
@@ -686,7 +686,7 @@ module flk_preprocessing
 
   // ---- colours that are stored ----------------------------------------------------------------------
 
-  logic                 store_idle, store_error, keep_valid, keep_ready, keep_room;
+  logic                 store_error, keep_valid, keep_ready, keep_room;
   logic                 keep_record;
   store_entry_t [3:0]   kept_record;
   logic [31:0]          store_beats;

@@ -615,12 +615,12 @@ module flk_preprocessing_core
     logic last;
   } end_t;
 
-  if (COLOUR_GROUP_LATENCY + TermCycles < COLOUR_CONSTANT_LATENCY) begin : gen_check_latency
+  if (COLOUR_GROUP_LATENCY + TermCycles < COLOUR_CONSTANT_LATENCY + 2) begin : gen_check_latency
     $error("flk_preprocessing_core: the constant part is later than the first term");
   end
 
   end_t [TermCycles-1:0] end_q;
-  end_t                  ended;
+  end_t                  ended, ending;
   logic                  total_valid_q, rgb_valid_q;
   logic [2:0][ColourBits-1:0] rgb;
   logic [2:0]            clipped;
@@ -628,7 +628,7 @@ module flk_preprocessing_core
 
   flk_delay #(
     .Width($bits(constant)),
-    .Depth(COLOUR_GROUP_LATENCY + TermCycles - COLOUR_CONSTANT_LATENCY)
+    .Depth(COLOUR_GROUP_LATENCY + TermCycles - 1 - COLOUR_CONSTANT_LATENCY)
   ) i_constant_late (
     .clk_i,
     .en_i(colour_en),
@@ -636,8 +636,10 @@ module flk_preprocessing_core
     .q_o (constant_late)
   );
 
+  // What a colour begins with stands beside its first term.
   assign ended      = end_q[TermCycles-1];
-  assign codes_take = colour_en && ended.term && ended.stored;
+  assign ending     = end_q[TermCycles-2];
+  assign codes_take = colour_en && ending.term && ending.stored;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -654,7 +656,7 @@ module flk_preprocessing_core
 
   for (genvar c = 0; c < 3; c++) begin : gen_channels
     term_t                       term;
-    constant_t                   begins;  // constant part, or the stored colour
+    constant_t                   begin_q;  // constant part, or the stored colour
     logic signed [TotalBits-1:0] total_q;
     logic [ColourBits-1:0]       code_d, code_q;
     logic                        clipped_d, clipped_q;
@@ -702,15 +704,14 @@ module flk_preprocessing_core
       );
     end
 
-    assign begins = ended.stored ? constant_t'(codes[c]) <<< (TERM_FRACTION - 9)
-                                 : constant_late[c];
-
     always_ff @(posedge clk_i) begin
       if (colour_en && ended.term) begin
-        total_q <= (ended.first ? TotalBits'($signed(begins)) : total_q)
+        total_q <= (ended.first ? TotalBits'($signed(begin_q)) : total_q)
                  + TotalBits'(term);
       end
       if (colour_en) begin
+        begin_q   <= ending.stored ? constant_t'(codes[c]) <<< (TERM_FRACTION - 9)
+                                   : constant_late[c];
         clipped_q <= clipped_d;
         code_q    <= code_d;
       end

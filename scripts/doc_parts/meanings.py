@@ -14,6 +14,7 @@ from .common import Say
 # Pages of docs/reference/ and the modules of flicker whose docstrings they show.
 MODULES = {
     "front_end": "golden.front.cull golden.front.splat golden.front.reach golden.front.colour",
+    "colour_store": "golden.front.reuse",
     "lanes": "golden.lanes.lane golden.lanes.mask",
     "ff": "arithmetic.ff_tables",
     "mask_bounds": "explore.generators.exact explore.generators.rows",

@@ -26,7 +26,8 @@ PAGES = (
     )),
     ("Front end", (
         ("front_end.md", "flk_preprocessing* flk_preproc_pkg flk_front_pkg flk_colour_fetch"), ("cluster_cull.md", "flk_cluster_cull flk_geometry_fetch"),
-        ("datapath.md", "flk_cluster_* flk_geometry_decode flk_projection* flk_splat_b* flk_colour_* flk_*_field flk_coefficient flk_phase_mux"),
+        ("colour_store.md", "flk_colour_store flk_colour_heads flk_colour_rows flk_colour_keeper"),
+        ("datapath.md", "flk_cluster_* flk_geometry_decode flk_projection* flk_splat_b* flk_colour_* flk_colours_* flk_*_field flk_coefficient flk_phase_mux"),
         ("entries_and_records.md", "flk_tile_walker flk_entry_merge flk_record_writer"), ("list_writer.md", "flk_list_writer flk_pointer_port"),
     )),
     ("Rendering half", (
@@ -57,6 +58,7 @@ HEADS = {
     "streams": "flk_pipe_reg flk_skid_buffer flk_fifo flk_sram_fifo flk_pair_fifo flk_stream_arbiter",
     "frame_control": "flk_frame_control flk_frame_counters", "memory_port": "flk_axi_arbiter flk_priority_arbiter flk_axi_hold flk_axi_lane flk_axi_downsizer",
     "front_end": "flk_preprocessing flk_preprocessing_core flk_colour_fetch", "cluster_cull": "flk_cluster_cull flk_geometry_fetch",
+    "colour_store": "flk_colour_store flk_colour_heads flk_colour_rows flk_colour_keeper",
     "entries_and_records": "flk_tile_walker flk_entry_merge flk_record_writer", "list_writer": "flk_list_writer flk_pointer_port",
     "rendering": "flk_rendering flk_tile_walk", "list_reader": "flk_list_reader", "bitonic_sorter": "flk_bitonic_sorter",
     "sorting_unit": "flk_sorting_unit flk_sort_runs flk_sort_merge flk_sort_select",

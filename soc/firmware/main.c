@@ -41,6 +41,9 @@ static const char *const STATUS_NAME[FLK_STATUSES] = {
     [FLK_FRAME_DEADLINE] = "FRAME_DEADLINE",
     [FLK_FRAME_ORDER] = "FRAME_ORDER",
     [FLK_FRAME_SH_BITS] = "FRAME_SH_BITS",
+    [FLK_FRAME_STORE] = "FRAME_STORE",
+    [FLK_FRAME_TOLERANCE] = "FRAME_TOLERANCE",
+    [FLK_FRAME_KEEPS] = "FRAME_KEEPS",
     [FLK_DEVICE_ID] = "DEVICE_ID",
     [FLK_DEVICE_VERSION] = "DEVICE_VERSION",
     [FLK_BUSY] = "BUSY",
@@ -177,6 +180,7 @@ static void find_chip(void)
   say_line("preprocessing lanes", g.device.preproc_lanes);
   say_line("list writers", g.device.list_writers);
   say_line("sorting units", g.device.sort_units);
+  say_line("keeps colours", (uint32_t)g.device.colour_store);
 }
 
 static void take_view(uint32_t view)

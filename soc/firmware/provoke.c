@@ -146,6 +146,17 @@ static void frames(void)
   f = good;
   f.scene = &narrow;
   say_status(flk_frame_write(&old, &f, NULL));
+  flk_store_t store = {.address = 0, .bytes = 0, .generation = 1, .tolerance = 0.0};
+  f = good;
+  f.store = &store;
+  check(&f, NULL, 0);
+  store.bytes = flk_store_bytes(good.scene);
+  store.tolerance = 2.0;
+  check(&f, NULL, 0);
+  flk_scene_t halves = *good.scene;
+  halves.format = FLK_FORMAT_FP16;
+  f.scene = &halves;
+  check(&f, NULL, 0);
 }
 
 /* A bus with nothing on it, and one with a chip of the next major version. */

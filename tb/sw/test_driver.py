@@ -27,6 +27,7 @@ from flicker.chip_registers import REGISTERS, ResultError
 from flicker.errors import FlickerError
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.front.record import RecordKind
+from flicker.golden.front.reuse import ColourStore, limit_of
 from flicker.golden.front.setup import CLUSTER_M, FrameSetup
 from flicker.golden.lists import CHUNK_LINES, LINE_BYTES, MAX_CHUNKS, WRITERS, list_chunks, pointer_lines
 from flicker.golden.long_lists import region_bytes
@@ -50,6 +51,7 @@ from flicker.sim.driver import (
     CFrame,
     CRegion,
     CScene,
+    CStore,
     library,
     statuses,
     u8,
@@ -394,9 +396,9 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3 | 5 << 8)
+        self.set("version", 3 | 6 << 8)
         self.set("capability_units", 0x1201)
-        self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5)
+        self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5, colour_store=1)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
         self.bus = CBus(*self.calls, 0x1234)
@@ -517,6 +519,55 @@ def test_each_fault_of_a_frame(lib: ctypes.CDLL, chunk: PackedScene) -> None:
             place(moved, far[moved])
 
 
+def test_kept_colours(lib: ctypes.CDLL, chunk: PackedScene, chip: Chip) -> None:
+    """The region's place and size, generation and tolerance; two frames may share it, and nothing else may; what the chip is told, and that a frame without takes
+    it back."""
+    frame, scene = good_frame(lib, chunk)
+    other, _scene = good_frame(lib, chunk)
+    size = lib.flk_store_bytes(ctypes.byref(scene))
+    assert size == len(ColourStore(chunk).image())
+    store = CStore(1 << 38, size, 7, 2 / 255)
+    frame.store = ctypes.pointer(store)
+
+    def status(**changes: Any) -> str:
+        before = {name: getattr(store, name) for name in changes}
+        for name, value in changes.items():
+            setattr(store, name, value)
+        found = check_frame(lib, frame)
+        for name, value in before.items():
+            setattr(store, name, value)
+        return found
+
+    assert status() == status(tolerance=0.0) == status(tolerance=1.0) == status(generation=(1 << 32) - 1) == status(address=(1 << 40) - size & -2048) == "OK"
+    assert status(bytes=size - 1) == status(generation=0) == "FRAME_STORE"
+    assert {status(tolerance=x) for x in (-1e-300, 1.0 + 2**-52, float("nan"), float("inf"))} == {"FRAME_TOLERANCE"}
+    assert {status(address=(1 << 38) + at) for at in (1, 64, 1024)} == {"FRAME_ALIGN"} and status(address=(1 << 40) - 2048) == "FRAME_RANGE"
+    region = frame.region
+    for at in (region.records, region.lists, region.pointers, frame.frame_buffer, scene.address):
+        assert status(address=at & -2048) == "FRAME_OVERLAP"
+    conic, _conic = good_frame(lib, chunk, records=Form.CONIC)
+    conic.store = frame.store
+    assert check_frame(lib, conic, form=Form.CONIC) == "FRAME_KEEPS"
+    for name in ("records", "lists", "pointers"):
+        setattr(other.region, name, getattr(other.region, name) + (1 << 36))
+    other.store = ctypes.pointer(store)
+    assert check_frame(lib, other, frame) == "OK"
+    away, other.store = other.region.records, None
+    other.region.records = store.address
+    assert check_frame(lib, other, frame) == check_frame(lib, frame, other) == "FRAME_OVERLAP"
+    other.region.records = away
+    write = lambda what: chip.call("flk_frame_write", ctypes.byref(what), None)  # noqa: E731
+    chip.device.colour_store = 0
+    assert write(frame) == "FRAME_KEEPS" and not chip.writes
+    chip.device.colour_store = 1
+    assert write(frame) == "OK"
+    assert (chip.get("store_low") | chip.get("store_high") << 32, chip.get("store_beats"), chip.get("generation")) == (1 << 38, size // 64, 7)
+    assert chip.get("tolerance") == ff_bits(limit_of(2 / 255), CLUSTER_M)
+    assert write(other) == "OK" and chip.get("generation") == 0
+    scene.format = 1
+    assert check_frame(lib, frame) == "FRAME_KEEPS"
+
+
 def test_records_of_either_form(lib: ctypes.CDLL, chunk: PackedScene) -> None:
     """A chip of the conic form wants twice as much; more records than its register counts are refused."""
     frame, scene = good_frame(lib, chunk)
@@ -557,7 +608,8 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
     frame.box, frame.by_distance = 7, -1
     assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "OK"
     centred = {REGISTERS[name].offset + 4 * i for name in ("middle", "least") for i in range(2)}  # of a principal point off the middle
-    descriptor = {offset for offset in chip.value if offset >= 0x100 and offset not in centred}
+    kept = {REGISTERS[name].offset for name in ("store_low", "store_high", "store_beats", "tolerance")}  # of frames that keep colours
+    descriptor = {offset for offset in chip.value if offset >= 0x100 and offset not in centred | kept}
     assert {offset for offset, _ in chip.writes} == descriptor and len(chip.writes) == len(descriptor)
 
     def fields(name: str) -> dict[str, int]:
@@ -584,11 +636,13 @@ def test_descriptor(lib: ctypes.CDLL, packed: PackedScene, chip: Chip, form: Pix
 
 
 def test_descriptor_with_all_features(lib: ctypes.CDLL, chunk: PackedScene, chip: Chip) -> None:
-    """Of an antialiased scene through a camera whose principal point is off the middle."""
+    """Of an antialiased scene through a camera whose principal point is off the middle, with kept colours."""
     packed = dataclasses.replace(chunk, antialiased=True)
     frame, scene = good_frame(lib, packed, 333, 250)
     camera = dataclasses.replace(camera_of(333, 250), cx=200.125, cy=-7.75)
     frame.camera = c_camera(camera)
+    store = CStore(1 << 38, 1 << 30, 1, 0.5)
+    frame.store = ctypes.pointer(store)
     assert scene.antialiased == 1
     assert chip.call("flk_frame_write", ctypes.byref(frame), None) == "OK"
     written = {offset for offset, _ in chip.writes}
@@ -661,12 +715,13 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (5, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (6, 1, 1, 2, 2, 3, 32)
+    assert device.colour_store == 1
     assert (device.lists, device.beat) == (16384, 64)
     assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (2, 1, 4, 2)
     assert device.started == 0xFFFF and not chip.writes
     chip.set("version", 3 | 3 << 8)  # of before these
-    assert chip.probe() == "OK" and (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (4, 4, 4, 4)
+    assert chip.probe() == "OK" and not device.colour_store and (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (4, 4, 4, 4)
     chip.set("version", 2)
     assert chip.probe() == "DEVICE_VERSION"
     chip.set("id", 0xFFFFFFFF)
