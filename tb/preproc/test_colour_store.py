@@ -153,6 +153,24 @@ def test_generations() -> None:
     assert not any(len(frame.reused.cleared) for frame in frames)
 
 
+def test_noise() -> None:
+    """What the memory holds before is of no generation; and where it is by chance, a position that is no number is none, nor is one that is subnormal another than 0."""
+    packed, views = scene(), [camera(), camera(0.001)]
+    rng = np.random.default_rng([seed(), 8])
+    noise = rng.integers(0, 256, (len(packed.table), CLUSTER_BEATS, BEAT), np.uint8)
+    noise[:, 0, 12:16] = np.frombuffer(np.uint32(1).tobytes(), np.uint8)
+    noise[:, 0, :12] = np.array([0.5, np.inf, 0.0], "<f4").view(np.uint8)
+    noise[1::3, 0, :12] = np.array([np.nan, 0.0, 1.0], "<f4").view(np.uint8)
+    noise[2::3, 0, 12:16] = 0
+    golden = [frame for frame, _ in golden_path(packed, views, 0.5)]
+    chunks = max(front_memory(frame).lists.chunks for frame in golden)
+    rtl = front_path(packed, views, 0.5, chunks=chunks, seed=seed(), limit=LIMIT, store=noise.tobytes())
+    for frame, got in zip(golden, rtl, strict=True):
+        image = front_memory(frame, chunks)
+        assert got.error == 0 and np.array_equal(got.records[image.written], image.records[image.written])
+        assert got.counters["store_lines"] == frame.reused.written_beats
+
+
 def test_demo_scene() -> None:
     """As the formats have it, with the camera's own path: what lasts is most of it."""
     view = demo()

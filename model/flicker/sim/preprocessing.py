@@ -192,8 +192,9 @@ def front_rtl(
 def front_path(
     packed: PackedScene, cameras: Sequence[Camera], epsilon: float, *, chunks: int, memory: MemoryOptions | None = None, seed: int = 1,
     limit: int = 20_000_000, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], generations: Sequence[int] | None = None,
+    store: bytes | None = None,
 ) -> Iterator[RtlFront]:
-    """Frames of a path one after the other, with a colour store that is zero at first. generations: of each frame [1]. memory.mended: from the second one on.
+    """Frames of a path one after the other, with a colour store that holds `store` [zeros] at first. generations: of each frame [1]. memory.mended: from the second one on.
     Raises as `front_rtl`."""
     run = _Run(packed, RecordKind.FACTORED16, ListKind.ELLIPSE, chunks, SortOrder.DEPTH, 1, limit)
     regions = Regions.of(packed, cameras[0], chunks)
@@ -202,7 +203,7 @@ def front_path(
     options = replace(memory, mended=False)
     with Half("front end", build(lanes=lanes, writers=writers), dict.fromkeys(PORTS, PORT), options, seed) as sim:
         scene = _load(sim, packed, regions, None)
-        sim.load(regions.store, size, bytes(size), PURPOSES.index("store"))
+        sim.load(regions.store, size, store or bytes(size), PURPOSES.index("store"))
         for number, camera in enumerate(cameras):
             if number and memory.mended:
                 sim.mend()
