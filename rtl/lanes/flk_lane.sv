@@ -258,6 +258,19 @@ module flk_lane
   localparam int unsigned VALUE_BITS = $bits(H_VALUE[0][0]);
   localparam int unsigned FALL_BITS = $bits(H_FALL[0][0]);
   localparam int unsigned LINE_BITS = VALUE_BITS + REST_BITS;
+  localparam int unsigned LINES = $size(H_VALUE) << PIECE_BITS;
+
+  // Value and fall by one number: so synthesisers see a table, an FPGA's a memory whose read register value_q and fall_q are.
+  typedef logic [LINES-1:0][VALUE_BITS+FALL_BITS-1:0] lines_t;
+
+  function automatic lines_t lines();
+    for (int unsigned i = 0; i < LINES; i++) begin
+      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)],
+                  H_FALL[i>>PIECE_BITS][i%(1<<PIECE_BITS)]};
+    end
+  endfunction
+
+  localparam lines_t TABLE = lines();
 
   logic [VALUE_BITS-1:0] value_q;
   logic [FALL_BITS-1:0] fall_q;
@@ -269,12 +282,11 @@ module flk_lane
 
   always_ff @(posedge clk_i) begin
     if (valid_q[3]) begin
-      value_q   <= H_VALUE[zeros][piece];
-      fall_q    <= H_FALL[zeros][piece];
-      rest_q    <= normal[REST_BITS-1:0];
-      la_4_q    <= la_q;
-      skip_4_q  <= skip_q;
-      clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
+      {value_q, fall_q} <= TABLE[{zeros, piece}];
+      rest_q            <= normal[REST_BITS-1:0];
+      la_4_q            <= la_q;
+      skip_4_q          <= skip_q;
+      clamp_4_q         <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
     end
   end
 
