@@ -283,10 +283,10 @@ module flk_lane
   always_ff @(posedge clk_i) begin
     if (valid_q[3]) begin
       {value_q, fall_q} <= TABLE[{zeros, piece}];
-      rest_q            <= normal[REST_BITS-1:0];
-      la_4_q            <= la_q;
-      skip_4_q          <= skip_q;
-      clamp_4_q         <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
+      rest_q    <= normal[REST_BITS-1:0];
+      la_4_q    <= la_q;
+      skip_4_q  <= skip_q;
+      clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
     end
   end
 
