@@ -19,8 +19,11 @@
 // | 7 | its products with the colours |
 // | 8 = COLOUR | are shifted; colours of the pixel are read and written |
 //
-// The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token copies S at STATE and the
+// The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token moves S at STATE and the
 // colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next list may follow at once.
+// Pixels of one sub-tile, few, are flip-flops, which a token copies and sets. Those of more are two memories each of S and of colours, with a
+// write port and a read port without latency: in turn one has the pixels that are visited, one those that leave. What a word held before counts
+// as 0 until it is written: seen_q.
 // Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
@@ -81,6 +84,7 @@ module flk_lane
   localparam int unsigned GUARD = PLACE - UV;
   localparam int unsigned WIDE = UV_BITS + GUARD;  // sums of u and v before they are rounded
   localparam int unsigned MAG_BITS = UV_BITS - 1;
+  localparam bit MEMORY = Subtiles > 1;  // of the pixels' state
 
   // ---- Control: index s holds what came s cycles ago ---------------------------------------------------------
 
@@ -89,7 +93,8 @@ module flk_lane
   logic [FETCH:1] last_q;
   logic [COLOUR-1:1][PixelW-1:0] pixel_q;
   logic [FETCH:1][SlotW-1:0] slot_q;
-  logic [Pixels-1:0] select_s_q, select_c_q;  // the pixel, one bit each: at STATE and at COLOUR
+  logic [Pixels-1:0] select_s_q;  // the pixel at STATE, one bit each
+  logic [PixelW-1:0] place_d, place_q;  // the pixel that leaves
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -111,7 +116,6 @@ module flk_lane
     pixel_q    <= {pixel_q[COLOUR-2:1], visit_pixel_i};
     slot_q     <= {slot_q[FETCH-1:1], visit_slot_i};
     select_s_q <= Pixels'(1) << pixel_q[STATE-1];
-    select_c_q <= Pixels'(1) << pixel_q[COLOUR-1];
   end
 
   assign token_o       = |eos_q[STATE:1];
@@ -254,6 +258,19 @@ module flk_lane
   localparam int unsigned VALUE_BITS = $bits(H_VALUE[0][0]);
   localparam int unsigned FALL_BITS = $bits(H_FALL[0][0]);
   localparam int unsigned LINE_BITS = VALUE_BITS + REST_BITS;
+  localparam int unsigned LINES = $size(H_VALUE) << PIECE_BITS;
+
+  // Value and fall by one number: so synthesisers see a table, an FPGA's a memory whose read register value_q and fall_q are.
+  typedef logic [LINES-1:0][VALUE_BITS+FALL_BITS-1:0] lines_t;
+
+  function automatic lines_t lines();
+    for (int unsigned i = 0; i < LINES; i++) begin
+      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)],
+                  H_FALL[i>>PIECE_BITS][i%(1<<PIECE_BITS)]};
+    end
+  endfunction
+
+  localparam lines_t TABLE = lines();
 
   logic [VALUE_BITS-1:0] value_q;
   logic [FALL_BITS-1:0] fall_q;
@@ -265,8 +282,7 @@ module flk_lane
 
   always_ff @(posedge clk_i) begin
     if (valid_q[3]) begin
-      value_q   <= H_VALUE[zeros][piece];
-      fall_q    <= H_FALL[zeros][piece];
+      {value_q, fall_q} <= TABLE[{zeros, piece}];
       rest_q    <= normal[REST_BITS-1:0];
       la_4_q    <= la_q;
       skip_4_q  <= skip_q;
@@ -286,9 +302,9 @@ module flk_lane
   logic [H_BITS-1:0] h_q;
   logic [X_BITS-1:0] x_q;
   logic skip_5_q;
-  logic [Pixels-1:0][S_BITS-1:0] s_q;
   logic [Pixels-1:0] finished_q;
   logic [S_BITS-1:0] s_now;
+  logic [RESULT_BITS-1:0] s_out;
   logic [S_BITS:0] s_next;
   logic [TOTAL_BITS-1:0] total;
   logic was_done, live, ends, blend, finish;
@@ -302,14 +318,7 @@ module flk_lane
     end
   end
 
-  always_comb begin
-    s_now    = '0;
-    was_done = 1'b0;
-    for (int unsigned p = 0; p < Pixels; p++) begin
-      s_now    |= s_q[p] & {S_BITS{select_s_q[p]}};
-      was_done |= finished_q[p] & select_s_q[p];
-    end
-  end
+  assign was_done = |(finished_q & select_s_q);
 
   assign s_next = (S_BITS + 1)'(s_now) + (S_BITS + 1)'(h_q);
   assign total  = TOTAL_BITS'(s_now) + TOTAL_BITS'(x_q);
@@ -321,19 +330,97 @@ module flk_lane
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      s_q        <= '0;
       finished_q <= '0;
     end else if (clear_i || eos_q[STATE]) begin
-      s_q        <= '0;
       finished_q <= '0;
     end else begin
-      for (int unsigned p = 0; p < Pixels; p++) begin
-        if (blend && select_s_q[p]) begin
-          s_q[p] <= s_next[S_BITS-1:0];
-        end
-      end
       finished_q <= finished_q | (finish ? select_s_q : '0);
     end
+  end
+
+  logic was_seen, seen_out;  // the pixel at STATE, the pixel that leaves
+
+  if (MEMORY) begin : gen_s
+    logic bank_d, bank_q;  // that is visited
+    logic [Pixels-1:0] seen_q, seen_out_q;
+    logic [1:0][S_BITS-1:0] word;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        bank_q <= 1'b0;
+        seen_q <= '0;
+      end else begin
+        bank_q <= bank_d;
+        if (clear_i || eos_q[STATE]) begin
+          seen_q <= '0;
+        end else begin
+          seen_q <= seen_q | (blend ? select_s_q : '0);
+        end
+      end
+    end
+
+    assign bank_d = bank_q ^ eos_q[STATE];
+
+    always_ff @(posedge clk_i) begin
+      if (eos_q[STATE]) begin
+        seen_out_q <= seen_q;
+      end
+    end
+
+    for (genvar b = 0; b < 2; b++) begin : gen_bank
+      logic [S_BITS-1:0] storage_q[Pixels];
+      logic [PixelW-1:0] at_q;
+
+      always_ff @(posedge clk_i) begin
+        at_q <= bank_d == 1'(b) ? pixel_q[STATE-1] : place_d;
+        if (blend && bank_q == 1'(b)) begin
+          storage_q[at_q] <= s_next[S_BITS-1:0];
+        end
+      end
+
+      assign word[b] = storage_q[at_q];
+    end
+
+    assign was_seen = |(seen_q & select_s_q);
+    assign seen_out = seen_out_q[place_q];
+    assign s_now    = word[bank_q] & {S_BITS{was_seen}};
+    assign s_out    = word[!bank_q][S_BITS-1-:RESULT_BITS] & {RESULT_BITS{seen_out}};
+  end else begin : gen_s
+    logic [Pixels-1:0][S_BITS-1:0] s_q;
+    logic [Pixels-1:0][RESULT_BITS-1:0] s_out_q;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        s_q <= '0;
+      end else if (clear_i || eos_q[STATE]) begin
+        s_q <= '0;
+      end else begin
+        for (int unsigned p = 0; p < Pixels; p++) begin
+          if (blend && select_s_q[p]) begin
+            s_q[p] <= s_next[S_BITS-1:0];
+          end
+        end
+      end
+    end
+
+    always_ff @(posedge clk_i) begin
+      if (eos_q[STATE]) begin
+        for (int unsigned p = 0; p < Pixels; p++) begin
+          s_out_q[p] <= s_q[p][S_BITS-1-:RESULT_BITS];
+        end
+      end
+    end
+
+    always_comb begin
+      s_now = '0;
+      s_out = '0;
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        s_now |= s_q[p] & {S_BITS{select_s_q[p]}};
+        s_out |= s_out_q[p] & {RESULT_BITS{place_q == PixelW'(p)}};
+      end
+    end
+
+    assign {was_seen, seen_out} = '0;
   end
 
   assign finished_o = finished_q;
@@ -398,15 +485,10 @@ module flk_lane
 
   // ---- Cycle 8: colours --------------------------------------------------------------------------------------------
 
-  logic [Pixels-1:0][2:0][C_BITS-1:0] c_q;
-  logic [2:0][C_BITS-1:0] c_now, c_next;
+  logic [2:0][C_BITS-1:0] c_now, c_next, c_out;
   logic [2:0] unused_place;
 
   always_comb begin
-    c_now = '0;
-    for (int unsigned p = 0; p < Pixels; p++) begin
-      c_now |= c_q[p] & {(3 * C_BITS) {select_c_q[p]}};
-    end
     for (int unsigned c = 0; c < 3; c++) begin
       automatic logic [PART_BITS-1:0] near, part;  // with the place that rounds
       near = '0;
@@ -421,41 +503,103 @@ module flk_lane
     end
   end
 
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      c_q <= '0;
-    end else if (clear_i || eos_q[COLOUR]) begin
-      c_q <= '0;
-    end else begin
-      for (int unsigned p = 0; p < Pixels; p++) begin
-        if (blend_q[COLOUR] && select_c_q[p]) begin
-          c_q[p] <= c_next;
+  if (MEMORY) begin : gen_c
+    logic bank_d, bank_q;
+    logic [COLOUR:STATE+1] was_seen_q;
+    logic [1:0][3*C_BITS-1:0] word;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        bank_q <= 1'b0;
+      end else begin
+        bank_q <= bank_d;
+      end
+    end
+
+    assign bank_d = bank_q ^ eos_q[COLOUR];
+
+    always_ff @(posedge clk_i) begin
+      was_seen_q <= {was_seen_q[COLOUR-1:STATE+1], was_seen};
+    end
+
+    for (genvar b = 0; b < 2; b++) begin : gen_bank
+      logic [3*C_BITS-1:0] storage_q[Pixels];
+      logic [PixelW-1:0] at_q;
+
+      always_ff @(posedge clk_i) begin
+        at_q <= bank_d == 1'(b) ? pixel_q[COLOUR-1] : place_d;
+        if (blend_q[COLOUR] && bank_q == 1'(b)) begin
+          storage_q[at_q] <= c_next;
+        end
+      end
+
+      assign word[b] = storage_q[at_q];
+    end
+
+    assign c_now = word[bank_q] & {(3 * C_BITS) {was_seen_q[COLOUR]}};
+    assign c_out = word[!bank_q] & {(3 * C_BITS) {seen_out}};
+  end else begin : gen_c
+    logic [Pixels-1:0] select_q;
+    logic [Pixels-1:0][2:0][C_BITS-1:0] c_q, c_out_q;
+    logic unused_seen;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        c_q <= '0;
+      end else if (clear_i || eos_q[COLOUR]) begin
+        c_q <= '0;
+      end else begin
+        for (int unsigned p = 0; p < Pixels; p++) begin
+          if (blend_q[COLOUR] && select_q[p]) begin
+            c_q[p] <= c_next;
+          end
         end
       end
     end
+
+    always_ff @(posedge clk_i) begin
+      select_q <= Pixels'(1) << pixel_q[COLOUR-1];
+      if (eos_q[COLOUR]) begin
+        c_out_q <= c_q;
+      end
+    end
+
+    always_comb begin
+      c_now = '0;
+      c_out = '0;
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        c_now |= c_q[p] & {(3 * C_BITS) {select_q[p]}};
+        c_out |= c_out_q[p] & {(3 * C_BITS) {place_q == PixelW'(p)}};
+      end
+    end
+
+    assign unused_seen = was_seen ^ seen_out;
   end
 
   // ---- Bank that leaves --------------------------------------------------------------------------------------------
 
   logic bank_q, full_q;  // taken, and ready to leave
-  logic [Pixels-1:0] place_q;  // the pixel that leaves, one bit each
   subtile_t subtile_q;
-  logic [Pixels-1:0][RESULT_BITS-1:0] s_out_q;
-  logic [Pixels-1:0][2:0][C_BITS-1:0] c_out_q;
   logic last;
 
-  assign last = out_valid_o && out_ready_i && place_q[Pixels-1];
+  assign last = out_valid_o && out_ready_i && place_q == '1;
+
+  always_comb begin
+    place_d = place_q;
+    if (clear_i) begin
+      place_d = '0;
+    end else if (out_valid_o && out_ready_i) begin
+      place_d = place_q + 1'b1;
+    end
+  end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       bank_q  <= 1'b0;
       full_q  <= 1'b0;
-      place_q <= Pixels'(1);
-    end else if (clear_i) begin
-      bank_q  <= 1'b0;
-      full_q  <= 1'b0;
-      place_q <= Pixels'(1);
+      place_q <= '0;
     end else begin
+      place_q <= place_d;
       if (visit_valid_i && visit_eos_i) begin
         bank_q <= 1'b1;
       end else if (last) begin
@@ -466,8 +610,9 @@ module flk_lane
       end else if (last) begin
         full_q <= 1'b0;
       end
-      if (out_valid_o && out_ready_i) begin
-        place_q <= {place_q[Pixels-2:0], place_q[Pixels-1]};
+      if (clear_i) begin
+        bank_q <= 1'b0;
+        full_q <= 1'b0;
       end
     end
   end
@@ -476,42 +621,22 @@ module flk_lane
     if (visit_valid_i && visit_eos_i) begin
       subtile_q <= visit_shape_i[$bits(subtile_t)-1:0];
     end
-    if (eos_q[STATE]) begin
-      for (int unsigned p = 0; p < Pixels; p++) begin
-        s_out_q[p] <= s_q[p][S_BITS-1-:RESULT_BITS];
-      end
-    end
-    if (eos_q[COLOUR]) begin
-      c_out_q <= c_q;
-    end
   end
 
   assign bank_free_o = !bank_q;
   assign out_valid_o = full_q;
 
   always_comb begin
-    out_data_o = '0;
-    for (int unsigned p = 0; p < Pixels; p++) begin
-      out_data_o.column |= lane_column(Lanes, Lane, p % Own) & {3{place_q[p]}};
-      out_data_o.row    |= lane_row(Lanes, Lane, p % Own) & {3{place_q[p]}};
-      out_data_o.s      |= s_out_q[p] & {RESULT_BITS{place_q[p]}};
-      out_data_o.colour |= c_out_q[p] & {(3 * C_BITS) {place_q[p]}};
-    end
+    out_data_o.column  = lane_column(Lanes, Lane, 32'(place_q[OwnW-1:0]));
+    out_data_o.row     = lane_row(Lanes, Lane, 32'(place_q[OwnW-1:0]));
+    out_data_o.s       = s_out;
+    out_data_o.colour  = c_out;
     out_data_o.subtile = subtile_q;
     // The list's sub-tiles lie one below the other, or fill a tile.
-    if (Subtiles > 1) begin
-      out_data_o.subtile.row[0] = 1'b0;
-    end
-    if (Subtiles > 2) begin
-      out_data_o.subtile.col[0] = 1'b0;
-    end
-    for (int unsigned p = 0; p < Pixels; p++) begin
-      if (Subtiles == 2) begin
-        out_data_o.subtile.row[0] |= place_q[p] && (p / Own) % 2 == 1;
-      end else if (Subtiles == 4) begin
-        out_data_o.subtile.col[0] |= place_q[p] && (p / Own) % 2 == 1;
-        out_data_o.subtile.row[0] |= place_q[p] && p / Own >= 2;
-      end
+    if (Subtiles == 2) begin
+      out_data_o.subtile.row[0] = place_q[PixelW-1];
+    end else if (Subtiles == 4) begin
+      {out_data_o.subtile.row[0], out_data_o.subtile.col[0]} = 2'(place_q >> OwnW);
     end
   end
 

@@ -62,6 +62,7 @@ module flk_lane_core
   localparam int unsigned PixelW = $clog2(Subtiles * Pixels);
   localparam int unsigned SubtileW = (Subtiles > 1) ? $clog2(Subtiles) : 1;
   localparam int unsigned SlotW = $clog2(Slots);
+  localparam bit MEMORY = Subtiles > 1;  // as of a lane's pixels (flk_lane)
 
   // ---- Setup and masks: index s holds what came s moves ago ----------------------------------------------------
 
@@ -232,8 +233,6 @@ module flk_lane_core
 
   // ---- Store -------------------------------------------------------------------------------------------------------
 
-  lane_shape_t [Slots-1:0] shape_q;
-  lane_colour_t [Slots-1:0] colour_q;
   logic [Slots-1:0][Lanes-1:0] pending_d, pending_q;
   logic [Lanes-1:0] release_valid;
   logic [Lanes-1:0][SlotW-1:0] release_slot;
@@ -264,11 +263,74 @@ module flk_lane_core
     end
   end
 
-  always_ff @(posedge clk_i) begin
-    for (int unsigned i = 0; i < Slots; i++) begin
-      if (dispatch && slot == SlotW'(i)) begin
-        shape_q[i]  <= shape[choice];
-        colour_q[i] <= colour[choice];
+  // What each lane reads.
+  logic [Lanes-1:0][SlotW-1:0] visit_slot;
+  lane_shape_t [Lanes-1:0] visit_shape;
+  lane_colour_t [Lanes-1:0] visit_colour;
+
+  if (MEMORY) begin : gen_shape
+    logic [$bits(lane_shape_t)-1:0] storage_q[Slots];
+
+    always_ff @(posedge clk_i) begin
+      if (dispatch) begin
+        storage_q[slot] <= shape[choice];
+      end
+    end
+
+    for (genvar l = 0; l < Lanes; l++) begin : gen_read
+      assign visit_shape[l] = storage_q[visit_slot[l]];
+    end
+  end else begin : gen_shape
+    lane_shape_t [Slots-1:0] shape_q;
+
+    always_ff @(posedge clk_i) begin
+      for (int unsigned i = 0; i < Slots; i++) begin
+        if (dispatch && slot == SlotW'(i)) begin
+          shape_q[i] <= shape[choice];
+        end
+      end
+    end
+
+    // One bit for each slot selects: smaller than a multiplexer by the slot's number.
+    always_comb begin
+      visit_shape = '0;
+      for (int unsigned l = 0; l < Lanes; l++) begin
+        for (int unsigned i = 0; i < Slots; i++) begin
+          visit_shape[l] |= shape_q[i] & {$bits(lane_shape_t){visit_slot[l] == SlotW'(i)}};
+        end
+      end
+    end
+  end
+
+  if (MEMORY) begin : gen_colour
+    logic [$bits(lane_colour_t)-1:0] storage_q[Slots];
+
+    always_ff @(posedge clk_i) begin
+      if (dispatch) begin
+        storage_q[slot] <= colour[choice];
+      end
+    end
+
+    for (genvar l = 0; l < Lanes; l++) begin : gen_read
+      assign visit_colour[l] = storage_q[release_slot[l]];
+    end
+  end else begin : gen_colour
+    lane_colour_t [Slots-1:0] colour_q;
+
+    always_ff @(posedge clk_i) begin
+      for (int unsigned i = 0; i < Slots; i++) begin
+        if (dispatch && slot == SlotW'(i)) begin
+          colour_q[i] <= colour[choice];
+        end
+      end
+    end
+
+    always_comb begin
+      visit_colour = '0;
+      for (int unsigned l = 0; l < Lanes; l++) begin
+        for (int unsigned i = 0; i < Slots; i++) begin
+          visit_colour[l] |= colour_q[i] & {$bits(lane_colour_t){release_slot[l] == SlotW'(i)}};
+        end
       end
     end
   end
@@ -285,20 +347,7 @@ module flk_lane_core
   for (genvar l = 0; l < Lanes; l++) begin : gen_lane
     logic visit_valid, visit_eos, visit_last, bank_free, token_inside, token_done, queue_empty;
     logic [PixelW-1:0] visit_pixel;
-    logic [SlotW-1:0] visit_slot;
     logic [Subtiles-1:0][Pixels-1:0] finished;
-    lane_shape_t visit_shape;
-    lane_colour_t visit_colour;
-
-    // One bit for each slot selects: smaller than a multiplexer by the slot's number.
-    always_comb begin
-      visit_shape  = '0;
-      visit_colour = '0;
-      for (int unsigned i = 0; i < Slots; i++) begin
-        visit_shape  |= shape_q[i] & {$bits(lane_shape_t){visit_slot == SlotW'(i)}};
-        visit_colour |= colour_q[i] & {$bits(lane_colour_t){release_slot[l] == SlotW'(i)}};
-      end
-    end
 
     flk_lane_queue #(
       .Pixels  (Pixels),
@@ -324,7 +373,7 @@ module flk_lane_core
       .visit_eos_o   (visit_eos),
       .visit_last_o  (visit_last),
       .visit_pixel_o (visit_pixel),
-      .visit_slot_o  (visit_slot),
+      .visit_slot_o  (visit_slot[l]),
       .starved_o     (starved[l]),
       .waits_o       (waits[l])
     );
@@ -342,10 +391,10 @@ module flk_lane_core
       .visit_eos_i  (visit_eos),
       .visit_last_i (visit_last),
       .visit_pixel_i(visit_pixel),
-      .visit_slot_i (visit_slot),
-      .visit_shape_i(visit_shape),
+      .visit_slot_i (visit_slot[l]),
+      .visit_shape_i(visit_shape[l]),
       .colour_slot_o(release_slot[l]),
-      .colour_i     (visit_colour),
+      .colour_i     (visit_colour[l]),
       .release_o    (release_valid[l]),
       .bank_free_o  (bank_free),
       .token_o      (token_inside),

@@ -74,6 +74,7 @@ module flk_frame_writer
   localparam int unsigned IndexBits = $clog2(Pairs);
   localparam int unsigned FullBits = $clog2(Pairs + 1);
   localparam int unsigned Share = CORES / Cores;  // sub-tiles of a core
+  localparam int unsigned PlaceBits = $clog2(Share * Pairs) + 4;
   localparam int unsigned Groups = (Lanes == 0) ? CHANNELS : Lanes / Cores;
   localparam int unsigned GroupBits = $clog2(Groups);
   localparam int unsigned CountBits = $clog2(2 * Share * SUBTILE * SUBTILE / Groups);
@@ -85,11 +86,16 @@ module flk_frame_writer
   logic [Pairs-1:0][PairBits-1:0]   columns_q;
   logic [Pairs-1:0][TileBits-1:0]   rows_q;
 
-  // Reads: 8 columns of each sub-tile, of which four of one are used.
+  // Reads: of each core 8 columns of the one of its sub-tiles that the group is of; four of one core are used.
   logic                             en, read;
   logic [3:0]                       line_q;   // row of pixels
   logic [2:0]                       group_q;  // four pixels of it
-  pixel_t [CORES-1:0][7:0]          pixel;
+  logic [1:0]                       which_from;
+  logic [PlaceBits-1:0]             from;
+  pixel_t [Cores-1:0][7:0]          pixel;
+
+  assign which_from = {line_q[3], group_q[1]};
+  assign from       = PlaceBits'({which_from >> $clog2(Cores), from_q, group_q[2], line_q[2:0]});
 
   for (genvar k = 0; k < Cores; k++) begin : gen_core
     logic [Groups-1:0][CountBits-1:0] count_q;  // pixels of a group in the pair that comes
@@ -97,35 +103,31 @@ module flk_frame_writer
     logic [Groups-1:0][FullBits-1:0]  full_q;   // pairs that are there
     logic [2:0]                       row, column;
     logic [GroupBits-1:0]             group;
-    logic [IndexBits+3:0]             place;
+    logic [1:0]                       which;  // sub-tile of the tile
+    logic [PlaceBits-1:0]             place;
 
     assign row    = {in_data_i[k].minitile[1], in_data_i[k].index[3:2]};
     assign column = {in_data_i[k].minitile[0], in_data_i[k].index[1:0]};
     assign group  = (Lanes == 0) ? GroupBits'(in_data_i[k].minitile)
                                  : GroupBits'(flk_lane_pkg::lane_of(Groups, row, column));
-    // Buffer, tile of the pair, row.
-    assign place  = {into_q[group], in_data_i[k].subtile.col[1], row};
+    assign which  = {in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]};
+    // Which of the core's sub-tiles, buffer, tile of the pair, row.
+    assign place  = PlaceBits'({which >> $clog2(Cores), into_q[group],
+                                in_data_i[k].subtile.col[1], row});
 
-    for (genvar m = 0; m < Share; m++) begin : gen_subtile
-      logic hit;
-
-      assign hit = in_valid_i[k] && (Share == 1 || Cores * m + k == 32'({
-          in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}));
-
-      for (genvar x = 0; x < 8; x++) begin : gen_column
-        flk_sram #(
-          .Width($bits(pixel_t)),
-          .Depth(16 * Pairs)
-        ) i_pixels (
-          .clk_i,
-          .wr_en_i  (hit && column == 3'(x)),
-          .wr_addr_i(place),
-          .wr_data_i(in_data_i[k].pixel),
-          .rd_en_i  (en && read),
-          .rd_addr_i({from_q, group_q[2], line_q[2:0]}),
-          .rd_data_o(pixel[Cores*m+k][x])
-        );
-      end
+    for (genvar x = 0; x < 8; x++) begin : gen_column
+      flk_sram #(
+        .Width($bits(pixel_t)),
+        .Depth(16 * Pairs * Share)
+      ) i_pixels (
+        .clk_i,
+        .wr_en_i  (in_valid_i[k] && column == 3'(x)),
+        .wr_addr_i(place),
+        .wr_data_i(in_data_i[k].pixel),
+        .rd_en_i  (en && read),
+        .rd_addr_i(from),
+        .rd_data_o(pixel[k][x])
+      );
     end
 
     for (genvar i = 0; i < Groups; i++) begin : gen_group
@@ -175,7 +177,7 @@ module flk_frame_writer
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
         in_valid_i[k] |->
-        32'({in_data_i[k].subtile.row[0], in_data_i[k].subtile.col[0]}) % Cores == k)
+        32'(which) % Cores == k)
     else $error("flk_frame_writer: a sub-tile from another core");
 `endif
   end
@@ -292,7 +294,8 @@ module flk_frame_writer
   logic  [STAGES-1:0] valid_q;
   mark_t [STAGES-1:0] mark_q;
   logic  [2:0]        number;  // of the burst in its row
-  logic  [1:0]        core_q;
+  logic  [1:0]        which_q;
+  pixel_t [7:0]       chosen;
   pixel_t [3:0]       four_q;
   logic  [3:0][2:0][7:0]  rgb;
   logic  [3:0][3:0][15:0] rgba;
@@ -309,7 +312,7 @@ module flk_frame_writer
 
   always_ff @(posedge clk_i) begin
     if (en) begin
-      core_q  <= {line_q[3], group_q[1]};
+      which_q <= which_from;
       mark_q[0] <= '{group: group_q, carry: 1'b0, half: half_q};
       for (int unsigned s = 1; s < STAGES; s++) begin
         mark_q[s] <= mark_q[s-1];
@@ -318,9 +321,11 @@ module flk_frame_writer
           {1'b0, mark_q[1].half[LowBits-1:0]} + (LowBits + 1)'(number);
       mark_q[3].half[HalfBits-1:LowBits] <=
           mark_q[2].half[HalfBits-1:LowBits] + HighBits'(mark_q[2].carry);
-      four_q <= mark_q[0].group[0] ? pixel[core_q][7:4] : pixel[core_q][3:0];
+      four_q <= mark_q[0].group[0] ? chosen[7:4] : chosen[3:0];
     end
   end
+
+  assign chosen = pixel[32'(which_q) % Cores];
 
   assign number = rgba_i ? mark_q[1].group
                          : {1'b0, &mark_q[1].group, mark_q[1].group == 3'd5};
@@ -392,7 +397,6 @@ module flk_frame_writer
 
   // ---- bursts become lines ------------------------------------------------------------------------
 
-  logic [255:0]        low_q;
   logic                low_valid_q, out_valid_q, send;
   logic [BeatBits-1:0] out_beat_q;
   logic [3:0]          out_strobe_q;
@@ -418,10 +422,10 @@ module flk_frame_writer
 
   always_ff @(posedge clk_i) begin
     if (en && burst_valid_q) begin
-      low_q        <= burst_q;
       out_beat_q   <= burst_half_q[HalfBits-1:1];
       out_strobe_q <= {{2{burst_half_q[0]}}, {2{low_valid_q || !burst_half_q[0]}}};
-      out_data_q   <= burst_half_q[0] ? {burst_q, low_q} : {256'b0, burst_q};
+      // The burst before it, which may be of the same line, is above.
+      out_data_q   <= {burst_q, burst_half_q[0] ? out_data_q[511:256] : burst_q};
     end
   end
 

@@ -1,4 +1,4 @@
-"""cocotb test of flk_lane; settings: Lanes, Lane, Slots, sweep (share of all La that are visited one after the other)."""
+"""cocotb test of flk_lane; settings: Lanes, Lane, Slots, Subtiles, sweep (share of all La that are visited one after the other)."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ INPUTS = ("clear_i", "visit_valid_i", "visit_eos_i", "visit_last_i", "visit_pixe
 OUTPUTS = ("release_o", "token_o", "token_done_o", "bank_free_o", "finished_o", "events_o", "out_valid_o")
 RESULT_PLACES = 3  # of S, which the result does not take
 C_BITS = 16
+ROW = SUBTILE_COORD_BITS  # subtile_t: row, then column
 FULL_COLOUR = (1023,) * 3
 POOL = 3000
 HOT = 2500  # visits that a faint splat of the least alpha needs to finish a pixel, and some
@@ -100,11 +101,11 @@ def numbers_of(kind: str, rng) -> list[int]:
     return [int(a * s0 + b * s1), int(b * s2), s0, s1, s2, opacity]
 
 
-def splats(numbers: list[list[int]], lanes: int, lane: int, rng) -> list[Splat]:
-    """Those that have a pixel of the lane in their mask."""
+def splats(numbers: list[list[int]], lanes: int, lane: int, subtiles: int, rng) -> list[Splat]:
+    """Those that have a pixel of the lane in their mask, which is that of each sub-tile."""
     masks, las = np.zeros((len(numbers), 8, 8), np.int64), np.zeros((len(numbers), 8, 8), np.int64)
     examine(np.array(numbers, np.int64), T, masks, las)
-    places = [place(lanes, lane, p) for p in range(64 // lanes)]
+    places = [place(lanes, lane, p) for p in range(64 // lanes)] * subtiles
     found = []
     for n, row in enumerate(numbers):
         if pixels := [(p, int(las[n, i, j])) for p, (i, j) in enumerate(places) if masks[n, i, j]]:
@@ -137,9 +138,11 @@ class Lane:
         self.dut, self.rng = dut, bench.rng
         setting = config()
         self.lanes, self.lane, self.slots = setting["Lanes"], setting["Lane"], setting["Slots"]
-        self.pixels = 64 // self.lanes
+        self.subtiles = setting.get("Subtiles", 1)
+        self.pixels = self.subtiles * 64 // self.lanes
+        self.of = self.lanes, self.lane, self.subtiles
         self.slot_bits, self.pixel_bits = (self.slots - 1).bit_length(), (self.pixels - 1).bit_length()
-        self.places = [place(self.lanes, self.lane, p) for p in range(self.pixels)]
+        self.places = [place(self.lanes, self.lane, p) for p in range(self.pixels // self.subtiles)] * self.subtiles
         self.edge = RisingEdge(dut.clk_i)
         self.inputs, self.outputs = ([getattr(dut, name) for name in names] for names in (INPUTS, OUTPUTS))
         self.driven = (0,) * len(INPUTS)
@@ -262,14 +265,19 @@ class Lane:
 
     def fill(self, subtile: Subtile) -> None:
         """The bank: pixels as they are to leave."""
-        for (column, row), total, colour in zip(self.places, subtile.total.tolist(), subtile.colour.tolist()):
-            word = subtile.address << 6 | column << 3 | row
+        for p, ((column, row), total, colour) in enumerate(zip(self.places, subtile.total.tolist(), subtile.colour.tolist())):
+            word = self.address(subtile, p * self.subtiles // self.pixels) << 6 | column << 3 | row
             word = word << 17 | total >> RESULT_PLACES
             for c in colour:
                 word = word << C_BITS | c
             self.seen["colour of 1.98 and more"] += max(colour) > 1.98 * (1 << FORMATS.accumulator)
             self.leaves.append(word)
         self.seen["sub-tiles"] += 1
+
+    def address(self, subtile: Subtile, member: int) -> int:
+        """Of one of the list's sub-tiles: two lie one below the other, four fill a tile."""
+        row = 1 << ROW
+        return {1: subtile.address, 2: subtile.address & ~row | member * row, 4: subtile.address & ~row & ~1 | (member >> 1) * row | member & 1}[self.subtiles]
 
     async def run(self, entries: list[tuple[Splat, list[tuple[int, int]]]], *, idle: float, stall, clears: float = 0.0) -> None:
         """A sub-tile: the visits of each entry in order, and its end; or until clear_i comes."""
@@ -313,11 +321,11 @@ async def program_order(dut):
     rng = bench.rng
     lane = Lane(dut, bench)
     seen = lane.seen
-    assert sorted(place(lane.lanes, l, p) for l in range(lane.lanes) for p in range(lane.pixels)) == [(i, j) for i in range(8) for j in range(8)]
+    assert sorted(place(lane.lanes, l, p) for l in range(lane.lanes) for p in range(64 // lane.lanes)) == [(i, j) for i in range(8) for j in range(8)]
     kinds = {"any": 0.4, "flat": 0.15, "opaque": 0.1, "faint": 0.15, "edge": 0.2}
-    pool = {kind: splats([numbers_of(kind, rng) for _ in range(int(POOL * share))], lane.lanes, lane.lane, rng) for kind, share in kinds.items()}
+    pool = {kind: splats([numbers_of(kind, rng) for _ in range(int(POOL * share))], *lane.of, rng) for kind, share in kinds.items()}
     assert all(len(p) > 50 for p in pool.values()), {k: len(p) for k, p in pool.items()}
-    every = splats([flat(la, rng) for la in range(T.limit + 1)], lane.lanes, lane.lane, rng)
+    every = splats([flat(la, rng) for la in range(T.limit + 1)], *lane.of, rng)
     assert all({la for _, la in s.pixels} == {n} for n, s in enumerate(every))
     assert len(every) == T.limit + 1 and all(len(s.pixels) == lane.pixels for s in every)
     await bench.reset()
