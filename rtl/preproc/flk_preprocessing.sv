@@ -689,6 +689,7 @@ module flk_preprocessing
   logic                 store_error, keep_valid, keep_ready, keep_room;
   logic                 keep_record;
   store_entry_t [3:0]   kept_record;
+  logic [PreprocLanes-1:0][7:0] record_opacity;
   logic [31:0]          store_beats;
   logic [BEAT_BITS-1:0] keep_beat;
   logic [Width-1:0]     keep_data;
@@ -808,7 +809,6 @@ module flk_preprocessing
   logic   [PreprocLanes-1:0]               record_valid, record_ready, entry_valid, entry_ready;
   place_t [PreprocLanes-1:0]               record_place;
   logic   [PreprocLanes-1:0][RecordBits-1:0] record;
-  logic   [PreprocLanes-1:0][7:0]            record_opacity;
   entry_t [PreprocLanes-1:0]               entry;
   logic   [PreprocLanes-1:0][SEQ_BITS-1:0] progress;
   logic   [PreprocLanes-1:0]               saturated, clipped, faint, unlisted;

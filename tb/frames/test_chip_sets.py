@@ -19,6 +19,7 @@ from flicker.chips import chip_of
 from flicker.golden.chip import render_chip
 from flicker.golden.frame_buffer import PixelFormat
 from flicker.golden.front.frame import run_front
+from flicker.golden.front.reuse import ColourStore, Reuse
 from flicker.golden.lanes.lists import front_lists
 from flicker.params import CHIP_MEMORIES, CORE_COUNTS, LANES_PER_CORE, PORT_WIDTHS, UNIT_COUNTS, RenderConfig
 from flicker.scene.camera import Camera
@@ -33,6 +34,7 @@ CANDIDATES = 40  # of which the one with most pairs that are new is taken
 VALUES = {
     "cores": CORE_COUNTS, "lanes": LANES_PER_CORE, "delivered": (1, 2), "in_width": (1, 2), "slots": (8, 20), "fifo_depth": (4, 16),
     "memories": tuple(CHIP_MEMORIES), "port_bits": PORT_WIDTHS, "sort_units": UNIT_COUNTS, "list_writers": UNIT_COUNTS, "preproc_lanes": UNIT_COUNTS,
+    "colour_store": (False, True),
 }
 LIMIT = 1_000_000  # cycles
 
@@ -73,7 +75,7 @@ def test_every_pair_is_there() -> None:
 
 @pytest.mark.parametrize("number", [pytest.param(k, marks=[pytest.mark.slow] * (k > 1)) for k in range(SETS)])
 def test_set(number: int) -> None:
-    """Two pictures, the second of no whole number of tiles and in FP16."""
+    """Two pictures, the second of no whole number of tiles and in FP16; and where colours can be kept, the first one of what it has kept."""
     config = config_of(chosen()[number])
     print(f"seed {seed()}, set {number}: {chosen()[number]}")
     rng, count = np.random.default_rng(seed()), 256 * len(SH_BITS)
@@ -95,3 +97,16 @@ def test_set(number: int) -> None:
             want = render_chip(front_lists(run_front(packed, camera)), config, format_)
             assert done.error == 0 and np.array_equal(done.buffer, want.buffer)
             assert np.ptp(want.buffer) > 0
+        assert device.colour_store == config.colour_store
+        if not config.colour_store:
+            return
+        store, kept, view = chip.store(0.0), ColourStore(packed), Camera(96, 54, 80.0, 80.0, np.zeros(3), np.eye(3))
+        place = chip.place(view)
+        for _ in range(2):
+            frame = chip.frame(view, place, store=store)
+            chip.start(frame)
+            done = chip.finish(frame, LIMIT)
+            front = run_front(packed, view, reuse=Reuse(kept, 0.0))
+            assert done.error == 0 and np.array_equal(done.buffer, render_chip(front_lists(front), config, PixelFormat.RGB8).buffer)
+            assert done.front["store_beats"] == front.reused.read_beats and np.array_equal(chip.read(store.address, store.bytes), kept.image())
+        assert front.reused.stored.all()

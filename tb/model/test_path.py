@@ -37,6 +37,7 @@ from flicker.scene.metrics import flip, psnr, ssim
 SIZE = (48, 32)
 COUNT = 6
 PAN = ("--pan", 0.5, "--frames", COUNT)
+GOLDEN = ("--engine", "golden", "--front", "golden")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -239,10 +240,10 @@ def stopped_at(number: int, error: BaseException) -> Iterator[None]:
     """Ctrl-C, or an error, when a frame is begun."""
     usual = motion_frames.make
 
-    def make(scene, wanted, n, camera):
+    def make(scene, wanted, n, camera, kept):
         if n == number:
             raise error
-        return usual(scene, wanted, n, camera)
+        return usual(scene, wanted, n, camera, kept)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(motion_frames, "make", make)
@@ -269,6 +270,25 @@ def test_interrupted_path_goes_on(out: str) -> None:
         assert all((a == b).all() for a, b in zip(shown(out), shown(f"whole.{out}"), strict=True))
     else:
         assert all(p.read_bytes() == (Path("whole") / p.name).read_bytes() for p in Path(out).glob("*.png"))
+
+
+def test_kept_colours() -> None:
+    """The share of stored colours and what they take from the memory stand in the figures; the picture beside keeps none; a path that is taken up again ends with
+    what an uninterrupted run gives; of a camera that turns on the spot no pixel differs."""
+    words = (*PAN, *GOLDEN, "--keep-colours", "0", "--cycles")
+    path("-o", "whole", *words, "--stats", "whole.csv")
+    path("-o", "plain", *PAN, *GOLDEN, "--stats", "plain.csv", "--cycles")
+    found, plain = rows("whole.csv"), rows("plain.csv")
+    shares = [float(row["kept_colours"]) for row in found]
+    assert shares[0] == 0.0 and min(shares[1:]) > 0.5 and "kept_colours" not in plain[0]
+    assert [row["psnr_db"] for row in found] == [row["psnr_db"] for row in plain]
+    assert all(int(a["bytes_store"]) > 0 and int(a["bytes_colour"]) < int(b["bytes_colour"]) for a, b in zip(found[1:], plain[1:]))
+    assert all((Path("plain") / p.name).read_bytes() == p.read_bytes() for p in Path("whole").glob("*.png"))
+    with stopped_at(3, KeyboardInterrupt()):
+        path("-o", "again", *words, "--stats", "a.csv", code=130)
+    path("-o", "again", *words, "--stats", "a.csv", "--resume")
+    strip = lambda found: [{k: v for k, v in row.items() if k != "made_s"} for row in found]  # noqa: E731
+    assert strip(rows()) == strip(found)
 
 
 def test_resume_is_of_the_same_path() -> None:
@@ -353,6 +373,12 @@ def test_full_disk_behind_frames() -> None:
     (("-o", "a.mp4", "--walk", "--coords", "absolute", "--cycles"), "--cycles: not with --coords absolute, of which no chip has records"),
     (("-o", "a.mp4", "--walk", "--faithful", "--cat", "dense"), "--faithful: fixes the configuration"),
     (("-o", "a.mp4", "--walk", "--frames", 0), "--frames"),
+    *((("-o", "a.mp4", "--walk", "--keep-colours", text), f"--keep-colours: {text}: not 0 to 1, such as 2/255") for text in ("2", "-1/255", "nan", "1/0", "x")),
+    (("-o", "a.mp4", "--walk", "--keep-colours", "2/255"), "--keep-colours: for --engine golden with --front golden, chip-golden and chip"),
+    (("-o", "a.mp4", "--walk", *GOLDEN, "--format", "fp16", "--keep-colours", "0"), "--keep-colours: of scenes in chunks, in records of 16 bytes"),
+    (("-o", "a.mp4", "--walk", *GOLDEN, "--workers", 2, "--keep-colours", "0"), "--keep-colours: --workers must be 1"),
+    (("-o", "a.mp4", "--walk", "--engine", "chip-golden", "--chip", "tiny", "--keep-colours", "0"), "--keep-colours: the chip has no colour store"),
+    (("-o", "a.mp4", "--walk", "--engine", "chip", "--resume", "--keep-colours", "0"), "--keep-colours: no --resume with --engine chip"),
     (("-o", "a.mp4", "--frames", 9), "cameras.json: 4 cameras, not 9, each a frame; as keyframes they make any number"),
 ])
 def test_refused_in_one_line(words: tuple, said: str) -> None:

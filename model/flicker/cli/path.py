@@ -199,6 +199,8 @@ def _tolerance(text: str, chosen: Chosen, workers: int | None, resume: bool) -> 
         raise FlickerError("--keep-colours: for --engine golden with --front golden, chip-golden and chip")
     if chosen.config.form is not Form.FACTORED or chosen.memory not in (None, FormatChoice.CHUNK):
         raise FlickerError("--keep-colours: of scenes in chunks, in records of 16 bytes")
+    if chosen.whole and not chosen.config.colour_store:
+        raise FlickerError("--keep-colours: the chip has no colour store")
     if workers not in (None, 1):
         raise FlickerError("--keep-colours: --workers must be 1, as every frame needs those before it")
     if resume and drawn is EngineChoice.CHIP:

@@ -56,7 +56,8 @@ class _Counted:
         before, now = self.before[place.number], self._now(place)
         self.before[place.number] = now
         beats = {"table": self.table} | {name: int(frame.front[f"{name.removesuffix('s')}_beats"]) for name in ("headers", "geometry", "colour")}
-        beats["store"] = int(frame.front["store_beats"]) + int(frame.front["store_lines"])
+        if store := int(frame.front["store_beats"]) + int(frame.front["store_lines"]):
+            beats["store"] = store
         return {name: BEAT * count for name, count in beats.items()} | {name: now[name] - before[name] for name in OF_PLACE}
 
 
