@@ -254,7 +254,7 @@ module flk_colour_heads
   assign idle_o = inside_q == '0;
 
   logic unused;
-  assign unused = ^{placed_empty, out_empty};
+  assign unused = ^{placed_empty, placed_room, out_empty, out_room};
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) box_move |-> placed_room)

@@ -199,6 +199,9 @@ module flk_colour_rows
     assign out_valid_o[k] = order_valid && (order_stored ? entry_valid : in_valid_i[k]);
     assign out_data_o[k]  = order_stored ? part : in_data_i[k];
     assign in_ready_o[k]  = out_ready_i[k] && order_valid && !order_stored;
+    logic unused_room;
+    assign unused_room = order_room;
+
     assign order_take     = out_valid_o[k] && out_ready_i[k] && out_data_o[k].last;
 
 `ifndef SYNTHESIS

@@ -171,6 +171,9 @@ module flk_colour_store
     assign row[p] = beat_data[40*p+:38];
   end
 
+  logic unused_spare;
+  assign unused_spare = ^beat_data;
+
   flk_colour_rows #(
     .Lanes  (Lanes),
     .Waiting(Waiting)

@@ -145,7 +145,7 @@ package flk_preproc_pkg;
   // coefficients. Codes of a chunk, or FP16.
   typedef struct packed {
     cluster_index_t          cluster;
-    logic                    stored;   // dc holds a record's codes, in 10 bits each; there are no coefficients
+    logic                    stored;   // dc holds a record's codes; there are no coefficients
     logic                    first;
     logic                    last;
     logic [1:0]              part;

@@ -543,7 +543,7 @@ module flk_preprocessing
   assign survivors.degree  = of.degree;
   assign survivors.group   = 6'(side.group >> TurnShift);
   assign survivors.at      = turn_at;
-  assign survivors.alive   = 4'(alive & ~there) << turn_at;
+  assign survivors.alive   = 4'({alive & ~there}) << turn_at;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -799,9 +799,21 @@ module flk_preprocessing
     assign shared_r_valid[0]  = colour_r_valid_i;
     assign colour_r_ready_o   = shared_r_ready[0];
 
+    assign shared_ar_valid[1] = 1'b0;
+    assign shared_ar_ready[1] = 1'b0;
+    assign shared_ar_addr[1]  = '0;
+    assign shared_ar_len[1]   = '0;
+    assign shared_ar_size[1]  = '0;
+    assign shared_ar_burst[1] = '0;
+    assign shared_r_valid[1]  = 1'b0;
+    assign shared_r_ready[1]  = 1'b0;
+    assign unused_id[1]       = '0;
+
     logic unused_store;
     assign unused_store = ^{registers_i.store, kept_box, keep_record, kept_record, keep_ready,
-                            record_opacity};
+                            record_opacity, shared_ar_valid[1], shared_ar_ready[1],
+                            shared_ar_addr[1], shared_ar_len[1], shared_ar_size[1],
+                            shared_ar_burst[1], shared_r_valid[1], shared_r_ready[1]};
   end
 
   // ---- lanes ----------------------------------------------------------------------------------------
@@ -969,7 +981,8 @@ module flk_preprocessing
     logic [Width-1:0]     data;
   } line_t;
 
-  logic  [ListWriters+1:0]      out_valid, out_ready;  // of records, the last but one, of the colour store, the last one
+  // Of records the last but one, of the colour store the last one.
+  logic  [ListWriters+1:0]      out_valid, out_ready;
   line_t [ListWriters+1:0]      out;
   logic [ListWriters-1:0][31:0] list_entries, list_lines, list_evicted;
   logic [3:0][24:0]             list_taken;            // by bank
@@ -1299,7 +1312,8 @@ module flk_preprocessing
 
   assign error_o = {geometry_damaged, cull_damaged, |list_failed, beyond_q,
                     write_error_q || pointer_write_error,
-                    cull_error || geometry_error || colour_error || store_error || pointer_read_error};
+                    cull_error || geometry_error || colour_error || store_error ||
+                    pointer_read_error};
 
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,

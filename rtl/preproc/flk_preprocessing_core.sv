@@ -483,7 +483,7 @@ module flk_preprocessing_core
   );
 
   logic unused_codes;
-  assign unused_codes = codes_empty;
+  assign unused_codes = ^{codes_empty, codes_room, codes_valid};
 
   group_first_t [2:0]  first;
   group_fourth_t [2:0] fourth;
@@ -640,6 +640,9 @@ module flk_preprocessing_core
   assign ended      = end_q[TermCycles-1];
   assign ending     = end_q[TermCycles-2];
   assign codes_take = colour_en && ending.term && ending.stored;
+
+  logic unused_ends;
+  assign unused_ends = ^{ended.stored, ending.first, ending.last};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

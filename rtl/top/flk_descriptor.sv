@@ -41,7 +41,7 @@ module flk_descriptor
 
   assign descriptor_o.store        = {registers_i.store_high.value.value,
                                       registers_i.store_low.value.value};
-  assign descriptor_o.store_beats  = registers_i.store_beats.value.value;
+  assign descriptor_o.store_clusters = registers_i.store_beats.value.value[28:5];
   assign descriptor_o.generation   = registers_i.generation.value.value;
   assign descriptor_o.tolerance    = registers_i.tolerance.value.value;
 
@@ -89,6 +89,7 @@ module flk_descriptor
 
   logic unused_registers;
   assign unused_registers = ^{registers_i.control, registers_i.interrupt, registers_i.timeout,
-                              registers_i.counter_select};
+                              registers_i.counter_select,
+                              registers_i.store_beats.value.value[4:0]};
 
 endmodule

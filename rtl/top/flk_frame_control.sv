@@ -211,7 +211,7 @@ module flk_frame_control
                     frame_q.mode > CAT_AUTO || frame_q.clusters == '0;
     unkept_q     <= frame_q.generation != '0 && (!ColourStore || !frame_q.lane.chunked ||
                                                  frame_q.store[10:0] != '0 ||
-                                                 {frame_q.clusters, 5'b0} > frame_q.store_beats);
+                                                 frame_q.clusters > frame_q.store_clusters);
     if (take) begin
       front_error_q <= '0;
     end else if (front_q == CHECK && check_q == 2'd2) begin

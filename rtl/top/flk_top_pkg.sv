@@ -22,7 +22,7 @@ package flk_top_pkg;
     address_t        pointers;
     address_t        frame_buffer;
     address_t        store;        // of kept colours
-    logic [28:0]     store_beats;
+    logic [23:0]     store_clusters;  // for which there is room
     logic [31:0]     generation;   // 0: no colours are kept
     logic [31:0]     tolerance;    // square of what kept colours may differ by
     logic [23:0]     clusters;

@@ -1,4 +1,4 @@
-"""`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, and pictures, in
+"""`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, pictures, in
 docs/results/kept_colours.md."""
 
 from __future__ import annotations

@@ -678,8 +678,8 @@ def test_kept_colours(config: RenderConfig) -> None:
 
 
 def test_kept_colours_behind_aborts() -> None:
-    """Frames that are aborted or late at random times leave no colour that is not its position's: with a tolerance of 0, what follows is what it is without a store,
-    from the same position, the one before and another one. Behind a reset it is so in another generation."""
+    """Frames that are aborted or late at random times leave no colour that is not its position's: with a tolerance of 0, what follows is what it is without a
+    store, from the same position, the one before and another one. Behind a reset it is so in another generation."""
     rng = random.Random(f"{seed()} kept")
     port = replace(PORT, stall={name: 0.2 for name in CHANNELS}, seed=seed())
     with session(port=port) as chip:

@@ -273,8 +273,8 @@ def test_interrupted_path_goes_on(out: str) -> None:
 
 
 def test_kept_colours() -> None:
-    """The share of stored colours and what they take from the memory stand in the figures; the picture beside keeps none; a path that is taken up again ends with
-    what an uninterrupted run gives; of a camera that turns on the spot no pixel differs."""
+    """The share of stored colours and what they take from the memory stand in the figures; a path that is taken up again ends with what an
+    uninterrupted run gives; of a camera that turns on the spot no pixel differs."""
     words = (*PAN, *GOLDEN, "--keep-colours", "0", "--cycles")
     path("-o", "whole", *words, "--stats", "whole.csv")
     path("-o", "plain", *PAN, *GOLDEN, "--stats", "plain.csv", "--cycles")

@@ -426,5 +426,5 @@ def test_units_are_named_in_this_file() -> None:
     from flicker.datapath.units import PIPELINES
 
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
-        "cluster_test", "colours_last", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis", "colour_group",
-        "colour_constant", "colour_term")}
+        "cluster_test", "colours_last", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis",
+        "colour_group", "colour_constant", "colour_term")}

@@ -520,8 +520,8 @@ def test_each_fault_of_a_frame(lib: ctypes.CDLL, chunk: PackedScene) -> None:
 
 
 def test_kept_colours(lib: ctypes.CDLL, chunk: PackedScene, chip: Chip) -> None:
-    """The region's place and size, generation and tolerance; two frames may share it, and nothing else may; what the chip is told, and that a frame without takes
-    it back."""
+    """The region's place and size, generation and tolerance; two frames may share it, and nothing else may; what the chip is told, and that a frame without
+    takes it back."""
     frame, scene = good_frame(lib, chunk)
     other, _scene = good_frame(lib, chunk)
     size = lib.flk_store_bytes(ctypes.byref(scene))

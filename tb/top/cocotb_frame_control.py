@@ -9,7 +9,6 @@ from cocotb.triggers import RisingEdge
 from flicker_tb.bench import Bench, four_state, netlist
 
 from flicker.golden.frame_buffer import PixelFormat, least_stride
-from flicker.golden.front.reuse import CLUSTER_BEATS
 from flicker.golden.lists import WRITERS, pointer_lines, writer_columns
 from flicker.params import CatMode
 
@@ -19,11 +18,12 @@ LANE = (("chunked", 1), ("box", 1), ("antialiased", 1), ("by_distance", 1), ("wi
 ADDRESSES = ("scene_table", "headers", "geometry", "colours", "records", "lists", "pointers", "frame_buffer")
 DESCRIPTOR = (
     ("tag", 16), ("mode", 3), ("rgba", 1), ("background", 24), ("cull", CULL), *LANE, *((name, 40) for name in ADDRESSES),
-    ("store", 40), ("store_beats", 29), ("generation", 32), ("tolerance", 32),
+    ("store", 40), ("store_clusters", 24), ("generation", 32), ("tolerance", 32),
     ("clusters", 24), ("record_beats", 23), ("chunks", 25), ("stride", 17), ("deadline", 32),
 )
 FRONT = (
-    ("cull", CULL), *LANE, ("store_enable", 1), ("store", 29), ("generation", 32), ("tolerance", 32), ("scene_table", 34), ("headers", 34), ("geometry", 34), ("colours", 34), ("clusters", 24), ("records", 34), ("record_beats", 23),
+    ("cull", CULL), *LANE, ("store_enable", 1), ("store", 29), ("generation", 32), ("tolerance", 32),
+    ("scene_table", 34), ("headers", 34), ("geometry", 34), ("colours", 34), ("clusters", 24), ("records", 34), ("record_beats", 23),
     ("lists", 34), ("chunks", 25), ("pointers", 34), ("pointer_lines", 11), ("list_columns", 8),
 )
 RENDERING = (
@@ -69,7 +69,7 @@ def legal(d, lists: int) -> bool:
     return (
         all(d[name] % 64 == 0 for name in ADDRESSES) and d["stride"] % 32 == 0 and 1 <= d["width"] <= 4096 and 1 <= d["height"] <= 4096
         and d["mode"] <= max(CatMode) and d["clusters"] > 0 and writer_lists(d) <= lists and d["stride"] >= stride_of(d)
-        and (d["generation"] == 0 or (d["chunked"] and d["store"] % 2048 == 0 and d["store_beats"] >= CLUSTER_BEATS * d["clusters"]))
+        and (d["generation"] == 0 or (d["chunked"] and d["store"] % 2048 == 0 and d["store_clusters"] >= d["clusters"]))
     )
 
 
@@ -229,8 +229,8 @@ class ControlTest:
             limit = rng.choice([40, 700, 4096])
             d |= {"width": rng.choice([rng.randint(1, limit), 16 * rng.randint(1, limit // 16)]), "height": rng.choice([rng.randint(1, limit), limit])}
             d |= {"mode": rng.randint(0, max(CatMode)), "clusters": rng.choice([1, 1 << 23, rng.randint(1, (1 << 24) - 1)])}
-            least = CLUSTER_BEATS * d["clusters"]
-            d |= rng.choice([{"generation": 0}, {"chunked": 1, "store": d["store"] & ~2047, "store_beats": rng.choice([least, rng.randint(least, (1 << 29) - 1)])}])
+            room = rng.choice([d["clusters"], rng.randint(d["clusters"], (1 << 24) - 1)])
+            d |= rng.choice([{"generation": 0}, {"chunked": 1, "store": d["store"] & ~2047, "store_clusters": room}])
             if self.deadline:
                 d["deadline"] = rng.choice([0, rng.randint(1, self.deadline), rng.randint(1, 2 * self.deadline), (1 << 32) - 1])
             least = stride_of(d)
@@ -252,8 +252,8 @@ class ControlTest:
         wide = d | {"height": 1, "stride": (1 << 17) - 32}
         out += [wide | {"width": w} for w in (4097, 4112, 8191)]
         out += [d | {"width": 1, "height": h, "stride": 4096} for h in (4097, 4112, 8191)]
-        kept = d | {"generation": 1 << 31, "chunked": 1, "store": d["store"] & ~2047, "store_beats": CLUSTER_BEATS * d["clusters"]}
-        out += [kept | {"chunked": 0}, kept | {"store_beats": kept["store_beats"] - 1}, *(kept | {"store": kept["store"] | 1 << bit} for bit in range(11))]
+        kept = d | {"generation": 1 << 31, "chunked": 1, "store": d["store"] & ~2047, "store_clusters": d["clusters"]}
+        out += [kept | {"chunked": 0}, kept | {"store_clusters": kept["clusters"] - 1}, *(kept | {"store": kept["store"] | 1 << bit} for bit in range(11))]
         return [x for x in out if not legal(x, self.lists)]
 
     def new_frame(self) -> Frame:

@@ -39,8 +39,8 @@ AHEAD = 2  # frames that wait for their turn, for each process
 @dataclass(frozen=True)
 class Wanted:
     """What is made of every frame. beside: a second picture. reference: the float64 reference; quality: SSIM and FLIP against it. depth: of the reference.
-    cycles: what the frame costs on the chip, by its models. order: what splats are sorted by. pops: what is needed to count them. tolerance: by how much colours
-    that are kept from frame to frame may differ, of the drawing's bit-true front end; None: none are kept."""
+    cycles: what the frame costs on the chip, by its models. order: what splats are sorted by. pops: what is needed to count them. tolerance: by how much
+    colours that are kept from frame to frame may differ, of the drawing's bit-true front end; None: none are kept."""
 
     drawing: Drawing
     beside: Drawing | None = None
@@ -153,8 +153,8 @@ def _make(number: int, camera: Camera) -> Made:
 
 
 def frames(scene: Scene, file: str | Path, cameras: Sequence[Camera], wanted: Wanted, first: int = 0, workers: int = 1) -> Iterator[Made]:
-    """Frames `first` to the last one of a path, in order. file: of the scene, for the processes; workers: of them, 1: none, all is made here, as it must be where
-    colours are kept."""
+    """Frames `first` to the last one of a path, in order. file: of the scene, for the processes; workers: of them, 1: none, all is made here, as it must be
+    where colours are kept."""
     if workers == 1:
         kept = KeptColours(wanted)
         if wanted.tolerance is not None:  # those that are there have left their colours

@@ -194,8 +194,8 @@ def front_path(
     limit: int = 20_000_000, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], generations: Sequence[int] | None = None,
     store: bytes | None = None,
 ) -> Iterator[RtlFront]:
-    """Frames of a path one after the other, with a colour store that holds `store` [zeros] at first. generations: of each frame [1]. memory.mended: from the second one on.
-    Raises as `front_rtl`."""
+    """Frames of a path one after the other, with a colour store that holds `store` [zeros] at first. generations: of each frame [1]. memory.mended: from
+    the second one on. Raises as `front_rtl`."""
     run = _Run(packed, RecordKind.FACTORED16, ListKind.ELLIPSE, chunks, SortOrder.DEPTH, 1, limit)
     regions = Regions.of(packed, cameras[0], chunks)
     size = len(packed.table) * CLUSTER_BEATS * BEAT

@@ -69,7 +69,8 @@ def back_to_back(
     """A frame for each camera, all of one size, each started as soon as the chip takes it: while one is rendered, the front end works on the next.
 
     The session has no other frames. chunks: of a list writer; None: as many as are expected. Where they do not suffice there are four times as many, and the
-    row goes on with the frame before that one, which is not given again: every interval is one of a row. limit: cycles until the next frame ends. store: of `ChipSession.store`, colours that frames keep.
+    row goes on with the frame before that one, which is not given again: every interval is one of a row. limit: cycles until the next frame ends.
+    store: of `ChipSession.store`, colours that frames keep.
     FlickerError, naming the frame, for any other fault.
     """
     given, before = 0, chip.dram_counts().spent

@@ -151,6 +151,7 @@ def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, 
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
     factored = parameters.get("Form", 1) == 1
+    keeps = factored and parameters.get("ColourStore", 1) == 1
     width = 1 + parameters.get("ExpBits", 5) + parameters.get("ManBits", 10)
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
@@ -162,7 +163,8 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_preprocessing": [
             f"{port}{name}" for port in ("table_r_", "geometry_r_", "colour_r_", "pointer_r_", "pointer_b_", "b_")
             for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))
-        ],
+        ] + ([] if keeps else [f"registers_i[{bit}]" for bit in range(329, 423)]),  # of kept colours
+        "flk_frame_control": [] if keeps else [f"descriptor_i[{bit}]" for bit in range(185, 220)],  # room and place of kept colours
         "flk_pointer_port": [f"{channel}_{name}" for channel in "rb" for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))],
         "flk_preprocessing_core": ["part_i[268]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.

@@ -1,4 +1,4 @@
-"""Colours that last: what the front end keeps of colours from frame to frame, and for how long a cluster may show them, bit for bit (docs/reference/colour_store.md).
+"""Colours that last: what the front end keeps from frame to frame, and how long a cluster may show it, bit for bit (docs/reference/colour_store.md).
 
 A colour depends on the direction from the camera to the Gaussian alone. A cluster's stored colours are those for one position of the camera; from another one
 no direction to a point of its box differs by more than asin(|move| / distance), distance from the stored position to the nearest point of the box. So with a
@@ -8,8 +8,9 @@ slope of at most s (`scene.slopes`) no colour differs by more than s asin(|move|
 
 in ff numbers of 23 bits, whose rounding is within what 1.0125 is larger. Where the position is the stored one, always.
 
-The store: 32 beats a cluster, at a multiple of 2048 bytes. Beat 0, the head: position (3 x float32), generation (uint32), 16 bytes of zeros, and a bit for each of the cluster's
-Gaussians whose colour is there. Beats 1 to 22, the rows: 12 Gaussians each, 5 bytes a Gaussian: bits 29:0 colour as in a record, 37:30 opacity code.
+The store: 32 beats a cluster, at a multiple of 2048 bytes. Beat 0, the head: position (3 x float32), generation (uint32), 16 bytes of zeros, and a bit for
+each of the cluster's Gaussians whose colour is there. Beats 1 to 22, the rows: 12 Gaussians each, 5 bytes a Gaussian: bits 29:0 colour as in a
+record, 37:30 opacity code.
 
 A frame, cluster by cluster of those that pass the cull. Its colours last where the head has the frame's generation, a bit at least, and the test holds. Of a
 cluster whose colours last, survivors with a bit take their stored colour. All other survivors' colours are computed, with this frame's camera. They are stored
@@ -144,8 +145,8 @@ class ColourStore:
         self.position[cleared | heads] = setup.position
         self.generation[cleared | heads] = generation
         split = lambda flags: np.stack(np.divmod(np.flatnonzero(flags), ROWS), axis=1)  # noqa: E731
-        kept_clusters = np.flatnonzero(kept)
-        return Reused(stored, kept_clusters, lasting[kept_clusters], np.flatnonzero(cleared), split(read & np.repeat(kept, ROWS)), split(written), np.flatnonzero(heads))
+        of = np.flatnonzero(kept)
+        return Reused(stored, of, lasting[of], np.flatnonzero(cleared), split(read & np.repeat(kept, ROWS)), split(written), np.flatnonzero(heads))
 
     @property
     def bytes(self) -> int:
