@@ -23,7 +23,9 @@ from gen_tables import Package
 from flicker import layout
 from flicker import params as p
 from flicker.arithmetic.formats import E4M3, FP16
+from flicker.datapath.sources import PACKAGE
 from flicker.datapath.sources import sources as datapath_sources
+from flicker.datapath.units import PIPELINES
 from flicker.errors import FlickerError
 from flicker.golden.front import record, setup
 from flicker.golden.front.colour import COLOUR_FRACTION, COLOUR_LIMIT
@@ -535,10 +537,15 @@ def file_list() -> str:
     ]) + "\n"
 
 
+@functools.cache
+def pipelines() -> dict[str, str]:
+    """Sources of the front end: seconds to make, which whoever imports another generator does not take."""
+    return datapath_sources()
+
+
 # Text by path below rtl/.
-PIPELINES = datapath_sources()
 SOURCES = {
-    **{name: functools.partial(PIPELINES.__getitem__, name) for name in PIPELINES},
+    **{name: functools.partial(lambda name: pipelines()[name], name) for name in (PACKAGE, *(f"preproc/{p.module}.sv" for p in PIPELINES))},
     "common/flk_param_pkg.sv": param_package,
     "common/flk_pkg.sv": record_package,
     "lanes/flk_lane_pkg.sv": lane_package,

@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 TB = Path(__file__).resolve().parent
+# Each worker's numba has a thread for each core: those that have nothing to do must sleep. They spin otherwise, and what takes a tenth of a second takes seconds.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+UNKNOWN = 100.0  # processor seconds of a test file that is not in costs.csv, for the order
 sys.path.insert(0, str(TB))
 
 from flicker_tb import durations, passed, progress, runner  # noqa: E402
@@ -95,7 +98,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if _simulates(item.path):
             item.add_marker("sim")
-    items.sort(key=lambda item: -_costs().get(item.nodeid.split("::")[0], 0.0))  # files in the order of what they cost: the last ones to end are short
+    # Files in the order of what they cost: the last ones to end are short. One without a line may take long.
+    items.sort(key=lambda item: -_costs().get(item.nodeid.split("::")[0], UNKNOWN))
 
 
 @functools.cache

@@ -35,6 +35,7 @@ _MAKE_FIXES = ("CFG_CXXFLAGS_PCH_I=-include", "AR=ar")
 _CFLAGS = "-fPIC -std=c++17"
 # Environment variable: folder of notes on what is under way, for whoever shows progress.
 PROGRESS = "FLICKER_PROGRESS"
+_PIECE = 16 << 20  # bytes of C++ that are compiled as one: the compiler takes a gigabyte for it
 _FST_HEADERS = {"lz4.h": "liblz4-dev", "zlib.h": "zlib1g-dev"}
 
 
@@ -241,7 +242,7 @@ def verilate(
             make = ["make", "-C", folder, "-f", "Vtop.mk", f"CXX={compiler()}", f"LINK={compiler()}",
                     f"PYTHON3={sys.executable}", f"OPT_FAST={opt}", *_MAKE_FIXES]
             _share_runtime(folder, make, cflags, log, jobs)
-            run_tool([*make, *_share_headers(folder, make, cflags, log), f"-j{jobs}"], log)
+            run_tool([*make, *_join(folder), *_share_headers(folder, make, cflags, log), f"-j{jobs}"], log)
         stamp.touch()
     return product
 
@@ -329,6 +330,34 @@ def _share_runtime(folder: Path, make: Sequence[object], cflags: str, log: Path,
                 os.replace(cached[name].with_suffix(".new"), cached[name])
     for name in objects:
         shutil.copy(cached[name], folder / name)
+
+
+def _join(folder: Path) -> list[str]:
+    """Join a large model's C++ to few pieces, fast code apart from slow code, which is not optimised. What to tell make then.
+
+    The headers of a chip take the compiler seconds, compiled ones more than twice that, and Verilator writes dozens of files. (A small model is one piece.)
+    """
+    listing = folder / "Vtop_classes.mk"
+    text = listing.read_text()
+    if not re.search(r"^VM_PARALLEL_BUILDS = 1$", text, re.M):
+        return []
+    for kind in ("FAST", "SLOW"):
+        lists = re.compile(rf"^VM_(?:CLASSES|SUPPORT)_{kind} \+= \\\n((?:  \S+ \\\n)*)", re.M)
+        pieces, room = list[list[str]](), 0
+        for name in "".join(lists.findall(text)).replace("\\", "").split():
+            size = (folder / f"{name}.cpp").stat().st_size
+            if not pieces or size > room:
+                pieces.append([])
+                room = _PIECE
+            pieces[-1].append(name)
+            room -= size
+        names = [f"Vtop__{kind}_{number}" for number in range(len(pieces))]
+        for name, piece in zip(names, pieces):
+            (folder / f"{name}.cpp").write_text("".join(f'#include "{part}.cpp"\n' for part in piece))
+        text = lists.sub("", text) + f"VM_CLASSES_{kind} = {' '.join(names)}\n"
+        (folder / f"Vtop__pch.h.{kind.lower()}.gch").touch()  # make asks for it
+    listing.write_text(text)
+    return ["VK_PCH_I_FAST=", "VK_PCH_I_SLOW="]
 
 
 def _share_headers(folder: Path, make: Sequence[object], cflags: str, log: Path) -> list[str]:

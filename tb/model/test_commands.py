@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import json
 import math
 import re
@@ -86,17 +87,22 @@ def account(command: str) -> str | None:
     return next((who for pattern, who in ACCOUNTS if re.fullmatch(pattern, command)), None)
 
 
-def is_whole(command: str) -> bool:
-    """Whether a command can be typed as it stands: a mention such as `flicker view` or `flicker fit --engine gsplat` names no scene or data set."""
+@functools.cache
+def parameters(sub: str) -> list[Any]:
+    """Of a subcommand of `flicker`."""
     from typer.main import get_command
 
     from flicker.cli.main import app
 
+    return get_command(app).commands[sub].params
+
+
+def is_whole(command: str) -> bool:
+    """Whether a command can be typed as it stands: a mention such as `flicker view` or `flicker fit --engine gsplat` names no scene or data set."""
     words = words_of(command)
     if not words[0].endswith("flicker") or words[1].startswith("-"):
         return True
-    sub = get_command(app).commands[words[1]]
-    arguments = [p for p in sub.params if p.param_type_name == "argument"]
+    arguments = [p for p in parameters(words[1]) if p.param_type_name == "argument"]
     if len(words) == 2 or words[2].startswith("-"):
         return not any(p.required for p in arguments) and words[-1] not in ("--photos", "--memories") and not (len(words) == 2 and words[1] == "pack")
     return True

@@ -19,7 +19,6 @@ from .memory import HEADERS, Counts, PortConfig, PurposeCounts, Timing, _Config
 HERE = Path(__file__).parent
 BEAT = 64
 PAGE = 4096  # regions begin at a multiple of it
-GROUPS = "4"  # pieces that fast and slow C++ are compiled in: each takes seconds for the headers alone
 
 Fields = Sequence[tuple[int, int]]  # value and width, the highest first
 
@@ -41,7 +40,7 @@ def build(top: str, parameters: Mapping[str, int], settings: Sequence[Path], arg
     return verilate(
         top,
         parameters=parameters,
-        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--output-groups", GROUPS, *args, "--assert"],
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", *args, "--assert"],
         cpp=[HERE / "frame_harness.cpp"],
         depends=HEADERS,
         settings=settings,
