@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 TB = Path(__file__).resolve().parent
-# Each worker's numba has a thread for each core: those that have nothing to do must sleep. They spin otherwise, and what takes a tenth of a second takes seconds.
+# Each worker's numba has a thread for each core: those that wait must sleep. They spin otherwise, and what takes a tenth of a second takes seconds.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 UNKNOWN = 100.0  # processor seconds of a test file that is not in costs.csv, for the order
 sys.path.insert(0, str(TB))

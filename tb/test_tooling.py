@@ -101,8 +101,8 @@ def test_names_of_tests_are_unique() -> None:
 
 
 def test_every_named_unit_has_simulations() -> None:
-    """Each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these; but for files that need a package that is not here. Of tb/model, whose
-    imports take longest, one file is collected: the mark comes from the folder, and no file of it sets it."""
+    """Each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these; but for files that need a package that is not here. Of tb/model,
+    whose imports take longest, one file is collected: the mark comes from the folder, and no file of it sets it."""
     others = [path for path in sorted((ROOT / "tb").glob("*/test_*.py")) if path.parent.name == "model"]
     assert not [path for path in others if "mark.sim" in path.read_text()]
     ignored = [f"--ignore={path}" for path in others if path.name != "test_memory.py"]
