@@ -51,11 +51,12 @@ MANAGERS = (
     ("lists", "READ_LISTS", "i_rendering.gen_unit", "a pointer is a narrow beat of 32 bytes"),
     ("pointers that were written", "READ_POINTERS", "i_front.i_pointers", ""),
     ("colours", "READ_COLOURS", "i_front.i_colours", ""),
+    ("kept colours", "READ_COLOURS", "i_front.gen_store.i_store", ""),
     ("cluster headers, geometry", "READ_GEOMETRY", "i_front.i_geometry", ""),
     ("cluster table", "READ_TABLE", "i_front.i_cull", ""),
     ("frame buffer", "WRITE_FRAME", "i_rendering.i_lines", ""),
     ("pointers that make room", "WRITE_POINTERS", "i_front.i_pointers", ""),
-    ("records, lists, pointers", "WRITE_FRONT", "i_front.i_write", ""),
+    ("records, lists, pointers, kept colours", "WRITE_FRONT", "i_front.i_write", ""),
 )
 AXI_SIZES = ("MaxBeats", "Bursts", "Width", "Id")  # parameters of the units of AXI
 OWN_ID_BITS = 4  # of a manager's identifier, below its number
