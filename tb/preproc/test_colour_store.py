@@ -1,7 +1,7 @@
 """Colours that are kept from frame to frame, front end in RTL against the golden model: records, the store byte by byte, and what is moved, frame by frame.
 
 State space: cameras that stay, turn, walk and jump, so that clusters' colours last, do not last, lose and gain survivors; tolerances of 0, some and 1; clusters
-of 16 to 256 Gaussians, all SH degrees, few bits, antialiased scenes, images without slopes; generations that change; memories (perfect, LPDDR4 with
+of 1 to 256 Gaussians, all SH degrees, few bits, antialiased scenes, images without slopes; generations that change; memories (perfect, LPDDR4 with
 pauses on all channels); errors of the memory in heads and rows, with the frames behind; a store of noise. Colours never differ by more than the tolerance from
 those of the frame's own camera, and the slopes of the table hold for every direction. Parameter space: with SLOW=1 one and two lanes.
 """
@@ -135,6 +135,19 @@ def test_tolerances(epsilon: float) -> None:
     """0: the same position alone. 1: whatever has a position near enough."""
     frames = check(scene(), epsilon=epsilon)
     assert [bool(frame.reused.lasting.any()) for frame in frames][1:4] == [True, epsilon > 0, epsilon > 0]
+
+
+@pytest.mark.parametrize("count", [1, 12, 13, 256])
+def test_one_cluster(count: int) -> None:
+    """The row that a frame reads last is the one that the next frame reads first: it is read anew."""
+    rng = np.random.default_rng([seed(), count])
+    means = np.stack([rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), rng.uniform(3.0, 3.2, count)], axis=1)
+    packed = pack(Scene(
+        means, np.full((count, 3), 0.03), rng.normal(size=(count, 4)), np.full(count, 0.8), rng.normal(size=(count, 4, 3)) * 0.3,
+    ), PackedFormat.CHUNK, Recipe(cuts=0)).packed
+    assert packed.counts.tolist() == [count]
+    frames = check(packed, [camera()] * 3 + [camera(turn=2.0), camera(0.001), camera(0.5), camera(0.5)])
+    assert [frame.reused.stored.mean() for frame in frames] == [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0]
 
 
 def test_images_without_slopes() -> None:
