@@ -98,7 +98,7 @@ module fv_lane_core #(
 
   logic [1:0] seen;
 
-  assign seen = eos_q ? dut.gen_lane[Watched].visit_shape[1:0] : dut.gen_lane[Watched].visit_shape.s0;
+  assign seen = eos_q ? dut.visit_shape[Watched][1:0] : dut.visit_shape[Watched].s0;
 
   logic [63:0] some;
 
@@ -129,7 +129,7 @@ module fv_lane_core #(
         end
       end
       if (colour_due_q) begin
-        a_colour: assert (dut.gen_lane[Watched].visit_colour[2] == key_q);
+        a_colour: assert (dut.visit_colour[Watched][2] == key_q);
       end
 
       c_third: cover (watching_q && visit && visited_q == number_q && number_q == 4'd3);

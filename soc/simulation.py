@@ -87,7 +87,7 @@ def build(chip: str, shared: bool = False, crossing: bool = False) -> Built:
         sources, other, define, settings = sources_of("flk_top_axi"), None, "", [half.HERE / f"{name}.vlt" for name in SETTINGS]
     library = verilate(
         "flk_soc", [*dict.fromkeys(sources), cpu, source],
-        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--output-groups", half.GROUPS, "--inline-mult", "20000",
+        args=["--x-assign", "unique", "--x-initial", "unique", "-fno-dfg", "-fno-table", "--inline-mult", "20000",
               "-Wno-lint", "-Wno-style", "-Wno-TIMESCALEMOD", "-Wno-MULTITOP"],
         cpp=[HERE / "harness.cpp"], depends=HEADERS, settings=settings,
         cflags=f"-DVL_USER_STOP -DVL_USER_FATAL {define} -I{half.HERE}".replace("  ", " "), opt="-O1", shared=True, kind="soc", name="soc",

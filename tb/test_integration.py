@@ -59,7 +59,7 @@ def test_cells_to_replace() -> None:
     assert len(listed) == 4 and all((ROOT / file).stem == name for name, file in listed)
     cells = {name for name, _ in listed}
     arrays = {path.stem for path in filelist() if re.search(r"\blogic\b[^;=]*\]\s*\w+_q\s*\[\w+\]\s*;", code(path))}
-    assert arrays == {"flk_sram", "flk_sram_single", "flk_fifo"}, arrays
+    assert arrays == {"flk_sram", "flk_sram_single", "flk_fifo", "flk_lane", "flk_lane_core"}, arrays  # the latter of shared cores alone
     for stage in ("flk_render_stage", "flk_lane_stage"):
         assert not cells & {path.stem for path in sources_of(stage)}
 
@@ -89,7 +89,7 @@ def test_figures_of_the_page() -> None:
 def test_parameters_are_those_of_the_chip(file: str) -> None:
     """Each has the chip's default and is handed on; the shim has no chip inside."""
     def parameters(text: str) -> dict[str, str]:
-        return dict(re.findall(r"^\s*parameter\s+int unsigned (\w+)\s*= ([\w:]+)", text, re.M))
+        return dict(re.findall(r"^\s*parameter\s+(?:int unsigned|bit)\s+(\w+)\s*= ([\w:']+)", text, re.M))
 
     text = (ROOT / file).read_text()
     chip = parameters(header(TOP))

@@ -82,8 +82,9 @@ def read_image(data: bytes) -> list[dict]:
     found = []
     for cluster in range(clusters):
         *box, sigma, last, flags, first = struct.unpack_from("<6fHBBI", data, places["table"] + 32 * cluster)
-        k = (flags + 1) ** 2
-        assert flags <= degree
+        own = flags & 3
+        k = (own + 1) ** 2
+        assert own <= degree and (form == 0 or flags >> 2 == 0)
         header = places["headers"] + (128 if form == 0 else 64) * cluster
         colours = places["colour"] + 64 * struct.unpack_from("<I", data, header + 12)[0]
         floats = np.frombuffer(data, "<f4", 32 if form == 0 else 16, header).astype(np.float64)
@@ -492,7 +493,8 @@ SOUND = {  # what is wrong with an image whose checksums are right: change, form
     "sigma zero": (at(TABLE + 24, "<H", 0), "chunk", "cluster 0: sigma: not a positive"),
     "sigma negative": (at(TABLE + 24, "<H", 0xBF80), "chunk", "cluster 0: sigma: not a positive"),
     "count": (at(TABLE + 26, "<B", 3), "chunk", "cluster 1: first: not where"),
-    "flags": (at(TABLE + 27, "<B", 7), "chunk", "cluster 0: flags: reserved"),
+    "flags": (at(TABLE + 27, "<B", 7), "fp16", "cluster 0: flags: reserved"),
+    "slope": (at(TABLE + 27, "<B", 3 | 8 << 2), "chunk", "cluster 0: slope: below that of its colours"),
     "degree of a cluster": (at(TABLE + 27, "<B", 2), "chunk", "cluster 1: colour: not where"),
     "first slot": (at(TABLE + 32 + 28, "<I", 1 << 28), "chunk", "cluster 1: first: not where"),
     "low not finite": (at(CHUNK_HEADERS + 128 + 4, "<f", np.inf), "chunk", "cluster 1: position_low: not finite"),

@@ -38,7 +38,7 @@ class Bench:
     def _library(self) -> ctypes.CDLL:
         names = [*self.registers, *self.inputs]
         kinds = {**self.registers, **self.inputs}
-        lines = ["module datapath_bench (", "  input logic clk_i, rst_ni, en_i,", "  input logic [1:0] phase_i,"]
+        lines = ["module datapath_bench (", "  input logic clk_i, rst_ni, en_i,", "  input logic [3:0] phase_i,"]
         # Two outputs at least: an array of words in C++.
         lines += [f"  input logic [{64 * len(names) - 1}:0] in_i,", f"  output logic [{max(64 * len(self.outputs), 128) - 1}:0] out_o", ");"]
         phase = f".phase_i(phase_i[{max((self.pipeline.interval - 1).bit_length(), 1) - 1}:0]), " if self.pipeline.interval > 1 else ""

@@ -552,6 +552,11 @@ def _check_gaussians(packed: PackedScene, path: Path) -> None:
         _, scales = means_and_scales(packed)
     _refuse(path, ~((low >= packed.table["low"]) & (high <= packed.table["high"])), "low, high", "a mean lies outside")
     _refuse(path, sigma > packed.table["sigma"], "sigma", "below a standard deviation")
+    if packed.format is PackedFormat.CHUNK:
+        from .slopes import slope_codes
+
+        least = slope_codes(packed)  # 0: beyond what a code can say
+        _refuse(path, (packed.slopes > 0) & ((packed.slopes < least) | (least == 0)), "slope", "below that of its colours")
     if packed.format is PackedFormat.CHUNK and (small := (scales < 2.0**-126).any(axis=1)).any():
         raise FlickerError(f"{path}: scale: slot {packed.slot[np.flatnonzero(small)[0]]}: below 2^-126")
 
