@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FlickerError, one_line
+from . import slopes
 from .gaussians import SH_C0, Scene
 from .memory import rotation_of
 
@@ -319,6 +320,18 @@ def chunk_codes(packed: PackedScene) -> ChunkCodes:
     )
 
 
+def slope_codes(packed: PackedScene) -> np.ndarray:
+    """uint8 (C,): slopes of a scene in chunks (`scene.slopes`), from its decoded coefficients; 0 in other formats, whose colours are not kept."""
+    if packed.format is not PackedFormat.CHUNK:
+        return np.zeros(len(packed.table), np.uint8)
+    codes = chunk_codes(packed).sh
+    sh = np.zeros((len(codes), codes.shape[1] + 1, 3), np.float32)
+    for degree in range(1, packed.degree + 1):
+        of = slice(coefficients(degree - 1), coefficients(degree))
+        sh[:, of] = codes[:, of.start - 1 : of.stop - 1] * packed.headers["sh_step"][:, degree - 1][packed.cluster, None]
+    return slopes.codes_of(sh, packed.start[:-1])
+
+
 @dataclass(frozen=True, eq=False)
 class Fp16Bits:
     """Bits of the FP16 numbers of all Gaussians, uint16. mean (from the origin of the cluster), scale: (N, 3). quat: (N, 4). opacity: (N,). sh: (N, K, 3)."""
@@ -553,8 +566,6 @@ def _check_gaussians(packed: PackedScene, path: Path) -> None:
     _refuse(path, ~((low >= packed.table["low"]) & (high <= packed.table["high"])), "low, high", "a mean lies outside")
     _refuse(path, sigma > packed.table["sigma"], "sigma", "below a standard deviation")
     if packed.format is PackedFormat.CHUNK:
-        from .slopes import slope_codes
-
         least = slope_codes(packed)  # 0: beyond what a code can say
         _refuse(path, (packed.slopes > 0) & ((packed.slopes < least) | (least == 0)), "slope", "below that of its colours")
     if packed.format is PackedFormat.CHUNK and (small := (scales < 2.0**-126).any(axis=1)).any():

@@ -34,10 +34,10 @@ from .packed import (
     coefficients,
     load_packed,
     narrowed,
+    slope_codes,
     split,
     too_long,
 )
-from .slopes import slope_codes
 
 VISIBLE = 1.0 / 255.0  # opacity below which a Gaussian never is: pixels skip alphas below
 CUTS = 0.015

@@ -15,8 +15,6 @@ import math
 
 import numpy as np
 
-from .packed import PackedFormat, PackedScene, chunk_codes, coefficients
-
 CODE_BITS = 6
 CODE_ONE = 32  # of a slope of 1
 CODE_SHIFT = 2  # fraction bits of a slope's logarithm to base 2
@@ -33,22 +31,15 @@ def largest_slopes(sh: np.ndarray, start: np.ndarray) -> np.ndarray:
     """float64 (C,): the largest slope of each cluster's Gaussians. sh: (N, K, 3), `start`: (C,) first Gaussian of each."""
     slope = np.zeros((len(sh), 3))
     for degree in range(1, math.isqrt(sh.shape[1])):
-        of = sh[:, coefficients(degree - 1) : coefficients(degree)].astype(np.float64)
+        of = sh[:, degree**2 : (degree + 1) ** 2].astype(np.float64)
         slope += degree_factor(degree) * np.sqrt((of * of).sum(axis=1))
     return np.maximum.reduceat(slope.max(axis=1), start)
 
 
-def slope_codes(packed: PackedScene) -> np.ndarray:
-    """uint8 (C,): codes of a scene in chunks, from its decoded coefficients; 0 in other formats, whose colours are not kept."""
-    if packed.format is not PackedFormat.CHUNK:
-        return np.zeros(len(packed.table), np.uint8)
-    codes = chunk_codes(packed).sh
-    sh = np.zeros((len(codes), codes.shape[1] + 1, 3), np.float32)
-    for degree in range(1, packed.degree + 1):
-        of = slice(coefficients(degree - 1), coefficients(degree))
-        sh[:, of] = codes[:, of.start - 1 : of.stop - 1] * packed.headers["sh_step"][:, degree - 1][packed.cluster, None]
+def codes_of(sh: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """uint8 (C,): codes of clusters that begin with Gaussians `start`. sh: as of `largest_slopes`."""
     with np.errstate(divide="ignore"):
-        code = np.ceil(CODE_STEP * np.log2(ROUNDING * largest_slopes(sh, packed.start[:-1]))) + CODE_ONE
+        code = np.ceil(CODE_STEP * np.log2(ROUNDING * largest_slopes(sh, start))) + CODE_ONE
     return np.where(code < 1 << CODE_BITS, np.maximum(code, 1), 0).astype(np.uint8)
 
 
