@@ -141,7 +141,7 @@ typedef struct {
 } flk_region_t;
 
 /* Colours that are kept from frame to frame (docs/reference/colour_store.md). All frames of a scene may name the same one, those under way too. Its memory holds zeros before
- * its first frame, or what frames of other generations have left. After a frame with FLK_ERROR_FRONT_READ or FLK_ERROR_FRONT_WRITE, take another generation. */
+ * its first frame, or what frames of other generations have left. After a frame with FLK_ERROR_FRONT_WRITE, and after flk_reset, take a new generation. */
 typedef struct {
   uint64_t address, bytes; /* address: a multiple of 2048 */
   uint32_t generation; /* 1 to 2^32 - 1: another one for another scene */

@@ -1,10 +1,10 @@
 // Heads of the colour store: which clusters' stored colours last (docs/reference/colour_store.md).
 //
-// Of each cluster that passed the cull, in order, the head is asked for and, when it comes, tested: its colours last where it has the
-// frame's generation, a finite position, a bit at least, and flk_colours_last says so. Out come the clusters in order: where they lie in
-// the store, the bits of what is stored (none where colours do not last), and whether this frame's colours are stored. A head that is
-// about to become wrong leaves without bits (clear_*) before its cluster does.
-// Ahead clusters at most are inside; what was asked for always has room, so that heads never stand in front of rows for long.
+// Of each cluster that passed the cull, in order, the head is requested and, when it comes, tested: its colours last where it has the
+// frame's generation, a bit at least, and flk_colours_last says so. Out come the clusters in order: where they lie in
+// the store, the bits of what is stored (none where colours do not last), and whether this frame's colours are stored. A head with
+// bits, of any generation, whose colours do not last leaves without bits (clear_*) before its cluster does.
+// Ahead clusters at most are inside; what was requested always has room, so that heads never stand in front of rows for long.
 // flush_i: no one takes clusters any more, all go. Registers of a frame stay until idle_o.
 // Throughput: a cluster every COLOURS_LAST_LATENCY + 5 cycles. No combinational path from ready to ready.
 module flk_colour_heads
@@ -17,7 +17,7 @@ module flk_colour_heads
   input  logic                 rst_ni,
   input  logic                 flush_i,
   output logic                 idle_o,
-  input  store_place_t         first_i,       // of the store's first cluster
+  input  store_slot_t          first_i,       // of the store's first cluster
   input  logic [31:0]          generation_i,
   input  cluster_t             limit_i,
   input  cluster_t [2:0]       position_i,
@@ -26,9 +26,9 @@ module flk_colour_heads
   output logic                 in_ready_o,
   input  boxed_t               in_data_i,
   // Requests for heads, in order
-  output logic                 ask_valid_o,
-  input  logic                 ask_ready_i,
-  output store_place_t         ask_o,
+  output logic                 request_valid_o,
+  input  logic                 request_ready_i,
+  output store_slot_t          request_slot_o,
   // Heads
   input  logic                 head_valid_i,
   output logic                 head_ready_o,
@@ -36,7 +36,7 @@ module flk_colour_heads
   // Heads without bits
   output logic                 clear_valid_o,
   input  logic                 clear_ready_i,
-  output store_place_t         clear_place_o,
+  output store_slot_t          clear_slot_o,
   output store_head_t          clear_o,
   // Clusters, with what is stored
   output logic                 out_valid_o,
@@ -45,14 +45,14 @@ module flk_colour_heads
 );
 
   localparam int unsigned COUNT_BITS = $clog2(Ahead + 1);
-  localparam int unsigned PlaceBits = $bits(store_place_t);
-  localparam int unsigned LowBits = PlaceBits / 2;
-  localparam int unsigned HighBits = PlaceBits - LowBits;
+  localparam int unsigned SlotBits = $bits(store_slot_t);
+  localparam int unsigned LowBits = SlotBits / 2;
+  localparam int unsigned HighBits = SlotBits - LowBits;
   localparam int unsigned Interval = 16;  // of flk_colours_last
   localparam int unsigned STEP_BITS = $clog2(COLOURS_LAST_LATENCY + 1);
 
   typedef struct packed {
-    store_place_t   place;
+    store_slot_t    slot;
     cluster_t [2:0] low;
     cluster_t [2:0] high;
     logic [5:0]     slope;
@@ -61,28 +61,28 @@ module flk_colour_heads
   // ---- clusters -------------------------------------------------------------------------------------
 
   logic [COUNT_BITS-1:0] inside_q;
-  logic                  in_move, out_move, box_valid_q, box_move, ask_valid_q;
+  logic                  in_move, out_move, box_valid_q, box_move, request_valid_q;
   boxed_t                box_q;
-  store_place_t          ask_q, place;
-  logic [LowBits:0]      low_q;  // of the place, which is added up in two halves
+  store_slot_t           request_q, slot;
+  logic [LowBits:0]      low_q;  // of the slot, which is added up in two halves
   placed_t               placed;
   logic                  placed_room, placed_valid, placed_take, placed_empty;
 
   assign in_ready_o = inside_q < COUNT_BITS'(Ahead) && (!box_valid_q || box_move);
   assign in_move    = in_valid_i && in_ready_o;
-  assign box_move   = box_valid_q && (!ask_valid_q || ask_ready_i);
-  assign place      = {first_i[PlaceBits-1:LowBits] + HighBits'(box_q.index[23:LowBits]) +
+  assign box_move   = box_valid_q && (!request_valid_q || request_ready_i);
+  assign slot       = {first_i[SlotBits-1:LowBits] + HighBits'(box_q.index[23:LowBits]) +
                        HighBits'(low_q[LowBits]), low_q[LowBits-1:0]};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      inside_q    <= '0;
-      box_valid_q <= 1'b0;
-      ask_valid_q <= 1'b0;
+      inside_q        <= '0;
+      box_valid_q     <= 1'b0;
+      request_valid_q <= 1'b0;
     end else begin
-      inside_q    <= inside_q + COUNT_BITS'(in_move) - COUNT_BITS'(out_move);
-      box_valid_q <= in_move || (box_valid_q && !box_move);
-      ask_valid_q <= box_move || (ask_valid_q && !ask_ready_i);
+      inside_q        <= inside_q + COUNT_BITS'(in_move) - COUNT_BITS'(out_move);
+      box_valid_q     <= in_move || (box_valid_q && !box_move);
+      request_valid_q <= box_move || (request_valid_q && !request_ready_i);
     end
   end
 
@@ -92,12 +92,12 @@ module flk_colour_heads
       low_q <= {1'b0, first_i[LowBits-1:0]} + {1'b0, in_data_i.index[LowBits-1:0]};
     end
     if (box_move) begin
-      ask_q <= place;
+      request_q <= slot;
     end
   end
 
-  assign ask_valid_o = ask_valid_q;
-  assign ask_o       = ask_q;
+  assign request_valid_o = request_valid_q;
+  assign request_slot_o  = request_q;
 
   flk_sram_fifo #(
     .Width($bits(placed_t)),
@@ -108,7 +108,7 @@ module flk_colour_heads
     .clear_i    (1'b0),
     .in_valid_i (box_move),
     .in_ready_o (placed_room),
-    .in_data_i  ({place, box_q.low, box_q.high, box_q.slope}),
+    .in_data_i  ({slot, box_q.low, box_q.high, box_q.slope}),
     .out_valid_o(placed_valid),
     .out_ready_i(placed_take),
     .out_data_o (placed),
@@ -126,9 +126,9 @@ module flk_colour_heads
   state_e               state_d, state_q;
   logic [3:0]           phase_q;     // of the test: 0 with the cluster that has been loaded
   logic [STEP_BITS-1:0] step_q;      // cycles that it has been in it
-  logic                 ours_q;      // generation and a finite position
+  logic                 ours_q;      // of the frame's generation
   logic [3:0]           some_q;      // bits, by quarter
-  logic                 last, last_q, same_q, old, lasting, load;
+  logic                 last, last_q, same_q, lasting, load;
   cluster_t [2:0]       then_q;
   logic [3:0][63:0]     bits_q;
 
@@ -147,7 +147,7 @@ module flk_colour_heads
           state_d = DECIDE;
         end
       end
-      DECIDE: state_d = old && !last_q ? CLEAR : GIVE;
+      DECIDE: state_d = some_q != '0 && !lasting ? CLEAR : GIVE;
       CLEAR: begin
         if (clear_ready_i) begin
           state_d = GIVE;
@@ -175,9 +175,6 @@ module flk_colour_heads
       bits_q <= head_i.there;
       for (int unsigned k = 0; k < 3; k++) begin
         then_q[k] <= number(head_i.position[k]);
-        if (&head_i.position[k][30:23]) begin
-          ours_q <= 1'b0;
-        end
       end
     end
     for (int unsigned k = 0; k < 4; k++) begin
@@ -210,10 +207,9 @@ module flk_colour_heads
 
   assign head_ready_o  = load;
   assign placed_take   = state_q == GIVE;
-  assign old           = ours_q && some_q != '0;
-  assign lasting       = old && last_q;
+  assign lasting       = ours_q && some_q != '0 && last_q;
   assign clear_valid_o = state_q == CLEAR;
-  assign clear_place_o = placed.place;
+  assign clear_slot_o  = placed.slot;
   assign clear_o       = '{there: '0, generation: generation_i, position: position_i};
 
   // ---- what is stored -------------------------------------------------------------------------------
@@ -231,7 +227,7 @@ module flk_colour_heads
   stored_t given;
   logic    out_take;
 
-  assign given    = '{place: placed.place, storing: storing_q, there: lasting_q ? bits_q : '0};
+  assign given    = '{slot: placed.slot, storing: storing_q, there: lasting_q ? bits_q : '0};
   assign out_take = out_ready_i || flush_i;
   assign out_move = out_valid_o && out_take;
 

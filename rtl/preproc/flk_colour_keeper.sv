@@ -26,7 +26,7 @@ module flk_colour_keeper
   // Clusters
   input  logic                     cluster_valid_i,
   output logic                     cluster_ready_o,
-  input  store_place_t             cluster_place_i,
+  input  store_slot_t              cluster_slot_i,
   input  logic                     cluster_storing_i,
   // Turns
   input  logic                     turn_valid_i,
@@ -49,8 +49,8 @@ module flk_colour_keeper
   localparam int unsigned CountBits = 3;  // 0 to 4
 
   typedef struct packed {
-    store_place_t place;
-    logic         storing;
+    store_slot_t slot;
+    logic        storing;
   } about_t;
 
   typedef struct packed {
@@ -77,7 +77,7 @@ module flk_colour_keeper
     .clear_i    (start_i),
     .in_valid_i (cluster_valid_i),
     .in_ready_o (cluster_ready_o),
-    .in_data_i  ({cluster_place_i, cluster_storing_i}),
+    .in_data_i  ({cluster_slot_i, cluster_storing_i}),
     .out_valid_o(about_valid),
     .out_ready_i(about_take),
     .out_data_o (about),
@@ -305,7 +305,7 @@ module flk_colour_keeper
     end
   end
 
-  assign line_beat_o = {about.place, state_q == HEAD ? 5'd0 : row_q + 1'b1};
+  assign line_beat_o = {about.slot, state_q == HEAD ? 5'd0 : row_q + 1'b1};
   assign line_o      = state_q == HEAD ? {head.there, 128'b0, head.generation, head.position}
                                        : row_line;
   assign idle_o      = turns_empty && !turn_valid_q && state_q == FILL;

@@ -1,7 +1,7 @@
 // Rows of the colour store: stored colours of survivors to the preprocessing lanes, in order with those that are computed (docs/reference/colour_store.md).
 //
-// A turn's survivors come in the order of the scene, with those whose colours are stored; a row that holds one of them is asked for once, when it
-// is not the row asked for last. When it comes, each lane gets its entries. Of what a lane gets in in_* (parts of computed colours) and from rows,
+// A turn's survivors come in the order of the scene, with those whose colours are stored; a row that holds one of them is requested once, when it
+// is not the row requested last. When it comes, each lane gets its entries. Of what a lane gets in in_* (parts of computed colours) and from rows,
 // it is given each survivor's, in the order of the survivors; a stored colour is one part, first and last, with its codes in dc.
 // turn_ready_o does not depend on turn_valid_i. A lane holds Waiting survivors that have no colour yet; who sends turns sees to it.
 // Throughput: a turn every two cycles, a colour a cycle and lane. Latency: the memory's and 7.
@@ -24,11 +24,11 @@ module flk_colour_rows
   input  logic [Lanes-1:0]         turn_stored_i,  // of the alive ones
   input  logic [5:0]               turn_group_i,
   input  logic [1:0]               turn_at_i,      // place in the group of the first lane's
-  input  store_place_t             turn_place_i,   // of the cluster
+  input  store_slot_t              turn_slot_i,    // of the cluster
   // Requests for rows, in order
-  output logic                     ask_valid_o,
-  input  logic                     ask_ready_i,
-  output logic [BEAT_BITS-1:0]     ask_beat_o,
+  output logic                     request_valid_o,
+  input  logic                     request_ready_i,
+  output logic [BEAT_BITS-1:0]     request_beat_o,
   // Rows
   input  logic                     row_valid_i,
   output logic                     row_ready_o,
@@ -51,19 +51,19 @@ module flk_colour_rows
     logic [Lanes-1:0] stored;
   } item_t;
 
-  logic                 a_valid_q, a_move, known_q, same, item_room, asking;
+  logic                 a_valid_q, a_move, known_q, same, item_room, requesting;
   logic [Lanes-1:0]     a_stored_q;
   logic [4:0]           row, a_row_q, row_q;  // the latter two: of the cluster's beats
   logic [3:0]           a_place_q;
-  store_place_t         a_cluster_q, cluster_q;
+  store_slot_t          a_cluster_q, cluster_q;
 
-  assign row          = store_row(turn_group_i);
-  assign turn_ready_o = !a_valid_q;
-  assign same         = known_q && row_q == a_row_q && cluster_q == a_cluster_q;
-  assign asking       = a_valid_q && !same && item_room;
-  assign a_move       = a_valid_q && item_room && (same || ask_ready_i);
-  assign ask_valid_o  = asking;
-  assign ask_beat_o   = {a_cluster_q, a_row_q};
+  assign row             = store_row(turn_group_i);
+  assign turn_ready_o    = !a_valid_q;
+  assign same            = known_q && row_q == a_row_q && cluster_q == a_cluster_q;
+  assign requesting      = a_valid_q && !same && item_room;
+  assign a_move          = a_valid_q && item_room && (same || request_ready_i);
+  assign request_valid_o = requesting;
+  assign request_beat_o  = {a_cluster_q, a_row_q};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -80,7 +80,7 @@ module flk_colour_rows
       a_stored_q  <= turn_stored_i;
       a_row_q     <= row + 1'b1;
       a_place_q   <= 4'({turn_group_i - 6'(6'(row) * 6'd3), 2'b0}) | 4'(turn_at_i);
-      a_cluster_q <= turn_place_i;
+      a_cluster_q <= turn_slot_i;
     end
     if (a_move) begin
       row_q     <= a_row_q;
@@ -219,7 +219,7 @@ module flk_colour_rows
   else $error("flk_colour_rows: a stored colour of no survivor");
 
   assert property (@(posedge clk_i) disable iff (!rst_ni)
-      ask_valid_o && !ask_ready_i |=> ask_valid_o && $stable(ask_beat_o))
+      request_valid_o && !request_ready_i |=> request_valid_o && $stable(request_beat_o))
   else $error("flk_colour_rows: a request that is withdrawn");
 `endif
 

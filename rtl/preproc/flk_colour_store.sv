@@ -6,8 +6,8 @@
 // are stored leave as lines, in an order in which every prefix leaves the store without a wrong colour (flk_colour_keeper, flk_colour_heads).
 // Without setup_i.enable nothing is read or written, and parts pass.
 // A frame: start_i while idle_o; registers stay until idle_o. flush_i, from the front's end on: clusters whose turns do not come
-// any more go. failing_i, until the frame's end: it will end with an error, and turns of some clusters do not come; nothing is shown or
-// kept any more. An error of the memory: error_o rises and stays until the next start; colours then mean nothing.
+// any more go. failing_i, until the frame's end: what has been read is wrong, and turns of some clusters do not come; nothing is shown or
+// kept any more. An error of the memory: error_o rises and stays until the next start; the same holds, so that no wrong colour is kept.
 // Combinational: out_ready_i to in_ready_o, in_* to out_*; ar_ready_i to the requests, r_*_i to the buffer's write port.
 module flk_colour_store
   import flk_front_pkg::*;
@@ -81,8 +81,9 @@ module flk_colour_store
   typedef struct packed {
     logic                 head;
     logic [BEAT_BITS-1:0] beat;
-  } ask_t;
+  } request_t;
 
+  logic error_q;
   logic enable_q;  // heads are read
   logic shown_q;   // colours are shown and kept
 
@@ -92,17 +93,17 @@ module flk_colour_store
       shown_q  <= 1'b0;
     end else begin
       enable_q <= setup_i.enable;
-      shown_q  <= setup_i.enable && !failing_i;
+      shown_q  <= setup_i.enable && !failing_i && !error_q;
     end
   end
 
   // ---- heads ----------------------------------------------------------------------------------------
 
   logic                 heads_idle, heads_ready, beat_valid, beat_is_head, head_ready, row_ready;
-  logic [1:0]           ask_valid, ask_ready;
-  ask_t [1:0]           asks;
+  logic [1:0]           request_valid, request_ready;
+  request_t [1:0]       requests;
   logic                 clear_valid, clear_ready, stored_valid, stored_take;
-  store_place_t         ask_head, clear_place;
+  store_slot_t          request_head, clear_slot;
   logic [Width-1:0]     beat_data;
   store_head_t          head, clear;
   stored_t              stored;
@@ -112,34 +113,34 @@ module flk_colour_store
   flk_colour_heads i_heads (
     .clk_i,
     .rst_ni,
-    .flush_i      (flush_i || !shown_q),
-    .idle_o       (heads_idle),
-    .first_i      (setup_i.first),
-    .generation_i (setup_i.generation),
-    .limit_i      (setup_i.limit),
+    .flush_i        (flush_i || !shown_q),
+    .idle_o         (heads_idle),
+    .first_i        (setup_i.first),
+    .generation_i   (setup_i.generation),
+    .limit_i        (setup_i.limit),
     .position_i,
-    .in_valid_i   (kept_valid_i && enable_q),
-    .in_ready_o   (heads_ready),
-    .in_data_i    (kept_i),
-    .ask_valid_o  (ask_valid[0]),
-    .ask_ready_i  (ask_ready[0]),
-    .ask_o        (ask_head),
-    .head_valid_i (beat_valid && beat_is_head),
-    .head_ready_o (head_ready),
-    .head_i       (head),
-    .clear_valid_o(clear_valid),
-    .clear_ready_i(clear_ready),
-    .clear_place_o(clear_place),
-    .clear_o      (clear),
-    .out_valid_o  (stored_valid),
-    .out_ready_i  (stored_take),
-    .out_data_o   (stored)
+    .in_valid_i     (kept_valid_i && enable_q),
+    .in_ready_o     (heads_ready),
+    .in_data_i      (kept_i),
+    .request_valid_o(request_valid[0]),
+    .request_ready_i(request_ready[0]),
+    .request_slot_o (request_head),
+    .head_valid_i   (beat_valid && beat_is_head),
+    .head_ready_o   (head_ready),
+    .head_i         (head),
+    .clear_valid_o  (clear_valid),
+    .clear_ready_i  (clear_ready),
+    .clear_slot_o   (clear_slot),
+    .clear_o        (clear),
+    .out_valid_o    (stored_valid),
+    .out_ready_i    (stored_take),
+    .out_data_o     (stored)
   );
 
-  assign head         = {beat_data[511:256], beat_data[127:0]};
-  assign asks[0].beat = {ask_head, 5'd0};
-  assign asks[0].head = 1'b1;
-  assign asks[1].head = 1'b0;
+  assign head             = {beat_data[511:256], beat_data[127:0]};
+  assign requests[0].beat = {request_head, 5'd0};
+  assign requests[0].head = 1'b1;
+  assign requests[1].head = 1'b0;
 
   // ---- turns ----------------------------------------------------------------------------------------
 
@@ -181,20 +182,20 @@ module flk_colour_store
     .clk_i,
     .rst_ni,
     .start_i,
-    .idle_o       (rows_idle),
-    .turn_valid_i (go_i),
-    .turn_ready_o (rows_ready),
-    .turn_alive_i (alive_i),
-    .turn_stored_i(alive_i & there_o),
-    .turn_group_i (group_i),
-    .turn_at_i    (at_i),
-    .turn_place_i (stored.place),
-    .ask_valid_o  (ask_valid[1]),
-    .ask_ready_i  (ask_ready[1]),
-    .ask_beat_o   (asks[1].beat),
-    .row_valid_i  (beat_valid && !beat_is_head),
-    .row_ready_o  (row_ready),
-    .row_i        (row),
+    .idle_o         (rows_idle),
+    .turn_valid_i   (go_i),
+    .turn_ready_o   (rows_ready),
+    .turn_alive_i   (alive_i),
+    .turn_stored_i  (alive_i & there_o),
+    .turn_group_i   (group_i),
+    .turn_at_i      (at_i),
+    .turn_slot_i    (stored.slot),
+    .request_valid_o(request_valid[1]),
+    .request_ready_i(request_ready[1]),
+    .request_beat_o (requests[1].beat),
+    .row_valid_i    (beat_valid && !beat_is_head),
+    .row_ready_o    (row_ready),
+    .row_i          (row),
     .in_valid_i,
     .in_ready_o,
     .in_data_i,
@@ -205,24 +206,25 @@ module flk_colour_store
 
   // ---- beats ----------------------------------------------------------------------------------------
 
-  logic             ask_one, fetch_ready, fetch_idle, fetch_valid, fetch_head, fetch_error, freed_q;
+  logic             request_any, fetch_ready, fetch_idle, fetch_valid, fetch_head, fetch_error;
+  logic             freed_q;
   logic             buffer_empty, unused_index, unused_room;
-  ask_t             ask;
+  request_t         request;
   logic [Width-1:0] fetch_data;
 
   flk_stream_arbiter #(
     .Inputs(2),
-    .Width ($bits(ask_t))
-  ) i_asks (
+    .Width ($bits(request_t))
+  ) i_requests (
     .clk_i,
     .rst_ni,
     .clear_i    (1'b0),
-    .in_valid_i (ask_valid),
-    .in_ready_o (ask_ready),
-    .in_data_i  (asks),
-    .out_valid_o(ask_one),
+    .in_valid_i (request_valid),
+    .in_ready_o (request_ready),
+    .in_data_i  (requests),
+    .out_valid_o(request_any),
     .out_ready_i(fetch_ready),
-    .out_data_o (ask),
+    .out_data_o (request),
     .out_index_o(unused_index)
   );
 
@@ -240,11 +242,11 @@ module flk_colour_store
     .rst_ni,
     .stop_i     (1'b0),
     .idle_o     (fetch_idle),
-    .in_valid_i (ask_one),
+    .in_valid_i (request_any),
     .in_ready_o (fetch_ready),
-    .in_beat_i  (ask.beat),
+    .in_beat_i  (request.beat),
     .in_beats_i (2'd1),
-    .in_tag_i   (ask.head),
+    .in_tag_i   (request.head),
     .in_placed_i(1'b0),
     .freed_i    (freed_q),
     .out_valid_o(fetch_valid),
@@ -282,8 +284,6 @@ module flk_colour_store
     .empty_o    (buffer_empty)
   );
 
-  logic error_q;
-
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       freed_q <= 1'b0;
@@ -320,7 +320,7 @@ module flk_colour_store
     .position_i,
     .cluster_valid_i  (turn && !opened_q),
     .cluster_ready_o  (about_ready),
-    .cluster_place_i  (stored.place),
+    .cluster_slot_i   (stored.slot),
     .cluster_storing_i(stored.storing),
     .turn_valid_i     (turn),
     .turn_ready_o     (keeper_ready),
@@ -352,7 +352,7 @@ module flk_colour_store
   assign clear_ready  = line_ready_i && !keeping_q;
   assign keep_ready   = line_ready_i && (keeping_q || !clear_valid);
   assign line_valid_o = clear_valid || keep_valid;
-  assign line_beat_o  = clear_valid && !keeping_q ? {clear_place, 5'd0} : keep_beat;
+  assign line_beat_o  = clear_valid && !keeping_q ? {clear_slot, 5'd0} : keep_beat;
   assign line_o       = clear_valid && !keeping_q
                       ? {clear.there, 128'b0, clear.generation, clear.position} : keep;
 
@@ -368,6 +368,10 @@ module flk_colour_store
 
   assert property (@(posedge clk_i) disable iff (!rst_ni) go_i |-> ready_o)
   else $error("flk_colour_store: a turn that was not let go");
+
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      line_valid_o && !line_ready_i |=> line_valid_o && $stable({line_beat_o, line_o}))
+  else $error("flk_colour_store: a line that changes before it leaves");
 `endif
 
 endmodule

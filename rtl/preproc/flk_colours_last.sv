@@ -72,10 +72,9 @@ module flk_colours_last (
   logic v50;  // cycle 37
   logic v51;  // cycle 0
   logic v52;  // cycle 38
-  logic v53;  // cycle 39
-  logic v54;  // cycle 29
-  logic v55;  // cycle 40
-  logic last;  // cycle 40
+  logic v53;  // cycle 29
+  logic v54;  // cycle 39
+  logic last;  // cycle 39
   logic [0:0][31:0] low_1_i_q;
   logic [0:0][31:0] low_2_i_q;
   logic [0:0][31:0] high_0_i_q;
@@ -114,7 +113,6 @@ module flk_colours_last (
   logic [2:0][0:0] v51_q;
   logic [0:0][0:0] v52_q;
   logic [0:0][0:0] v53_q;
-  logic [0:0][0:0] v54_q;
   logic [0:0][0:0] last_q;
 
   always_ff @(posedge clk_i) begin
@@ -179,14 +177,13 @@ module flk_colours_last (
     if (en_i && phase_i == 4'd7) begin
       v28_q <= v28;
       v29_q <= v29;
-      v53_q <= v53;
+      last_q <= last;
     end
   end
 
   always_ff @(posedge clk_i) begin
     if (en_i && phase_i == 4'd8) begin
       v30_q <= v30;
-      last_q <= last;
     end
   end
 
@@ -215,7 +212,7 @@ module flk_colours_last (
       v17_q <= v17;
       v21_q <= v21;
       v46_q <= v46;
-      v54_q <= v54;
+      v53_q <= v53;
     end
   end
 
@@ -276,15 +273,14 @@ module flk_colours_last (
   flk_ff_exp2 #(.ManBits(23), .IntBits(5), .FracBits(2), .Stages(4)) i_u_v44 (.clk_i, .en_i, .l_i(7'(v43)), .y_o(u_v44));
   assign v44 = u_v44;
   flk_ff_ldexp #(.ManBits(23), .ShiftBits(10)) i_v46 (.x_i(v21), .shift_i(10'sd4), .y_o(v46));
-  flk_ff_cmp #(.ManBits(23)) i_v47 (.a_i(v41), .b_i(v46_q[0]), .lt_o(v47));
-  flk_ff_cmp #(.ManBits(23)) i_v49 (.a_i(v48), .b_i(v45_q[0]), .lt_o(v49));
-  assign v50 = v47_q[0] | v49_q[0];
-  assign v51 = slope_i < 6'd1;
-  assign v52 = v50_q[0] | v51_q[2];
-  assign v53 = v52_q[0] < 1'd1;
-  flk_ff_cmp #(.ManBits(23)) i_v54 (.a_i(32'h0), .b_i(v21), .lt_o(v54));
-  assign v55 = !v54_q[0];
-  assign last = v53_q[0] | v55;
+  flk_ff_cmp #(.ManBits(23)) i_v47 (.a_i(v46_q[0]), .b_i(v41), .lt_o(v47));
+  flk_ff_cmp #(.ManBits(23)) i_v49 (.a_i(v45_q[0]), .b_i(v48), .lt_o(v49));
+  assign v50 = v47_q[0] & v49_q[0];
+  assign v51 = slope_i > 6'd0;
+  assign v52 = v50_q[0] & v51_q[2];
+  flk_ff_cmp #(.ManBits(23)) i_v53 (.a_i(32'h0), .b_i(v21), .lt_o(v53));
+  assign v54 = !v53_q[0];
+  assign last = v52_q[0] | v54;
 
   assign last_o = last_q[0];
 

@@ -159,12 +159,12 @@ package flk_preproc_pkg;
   localparam int unsigned STORE_ROW = 12;
   localparam int unsigned STORE_ROWS = 22;
   localparam int unsigned STORE_LINE_BITS = 5;
-  typedef logic [BEAT_BITS-STORE_LINE_BITS-1:0] store_place_t;  // of a cluster: its first beat / 32
+  typedef logic [BEAT_BITS-STORE_LINE_BITS-1:0] store_slot_t;  // of a cluster: its first beat / 32
 
   // Registers of a frame.
   typedef struct packed {
     logic                 enable;
-    store_place_t         first;       // of the first cluster
+    store_slot_t          first;       // of the first cluster
     logic [31:0]          generation;
     cluster_t             limit;       // square of what colours may differ by
   } store_setup_t;
@@ -184,9 +184,9 @@ package flk_preproc_pkg;
 
   // A cluster with what may be shown of it.
   typedef struct packed {
-    store_place_t         place;
-    logic                 storing;  // this frame's colours are stored
-    logic [3:0][63:0]     there;
+    store_slot_t      slot;
+    logic             storing;  // this frame's colours are stored
+    logic [3:0][63:0] there;
   } stored_t;
 
   // Row of a group's Gaussians: a third of its number.

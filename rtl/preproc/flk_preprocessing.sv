@@ -705,7 +705,8 @@ module flk_preprocessing
       .rst_ni,
       .start_i       (start),
       .flush_i       (state_q != FRONT),
-      .failing_i     (geometry_error || geometry_damaged),
+      .failing_i     (cull_error || cull_damaged || geometry_error || geometry_damaged ||
+                      colour_error),
       .idle_o        (store_idle),
       .setup_i       (registers_i.store),
       .position_i    (registers_i.cull.position),

@@ -9,7 +9,7 @@ those of the frame's own camera, and the slopes of the table hold for every dire
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
@@ -24,6 +24,7 @@ from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.front.reuse import CLUSTER_BEATS, ColourStore, Reuse, limit_of
+from flicker.scene import packing
 from flicker.scene.camera import Camera
 from flicker.scene.gaussians import Scene
 from flicker.scene.packed import BEAT, HEADER_BYTES, SH_BITS, PackedFormat, PackedScene, decode
@@ -65,9 +66,11 @@ PATH = [
 ]
 
 
-def golden_path(packed: PackedScene, cameras: Sequence[Camera], epsilon: float, generations: Sequence[int] | None = None):
+def golden_path(
+    packed: PackedScene, cameras: Sequence[Camera], epsilon: float, generations: Sequence[int] | None = None, store: ColourStore | None = None,
+) -> Iterator[tuple[FrontFrame, np.ndarray]]:
     """Frame and store behind it, of each camera."""
-    store = ColourStore(packed)
+    store = store or ColourStore(packed)
     for number, view in enumerate(cameras):
         frame = run_front(packed, view, reuse=Reuse(store, epsilon, generations[number] if generations else 1))
         yield frame, store.image()
@@ -159,11 +162,12 @@ def test_images_without_slopes() -> None:
 
 
 def test_generations() -> None:
-    """What another generation has left is nothing, and its heads are overwritten."""
+    """What another generation has left is nothing. Its heads lose their bits before a row is written, so that the first generation may come back whenever
+    the second one's frame ends."""
     generations = [1, 1, 2, 2, 1, (1 << 32) - 1]
     frames = check(scene(), [camera()] * 6, generations=generations, memory=lpddr4())
     assert [frame.reused.lasting.any() for frame in frames] == [False, True, False, True, False, False]
-    assert not any(len(frame.reused.cleared) for frame in frames)
+    assert [len(frame.reused.cleared) > 0 for frame in frames] == [False, False, True, False, True, True]
 
 
 def test_noise() -> None:
@@ -175,13 +179,18 @@ def test_noise() -> None:
     noise[:, 0, :12] = np.array([0.5, np.inf, 0.0], "<f4").view(np.uint8)
     noise[1::3, 0, :12] = np.array([np.nan, 0.0, 1.0], "<f4").view(np.uint8)
     noise[2::3, 0, 12:16] = 0
-    golden = [frame for frame, _ in golden_path(packed, views, 0.5)]
-    chunks = max(front_memory(frame).lists.chunks for frame in golden)
+    before = ColourStore(packed)
+    before.there = np.unpackbits(noise[:, 0, 32:], axis=1, bitorder="little")[packed.cluster, np.arange(len(packed)) - packed.start[packed.cluster]] > 0
+    golden = list(golden_path(packed, views, 0.5, store=before))
+    chunks = max(front_memory(frame).lists.chunks for frame, _ in golden)
     rtl = front_path(packed, views, 0.5, chunks=chunks, seed=seed(), limit=LIMIT, store=noise.tobytes())
-    for frame, got in zip(golden, rtl, strict=True):
+    for (frame, store), got in zip(golden, rtl, strict=True):
         image = front_memory(frame, chunks)
         assert got.error == 0 and np.array_equal(got.records[image.written], image.records[image.written])
         assert got.counters["store_lines"] == frame.reused.written_beats
+        heads = [data.reshape(noise.shape)[frame.reused.kept, 0] for data in (got.store, store)]
+        assert np.array_equal(*heads)
+    assert len(golden[0][0].reused.cleared) == len(golden[0][0].reused.kept)
 
 
 def test_demo_scene() -> None:
@@ -201,37 +210,65 @@ def test_fewer_lanes(lanes: int) -> None:
         check(scene(), memory=memory, lanes=lanes)
 
 
-@pytest.mark.parametrize("part", ["head", "row, written", "geometry"])
-def test_errors_of_the_memory(part: str) -> None:
-    """A frame ends with a code; the next one, of a mended memory and another generation, is right, as if nothing had been kept."""
-    packed, view = scene(), camera()
-    golden = [frame for frame, _ in golden_path(packed, [view, view], 0.5)]
+def test_many_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a Gaussian each, so that those with a survivor have numbers of more than the lower half of a slot's."""
+    rng, count, few = np.random.default_rng([seed(), 9]), 16_600, 200
+    means = np.stack([rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), np.full(count, -3.0)], axis=1)
+    means[4:12, 2] = means[-few:, 2] = 3.0
+    monkeypatch.setattr(packing, "cluster_order", lambda means, size, reach: (np.arange(len(means)), np.arange(len(means)), 0))
+    packed = pack(Scene(
+        means, np.full((count, 3), 0.03), rng.normal(size=(count, 4)), np.full(count, 0.8), rng.normal(size=(count, 4, 3)) * 0.3,
+    ), PackedFormat.CHUNK, Recipe(cuts=0)).packed
+    frames = check(packed, [camera(), camera(), camera(0.5)])
+    assert (packed.counts == 1).all() and frames[1].reused.stored.all()
+    assert {4, 7, 8, 11, count - few, count - 1} <= set(frames[1].reused.kept.tolist()) and count - few > 1 << 14
+
+
+def golden_views(packed: PackedScene, cameras: Sequence[Camera]) -> tuple[list[FrontFrame], int, Regions]:
+    """Of a path whose memory fails: frames, chunks of the lists, where things lie."""
+    golden = [frame for frame, _ in golden_path(packed, cameras, 0.5)]
     chunks = max(front_memory(frame).lists.chunks for frame in golden)
-    regions = Regions.of(packed, view, chunks)
+    return golden, chunks, Regions.of(packed, cameras[0], chunks)
+
+
+@pytest.mark.parametrize("part", ["table", "headers", "geometry", "colour", "head", "row, written"])
+def test_errors_of_the_memory(part: str) -> None:
+    """A frame ends with a code; the next one, of a mended memory, is right, as if nothing had been kept: after reads that failed without a word, after writes
+    in another generation."""
+    packed, view = scene(), camera()
+    golden, chunks, regions = golden_views(packed, [view, view])
     cluster, row = next((c, r) for c, r in golden[1].reused.rows_read.tolist() if c > 3 and r > 2)
-    at = regions.store + BEAT * (CLUSTER_BEATS * cluster + (1 + row if "row" in part else 0))
-    if part == "geometry":
-        parts = packed.sections()
-        at = regions.image + HEADER_BYTES + len(parts["table"]) + len(parts["headers"]) + 12 * int(packed.first[cluster])
-    memory = MemoryOptions(**{"fail" if "written" in part else "fail_reads": [(at, BEAT)]}, mended=True)
-    first, second = front_path(packed, [view, view], 0.5, chunks=chunks, memory=memory, seed=seed(), limit=LIMIT, generations=[1, 2])
-    wrong = 1 << ERRORS.index("a write failed" if "written" in part else "a read failed")
-    assert (first.error, second.error) == (wrong, 0)
+    at, size, written = regions.store + BEAT * CLUSTER_BEATS * cluster, BEAT, "written" in part
+    if written:
+        at += BEAT * (1 + row)
+    elif part != "head":
+        sections = packed.sections()
+        names = list(sections)
+        size = len(sections[part])
+        at = regions.image + HEADER_BYTES + sum(len(sections[name]) for name in names[: names.index(part)])
+        at, size = at + size // 2 // BEAT * BEAT, size // 4
+    memory = MemoryOptions(**{"fail" if written else "fail_reads": [(at, size)]}, mended=True)
+    first, second = front_path(
+        packed, [view, view], 0.5, chunks=chunks, memory=memory, seed=seed(), limit=LIMIT, generations=[1, 1 + written],
+    )
+    wrong = 1 << ERRORS.index("a write failed" if written else "a read failed")
+    assert (first.error & wrong, second.error) == (wrong, 0)
     image = front_memory(golden[0], chunks)
     assert np.array_equal(second.records[image.written], image.records[image.written])
 
 
 def test_a_row_that_cannot_be_read() -> None:
-    """The frame that would show it ends with a code; what follows in another generation is right."""
-    packed, view = scene(), camera()
-    golden = [frame for frame, _ in golden_path(packed, [view, view], 0.5)]
-    chunks = max(front_memory(frame).lists.chunks for frame in golden)
-    cluster, row = golden[1].reused.rows_read[-3].tolist()
-    memory = MemoryOptions(fail_reads=[(Regions.of(packed, view, chunks).store + BEAT * (CLUSTER_BEATS * cluster + 1 + row), BEAT)])
-    found = list(front_path(packed, [view] * 3, 0.5, chunks=chunks, memory=memory, seed=seed(), limit=LIMIT, generations=[1, 1, 2]))
-    assert [frame.error for frame in found] == [0, 1 << ERRORS.index("a read failed"), 0]
-    image = front_memory(golden[0], chunks)
-    assert np.array_equal(found[2].records[image.written], image.records[image.written])
+    """The frame that would show it, and write it again with more survivors, ends with a code; the next one computes or has all that it shows."""
+    packed, views = scene(), [camera(turn=turn) for turn in (0, 12, 0, 12)]
+    golden, chunks, regions = golden_views(packed, views)
+    found = golden[1].reused
+    cluster, row = sorted({*map(tuple, found.rows_read.tolist())} & {*map(tuple, found.rows_written.tolist())})[-3]
+    memory = MemoryOptions(fail_reads=[(regions.store + BEAT * (CLUSTER_BEATS * cluster + 1 + row), BEAT)], mended=True)
+    frames = front_path(packed, views, 0.5, chunks=chunks, memory=memory, seed=seed(), limit=LIMIT, mended=2)
+    for number, (frame, got) in enumerate(zip(golden, frames, strict=True)):
+        assert got.error == (1 << ERRORS.index("a read failed") if number == 1 else 0)
+        image = front_memory(frame, chunks)
+        assert number == 1 or np.array_equal(got.records[image.written], image.records[image.written])
 
 
 # ---- the bound ---------------------------------------------------------------------------------------------

@@ -122,6 +122,8 @@ def test_colours_last() -> None:
     reuse._last(low, high, code.astype(np.uint8), then, position, limit, last)
     some = last[: -few]
     assert 0.2 < some.mean() < 0.8 and some[::10].all()
+    moved, far = ((v**2).sum(axis=1) for v in (then - position, np.maximum(np.maximum(low - then, then - high), 0.0)))  # float64 holds what ff numbers do not
+    assert ((moved < 2.0**-120) | (16 * moved < far * 1.001) | ~last).all() and (last & (moved > 2.0**90)).any()
     got = bench("flk_colours_last")(
         {f"position_{k}": position[k] for k in range(3)} | {"limit": limit}, **of("low", low), **of("high", high), **of("then", then), slope=code,
     )

@@ -167,6 +167,10 @@ class Value:
 
     __ror__ = __or__
 
+    def __and__(self, other: Any) -> Value:
+        """Of truth values."""
+        return self.graph.expression("{0} & {1}", BOOL, (self, other))
+
     def __floordiv__(self, divisor: int) -> Value:
         if divisor & (divisor - 1):
             raise FlickerError(f"datapath: {divisor} is no power of two")

@@ -50,8 +50,8 @@ class Regions:
 
     @property
     def store(self) -> int:
-        """Of kept colours, behind the pointers."""
-        return -(-(self.pointers + self.pointer_bytes) // PAGE) * PAGE
+        """Of kept colours: far up, and such that clusters 7 and 8 differ in more than the lower half of a slot's number."""
+        return (0x5A << 32 | 1 << 25) - 8 * CLUSTER_BEATS * BEAT
 
     @staticmethod
     def of(packed: PackedScene, camera: Camera, chunks: int, kind: RecordKind = RecordKind.FACTORED16) -> Regions:
@@ -192,10 +192,10 @@ def front_rtl(
 def front_path(
     packed: PackedScene, cameras: Sequence[Camera], epsilon: float, *, chunks: int, memory: MemoryOptions | None = None, seed: int = 1,
     limit: int = 20_000_000, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], generations: Sequence[int] | None = None,
-    store: bytes | None = None,
+    store: bytes | None = None, mended: int = 1,
 ) -> Iterator[RtlFront]:
-    """Frames of a path one after the other, with a colour store that holds `store` [zeros] at first. generations: of each frame [1]. memory.mended: from
-    the second one on. Raises as `front_rtl`."""
+    """Frames of a path one after the other, with a colour store that holds `store` [zeros] at first. generations: of each frame [1]. With memory.mended
+    ranges fail in frames before number `mended`. Raises as `front_rtl`."""
     run = _Run(packed, RecordKind.FACTORED16, ListKind.ELLIPSE, chunks, SortOrder.DEPTH, 1, limit)
     regions = Regions.of(packed, cameras[0], chunks)
     size = len(packed.table) * CLUSTER_BEATS * BEAT
@@ -205,7 +205,7 @@ def front_path(
         scene = _load(sim, packed, regions, None)
         sim.load(regions.store, size, store or bytes(size), PURPOSES.index("store"))
         for number, camera in enumerate(cameras):
-            if number and memory.mended:
+            if number == mended and memory.mended:
                 sim.mend()
             setup = StoreSetup(regions.store, epsilon, generations[number] if generations else 1)
             found = run.frame(sim, camera, regions, scene, setup)

@@ -4,9 +4,10 @@ A colour depends on the direction from the camera to the Gaussian alone. A clust
 no direction to a point of its box differs by more than asin(|move| / distance), distance from the stored position to the nearest point of the box. So with a
 slope of at most s (`scene.slopes`) no colour differs by more than s asin(|move| / distance). Since asin(x) <= 1.0106 x up to 1/4, they may be shown where
 
-    16 |move|^2 <= distance^2   and   s^2 |move|^2 <= limit distance^2,   limit = (epsilon / 1.0125)^2
+    16 |move|^2 < distance^2   and   s^2 |move|^2 < limit distance^2,   limit = (epsilon / 1.0125)^2
 
-in ff numbers of 23 bits, whose rounding is within what 1.0125 is larger. Where the position is the stored one, always.
+in ff numbers of 23 bits, whose rounding is within what 1.0125 is larger. Where the position is the stored one, always. Of numbers that are too large for their
+squares, or too small, no side is the smaller one.
 
 The store: 32 beats a cluster, at a multiple of 2048 bytes. Beat 0, the head: position (3 x float32), generation (uint32), 16 bytes of zeros, and a bit for
 each of the cluster's Gaussians whose colour is there. Beats 1 to 22, the rows: 12 Gaussians each, 5 bytes a Gaussian: bits 29:0 colour as in a
@@ -15,7 +16,8 @@ record, 37:30 opacity code.
 A frame, cluster by cluster of those that pass the cull. Its colours last where the head has the frame's generation, a bit at least, and the test holds. Of a
 cluster whose colours last, survivors with a bit take their stored colour. All other survivors' colours are computed, with this frame's camera. They are stored
 where the cluster's colours do not last, or where the camera is at the stored position; a row is written where it has such a survivor and no stored colour of a
-Gaussian that is no survivor now. A head that is about to become wrong is written without bits before the first row, and the new one behind the last.
+Gaussian that is no survivor now. A head with bits, of any generation, whose colours do not last is written without them before the first row, and the new one
+behind the last.
 """
 
 from __future__ import annotations
@@ -59,8 +61,8 @@ def colours_last(low, high, code, then, position, limit):
     z = max(max(ff_sub(low[2], then[2], M), ff_sub(then[2], high[2], M)), 0.0)
     away = ff_add(ff_add(ff_mul(x, x, M), ff_mul(y, y, M), M), ff_mul(z, z, M), M)
     turned = ff_mul(ff_exp2_fixed((code - CODE_ONE) * 2, CODE_SHIFT, M), move, M)
-    beyond = (away < ff_ldexp(move, 4, M)) | (ff_mul(limit, away, M) < turned) | (code < 1)
-    return (beyond < 1) | (move <= 0.0)
+    within = (ff_ldexp(move, 4, M) < away) & (turned < ff_mul(limit, away, M)) & (0 < code)
+    return within | (move <= 0.0)
 
 
 @numba.njit(cache=True)
@@ -126,7 +128,6 @@ class ColourStore:
         """What a frame reads and writes; the store is that behind it. kept: bool (C,), of the cull. lasting: `lasting` before the frame. gaussian: int64 (R,),
         survivors; entry: int64 (R,), their bits."""
         packed, rows = self.packed, len(self.packed.table) * ROWS
-        old = self.there & (self.generation == generation)[packed.cluster]
         valid = self.there & lasting[packed.cluster]
         alive = np.zeros(len(packed), np.bool_)
         alive[gaussian] = True
@@ -135,7 +136,7 @@ class ColourStore:
         read = has(alive & valid)
         written = has(alive & ~valid) & ~has(valid & ~alive) & np.repeat(storing, ROWS)
         heads = written.reshape(-1, ROWS).any(axis=1)
-        cleared = kept & ~lasting & np.logical_or.reduceat(old, packed.start[:-1])
+        cleared = kept & ~lasting & np.logical_or.reduceat(self.there, packed.start[:-1])
         stored = valid[gaussian]
         into = written[self._row]
         self.entry[gaussian[into[gaussian]]] = entry[into[gaussian]]
