@@ -184,13 +184,16 @@ module flk_colour_keeper
   logic [3:0]                   place_q;
   logic [4:0]                   row_q;
   logic                         row_end, last_q, wanted, written_q, row_done;
+  store_slot_t                  slot_q;
+  logic                         storing_q;
+  logic                         new_q, lost_q;  // in the row: a new colour; a colour that goes
   logic [Rows-1:0][STORE_ROW-1:0] bits_q;
 
   assign turn_take = state_q == FILL && turn_valid && about_valid &&
                      (count_q == '0 || (open_valid_q && (behind <= 4'd4 || next_valid)));
   assign row_end   = turn.last || place_q == 4'(STORE_ROW - Lanes);
   // It leaves: a survivor's colour is new, and no stored one would be lost.
-  assign wanted    = about.storing && (alive_q & ~there_q) != '0 && (there_q & ~alive_q) == '0;
+  assign wanted    = storing_q && new_q && !lost_q;
   assign row_done  = state_q == ROW && (!wanted || line_ready_i);
 
   assign line_valid_o = (state_q == ROW && wanted) || (state_q == HEAD && written_q);
@@ -233,6 +236,8 @@ module flk_colour_keeper
       row_q        <= '0;
       alive_q      <= '0;
       there_q      <= '0;
+      new_q        <= 1'b0;
+      lost_q       <= 1'b0;
       written_q    <= 1'b0;
     end else if (start_i) begin
       state_q      <= FILL;
@@ -242,6 +247,8 @@ module flk_colour_keeper
       row_q        <= '0;
       alive_q      <= '0;
       there_q      <= '0;
+      new_q        <= 1'b0;
+      lost_q       <= 1'b0;
       written_q    <= 1'b0;
     end else begin
       state_q      <= state_d;
@@ -249,6 +256,8 @@ module flk_colour_keeper
       if (turn_take) begin
         gone_q  <= turn.last ? '0 : behind[1:0];
         place_q <= row_end ? '0 : place_q + 4'(Lanes);
+        new_q   <= new_q || (turn.alive & ~turn.there) != '0;
+        lost_q  <= lost_q || (turn.there & ~turn.alive) != '0;
         for (int unsigned p = 0; p < STORE_ROW; p++) begin
           if (4'(p - p % Lanes) == place_q) begin
             alive_q[p] <= turn.alive[p%Lanes];
@@ -259,6 +268,8 @@ module flk_colour_keeper
       if (row_done) begin
         alive_q   <= '0;
         there_q   <= '0;
+        new_q     <= 1'b0;
+        lost_q    <= 1'b0;
         row_q     <= last_q ? '0 : row_q + 1'b1;
         written_q <= written_q || wanted;
       end
@@ -273,7 +284,9 @@ module flk_colour_keeper
       open_q <= next;
     end
     if (turn_take) begin
-      last_q <= turn.last;
+      last_q    <= turn.last;
+      slot_q    <= about.slot;
+      storing_q <= about.storing;
       for (int unsigned p = 0; p < STORE_ROW; p++) begin
         if (4'(p - p % Lanes) == place_q) begin
           entry_q[p] <= found[p%Lanes];
@@ -305,7 +318,7 @@ module flk_colour_keeper
     end
   end
 
-  assign line_beat_o = {about.slot, state_q == HEAD ? 5'd0 : row_q + 1'b1};
+  assign line_beat_o = {slot_q, state_q == HEAD ? 5'd0 : row_q + 1'b1};
   assign line_o      = state_q == HEAD ? {head.there, 128'b0, head.generation, head.position}
                                        : row_line;
   assign idle_o      = turns_empty && !turn_valid_q && state_q == FILL;
