@@ -68,7 +68,7 @@ module flk_colour_heads
   placed_t               placed;
   logic                  placed_room, placed_valid, placed_take, placed_empty;
 
-  assign in_ready_o = inside_q < COUNT_BITS'(Ahead) && (!box_valid_q || box_move);
+  assign in_ready_o = inside_q < COUNT_BITS'(Ahead) && !box_valid_q;
   assign in_move    = in_valid_i && in_ready_o;
   assign box_move   = box_valid_q && (!request_valid_q || request_ready_i);
   assign slot       = {first_i[SlotBits-1:LowBits] + HighBits'(box_q.index[23:LowBits]) +

@@ -1,5 +1,8 @@
-"""`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, pictures, in
-docs/results/kept_colours.md."""
+"""`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, pictures;
+`make docs PART=kept_hardware`: such frames in the verilated chip; both in docs/results/kept_colours.md.
+
+An error: a frame buffer that differs from the golden model's; bytes of the chip that are not the model's, of records and lists by more than `LOOSE`.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from flicker.chip.dram import DramConfig
+from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.whole import halves, whole_frame
+from flicker.errors import FlickerError
 from flicker.front.paths import Asked, path_of
+from flicker.golden.chip import render_chip
 from flicker.golden.front.cull import cull
 from flicker.golden.front.frame import FrontFrame, run_front
 from flicker.golden.front.reuse import ColourStore, Reuse
@@ -28,6 +33,10 @@ from flicker.scene.packing import pack_file
 from flicker.scene.real import REAL_VIEWS, RealView
 from flicker.scene.sources import Source, open_scene
 from flicker.scene.temporal import TemporalError
+
+from flicker.sim.chip import ChipSession
+from flicker.sim.half import MemoryOptions
+from flicker.sim.row import back_to_back
 
 from .common import SIZE, Say, folder_of_scenes
 
@@ -130,3 +139,55 @@ def tables(say: Say) -> dict[str, str]:
         ["view", "picture", "motion", "tolerance", "clusters anew", "stored colours", "colours + store, MB", "MB without", "MB", "M cycles without", "M cycles",
          "frames a second", "differ by, of 255", "dB", "temporal dB"], rows, numbers=True,
     )}
+
+
+ROW = 4  # frames back to back in RTL, the last of a path: its third is measured, beside whose rendering the front end works on the fourth
+LOOSE = {"records": 0.02, "lists": 0.002}  # which lines are read again, and whether a list that is read again is left before that, depends on timing
+CHUNKS = 24_000  # of a list writer: enough for these views
+TURNING, MOVING = (next(case for case in MOTIONS if case.tolerance == t and case.share == s) for t, s in ((0, 0.0), (TWO, 0.001)))
+HARDWARE = (  # folder, path, with kept colours, refresh
+    ("flowers", TURNING, False, Refresh.ALL_BANKS), ("flowers", TURNING, True, Refresh.ALL_BANKS), ("flowers", MOVING, True, Refresh.ALL_BANKS),
+    ("flowers", TURNING, False, Refresh.PER_BANK), ("flowers", TURNING, True, Refresh.PER_BANK), ("flowers", MOVING, True, Refresh.PER_BANK),
+    ("playbot", MOVING, False, Refresh.ALL_BANKS), ("playbot", MOVING, True, Refresh.ALL_BANKS), ("playbot", MOVING, True, Refresh.PER_BANK),
+)
+
+
+def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, refresh: Refresh) -> tuple[tuple, tuple]:
+    """A row of each table. The frames before those in RTL are of the golden model, whose store the chip finds."""
+    view = next(v for v in REAL_VIEWS if v.folder == folder)
+    path = view.path(folder_of_scenes())
+    source, packed, dram = open_scene(path), pack_file(path).packed, DramConfig(refresh=refresh)
+    title = f"{view.title}, {case.motion}" + (f", {case.tolerance or 0}" if keeps else "")
+    say(f"{title}: refresh {refresh}")
+    views, reuse = cameras(case, source, view, packed), Reuse(ColourStore(packed), float(case.tolerance)) if keeps else None
+    for camera in views[:-ROW] if keeps else ():
+        run_front(packed, camera, reuse=reuse)
+    with ChipSession(packed, CONFIG, memory=MemoryOptions(dram.timing)) as chip:
+        store = chip.store(reuse.epsilon, reuse.generation, reuse.store.image().tobytes()) if reuse else None
+        row = back_to_back(chip, views[-ROW:], chunks=CHUNKS, store=store)
+        for number, (camera, done) in enumerate(zip(views[-ROW:], row, strict=True)):
+            front = run_front(packed, camera, reuse=reuse)
+            if not np.array_equal(done.frame.buffer, render_chip(front_lists(front), CONFIG).buffer):
+                raise FlickerError(f"{title}: frame {number}: the picture differs from the golden model's")
+            if number == 2:
+                model, found = whole_frame(*halves(front, CONFIG, dram), dram), done
+    for purpose, due in model.bytes.items():
+        if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
+            raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
+    assert found.interval is not None
+    kept = str(case.tolerance or 0) if keeps else "-"
+    head = (view.title, case.motion, kept, str(refresh))
+    moved, busy = sum(found.moved.values()), {name: clocks / sum(found.spent.values()) for name, clocks in found.spent.items()}
+    return (
+        (*head, f"{moved / 1e6:.1f}", f"{found.interval:,}", f"{model.interval / found.interval - 1:+.1%}", f"{1e9 / found.interval:,.0f}"),
+        (*head, *(f"{share:.1%}" for share in busy.values())),
+    )
+
+
+def hardware_tables(say: Say) -> dict[str, str]:
+    rows, spent = zip(*(_in_hardware(say, *row) for row in HARDWARE))
+    head = ["view", "motion", "tolerance", "refresh"]
+    return {
+        "cycles": table([*head, "MB", "interval back to back", "model off by", "frames a second"], list(rows), numbers=True),
+        "spent": table([*head, "data", "nothing waits", "turns between reads and writes", "refresh", "rows"], list(spent), numbers=True),
+    }

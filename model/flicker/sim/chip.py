@@ -214,10 +214,10 @@ class ChipSession(Half):
         )
         return Place(driver.CRegion(records, record_bytes, lists, chunks, pointers), picture, stride, number)
 
-    def store(self, tolerance: float, generation: int = 1) -> driver.CStore:
-        """Memory for kept colours, zeros, for frames that follow each other."""
+    def store(self, tolerance: float, generation: int = 1, colours: bytes = b"") -> driver.CStore:
+        """Memory for kept colours, for frames that follow each other. colours: what it holds at first (`ColourStore.image`); else zeros."""
         size = self.driver.flk_store_bytes(ctypes.byref(self.scene))
-        return driver.CStore(self.allocate(size, "store", bytes(size)), size, generation, tolerance)
+        return driver.CStore(self.allocate(size, "store", colours or bytes(size)), size, generation, tolerance)
 
     def fail(self, base: int, size: int, writes: bool = True) -> None:
         """Bursts that touch a range, or reads alone, are answered with an error from now on."""
