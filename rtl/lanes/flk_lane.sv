@@ -22,8 +22,8 @@
 // The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token moves S at STATE and the
 // colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next list may follow at once.
 // Pixels of one sub-tile, few, are flip-flops, which a token copies and sets. Those of more are two memories each of S and of colours, with a
-// write port and a read port without latency: in turn one has the pixels that are visited, one those that leave. What a word held before counts
-// as 0 until it is written: seen_q.
+// write port and a read port without latency: in turn one has the pixels that are visited, one those that leave. A visit's are read a
+// cycle before STATE and COLOUR, or are what is written then. What a word held before counts as 0 until it is written: seen_q.
 // Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
@@ -230,7 +230,7 @@ module flk_lane
 
   localparam int unsigned REST_BITS = LOG + 2 - PIECE_BITS;
 
-  logic skip_q;
+  logic above_q;  // La has more bits
   logic [LA_BITS-1:0] la_q;
   logic [LA_BITS-2:0] normal;  // below the leading one
   logic [$clog2(LA_BITS+1)-1:0] zeros;
@@ -238,8 +238,8 @@ module flk_lane
 
   always_ff @(posedge clk_i) begin
     if (valid_q[2]) begin
-      la_q   <= la[LA_BITS-1:0];
-      skip_q <= la > (LA_WIDE - DROP)'(LIMIT);
+      la_q    <= la[LA_BITS-1:0];
+      above_q <= la[LA_WIDE-DROP-1:LA_BITS] != '0;
     end
   end
 
@@ -260,12 +260,13 @@ module flk_lane
   localparam int unsigned LINE_BITS = VALUE_BITS + REST_BITS;
   localparam int unsigned LINES = $size(H_VALUE) << PIECE_BITS;
 
-  // Value and fall by one number: so synthesisers see a table, an FPGA's a memory whose read register value_q and fall_q are.
+  // Value, with the half unit of rounding, and fall by one number: so synthesisers see a table, an FPGA's a memory whose read register
+  // value_q and fall_q are.
   typedef logic [LINES-1:0][VALUE_BITS+FALL_BITS-1:0] lines_t;
 
   function automatic lines_t lines();
     for (int unsigned i = 0; i < LINES; i++) begin
-      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)],
+      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)] + VALUE_BITS'(1 << (LINE_GUARD - 1)),
                   H_FALL[i>>PIECE_BITS][i%(1<<PIECE_BITS)]};
     end
   endfunction
@@ -285,13 +286,12 @@ module flk_lane
       {value_q, fall_q} <= TABLE[{zeros, piece}];
       rest_q    <= normal[REST_BITS-1:0];
       la_4_q    <= la_q;
-      skip_4_q  <= skip_q;
+      skip_4_q  <= above_q || la_q > LA_BITS'(LIMIT);
       clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
     end
   end
 
-  assign line = {value_q, {REST_BITS{1'b0}}} + LINE_BITS'(1 << (REST_BITS + LINE_GUARD - 1))
-              - LINE_BITS'(fall_q) * LINE_BITS'(rest_q);
+  assign line = {value_q, {REST_BITS{1'b0}}} - LINE_BITS'(fall_q) * LINE_BITS'(rest_q);
   assign unused_line = ^line;
 
   // ---- Cycle 5: transmittance --------------------------------------------------------------------------------------
@@ -344,6 +344,8 @@ module flk_lane
     logic bank_d, bank_q;  // that is visited
     logic [Pixels-1:0] seen_q, seen_out_q;
     logic [1:0][S_BITS-1:0] word;
+    logic [S_BITS-1:0] s_q;
+    logic again_q, seen, seen_s_q;  // the pixel before STATE is the one at it; is seen
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -369,21 +371,27 @@ module flk_lane
 
     for (genvar b = 0; b < 2; b++) begin : gen_bank
       logic [S_BITS-1:0] storage_q[Pixels];
-      logic [PixelW-1:0] at_q;
 
       always_ff @(posedge clk_i) begin
-        at_q <= bank_d == 1'(b) ? pixel_q[STATE-1] : place_d;
         if (blend && bank_q == 1'(b)) begin
-          storage_q[at_q] <= s_next[S_BITS-1:0];
+          storage_q[pixel_q[STATE]] <= s_next[S_BITS-1:0];
         end
       end
 
-      assign word[b] = storage_q[at_q];
+      assign word[b] = storage_q[bank_d==1'(b)?pixel_q[STATE-1] : place_q];
     end
 
-    assign was_seen = |(seen_q & select_s_q);
+    assign seen = seen_q[pixel_q[STATE-1]] && !eos_q[STATE];
+
+    always_ff @(posedge clk_i) begin
+      again_q  <= pixel_q[STATE-2] == pixel_q[STATE-1];
+      seen_s_q <= seen || (again_q && blend);
+      s_q      <= again_q && blend ? s_next[S_BITS-1:0] : word[bank_d] & {S_BITS{seen}};
+    end
+
+    assign was_seen = seen_s_q;
     assign seen_out = seen_out_q[place_q];
-    assign s_now    = word[bank_q] & {S_BITS{was_seen}};
+    assign s_now    = s_q;
     assign s_out    = word[!bank_q][S_BITS-1-:RESULT_BITS] & {RESULT_BITS{seen_out}};
   end else begin : gen_s
     logic [Pixels-1:0][S_BITS-1:0] s_q;
@@ -505,8 +513,11 @@ module flk_lane
 
   if (MEMORY) begin : gen_c
     logic bank_d, bank_q;
-    logic [COLOUR:STATE+1] was_seen_q;
+    logic [COLOUR-1:STATE+1] was_seen_q;
     logic [1:0][3*C_BITS-1:0] word;
+    logic [3*C_BITS-1:0] c_q;
+    logic [PixelW-1:0] at_q;  // the pixel at COLOUR
+    logic again_q;            // the pixel before COLOUR is that one
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -519,24 +530,26 @@ module flk_lane
     assign bank_d = bank_q ^ eos_q[COLOUR];
 
     always_ff @(posedge clk_i) begin
-      was_seen_q <= {was_seen_q[COLOUR-1:STATE+1], was_seen};
+      was_seen_q <= {was_seen_q[COLOUR-2:STATE+1], was_seen};
+      at_q       <= pixel_q[COLOUR-1];
+      again_q    <= pixel_q[COLOUR-2] == pixel_q[COLOUR-1];
+      c_q        <= again_q && blend_q[COLOUR] ? c_next
+                    : word[bank_d] & {(3 * C_BITS) {was_seen_q[COLOUR-1]}};
     end
 
     for (genvar b = 0; b < 2; b++) begin : gen_bank
       logic [3*C_BITS-1:0] storage_q[Pixels];
-      logic [PixelW-1:0] at_q;
 
       always_ff @(posedge clk_i) begin
-        at_q <= bank_d == 1'(b) ? pixel_q[COLOUR-1] : place_d;
         if (blend_q[COLOUR] && bank_q == 1'(b)) begin
           storage_q[at_q] <= c_next;
         end
       end
 
-      assign word[b] = storage_q[at_q];
+      assign word[b] = storage_q[bank_d==1'(b)?pixel_q[COLOUR-1] : place_q];
     end
 
-    assign c_now = word[bank_q] & {(3 * C_BITS) {was_seen_q[COLOUR]}};
+    assign c_now = c_q;
     assign c_out = word[!bank_q] & {(3 * C_BITS) {seen_out}};
   end else begin : gen_c
     logic [Pixels-1:0] select_q;

@@ -341,6 +341,7 @@ module flk_preprocessing
   logic                               turn_first, turn_last;
   logic [PreprocLanes-1:0]            turn_used;
   logic [PreprocLanes-1:0][4:0][31:0] turn_word;
+  logic                               turn_there;  // turn_word is of this turn
 
   if (Turns == 1) begin : gen_whole
     assign turn_q     = '0;
@@ -348,20 +349,34 @@ module flk_preprocessing
     assign turn_last  = 1'b1;
     assign turn_used  = group.used;
     assign turn_word  = group.word;
+    assign turn_there = 1'b1;
   end else begin : gen_in_turns
     assign turn_first = group.first && turn_q == '0;
     assign turn_last  = group.used >> (PreprocLanes * (32'(turn_q) + 1)) == '0;
     assign turn_used  = PreprocLanes'(group.used >> (PreprocLanes * 32'(turn_q)));
 
-    for (genvar k = 0; k < PreprocLanes; k++) begin : gen_word
-      assign turn_word[k] = group.word[2'(PreprocLanes*32'(turn_q)+k)];
+    // Chosen in the cycle before: a turn enters every other one at most.
+    logic [PreprocLanes-1:0][4:0][31:0] word_q;
+    logic                               there_q;
+
+    assign turn_word  = word_q;
+    assign turn_there = there_q;
+
+    always_ff @(posedge clk_i) begin
+      for (int unsigned k = 0; k < PreprocLanes; k++) begin
+        word_q[k] <= group.word[2'(PreprocLanes*32'(turn_q)+k)];
+      end
     end
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
-        turn_q <= '0;
-      end else if (enter) begin
-        turn_q <= turn_last ? '0 : turn_q + 1'b1;
+        turn_q  <= '0;
+        there_q <= 1'b0;
+      end else begin
+        there_q <= group_valid && !enter && !take_end;
+        if (enter) begin
+          turn_q <= turn_last ? '0 : turn_q + 1'b1;
+        end
       end
     end
   end
@@ -369,7 +384,7 @@ module flk_preprocessing
   assign cluster     = turn_first ? cluster_q + 1'b1 : cluster_q;
   assign room        = !turn_first ||
                        CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
-  assign opens       = front_en && !front_phase_q && (group_end || room);
+  assign opens       = front_en && !front_phase_q && (group_end || (room && turn_there));
   assign group_ready = opens && (group_end || turn_last);
   assign enter       = group_valid && opens && !group_end;
   assign take_end    = group_valid && opens && group_end;

@@ -197,6 +197,7 @@ module flk_frame_writer
   logic [15:0]                        left_q;  // pairs of the frame
   logic [PairBits-1:0]                column_q;
   logic [TileBits-1:0]                row_q;
+  logic [StrideBits-1:0]              stride_q;
   logic [TileBits+StrideBits-1:0]     down_q;
   logic [PairBits+3:0]                across_q;
   logic [HalfBits-1:0]                half_q, next_q;  // where the row begins, and the next one
@@ -251,10 +252,11 @@ module flk_frame_writer
     if (en) begin
       if (state_q == WAIT) begin
         row_q    <= rows_q[from_q];
+        stride_q <= stride_i;
         column_q <= columns_q[from_q];
       end
       if (state_q == ROWS) begin
-        down_q   <= (TileBits + StrideBits)'(row_q) * (TileBits + StrideBits)'(stride_i);
+        down_q   <= (TileBits + StrideBits)'(row_q) * (TileBits + StrideBits)'(stride_q);
         across_q <= rgba_i ? {1'b0, column_q, 3'b0}
                            : (PairBits + 4)'(column_q) + (PairBits + 4)'({column_q, 1'b0});
       end
@@ -267,7 +269,7 @@ module flk_frame_writer
                                       HighBits'(carry_q);
       end
       if (read && group_q == 3'd1) begin
-        {carry_q[0], next_q[LowBits-1:0]} <= {1'b0, half_q[LowBits-1:0]} + (LowBits + 1)'(stride_i);
+        {carry_q[0], next_q[LowBits-1:0]} <= {1'b0, half_q[LowBits-1:0]} + (LowBits + 1)'(stride_q);
       end
       if (read && group_q == 3'd2) begin
         next_q[HalfBits-1:LowBits] <= half_q[HalfBits-1:LowBits] + HighBits'(carry_q[0]);

@@ -33,7 +33,6 @@ from flicker.scene.packing import pack_file
 from flicker.scene.real import REAL_VIEWS, RealView
 from flicker.scene.sources import Source, open_scene
 from flicker.scene.temporal import TemporalError
-
 from flicker.sim.chip import ChipSession
 from flicker.sim.half import MemoryOptions
 from flicker.sim.row import back_to_back
