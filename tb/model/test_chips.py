@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,15 @@ from flicker.errors import FlickerError
 from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, Form, RenderConfig
 
 LINE = '[mine]\npurpose = "x"\nstatus = "untested"\nstage = "lanes"\n'
+
+
+@pytest.fixture(autouse=True)
+def own_sizes() -> Iterator[None]:
+    """Sizes of memories that a test's chips bring are forgotten behind it: pages are made of that table."""
+    before = dict(CHIP_MEMORIES)
+    yield
+    CHIP_MEMORIES.clear()
+    CHIP_MEMORIES.update(before)
 
 
 def test_table() -> None:
