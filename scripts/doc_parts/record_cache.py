@@ -18,7 +18,7 @@ from flicker.scene.packed import PackedFormat
 from .common import Say, titled_views
 
 DEFAULT = (1024, 4)  # lines, ways
-SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (2048, 4))
+SIZES = ((512, 4), (1024, 2), DEFAULT, (1024, 8), (1536, 6), (2048, 4))
 
 
 @numba.njit(cache=True)

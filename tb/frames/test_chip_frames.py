@@ -677,6 +677,21 @@ def test_kept_colours(config: RenderConfig) -> None:
         check(chip, camera(x=0.1), config=config)
 
 
+def test_kept_colours_from_before() -> None:
+    """A session that begins with the colours of frames before it shows them in its first frame; those of another scene are refused."""
+    with session() as chip:
+        kept, view = ColourStore(chip.packed), KEPT_PATH[0]
+        run_front(chip.packed, view, reuse=Reuse(kept, 0.0, 7))
+        colours = kept.image().tobytes()
+        with pytest.raises(FlickerError, match="kept colours: .* bytes, the scene's take"):
+            chip.store(0.0, 7, colours[64:])
+        (done,) = back_to_back(chip, [view], background=BLUE, store=chip.store(0.0, 7, colours))
+        found = run_front(chip.packed, view, reuse=Reuse(kept, 0.0, 7)).reused
+        assert found is not None and found.stored.all() and len(found.rows_read)
+        assert (done.frame.front["store_beats"], done.frame.front["store_lines"], done.frame.front["colour_beats"]) == (found.read_beats, 0, 0)
+        compare(chip, view, done.frame)
+
+
 def test_kept_colours_behind_aborts() -> None:
     """Frames that are aborted or late at random times leave no colour that is not its position's: with a tolerance of 0, what follows is what it is without a
     store, from the same position, the one before and another one. Behind a reset it is so in another generation."""

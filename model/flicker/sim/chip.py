@@ -215,8 +215,11 @@ class ChipSession(Half):
         return Place(driver.CRegion(records, record_bytes, lists, chunks, pointers), picture, stride, number)
 
     def store(self, tolerance: float, generation: int = 1, colours: bytes = b"") -> driver.CStore:
-        """Memory for kept colours, for frames that follow each other. colours: what it holds at first (`ColourStore.image`); else zeros."""
+        """Memory for kept colours, of frames that follow each other. colours: what it holds first (`ColourStore.image`); else zeros. FlickerError where they
+        are not as many bytes as the scene's."""
         size = self.driver.flk_store_bytes(ctypes.byref(self.scene))
+        if colours and len(colours) != size:
+            raise self._failure(f"kept colours: {len(colours):,} bytes, the scene's take {size:,}")
         return driver.CStore(self.allocate(size, "store", colours or bytes(size)), size, generation, tolerance)
 
     def fail(self, base: int, size: int, writes: bool = True) -> None:
