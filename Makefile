@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV   := .venv
 STAMP  := $(VENV)/.installed
 SOC    := $(VENV)/.installed-soc
+NEXTPNR := $(VENV)/.installed-route
 BIN    := $(VENV)/bin
 JOBS   ?= 2
 UNIT   ?=
@@ -17,6 +18,7 @@ REASON ?=
 LIBERTY ?=
 CHIP   ?= tiny
 KEYS   ?=
+ROUTE  ?=
 
 # What make itself was told must not reach the makes that the builds start.
 unexport MAKEFLAGS MFLAGS
@@ -78,8 +80,12 @@ mutants: $(STAMP) ## every mutant of the hardware must die in its unit's tests; 
 synth: $(STAMP) ## area and timing of every unit: make synth [UNIT=prtu [CONFIG="conic fp8"]] [LIBERTY=path]
 	@$(BIN)/python scripts/synth.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT)) $(if $(CONFIG),--config "$(CONFIG)") $(if $(LIBERTY),--liberty "$(LIBERTY)")
 
-fpga: $(STAMP) ## what a chip takes on an FPGA: make fpga [CHIP=tiny] [BOARD=kv260]
-	@$(BIN)/python scripts/fpga.py --chip "$(CHIP)" $(if $(BOARD),--board "$(BOARD)")
+fpga: $(if $(ROUTE),$(NEXTPNR),$(STAMP)) ## what a chip takes on an FPGA; ROUTE=1: its rendering stage placed and routed: make fpga [CHIP=tiny] [BOARD=kv260]
+	@$(BIN)/python scripts/fpga.py --chip "$(CHIP)" $(if $(BOARD),--board "$(BOARD)") $(if $(ROUTE),--route)
+
+$(NEXTPNR): $(STAMP) requirements.lock scripts/setup.sh
+	@scripts/setup.sh "$(VENV)" route
+	@touch $@
 
 formal: $(STAMP) ## all proofs, with covers and mutants: make formal [UNIT=fifo]
 	@$(BIN)/python scripts/formal.py --jobs $(JOBS) $(if $(UNIT),--unit $(UNIT))

@@ -40,6 +40,7 @@ module flk_top
   parameter  int unsigned Entries        = 704,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
+  parameter  int unsigned PreprocInterval = 2,    // cycles a Gaussian of a lane: 2 or 4
   parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists
   parameter  bit          ColourStore    = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Waiting        = 128,   // and flk_preprocessing
@@ -593,6 +594,7 @@ module flk_top
   flk_preprocessing #(
     .Form        (Form),
     .PreprocLanes(PreprocLanes),
+    .PreprocInterval(PreprocInterval),
     .ListWriters (ListWriters),
     .ColourStore (ColourStore),
     .Pointers    (Pointers),
@@ -864,6 +866,7 @@ module flk_top
   assign to_host.capability.colour_store.next = Keeps;
   assign to_host.capability_units.log2.next  =
       {4'($clog2(SortUnits)), 4'($clog2(ListWriters)), 4'($clog2(PreprocLanes)), 4'($clog2(Cores))};
+  assign to_host.capability_units.log2_interval.next = 4'($clog2(PreprocInterval));
   assign to_host.status.ready.next           = !locked && state_q == RUN;
   assign to_host.status.front_busy.next      = front_busy;
   assign to_host.status.render_busy.next     = rendering_busy;

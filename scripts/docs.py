@@ -122,6 +122,7 @@ PARTS = (
     Part("chip_sizes", "which chip a scene needs: frames a second by size of the chip, with chart", ("rates", "needs"), chip_sizes.tables, scenes_missing),
     Part("chip_memory", "memories of the chip, unit by unit", ("", "sizes"), chip_memory.tables),
     Part("fpga", "chips on FPGAs, and how full boards are", ("boards", "units", "known"), fpga.tables),
+    Part("floorplan", "a rendering stage placed and routed on an ECP5", ("stages", "path"), fpga.floorplan),
     Part("library", "another cell library beside our own", ("",), synthesis.library_tables, synthesis.library_missing),
     Part("proofs", "what is proved", ("",), proofs.tables, cheap=True),
     Part("families", "families of the stability suite", ("still", "moving"), families.tables, cheap=True),

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Resources of a chip on FPGAs, by unit and in all, and how full known boards are (docs/reference/fpga.md): make fpga [CHIP=tiny]
-[BOARD=kv260].
+[BOARD=kv260] [ROUTE=1].
 
 Exits 1 when the chip does not fit the board. Without a board: the family's, all of them. Writes build/fpga/<chip>-<family>.json, which make docs
-PART=fpga takes.
+PART=fpga takes. --route: the chip's rendering stage alone, placed and routed on the board, with its frequency and longest path.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from rich.table import Table
 from flicker.chips import chip_of, chips
 from flicker.cli.tables import Terminal
 from flicker.cost.fpga import COMMANDS, FOLDER, Fpga, Resources, boards
+from flicker.cost.place import delays, part_of, place
 from flicker.errors import FlickerError
 from flicker.output import write_text
 
@@ -28,10 +29,14 @@ def main() -> int:
     parser.add_argument("--chips", help="file with chips of your own")
     parser.add_argument("--board", help=f"name of a board: {', '.join(boards())}")
     parser.add_argument("--family", default=None, help=f"of the device, without a board: {', '.join(COMMANDS)} (default: xcup)")
+    parser.add_argument("--route", action="store_true", help="place and route the rendering stage on the board: minutes")
+    parser.add_argument("--seed", type=int, default=1, help="of the placement")
     options = parser.parse_args()
     console, known = Terminal(), boards()
     if options.board and options.board not in known:
         raise FlickerError(f"BOARD: one of {', '.join(known)}, not {options.board}")
+    if options.route:
+        return route(options, console)
     family = options.family or (known[options.board].family if options.board else "xcup")
     if options.board and known[options.board].family != family:
         raise FlickerError(f"--family {family}: {options.board} has an {known[options.board].family} device")
@@ -56,6 +61,23 @@ def main() -> int:
         "parameters": chip.parameters, "all": asdict(all_), "units": {module: [number, asdict(own)] for module, (number, own) in units.items()},
     }, indent=1) + "\n")
     return 0 if fits or options.board is None else 1
+
+
+def route(options: argparse.Namespace, console: Terminal) -> int:
+    """The rendering stage, placed and routed."""
+    board = options.board or next(name for name, known in boards().items() if known.nextpnr)
+    chip = chip_of(options.chip, options.chips)
+    with console.status(f"{chip.name} on {board}") as status:
+        found = place(chip, board, options.seed, lambda phase: status.update(f"{chip.name} on {board}: {phase}"))
+    console.print(f"rendering stage of {chip.name} on {found.board}, seed {found.seed}: {found.mhz:.1f} MHz", highlight=False)
+    for name, (used, there) in found.used.items():
+        console.print(f"  {name:<14} {used:>7,} of {there:>7,}, {used / there:.0%}", highlight=False)
+    shares = ", ".join(f"{ns:.1f} ns {kind}" for kind, ns in delays(found).items())
+    console.print(f"longest path, {found.path[-1][0]:.1f} ns ({shares}):", highlight=False)
+    for at, kind, cell in found.path:
+        if kind != "routing":
+            console.print(f"  {at:6.2f} {part_of(cell)}: {cell[-48:]}", highlight=False, markup=False)
+    return 0
 
 
 def _cells(of: Resources) -> list[str]:

@@ -47,13 +47,13 @@ TIMEOUT = 900  # seconds of a test run, on a busy machine
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 # Modules whose numbers stand in a generated package: an outcome depends on that.
 PACKAGES = {"flicker.params": ROOT / "rtl/common/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/common/flk_pkg.sv"}
-KEYS = {"file", "find", "replace", "unit", "note", "survives", "slow"}
+KEYS = {"file", "find", "replace", "unit", "note", "survives", "slow", "times"}
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """find occurs once in file. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none can notice.
-    slow: its unit's tests that are marked slow run too."""
+    """find occurs `times` in file and is replaced everywhere. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none
+    can notice. slow: its unit's tests that are marked slow run too."""
 
     number: int
     file: str
@@ -63,6 +63,7 @@ class Mutant:
     note: str = ""
     survives: str = ""
     slow: bool = False
+    times: int = 1
 
     @property
     def title(self) -> str:
@@ -101,12 +102,12 @@ def load(folder: Path = LISTS) -> list[Mutant]:
             where = f"{path}: mutant {i + 1}"
             if unknown := entry.keys() - KEYS:
                 raise FlickerError(f"{where}: unknown key '{sorted(unknown)[0]}'")
-            if missing := KEYS - {"note", "survives", "slow"} - entry.keys():
+            if missing := KEYS - {"note", "survives", "slow", "times"} - entry.keys():
                 raise FlickerError(f"{where}: key '{sorted(missing)[0]}' is missing")
             source = ROOT / entry["file"]
             if not source.is_file():
                 raise FlickerError(f"{where}: {entry['file']}: no such file")
-            if (count := source.read_text().count(entry["find"])) != 1:
+            if (count := source.read_text().count(entry["find"])) != entry.get("times", 1):
                 raise FlickerError(f"{where}: '{_short(entry['find'])}' occurs {count} times in {entry['file']}")
             if entry["unit"] not in units:
                 raise FlickerError(f"{where}: no unit '{entry['unit']}'")

@@ -24,6 +24,7 @@ module flk_top_axi
   parameter int unsigned Entries        = 704,
   parameter int unsigned Pairs          = 4,
   parameter int unsigned PreprocLanes   = 4,
+  parameter int unsigned PreprocInterval = 2,
   parameter int unsigned ListWriters    = 4,
   parameter bit          ColourStore    = 1'b1,
   parameter int unsigned Waiting        = 128,

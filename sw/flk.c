@@ -21,7 +21,8 @@
 #define MINOR_DEADLINE 1u /* of the version: since then there are deadlines, */
 #define MINOR_BY_DISTANCE 2u /* frames by distance, */
 #define MINOR_SH_BITS 5u     /* SH codes of fewer than 8 bits, */
-#define MINOR_STORE 6u       /* and kept colours */
+#define MINOR_STORE 6u       /* kept colours, */
+#define MINOR_INTERVAL 7u    /* and slower preprocessing lanes */
 
 static const char *const STATUS_TEXT[FLK_STATUSES] = {
     [FLK_OK] = "no fault",
@@ -483,6 +484,7 @@ flk_status_t flk_probe(flk_device_t *device, const flk_bus_t *bus)
   const uint32_t units = device->minor < 4 ? 0x2222 : get(device, FLK_CAPABILITY_UNITS_OFFSET);
   device->cores = (uint32_t)1 << (units & 15);
   device->preproc_lanes = (uint32_t)1 << (units >> 4 & 15);
+  device->preproc_interval = device->minor < MINOR_INTERVAL ? 2 : (uint32_t)1 << (units >> 16 & 15);
   device->list_writers = (uint32_t)1 << (units >> 8 & 15);
   device->sort_units = (uint32_t)1 << (units >> 12 & 15);
   device->colour_store = device->minor >= MINOR_STORE && GET(FLK_CAPABILITY_COLOUR_STORE, capability) != 0;

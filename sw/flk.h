@@ -186,6 +186,7 @@ typedef struct {
   uint32_t lists;                        /* of a list writer: pictures have at most 4 as many tiles, whole pairs in each direction */
   uint32_t beat;                         /* bytes of the memory port's data */
   uint32_t cores, preproc_lanes, list_writers, sort_units; /* units of a kind */
+  uint32_t preproc_interval;             /* cycles from a Gaussian of a preprocessing lane to the next */
   int colour_store;                      /* colours can be kept */
   uint16_t started;                      /* number of the frame that was started last, modulo 2^16 */
   unsigned region;                       /* 0 or 1 */

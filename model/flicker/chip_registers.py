@@ -35,7 +35,7 @@ REGISTERS = {
     "counter_select": Register(0x028, 1, {"index": (0, 10)}),
     "counter_value": Register(0x02C, 1, {"value": (0, 32)}),
     "progress": Register(0x030, 1, {"pairs": (0, 16)}),
-    "capability_units": Register(0x034, 1, {"log2": (0, 16)}),
+    "capability_units": Register(0x034, 1, {"log2": (0, 16), "log2_interval": (16, 4)}),
     "frame": Register(
         0x100, 1, {
             "tag": (0, 16), "mode": (16, 3), "rgba": (20, 1), "box": (21, 1), "chunked": (22, 1), "antialiased": (23, 1), "off_centre": (24, 1), "by_distance":

@@ -224,7 +224,7 @@ class Device:
         """What the chip was built with, by the names of flk_device_t."""
         names = (
             "minor", "stage", "form", "precision", "vrus", "mask_generator", "lanes", "lists", "beat", "cores", "preproc_lanes", "list_writers",
-            "sort_units", "colour_store",
+            "sort_units", "preproc_interval", "colour_store",
         )
         return {name: getattr(self._device, name) for name in names}
 

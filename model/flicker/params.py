@@ -172,6 +172,7 @@ LANE_COUNTS = (32, 64, 128)  # lanes of all of four cores
 CORE_COUNTS = (1, 2, 4)  # cores of the stage of lanes
 LANES_PER_CORE = (4, 8, 16, 32)
 UNIT_COUNTS = (1, 2, 4)  # sorting units, list writers, preprocessing lanes
+PREPROC_INTERVALS = (2, 4)  # cycles from a Gaussian of a preprocessing lane to the next
 MAX_LANE_ENTRIES = 64  # splats in the store of a core of lanes, entries in a lane's queue
 
 
@@ -264,8 +265,8 @@ class RenderConfig:
     or 1 sub-tiles of a tile; `lanes` of all cores; `in_width` elements that a core takes in a cycle; `slots` splats in its store; `fifo_depth` entries in a
     lane's queue. Of the whole chip: `delivered` records that a core gets in a cycle there, and so takes, whatever `in_width`; `memories`, key of
     CHIP_MEMORIES; `port_bits` of the memory port; `sort_units`, with list readers and buffers of their own; `list_writers`, which share the four banks of
-    lists; `preproc_lanes`, preprocessing cores. No bit of records, lists and pictures depends on their numbers. `colour_store`: colours can be kept from
-    frame to frame, in factored form alone.
+    lists; `preproc_lanes`, preprocessing cores, which take a Gaussian every `preproc_interval` cycles. No bit of records, lists and pictures depends on
+    these. `colour_store`: colours can be kept from frame to frame, in factored form alone.
     """
 
     form: Form = Form.FACTORED
@@ -287,6 +288,7 @@ class RenderConfig:
     sort_units: int = UNIT_COUNTS[-1]
     list_writers: int = UNIT_COUNTS[-1]
     preproc_lanes: int = UNIT_COUNTS[-1]
+    preproc_interval: int = PREPROC_INTERVALS[0]
     colour_store: bool = True
 
     def __post_init__(self) -> None:
@@ -316,6 +318,8 @@ class RenderConfig:
         for field in ("sort_units", "list_writers", "preproc_lanes"):
             if (value := getattr(self, field)) not in UNIT_COUNTS:
                 raise FlickerError(f"configuration: {field} must be 1, 2 or 4, not {value}")
+        if self.preproc_interval not in PREPROC_INTERVALS:
+            raise FlickerError(f"configuration: preproc_interval must be 2 or 4, not {self.preproc_interval}")
         for field in ("slots", "fifo_depth"):
             if self.by_lanes and not 2 <= (value := getattr(self, field)) <= MAX_LANE_ENTRIES:
                 raise FlickerError(f"configuration: {field} must be 2 to {MAX_LANE_ENTRIES} with stage lanes, not {value}")
@@ -365,8 +369,9 @@ class RenderConfig:
     def front_parameters(self) -> dict[str, int]:
         """Module parameters of the front end and the chip: what is not the default."""
         units = {"PreprocLanes": self.preproc_lanes, "ListWriters": self.list_writers}
+        interval = {"PreprocInterval": self.preproc_interval} if self.preproc_interval != PREPROC_INTERVALS[0] else {}
         store = {} if self.colour_store else {"ColourStore": 0}
-        return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]} | store
+        return self.chip_memories.front_parameters() | {name: value for name, value in units.items() if value != UNIT_COUNTS[-1]} | interval | store
 
     def top_parameters(self) -> dict[str, int]:
         """Of the whole chip, flk_top and what wraps it: `chip_parameters`, `front_parameters`, the port; those that are not the default."""

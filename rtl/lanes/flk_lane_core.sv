@@ -11,12 +11,12 @@
 //                                                        └──► a queue for each lane ───────┘
 //
 // Dispatch drops a splat whose mask is empty, or holds only pixels that are known to be finished; another takes a slot of the store, one a
-// cycle, and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it.
+// cycle (in a core that is shared after a register slice, which keeps an FPGA's paths short), and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it.
 // The end of a list goes through all queues in order.
 // clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no list and no pixel is inside.
 // finished_o, of each sub-tile of the list that in_* takes: all its pixels are finished, so that its splats change no pixel any
 // more. It comes from a register, rises some cycles late and is low in the cycle after a token was taken.
-// in_ready_o comes from registers.
+// in_ready_o hangs on registers alone; in a core that is shared and takes one element a cycle it is one.
 module flk_lane_core
   import flk_pkg::*;
   import flk_lane_pkg::*;
@@ -157,24 +157,32 @@ module flk_lane_core
     assign unused_high = ^{splat_q.w, splat_q.z};
   end
 
-  // ---- Dispatch --------------------------------------------------------------------------------------------------
+  // ---- Choice: the oldest splat that is wanted -------------------------------------------------------------------
 
-  logic [Subtiles-1:0][63:0] alive;  // pixel 16 m + i: not known to be finished
+  typedef struct packed {
+    logic                         token;
+    logic [SubtileW-1:0]          member;
+    logic [Lanes-1:0][Pixels-1:0] bits;
+    lane_shape_t                  shape;
+    lane_colour_t                 colour;
+  } visit_t;
+
+  logic [Subtiles-1:0][63:0] alive, worth;  // pixel 16 m + i: not known to be finished
   logic [InWidth-1:0][63:0] live;
   logic [InWidth-1:0] wanted, sent, sent_q, left;  // sent: with the one of this cycle
-  logic [Lanes-1:0][Pixels-1:0] bits;
   logic [Lanes-1:0] need, queue_ready;
   logic [Slots-1:0] busy;
   logic [SlotW-1:0] slot;
-  logic slot_free, room, dispatch, choice, token;
+  logic slot_free, room, dispatch, choice, tokens_ahead;
+  logic choice_valid, choice_ready, given_valid, given_ready;
   logic [63:0] chosen;
-  logic [SubtileW-1:0] chosen_member;
+  visit_t choice_visit, given;
 
   always_comb begin
     live = '0;
     for (int unsigned w = 0; w < InWidth; w++) begin
       for (int unsigned s = 0; s < Subtiles; s++) begin
-        live[w] |= mask[w] & alive[s] & {64{member[w] == SubtileW'(s)}};
+        live[w] |= mask[w] & worth[s] & {64{member[w] == SubtileW'(s)}};
       end
     end
     if (InWidth == 2 && valid_q[STAGES][0] && eos_q[STAGES][0] && !sent_q[0]) begin
@@ -185,16 +193,62 @@ module flk_lane_core
     end
     choice = InWidth == 2 && !wanted[0];
     chosen = live[choice];
-    chosen_member = member[choice];
-    token  = eos_q[STAGES][choice];
+    choice_valid        = wanted != '0;
+    choice_visit.token  = eos_q[STAGES][choice];
+    choice_visit.member = member[choice];
+    choice_visit.shape  = shape[choice];
+    choice_visit.colour = colour[choice];
+    for (int unsigned l = 0; l < Lanes; l++) begin
+      for (int unsigned p = 0; p < Pixels; p++) begin
+        choice_visit.bits[l][p] = !eos_q[STAGES][choice] && chosen[lane_pixel(Lanes, l, p)];
+      end
+    end
   end
+
+  if (MEMORY) begin : gen_slice
+    flk_skid_buffer #(
+      .Width($bits(visit_t))
+    ) i_slice (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .in_valid_i (choice_valid),
+      .in_ready_o (choice_ready),
+      .in_data_i  (choice_visit),
+      .out_valid_o(given_valid),
+      .out_ready_i(given_ready),
+      .out_data_o (given)
+    );
+
+    // Tokens inside: lanes do not know of them, so their flags are of an older list.
+    logic [1:0] ahead_q;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        ahead_q <= '0;
+      end else if (clear_i) begin
+        ahead_q <= '0;
+      end else begin
+        ahead_q <= ahead_q + 2'(choice_valid && choice_ready && choice_visit.token)
+                           - 2'(dispatch && given.token);
+      end
+    end
+
+    assign tokens_ahead = ahead_q != '0;
+  end else begin : gen_slice
+    assign given_valid  = choice_valid;
+    assign given        = choice_visit;
+    assign choice_ready = given_ready;
+    assign tokens_ahead = 1'b0;
+  end
+
+  assign worth = tokens_ahead ? '1 : alive;
+
+  // ---- Dispatch --------------------------------------------------------------------------------------------------
 
   always_comb begin
     for (int unsigned l = 0; l < Lanes; l++) begin
-      for (int unsigned p = 0; p < Pixels; p++) begin
-        bits[l][p] = !token && chosen[lane_pixel(Lanes, l, p)];
-      end
-      need[l] = token || bits[l] != '0;
+      need[l] = given.token || given.bits[l] != '0;
     end
   end
 
@@ -209,18 +263,17 @@ module flk_lane_core
 
   assign slot_free = !(&busy);
   assign room      = (queue_ready | ~need) == '1;
-  assign dispatch  = wanted != '0 && slot_free && room;
+  assign given_ready = slot_free && room;
+  assign dispatch    = given_valid && given_ready;
 
   always_comb begin
     left = wanted;
-    if (dispatch) begin
-      left[choice] = 1'b0;
-    end
-    move = left == '0;
     sent = sent_q;
-    if (dispatch) begin
+    if (choice_valid && choice_ready) begin
+      left[choice] = 1'b0;
       sent[choice] = 1'b1;
     end
+    move = (MEMORY && InWidth == 1) ? choice_ready : left == '0;
   end
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -269,11 +322,13 @@ module flk_lane_core
   lane_colour_t [Lanes-1:0] visit_colour;
 
   if (MEMORY) begin : gen_shape
+    (* ram_style = "distributed" *)
     logic [$bits(lane_shape_t)-1:0] storage_q[Slots];
 
+    // A free slot holds nothing, so what is given may lie there before its dispatch: the write hangs on the slots alone.
     always_ff @(posedge clk_i) begin
-      if (dispatch) begin
-        storage_q[slot] <= shape[choice];
+      if (slot_free) begin
+        storage_q[slot] <= given.shape;
       end
     end
 
@@ -286,7 +341,7 @@ module flk_lane_core
     always_ff @(posedge clk_i) begin
       for (int unsigned i = 0; i < Slots; i++) begin
         if (dispatch && slot == SlotW'(i)) begin
-          shape_q[i] <= shape[choice];
+          shape_q[i] <= given.shape;
         end
       end
     end
@@ -303,11 +358,12 @@ module flk_lane_core
   end
 
   if (MEMORY) begin : gen_colour
+    (* ram_style = "distributed" *)
     logic [$bits(lane_colour_t)-1:0] storage_q[Slots];
 
     always_ff @(posedge clk_i) begin
-      if (dispatch) begin
-        storage_q[slot] <= colour[choice];
+      if (slot_free) begin
+        storage_q[slot] <= given.colour;
       end
     end
 
@@ -320,7 +376,7 @@ module flk_lane_core
     always_ff @(posedge clk_i) begin
       for (int unsigned i = 0; i < Slots; i++) begin
         if (dispatch && slot == SlotW'(i)) begin
-          colour_q[i] <= colour[choice];
+          colour_q[i] <= given.colour;
         end
       end
     end
@@ -361,8 +417,8 @@ module flk_lane_core
       .push_i        (dispatch && need[l]),
       .ready_o       (queue_ready[l]),
       .push_slot_i   (slot),
-      .push_subtile_i(chosen_member),
-      .push_pixels_i (bits[l]),
+      .push_subtile_i(given.member),
+      .push_pixels_i (given.bits[l]),
       .alive_o       (lane_alive[l]),
       .empty_o       (queue_empty),
       .finished_i    (finished),
@@ -419,8 +475,8 @@ module flk_lane_core
 
   // ---- Finished pixels ---------------------------------------------------------------------------------------------
 
-  logic choice_valid, choice_ready, taken_valid, taken_ready;
-  lane_pixel_t choice_pixel, taken;
+  logic leaving_valid, leaving_ready, taken_valid, taken_ready;
+  lane_pixel_t leaving_pixel, taken;
   core_pixel_t converted;
   logic [$clog2(Lanes)-1:0] unused_lane;
 
@@ -434,9 +490,9 @@ module flk_lane_core
     .in_valid_i (pixel_valid),
     .in_ready_o (pixel_ready),
     .in_data_i  (pixel),
-    .out_valid_o(choice_valid),
-    .out_ready_i(choice_ready),
-    .out_data_o (choice_pixel),
+    .out_valid_o(leaving_valid),
+    .out_ready_i(leaving_ready),
+    .out_data_o (leaving_pixel),
     .out_index_o(unused_lane)
   );
 
@@ -446,9 +502,9 @@ module flk_lane_core
     .clk_i,
     .rst_ni,
     .clear_i,
-    .in_valid_i (choice_valid),
-    .in_ready_o (choice_ready),
-    .in_data_i  (choice_pixel),
+    .in_valid_i (leaving_valid),
+    .in_ready_o (leaving_ready),
+    .in_data_i  (leaving_pixel),
     .out_valid_o(taken_valid),
     .out_ready_i(taken_ready),
     .out_data_o (taken)
@@ -485,14 +541,15 @@ module flk_lane_core
 
   assign token_in   = move && (in_valid_i & in_eos) != '0;
   assign finished_o = finished_q;
-  assign idle_o     = valid_q == '0 && (&lane_idle) && !taken_valid && !out_valid_o;
+  assign idle_o     = valid_q == '0 && !given_valid && (&lane_idle) && !taken_valid && !out_valid_o;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       finished_q <= '0;
     end else begin
       for (int unsigned s = 0; s < Subtiles; s++) begin
-        finished_q[s] <= (&lane_finished[s]) && (valid_q & eos_q) == '0 && !token_in && !clear_i;
+        finished_q[s] <= (&lane_finished[s]) && (valid_q & eos_q) == '0 && !tokens_ahead &&
+                         !token_in && !clear_i;
       end
     end
   end
@@ -505,7 +562,7 @@ module flk_lane_core
     if (!rst_ni) begin
       entry_q <= '0;
     end else begin
-      entry_q <= (dispatch && !token) ? need : '0;
+      entry_q <= (dispatch && !given.token) ? need : '0;
     end
   end
 
@@ -523,8 +580,8 @@ module flk_lane_core
       end
     end
     events_o.dispatched = dispatch;
-    events_o.no_slot    = wanted != '0 && !slot_free;
-    events_o.no_room    = wanted != '0 && slot_free && !room;
+    events_o.no_slot    = given_valid && !slot_free;
+    events_o.no_room    = given_valid && slot_free && !room;
     for (int unsigned l = 0; l < Lanes; l++) begin
       events_o.entries  += 6'(entry_q[l]);
       events_o.visits   += 6'(lane_events[l].visited);

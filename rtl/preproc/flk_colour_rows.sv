@@ -132,10 +132,12 @@ module flk_colour_rows
 
   // ---- lanes ----------------------------------------------------------------------------------------
 
-  logic [Lanes-1:0] order_empty, entry_empty;
+  logic [Lanes-1:0] order_empty, entry_empty, parts_left;
 
   for (genvar k = 0; k < Lanes; k++) begin : gen_lanes
     logic         order_room, order_valid, order_stored, order_take, entry_valid;
+    logic         inside_q;  // of a computed colour parts are to come
+    logic         stored, computed, move;
     logic         unused_full;
     logic [1:0]   unused_usage;
     store_entry_t entry_in, entry;
@@ -178,7 +180,7 @@ module flk_colour_rows
       .in_ready_o (entry_room[k]),
       .in_data_i  (entry_in),
       .out_valid_o(entry_valid),
-      .out_ready_i(out_ready_i[k] && order_valid && order_stored),
+      .out_ready_i(out_ready_i[k] && stored),
       .out_data_o (entry),
       .usage_o    (unused_usage),
       .full_o     (unused_full),
@@ -196,13 +198,27 @@ module flk_colour_rows
       end
     end
 
-    assign out_valid_o[k] = order_valid && (order_stored ? entry_valid : in_valid_i[k]);
-    assign out_data_o[k]  = order_stored ? part : in_data_i[k];
-    assign in_ready_o[k]  = out_ready_i[k] && order_valid && !order_stored;
+    // A survivor leaves its order with its first part, as it leaves the lane's own queue: this one never holds more.
+    assign stored         = order_valid && order_stored && !inside_q;
+    assign computed       = inside_q || (order_valid && !order_stored);
+    assign out_valid_o[k] = stored ? entry_valid : computed && in_valid_i[k];
+    assign out_data_o[k]  = stored ? part : in_data_i[k];
+    assign in_ready_o[k]  = out_ready_i[k] && computed;
+    assign move           = out_valid_o[k] && out_ready_i[k];
+    assign order_take     = move && !inside_q;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        inside_q <= 1'b0;
+      end else if (move) begin
+        inside_q <= !out_data_o[k].last;
+      end
+    end
+
+    assign parts_left[k] = inside_q;
+
     logic unused_room;
     assign unused_room = order_room;
-
-    assign order_take     = out_valid_o[k] && out_ready_i[k] && out_data_o[k].last;
 
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni)
@@ -211,7 +227,8 @@ module flk_colour_rows
 `endif
   end
 
-  assign idle_o = !a_valid_q && items_empty && !loaded_q && (&order_empty) && (&entry_empty);
+  assign idle_o = !a_valid_q && items_empty && !loaded_q && (&order_empty) && (&entry_empty) &&
+                  parts_left == '0;
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni)

@@ -22,15 +22,29 @@ package flk_front_pkg;
   typedef logic signed [20:0] constant_t;
 
   // Cycles from an element to its outputs
-  localparam int unsigned CLUSTER_TEST_LATENCY = 36;
+  function automatic int unsigned cluster_test_latency(int unsigned interval);
+    return (interval == 16) ? 48 : 36;
+  endfunction
   localparam int unsigned COLOURS_LAST_LATENCY = 48;
   localparam int unsigned CLUSTER_HEADER_LATENCY = 8;
-  localparam int unsigned GEOMETRY_DECODE_LATENCY = 14;
-  localparam int unsigned PROJECTION_LATENCY = 72;
-  localparam int unsigned PROJECTION_CONIC_LATENCY = 72;
-  localparam int unsigned SPLAT_BOUNDS_LATENCY = 20;
-  localparam int unsigned SPLAT_BAND_LATENCY = 26;
-  localparam int unsigned COLOUR_BASIS_LATENCY = 20;
+  function automatic int unsigned geometry_decode_latency(int unsigned interval);
+    return (interval == 4) ? 16 : 14;
+  endfunction
+  function automatic int unsigned projection_latency(int unsigned interval);
+    return (interval == 4) ? 96 : 72;
+  endfunction
+  function automatic int unsigned projection_conic_latency(int unsigned interval);
+    return (interval == 4) ? 96 : 72;
+  endfunction
+  function automatic int unsigned splat_bounds_latency(int unsigned interval);
+    return (interval == 4) ? 24 : 20;
+  endfunction
+  function automatic int unsigned splat_band_latency(int unsigned interval);
+    return (interval == 2) ? 28 : 26;
+  endfunction
+  function automatic int unsigned colour_basis_latency(int unsigned interval);
+    return (interval == 4) ? 28 : 20;
+  endfunction
   localparam int unsigned COLOUR_GROUP_LATENCY = 4;
   localparam int unsigned COLOUR_CONSTANT_LATENCY = 8;
   localparam int unsigned COLOUR_TERM_LATENCY = 6;

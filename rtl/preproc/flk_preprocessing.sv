@@ -8,7 +8,7 @@
 // error_o: bits of FRONT_ERROR_*. An error of the memory, or a float of the cluster table or a header
 // that is not finite, ends the frame early where it was met; a cluster beyond the records' region
 // writes nothing; a list writer without a chunk writes no more.
-// A group of four Gaussians takes the lanes as many turns as it needs, two cycles each. ListWriters share the four banks of lists:
+// A group of four Gaussians takes the lanes as many turns as it needs, PreprocInterval cycles each. ListWriters share the four banks of lists:
 // writer w has bank w and every ListWriters-th one behind it. What is written is the same bytes for any number of both; colours are read
 // for the survivors of a turn. entries, lines and evicted of the counters are by writer, taken by bank.
 // Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
@@ -21,6 +21,7 @@ module flk_preprocessing
 #(
   parameter  int unsigned Form         = FORM_FACTORED,
   parameter  int unsigned PreprocLanes = 4,     // 1, 2 or 4
+  parameter  int unsigned PreprocInterval = 2,  // cycles a Gaussian of a lane: 2 or 4
   parameter  int unsigned ListWriters  = 4,     // 1, 2 or 4
   parameter  bit          ColourStore  = 1'b1,  // colours can be kept; not with FORM_CONIC
   parameter  int unsigned Pointers     = 2048,  // of a bank of lists, held on the chip
@@ -132,8 +133,11 @@ module flk_preprocessing
 );
 
   localparam int unsigned ProjectionLatency =
-      (Form == FORM_FACTORED) ? PROJECTION_LATENCY : PROJECTION_CONIC_LATENCY;
-  localparam int unsigned Latency = GEOMETRY_DECODE_LATENCY + ProjectionLatency;
+      (Form == FORM_FACTORED) ? projection_latency(PreprocInterval)
+                              : projection_conic_latency(PreprocInterval);
+  localparam int unsigned DecodeLatency = geometry_decode_latency(PreprocInterval);
+  localparam int unsigned Latency = DecodeLatency + ProjectionLatency;
+  localparam int unsigned PhaseBits = $clog2(PreprocInterval);
   localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS);
   localparam int unsigned RING = 1 << PLACE_BEAT_BITS;
   localparam int unsigned ListAddrBits = BEAT_BITS;
@@ -160,8 +164,12 @@ module flk_preprocessing
   if (ListWriters != 1 && ListWriters != 2 && ListWriters != 4) begin : gen_check_writers
     $error("flk_preprocessing: ListWriters must be 1, 2 or 4");
   end
-  if (GEOMETRY_DECODE_LATENCY % 2 != 0 || ProjectionLatency % 2 != 0) begin : gen_check
-    $error("flk_preprocessing: latencies of the front must be multiples of its interval, 2");
+  if (PreprocInterval != 2 && PreprocInterval != 4) begin : gen_check_interval
+    $error("flk_preprocessing: PreprocInterval must be 2 or 4");
+  end
+  if (DecodeLatency % PreprocInterval != 0 ||
+      ProjectionLatency % PreprocInterval != 0) begin : gen_check
+    $error("flk_preprocessing: latencies of the front must be multiples of its interval");
   end
 
   // ---- frame ----------------------------------------------------------------------------------------
@@ -234,7 +242,8 @@ module flk_preprocessing
   logic              unused_cull_done, unused_geometry_done;
 
   flk_cluster_cull #(
-    .IdBits(IdBits)
+    .Interval(PreprocInterval == 2 ? 4 : 16),
+    .IdBits  (IdBits)
   ) i_cull (
     .clk_i,
     .rst_ni,
@@ -328,7 +337,8 @@ module flk_preprocessing
     cluster_index_t cluster;
   } side_t;
 
-  logic                   front_en, front_phase_q, enter, room, beyond, beyond_q, take_end, opens;
+  logic [PhaseBits-1:0]   front_phase_q;
+  logic                   front_en, enter, room, beyond, beyond_q, take_end, opens;
   cluster_index_t         cluster_q, cluster, oldest, exit, exit_q;
   place_of_cluster_t [COLOUR_CLUSTERS-1:0] clusters_q;
   colour_step_t           entering_step;
@@ -384,7 +394,7 @@ module flk_preprocessing
   assign cluster     = turn_first ? cluster_q + 1'b1 : cluster_q;
   assign room        = !turn_first ||
                        CLUSTER_BITS'(cluster - oldest) < CLUSTER_BITS'(COLOUR_CLUSTERS);
-  assign opens       = front_en && !front_phase_q && (group_end || (room && turn_there));
+  assign opens       = front_en && front_phase_q == '0 && (group_end || (room && turn_there));
   assign group_ready = opens && (group_end || turn_last);
   assign enter       = group_valid && opens && !group_end;
   assign take_end    = group_valid && opens && group_end;
@@ -394,14 +404,14 @@ module flk_preprocessing
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      front_phase_q <= 1'b0;
+      front_phase_q <= '0;
       front_valid_q <= '0;
       cluster_q     <= '1;
       ended_q       <= 1'b0;
       beyond_q      <= 1'b0;
     end else begin
       if (front_en) begin
-        front_phase_q <= !front_phase_q;
+        front_phase_q <= front_phase_q + 1'b1;
         front_valid_q <= {front_valid_q[Latency-2:0], enter};
       end
       if (start) begin
@@ -437,10 +447,10 @@ module flk_preprocessing
 
   flk_delay #(
     .Width($bits(side_t)),
-    .Depth(Latency / 2)
+    .Depth(Latency / PreprocInterval)
   ) i_side (
     .clk_i,
-    .en_i(front_en && !front_phase_q),
+    .en_i(front_en && front_phase_q == '0),
     .d_i (side_in),
     .q_o (side)
   );
@@ -449,10 +459,10 @@ module flk_preprocessing
 
   flk_delay #(
     .Width(2 * $bits(low)),
-    .Depth(GEOMETRY_DECODE_LATENCY / 2)
+    .Depth(DecodeLatency / PreprocInterval)
   ) i_low (
     .clk_i,
-    .en_i(front_en && !front_phase_q),
+    .en_i(front_en && front_phase_q == '0),
     .d_i ({group.header.low, group.header.step}),
     .q_o ({low, step})
   );
@@ -843,8 +853,9 @@ module flk_preprocessing
 
   for (genvar k = 0; k < PreprocLanes; k++) begin : gen_lanes
     flk_preprocessing_core #(
-      .Form   (Form),
-      .Waiting(Waiting)
+      .Form    (Form),
+      .Interval(PreprocInterval),
+      .Waiting (Waiting)
     ) i_core (
       .clk_i,
       .rst_ni,
@@ -1242,7 +1253,7 @@ module flk_preprocessing
       merged_q     <= '0;
       out_q        <= '0;
     end else begin
-      front_q      <= state_q == FRONT && !ended_q && !front_phase_q;
+      front_q      <= state_q == FRONT && !ended_q && front_phase_q == '0;
       exit_valid_q <= exit_valid;
       kept_q       <= {kept_ready, kept_valid};
       line_q       <= {line_ready, line_valid};

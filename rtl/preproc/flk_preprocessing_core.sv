@@ -2,7 +2,7 @@
 //
 // Front: a Gaussian as it lies in memory goes through decoding and projection. All lanes move
 // together: front_en_i, front_phase_i and the cluster's numbers come from outside, low_i and step_i
-// GEOMETRY_DECODE_LATENCY enabled cycles after the words. alive_o stands when the outputs of
+// geometry_decode_latency(Interval) enabled cycles after the words. alive_o stands when the outputs of
 // flk_projection (of records in conic form flk_projection_conic) do; push_i then takes the survivor
 // with its seq, record number and place; ready_o: there is room for it.
 // Back: with its colours (parts, in order) a survivor becomes a record in the form that Form says, and
@@ -11,8 +11,8 @@
 // this lane with a seq before it is to come; issued_i is the next seq that will be given to any lane.
 // Counters are pulses: a survivor whose mean was saturated, whose colour was clipped, whose opacity
 // code is 0, that has no entry. setup_i stays while idle_o is low.
-// Throughput: a Gaussian every two cycles in front, behind every two cycles (SH degree 0 to 2) or
-// four (3), a band of tiles a cycle, an entry a cycle. No combinational path from ready to ready but
+// Throughput: a Gaussian every Interval cycles in front, behind every Interval (SH degree 3: four) cycles,
+// a band of tiles every Interval / 2, an entry a cycle. No combinational path from ready to ready but
 // within the streams' own stages.
 module flk_preprocessing_core
   import flk_param_pkg::*;
@@ -20,8 +20,10 @@ module flk_preprocessing_core
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Form       = FORM_FACTORED,
+  parameter  int unsigned Interval   = 2,    // cycles from a Gaussian to the next: 2 or 4
   parameter  int unsigned Waiting    = 128,  // survivors that wait for colours
   parameter  int unsigned Unfinished = 256,  // survivors that are not listed yet
+  localparam int unsigned PhaseBits  = $clog2(Interval),
   localparam int unsigned HeaderBits = $clog2(COLOUR_CLUSTERS),
   localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? FACTORED_RECORD_BITS
                                                                : CONIC_RECORD_BITS
@@ -32,7 +34,7 @@ module flk_preprocessing_core
   output logic                        idle_o,       // nothing behind the front
   // Front, in step with the other lanes
   input  logic                        front_en_i,
-  input  logic                        front_phase_i,
+  input  logic [PhaseBits-1:0]        front_phase_i,
   input  logic [4:0][31:0]            words_i,
   input  logic [2:0][26:0]            scale_low_i,
   input  logic [2:0][16:0]            scale_step_i,
@@ -72,6 +74,9 @@ module flk_preprocessing_core
   output logic                        unlisted_o
 );
 
+  if (Interval != 2 && Interval != 4) begin : gen_check_interval
+    $error("flk_preprocessing_core: Interval must be 2 or 4");
+  end
   if (Form != FORM_FACTORED && Form != FORM_CONIC) begin : gen_check_form
     $error("flk_preprocessing_core: Form must be FORM_CONIC or FORM_FACTORED");
   end
@@ -119,7 +124,9 @@ module flk_preprocessing_core
     end
   end
 
-  flk_geometry_decode i_decode (
+  flk_geometry_decode #(
+    .Interval(Interval)
+  ) i_decode (
     .clk_i,
     .en_i          (front_en_i),
     .phase_i       (front_phase_i),
@@ -148,7 +155,9 @@ module flk_preprocessing_core
   );
 
   if (Form == FORM_FACTORED) begin : gen_projection
-    flk_projection i_projection (
+    flk_projection #(
+      .Interval(Interval)
+    ) i_projection (
       .clk_i,
       .rst_ni,
       .en_i         (front_en_i),
@@ -224,7 +233,9 @@ module flk_preprocessing_core
       .direction_2_o(direction_in[2])
     );
   end else begin : gen_projection_conic
-    flk_projection_conic i_projection (
+    flk_projection_conic #(
+      .Interval(Interval)
+    ) i_projection (
       .clk_i,
       .rst_ni,
       .en_i         (front_en_i),
@@ -349,11 +360,16 @@ module flk_preprocessing_core
 
   // ---- spherical harmonics --------------------------------------------------------------------------
 
-  logic                            basis_en, basis_phase_q, basis_take, basis_out, held_q, held_pop;
-  logic [COLOUR_BASIS_LATENCY-1:0] basis_valid_q;
-  basis_t [15:1]                   basis, basis_q;
+  localparam int unsigned BasisLatency = colour_basis_latency(Interval);
 
-  flk_colour_basis i_basis (
+  logic                    basis_en, basis_take, basis_out, held_q, held_pop;
+  logic [PhaseBits-1:0]    basis_phase_q;
+  logic [BasisLatency-1:0] basis_valid_q;
+  basis_t [15:1]           basis, basis_q;
+
+  flk_colour_basis #(
+    .Interval(Interval)
+  ) i_basis (
     .clk_i,
     .en_i         (basis_en),
     .phase_i      (basis_phase_q),
@@ -377,20 +393,20 @@ module flk_preprocessing_core
     .basis_15_o   (basis[15])
   );
 
-  assign basis_out       = basis_valid_q[COLOUR_BASIS_LATENCY-1];
+  assign basis_out       = basis_valid_q[BasisLatency-1];
   assign basis_en        = !basis_out || !held_q || held_pop;
-  assign basis_take      = basis_en && !basis_phase_q && direction_valid;
-  assign direction_ready = basis_en && !basis_phase_q;
+  assign basis_take      = basis_en && basis_phase_q == '0 && direction_valid;
+  assign direction_ready = basis_en && basis_phase_q == '0;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      basis_phase_q <= 1'b0;
+      basis_phase_q <= '0;
       basis_valid_q <= '0;
       held_q        <= 1'b0;
     end else begin
       if (basis_en) begin
-        basis_phase_q <= !basis_phase_q;
-        basis_valid_q <= {basis_valid_q[COLOUR_BASIS_LATENCY-2:0], basis_take};
+        basis_phase_q <= basis_phase_q + 1'b1;
+        basis_valid_q <= {basis_valid_q[BasisLatency-2:0], basis_take};
       end
       held_q <= (basis_out && basis_en) || (held_q && !held_pop);
     end
@@ -774,12 +790,15 @@ module flk_preprocessing_core
     shape_t                 kappa;
   } side_t;
 
+  localparam int unsigned BoundsLatency = splat_bounds_latency(Interval);
+
   bounded_t                        bounded;
   side_t                           side;
   listed_t                         listed, walk;
   logic                            bounded_valid, side_valid, side_empty, outside_bounds;
-  logic                            bounds_en, bounds_phase_q, bounds_out, bounds_take;
-  logic [SPLAT_BOUNDS_LATENCY-1:0] bounds_valid_q;
+  logic                            bounds_en, bounds_out, bounds_take;
+  logic [PhaseBits-1:0]            bounds_phase_q;
+  logic [BoundsLatency-1:0]        bounds_valid_q;
   logic [7:0]                      code;
   logic                            walk_room, walk_valid, walk_ready, code_room, code_valid;
   logic                            bounded_empty, walk_empty, code_empty;
@@ -822,7 +841,9 @@ module flk_preprocessing_core
     .empty_o    (side_empty)
   );
 
-  flk_splat_bounds i_bounds (
+  flk_splat_bounds #(
+    .Interval(Interval)
+  ) i_bounds (
     .clk_i,
     .en_i     (bounds_en),
     .phase_i  (bounds_phase_q),
@@ -846,17 +867,17 @@ module flk_preprocessing_core
     .code_o   (code)
   );
 
-  assign bounds_out  = bounds_valid_q[SPLAT_BOUNDS_LATENCY-1];
+  assign bounds_out  = bounds_valid_q[BoundsLatency-1];
   assign bounds_en   = !bounds_out || (side_valid && walk_room && code_room);
-  assign bounds_take = bounds_en && !bounds_phase_q && bounded_valid;
+  assign bounds_take = bounds_en && bounds_phase_q == '0 && bounded_valid;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      bounds_phase_q <= 1'b0;
+      bounds_phase_q <= '0;
       bounds_valid_q <= '0;
     end else if (bounds_en) begin
-      bounds_phase_q <= !bounds_phase_q;
-      bounds_valid_q <= {bounds_valid_q[SPLAT_BOUNDS_LATENCY-2:0], bounds_take};
+      bounds_phase_q <= bounds_phase_q + 1'b1;
+      bounds_valid_q <= {bounds_valid_q[BoundsLatency-2:0], bounds_take};
     end
   end
 
@@ -893,7 +914,9 @@ module flk_preprocessing_core
     .empty_o    (walk_empty)
   );
 
-  flk_tile_walker i_walker (
+  flk_tile_walker #(
+    .Interval(Interval / 2)
+  ) i_walker (
     .clk_i,
     .rst_ni,
     .box_i       (setup_i.box),

@@ -5,10 +5,10 @@
 // finished: in the cycle after its last entry was taken, or when it turned out to have no more.
 // A splat stays at the input until its last band is on its way: in_ready_o depends combinationally
 // on in_data_i, and no register holds it. box_i keeps still while idle_o is low.
-// Throughput: a band a cycle in (an empty splat counts as one), an entry a cycle out; a tile column
-// between two bands' intervals and a tile row without entries cost a cycle each. At most Splats + 1
-// begin in SPLAT_BAND_LATENCY + 3 cycles. Latency, from a tile row's last band to its first entry,
-// SPLAT_BAND_LATENCY + 3. Outputs come from registers; in_ready_o does not depend on out_ready_i.
+// Throughput: a band every Interval cycles in (an empty splat counts as one), an entry a cycle out; a tile
+// column between two bands' intervals and a tile row without entries cost a cycle each. At most Splats + 1
+// begin in Latency + 3 cycles. Latency, from a tile row's last band to its first entry, Latency + 3. Outputs
+// come from registers; in_ready_o does not depend on out_ready_i.
 //
 // What the band pipeline does not need lies in a memory until the splat's first tile row comes out;
 // the pipeline stands while a tile row waits that has no place in the queue behind it.
@@ -16,8 +16,9 @@ module flk_tile_walker
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter int unsigned Splats = 32,  // that wait for their first tile row
-  parameter int unsigned Rows   = 4    // of tiles that wait behind the pipeline
+  parameter int unsigned Interval = 1,   // of flk_splat_band
+  parameter int unsigned Splats   = 32,  // that wait for their first tile row
+  parameter int unsigned Rows     = 4    // of tiles that wait behind the pipeline
 ) (
   input  logic    clk_i,
   input  logic    rst_ni,
@@ -34,6 +35,8 @@ module flk_tile_walker
   output logic    done_valid_o
 );
 
+  localparam int unsigned Latency = splat_band_latency(Interval);
+
   // ---- bands into the pipeline ----------------------------------------------------------------------
 
   typedef struct packed {
@@ -49,7 +52,7 @@ module flk_tile_walker
     logic [7:0]             row;  // first tile row
   } splat_t;
 
-  logic       en, may_send, send, last_band;
+  logic       en, phase_q, may_send, send, last_band;
   logic       sending_q;  // of the splat at the input some bands are on their way
   logic [8:0] band, band_q;
   logic       store_ready, splat_valid, splat_pop, store_empty;
@@ -57,15 +60,21 @@ module flk_tile_walker
 
   assign band       = sending_q ? band_q : in_data_i.y0[11:3];
   assign last_band  = in_data_i.empty || band == in_data_i.y1[11:3];
-  assign may_send   = en && (sending_q || store_ready);
+  assign may_send   = en && !phase_q && (sending_q || store_ready);
   assign send       = in_valid_i && may_send;
   assign in_ready_o = may_send && last_band;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       sending_q <= 1'b0;
-    end else if (send) begin
-      sending_q <= !last_band;
+      phase_q   <= 1'b0;
+    end else begin
+      if (send) begin
+        sending_q <= !last_band;
+      end
+      if (en) begin
+        phase_q <= Interval == 2 && !phase_q;
+      end
     end
   end
 
@@ -103,27 +112,30 @@ module flk_tile_walker
     logic [8:0] last;
   } interval_t;
 
-  mark_t [SPLAT_BAND_LATENCY-1:0] mark_q;
+  mark_t [Latency-1:0] mark_q;
   mark_t                          mark_in, mark;
   interval_t                      interval;
 
   assign mark_in = '{
     band: send && !in_data_i.empty, odd: band[0] && !in_data_i.empty, last: send && last_band
   };
-  assign mark    = mark_q[SPLAT_BAND_LATENCY-1];
+  assign mark    = mark_q[Latency-1];
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       mark_q <= '0;
     end else if (en) begin
-      mark_q <= {mark_q[SPLAT_BAND_LATENCY-2:0], mark_in};
+      mark_q <= {mark_q[Latency-2:0], mark_in};
     end
   end
 
-  flk_splat_band i_band (
+  flk_splat_band #(
+    .Interval(Interval)
+  ) i_band (
     .clk_i,
     .rst_ni,
     .en_i   (en),
+    .phase_i(phase_q),
     .band_i (band),
     .box_i,
     .x_i    (in_data_i.x),
@@ -324,7 +336,7 @@ module flk_tile_walker
   assert property (@(posedge clk_i) disable iff (!rst_ni) !idle_o |=> idle_o || $stable(box_i))
   else $error("flk_tile_walker: kind of lists changed within a frame");
 
-  // Written SPLAT_BAND_LATENCY cycles before its first tile row is in work, at least.
+  // Written Latency cycles before its first tile row is in work, at least.
   assert property (@(posedge clk_i) disable iff (!rst_ni) walk_q |-> splat_valid)
   else $error("flk_tile_walker: a tile row without its splat");
 

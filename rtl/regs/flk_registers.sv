@@ -2731,7 +2731,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h4) begin
             readback_data_var[7:0] = 8'h3;
-            readback_data_var[15:8] = 8'h6;
+            readback_data_var[15:8] = 8'h7;
         end
         if(rd_mux_addr == 10'h8) begin
             readback_data_var[3:0] = hwif_in.capability.stage.next;
@@ -2787,6 +2787,7 @@ module flk_registers (
         end
         if(rd_mux_addr == 10'h34) begin
             readback_data_var[15:0] = hwif_in.capability_units.log2.next;
+            readback_data_var[19:16] = hwif_in.capability_units.log2_interval.next;
         end
         if(rd_mux_addr == 10'h100) begin
             readback_data_var[15:0] = field_storage.frame.tag.value;

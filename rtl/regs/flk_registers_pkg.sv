@@ -162,7 +162,12 @@ package flk_registers_pkg;
     } flk_registers__capability_units__log2__in_t;
 
     typedef struct packed {
+        logic [3:0] next;
+    } flk_registers__capability_units__log2_interval__in_t;
+
+    typedef struct packed {
         flk_registers__capability_units__log2__in_t log2;
+        flk_registers__capability_units__log2_interval__in_t log2_interval;
     } flk_registers__capability_units__in_t;
 
     typedef struct packed {

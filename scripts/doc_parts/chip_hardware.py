@@ -120,7 +120,7 @@ def measure(
     second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
     # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
     loose = {"records"} | ({"lists"} if lists_there.run_lines.any() else set())
-    model = whole_frame(preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers), second, dram)
+    model = whole_frame(preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval), second, dram)
     say(f"{title}: alone")
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         begin = time.process_time()

@@ -1,12 +1,18 @@
-"""`make docs PART=fpga`: chips on FPGAs and how full boards are, from what make fpga has left in build/fpga."""
+"""`make docs PART=fpga`: chips on FPGAs and how full boards are, from what make fpga has left in build/fpga; `PART=floorplan`: a stage placed and routed."""
 
 from __future__ import annotations
 
 import json
 
+import matplotlib.pyplot as plt
+import numpy as np
+
 from flicker import markdown
-from flicker.chips import chips
+from flicker.chips import chip_of, chips
 from flicker.cost.fpga import COMMANDS, FOLDER, Resources, boards
+from flicker.cost.place import Placed, delays, part_of, place
+from flicker.report.figures import STYLE
+from flicker.toolchain import ROOT
 
 from .common import Say
 
@@ -50,3 +56,55 @@ def tables(say: Say) -> dict[str, str]:
             [b.name, f"{b.lut:,}", f"{b.ff:,}", f"{b.dsp:,}", str(b.bram), b.source] for b in known.values()
         ]),
     }
+
+
+PLACED = (("tiny", "ulx3s"),)
+PICTURE = ROOT / "docs" / "images" / "floorplan.png"
+# What nextpnr counts, in words.
+_USED = {"TRELLIS_COMB": "LUT4 and carry", "TRELLIS_FF": "FF", "TRELLIS_RAMW": "LUT RAM", "MULT18X18D": "DSP", "DP16KD": "BRAM"}
+
+
+def floorplan(say: Say) -> dict[str, str]:
+    """Placed stages: frequency, resources, longest path; and the picture of the first one."""
+    rows, paths = [], []
+    for name, board in PLACED:
+        found = place(chip_of(name), board, report=lambda phase: say(f"{name} on {board}: {phase}"))
+        used = [f"{found.used[key][0]:,} of {found.used[key][1]:,}" for key in _USED]
+        times = delays(found)
+        rows.append([f"`{name}`", found.board, f"{found.mhz:.1f}", *used, f"{times['routing']:.1f} of {sum(times.values()):.1f}"])
+        steps: list[tuple[str, float, int]] = []
+        for at, kind, cell in found.path:
+            part = part_of(cell)
+            if not steps or steps[-1][0] != part:
+                steps.append((part, at, 0))
+            steps[-1] = (part, at, steps[-1][2] + (kind == "logic"))
+        paths += [[f"`{name}`", part, str(levels), f"{at:.1f}"] for part, at, levels in steps]
+        if (name, board) == PLACED[0]:
+            _picture(found, name)
+    return {
+        "stages": markdown.table(["chip", "board", "MHz", *_USED.values(), "routing in the longest path, ns"], rows),
+        "path": markdown.table(["chip", "through", "levels of logic", "until, ns"], paths),
+    }
+
+
+def _picture(found: Placed, name: str) -> None:
+    """Each cell where it lies, coloured by part."""
+    parts = sorted({part for _, _, part in found.cells}, key=lambda part: (not part.startswith("lane"), part))
+    lanes = [part for part in parts if part.startswith("lane")]
+    shades = plt.get_cmap("viridis")(np.linspace(0.1, 0.95, len(lanes)))
+    others = plt.get_cmap("Set1").colors
+    colours = dict(zip(lanes, shades)) | {part: others[k % len(others)] for k, part in enumerate(p for p in parts if p not in lanes)}
+    with plt.style.context(STYLE):
+        figure, axis = plt.subplots(figsize=(8.0, 5.6))
+        for part in parts:
+            x, y = np.array([(x, y) for x, y, own in found.cells if own == part], float).T
+            jitter = np.random.default_rng(1).uniform(-0.45, 0.45, (2, len(x)))
+            axis.scatter(x + jitter[0], y + jitter[1], s=0.5, color=colours[part], label=part, linewidths=0)
+        axis.set_aspect("equal")
+        axis.invert_yaxis()
+        axis.set_xlabel("column of the device")
+        axis.set_ylabel("row")
+        axis.set_title(f"rendering stage of {name} on {found.board}, {found.mhz:.0f} MHz")
+        axis.legend(markerscale=10, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        figure.savefig(PICTURE, dpi=110, bbox_inches="tight")
+        plt.close(figure)

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from zlib import crc32
 
 import numpy as np
@@ -173,7 +174,7 @@ def _instances(formats: FrontFormats) -> Counter[Unit]:
     count: Counter[Unit] = Counter()
     for p in PIPELINES:
         if p.module in LANE:
-            text, _ = module(p.module, p.head, p.build(formats), p.interval)
+            text, _ = module(p.module, p.head, partial(p.build, formats), p.intervals[:1])
             for name, parameters in _INSTANCE.findall(text):
                 count[unit(name, **{key: int(value) for key, value in _PARAMETER.findall(parameters)})] += LANE[p.module]
     return count

@@ -234,12 +234,17 @@ def pipeline_table() -> str:
     there, rows = sources(), []
     package = there["flk_front_pkg"].read_text()
     for pipeline in PIPELINES:
-        latency = re.search(rf" {pipeline.module.removeprefix('flk_').upper()}_LATENCY = (\d+);", package)
-        shared = re.search(r"Units: ([^.]*)\.", head(there[pipeline.module].read_text()))
-        if latency is None or shared is None:
+        name = pipeline.module.removeprefix("flk_")
+        latency = re.search(rf" {name.upper()}_LATENCY = (\d+);| {name}_latency\(.*?return ([^;]*);", package, re.S)
+        shared = re.findall(r"Units(?: with Interval \d+)?: ([^.]*)\.", " ".join(head(there[pipeline.module].read_text()).split()))
+        if latency is None or len(shared) != len(pipeline.intervals):
             raise FlickerError(f"rtl: {pipeline.module}: no latency, or no units")
-        units = " ".join(shared[1].split()).replace(" of 0 bits", "")
-        rows.append((f"`{pipeline.module}`", str(pipeline.interval), latency[1], pipeline.head.rstrip("."), units))
+        usual, others = re.findall(r"\d+$", latency[1] or latency[2])[0], dict(re.findall(r"interval == (\d+)\) \? (\d+)", latency[2] or ""))
+        rows += [
+            (f"`{pipeline.module}`" if k == 0 else "", str(n), usual if k == 0 else others[str(n)], pipeline.head.rstrip(".") if k == 0 else "",
+             shared[k].replace(" of 0 bits", ""))
+            for k, n in enumerate(pipeline.intervals)
+        ]
     return table(["module", "interval", "latency", "what", "operations in units"], rows)
 
 

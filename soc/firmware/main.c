@@ -178,6 +178,7 @@ static void find_chip(void)
   say_line("bytes of a beat", g.device.beat);
   say_line("cores", g.device.cores);
   say_line("preprocessing lanes", g.device.preproc_lanes);
+  say_line("cycles a Gaussian of a lane", g.device.preproc_interval);
   say_line("list writers", g.device.list_writers);
   say_line("sorting units", g.device.sort_units);
   say_line("keeps colours", (uint32_t)g.device.colour_store);

@@ -1,9 +1,10 @@
 """An IP folder of the chip for Vivado: component.xml (IP-XACT 1685-2009) with the registers of the SystemRDL, and the sources.
 
-    python soc/xilinx/package_ip.py --out build/ip/flicker
+    python soc/xilinx/package_ip.py --chip tiny --out build/ip/flicker
 
-Add the folder to `ip_repo_paths`. Ports and their widths are read from flk_top_axi by slang, with its default parameters; bus interfaces are AXI4-Lite
-(s_axil), AXI4 (m_axi), clock, reset and interrupt. Not opened in Vivado: no vendor tool is part of this repository.
+Add the folder to `ip_repo_paths`; design.tcl puts it beside a processor. Ports and their widths are read from flk_top_axi by slang, with the chip's
+parameters, which the IP fixes; bus interfaces are AXI4-Lite (s_axil), AXI4 (m_axi), clock, reset and interrupt. Not opened in Vivado: no vendor tool is part
+of this repository.
 """
 
 import argparse
@@ -12,11 +13,13 @@ import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as Xml
+from collections.abc import Mapping
 from pathlib import Path
 
 import pyslang
 from peakrdl_ipxact import IPXACTExporter, Standard
 
+from flicker.chips import chip_of, chips
 from flicker.toolchain import ROOT, filelist
 
 sys.path.append(str(ROOT / "scripts"))
@@ -39,10 +42,11 @@ def child(parent: Xml.Element, name: str, text: str | None = None, /, **attribut
     return element
 
 
-def top_body():
-    """flk_top_axi with its default parameters."""
+def top_body(parameters: Mapping[str, int]):
+    """flk_top_axi with parameters of a chip."""
     options = pyslang.ast.CompilationOptions()
     options.topModules = {TOP}
+    options.paramOverrides = [f"{name}={value}" for name, value in parameters.items()]
     compilation = pyslang.ast.Compilation(pyslang.Bag([options]))
     for path in filelist():
         compilation.addSyntaxTree(pyslang.syntax.SyntaxTree.fromFile(str(path)))
@@ -73,8 +77,8 @@ def bus(buses: Xml.Element, name: str, kind: tuple[str, str, str, str], role: st
             child(one, "value", value, id=f"BUSIFPARAM_VALUE.{name.upper()}.{key}")
 
 
-def component() -> Xml.ElementTree:
-    """component.xml."""
+def component(parameters: Mapping[str, int]) -> Xml.ElementTree:
+    """component.xml of a chip with parameters."""
     Xml.register_namespace("spirit", SPIRIT)
     Xml.register_namespace("xilinx", XILINX)
     with tempfile.TemporaryDirectory() as folder:
@@ -84,7 +88,7 @@ def component() -> Xml.ElementTree:
     assert maps is not None
     maps.find(f".//{S}memoryMap/{S}name").text = "s_axil"
     maps.find(f".//{S}addressBlock/{S}range").text = str(REGISTER_BYTES)
-    body = top_body()
+    body = top_body(parameters)
     ports = [member for member in body if isinstance(member, pyslang.ast.PortSymbol)]
     names = [port.name for port in ports]
     root = Xml.Element(S + "component")
@@ -93,15 +97,15 @@ def component() -> Xml.ElementTree:
     buses = child(root, "busInterfaces")
     for prefix, role, reference in (("s_axil", "slave", "s_axil"), ("m_axi", "master", "m_axi")):
         bus(buses, prefix, AXI, role, {name.removeprefix(f"{prefix}_").upper(): name for name in names if name.startswith(f"{prefix}_")}, reference)
-    for name, pin, role, parameters in (
+    for name, pin, role, about in (
         ("clock", "aclk", "slave", {"ASSOCIATED_BUSIF": "s_axil:m_axi", "ASSOCIATED_RESET": "aresetn"}),
         ("reset", "aresetn", "slave", {"POLARITY": "ACTIVE_LOW"}), ("interrupt", "irq", "master", {"SENSITIVITY": "LEVEL_HIGH"}),
     ):
-        bus(buses, pin, ("xilinx.com", "signal", name, "1.0"), role, {SIGNALS[name]: pin}, **parameters)
+        bus(buses, pin, ("xilinx.com", "signal", name, "1.0"), role, {SIGNALS[name]: pin}, **about)
     space = child(child(root, "addressSpaces"), "addressSpace")
     child(space, "name", "m_axi")
     child(space, "range", str(MEMORY_BYTES))
-    child(space, "width", "512")
+    child(space, "width", str(next(port for port in ports if port.name == "m_axi_rdata").type.bitWidth))
     root.append(maps)
     model = child(root, "model")
     views = child(model, "views")
@@ -122,6 +126,11 @@ def component() -> Xml.ElementTree:
             vector = child(wire, "vector")
             child(vector, "left", str(port.type.bitWidth - 1))
             child(vector, "right", "0")
+    fixed = child(model, "modelParameters") if parameters else None
+    for name, value in parameters.items():
+        one = child(fixed, "modelParameter")
+        child(one, "name", name)
+        child(one, "value", str(value), format="long", resolve="immediate", id=f"MODELPARAM_VALUE.{name}")
     files = child(child(root, "fileSets"), "fileSet")
     child(files, "name", "sources")
     for path in filelist():
@@ -129,8 +138,7 @@ def component() -> Xml.ElementTree:
         child(one, "name", f"src/{path.name}")
         child(one, "fileType", "systemVerilogSource")
     child(root, "description", "FLICKER: an accelerator for 3D Gaussian Splatting")
-    parameters = child(root, "parameters")
-    one = child(parameters, "parameter")
+    one = child(child(root, "parameters"), "parameter")
     child(one, "name", "Component_Name")
     child(one, "value", TOP, resolve="user", id="PARAM_VALUE.Component_Name", order="1")
     extensions = Xml.SubElement(Xml.SubElement(root, S + "vendorExtensions"), X + "coreExtensions")
@@ -141,19 +149,21 @@ def component() -> Xml.ElementTree:
     return Xml.ElementTree(root)
 
 
-def package(folder: Path) -> None:
-    """component.xml and src/ into a folder, which is made."""
+def package(folder: Path, chip: str) -> None:
+    """component.xml of a chip and src/ into a folder, which is made."""
     (folder / "src").mkdir(parents=True, exist_ok=True)
     for path in filelist():
         shutil.copy(path, folder / "src" / path.name)
-    component().write(folder / "component.xml", encoding="UTF-8", xml_declaration=True)
+    component(chip_of(chip).parameters).write(folder / "component.xml", encoding="UTF-8", xml_declaration=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=re.split(r"\n\n", __doc__)[0])
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "ip" / "flicker")
-    out = parser.parse_args().out
-    package(out)
+    parser.add_argument("--chip", choices=chips(), default="tiny")
+    options = parser.parse_args()
+    out = options.out
+    package(out, options.chip)
     print(out / "component.xml")
 
 

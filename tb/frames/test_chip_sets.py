@@ -21,7 +21,7 @@ from flicker.golden.frame_buffer import PixelFormat
 from flicker.golden.front.frame import run_front
 from flicker.golden.front.reuse import ColourStore, Reuse
 from flicker.golden.lanes.lists import front_lists
-from flicker.params import CHIP_MEMORIES, CORE_COUNTS, LANES_PER_CORE, PORT_WIDTHS, UNIT_COUNTS, RenderConfig
+from flicker.params import CHIP_MEMORIES, CORE_COUNTS, LANES_PER_CORE, PORT_WIDTHS, PREPROC_INTERVALS, UNIT_COUNTS, RenderConfig
 from flicker.scene.camera import Camera
 from flicker.scene.gaussians import Scene
 from flicker.scene.packed import SH_BITS
@@ -34,7 +34,7 @@ CANDIDATES = 40  # of which the one with most pairs that are new is taken
 VALUES = {
     "cores": CORE_COUNTS, "lanes": LANES_PER_CORE, "delivered": (1, 2), "in_width": (1, 2), "slots": (8, 20), "fifo_depth": (4, 16),
     "memories": tuple(CHIP_MEMORIES), "port_bits": PORT_WIDTHS, "sort_units": UNIT_COUNTS, "list_writers": UNIT_COUNTS, "preproc_lanes": UNIT_COUNTS,
-    "colour_store": (False, True),
+    "preproc_interval": PREPROC_INTERVALS, "colour_store": (False, True),
 }
 LIMIT = 1_000_000  # cycles
 
@@ -86,8 +86,8 @@ def test_set(number: int) -> None:
     packed = pack(scene, recipe=Recipe(cuts=0, sh_bits=lambda scene, start: np.resize(SH_BITS, len(start)))).packed
     with ChipSession(packed, config, seed=seed(), memory=MemoryOptions(DramConfig(port_bits=config.port_bits).timing)) as chip:
         device = chip.device
-        assert (device.cores, device.lanes, device.sort_units, device.list_writers, device.preproc_lanes) == (
-            config.cores, config.lanes, config.sort_units, config.list_writers, config.preproc_lanes,
+        assert (device.cores, device.lanes, device.sort_units, device.list_writers, device.preproc_lanes, device.preproc_interval) == (
+            config.cores, config.lanes, config.sort_units, config.list_writers, config.preproc_lanes, config.preproc_interval,
         )
         for camera, format_ in (
             (Camera(96, 54, 80.0, 80.0, np.zeros(3), np.eye(3)), PixelFormat.RGB8),

@@ -1,12 +1,18 @@
-"""Resources on FPGAs: cells counted, boards, units mapped for both families and summed along the hierarchy."""
+"""Resources on FPGAs: cells counted, boards, units mapped for both families and summed along the hierarchy; the harness of what is placed, and with SLOW=1
+the stage of the smallest chip placed and routed."""
 
 from __future__ import annotations
 
+import re
 import subprocess
+from pathlib import Path
 
 import pytest
 
+from flicker.chips import chip_of
 from flicker.cost.fpga import COMMANDS, Fpga, Resources, boards, count
+from flicker.cost.place import Placed, delays, harness, part_of, place
+from flicker.cost.synth.flow import Yosys
 from flicker.errors import FlickerError
 from flicker.toolchain import ROOT
 
@@ -46,8 +52,41 @@ def test_unit(family: str) -> None:
 
 @pytest.mark.parametrize(("words", "message"), [
     ("BOARD=nope", "fpga: BOARD: one of kv260, zcu104, zcu102, vcu118, ulx3s, not nope"),
+    ("BOARD=kv260 ROUTE=1", "fpga: BOARD: kv260: only boards with an ECP5 are placed and routed here"),
     ("CHIP=nope", "fpga: chip: one of tiny, small, default, wide, max, channels, faithful, not nope"),
 ])
 def test_refused(words: str, message: str) -> None:
-    done = subprocess.run(["make", "fpga", words], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(["make", "fpga", *words.split()], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode and message in done.stderr and "Traceback" not in done.stderr
+
+
+def test_harness(tmp_path: Path) -> None:
+    """Every input bit is a flip-flop of the shift register, every output bit reaches q through flip-flops alone: two levels here, of 4 and 2 bits."""
+    (tmp_path / "pins.v").write_text(harness({"a_i": 3, "b_i": 2}, {"y_o": 6, "z_o": 1}))
+    (tmp_path / "stage.v").write_text(
+        "module flk_stage(input clk_i, input rst_ni, input [2:0] a_i, input [1:0] b_i, output [5:0] y_o, output z_o);\n"
+        "  assign {z_o, y_o} = {a_i, b_i, a_i[1:0] & b_i} ^ {7{rst_ni}};\nendmodule\n"
+    )
+    yosys = Yosys(tmp_path)
+    files = f"{tmp_path / 'pins.v'} {tmp_path / 'stage.v'}"
+    for command in (f"read_verilog {files}", "hierarchy -check -top pins", "proc", "flatten", "check -assert", "opt_clean"):
+        yosys.run(command)
+    flops = yosys.select("pins/t:$dff")
+    assert len(flops) == 1 + 1 + 1 + 2 + 1  # reset, inputs, outputs, and two registers, each bit a process, and one
+    assert all(part_of(name) == "harness" for name in ("in_q_TRELLIS_FF_Q", "x0_TRELLIS_FF_Q_4", "x12"))
+    assert [part_of(f"i_stage.gen_lanes.i_stage.gen_core[0].i_core.{name}") for name in ("gen_lane[7].i_lane.u_q", "gen_way[0].i_mask.x", "slot")] == [
+        "lane 7", "setup and masks", "dispatch and output",
+    ]
+    placed = Placed("x", 1, 50.0, {}, [(0.5, "clk-to-q", "a"), (2.5, "routing", "b"), (3.0, "logic", "b"), (5.0, "routing", "c")], [])
+    assert delays(placed) == {"clk-to-q": 0.5, "routing": 4.0, "logic": 0.5}
+
+
+@pytest.mark.slow
+def test_placed() -> None:
+    """As the page names it: the command says a frequency, and the same placement again."""
+    done = subprocess.run(["make", "fpga", "CHIP=tiny", "BOARD=ulx3s", "ROUTE=1"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = place(chip_of("tiny"), "ulx3s")
+    said = re.search(r"seed 1: ([\d.]+) MHz", done.stdout)
+    assert said and float(said[1]) == round(found.mhz, 1) and found.used["TRELLIS_FF"][0] > 5000
+    assert {f"lane {k}" for k in range(8)} <= {part for _, _, part in found.cells} and found.path[-1][0] <= 1000 / found.mhz

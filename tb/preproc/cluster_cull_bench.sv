@@ -2,6 +2,7 @@
 module cluster_cull_bench
   import flk_preproc_pkg::*;
 #(
+  parameter int unsigned Interval    = 4,
   parameter int unsigned BufferBeats = 32
 ) (
   input  logic            clk_i,
@@ -45,6 +46,7 @@ module cluster_cull_bench
   assign out_data_o = 288'({box, 9'b0, out_end, cluster});
 
   flk_cluster_cull #(
+    .Interval   (Interval),
     .BufferBeats(BufferBeats)
   ) i_dut (
     .clk_i,

@@ -16,7 +16,7 @@ from datapath_bench import Bench
 from flicker_tb.runner import seed
 
 from flicker.arithmetic.ff import ff_round, ff_value
-from flicker.datapath.units import SCALE_HEADER, SCALE_STEP, degree_sum
+from flicker.datapath.units import PIPELINES, SCALE_HEADER, SCALE_STEP, degree_sum
 from flicker.front.view import DEMO, load_view
 from flicker.golden.front import colour, cull, frame, reach, reuse, splat
 from flicker.golden.front.frame import cluster_values, lanes_of
@@ -65,8 +65,17 @@ def demo(form: PackedFormat) -> Sample:
 
 
 @cache
-def bench(name: str) -> Bench:
-    return Bench(name)
+def bench(name: str, interval: int = 0) -> Bench:
+    return Bench(name, interval)
+
+
+INTERVALS = {p.module: p.intervals for p in PIPELINES}
+
+
+def by_interval(*names: str) -> pytest.MarkDecorator:
+    """Once for each interval that pipelines can be built for: all the same ones."""
+    (intervals,) = {INTERVALS[name] for name in names}
+    return pytest.mark.parametrize("interval", intervals)
 
 
 def same(got: dict[str, np.ndarray], want: dict[str, np.ndarray], where: np.ndarray | None = None) -> None:
@@ -86,7 +95,8 @@ def cluster_registers(setup: FrameSetup) -> dict[str, float]:
     return registers | {f"offset_{k}": setup.offset[k] for k in range(5)} | {f"reach_{k}": setup.reach[k] for k in range(5)}
 
 
-def test_cluster_test() -> None:
+@by_interval("flk_cluster_test")
+def test_cluster_test(interval: int) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(2)
     table, n = s.packed.table, 300
     low = np.concatenate([table["low"], np.stack([wild(rng, n, CLUSTER_M) for _ in range(3)], 1)]).astype(np.float64)
@@ -95,7 +105,7 @@ def test_cluster_test() -> None:
     keep = np.zeros(len(low), np.bool_)
     cull._cull(low, high, sigma, s.setup.position, s.setup.normal, s.setup.offset, s.setup.reach, keep)
     assert keep[: len(table)].any() and not keep[: len(table)].all()
-    got = bench("flk_cluster_test")(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
+    got = bench("flk_cluster_test", interval)(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
     same(got, {"keep": keep.astype(np.int64)})
 
 
@@ -164,8 +174,9 @@ def _decoded(index, lanes, values, M, out):
         out[j, 6], out[j, 7], out[j, 8], out[j, 9] = frame._quaternion(lanes.chunked, lanes.quat[i], M)
 
 
+@by_interval("flk_geometry_decode")
 @pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16])
-def test_geometry_decode(form: PackedFormat) -> None:
+def test_geometry_decode(form: PackedFormat, interval: int) -> None:
     s = demo(form)
     chunked = form is PackedFormat.CHUNK
     words = np.zeros((SOME, 5), np.int64)
@@ -175,7 +186,7 @@ def test_geometry_decode(form: PackedFormat) -> None:
     c = s.packed.cluster[s.index]
     top, most = (SCALE_HEADER.high, SCALE_STEP.high) if chunked else (0, 0)
     inputs = of("word", words) | of("scale_low", np.minimum(s.values.scale_low[c], top)) | of("scale_step", np.minimum(s.values.scale_step[c], most))
-    same(bench("flk_geometry_decode")({"chunked": chunked}, **inputs), geometry(s))
+    same(bench("flk_geometry_decode", interval)({"chunked": chunked}, **inputs), geometry(s))
 
 
 FIELDS = splat.Projection._fields
@@ -218,10 +229,11 @@ def projection_inputs(s: Sample) -> tuple[np.ndarray, ...]:
             np.stack([g[f"q{k}"] for k in "wxyz"], 1))
 
 
+@by_interval("flk_projection", "flk_projection_conic")
 @pytest.mark.parametrize("order", list(SortOrder), ids=lambda order: order.value)
 @pytest.mark.parametrize("features", [False, True], ids=["plain", "features"])
 @pytest.mark.parametrize("form", list(Form), ids=lambda form: form.name.lower())
-def test_projection(form: Form, features: bool, order: SortOrder) -> None:
+def test_projection(form: Form, features: bool, order: SortOrder, interval: int) -> None:
     """features: of an antialiased scene, with the principal point at some place."""
     by_distance = order is SortOrder.DISTANCE
     s, rng = demo(PackedFormat.CHUNK), random(3)
@@ -246,7 +258,7 @@ def test_projection(form: Form, features: bool, order: SortOrder) -> None:
     registers |= {"chunked": chunked, "antialiased": features, "by_distance": by_distance}
     registers |= {"width": t.width, "height": t.height}
     low, step, q, scales, quat = inputs
-    got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic")(
+    got = bench("flk_projection" if form is Form.FACTORED else "flk_projection_conic", interval)(
         registers, **of("low", low), **of("step", step), **of("q", q), **of("s", scales), **{f"q{c}": quat[:, k] for k, c in enumerate("wxyz")},
     )
     want = {name: places[:, k] for k, name in enumerate(("near", "outside", "x", "y", "spiky", "key", "far"))}
@@ -290,8 +302,9 @@ def bounded(s: Sample, box: bool, x, y, sx, sy, lean, code) -> tuple[np.ndarray,
     return out, limit
 
 
+@by_interval("flk_splat_bounds")
 @pytest.mark.parametrize("box", [False, True])
-def test_splat_bounds(box: bool) -> None:
+def test_splat_bounds(box: bool, interval: int) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(4)
     out, places = seen(s)
     n = 500
@@ -308,7 +321,7 @@ def test_splat_bounds(box: bool) -> None:
         assert np.array_equal(code[scale == frame.CHUNK_SHARE], raw[scale == frame.CHUNK_SHARE])
     want, limit = bounded(s, box, x, y, sx, sy, lean, code)
     registers = {"box": box, "width": s.setup.width, "height": s.setup.height}
-    got = bench("flk_splat_bounds")(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, scale=scale, opacity=raw)
+    got = bench("flk_splat_bounds", interval)(registers, x=x, y=y, sx=sx, sy=sy, lean=lean, scale=scale, opacity=raw)
     assert np.array_equal(got["code"], code)
     empty = want[:, 0] == 1
     assert empty.any() and not empty.all()
@@ -325,8 +338,9 @@ def _bands(band, box, x, y, l2, i0, kappa, r, limit, N, out):
         out[j, 0], out[j, 1], out[j, 2] = a > b, a, b
 
 
+@by_interval("flk_splat_band")
 @pytest.mark.parametrize("box", [False, True])
-def test_splat_band(box: bool) -> None:
+def test_splat_band(box: bool, interval: int) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(5)
     out, places = seen(s)
     r, limit = bounded(s, box, places[:, 2], places[:, 3], out[:, 0], out[:, 1], out[:, 7], rng.integers(1, 256, len(out)))
@@ -337,7 +351,7 @@ def test_splat_band(box: bool) -> None:
     want = np.zeros((len(on), 3), np.int64)
     l2, i0, kappa = out[:, 4], out[:, 5], out[:, 6]
     _bands(band, box, places[:, 2], places[:, 3], l2, i0, kappa, r, limit, S, want)
-    got = bench("flk_splat_band")(
+    got = bench("flk_splat_band", interval)(
         {"box": box}, band=band, x=places[:, 2], y=places[:, 3], right=r[:, 5], x0=r[:, 1], x1=r[:, 2], y0=r[:, 3], y1=r[:, 4],
         l2=l2, i0=i0, kappa=kappa, limit=limit,
     )
@@ -356,12 +370,13 @@ def _basis(d, M, out):
         colour.basis_functions(d[j, 0], d[j, 1], d[j, 2], 3, out[j], M)
 
 
-def test_colour_basis() -> None:
+@by_interval("flk_colour_basis")
+def test_colour_basis(interval: int) -> None:
     s, rng = demo(PackedFormat.CHUNK), random(6)
     d = np.concatenate([seen(s)[0][:, 8:11], np.stack([wild(rng, 300, C) for _ in range(3)], 1)])
     out = np.zeros((len(d), 16), np.int64)
     _basis(d, C, out)
-    got = bench("flk_colour_basis")({}, **of("direction", d))
+    got = bench("flk_colour_basis", interval)({}, **of("direction", d))
     same(got, {f"basis_{k}": out[:, k] for k in range(1, 16)})
 
 
@@ -425,8 +440,6 @@ def test_colour_term(chunked: bool) -> None:
 
 def test_units_are_named_in_this_file() -> None:
     """Every pipeline has a test here."""
-    from flicker.datapath.units import PIPELINES
-
     assert {p.module for p in PIPELINES} == {f"flk_{name}" for name in (
         "cluster_test", "colours_last", "cluster_header", "geometry_decode", "projection", "projection_conic", "splat_bounds", "splat_band", "colour_basis",
         "colour_group", "colour_constant", "colour_term")}

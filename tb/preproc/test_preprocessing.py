@@ -3,7 +3,7 @@
 State space: formats, list kinds, records of 16 and of 32 bytes, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters
 all culled, one Gaussian, pictures of 4096x4096, 4096x1 and 1x4096, a Gaussian over the whole of the largest (SLOW=1), a camera inside a cluster, errors of the
 memory by address, list memory that runs out, a table that points beyond the records. Registers and memories begin random; bytes that no one should write are
-compared too. Parameter space: with SLOW=1 one and two lanes and list writers.
+compared too. Parameter space: with SLOW=1 one and two lanes and list writers, and slower lanes.
 """
 
 from __future__ import annotations
@@ -57,12 +57,14 @@ def demo() -> View:
 def check(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, memory: MemoryOptions = QUICK, frames: int = 1,
     kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH, lanes: int = 4, writers: int = 4,
+    interval: int = 2,
 ) -> tuple[FrontFrame, RtlFront]:
     """A frame of both, compared."""
     golden = run_front(packed, camera, lists, kind, order=order)
     image = front_memory(golden)
     rtl = front_rtl(
         packed, camera, lists, kind=kind, chunks=image.lists.chunks, memory=memory, frames=frames, seed=seed(), order=order, lanes=lanes, writers=writers,
+        interval=interval,
     )
     assert rtl.error == 0 and "value beyond FP16 clamped" not in golden.adjusted
     assert rtl.waits == {name: rtl.counters[name] for name in rtl.waits}
@@ -273,35 +275,46 @@ def wide(count: int = 400, **changes) -> tuple[PackedScene, Camera]:
     return pack(scene, PackedFormat.CHUNK).packed, Camera(width, height, width, width, np.zeros(3), np.eye(3))
 
 
-FEWER = [(1, 1), (2, 2), (4, 1), (1, 4)]
+FEWER = [(1, 1, 4), (2, 2, 2), (4, 1, 4), (1, 4, 2)]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("lanes", "writers"), FEWER)
-def test_fewer_lanes_and_writers(lanes: int, writers: int) -> None:
+@pytest.mark.parametrize(("lanes", "writers", "interval"), FEWER)
+def test_fewer_lanes_and_writers(lanes: int, writers: int, interval: int) -> None:
     """The same bytes: the demo scene, groups of one to four Gaussians and all degrees behind a slow memory, lines of pointers that move."""
     view = demo()
-    golden, rtl = check(pack(view.scene, PackedFormat.CHUNK).packed, view.camera, lanes=lanes, writers=writers)
-    assert abs(unit_cycles(golden, lanes=lanes, writers=writers).all / rtl.cycles - 1) <= 0.1
+    golden, rtl = check(pack(view.scene, PackedFormat.CHUNK).packed, view.camera, lanes=lanes, writers=writers, interval=interval)
+    assert abs(unit_cycles(golden, lanes=lanes, writers=writers, interval=interval).all / rtl.cycles - 1) <= 0.1
     sizes = some(2000)
     for degree, form in enumerate((PackedFormat.FP16, PackedFormat.CHUNK, PackedFormat.FP16, PackedFormat.CHUNK)):
         scene = dataclasses.replace(sizes, sh=sizes.sh[:, : (degree + 1) ** 2])
-        check(pack(scene, form).packed, plain_camera(), memory=lpddr4(), frames=2, lanes=lanes, writers=writers)
+        check(pack(scene, form).packed, plain_camera(), memory=lpddr4(), frames=2, lanes=lanes, writers=writers, interval=interval)
     packed, camera = wide()
-    check(packed, camera, memory=lpddr4(), lanes=lanes, writers=writers)
+    check(packed, camera, memory=lpddr4(), lanes=lanes, writers=writers, interval=interval)
     packed, camera = wide(150, size=(4096, 4096))
-    check(packed, camera, lanes=lanes, writers=writers)
+    check(packed, camera, lanes=lanes, writers=writers, interval=interval)
+
+
+def test_one_slow_lane() -> None:
+    """All survive, with entries and four parts of a colour each: the lane's queue is full, and so is the order of stored and computed colours beside it."""
+    count, rng = 2000, np.random.default_rng([seed(), 6])
+    z = rng.uniform(2.0, 6.0, count)
+    means = np.stack([rng.uniform(-0.3, 0.3, count) * z, rng.uniform(-0.2, 0.2, count) * z, z], axis=1)
+    packed = pack(some(count, means=means, scales=np.full((count, 3), 0.15)), PackedFormat.CHUNK).packed
+    for memory in (QUICK, lpddr4()):
+        golden, rtl = check(packed, plain_camera(), memory=memory, lanes=1, writers=1, interval=4)
+        assert len(golden.number) == count and rtl.counters["lane_waits"] > 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("lanes", "writers"), FEWER[:2])
-def test_fewer_writers_out_of_list_memory(lanes: int, writers: int) -> None:
+@pytest.mark.parametrize(("lanes", "writers", "interval"), FEWER[:2])
+def test_fewer_writers_out_of_list_memory(lanes: int, writers: int, interval: int) -> None:
     """Each bank ends by itself, in pictures with all pointers held and with more."""
     for packed, camera in ((pack(some(2000), PackedFormat.CHUNK).packed, plain_camera()), wide()):
         frame = run_front(packed, camera)
         full = front_memory(frame).lists
         image = front_memory(frame, (int(full.taken.min()) + int(full.taken.max())) // 2).lists
-        rtl = front_rtl(packed, camera, chunks=image.chunks, seed=seed(), lanes=lanes, writers=writers)
+        rtl = front_rtl(packed, camera, chunks=image.chunks, seed=seed(), lanes=lanes, writers=writers, interval=interval)
         assert image.failed.any() and rtl.error == 1 << ERRORS.index("out of list memory") and np.array_equal(rtl.counters["taken"], image.taken)
         lines = np.unique(np.concatenate(image.writes))
         assert np.array_equal(rtl.memory[lines], image.memory[lines])
@@ -313,6 +326,11 @@ def test_fewer_writers_out_of_list_memory(lanes: int, writers: int) -> None:
 @pytest.mark.parametrize("parameters", [{"PreprocLanes": 3}, {"ListWriters": 3}], ids=str)
 def test_illegal_parameters(parameters: dict[str, int]) -> None:
     refused("flk_preprocessing", parameters, f"{next(iter(parameters))} must be 1, 2 or 4")
+
+
+@pytest.mark.parametrize("interval", [1, 3, 8])
+def test_illegal_interval(interval: int) -> None:
+    refused("flk_preprocessing", {"PreprocInterval": interval}, "PreprocInterval must be 2 or 4")
 
 
 @pytest.mark.parametrize("memory", [QUICK, lpddr4()], ids=["perfect", "lpddr4"])

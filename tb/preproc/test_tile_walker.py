@@ -1,7 +1,8 @@
 """Tile walker: every entry, in order, and each splat's end against the golden `tiles_of`; splats of the demo scene and made-up ones.
 
 State space: splats of one band to 512, of one tile to 65,536, without pixels, with bands that hold nothing, with gaps between two bands' intervals, at the
-edges of pictures up to 4096x4096; idle and back-pressure patterns; reset with splats inside. Both kinds of lists. Parameter space: the defaults, and the least.
+edges of pictures up to 4096x4096; idle and back-pressure patterns; reset with splats inside. Both kinds of lists. Parameter space: the defaults, the least
+queues, and a band every two cycles.
 Noise at the input beside splats; the bounds of empty splats are noise.
 """
 
@@ -238,7 +239,17 @@ def test_whole_picture(box: bool) -> None:
 
 
 def test_least_queues() -> None:
-    check(made_up(random(4), 300, largest=50.0), False, "rare", "half", Splats=2, Rows=1)
+    check(made_up(random(4), 300, largest=50.0), False, "rare", "half", Splats=2, Rows=1, Interval=2)
+
+
+def test_every_other_cycle() -> None:
+    """A band every two cycles in: splats without entries take two each."""
+    n = 300
+    splats = joined(made_up(random(10), n), whole(False), tagged(made_up(random(11), n) | {"empty": np.ones(n, np.bool_)}, random(12)))
+    for idle, stall in (("never", "never"), ("half", "half"), ("bursts", "heavy")):
+        check(splats, False, idle, stall, Interval=2)
+    run = check(tagged(made_up(random(11), n) | {"empty": np.ones(n, np.bool_)}, random(12)), False, Interval=2)
+    assert 2 * n <= run.cycles < 2.08 * n + 40
 
 
 def test_only_empty() -> None:

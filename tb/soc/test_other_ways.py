@@ -134,7 +134,8 @@ def test_guide_example() -> None:
     assert len(soc.flicker.memory.r.data) == chip_of("small").config.port_bits == 256
 
 
-def test_ip_folder(tmp_path: Path) -> None:
+@pytest.mark.parametrize("chip", ["tiny", "default"])
+def test_ip_folder(chip: str, tmp_path: Path) -> None:
     """component.xml has every port with its width, two AXI interfaces whose pins are those ports, the registers of the map, and the sources beside it."""
     pytest.importorskip("peakrdl_ipxact", reason="peakrdl-ipxact is not installed: make soc sets it up")
     import xml.etree.ElementTree as Xml
@@ -145,7 +146,7 @@ def test_ip_folder(tmp_path: Path) -> None:
         sys.path.insert(0, str(SOC / "xilinx"))
     import package_ip
 
-    package_ip.package(tmp_path)
+    package_ip.package(tmp_path, chip)
     root = Xml.parse(tmp_path / "component.xml").getroot()
     name = {"s": package_ip.SPIRIT}
     ports = {port.findtext("s:name", None, name): port for port in root.iterfind("s:model/s:ports/s:port", name)}
@@ -153,7 +154,9 @@ def test_ip_folder(tmp_path: Path) -> None:
     assert {pin: kind[:-3] if kind == "output" else "in" for kind, pin in declared} == {
         pin: port.findtext("s:wire/s:direction", None, name) for pin, port in ports.items()
     }
-    assert ports["m_axi_rdata"].findtext("s:wire/s:vector/s:left", None, name) == "511"
+    assert ports["m_axi_rdata"].findtext("s:wire/s:vector/s:left", None, name) == str(chip_of(chip).config.port_bits - 1)
+    fixed = root.iterfind("s:model/s:modelParameters/s:modelParameter", name)
+    assert {one.findtext("s:name", "", name): int(one.findtext("s:value", "", name)) for one in fixed} == chip_of(chip).parameters
     mapped = [place.text for place in root.iterfind("s:busInterfaces/s:busInterface/s:portMaps/s:portMap/s:physicalPort/s:name", name)]
     assert sorted(mapped) == sorted(set(ports) - {"test_en"})
     offsets = {
@@ -163,6 +166,55 @@ def test_ip_folder(tmp_path: Path) -> None:
     assert {key: at for key, at in offsets.items() if key in REGISTERS} == {key: register.offset for key, register in REGISTERS.items() if key in offsets}
     assert len(offsets) >= len(REGISTERS)
     assert all((tmp_path / file.text).is_file() for file in root.iterfind("s:fileSets/s:fileSet/s:file/s:name", name) if file.text)
+
+
+def block_design(*arguments: str) -> tuple[str, list[list[str]]]:
+    """What soc/xilinx/design.tcl says on standard error, and the commands of Vivado that it gives, which do nothing here."""
+    tkinter = pytest.importorskip("tkinter", reason="Python comes without Tcl here")
+    tcl, given, said = tkinter.Tcl(), [], []
+
+    def unknown(*command: str) -> str:
+        given.append(list(command))
+        return command[-1]
+
+    def stop(code: str) -> None:
+        raise RuntimeError(code)
+
+    tcl.createcommand("unknown", unknown)
+    tcl.createcommand("exit", stop)
+    tcl.createcommand("puts", lambda *words: said.append(words[-1]))
+    tcl.eval(f"set argv [list {' '.join(f'{{{argument}}}' for argument in arguments)}]")
+    try:
+        tcl.eval(f"source {{{SOC / 'xilinx' / 'design.tcl'}}}")
+    except tkinter.TclError:
+        assert len(said) == 1 and not given
+    return said[-1], given
+
+
+def test_block_design(tmp_path: Path) -> None:
+    """The script runs to its end with commands that do nothing; it ties up every interface and pin of the IP that package_ip makes, once."""
+    pytest.importorskip("peakrdl_ipxact", reason="peakrdl-ipxact is not installed: make soc sets it up")
+    if str(SOC / "xilinx") not in sys.path:
+        sys.path.insert(0, str(SOC / "xilinx"))
+    import package_ip
+
+    root = package_ip.component(chip_of("tiny").parameters).getroot()
+    name = {"s": package_ip.SPIRIT}
+    buses = {bus.findtext("s:name", "", name) for bus in root.iterfind("s:busInterfaces/s:busInterface", name)}
+    (tmp_path / "component.xml").write_text("")
+    for board in ("kv260", "zcu104", "zcu102"):
+        said, given = block_design(board, str(tmp_path))
+        assert said.endswith("flicker.xsa")
+        pins = [word for command in given if command[0].startswith(("get_bd_pins", "get_bd_intf_pins")) for word in command[1:] if word.startswith("chip/")]
+        assert sorted(pins) == sorted(f"chip/{bus}" for bus in [*buses, "test_en"])
+        vlnv = next(command for command in given if command[0] == "create_bd_cell" and command[-1] == "chip")[4]
+        assert vlnv == f"{package_ip.VENDOR}:{package_ip.LIBRARY}:{package_ip.TOP}"
+        constraints = next(command for command in given if command[:3] == ["add_files", "-fileset", "constrs_1"])[-1]
+        text = Path(constraints).read_text()
+        assert all(name in (ROOT / "rtl" / file).read_text() for name, file in (("i_reset", "flk_top_axi.sv"), ("released_q", "common/flk_reset_sync.sv")))
+        assert text.count("i_reset/released_q_reg") == 2
+    assert "two arguments: a board (kv260, zcu104, zcu102)" in block_design("nope", str(tmp_path))[0]
+    assert "component.xml: no such file" in block_design("kv260", str(tmp_path / "nothing"))[0]
 
 
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["set up", "linted"])

@@ -396,8 +396,8 @@ class Chip:
         self.writes: list[tuple[int, int]] = []
         self.reads: list[int] = []
         self.set("id", 0x464C4B52)
-        self.set("version", 3 | 6 << 8)
-        self.set("capability_units", 0x1201)
+        self.set("version", 3 | 7 << 8)
+        self.set("capability_units", 0x21201)
         self.field("capability", stage=1, form=1, precision=2, vrus=2, mask_generator=3, log2_lists=14, log2_beat=6, log2_lanes=5, colour_store=1)
         self.field("status", ready=1)
         self.calls = READ(self._read), WRITE(self._write)
@@ -715,13 +715,14 @@ def test_probe(lib: ctypes.CDLL) -> None:
     chip.field("frames", started=0xFFFF, finished=0xFFFE)
     assert chip.probe() == "OK"
     device = chip.device
-    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (6, 1, 1, 2, 2, 3, 32)
+    assert (device.minor, device.stage, device.form, device.precision, device.vrus, device.mask_generator, device.lanes) == (7, 1, 1, 2, 2, 3, 32)
     assert device.colour_store == 1
     assert (device.lists, device.beat) == (16384, 64)
-    assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (2, 1, 4, 2)
+    assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units, device.preproc_interval) == (2, 1, 4, 2, 4)
     assert device.started == 0xFFFF and not chip.writes
     chip.set("version", 3 | 3 << 8)  # of before these
-    assert chip.probe() == "OK" and not device.colour_store and (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (4, 4, 4, 4)
+    assert chip.probe() == "OK" and not device.colour_store and device.preproc_interval == 2
+    assert (device.cores, device.preproc_lanes, device.list_writers, device.sort_units) == (4, 4, 4, 4)
     chip.set("version", 2)
     assert chip.probe() == "DEVICE_VERSION"
     chip.set("id", 0xFFFFFFFF)

@@ -81,7 +81,7 @@ def _first_half(front: FrontFrame, config: RenderConfig, dram: DramConfig, sorte
     """Preprocessing of a frame, and the lists that it leaves. sorter: False: for an ideal one, which costs the bytes of one reading and no time."""
     image, sizes = front_memory(front), config.chip_memories
     tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
-    return preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers), tables
+    return preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval), tables
 
 
 def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:

@@ -20,17 +20,18 @@ from ..golden.front.memory import FrontImage
 from ..golden.front.reuse import CLUSTER_BEATS, ROW, Reused
 from ..golden.front.setup import FrameSetup
 from ..golden.lists import COMBINER_SETS, COMBINER_WAYS, ENTRY_BITS, POINTERS_PER_LINE, WRITERS, pointer_lines
-from ..params import CHIP_MEMORIES, TILE, UNIT_COUNTS, ChipMemories
+from ..params import CHIP_MEMORIES, PREPROC_INTERVALS, TILE, UNIT_COUNTS, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
 from .dram import READ, WRITE, DramConfig, Stream, simulate
 
 # Of the RTL, times in cycles.
 LANES, LIST_WRITERS = UNIT_COUNTS[-1], UNIT_COUNTS[-1]
-CLUSTER_CYCLES = 4  # of the cluster test
-GROUP_CYCLES = 2  # a Gaussian of each lane enters the front
-LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree
-LATENCY = 110  # from a group to its entries, colours at hand
+INTERVAL = PREPROC_INTERVALS[0]  # a Gaussian of each lane enters the front
+CLUSTER_CYCLES = {2: 4, 4: 16}  # of the cluster test, by that interval,
+LATENCY = {2: 110, 4: 142}  # from a group to its entries, colours at hand,
+BAND_CYCLES = {2: 1, 4: 2}  # and of a band
+LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree, at least
 SIZES = CHIP_MEMORIES["default"]
 WAITING = SIZES.survivors  # of a lane between front and entries
 MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
@@ -294,8 +295,9 @@ class UnitCycles:
     all: int
 
 
-def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, writers: int = LIST_WRITERS) -> UnitCycles:
-    """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries. lanes, writers: how many there are."""
+def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, writers: int = LIST_WRITERS, interval: int = INTERVAL) -> UnitCycles:
+    """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries. lanes, writers: how many there are. interval:
+    cycles from a Gaussian of a lane to the next."""
     packed = frame.packed
     keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)))
     groups = -(-packed.counts[keep] // lanes)  # Gaussians that enter together
@@ -304,7 +306,7 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, w
     within = frame.gaussian - packed.start[cluster]
     slot = np.searchsorted(keep, cluster)
     # A cluster enters when it has been tested and those before it have.
-    enters = GROUP_CYCLES * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES * (keep + 1) - GROUP_CYCLES * start[:-1])
+    enters = interval * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES[interval] * (keep + 1) - interval * start[:-1])
     place = np.concatenate([[0], np.cumsum(packed.counts[keep])])[slot] + within
     degree = packed.degrees[cluster]
     lane = within % lanes
@@ -317,14 +319,14 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, w
     bands = np.maximum(np.bincount(np.unique(band) >> 20, minlength=len(frame.gaussian)), 1)
     bank = ((x & 1 | (y & 1) << 1) % writers).astype(np.int64)
     front, went = _unit_cycles(
-        enters[slot] + GROUP_CYCLES * (within // lanes), lane, np.array(LANE_CYCLES)[degree], first, bank, bands, waiting,
-        MERGE_DEPTH, LATENCY, lanes, writers,
+        enters[slot] + interval * (within // lanes), lane, np.maximum(LANE_CYCLES, interval)[degree], first, bank, BAND_CYCLES[interval] * bands, waiting,
+        MERGE_DEPTH, LATENCY[interval], lanes, writers,
     )
-    fed = enters[-1] + GROUP_CYCLES * groups[-1] if len(keep) else 0
+    fed = enters[-1] + interval * groups[-1] if len(keep) else 0
     # At the end a writer closes its banks one after the other; those of the first are within what the estimate leaves out.
     closed = COMBINER_SETS * COMBINER_WAYS + POINTERS_PER_LINE * pointer_lines(cols, -(-frame.camera.height // TILE)) // WRITERS
     more = (WRITERS // writers - 1) * closed
-    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES * len(packed.table))) + more)
+    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES[interval] * len(packed.table))) + more)
 
 
 def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING, lanes: int = LANES) -> int:
@@ -365,13 +367,14 @@ class Preprocessing:
 
 def estimate(
     frame: FrontFrame, image: FrontImage, config: DramConfig | None, sizes: ChipMemories = SIZES, lanes: int = LANES, writers: int = LIST_WRITERS,
+    interval: int = INTERVAL,
 ) -> Preprocessing:
-    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. lanes, writers: how many there are."""
+    """Cycles and bytes of a frame. config: of the DRAM; None: a perfect memory. lanes, writers, interval: as of `unit_cycles`."""
     beats = traffic(frame, image, lanes)
     used = bytes_of(beats)
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    units = unit_cycles(frame, sizes.survivors, lanes, writers)
+    units = unit_cycles(frame, sizes.survivors, lanes, writers, interval)
     order = in_order(beats, config, sizes.gathered_lines) if config else None
     dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
     if config:

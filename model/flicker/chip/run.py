@@ -131,11 +131,12 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     tested = chip.scene.gaussians - count("culled_gaussians")
     # Entries of all sorting units, and lines of those that they do not hold and sort a second time: of the one with most the same share.
     given = int(np.sum(rendering["entries"]))
-    # Share of the cycles in which each part does what it is there for: a Gaussian in two cycles each lane, entries of list writers or sorting units one a
-    # cycle each, in delivery two.
+    # Share of the cycles in which each part does what it is there for: a Gaussian in `preproc_interval` cycles each lane, entries of list writers or sorting
+    # units one a cycle each, in delivery two.
     busy = {
         "front end": {
-            "lanes": 2 * tested / (config.preproc_lanes * phases["front end"]), "list writers": int(np.max(front["entries"])) / phases["front end"],
+            "lanes": config.preproc_interval * tested / (config.preproc_lanes * phases["front end"]),
+            "list writers": int(np.max(front["entries"])) / phases["front end"],
             "memory port": (live["table_beats"] + live["geometry_beats"] + live["colour_beats"]) / phases["front end"], "DRAM": peak["front end"],
         },
         "rendering": {
@@ -154,7 +155,8 @@ def chip_stats(chip: ChipSession, frame: ChipFrame, config: RenderConfig, dram: 
     part = max(busy[longest], key=lambda name: busy[longest][name])
     return {
         **counted(frame, config), "memories": config.memories, "sort_units": config.sort_units, "list_writers": config.list_writers,
-        "preproc_lanes": config.preproc_lanes, "format": chip.packed.format.value, "records": RecordKind.of(config.form).value,
+        "preproc_lanes": config.preproc_lanes, "preproc_interval": config.preproc_interval, "format": chip.packed.format.value,
+        "records": RecordKind.of(config.form).value,
         "clusters": chip.scene.clusters, "clusters_kept": chip.scene.clusters - count("culled_clusters"),
         "outcomes": {
             OUTCOMES[Outcome.CULLED]: count("culled_gaussians"), OUTCOMES[Outcome.NEAR]: count("too_near"), OUTCOMES[Outcome.OUTSIDE]: count("outside"),

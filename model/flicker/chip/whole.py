@@ -51,7 +51,7 @@ class WholeFrame:
 def halves(front: FrontFrame, config: RenderConfig, dram: DramConfig) -> tuple[Preprocessing, Rendering]:
     """Both halves of a chip for what its front end makes of a frame, each with the memory to itself."""
     image, sizes = front_memory(front), config.chip_memories
-    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers)
+    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval)
     return first, rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
 
 

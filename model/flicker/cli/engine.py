@@ -154,6 +154,9 @@ def engine_options(
     sort_units: Annotated[int | None, typer.Option(help=f"of --engine chip: sorting units, {UNITS} [default: {_default('sort_units')}]")] = None,
     list_writers: Annotated[int | None, typer.Option(help=f"of --engine chip: list writers, {UNITS} [default: {_default('list_writers')}]")] = None,
     preproc_lanes: Annotated[int | None, typer.Option(help=f"of --engine chip: preprocessing cores, {UNITS} [default: {_default('preproc_lanes')}]")] = None,
+    preproc_interval: Annotated[int | None, typer.Option(
+        help=f"of --engine chip: cycles from a Gaussian of a preprocessing core to the next, 2 or 4 [default: {_default('preproc_interval')}]",
+    )] = None,
     refresh: Annotated[RefreshChoice | None, typer.Option(help="of --engine chip: what the DRAM refreshes at once [default: all-banks]")] = None,
     chip: Annotated[str | None, typer.Option(help="a chip by its name in chips.toml, as tiny, instead of options of its parts")] = None,
     chips_file: Annotated[Path | None, typer.Option("--chips", help="file with chips of your own for --chip, as chips.toml")] = None,
@@ -169,7 +172,7 @@ def engine_options(
     if engine is not EngineChoice.CHIP:
         for option, value in (
             ("--memories", memories), ("--port-bits", port_bits), ("--refresh", refresh), ("--sort-units", sort_units), ("--list-writers", list_writers),
-            ("--preproc-lanes", preproc_lanes),
+            ("--preproc-lanes", preproc_lanes), ("--preproc-interval", preproc_interval),
         ):
             if value is not None:
                 raise FlickerError(f"{option}: for --engine chip only")
@@ -188,6 +191,7 @@ def engine_options(
         parts = {
             "stage": stage, "cores": cores, "lanes": lanes, "cat": cat, "precision": precision, "form": form, "fifo-depth": fifo_depth, "memories": memories,
             "port-bits": port_bits, "sort-units": sort_units, "list-writers": list_writers, "preproc-lanes": preproc_lanes,
+            "preproc-interval": preproc_interval,
             "coords": None if coords is CoordsChoice.LOCAL else coords, "faithful": faithful or None,
         }
         if names := ", ".join(f"--{k}" for k, v in parts.items() if v is not None):
@@ -213,6 +217,7 @@ def engine_options(
         sort_units=base.sort_units if sort_units is None else sort_units,
         list_writers=base.list_writers if list_writers is None else list_writers,
         preproc_lanes=base.preproc_lanes if preproc_lanes is None else preproc_lanes,
+        preproc_interval=base.preproc_interval if preproc_interval is None else preproc_interval,
     )
     return Chosen(engine, config, front, memory, lists, rechunk, refresh, faithful)
 

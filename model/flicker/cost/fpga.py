@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 import time
@@ -29,9 +30,17 @@ from .synth.units import COMPOSED
 
 FOLDER = BUILD / "fpga"
 BOARDS = Path(__file__).with_name("boards.toml")
+# Yosys' own commands for a family, but that on UltraScale+ multiplexers take MUXF7 and MUXF8 and ABC maps for few LUTs of any size: its own costs are those
+# of LUTs that share a place.
+_AREA = "+&scorr;&sweep;&dc2;&dc2;&syn3;&dch,-f;&if,-W,300;&mfs;&st;&dch,-f;&if,-W,300;&mfs;&st;&dch,-f;&if,-W,300,-a;&mfs"
+_XILINX = "synth_xilinx -family xcup -flatten -noiopad -noclkbuf -widemux 3 -top {top}"
 COMMANDS = {
-    "xcup": "synth_xilinx -family xcup -flatten -noiopad -noclkbuf -top {top}",
-    "ecp5": "synth_ecp5 -noabc9 -top {top}",
+    "xcup": (
+        f"{_XILINX} -run begin:map_luts", "opt_expr -mux_undef -noclkinv", f"abc9 -luts 6:5,10,20 -script {_AREA}", "clean", "xilinx_srl -fixed -minlen 3",
+        "techmap -map +/techmap.v -D LUT_SIZE=6 -map +/xilinx/lut_map.v -map +/xilinx/cells_map.v -D LUT_WIDTH=6", "xilinx_dffopt",
+        "opt_lut_ins -tech xilinx", "clean", "blackbox =A:whitebox",
+    ),
+    "ecp5": ("synth_ecp5 -top {top}",),
 }
 # Modules that are synthesised apart.
 UNITS = {
@@ -69,7 +78,7 @@ class Resources:
 
 @dataclass(frozen=True)
 class Board:
-    """lut, ff, dsp, bram: what its device has. source: the document that says so."""
+    """lut, ff, dsp, bram: what its device has. source: the document that says so. nextpnr: the device's options, where it is placed and routed."""
 
     name: str
     family: str
@@ -78,6 +87,7 @@ class Board:
     dsp: int
     bram: int
     source: str
+    nextpnr: str = ""
 
     def full(self, of: Resources) -> dict[str, float]:
         """Shares of the device that resources take."""
@@ -133,7 +143,7 @@ class Fpga:
         boxes = [module for module in COMPOSED.get(top, []) if module in UNITS]
         job = {
             "top": top, "parameters": dict(parameters), "extra": [], "boxes": boxes, "family": self.family,
-            "command": COMMANDS[self.family].format(top=top),
+            "commands": [command.format(top=top) for command in COMMANDS[self.family]],
         }
         text = "".join(" ".join(words(path.read_text())) for path in sources_of(top))
         digest = hashlib.sha256(json.dumps([job, text, Path(__file__).read_text(), version("pyosys")], sort_keys=True).encode()).hexdigest()[:12]
@@ -150,7 +160,7 @@ class Fpga:
         entry: dict = {"top": top, "key": key, "own": count(result["cells"], self.family), "parts": []}
         self.found[key] = entry
         for _, module, everything in result["children"]:
-            own = _parameters(module)
+            own = parameters_of(module)
             entry["parts"].append(self.unit(module, {name: value for name, value in everything.items() if name in own})["key"])
         return entry
 
@@ -174,9 +184,8 @@ class Fpga:
         return found
 
 
-def _parameters(module: str) -> set[str]:
-    import re
-
+def parameters_of(module: str) -> set[str]:
+    """Names of a module's parameters."""
     text = next(path for path in sources_of(module) if path.stem == module).read_text()
     return set(re.findall(r"^\s*parameter\s+[\w\s]*?(\w+)\s*=", text, re.M))
 
@@ -204,7 +213,8 @@ def main() -> int:
     # Yosys takes a module without contents as one without parameters.
     for module, name in sorted({(module, name) for _, module, everything in inside for name in everything}):
         yosys.run(f"setparam -unset {name} t:{module}")
-    yosys.run(job["command"])
+    for command in job["commands"]:
+        yosys.run(command)
     yosys.run(f"write_json {folder / 'mapped.json'}")
     modules = json.loads((folder / "mapped.json").read_text())["modules"]
     (folder / "mapped.json").unlink()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .graph import BOOL, Ff, Graph, Int, Value
-from .schedule import Schedule, Unit, needed, schedule
+from .schedule import QUICK, Schedule, Unit, needed, schedule
 
 
 class _Writer:
@@ -97,10 +98,38 @@ def _widened(text: str, value: Value, wide: int, signed: bool) -> str:
     return f"{wide}'({text})" if value.kind.bits != wide else text
 
 
-def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Schedule]:
-    """Text of the module, and its schedule. `head` is the comment above it; how it works is added to it."""
-    plan = schedule(graph, interval)
-    w = _Writer(plan)
+def module(name: str, head: str, build: Callable[[], Graph], intervals: Sequence[int]) -> tuple[str, dict[int, Schedule]]:
+    """Text of the module, and its schedules by interval. Of several intervals, the parameter Interval chooses, the first where nobody does. `head` is the
+    comment above it; how it works is added to it."""
+    writers = {interval: _Writer(schedule(build(), interval)) for interval in intervals}
+    first = writers[intervals[0]]
+    memories = any(w.memories for w in writers.values())
+    bodies = {interval: _body(w, memories, len(intervals) > 1) for interval, w in writers.items()}
+    if len(intervals) == 1:
+        parameters, check, inside = [" ("], [], bodies[intervals[0]]
+    else:
+        several = f"{', '.join(map(str, intervals[:-1]))} or {intervals[-1]}"
+        parameters = [
+            " #(", f"  parameter  int unsigned Interval = {intervals[0]},  // {several}",
+            "  localparam int unsigned PhaseBits = (Interval > 2) ? $clog2(Interval) : 1", ") (",
+        ]
+        check = [
+            f"  if ({' && '.join(f'Interval != {n}' for n in intervals)}) begin : gen_check", f'    $error("{name}: Interval must be {several}");', "  end", "",
+        ]
+        inside = []
+        for interval, body in bodies.items():
+            inside += [f"  {'end else ' if inside else ''}if (Interval == {interval}) begin : gen_{interval}", *(f"  {line}".rstrip() for line in body)]
+        inside.append("  end")
+    text = "\n".join([
+        *_comment(_head(head, name, {interval: w.plan for interval, w in writers.items()}, memories)), f"module {name}{parameters[0]}", *parameters[1:],
+        *_ports(first, memories, intervals), ");", "", *check, *_tables(first.graph), *inside, "", "endmodule", "",
+    ])
+    return text, {interval: w.plan for interval, w in writers.items()}
+
+
+def _body(w: _Writer, reset: bool, chosen: bool) -> list[str]:
+    """What stands between ports and end. reset: the module has one; chosen: it has a phase, whatever the interval."""
+    plan, graph = w.plan, w.graph
     wires: list[str] = []
     body: list[str] = []
     turns = {v: unit for unit in plan.units for v in unit.turns.values()}
@@ -123,18 +152,19 @@ def module(name: str, head: str, graph: Graph, interval: int) -> tuple[str, Sche
             body += _instance(w, v, w.names[v])
         else:
             body.append(f"  assign {w.names[v]} = {_expression(w, v)};")
-    if wrapped := _wrapped(graph, live):
-        wires.append("  logic unused_wrapped;")
-        body.append(f"  assign unused_wrapped = ^{{{', '.join(w.names[v] for v in wrapped)}}};")
+    unused = {
+        "wrapped": [w.names[v] for v in _wrapped(graph, live)], "reset": ["rst_ni"] if reset and not w.memories else [],
+        "phase": ["phase_i"] if chosen and plan.interval == 1 else [],
+    }
+    for what, names in unused.items():
+        if names:
+            wires.append(f"  logic unused_{what};")
+            body.append(f"  assign unused_{what} = ^{{{', '.join(names)}}};")
     if any("next_odd" in line for line in body):
         wires.insert(0, "  logic next_odd;  // the phase of the next cycle")
         body.insert(0, "  assign next_odd = phase_i ^ en_i;")
     outputs = [f"  assign {n}_o = {w.operand(v, plan.latency)};" for n, v in graph.outputs.items()]
-    text = "\n".join([
-        *_comment(_head(head, name, plan, w.memories)), f"module {name} (", *_ports(w, plan), ");", "", *_tables(graph), *wires,
-        *_registers(w, plan), *body, "", *outputs, "", "endmodule", "",
-    ])
-    return text, plan
+    return [*wires, *_registers(w, plan), *body, "", *outputs]
 
 
 def _wrapped(graph: Graph, live: set[Value]) -> list[Value]:
@@ -148,14 +178,15 @@ def _wrapped(graph: Graph, live: set[Value]) -> list[Value]:
     return [o for o, found in users.items() if o not in graph.outputs.values() and all(narrow(v, o) for v in found)]
 
 
-def _head(head: str, name: str, plan: Schedule, memories: bool) -> str:
-    n = plan.interval
-    taken = "in each cycle with en_i" if n == 1 else f"in cycles with en_i and phase_i 0; phase_i counts cycles with en_i modulo {n}"
+def _head(head: str, name: str, plans: dict[int, Schedule], memories: bool) -> str:
+    by = lambda text: ", ".join(f"{text(plan)}{f' with Interval {n}' if len(plans) > 1 else ''}" for n, plan in plans.items())  # noqa: E731
+    modulo = "Interval" if len(plans) > 1 else next(iter(plans))
+    taken = "in each cycle with en_i" if modulo == 1 else f"in cycles with en_i and phase_i 0; phase_i counts cycles with en_i modulo {modulo}"
+    units = " ".join(f"Units{f' with Interval {n}' if len(plans) > 1 else ''}: {_census(plan) or 'none'}." for n, plan in plans.items())
     return (
         f"{head}\n\nGenerated by `make generate` from flicker.datapath.units.{_builder(name)}: edit that, not this (docs/reference/datapath.md).\n"
-        f"An element is taken {taken}. Its outputs stand {plan.latency} cycles with en_i later, for one of them. "
-        f"Registers load with en_i and are not reset{', but for places in memories' if memories else ''}.\n"
-        f"Units: {_census(plan) or 'none'}."
+        f"An element is taken {taken}. Its outputs stand {by(lambda plan: plan.latency)} cycles with en_i later, for one of them. "
+        f"Registers load with en_i and are not reset{', but for places in memories' if memories else ''}.\n{units}"
     )
 
 
@@ -177,10 +208,11 @@ def _census(plan: Schedule) -> str:
     return ", ".join(f"{operations} {name} in {units}" for name, (operations, units) in sorted(counts.items()))
 
 
-def _ports(w: _Writer, plan: Schedule) -> list[str]:
-    ports = [("input", "logic", "clk_i"), *([("input", "logic", "rst_ni")] if w.memories else []), ("input", "logic", "en_i")]
-    if plan.interval > 1:
-        ports.append(("input", f"logic [{max((plan.interval - 1).bit_length(), 1) - 1}:0]", "phase_i"))
+def _ports(w: _Writer, memories: bool, intervals: Sequence[int]) -> list[str]:
+    ports = [("input", "logic", "clk_i"), *([("input", "logic", "rst_ni")] if memories else []), ("input", "logic", "en_i")]
+    if max(intervals) > 1:
+        width = "PhaseBits-1" if len(intervals) > 1 else str(_phase_bits(w.plan) - 1)
+        ports.append(("input", f"logic [{width}:0]", "phase_i"))
     ports += [("input", w.type_of(v), w.names[v]) for v in w.graph.values if v.operator is None]
     ports += [("output", _type(v.kind), f"{name}_o") for name, v in w.graph.outputs.items()]
     wide = max(len(p[1]) for p in ports)
@@ -267,9 +299,6 @@ def _unit(w: _Writer, plan: Schedule, unit: Unit) -> tuple[list[str], list[str]]
     for v in turns.values():
         body.append(f"  assign {w.names[v]} = {f'{v.kind.bits}({name})'.replace('(', chr(39) + '(') if result > v.kind.bits else name};")
     return declared, body
-
-
-QUICK = ("flk_ff_to_fixed",)  # have time for a multiplexer and its choice in front of them
 
 
 def _turn(w: _Writer, plan: Schedule, v: Value, k: int) -> str:

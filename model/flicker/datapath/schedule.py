@@ -170,6 +170,14 @@ def needed(graph: Graph) -> set[Value]:
 
 # Operators whose first stage leaves no time for a multiplexer in front: their operands are held in registers behind it. Name, least mantissa bits.
 SLOW = {"flk_ff_add": 15, "flk_ff_mul": 15}
+QUICK = ("flk_ff_to_fixed",)  # have time for a multiplexer and its choice in front of them
+
+
+def _held(operator: Operator, interval: int) -> bool:
+    """Whether operands are registered behind the multiplexers of an operator that takes turns: of more than two, all but QUICK."""
+    if operator.module in QUICK:
+        return False
+    return interval > 2 or dict(operator.parameters).get("ManBits", 0) >= SLOW.get(operator.module, 99)
 
 
 def _hold(graph: Graph, interval: int) -> None:
@@ -184,7 +192,7 @@ def _hold(graph: Graph, interval: int) -> None:
         if operator is None or interval == 1 or counts[operator] < 2:
             continue
         v.late = operator.module == "flk_ff_to_fixed" and v.kind.bits >= WIDE
-        if dict(operator.parameters).get("ManBits", 0) >= SLOW.get(operator.module, 99):
+        if _held(operator, interval):
             v.operator = replace(operator, latency=operator.latency + 1, held=True)
 
 

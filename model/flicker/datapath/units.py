@@ -54,10 +54,10 @@ def term_range(formats: FrontFormats) -> Int:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """A pipeline. interval: cycles between two elements. head: what it does, for the comment of the module."""
+    """A pipeline. intervals: cycles between two elements that it can be built for, the usual one first. head: what it does, for the comment of the module."""
 
     module: str
-    interval: int
+    intervals: tuple[int, ...]
     build: Callable[[FrontFormats], Graph]
     head: str
 
@@ -306,19 +306,19 @@ def constant_range(formats: FrontFormats) -> Int:
     return Int(2 * one.low, 2 * one.high)
 
 PIPELINES = [
-    Pipeline("flk_cluster_test", 4, cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
-    Pipeline("flk_colours_last", 16, colours_last, "Whether a cluster's stored colours may be shown."),
-    Pipeline("flk_cluster_header", 4, cluster_header, "Header of a cluster to the numbers that the lanes take."),
-    Pipeline("flk_geometry_decode", 2, geometry_decode, "Geometry of a Gaussian from the image."),
-    Pipeline("flk_projection", 2, projection, "Projection of a Gaussian: mean, shape, key, what its bounds need."),
+    Pipeline("flk_cluster_test", (4, 16), cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
+    Pipeline("flk_colours_last", (16,), colours_last, "Whether a cluster's stored colours may be shown."),
+    Pipeline("flk_cluster_header", (4,), cluster_header, "Header of a cluster to the numbers that the lanes take."),
+    Pipeline("flk_geometry_decode", (2, 4), geometry_decode, "Geometry of a Gaussian from the image."),
+    Pipeline("flk_projection", (2, 4), projection, "Projection of a Gaussian: mean, shape, key, what its bounds need."),
     Pipeline(
-        "flk_projection_conic", 2, projection_conic,
+        "flk_projection_conic", (2, 4), projection_conic,
         "Projection of a Gaussian for records in conic form: mean, a / 2, b, c / 2, key, what its bounds need.",
     ),
-    Pipeline("flk_splat_bounds", 2, bounds, "Opacity code and bounds of a splat."),
-    Pipeline("flk_splat_band", 1, band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
-    Pipeline("flk_colour_basis", 2, colour_basis, "Spherical harmonics in a direction."),
-    Pipeline("flk_colour_group", 1, colour_group, "Four products of basis and coefficient for three channels: the sum of the first three, and the fourth."),
-    Pipeline("flk_colour_constant", 1, colour_constant, "Constant part of a colour, three channels."),
-    Pipeline("flk_colour_term", 1, colour_term, "What a degree of spherical harmonics adds to a channel: its sum of products times the cluster's step."),
+    Pipeline("flk_splat_bounds", (2, 4), bounds, "Opacity code and bounds of a splat."),
+    Pipeline("flk_splat_band", (1, 2), band, "Sub-tiles of a band of 8 pixel rows that a splat enters."),
+    Pipeline("flk_colour_basis", (2, 4), colour_basis, "Spherical harmonics in a direction."),
+    Pipeline("flk_colour_group", (1,), colour_group, "Four products of basis and coefficient for three channels: the sum of the first three, and the fourth."),
+    Pipeline("flk_colour_constant", (1,), colour_constant, "Constant part of a colour, three channels."),
+    Pipeline("flk_colour_term", (1,), colour_term, "What a degree of spherical harmonics adds to a channel: its sum of products times the cluster's step."),
 ]

@@ -1,7 +1,8 @@
 """Cycle model of the lanes in the log domain, equal to the RTL in cycles and in every counter (rtl/flk_lane_stage.sv; docs/reference/lanes.md).
 
 A core takes `in_width` elements a cycle through setup and masks, which move together. Dispatch gives one splat a cycle a slot of the store and each lane
-with pixels in its mask an entry in its queue; what is empty or finished is dropped beside it. Every lane visits a pixel a cycle, in the order of the list. A
+with pixels in its mask an entry in its queue; what is empty or finished is dropped beside it. In a core that several sub-tiles share, two of those that are
+left stand in a register slice before dispatch. Every lane visits a pixel a cycle, in the order of the list. A
 token takes a slot and an entry in every queue, waits for the lane's bank, and lets the bank leave, a pixel a cycle from all lanes of a core.
 
 The streams are offered as fast as they are taken, and pixels taken as they come. Numbers below are cycles after a visit (rtl/lanes/flk_lane.sv).
@@ -120,6 +121,9 @@ def _core(
     sent = np.zeros(width, np.bool_)
     live = np.zeros(width, np.uint64)
     wanted = np.zeros(width, np.bool_)
+    n_given = 0  # of a core that is shared: what stands in the slice, and its pixels by lane
+    given = np.full(2, NOTHING, np.int64)
+    given_bits = np.zeros((2, lanes), np.int64)
     going = np.full(width, -1, np.int64)  # slot of those that dispatch gives to the lanes in this cycle
     # Store
     pending = np.zeros(slots, np.int64)  # lanes that have not released
@@ -180,6 +184,8 @@ def _core(
         # ---- dispatch: of the group at the pipeline's end
         old = (young + 1) % latency
         after_token = False
+        for k in range(n_given):
+            after_token = after_token or given[k] <= TOKEN
         for w in range(width):
             e = pipe[old, w]
             wanted[w] = False
@@ -202,9 +208,34 @@ def _core(
         move = True
         slot, left = -1, dispatch
         coming[:] = 0
+        chosen, head = -1, -1  # the one that goes into the slice; the slot of the one that leaves it
+        if share > 1:
+            if n_given > 0:
+                head = 0
+                while head < slots and pending[head] != 0:
+                    head += 1
+                room = True
+                for l in range(lanes):
+                    if (given[0] <= TOKEN or given_bits[0, l]) and q_used[l] == depth:
+                        room = False
+                if head == slots:
+                    count[NO_SLOT] += 1
+                    head = -1
+                elif not room:
+                    count[NO_ROOM] += 1
+                    head = -1
+                else:
+                    count[DISPATCHED] += 1
+            left = 0
+            for w in range(width):
+                if wanted[w]:
+                    left += 1
+                    if chosen < 0 and n_given < 2:
+                        chosen = w
+            move = n_given < 2 if width == 1 else left == (chosen >= 0)
         for w in range(width):
             going[w] = -1
-            if not wanted[w]:
+            if share > 1 or not wanted[w]:
                 continue
             if left == 0 or not move:  # in order
                 move = False
@@ -308,12 +339,44 @@ def _core(
         for s in range(slots):
             pending[s] -= release[t % (RELEASE + 1), s]
             release[t % (RELEASE + 1), s] = 0
+        ahead = 0
+        for k in range(n_given):
+            ahead += given[k] <= TOKEN
         for own in range(share):
-            all_finished = pipe_tokens == 0
+            all_finished = pipe_tokens == 0 and ahead == 0
             for l in range(lanes):
                 if tokens[l] > 0 or flags[l, own] != (1 << per_lane) - 1:
                     all_finished = False
             sub_finished[own] = all_finished
+        if head >= 0:
+            for l in range(lanes):
+                if given[0] <= TOKEN or given_bits[0, l]:
+                    r = (q_read[l] + q_used[l]) % depth
+                    q_slot[l, r] = head
+                    q_bits[l, r] = given_bits[0, l]
+                    q_used[l] += 1
+                    pending[head] += 1
+                    if given[0] <= TOKEN:
+                        tokens[l] += 1
+                    else:
+                        count[ENTRIES] += 1
+            slot_at[head] = given[0]
+            n_given -= 1
+            given[0] = given[1]
+            given_bits[0] = given_bits[1]
+        if chosen >= 0:
+            given[n_given] = pipe[old, chosen]
+            for l in range(lanes):
+                given_bits[n_given, l] = 0
+                for p in range(per_lane):
+                    if pipe[old, chosen] > TOKEN:
+                        given_bits[n_given, l] |= np.int64((live[chosen] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
+            n_given += 1
+            sent[chosen] = True
+            for u in range(chosen):
+                if not sent[u]:
+                    sent[u] = True
+                    count[REJECTED if mask[element[pipe[old, u]]] == np.uint64(0) else DROPPED] += 1
         for w in range(width):
             slot = going[w]
             if slot < 0:

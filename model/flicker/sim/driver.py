@@ -71,8 +71,8 @@ class CDevice(ctypes.Structure):
     _fields_ = [
         ("bus", CBus), ("minor", u32), ("stage", u32), ("form", u32), ("precision", u32), ("vrus", u32), ("mask_generator", u32), ("lanes", u32),
         ("lists", u32), ("beat", u32),
-        ("cores", u32), ("preproc_lanes", u32), ("list_writers", u32), ("sort_units", u32), ("colour_store", ctypes.c_int), ("started", u16),
-        ("region", ctypes.c_uint),
+        ("cores", u32), ("preproc_lanes", u32), ("list_writers", u32), ("sort_units", u32), ("preproc_interval", u32),
+        ("colour_store", ctypes.c_int), ("started", u16), ("region", ctypes.c_uint),
     ]
 
 

@@ -22,7 +22,7 @@ from ..golden.front.reuse import CLUSTER_BEATS, limit_of
 from ..golden.front.setup import CLUSTER_M, MIDDLE_INTEGER, FrameSetup
 from ..golden.lists import CHUNK_LINES, LINE_BYTES, WRITERS, list_chunks, pointer_lines, read_lists, writer_columns
 from ..golden.long_lists import region_bytes
-from ..params import TILE, UNIT_COUNTS, SortOrder
+from ..params import PREPROC_INTERVALS, TILE, UNIT_COUNTS, SortOrder
 from ..scene.camera import Camera
 from ..scene.packed import HEADER_BYTES, PackedFormat, PackedScene
 from . import half
@@ -144,14 +144,17 @@ class RtlFront:
         return int(self.counters["cycles"])
 
 
-def build(kind: RecordKind = RecordKind.FACTORED16, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1]) -> Path:
+def build(
+    kind: RecordKind = RecordKind.FACTORED16, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], interval: int = PREPROC_INTERVALS[0],
+) -> Path:
     """Shared library of the simulator, with the design's assertions; cached by content.
 
     Operators are inlined into their pipelines: calls of them, one for each instance, took almost half of the time.
     """
     settings = [half.HERE / f"{name}.vlt" for name in ("preprocessing", "preprocessing_watched")]
     return half.build(
-        "flk_preprocessing", {"Form": int(kind.form), "PreprocLanes": lanes, "ListWriters": writers}, settings, ["--inline-mult", "20000"],
+        "flk_preprocessing", {"Form": int(kind.form), "PreprocLanes": lanes, "ListWriters": writers, "PreprocInterval": interval}, settings,
+        ["--inline-mult", "20000"],
         define=f"-DFLK_PREPROC_LANES={lanes} -DFLK_LIST_WRITERS={writers}",
     )
 
@@ -175,16 +178,18 @@ def front_rtl(
     order: SortOrder = SortOrder.DEPTH,
     lanes: int = UNIT_COUNTS[-1],
     writers: int = UNIT_COUNTS[-1],
+    interval: int = PREPROC_INTERVALS[0],
 ) -> RtlFront:
     """Run frames of a packed scene through the RTL.
 
     kind: of the records, which the RTL is built for. chunks: that each list writer may take. image: instead of the scene's own bytes. frames: the same one so
-    many times; what the last leaves counts. order: of the keys. lanes, writers: of the RTL, preprocessing lanes and list writers.
+    many times; what the last leaves counts. order: of the keys. lanes, writers, interval: of the RTL, preprocessing lanes, list
+    writers, and cycles from a Gaussian of a lane to the next.
     Raises FlickerError where a frame does not end within `limit` cycles, an assertion fails, a rule of AXI is broken or the scene is no longer what it was.
     """
     run = _Run(packed, kind, lists, chunks, order, frames, limit)
     regions = regions or Regions.of(packed, camera, chunks, kind)
-    with Half("front end", build(kind, lanes, writers), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
+    with Half("front end", build(kind, lanes, writers, interval), dict.fromkeys(PORTS, PORT), memory or MemoryOptions(), seed) as sim:
         scene = _load(sim, packed, regions, image)
         return run.frame(sim, camera, regions, scene)
 

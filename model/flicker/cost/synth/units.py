@@ -169,6 +169,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_preprocessing_core": ["part_i[268]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
+        "flk_splat_band": [] if parameters.get("Interval", 1) == 2 else ["phase_i[0]"],
         # Zeros fill a record of 32 bytes.
         "flk_record_to_splat": [] if factored else [f"in_record_i[{bit}]" for bit in range(177, 256)],
         # Where a sub-tile lies: of core 0 all but its place in the tile, of the others only which tile of the pair.
@@ -347,7 +348,8 @@ def _stage() -> list[Unit]:
 
 def _front() -> list[Unit]:
     """Pipelines of the front end, in its number formats."""
-    return [unit(p.module) for p in PIPELINES] + [
+    slower = [unit(p.module, f"every {n} cycles", Interval=n) for p in PIPELINES for n in p.intervals[1:]]
+    return [unit(p.module) for p in PIPELINES] + slower + [
         unit("flk_mean_field"), unit("flk_shape_field"), unit("flk_opacity_to_fp16"),
         unit("flk_coefficient"), unit("flk_event_counter"), unit("flk_event_counters", "20 x 4", Counters=20, Sources=4),
         unit("flk_sram_fifo", "68 x 32", Width=68, Depth=32), unit("flk_pair_fifo", "129 x 64", Width=129, Depth=64), unit("flk_axi_fetch"),
