@@ -91,8 +91,8 @@ def _picture(found: Placed, name: str) -> None:
     """Each cell where it lies, coloured by part."""
     parts = sorted({part for _, _, part in found.cells}, key=lambda part: (not part.startswith("lane"), part))
     lanes = [part for part in parts if part.startswith("lane")]
-    shades = plt.get_cmap("viridis")(np.linspace(0.1, 0.95, len(lanes)))
-    others = plt.get_cmap("Set1").colors
+    shades = plt.get_cmap("viridis")(np.linspace(0.0, 0.75, len(lanes)))
+    others = ("#e41a1c", "#ff9f1c", "#f78fb3", "#8c564b", "#ffd92f", "#b0b0b0")
     colours = dict(zip(lanes, shades)) | {part: others[k % len(others)] for k, part in enumerate(p for p in parts if p not in lanes)}
     with plt.style.context(STYLE):
         figure, axis = plt.subplots(figsize=(8.0, 5.6))
