@@ -101,7 +101,7 @@ class Recorded(ChipSession):
         reset = {name: int(value, 16) for name, value in re.findall(r"#define FLK_(\w+)_RESET 0x(\w+)u", (driver.SW / "flk_registers.h").read_text())}
         version = reset["VERSION_MAJOR"] | reset["VERSION_MINOR"] << 8
         self.answers = {REGISTERS[name].offset: value for name, value in (
-            ("id", reset["ID_VALUE"]), ("version", version), ("capability", capability), ("capability_units", 0x2222), ("status", 1),
+            ("id", reset["ID_VALUE"]), ("version", version), ("capability", capability), ("capability_units", 0x12222), ("status", 1),
         )}
         self.written: list[tuple[int, int]] = []
         self._calls = driver.READ(self._read), driver.WRITE(self._write)
