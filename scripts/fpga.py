@@ -30,13 +30,17 @@ def main() -> int:
     parser.add_argument("--board", help=f"name of a board: {', '.join(boards())}")
     parser.add_argument("--family", default=None, help=f"of the device, without a board: {', '.join(COMMANDS)} (default: xcup)")
     parser.add_argument("--route", action="store_true", help="place and route the rendering stage on the board: minutes")
-    parser.add_argument("--seed", type=int, default=1, help="of the placement")
+    parser.add_argument("--seed", type=int, help="of the placement (default: 1)")
     options = parser.parse_args()
     console, known = Terminal(), boards()
     if options.board and options.board not in known:
         raise FlickerError(f"BOARD: one of {', '.join(known)}, not {options.board}")
     if options.route:
+        if options.family:
+            raise FlickerError("--family: not with --route, which takes a board")
         return route(options, console)
+    if options.seed is not None:
+        raise FlickerError("--seed: of a placement, with --route only")
     family = options.family or (known[options.board].family if options.board else "xcup")
     if options.board and known[options.board].family != family:
         raise FlickerError(f"--family {family}: {options.board} has an {known[options.board].family} device")
@@ -68,7 +72,7 @@ def route(options: argparse.Namespace, console: Terminal) -> int:
     board = options.board or next(name for name, known in boards().items() if known.nextpnr)
     chip = chip_of(options.chip, options.chips)
     with console.status(f"{chip.name} on {board}") as status:
-        found = place(chip, board, options.seed, lambda phase: status.update(f"{chip.name} on {board}: {phase}"))
+        found = place(chip, board, 1 if options.seed is None else options.seed, lambda phase: status.update(f"{chip.name} on {board}: {phase}"))
     console.print(f"rendering stage of {chip.name} on {found.board}, seed {found.seed}: {found.mhz:.1f} MHz", highlight=False)
     for name, (used, there) in found.used.items():
         console.print(f"  {name:<14} {used:>7,} of {there:>7,}, {used / there:.0%}", highlight=False)

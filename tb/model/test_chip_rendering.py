@@ -70,6 +70,9 @@ def test_fewer_units() -> None:
     assert 0.5 * whole.bytes["colour"] < few.bytes["colour"] <= whole.bytes["colour"] and few.cycles > 2.5 * whole.cycles
     assert RenderConfig(sort_units=1).chip_parameters()["SortUnits"] == 1 and "SortUnits" not in RenderConfig().chip_parameters()
     assert RenderConfig(list_writers=2, preproc_lanes=1).front_parameters() == {"PreprocLanes": 1, "ListWriters": 2}
+    assert RenderConfig(preproc_interval=4).front_parameters() == {"PreprocInterval": 4}
+    slow = preprocessing.estimate(front, image, None, lanes=1, writers=1, interval=4)
+    assert slow.bytes == few.bytes and few.cycles < slow.cycles < 2.1 * few.cycles
 
 
 def test_sizes() -> None:
@@ -88,6 +91,7 @@ def test_sizes() -> None:
     for top in ("flk_top", "flk_top_axi", "preproc/flk_preprocessing"):
         assert RenderConfig().list_writers == default(top, "ListWriters") == preprocessing.LIST_WRITERS
         assert RenderConfig().preproc_lanes == default(top, "PreprocLanes") == preprocessing.LANES
+        assert RenderConfig().preproc_interval == default(top, "PreprocInterval") == preprocessing.INTERVAL
     for top in ("flk_rendering", "flk_top"):
         assert (sizes.sort_stages, sizes.list_chunks) == (default(top, "SortStages"), default(top, "Chunks"))
         assert (sizes.sorted_ahead, sizes.pairs) == (default(top, "Entries"), default(top, "Pairs"))

@@ -70,7 +70,6 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make check(?: BASE=.*)?", "tb/test_selection.py::test_plan"),
     (r"make record(?: REASON=.*)?", "tb/model/test_gates.py::test_holding"),
     (r"make site", "tb/test_pages.py::test_site_is_built"),
-    (r"python soc/xilinx/package_ip.py .*|soc/xilinx/package_ip.py .*", "tb/soc/test_other_ways.py::test_ip_folder"),
     (r"make fpga(?: .*)? ROUTE=1", "tb/model/test_fpga.py::test_placed"),
     (r"make fpga(?: .*)?", "tb/model/test_fpga.py::test_unit"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),

@@ -3,8 +3,10 @@ the stage of the smallest chip placed and routed."""
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -52,12 +54,40 @@ def test_unit(family: str) -> None:
 
 @pytest.mark.parametrize(("words", "message"), [
     ("BOARD=nope", "fpga: BOARD: one of kv260, zcu104, zcu102, vcu118, ulx3s, not nope"),
-    ("BOARD=kv260 ROUTE=1", "fpga: BOARD: kv260: only boards with an ECP5 are placed and routed here"),
     ("CHIP=nope", "fpga: chip: one of tiny, small, default, wide, max, channels, faithful, not nope"),
 ])
 def test_refused(words: str, message: str) -> None:
-    done = subprocess.run(["make", "fpga", *words.split()], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(["make", "fpga", words], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode and message in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    ("--route --board kv260", "fpga: BOARD: kv260: only boards with an ECP5 are placed and routed here"),
+    ("--route --family ecp5", "fpga: --family: not with --route, which takes a board"),
+    ("--board kv260 --seed 2", "fpga: --seed: of a placement, with --route only"),
+])
+def test_refused_routes(words: str, message: str) -> None:
+    """Without make, which would install nextpnr first."""
+    done = subprocess.run([sys.executable, "scripts/fpga.py", *words.split()], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode and done.stderr.strip() == message
+
+
+def sources(yosys: Yosys, folder: Path) -> set[str]:
+    """Outputs of the stage, y_o[0] and so on, from which q comes through flip-flops and XOR alone."""
+    yosys.run(f"write_json {folder / 'flat.json'}")
+    module = json.loads((folder / "flat.json").read_text())["modules"]["pins"]
+    names = {bit: f"{name}[{k}]" for name in ("y_o", "z_o") for k, bit in enumerate(module["netnames"][f"i_stage.{name}"]["bits"])}
+    driver = {bit: cell for cell in module["cells"].values() for port in "QY" for bit in cell["connections"].get(port, [])}
+    found, pending = set(), list(module["ports"]["q"]["bits"])
+    while pending:
+        bit = pending.pop()
+        if bit in names:
+            found.add(names[bit])
+            continue
+        cell = driver[bit]
+        assert cell["type"] in ("$_DFF_P_", "$_XOR_"), cell["type"]
+        pending += [b for port in ("A", "B", "D") for b in cell["connections"].get(port, [])]
+    return found
 
 
 def test_harness(tmp_path: Path) -> None:
@@ -69,10 +99,10 @@ def test_harness(tmp_path: Path) -> None:
     )
     yosys = Yosys(tmp_path)
     files = f"{tmp_path / 'pins.v'} {tmp_path / 'stage.v'}"
-    for command in (f"read_verilog {files}", "hierarchy -check -top pins", "proc", "flatten", "check -assert", "opt_clean"):
+    for command in (f"read_verilog {files}", "hierarchy -check -top pins", "proc", "flatten", "check -assert", "opt_clean", "simplemap"):
         yosys.run(command)
-    flops = yosys.select("pins/t:$dff")
-    assert len(flops) == 1 + 1 + 1 + 2 + 1  # reset, inputs, outputs, and two registers, each bit a process, and one
+    assert len(yosys.select("pins/t:$_DFF_P_")) == 2 + 5 + 7 + 2 + 1  # reset, inputs, outputs, and two levels of the tree
+    assert sources(yosys, tmp_path) == {*(f"y_o[{k}]" for k in range(6)), "z_o[0]"}
     assert all(part_of(name) == "harness" for name in ("in_q_TRELLIS_FF_Q", "x0_TRELLIS_FF_Q_4", "x12"))
     assert [part_of(f"i_stage.gen_lanes.i_stage.gen_core[0].i_core.{name}") for name in ("gen_lane[7].i_lane.u_q", "gen_way[0].i_mask.x", "slot")] == [
         "lane 7", "setup and masks", "dispatch and output",

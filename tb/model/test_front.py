@@ -499,6 +499,8 @@ def test_engines_take_the_golden_front_end(demo: View) -> None:
     (["--engine", "rtl", "--sort-units", "2"], "--sort-units: for --engine chip only"),
     (["--engine", "chip", "--list-writers", "3"], "list_writers must be 1, 2 or 4, not 3"),
     (["--engine", "chip", "--preproc-lanes", "0"], "preproc_lanes must be 1, 2 or 4, not 0"),
+    (["--engine", "chip", "--preproc-interval", "3"], "preproc_interval must be 2 or 4, not 3"),
+    (["--engine", "rtl", "--preproc-interval", "4"], "--preproc-interval: for --engine chip only"),
     (["--engine", "chip", "--stage", "lanes", "--faithful"], "--stage lanes: takes records of 16 bytes"),
 ])
 def test_refused_combinations(arguments: list[str], message: str, tmp_path: Path) -> None:

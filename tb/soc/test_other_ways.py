@@ -146,7 +146,8 @@ def test_ip_folder(chip: str, tmp_path: Path) -> None:
         sys.path.insert(0, str(SOC / "xilinx"))
     import package_ip
 
-    package_ip.package(tmp_path, chip)
+    done = subprocess.run([sys.executable, "soc/xilinx/package_ip.py", "--chip", chip, "--out", tmp_path], cwd=ROOT, text=True, capture_output=True)
+    assert done.returncode == 0 and Path(done.stdout.strip()) == tmp_path / "component.xml", done.stderr
     root = Xml.parse(tmp_path / "component.xml").getroot()
     name = {"s": package_ip.SPIRIT}
     ports = {port.findtext("s:name", None, name): port for port in root.iterfind("s:model/s:ports/s:port", name)}

@@ -37,10 +37,7 @@ PARTS = (
     (r"gen_lane\[(\d+)\]", "lane {}"), (r"gen_way|i_setup|i_mask", "setup and masks"), (r"gen_shape|gen_colour|gen_aside", "store"),
     (r"i_core", "dispatch and output"), (r"i_counters|i_control", "counters and control"), (r"^in_q|^x\d+", "harness"),
 )
-PHASES = {
-    "Running main analytical placer": "placing", "simulated annealing": "refining the placement", "Running router2": "routing",
-    "Running timing analysis": "timing",
-}
+PHASES = {"Running main analytical placer": "placing", "simulated annealing": "refining the placement", "Running router2": "routing"}
 
 
 @dataclass(frozen=True)

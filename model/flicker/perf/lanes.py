@@ -106,6 +106,34 @@ def pixels_of_lanes(lanes: int) -> np.ndarray:
 
 
 @numba.njit(cache=True)
+def _bits_of(element, live, pixel, bits):
+    """Sets the pixels of each lane in a splat's live mask; none of a token."""
+    for l in range(len(pixel)):
+        bits[l] = 0
+        if element > TOKEN:
+            for p in range(pixel.shape[1]):
+                bits[l] |= np.int64((live >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
+
+
+@numba.njit(cache=True)
+def _give(slot, element, bits, q_read, q_used, q_slot, q_bits, pending, tokens):
+    """A splat, or a token, into the queues of the lanes that need it. Returns the entries, of a splat."""
+    entries = 0
+    for l in range(len(q_read)):
+        if element <= TOKEN or bits[l]:
+            r = (q_read[l] + q_used[l]) % q_slot.shape[1]
+            q_slot[l, r] = slot
+            q_bits[l, r] = bits[l]
+            q_used[l] += 1
+            pending[slot] += 1
+            if element <= TOKEN:
+                tokens[l] += 1
+            else:
+                entries += 1
+    return entries
+
+
+@numba.njit(cache=True)
 def _core(
     order, start, element, member, subtile, position, mask, passes, finish, pixel, latency, width, slots, depth, leave, dispatch, count, subtile_end,
 ):
@@ -245,11 +273,8 @@ def _core(
                 slot += 1
             token = pipe[old, w] <= TOKEN
             room = True
+            _bits_of(pipe[old, w], live[w], pixel, bits[w])
             for l in range(lanes):
-                bits[w, l] = 0
-                if not token:
-                    for p in range(per_lane):
-                        bits[w, l] |= np.int64((live[w] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
                 if (token or bits[w, l]) and q_used[l] + coming[l] == depth:
                     room = False
             if slot == slots:
@@ -349,51 +374,22 @@ def _core(
                     all_finished = False
             sub_finished[own] = all_finished
         if head >= 0:
-            for l in range(lanes):
-                if given[0] <= TOKEN or given_bits[0, l]:
-                    r = (q_read[l] + q_used[l]) % depth
-                    q_slot[l, r] = head
-                    q_bits[l, r] = given_bits[0, l]
-                    q_used[l] += 1
-                    pending[head] += 1
-                    if given[0] <= TOKEN:
-                        tokens[l] += 1
-                    else:
-                        count[ENTRIES] += 1
+            count[ENTRIES] += _give(head, given[0], given_bits[0], q_read, q_used, q_slot, q_bits, pending, tokens)
             slot_at[head] = given[0]
             n_given -= 1
             given[0] = given[1]
             given_bits[0] = given_bits[1]
         if chosen >= 0:
             given[n_given] = pipe[old, chosen]
-            for l in range(lanes):
-                given_bits[n_given, l] = 0
-                for p in range(per_lane):
-                    if pipe[old, chosen] > TOKEN:
-                        given_bits[n_given, l] |= np.int64((live[chosen] >> np.uint64(pixel[l, p])) & np.uint64(1)) << p
+            _bits_of(pipe[old, chosen], live[chosen], pixel, given_bits[n_given])
             n_given += 1
-            sent[chosen] = True
-            for u in range(chosen):
-                if not sent[u]:
-                    sent[u] = True
-                    count[REJECTED if mask[element[pipe[old, u]]] == np.uint64(0) else DROPPED] += 1
         for w in range(width):
             slot = going[w]
-            if slot < 0:
+            if slot >= 0:
+                count[ENTRIES] += _give(slot, pipe[old, w], bits[w], q_read, q_used, q_slot, q_bits, pending, tokens)
+                slot_at[slot] = pipe[old, w]
+            elif w != chosen:
                 continue
-            token = pipe[old, w] <= TOKEN
-            for l in range(lanes):
-                if token or bits[w, l]:
-                    r = (q_read[l] + q_used[l]) % depth
-                    q_slot[l, r] = slot
-                    q_bits[l, r] = bits[w, l]
-                    q_used[l] += 1
-                    pending[slot] += 1
-                    if token:
-                        tokens[l] += 1
-                    else:
-                        count[ENTRIES] += 1
-            slot_at[slot] = pipe[old, w]
             sent[w] = True
             for u in range(w):  # what was passed over is dropped, whatever its lanes say later
                 if not sent[u]:
