@@ -42,6 +42,7 @@ module flk_rendering
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
+  parameter  int unsigned RecordLines    = 1024, // of 32 bytes that the record cache holds, a power of two from 32 on
   parameter  int unsigned IdBits         = 4,
   localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
 ) (
@@ -191,6 +192,14 @@ module flk_rendering
 
   if (Runs * RunLines > 64 * 228) begin : gen_check_runs
     $error("flk_rendering: SortStages, MergeLines: drivers hold 64 runs of 228 lines a unit");
+  end
+
+  // Record cache
+  localparam int unsigned RecordBanks = 4;
+  localparam int unsigned RecordWays  = 4;
+
+  if (RecordLines < 2 * RecordBanks * RecordWays || RecordLines != 1 << $clog2(RecordLines)) begin : gen_check_record_lines
+    $error("flk_rendering: RecordLines must be a power of two from 32 on");
   end
 
   logic [SortUnits-1:0]               run_valid, run_ready, run_waits, run_open_q;
@@ -405,6 +414,9 @@ module flk_rendering
     .RecordBits(RecordBits),
     .InWidth   (InWidth),
     .Queue     (Queue),
+    .Sets      (RecordLines / (RecordBanks * RecordWays)),
+    .Banks     (RecordBanks),
+    .Ways      (RecordWays),
     .AddrBits  (AddrBits),
     .IdBits    (IdBits),
     .Cores     (Cores)

@@ -39,6 +39,7 @@ module flk_top
   parameter  int unsigned Chunks         = 8,
   parameter  int unsigned Entries        = 704,
   parameter  int unsigned Pairs          = 4,
+  parameter  int unsigned RecordLines    = 1024,
   parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
   parameter  int unsigned PreprocInterval = 2,    // cycles a Gaussian of a lane: 2 or 4
   parameter  int unsigned ListWriters    = 4,     // 1, 2 or 4, for four banks of lists
@@ -717,6 +718,7 @@ module flk_top
     .Chunks        (Chunks),
     .Entries       (Entries),
     .Pairs         (Pairs),
+    .RecordLines   (RecordLines),
     .IdBits        (IdBits)
   ) i_rendering (
     .clk_i              (rendering_clk),

@@ -23,6 +23,7 @@ module flk_top_axi
   parameter int unsigned Chunks         = 8,
   parameter int unsigned Entries        = 704,
   parameter int unsigned Pairs          = 4,
+  parameter int unsigned RecordLines    = 1024,
   parameter int unsigned PreprocLanes   = 4,
   parameter int unsigned PreprocInterval = 2,
   parameter int unsigned ListWriters    = 4,

@@ -192,6 +192,7 @@ class ChipMemories:
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
     merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; half as many runs at most (docs/reference/list_sorter.md).
+    record_lines: of 32 bytes that the record cache holds, a power of two: the more, the fewer are read again.
     """
 
     sorted_entries: int = 2048
@@ -202,6 +203,7 @@ class ChipMemories:
     sort_ways: int = 8
     gathered_lines: int = 216
     merge_lines: int = 128
+    record_lines: int = 1024
 
     def __post_init__(self) -> None:
         rules = {
@@ -213,6 +215,7 @@ class ChipMemories:
             "sort_ways": (_power(self.sort_ways) and 2 <= self.sort_ways <= self.sorted_entries // SORT_CELLS, "a power of two, 2 to sorted_entries / 16"),
             "gathered_lines": (self.gathered_lines >= 8, "at least 8"),
             "merge_lines": (_power(self.merge_lines) and self.merge_lines >= 8, "a power of two from 8 on"),
+            "record_lines": (_power(self.record_lines) and 32 <= self.record_lines <= 1 << 16, "a power of two, 32 to 65,536"),
         }
         for name, (legal, text) in rules.items():
             if not legal:
@@ -240,7 +243,7 @@ class ChipMemories:
         """Of `flk_rendering` and `flk_top`; none where all sizes are the default ones."""
         values = {
             "SortStages": self.sort_stages, "SortWays": self.sort_ways, "MergeLines": self.merge_lines, "Chunks": self.list_chunks,
-            "Entries": self.sorted_ahead, "Pairs": self.pairs,
+            "Entries": self.sorted_ahead, "Pairs": self.pairs, "RecordLines": self.record_lines,
         }
         return values if self != ChipMemories() else {}
 
@@ -251,7 +254,13 @@ class ChipMemories:
 
 LINE_BITS = 512  # of what units read and write at once
 PORT_WIDTHS = (128, 256, LINE_BITS)  # of the memory port
-CHIP_MEMORIES = {"default": ChipMemories(), "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64)}  # small: within the paper's 288 KB
+CHIP_MEMORIES = {
+    "default": ChipMemories(),
+    "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64, 1024),  # within the paper's 288 KB
+    # Fewer bytes a frame: within the default's size, and beyond it.
+    "records": ChipMemories(list_chunks=6, sorted_ahead=448, pairs=2, survivors=64, gathered_lines=96, record_lines=2048),
+    "large": ChipMemories(record_lines=2048),
+}
 
 
 @dataclass(frozen=True)

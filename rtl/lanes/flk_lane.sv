@@ -260,13 +260,15 @@ module flk_lane
   localparam int unsigned LINE_BITS = VALUE_BITS + REST_BITS;
   localparam int unsigned LINES = $size(H_VALUE) << PIECE_BITS;
 
-  // Value, with the half unit of rounding, and fall by one number: so synthesisers see a table, an FPGA's a memory whose read register
-  // value_q and fall_q are.
+  // A line's value where its piece ends, with the half unit of rounding, and its fall over the piece, by one number: so synthesisers see a
+  // table, an FPGA's a memory whose read register value_q and fall_q are. h is that end + fall * what is left of the piece, added up in
+  // rows: as begin - fall * what is behind it, a product, it is 3 FO4 longer in lanes of several sub-tiles.
   typedef logic [LINES-1:0][VALUE_BITS+FALL_BITS-1:0] lines_t;
 
   function automatic lines_t lines();
     for (int unsigned i = 0; i < LINES; i++) begin
-      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)] + VALUE_BITS'(1 << (LINE_GUARD - 1)),
+      lines[i] = {H_VALUE[i>>PIECE_BITS][i%(1<<PIECE_BITS)] + VALUE_BITS'(1 << (LINE_GUARD - 1))
+                      - VALUE_BITS'(H_FALL[i>>PIECE_BITS][i%(1<<PIECE_BITS)]),
                   H_FALL[i>>PIECE_BITS][i%(1<<PIECE_BITS)]};
     end
   endfunction
@@ -275,7 +277,7 @@ module flk_lane
 
   logic [VALUE_BITS-1:0] value_q;
   logic [FALL_BITS-1:0] fall_q;
-  logic [REST_BITS-1:0] rest_q;
+  logic [REST_BITS-1:0] left_q;  // less one
   logic [LA_BITS-1:0] la_4_q;
   logic skip_4_q, clamp_4_q;
   logic [LINE_BITS-1:0] line;
@@ -284,14 +286,20 @@ module flk_lane
   always_ff @(posedge clk_i) begin
     if (valid_q[3]) begin
       {value_q, fall_q} <= TABLE[{zeros, piece}];
-      rest_q    <= normal[REST_BITS-1:0];
+      left_q    <= ~normal[REST_BITS-1:0];
       la_4_q    <= la_q;
       skip_4_q  <= above_q || la_q > LA_BITS'(LIMIT);
       clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
     end
   end
 
-  assign line = {value_q, {REST_BITS{1'b0}}} - LINE_BITS'(fall_q) * LINE_BITS'(rest_q);
+  always_comb begin
+    line = {value_q, {REST_BITS{1'b0}}} + LINE_BITS'(fall_q);
+    for (int unsigned i = 0; i < REST_BITS; i++) begin
+      line = line + (left_q[i] ? LINE_BITS'(fall_q) << i : '0);
+    end
+  end
+
   assign unused_line = ^line;
 
   // ---- Cycle 5: transmittance --------------------------------------------------------------------------------------

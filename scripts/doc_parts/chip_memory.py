@@ -58,9 +58,8 @@ def tables(say: Say) -> dict[str, str]:
     for side, total in sums.items():
         rows.append([SIDES[side], "all", "", "", *_sizes(total)])
     rows.append(["chip", "all", f"{sum(found.values())} memories", "", *_sizes(sum(sums.values()))])
-    config = RenderConfig(memories="small")
-    small = memories(runner, runner.add(TOP, config.top_parameters()))
-    bits = {name: sum(words * width * count for (*_, words, width), count in of.items()) for name, of in (("default", found), ("small", small))}
+    planned = {name: memories(runner, runner.add(TOP, RenderConfig(memories=name).top_parameters())) for name in CHIP_MEMORIES if name != "default"}
+    bits = {name: sum(words * width * count for (*_, words, width), count in of.items()) for name, of in {"default": found, **planned}.items()}
     sizes = [
         [f"`{name}`", *(f"{value:,}" for value in vars(CHIP_MEMORIES[name]).values()), *_sizes(bits[name])] for name in CHIP_MEMORIES
     ]

@@ -144,38 +144,41 @@ ROW = 4  # frames back to back in RTL, the last of a path: its third is measured
 LOOSE = {"records": 0.02, "lists": 0.002}  # which lines are read again, and whether a list that is read again is left before that, depends on timing
 CHUNKS = 24_000  # of a list writer: enough for these views
 TURNING, MOVING = (next(case for case in MOTIONS if case.tolerance == t and case.share == s) for t, s in ((0, 0.0), (TWO, 0.001)))
-HARDWARE = (  # folder, path, with kept colours, refresh
-    ("flowers", TURNING, False, Refresh.ALL_BANKS), ("flowers", TURNING, True, Refresh.ALL_BANKS), ("flowers", MOVING, True, Refresh.ALL_BANKS),
-    ("flowers", TURNING, False, Refresh.PER_BANK), ("flowers", TURNING, True, Refresh.PER_BANK), ("flowers", MOVING, True, Refresh.PER_BANK),
-    ("playbot", MOVING, False, Refresh.ALL_BANKS), ("playbot", MOVING, True, Refresh.ALL_BANKS), ("playbot", MOVING, True, Refresh.PER_BANK),
+HARDWARE = (  # folder, path, with kept colours, memories, refresh
+    ("flowers", TURNING, False, "default", Refresh.ALL_BANKS), ("flowers", TURNING, False, "records", Refresh.ALL_BANKS),
+    ("flowers", TURNING, True, "records", Refresh.ALL_BANKS), ("flowers", MOVING, True, "records", Refresh.ALL_BANKS),
+    ("flowers", TURNING, False, "large", Refresh.PER_BANK), ("flowers", MOVING, True, "large", Refresh.PER_BANK),
+    ("playbot", MOVING, False, "records", Refresh.ALL_BANKS), ("playbot", MOVING, True, "records", Refresh.ALL_BANKS),
+    ("playbot", MOVING, True, "large", Refresh.PER_BANK),
 )
 
 
-def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, refresh: Refresh) -> tuple[tuple, tuple]:
+def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, refresh: Refresh) -> tuple[tuple, tuple]:
     """A row of each table. The frames before those in RTL are of the golden model, whose store the chip finds."""
     view = next(v for v in REAL_VIEWS if v.folder == folder)
     path = view.path(folder_of_scenes())
     source, packed, dram = open_scene(path), pack_file(path).packed, DramConfig(refresh=refresh)
     title = f"{view.title}, {case.motion}" + (f", {case.tolerance or 0}" if keeps else "")
-    say(f"{title}: refresh {refresh}")
+    say(f"{title}: memories {memories}, refresh {refresh}")
+    config = CONFIG.with_(memories=memories)
     views, reuse = cameras(case, source, view, packed), Reuse(ColourStore(packed), float(case.tolerance)) if keeps else None
     for camera in views[:-ROW] if keeps else ():
         run_front(packed, camera, reuse=reuse)
-    with ChipSession(packed, CONFIG, memory=MemoryOptions(dram.timing)) as chip:
+    with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         store = chip.store(reuse.epsilon, reuse.generation, reuse.store.image().tobytes()) if reuse else None
         row = back_to_back(chip, views[-ROW:], chunks=CHUNKS, store=store)
         for number, (camera, done) in enumerate(zip(views[-ROW:], row, strict=True)):
             front = run_front(packed, camera, reuse=reuse)
-            if not np.array_equal(done.frame.buffer, render_chip(front_lists(front), CONFIG).buffer):
+            if not np.array_equal(done.frame.buffer, render_chip(front_lists(front), config).buffer):
                 raise FlickerError(f"{title}: frame {number}: the picture differs from the golden model's")
             if number == 2:
-                model, found = whole_frame(*halves(front, CONFIG, dram), dram), done
+                model, found = whole_frame(*halves(front, config, dram), dram), done
     for purpose, due in model.bytes.items():
         if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
     assert found.interval is not None
     kept = str(case.tolerance or 0) if keeps else "-"
-    head = (view.title, case.motion, kept, str(refresh))
+    head = (view.title, case.motion, kept, memories, str(refresh))
     moved, busy = sum(found.moved.values()), {name: clocks / sum(found.spent.values()) for name, clocks in found.spent.items()}
     return (
         (*head, f"{moved / 1e6:.1f}", f"{found.interval:,}", f"{model.interval / found.interval - 1:+.1%}", f"{1e9 / found.interval:,.0f}"),
@@ -185,7 +188,7 @@ def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, refresh: Refres
 
 def hardware_tables(say: Say) -> dict[str, str]:
     rows, spent = zip(*(_in_hardware(say, *row) for row in HARDWARE))
-    head = ["view", "motion", "tolerance", "refresh"]
+    head = ["view", "motion", "tolerance", "memories", "refresh"]
     return {
         "cycles": table([*head, "MB", "interval back to back", "model off by", "frames a second"], list(rows), numbers=True),
         "spent": table([*head, "data", "nothing waits", "turns between reads and writes", "refresh", "rows"], list(spent), numbers=True),

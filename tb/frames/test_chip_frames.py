@@ -61,6 +61,7 @@ ALL_CONFIGS = [
     pytest.param(config, id=name, marks=[pytest.mark.slow] * (config is not CONFIG))
     for name, config in (
         ("lanes", CONFIG), ("channels", CHANNELS_CONFIG), ("faithful", FAITHFUL), ("small", CONFIG.with_(memories="small")),
+        ("records", CONFIG.with_(memories="records")),
         ("two cores", CONFIG.with_(cores=2, lanes=16, delivered=2)),
     )
 ]

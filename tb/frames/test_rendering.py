@@ -187,10 +187,11 @@ def test_automatic_mode() -> None:
 
 
 @pytest.mark.slow
-def test_small_memories() -> None:
-    """Lists of more entries than the sorting unit takes in one reading, a last step of eight runs, a reader of few chunks, a frame writer of two pairs; DRAM
-    behind ports that pause."""
-    config = CONFIG.with_(memories="small")
+@pytest.mark.parametrize("memories", ["small", "records"])
+def test_other_memories(memories: str) -> None:
+    """Lists of more entries than the sorting unit takes in one reading, a last step of eight runs, a reader of few chunks, a frame writer of two pairs, twice
+    the lines of records; DRAM behind ports that pause."""
+    config = CONFIG.with_(memories=memories)
     tiles = 4
     assert (np.bincount(view_of(32, 32, "haze")[0].entry_tile) > config.chip_memories.sorted_entries).sum() == tiles
     rtl = check((32, 32), config, scene="haze")
@@ -203,7 +204,7 @@ def test_small_memories() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [
     CONFIG.with_(vrus_per_channel=1), CONFIG.with_(vrus_per_channel=4), CONFIG.with_(mask_generator="all", cat=CatMode.OFF),
-    LANES, LANES.with_(lanes=64), LANES.with_(lanes=128), LANES.with_(cores=1, lanes=8), LANES.with_(cores=2, lanes=16, delivered=2),
+    LANES, LANES.with_(lanes=64), LANES.with_(lanes=128, memories="large"), LANES.with_(cores=1, lanes=8), LANES.with_(cores=2, lanes=16, delivered=2),
 ], ids=lambda c: "-".join(map(str, c.chip_parameters().values())))
 def test_stages(config: RenderConfig) -> None:
     """Other stages: pixels leave in another order, sub-tiles finish at other times."""
@@ -276,6 +277,11 @@ def test_demo_scene_larger() -> None:
 
 def test_number_of_units() -> None:
     refused("flk_rendering", {"SortUnits": 3}, "SortUnits must be 1, 2 or 4")
+
+
+@pytest.mark.parametrize("lines", [0, 16, 48])
+def test_number_of_record_lines(lines: int) -> None:
+    refused("flk_rendering", {"RecordLines": lines}, "RecordLines must be a power of two from 32 on")
 
 
 @pytest.mark.parametrize("parameters", [{"SortStages": 8}, {"MergeLines": 256}], ids=str)

@@ -83,8 +83,9 @@ def test_sizes() -> None:
         return int(found[1])
 
     sizes = ChipMemories()
-    assert (model.CACHE_SETS, model.CACHE_WAYS) == (4 * default("sort/flk_record_cache", "Sets"), default("sort/flk_record_cache", "Ways"))
-    assert (default("sort/flk_delivery", "Sets"), default("sort/flk_delivery", "Ways")) == (model.CACHE_SETS // 4, model.CACHE_WAYS)
+    for unit in ("sort/flk_record_cache", "sort/flk_delivery"):
+        banks, sets, ways = (default(unit, name) for name in ("Banks", "Sets", "Ways"))
+        assert (banks * sets * ways, ways) == (1024, model.CACHE_WAYS)
     until = re.search(r"UntilBits\s*= (\d+)", (ROOT / "rtl/sort/flk_record_cache.sv").read_text())
     assert until and TILES == 1 << int(until[1])
     assert RenderConfig().sort_units == default("flk_rendering", "SortUnits") == default("flk_top", "SortUnits") == default("sort/flk_delivery", "Units")
@@ -96,6 +97,7 @@ def test_sizes() -> None:
         assert (sizes.sort_stages, sizes.list_chunks) == (default(top, "SortStages"), default(top, "Chunks"))
         assert (sizes.sorted_ahead, sizes.pairs) == (default(top, "Entries"), default(top, "Pairs"))
         assert (sizes.sort_ways, sizes.merge_lines) == (default(top, "SortWays"), default(top, "MergeLines"))
+        assert sizes.record_lines == default(top, "RecordLines")
     assert sizes.merge_lines == default("sort/flk_list_sorter", "MergeLines") == 2 * default("sort/flk_list_sorter", "Runs") == 2 * RUNS == LINES
     for top in ("flk_top", "preproc/flk_preprocessing", "preproc/flk_preprocessing_core"):
         assert sizes.survivors == default(top, "Waiting")
@@ -126,6 +128,8 @@ def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:
     half, small, default = (modelled(RenderConfig(memories=name)) for name in ("half", "small", "default"))
     assert half.bytes["lists"] > default.bytes["lists"]  # of lists of 1,025 to 2,048 entries
     assert default.bytes["lists"] < small.bytes["lists"] <= half.bytes["lists"]  # fewer lines are read ahead
+    large = modelled(RenderConfig(memories="large"))
+    assert large.bytes == default.bytes | {"records": large.bytes["records"]} and large.bytes["records"] < default.bytes["records"]
 
 
 def test_lists_longer_than_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:

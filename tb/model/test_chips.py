@@ -74,6 +74,7 @@ def test_own_file(tmp_path: Path) -> None:
     (LINE + "memories = {pairs = 3}", "own.toml: chip mine: memories: pairs must be 2, 4 or 8, not 3"),
     (LINE + "memories = {sorted_entries = 1000}", "own.toml: chip mine: memories: sorted_entries must be a power of two from 64 on, not 1000"),
     (LINE + "memories = {merge_lines = 4096}", "own.toml: chip mine: memories: merge_lines must be at most 128 with sorted_entries 2048, not 4096"),
+    (LINE + "memories = {record_lines = 48}", "own.toml: chip mine: memories: record_lines must be a power of two, 32 to 65,536, not 48"),
     (LINE + "memories = {pairs = 0}", "own.toml: chip mine: memories.pairs must be a whole number from 1 on, not 0"),
 ])
 def test_refused(tmp_path: Path, text: str, says: str) -> None:

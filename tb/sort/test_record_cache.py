@@ -14,7 +14,7 @@ from flicker_tb.runner import build_and_test
 SMALL = {"Banks": 2, "Sets": 4, "Ways": 2, "Depth": 8, "Places": 4}
 
 
-@pytest.mark.parametrize("parameters", [{}, SMALL, {"RecordBits": 256, "Sets": 16}])
+@pytest.mark.parametrize("parameters", [{}, SMALL, {"RecordBits": 256, "Sets": 128}])
 def test_record_cache(parameters: dict[str, int]) -> None:
     tests = [] if parameters in ({}, SMALL) else ["records"]
     build_and_test("flk_record_cache", "cocotb_record_cache", parameters=parameters, tests=tests)

@@ -51,7 +51,7 @@ OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
 QUEUE, MARGIN = 128, 6  # records of each core; places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
-CACHE_SETS, CACHE_WAYS = 256, 4  # of the record cache, all banks
+CACHE_WAYS = 4  # of the record cache
 DEPTH, PLACES = 512, 256  # elements that wait in the cache, lines on their way
 FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
@@ -583,7 +583,7 @@ def estimate(
         clock, misses, batches, given = _frame(
             tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
             tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
-            tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, CACHE_SETS, CACHE_WAYS,
+            tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, sizes.record_lines // CACHE_WAYS, CACHE_WAYS,
             READ + list_latency + later, line_latency + later, refresh, reads, early,
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
