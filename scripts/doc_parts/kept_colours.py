@@ -149,7 +149,6 @@ HARDWARE = (  # folder, path, with kept colours, memories, refresh
     ("flowers", TURNING, True, "records", Refresh.ALL_BANKS), ("flowers", MOVING, True, "records", Refresh.ALL_BANKS),
     ("flowers", TURNING, False, "large", Refresh.PER_BANK), ("flowers", MOVING, True, "large", Refresh.PER_BANK),
     ("playbot", MOVING, False, "records", Refresh.ALL_BANKS), ("playbot", MOVING, True, "records", Refresh.ALL_BANKS),
-    ("playbot", MOVING, True, "large", Refresh.PER_BANK),
 )
 
 
