@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Write what follows from rtl/counters.toml (`make generate`, before the registers); `--check` only compares.
 
-rtl/common/flk_counter_pkg.sv       structures of both halves' counters, their numbers, their words in order
+rtl/generated/flk_counter_pkg.sv       structures of both halves' counters, their numbers, their words in order
 rtl/regs/flk_counters.rdl           the enumeration of the register map
 model/flicker/chip_counters.py      the counters by half
 """
@@ -192,7 +192,7 @@ def main() -> int:
     found = load()
     wrong = 0
     for name, text in {
-        "rtl/common/flk_counter_pkg.sv": package(found), "rtl/regs/flk_counters.rdl": enumeration(found),
+        "rtl/generated/flk_counter_pkg.sv": package(found), "rtl/regs/flk_counters.rdl": enumeration(found),
         "model/flicker/chip_counters.py": python_module(found),
     }.items():
         path = ROOT / name

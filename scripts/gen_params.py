@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Write the generated sources of rtl/ (`make generate`); `--check` only compares.
+"""Write sources of rtl/generated/, and rtl/flk.f (`make generate`); `--check` only compares.
 
 flk_param_pkg.sv  constants, from flicker.params
 flk_pkg.sv        records, from flicker.layout
 flk_mask_generator.sv  the choice of the mask generator, from flicker.params.MASK_GENERATORS
 flk_stage.sv           the choice of the rendering stage, from flicker.params.STAGES
-lanes/flk_lane_pkg.sv  widths, constants and tables of the lanes, from flicker.golden.lanes.formats
-preproc/flk_*.sv  pipelines of the front end, from flicker.datapath
+flk_lane_pkg.sv   widths, constants and tables of the lanes, from flicker.golden.lanes.formats
+flk_*.sv          pipelines of the front end, from flicker.datapath
 flk.f             every source: packages first, each after those it uses; then the modules, folder by folder
 """
 
@@ -32,7 +32,7 @@ from flicker.golden.front.colour import COLOUR_FRACTION, COLOUR_LIMIT
 from flicker.golden.lanes import formats as lanes
 
 RTL = Path(__file__).resolve().parents[1] / "rtl"
-FOLDERS = ("common", "ctu", "render", "lanes", "sort")  # of the modules, in the file list's order; others follow by name
+FOLDERS = ("common", "generated", "ctu", "render", "lanes", "sort")  # of the modules, in the file list's order; others follow by name
 
 
 def param_package() -> str:
@@ -545,12 +545,12 @@ def pipelines() -> dict[str, str]:
 
 # Text by path below rtl/.
 SOURCES = {
-    **{name: functools.partial(lambda name: pipelines()[name], name) for name in (PACKAGE, *(f"preproc/{p.module}.sv" for p in PIPELINES))},
-    "common/flk_param_pkg.sv": param_package,
-    "common/flk_pkg.sv": record_package,
-    "lanes/flk_lane_pkg.sv": lane_package,
-    "render/flk_mask_generator.sv": mask_generator,
-    "render/flk_stage.sv": stage,
+    **{name: functools.partial(lambda name: pipelines()[name], name) for name in (PACKAGE, *(f"generated/{p.module}.sv" for p in PIPELINES))},
+    "generated/flk_param_pkg.sv": param_package,
+    "generated/flk_pkg.sv": record_package,
+    "generated/flk_lane_pkg.sv": lane_package,
+    "generated/flk_mask_generator.sv": mask_generator,
+    "generated/flk_stage.sv": stage,
 }
 GENERATED = {**SOURCES, "flk.f": file_list}
 

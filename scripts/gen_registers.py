@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Write what follows from rtl/regs/flk_registers.rdl and flk_counters.rdl, which it includes (`make generate`); `--check` only compares.
 
-rtl/regs/flk_registers.sv, flk_registers_pkg.sv   by PeakRDL-regblock, as AXI4-Lite subordinate with flat pins
+rtl/generated/flk_registers.sv, flk_registers_pkg.sv   by PeakRDL-regblock, as AXI4-Lite subordinate with flat pins
 sw/flk_registers.h                                offsets, masks, reset values, numbers of bits, counters and modes for the driver
 model/flicker/chip_registers.py                   the same for Python
 docs/reference/registers.md                                 the table between its marks
@@ -83,7 +83,7 @@ def hardware() -> dict[str, str]:
     package = f"// verilator lint_off SYMRSVDWORD\n{package.rstrip()}\n// verilator lint_on SYMRSVDWORD\n"
     header = f"// Registers of the chip (docs/reference/registers.md), an AXI4-Lite subordinate.\n// {NOTE}\n"
     return {
-        f"rtl/regs/flk_registers{suffix}.sv": header + re.sub(r"[ \t]+$", "", text, flags=re.M)
+        f"rtl/generated/flk_registers{suffix}.sv": header + re.sub(r"[ \t]+$", "", text, flags=re.M)
         for suffix, text in (("", module), ("_pkg", package))
     }
 

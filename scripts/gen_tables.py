@@ -14,7 +14,7 @@ import numpy as np
 from flicker.arithmetic import ff_tables as ff
 from flicker.arithmetic import functions as f
 
-FOLDER = Path(__file__).resolve().parents[1] / "rtl" / "common"
+FOLDER = Path(__file__).resolve().parents[1] / "rtl" / "generated"
 
 
 def _bits(table: np.ndarray) -> int:

@@ -35,7 +35,7 @@ from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
 RTL = ROOT / "rtl"
-REGISTERS = RTL / "regs"  # written by PeakRDL-regblock, in a style of its own: not for Verible
+REGISTERS = {RTL / "generated" / f"flk_registers{suffix}.sv" for suffix in ("", "_pkg")}  # by PeakRDL-regblock, in a style of its own: not for Verible
 FOLDER = toolchain.BUILD / "lint"
 REGISTER_LIST = ROOT / "lint" / "registers.toml"  # those that have no reset
 VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text() + Path(registers.__file__).read_text()
@@ -287,7 +287,7 @@ def main() -> int:
     verible: list[object] = [
         Path(sys.executable).parent / "verible-verilog-lint", "--rules_config", "lint/verible.rules",
         "--waiver_files", "lint/verible.waiver",
-        *(path.relative_to(ROOT) for path in listed if path.parent != REGISTERS),
+        *(path.relative_to(ROOT) for path in listed if path not in REGISTERS),
     ]
     with ThreadPoolExecutor(2) as pool:
         jobs: list[Future[tuple[str, object]]] = [pool.submit(run, CHECKS[0])]

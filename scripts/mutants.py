@@ -46,7 +46,7 @@ TIMEOUT = 900  # seconds of a test run, on a busy machine
 # Modules that build, simulate memory, show and report. Outcomes are not run anew when they change: what kills a mutant is not in them.
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 # Modules whose numbers stand in a generated package: an outcome depends on that.
-PACKAGES = {"flicker.params": ROOT / "rtl/common/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/common/flk_pkg.sv"}
+PACKAGES = {"flicker.params": ROOT / "rtl/generated/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/generated/flk_pkg.sv"}
 KEYS = {"file", "find", "replace", "unit", "note", "survives", "slow", "times"}
 
 

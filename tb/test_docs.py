@@ -144,8 +144,8 @@ def test_stamp_sees_hardware_only(tmp_path: Path) -> None:
 
 
 def test_every_source_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "rtl" / "common").mkdir(parents=True)
-    names = ("flk_a.sv", "common/flk_param_pkg.sv")
+    (tmp_path / "rtl" / "generated").mkdir(parents=True)
+    names = ("flk_a.sv", "generated/flk_param_pkg.sv")
     for name in names:
         (tmp_path / "rtl" / name).write_text("x")
     monkeypatch.setattr(stamp, "FILELIST", tmp_path / "rtl" / "flk.f")

@@ -30,7 +30,7 @@ WHOLE = {"docs", "pages", "tooling", "formal", "synth", "commands"}  # test file
 
 @pytest.mark.parametrize(("changed", "read_by", "not_by"), [
     ("rtl/ctu/flk_mmu.sv", {"mmu", "ctu", "render_stage", "frames", "chip_frames"}, {"vru", "lzc", "delivery", "camera", "top_axi_wiring"}),
-    ("rtl/common/flk_pkg.sv", {"ctu", "vru", "channel"}, {"lzc", "camera", "mmu", "delivery"}),
+    ("rtl/generated/flk_pkg.sv", {"ctu", "vru", "channel"}, {"lzc", "camera", "mmu", "delivery"}),
     ("rtl/common/flk_lzc.sv", {"lzc", "chip_frames"}, {"camera", "sram"}),
     ("rtl/sort/flk_delivery.sv", {"delivery", "rendering", "chip_frames", "chip_rendering"}, {"ctu", "lane", "preprocessing"}),
     ("model/flicker/golden/vru.py", {"vru", "golden", "channel", "frames"}, {"lzc", "delivery", "camera_files"}),
@@ -90,7 +90,7 @@ def test_surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @pytest.mark.parametrize(("edited", "about", "above", "further"), [
     ("rtl/ctu/flk_mmu.sv", {"mmu"}, {"ctu"}, {"frames", "chip_frames"}),
     ("rtl/sort/flk_delivery.sv", {"delivery"}, {"rendering"}, {"chip_frames"}),
-    ("rtl/common/flk_pkg.sv", set(), {"vru", "channel"}, {"pages"}),
+    ("rtl/generated/flk_pkg.sv", set(), {"vru", "channel"}, {"pages"}),
     ("model/flicker/golden/vru.py", {"golden", "vru"}, {"channel"}, {"commands"}),
     ("model/flicker/scene/camera.py", {"camera", "camera_files"}, {"perf"}, {"pages"}),
     ("tb/render/cocotb_vru.py", {"vru"}, set(), {"pages"}),

@@ -1,6 +1,6 @@
 """In-memory layout of the packed structs that RTL, simulation harness and tests share: described here, once.
 
-`scripts/gen_params.py` writes `rtl/common/flk_pkg.sv` from it, `flicker.sim.generate` the C++ header of the harness; tests take offsets and
+`scripts/gen_params.py` writes `rtl/generated/flk_pkg.sv` from it, `flicker.sim.generate` the C++ header of the harness; tests take offsets and
 widths from `place` and `fields`. Formats and field meanings: docs/reference/number_formats.md.
 """
 

@@ -1,7 +1,7 @@
 """The parameter object of the rendering stage.
 
 Everything that RTL, model, tests and docs must agree on is defined here once: `make generate` (scripts/gen_params.py) writes
-`rtl/common/flk_param_pkg.sv` from the constants and `rtl/render/flk_mask_generator.sv` from the table of mask generators;
+`rtl/generated/flk_param_pkg.sv` from the constants and `rtl/generated/flk_mask_generator.sv` from the table of mask generators;
 `RenderConfig.rtl_parameters()` gives the module parameters of a build. Records: `flicker.layout`.
 """
 

@@ -9,7 +9,7 @@ from flicker.toolchain import ROOT
 
 from .common import Say
 
-PACKAGE = ROOT / "rtl" / "common" / "flk_param_pkg.sv"
+PACKAGE = ROOT / "rtl" / "generated" / "flk_param_pkg.sv"
 CONSTANT = re.compile(r"^\s*localparam .*?(\w+) = (.*?);(?:\s*// (.*))?$")
 HEADING = re.compile(r"^\s*// (?!Generated)(.*)$")
 

@@ -185,7 +185,7 @@ def test_stub_stage() -> None:
     assert re.search(rf"assertion failed at .*wrong/flk_stub_stage.sv:{line}\b", found["error"])
     counters = found[json.dumps(change)]["counters"]
     assert sum(core[2] for core in counters) == found["elements"] and sum(core[1] for core in counters) == found["subtiles"]
-    generated = {"rtl/flk.f", "rtl/common/flk_param_pkg.sv", "rtl/render/flk_stage.sv"}
+    generated = {"rtl/flk.f", "rtl/generated/flk_param_pkg.sv", "rtl/generated/flk_stage.sv"}
     assert touched("stage") == {"rtl/render/flk_stub_stage.sv", "model/flicker/params.py"} | generated
 
 
@@ -199,5 +199,5 @@ def test_pixel_mask_generator() -> None:
     four, pixels = (found[json.dumps(change)] for change in changes)
     assert pixels["golden"] and not pixels["background"]
     assert pixels == four
-    generated = {"rtl/flk.f", "rtl/common/flk_param_pkg.sv", "rtl/render/flk_mask_generator.sv"}
+    generated = {"rtl/flk.f", "rtl/generated/flk_param_pkg.sv", "rtl/generated/flk_mask_generator.sv"}
     assert touched("generator") == {"rtl/render/flk_mask_pixels.sv", "model/flicker/params.py"} | generated

@@ -85,7 +85,7 @@ def test_every_colour() -> None:
 def test_illegal_formats(name: str, value: int, tmp_path: Path) -> None:
     """Of the package, which no parameter changes."""
     sources = sources_of("flk_lane_result")
-    package = ROOT / "rtl" / "lanes" / "flk_lane_pkg.sv"
+    package = ROOT / "rtl" / "generated" / "flk_lane_pkg.sv"
     text, count = re.subn(rf"(\b{name} = )\d+;", rf"\g<1>{value};", package.read_text())
     assert count == 1
     other = tmp_path / package.name

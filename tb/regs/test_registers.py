@@ -19,7 +19,7 @@ from flicker import chip_counters
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
 from flicker.toolchain import ROOT
 
-PACKAGE = ROOT / "rtl" / "regs" / "flk_registers_pkg.sv"
+PACKAGE = ROOT / "rtl" / "generated" / "flk_registers_pkg.sv"
 
 
 def described() -> list[dict[str, Any]]:

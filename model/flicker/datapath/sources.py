@@ -1,4 +1,4 @@
-"""Generated sources of rtl/preproc: the pipelines, and a package with their number formats and latencies."""
+"""Generated sources of the front end: the pipelines, and a package with their number formats and latencies."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ..golden.front.setup import FORMATS, FrontFormats
 from .emit import module
 from .units import PIPELINES, basis_range, constant_range, degree_sum, group_ranges, term_range
 
-PACKAGE = "preproc/flk_front_pkg.sv"
+PACKAGE = "generated/flk_front_pkg.sv"
 
 
 def sources(formats: FrontFormats = FORMATS) -> dict[str, str]:
     """Text by path below rtl/."""
     made = dict(_pipelines(formats))
     latencies = {name: latency for name, (_, latency) in made.items()}
-    return {PACKAGE: _package(formats, latencies), **{f"preproc/{name}.sv": text for name, (text, _) in made.items()}}
+    return {PACKAGE: _package(formats, latencies), **{f"generated/{name}.sv": text for name, (text, _) in made.items()}}
 
 
 def _pipelines(formats: FrontFormats) -> Iterator[tuple[str, tuple[str, dict[int, int]]]]:
