@@ -42,7 +42,7 @@ module flk_rendering
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
-  parameter  int unsigned RecordLines    = 1024, // of 32 bytes that the record cache holds, a power of two from 32 on
+  parameter  int unsigned RecordLines    = 1024, // of 32 bytes in the record cache, a power of two from 32
   parameter  int unsigned IdBits         = 4,
   localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
 ) (
@@ -198,7 +198,8 @@ module flk_rendering
   localparam int unsigned RecordBanks = 4;
   localparam int unsigned RecordWays  = 4;
 
-  if (RecordLines < 2 * RecordBanks * RecordWays || RecordLines != 1 << $clog2(RecordLines)) begin : gen_check_record_lines
+  if (RecordLines < 2 * RecordBanks * RecordWays ||
+      RecordLines != 1 << $clog2(RecordLines)) begin : gen_check_record_lines
     $error("flk_rendering: RecordLines must be a power of two from 32 on");
   end
 
