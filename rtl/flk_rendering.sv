@@ -42,7 +42,7 @@ module flk_rendering
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
-  parameter  int unsigned RecordLines    = 1024, // of 32 bytes in the record cache, a power of two from 32
+  parameter  int unsigned RecordLines    = 1024, // cached, of 32 bytes; from 32, a power of two
   parameter  int unsigned IdBits         = 4,
   localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
 ) (
