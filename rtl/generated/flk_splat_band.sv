@@ -300,7 +300,7 @@ module flk_splat_band #(
     logic signed [29:0] v31;  // cycle 21
     logic signed [29:0] u_v44;
     logic signed [31:0] v32;  // cycle 22
-    logic signed [30:0] v33;  // cycle 0
+    logic signed [30:0] v33;  // cycle 1
     logic signed [30:0] v34;  // cycle 2
     logic signed [30:0] v35;  // cycle 3
     logic [19:0] v36;  // cycle 6
@@ -379,7 +379,6 @@ module flk_splat_band #(
         v20_q <= v20;
         v21_q <= v21;
         v32_q <= v32;
-        v33_q <= v33;
         v34_q <= v34;
         v38_q <= {v38_q[2:0], v38};
         v44_q <= v44;
@@ -399,6 +398,7 @@ module flk_splat_band #(
         v22_q <= v22;
         v25_q <= {v25_q[2:0], v25};
         v31_q <= v31;
+        v33_q <= v33;
         v35_q <= v35;
         v45_q <= v45;
         v47_q <= v47;
@@ -512,7 +512,7 @@ module flk_splat_band #(
     assign v44 = u_v44;
     assign v31 = u_v44;
     assign v32 = 32'(32'($signed(x_i_end_q)) + 32'($signed(v31_q[0])));
-    assign v33 = 31'(31'sd0 - 31'(right_i));
+    assign v33 = 31'(31'sd0 - 31'($signed(right_i_q[0])));
     assign v34 = 31'($signed(v33_q[0]) < $signed(v16_q[0]) ? $signed(v16_q[0]) : $signed(v33_q[0]));
     assign v35 = 31'($signed(v20_q[0]) < $signed(v34_q[0]) ? $signed(v20_q[0]) : $signed(v34_q[0]));
     assign v45 = 32'(32'($signed(x_i_end_q)) + 32'($signed(v44_q[0])));

@@ -214,7 +214,8 @@ def band(formats: FrontFormats) -> Graph:
     """Sub-tiles of a band that a splat enters."""
     g, S = Graph(), formats.shape
     number, box = g.input("band", Int(0, BANDS - 1)), g.input("box", BOOL, register=True)
-    x, y, right = (g.input(n, range_(formats)) for n, range_ in (("x", mean_range), ("y", mean_range), ("right", reach_range)))
+    x, y = (g.input(n, mean_range(formats)) for n in ("x", "y"))
+    right = g.input("right", reach_range(formats), late=True)
     pixel = Int(0, MAX_PICTURE - 1)
     x0, x1, y0, y1 = (g.input(n, pixel) for n in ("x0", "x1", "y0", "y1"))
     l2, i0, kappa, limit = (g.input(n, Ff(S)) for n in ("l2", "i0", "kappa", "limit"))
