@@ -28,6 +28,7 @@ from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.drawing import Drawing
 from flicker.chip.run import chip_stats, render_on_chip
 from flicker.chip.tile_lists import TileLists
+from flicker.chip.whole import halves
 from flicker.chip_registers import REGISTERS, ChipCounter, ResultError
 from flicker.chips import chip_of
 from flicker.errors import FlickerError
@@ -188,14 +189,15 @@ def test_narrow_port(bits: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bits", [
-    128, pytest.param(256, marks=pytest.mark.xfail(reason="docs/reference/chips.md: the front end's model is early", strict=True)),
+@pytest.mark.parametrize("config", [
+    pytest.param(CONFIG.with_(port_bits=128), id="128 bits"), pytest.param(FEW, id="tiny"), pytest.param(chip_of("small").config, id="small"),
+    pytest.param(CONFIG.with_(port_bits=256), id="256 bits",
+                 marks=pytest.mark.xfail(reason="docs/reference/chips.md: the front end's model is early", strict=True)),
 ])
-def test_cycles_of_a_narrow_port(bits: int) -> None:
+def test_cycles_of_a_narrow_port(config: RenderConfig) -> None:
     """As the model has them, within a tenth."""
-    config = CONFIG.with_(port_bits=bits)
     view, packed, lists = demo(config)
-    with session(packed, config=config, memory=MemoryOptions(DramConfig(port_bits=bits).timing)) as chip:
+    with session(packed, config=config, memory=MemoryOptions(DramConfig(port_bits=config.port_bits).timing)) as chip:
         done = check(chip, view.camera, config=config, lists=lists)
         cost = frame_cost(view, Drawing(Engine.CHIP, config))
         for phase, name in (("front end", "front_cycles"), ("rendering", "render_cycles")):
@@ -207,7 +209,8 @@ def test_few_units() -> None:
     the default one; the model of the rendering half. A second frame, of a picture that is no whole number of tiles."""
     view = load_view(DEMO, 0, (96, 54))
     packed = packed_scene(view, PackedFormat.CHUNK)
-    with session(packed, config=FEW) as chip:
+    dram = DramConfig(port_bits=FEW.port_bits)
+    with session(packed, config=FEW, memory=MemoryOptions(dram.timing)) as chip:
         done = check(chip, view.camera, config=FEW)
         assert np.ptp(done.buffer.reshape(-1, 3), axis=0).min() > 50
         assert not done.front["entries"][1:].any() and done.front["taken"].all()
@@ -216,9 +219,8 @@ def test_few_units() -> None:
         tested, interval = chip.scene.gaussians - int(np.sum(done.front["culled_gaussians"])), FEW.preproc_interval
         assert stats["busy"]["front end"]["lanes"] == pytest.approx(interval * tested / done.phases["front end"]) and stats["busy"]["front end"]["lanes"] <= 1.0
         assert stats["stall_shares"]["sorted entries for buffers"] == stats["stalls"]["sorted entries for buffers"] / stats["cycles"]
-        front, sizes = run_front(packed, view.camera), FEW.chip_memories
-        tables = TileLists.of(front, front_memory(front), sizes.sorted_entries, sizes.merge_lines)
-        assert rendering.estimate(tables, FEW, None).cycles == pytest.approx(done.phases["rendering"], rel=0.1)
+        for half, phase in zip(halves(run_front(packed, view.camera), FEW, dram), ("front end", "rendering"), strict=True):
+            assert half.cycles == pytest.approx(done.phases[phase], rel=0.1), phase
         check(chip, replace(view.camera, width=40, height=24, cx=None, cy=None), PixelFormat.RGBA16F, FEW)
 
 

@@ -96,8 +96,9 @@ class DramConfig:
         return self.channels * self.width_bits * self.rate // 8
 
     def port_cycles(self, read_bytes: int, written_bytes: int) -> int:
-        """Cycles of the chip that the port takes: reads and writes go side by side."""
-        return math.ceil(8 * max(read_bytes, written_bytes) / self.port_bits)
+        """Cycles of the chip that the port takes: reads and writes go side by side. While all banks are refreshed it stands still, and nothing catches up."""
+        open_ = 1.0 - self.trfc / self.trefi if self.refresh == Refresh.ALL_BANKS else 1.0
+        return math.ceil(8 * max(read_bytes, written_bytes) / (self.port_bits * open_))
 
     @property
     def timing(self) -> Timing:

@@ -23,6 +23,7 @@ from ..golden.lists import COMBINER_SETS, COMBINER_WAYS, ENTRY_BITS, POINTERS_PE
 from ..params import CHIP_MEMORIES, PREPROC_INTERVALS, TILE, UNIT_COUNTS, ChipMemories
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
+from . import constants as c
 from .dram import READ, WRITE, DramConfig, Stream, simulate
 
 # Of the RTL, times in cycles.
@@ -295,9 +296,11 @@ class UnitCycles:
     all: int
 
 
-def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, writers: int = LIST_WRITERS, interval: int = INTERVAL) -> UnitCycles:
+def unit_cycles(
+    frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, writers: int = LIST_WRITERS, interval: int = INTERVAL, access: int = 0,
+) -> UnitCycles:
     """Cycles of a frame if the memory were perfect. waiting: survivors of a lane between front and entries. lanes, writers: how many there are. interval:
-    cycles from a Gaussian of a lane to the next."""
+    cycles from a Gaussian of a lane to the next. access: of the memory, for which a survivor waits until its colours come."""
     packed = frame.packed
     keep = np.flatnonzero(cull(packed, FrameSetup.of(frame.camera)))
     groups = -(-packed.counts[keep] // lanes)  # Gaussians that enter together
@@ -320,7 +323,7 @@ def unit_cycles(frame: FrontFrame, waiting: int = WAITING, lanes: int = LANES, w
     bank = ((x & 1 | (y & 1) << 1) % writers).astype(np.int64)
     front, went = _unit_cycles(
         enters[slot] + interval * (within // lanes), lane, np.maximum(LANE_CYCLES, interval)[degree], first, bank, BAND_CYCLES[interval] * bands, waiting,
-        MERGE_DEPTH, LATENCY[interval], lanes, writers,
+        MERGE_DEPTH, LATENCY[interval] + access, lanes, writers,
     )
     fed = enters[-1] + interval * groups[-1] if len(keep) else 0
     # At the end a writer closes its banks one after the other; those of the first are within what the estimate leaves out.
@@ -374,7 +377,7 @@ def estimate(
     used = bytes_of(beats)
     used["records"] = len(frame.number) * frame.kind.bytes
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
-    units = unit_cycles(frame, sizes.survivors, lanes, writers, interval)
+    units = unit_cycles(frame, sizes.survivors, lanes, writers, interval, c.DRAM_LATENCY_CYCLES if config else 0)
     order = in_order(beats, config, sizes.gathered_lines) if config else None
     dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
     if config:
