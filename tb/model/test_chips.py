@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from flicker_tb.elaboration import instances
 from flicker_tb.command import flicker
 from test_scene_cost import camera, some
 
@@ -156,3 +157,19 @@ def test_smallest_chip(tmp_path: Path) -> None:
     slow, text = cost("--fps", str(between), "--clock", "0.001")
     assert slow["smallest_chip"] is None and "no chip makes" in text
     assert slow["chips"][0]["frames_per_second"] == pytest.approx(rows[0]["frames_per_second"] / 1000)
+
+
+@pytest.mark.parametrize("name", ["small", "records"])
+def test_sizes_of_memories_reach_their_units(name: str) -> None:
+    """From the pins on. Both sets together have two values of each size but `sort_ways`."""
+    sizes, found = CHIP_MEMORIES[name], instances("flk_top_axi", RenderConfig(stage="lanes", memories=name).top_parameters())
+
+    def all_of(module: str, parameter: str) -> set[int]:
+        return {parameters[parameter] for parameters in found[module]}
+
+    assert all_of("flk_sorting_unit", "Stages") == {sizes.sort_stages} and all_of("flk_sorting_unit", "Ways") == {sizes.sort_ways}
+    assert all_of("flk_list_reader", "Slots") == {sizes.list_chunks} and all_of("flk_entry_buffer", "Depth") == {sizes.sorted_ahead}
+    assert all_of("flk_frame_writer", "Pairs") == {sizes.pairs} and all_of("flk_preprocessing_core", "Waiting") == {sizes.survivors}
+    assert max(all_of("flk_line_writer", "Gather")) == max(sizes.gathered_lines, 64)  # the front end's, and the rendering half's
+    assert all_of("flk_run_merge", "Lines") == {sizes.merge_lines} and all_of("flk_run_merge", "Runs") == {sizes.sort_runs}
+    assert [cache["Banks"] * cache["Sets"] * cache["Ways"] for cache in found["flk_record_cache"]] == [sizes.record_lines]
