@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from flicker_tb.elaboration import instances
 from flicker_tb.command import flicker
+from flicker_tb.elaboration import instances
 from test_scene_cost import camera, some
 
 from flicker.chip.dram import DramConfig

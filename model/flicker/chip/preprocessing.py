@@ -1,9 +1,9 @@
 """Preprocessing as the RTL does it (`flk_preprocessing`): what it moves, to the byte, and an estimate of its cycles.
 
 Traffic follows from the golden front end alone. The units are simulated cycle by cycle from a group of Gaussians at the front to an entry at a list writer
-(`unit_cycles`), the DRAM with all streams in the order in which they come (`simulate`). One waits for the other by phases: between the points at which one more
-queue of survivors (`WAITING` a lane) has left the front, a frame takes the longer of both (`phases`). docs/results/front_end.md has the estimate beside
-the RTL.
+(`unit_cycles`; a survivor's colours come an access of the memory later), the DRAM with all streams in the order in which they come (`simulate`). One waits
+for the other by phases: between the points at which one more queue of survivors (`WAITING` a lane) has left the front, a frame takes the longer of both
+(`phases`). docs/results/front_end.md has the estimate beside the RTL.
 """
 
 from __future__ import annotations

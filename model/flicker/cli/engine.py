@@ -149,7 +149,8 @@ def engine_options(
     fifo_depth: Annotated[int | None, typer.Option(
         help=f"feature FIFO, 1 to {MAX_FIFO_DEPTH}; queue of a lane, 2 to {MAX_LANE_ENTRIES} [default: {_default('fifo_depth')}]",
     )] = None,
-    memories: Annotated[MemoriesChoice | None, typer.Option(help="of --engine chip: sizes, for speed, within the paper's 288 KB, or for fewer bytes a frame, in as much memory or more [default: default]")] = None,
+    memories: Annotated[MemoriesChoice | None, typer.Option(
+        help="of --engine chip: sizes, for speed, within the paper's 288 KB, or for fewer bytes a frame, in as much memory or more [default: default]")] = None,
     port_bits: Annotated[int | None, typer.Option(help=f"of --engine chip: data of the memory port, {', '.join(map(str, PORT_WIDTHS))} [default: 512]")] = None,
     sort_units: Annotated[int | None, typer.Option(help=f"of --engine chip: sorting units, {UNITS} [default: {_default('sort_units')}]")] = None,
     list_writers: Annotated[int | None, typer.Option(help=f"of --engine chip: list writers, {UNITS} [default: {_default('list_writers')}]")] = None,
