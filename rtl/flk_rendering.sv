@@ -42,7 +42,7 @@ module flk_rendering
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
-  parameter  int unsigned RecordLines    = 1024, // cached, of 32 bytes; from 32, a power of two
+  parameter  int unsigned RecordLines    = 1024, // cached, of 32 bytes; a power of two
   parameter  int unsigned IdBits         = 4,
   localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
 ) (
@@ -198,9 +198,9 @@ module flk_rendering
   localparam int unsigned RecordBanks = 4;
   localparam int unsigned RecordWays  = 4;
 
-  if (RecordLines < 2 * RecordBanks * RecordWays ||
+  if (RecordLines < 2 * RecordBanks * RecordWays || RecordLines > 65536 ||
       RecordLines != 1 << $clog2(RecordLines)) begin : gen_check_record_lines
-    $error("flk_rendering: RecordLines must be a power of two from 32 on");
+    $error("flk_rendering: RecordLines must be a power of two, 32 to 65536");
   end
 
   logic [SortUnits-1:0]               run_valid, run_ready, run_waits, run_open_q;

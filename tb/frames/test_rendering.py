@@ -15,10 +15,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flicker_tb.elaboration import refused
+from flicker_tb.elaboration import refusals, refused
 from flicker_tb.runner import seed
 
 from flicker.chip.dram import DramConfig
+from flicker.errors import FlickerError
 from flicker.front.view import DEMO, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import may_be_given
@@ -29,7 +30,7 @@ from flicker.golden.lanes.lists import front_lists
 from flicker.golden.list_reader import read_tile
 from flicker.golden.long_lists import sort_long
 from flicker.golden.sorting import CAPACITY
-from flicker.params import TILE, CatMode, RenderConfig
+from flicker.params import TILE, CatMode, ChipMemories, RenderConfig
 from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -279,9 +280,15 @@ def test_number_of_units() -> None:
     refused("flk_rendering", {"SortUnits": 3}, "SortUnits must be 1, 2 or 4")
 
 
-@pytest.mark.parametrize("lines", [0, 16, 48])
-def test_number_of_record_lines(lines: int) -> None:
-    refused("flk_rendering", {"RecordLines": lines}, "RecordLines must be a power of two from 32 on")
+def test_number_of_record_lines() -> None:
+    """The least and the most are built; what is beyond them, or between powers of two, is not."""
+    for lines in (32, 65_536):
+        assert refusals("flk_rendering", {"RecordLines": lines}) == []
+        assert ChipMemories(record_lines=lines).rendering_parameters()["RecordLines"] == lines
+    for lines in (0, 16, 48, 131_072):
+        refused("flk_rendering", {"RecordLines": lines}, "RecordLines must be a power of two, 32 to 65536")
+        with pytest.raises(FlickerError, match="record_lines must be"):
+            ChipMemories(record_lines=lines)
 
 
 @pytest.mark.parametrize("parameters", [{"SortStages": 8}, {"MergeLines": 256}], ids=str)

@@ -422,6 +422,14 @@ def test_preprocessing_by_phases():
     assert phases(units, [table, replace(even, due=even.due + step)], 320) == 100 + 1000 + 100 + 100
 
 
+def test_narrow_port():
+    """Reads and writes side by side; refresh of all banks at once takes a part of the time, the DRAM's own, that of one bank none."""
+    for read, written in ((1600, 0), (0, 1600), (1600, 1599)):
+        assert DramConfig(port_bits=128, refresh=Refresh.PER_BANK).port_cycles(read, written) == 100
+    d = DramConfig(port_bits=128)
+    assert d.port_cycles(16 * d.trefi - 16 * d.trfc, 0) == d.trefi
+
+
 def test_recommended_scheme_fits_the_feature_buffers():
     cols, rows = 160, 90
     scheme = SCHEMES[RECOMMENDED]

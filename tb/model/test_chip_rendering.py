@@ -85,7 +85,7 @@ def test_sizes() -> None:
     sizes = ChipMemories()
     for unit in ("sort/flk_record_cache", "sort/flk_delivery"):
         banks, sets, ways = (default(unit, name) for name in ("Banks", "Sets", "Ways"))
-        assert (banks * sets * ways, ways) == (1024, model.CACHE_WAYS)
+        assert (banks * sets * ways, ways) == (sizes.record_lines, model.CACHE_WAYS)
     until = re.search(r"UntilBits\s*= (\d+)", (ROOT / "rtl/sort/flk_record_cache.sv").read_text())
     assert until and TILES == 1 << int(until[1])
     assert RenderConfig().sort_units == default("flk_rendering", "SortUnits") == default("flk_top", "SortUnits") == default("sort/flk_delivery", "Units")
@@ -145,6 +145,16 @@ def test_lists_longer_than_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
                 render_on_chip(view, Engine.CHIP_GOLDEN)
     monkeypatch.undo()
     assert [CHIP_MEMORIES[name].longest_list for name in ("default", "small")] == [131_072, 32_768]  # docs/guide/programming.md
+
+
+def test_survivors_wait_for_their_colours() -> None:
+    """An access of the memory, which few of them do not cover: those of the chip `small` at an interval of 2; those of the default chip do, but for a hundredth."""
+    default, small = RenderConfig(stage="lanes"), RenderConfig(stage="lanes", memories="small", preproc_lanes=2, list_writers=2)
+    for config, least, most in ((default, 1.0, 1.01), (small, 1.2, 1.6)):
+        alone, behind = (
+            preprocessing.estimate(*frame(), dram, config.chip_memories, config.preproc_lanes, config.list_writers).units for dram in (None, DramConfig())
+        )
+        assert least <= behind / alone <= most
 
 
 def test_ideal_sorter() -> None:

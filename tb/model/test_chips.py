@@ -16,6 +16,7 @@ from flicker_tb.elaboration import instances
 from test_scene_cost import camera, some
 
 from flicker.chip.dram import DramConfig
+from flicker.chip.rendering import CACHE_WAYS
 from flicker.chip.scene_cost import packed_for_cost
 from flicker.chip.sizing import Rate, rates, smallest
 from flicker.chips import STATUS, TABLE, chip_of, chips, name_of
@@ -159,10 +160,12 @@ def test_smallest_chip(tmp_path: Path) -> None:
     assert slow["chips"][0]["frames_per_second"] == pytest.approx(rows[0]["frames_per_second"] / 1000)
 
 
-@pytest.mark.parametrize("name", ["small", "records"])
-def test_sizes_of_memories_reach_their_units(name: str) -> None:
-    """From the pins on. Both sets together have two values of each size but `sort_ways`."""
-    sizes, found = CHIP_MEMORIES[name], instances("flk_top_axi", RenderConfig(stage="lanes", memories=name).top_parameters())
+def test_sizes_of_memories_reach_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the pins on; none is the default's."""
+    sizes = ChipMemories(1024, 6, 128, 2, 64, 4, 96, 64, 2048)
+    assert all(getattr(sizes, name) != value for name, value in vars(ChipMemories()).items())
+    monkeypatch.setitem(CHIP_MEMORIES, "others", sizes)
+    found = instances("flk_top_axi", RenderConfig(stage="lanes", memories="others").top_parameters())
 
     def all_of(module: str, parameter: str) -> set[int]:
         return {parameters[parameter] for parameters in found[module]}
@@ -170,6 +173,7 @@ def test_sizes_of_memories_reach_their_units(name: str) -> None:
     assert all_of("flk_sorting_unit", "Stages") == {sizes.sort_stages} and all_of("flk_sorting_unit", "Ways") == {sizes.sort_ways}
     assert all_of("flk_list_reader", "Slots") == {sizes.list_chunks} and all_of("flk_entry_buffer", "Depth") == {sizes.sorted_ahead}
     assert all_of("flk_frame_writer", "Pairs") == {sizes.pairs} and all_of("flk_preprocessing_core", "Waiting") == {sizes.survivors}
-    assert max(all_of("flk_line_writer", "Gather")) == max(sizes.gathered_lines, 64)  # the front end's, and the rendering half's
+    assert all_of("flk_line_writer", "Gather") == {sizes.gathered_lines, 64}  # the front end's, and the rendering half's
     assert all_of("flk_run_merge", "Lines") == {sizes.merge_lines} and all_of("flk_run_merge", "Runs") == {sizes.sort_runs}
-    assert [cache["Banks"] * cache["Sets"] * cache["Ways"] for cache in found["flk_record_cache"]] == [sizes.record_lines]
+    (cache,) = found["flk_record_cache"]
+    assert (cache["Banks"] * cache["Sets"] * cache["Ways"], cache["Ways"]) == (sizes.record_lines, CACHE_WAYS)

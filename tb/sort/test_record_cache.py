@@ -14,9 +14,12 @@ from flicker_tb.runner import build_and_test
 SMALL = {"Banks": 2, "Sets": 4, "Ways": 2, "Depth": 8, "Places": 4}
 
 
-@pytest.mark.parametrize("parameters", [{}, SMALL, {"RecordBits": 256, "Sets": 128}])
+LARGE = {"Sets": 128}  # of the memories `records` and `large`
+
+
+@pytest.mark.parametrize("parameters", [{}, SMALL, LARGE, {"RecordBits": 256, "Sets": 16}])
 def test_record_cache(parameters: dict[str, int]) -> None:
-    tests = [] if parameters in ({}, SMALL) else ["records"]
+    tests = [] if parameters in ({}, SMALL) else ["wanted"] if parameters == LARGE else ["records"]
     build_and_test("flk_record_cache", "cocotb_record_cache", parameters=parameters, tests=tests)
 
 
