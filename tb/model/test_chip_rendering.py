@@ -148,7 +148,7 @@ def test_lists_longer_than_is_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_survivors_wait_for_their_colours() -> None:
-    """An access of the memory, which few of them do not cover: those of the chip `small` at an interval of 2; those of the default chip do, but for a hundredth."""
+    """An access of the memory, which few of them do not cover: those of the chip `small` at an interval of 2; the default chip's do to a hundredth."""
     default, small = RenderConfig(stage="lanes"), RenderConfig(stage="lanes", memories="small", preproc_lanes=2, list_writers=2)
     for config, least, most in ((default, 1.0, 1.01), (small, 1.2, 1.6)):
         alone, behind = (
