@@ -557,39 +557,41 @@ module flk_projection #(
     logic signed [29:0] u_radius_y;
     logic [19:0] v248;  // cycle 61
     logic signed [29:0] radius_y;  // cycle 64
-    logic signed [31:0] v250;  // cycle 64
-    logic signed [24:0] v251;  // cycle 65
+    logic signed [29:0] v250;  // cycle 64
+    logic signed [31:0] v251;  // cycle 64
     logic signed [24:0] v252;  // cycle 65
-    logic signed [31:0] v253;  // cycle 64
-    logic signed [24:0] v254;  // cycle 65
-    logic [23:0] v255;  // cycle 66
-    logic [11:0] v256;
-    logic signed [24:0] v257;  // cycle 65
-    logic signed [31:0] v258;  // cycle 65
-    logic signed [24:0] v259;  // cycle 66
-    logic signed [24:0] v260;  // cycle 66
-    logic signed [31:0] v261;  // cycle 65
+    logic signed [24:0] v253;  // cycle 65
+    logic signed [31:0] v254;  // cycle 64
+    logic signed [24:0] v255;  // cycle 65
+    logic [23:0] v256;  // cycle 66
+    logic [11:0] v257;
+    logic signed [24:0] v258;  // cycle 65
+    logic signed [29:0] v259;  // cycle 65
+    logic signed [31:0] v260;  // cycle 65
+    logic signed [24:0] v261;  // cycle 66
     logic signed [24:0] v262;  // cycle 66
-    logic [23:0] v263;  // cycle 67
-    logic [11:0] v264;
-    logic signed [24:0] v265;  // cycle 66
-    logic [19:0] v266;  // cycle 67
-    logic [19:0] v267;  // cycle 69
+    logic signed [31:0] v263;  // cycle 65
+    logic signed [24:0] v264;  // cycle 66
+    logic [23:0] v265;  // cycle 67
+    logic [11:0] v266;
+    logic signed [24:0] v267;  // cycle 66
+    logic [19:0] v268;  // cycle 67
+    logic [19:0] v269;  // cycle 69
     logic [19:0] i0;  // cycle 71
-    logic [19:0] v269;  // cycle 59
+    logic [19:0] v271;  // cycle 59
     logic [19:0] kappa;  // cycle 61
     logic [19:0] lean;  // cycle 59
-    logic v272;  // cycle 67
-    logic v273;  // cycle 68
+    logic v274;  // cycle 67
+    logic v275;  // cycle 68
     logic outside;  // cycle 69
-    logic [27:0] v275;  // cycle 21
-    logic [26:0] v276;  // cycle 21
     logic [27:0] v277;  // cycle 21
-    logic [27:0] v278;  // cycle 21
+    logic [26:0] v278;  // cycle 21
     logic [27:0] v279;  // cycle 21
-    logic [25:0] v280;
-    logic signed [28:0] v281;  // cycle 22
-    logic [27:0] v282;  // cycle 23
+    logic [27:0] v280;  // cycle 21
+    logic [27:0] v281;  // cycle 21
+    logic [25:0] v282;
+    logic signed [28:0] v283;  // cycle 22
+    logic [27:0] v284;  // cycle 23
     logic [23:0] key;  // cycle 24
     logic [19:0] direction_0;  // cycle 10
     logic [19:0] direction_1;  // cycle 10
@@ -715,25 +717,25 @@ module flk_projection #(
     logic [0:0][29:0] radius_x_q;
     logic [0:0][19:0] v248_q;
     logic [0:0][29:0] radius_y_q;
-    logic [0:0][31:0] v250_q;
-    logic [0:0][24:0] v252_q;
-    logic [0:0][31:0] v253_q;
-    logic [0:0][23:0] v255_q;
-    logic [0:0][24:0] v257_q;
-    logic [0:0][31:0] v258_q;
-    logic [0:0][24:0] v260_q;
-    logic [0:0][31:0] v261_q;
-    logic [0:0][23:0] v263_q;
-    logic [0:0][24:0] v265_q;
+    logic [0:0][31:0] v251_q;
+    logic [0:0][24:0] v253_q;
+    logic [0:0][31:0] v254_q;
+    logic [0:0][23:0] v256_q;
+    logic [0:0][24:0] v258_q;
+    logic [0:0][31:0] v260_q;
+    logic [0:0][24:0] v262_q;
+    logic [0:0][31:0] v263_q;
+    logic [0:0][23:0] v265_q;
+    logic [0:0][24:0] v267_q;
     logic [0:0][19:0] i0_q;
     logic [5:0][19:0] kappa_q;
     logic [6:0][19:0] lean_q;
-    logic [0:0][0:0] v272_q;
-    logic [0:0][0:0] v273_q;
+    logic [0:0][0:0] v274_q;
+    logic [0:0][0:0] v275_q;
     logic [1:0][0:0] outside_q;
-    logic [0:0][27:0] v279_q;
-    logic [0:0][28:0] v281_q;
-    logic [0:0][27:0] v282_q;
+    logic [0:0][27:0] v281_q;
+    logic [0:0][28:0] v283_q;
+    logic [0:0][27:0] v284_q;
     logic [23:0] key_end;
     logic [19:0] direction_0_end;
     logic [19:0] direction_1_end;
@@ -793,13 +795,13 @@ module flk_projection #(
         rdet_q <= rdet;
         v234_q <= v234;
         radius_y_q <= radius_y;
-        v250_q <= v250;
-        v253_q <= v253;
-        v255_q <= v255;
-        v260_q <= v260;
-        v265_q <= v265;
-        v273_q <= v273;
-        v281_q <= v281;
+        v251_q <= v251;
+        v254_q <= v254;
+        v256_q <= v256;
+        v262_q <= v262;
+        v267_q <= v267;
+        v275_q <= v275;
+        v283_q <= v283;
       end
     end
 
@@ -855,18 +857,18 @@ module flk_projection #(
         sy_q <= {sy_q[5:0], sy};
         radius_x_q <= radius_x;
         v248_q <= v248;
-        v252_q <= v252;
-        v257_q <= v257;
+        v253_q <= v253;
         v258_q <= v258;
-        v261_q <= v261;
+        v260_q <= v260;
         v263_q <= v263;
+        v265_q <= v265;
         i0_q <= i0;
         kappa_q <= {kappa_q[4:0], kappa};
         lean_q <= {lean_q[5:0], lean};
-        v272_q <= v272;
+        v274_q <= v274;
         outside_q <= {outside_q[0:0], outside};
-        v279_q <= v279;
-        v282_q <= v282;
+        v281_q <= v281;
+        v284_q <= v284;
       end
     end
 
@@ -1746,9 +1748,9 @@ module flk_projection #(
     flk_phase_mux #(.Width(10)) i_u_v196_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v196_b_even[19:10]), .b_i(u_v196_b_odd[19:10]), .y_o(u_v196_b[19:10]));
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v196 (.clk_i, .en_i, .a_i(u_v196_a), .b_i(u_v196_b), .prod_o(u_v196));
     assign v196 = u_v196;
-    assign v266 = u_v196;
+    assign v268 = u_v196;
     assign u_v197_a_even = gv2_q[0];
-    assign u_v197_a_odd = v266;
+    assign u_v197_a_odd = v268;
     flk_phase_mux #(.Width(10)) i_u_v197_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v197_a_even[9:0]), .b_i(u_v197_a_odd[9:0]), .y_o(u_v197_a[9:0]));
     flk_phase_mux #(.Width(10)) i_u_v197_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v197_a_even[19:10]), .b_i(u_v197_a_odd[19:10]), .y_o(u_v197_a[19:10]));
     assign u_v197_b_even = gv2_q[0];
@@ -1757,7 +1759,7 @@ module flk_projection #(
     flk_phase_mux #(.Width(10)) i_u_v197_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v197_b_even[19:10]), .b_i(u_v197_b_odd[19:10]), .y_o(u_v197_b[19:10]));
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v197 (.clk_i, .en_i, .a_i(u_v197_a), .b_i(u_v197_b), .prod_o(u_v197));
     assign v197 = u_v197;
-    assign v267 = u_v197;
+    assign v269 = u_v197;
     assign u_v198_a_even = v195;
     assign u_v198_a_odd = v194;
     flk_phase_mux #(.Width(10)) i_u_v198_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v198_a_even[9:0]), .b_i(u_v198_a_odd[9:0]), .y_o(u_v198_a[9:0]));
@@ -1770,7 +1772,7 @@ module flk_projection #(
     assign v198 = u_v198;
     assign xx = u_v198;
     assign u_v205_a_even = gu1;
-    assign u_v205_a_odd = v267;
+    assign u_v205_a_odd = v269;
     flk_phase_mux #(.Width(10)) i_u_v205_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v205_a_even[9:0]), .b_i(u_v205_a_odd[9:0]), .y_o(u_v205_a[9:0]));
     flk_phase_mux #(.Width(10)) i_u_v205_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v205_a_even[19:10]), .b_i(u_v205_a_odd[19:10]), .y_o(u_v205_a[19:10]));
     assign u_v205_b_even = gv2;
@@ -1790,7 +1792,7 @@ module flk_projection #(
     flk_phase_mux #(.Width(10)) i_u_v206_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v206_b_even[19:10]), .b_i(u_v206_b_odd[19:10]), .y_o(u_v206_b[19:10]));
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v206 (.clk_i, .en_i, .a_i(u_v206_a), .b_i(u_v206_b), .prod_o(u_v206));
     assign v206 = u_v206;
-    assign v269 = u_v206;
+    assign v271 = u_v206;
     assign u_cross0_a_even = v205;
     assign u_cross0_a_odd = v199;
     flk_phase_mux #(.Width(10)) i_u_cross0_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_cross0_a_even[9:0]), .b_i(u_cross0_a_odd[9:0]), .y_o(u_cross0_a[9:0]));
@@ -1807,7 +1809,7 @@ module flk_projection #(
     flk_phase_mux #(.Width(10)) i_u_v208_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v208_a_even[9:0]), .b_i(u_v208_a_odd[9:0]), .y_o(u_v208_a[9:0]));
     flk_phase_mux #(.Width(10)) i_u_v208_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v208_a_even[19:10]), .b_i(u_v208_a_odd[19:10]), .y_o(u_v208_a[19:10]));
     assign u_v208_b_even = gv0;
-    assign u_v208_b_odd = v269;
+    assign u_v208_b_odd = v271;
     flk_phase_mux #(.Width(10)) i_u_v208_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v208_b_even[9:0]), .b_i(u_v208_b_odd[9:0]), .y_o(u_v208_b[9:0]));
     flk_phase_mux #(.Width(10)) i_u_v208_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v208_b_even[19:10]), .b_i(u_v208_b_odd[19:10]), .y_o(u_v208_b[19:10]));
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v208 (.clk_i, .en_i, .a_i(u_v208_a), .b_i(u_v208_b), .prod_o(u_v208));
@@ -1856,34 +1858,36 @@ module flk_projection #(
     flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_radius_y (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v248_q[0] : v246), .y_o(u_radius_y));
     assign radius_y = u_radius_y;
     assign radius_x = u_radius_y;
-    assign v250 = 32'(32'($signed(radius_x_q[0])) - 32'($signed(x_q[0])));
-    assign v251 = 25'($signed(v250_q[0]) >>> 7);
-    assign v252 = 25'(25'sd0 - v251);
-    assign v253 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
-    assign v254 = 25'($signed(v253_q[0]) >>> 7);
-    assign v255 = 24'($signed(v252_q[0]) < 25'sd0 ? 25'sd0 : $signed(v252_q[0]));
-    assign v256 = 12'(width_i - 13'd1);
-    assign v257 = 25'($signed(25'(v256)) < v254 ? $signed(25'(v256)) : v254);
-    assign v258 = 32'(32'($signed(radius_y_q[0])) - 32'($signed(y_q[0])));
-    assign v259 = 25'($signed(v258_q[0]) >>> 7);
-    assign v260 = 25'(25'sd0 - v259);
-    assign v261 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
-    assign v262 = 25'($signed(v261_q[0]) >>> 7);
-    assign v263 = 24'($signed(v260_q[0]) < 25'sd0 ? 25'sd0 : $signed(v260_q[0]));
-    assign v264 = 12'(height_i - 13'd1);
-    assign v265 = 25'($signed(25'(v264)) < v262 ? $signed(25'(v264)) : v262);
-    assign v272 = $signed(25'(v255_q[0])) > $signed(v257_q[0]);
-    assign v273 = $signed(25'(v263_q[0])) > $signed(v265_q[0]);
-    assign outside = v272_q[0] | v273_q[0];
-    assign v275 = square;
-    assign v276 = 27'(v275 >>> 1);
-    assign v277 = t2[27] ? '0 : t2;
-    assign v278 = v277;
-    assign v279 = by_distance_i ? 28'(v276) : v278;
-    assign v280 = by_distance_i ? 26'd31981568 : 26'd65011712;
-    assign v281 = 29'($signed(29'(v279_q[0])) - $signed(29'(v280)));
-    assign v282 = 28'($signed(v281_q[0]) < 29'sd0 ? 29'sd0 : $signed(v281_q[0]));
-    assign key = 24'(28'd16777215 < v282_q[0] ? 28'd16777215 : v282_q[0]);
+    assign v250 = ~$signed(radius_x_q[0]);
+    assign v251 = 32'(32'($signed(x_q[0])) + 32'(v250));
+    assign v252 = 25'($signed(v251_q[0]) >>> 7);
+    assign v253 = 25'(v252 + 25'sd1);
+    assign v254 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
+    assign v255 = 25'($signed(v254_q[0]) >>> 7);
+    assign v256 = 24'($signed(v253_q[0]) < 25'sd0 ? 25'sd0 : $signed(v253_q[0]));
+    assign v257 = 12'(width_i - 13'd1);
+    assign v258 = 25'($signed(25'(v257)) < v255 ? $signed(25'(v257)) : v255);
+    assign v259 = ~$signed(radius_y_q[0]);
+    assign v260 = 32'(32'($signed(y_q[0])) + 32'(v259));
+    assign v261 = 25'($signed(v260_q[0]) >>> 7);
+    assign v262 = 25'(v261 + 25'sd1);
+    assign v263 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
+    assign v264 = 25'($signed(v263_q[0]) >>> 7);
+    assign v265 = 24'($signed(v262_q[0]) < 25'sd0 ? 25'sd0 : $signed(v262_q[0]));
+    assign v266 = 12'(height_i - 13'd1);
+    assign v267 = 25'($signed(25'(v266)) < v264 ? $signed(25'(v266)) : v264);
+    assign v274 = $signed(25'(v256_q[0])) > $signed(v258_q[0]);
+    assign v275 = $signed(25'(v265_q[0])) > $signed(v267_q[0]);
+    assign outside = v274_q[0] | v275_q[0];
+    assign v277 = square;
+    assign v278 = 27'(v277 >>> 1);
+    assign v279 = t2[27] ? '0 : t2;
+    assign v280 = v279;
+    assign v281 = by_distance_i ? 28'(v278) : v280;
+    assign v282 = by_distance_i ? 26'd31981568 : 26'd65011712;
+    assign v283 = 29'($signed(29'(v281_q[0])) - $signed(29'(v282)));
+    assign v284 = 28'($signed(v283_q[0]) < 29'sd0 ? 29'sd0 : $signed(v283_q[0]));
+    assign key = 24'(28'd16777215 < v284_q[0] ? 28'd16777215 : v284_q[0]);
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_0 (.x_i(d0_q[0]), .y_o(direction_0));
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_1 (.x_i(d1_q[0]), .y_o(direction_1));
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_2 (.x_i(d2_q[0]), .y_o(direction_2));
@@ -2243,39 +2247,41 @@ module flk_projection #(
     logic signed [29:0] u_radius_x;
     logic [19:0] v248;  // cycle 80
     logic signed [29:0] radius_y;  // cycle 83
-    logic signed [31:0] v250;  // cycle 83
-    logic signed [24:0] v251;  // cycle 84
+    logic signed [29:0] v250;  // cycle 83
+    logic signed [31:0] v251;  // cycle 83
     logic signed [24:0] v252;  // cycle 84
-    logic signed [31:0] v253;  // cycle 83
-    logic signed [24:0] v254;  // cycle 84
-    logic [23:0] v255;  // cycle 85
-    logic [11:0] v256;
-    logic signed [24:0] v257;  // cycle 84
-    logic signed [31:0] v258;  // cycle 84
-    logic signed [24:0] v259;  // cycle 85
-    logic signed [24:0] v260;  // cycle 85
-    logic signed [31:0] v261;  // cycle 84
+    logic signed [24:0] v253;  // cycle 84
+    logic signed [31:0] v254;  // cycle 83
+    logic signed [24:0] v255;  // cycle 84
+    logic [23:0] v256;  // cycle 85
+    logic [11:0] v257;
+    logic signed [24:0] v258;  // cycle 84
+    logic signed [29:0] v259;  // cycle 84
+    logic signed [31:0] v260;  // cycle 84
+    logic signed [24:0] v261;  // cycle 85
     logic signed [24:0] v262;  // cycle 85
-    logic [23:0] v263;  // cycle 86
-    logic [11:0] v264;
-    logic signed [24:0] v265;  // cycle 85
-    logic [19:0] v266;  // cycle 88
-    logic [19:0] v267;  // cycle 92
+    logic signed [31:0] v263;  // cycle 84
+    logic signed [24:0] v264;  // cycle 85
+    logic [23:0] v265;  // cycle 86
+    logic [11:0] v266;
+    logic signed [24:0] v267;  // cycle 85
+    logic [19:0] v268;  // cycle 88
+    logic [19:0] v269;  // cycle 92
     logic [19:0] i0;  // cycle 96
-    logic [19:0] v269;  // cycle 76
+    logic [19:0] v271;  // cycle 76
     logic [19:0] kappa;  // cycle 80
     logic [19:0] lean;  // cycle 76
-    logic v272;  // cycle 86
-    logic v273;  // cycle 87
+    logic v274;  // cycle 86
+    logic v275;  // cycle 87
     logic outside;  // cycle 88
-    logic [27:0] v275;  // cycle 23
-    logic [26:0] v276;  // cycle 23
-    logic [27:0] v277;  // cycle 22
-    logic [27:0] v278;  // cycle 22
-    logic [27:0] v279;  // cycle 23
-    logic [25:0] v280;
-    logic signed [28:0] v281;  // cycle 24
-    logic [27:0] v282;  // cycle 25
+    logic [27:0] v277;  // cycle 23
+    logic [26:0] v278;  // cycle 23
+    logic [27:0] v279;  // cycle 22
+    logic [27:0] v280;  // cycle 22
+    logic [27:0] v281;  // cycle 23
+    logic [25:0] v282;
+    logic signed [28:0] v283;  // cycle 24
+    logic [27:0] v284;  // cycle 25
     logic [23:0] key;  // cycle 28
     logic [19:0] direction_0;  // cycle 12
     logic [19:0] direction_1;  // cycle 12
@@ -2394,28 +2400,28 @@ module flk_projection #(
     logic [0:0][29:0] radius_x_q;
     logic [0:0][19:0] v248_q;
     logic [0:0][29:0] radius_y_q;
-    logic [0:0][31:0] v250_q;
-    logic [0:0][24:0] v252_q;
-    logic [0:0][31:0] v253_q;
-    logic [0:0][23:0] v255_q;
-    logic [0:0][24:0] v257_q;
-    logic [0:0][31:0] v258_q;
-    logic [0:0][24:0] v260_q;
-    logic [0:0][31:0] v261_q;
-    logic [0:0][23:0] v263_q;
-    logic [0:0][24:0] v265_q;
-    logic [0:0][19:0] v266_q;
-    logic [0:0][19:0] v267_q;
+    logic [0:0][31:0] v251_q;
+    logic [0:0][24:0] v253_q;
+    logic [0:0][31:0] v254_q;
+    logic [0:0][23:0] v256_q;
+    logic [0:0][24:0] v258_q;
+    logic [0:0][31:0] v260_q;
+    logic [0:0][24:0] v262_q;
+    logic [0:0][31:0] v263_q;
+    logic [0:0][23:0] v265_q;
+    logic [0:0][24:0] v267_q;
+    logic [0:0][19:0] v268_q;
     logic [0:0][19:0] v269_q;
+    logic [0:0][19:0] v271_q;
     logic [3:0][19:0] kappa_q;
     logic [4:0][19:0] lean_q;
-    logic [0:0][0:0] v272_q;
-    logic [0:0][0:0] v273_q;
+    logic [0:0][0:0] v274_q;
+    logic [0:0][0:0] v275_q;
     logic [1:0][0:0] outside_q;
-    logic [0:0][27:0] v278_q;
-    logic [0:0][27:0] v279_q;
-    logic [0:0][28:0] v281_q;
-    logic [0:0][27:0] v282_q;
+    logic [0:0][27:0] v280_q;
+    logic [0:0][27:0] v281_q;
+    logic [0:0][28:0] v283_q;
+    logic [0:0][27:0] v284_q;
     logic [23:0] key_end;
     logic [19:0] direction_0_end;
     logic [19:0] direction_1_end;
@@ -2459,17 +2465,17 @@ module flk_projection #(
         sx_q <= {sx_q[3:0], sx};
         sy_q <= {sy_q[3:0], sy};
         v248_q <= v248;
-        v252_q <= v252;
-        v257_q <= v257;
+        v253_q <= v253;
         v258_q <= v258;
-        v261_q <= v261;
-        v266_q <= v266;
-        v267_q <= v267;
+        v260_q <= v260;
+        v263_q <= v263;
+        v268_q <= v268;
         v269_q <= v269;
+        v271_q <= v271;
         kappa_q <= {kappa_q[2:0], kappa};
         lean_q <= {lean_q[3:0], lean};
         outside_q <= {outside_q[0:0], outside};
-        v281_q <= v281;
+        v283_q <= v283;
       end
     end
 
@@ -2500,10 +2506,10 @@ module flk_projection #(
         v180_q <= v180;
         v186_q <= v186;
         v190_q <= v190;
-        v255_q <= v255;
-        v260_q <= v260;
-        v265_q <= v265;
-        v282_q <= v282;
+        v256_q <= v256;
+        v262_q <= v262;
+        v267_q <= v267;
+        v284_q <= v284;
       end
     end
 
@@ -2536,9 +2542,9 @@ module flk_projection #(
         v217_q <= v217;
         rxx_q <= rxx;
         radius_x_q <= radius_x;
-        v263_q <= v263;
-        v272_q <= v272;
-        v278_q <= v278;
+        v265_q <= v265;
+        v274_q <= v274;
+        v280_q <= v280;
       end
     end
 
@@ -2566,10 +2572,10 @@ module flk_projection #(
         trace_q <= trace;
         ryy_q <= {ryy_q[3:0], ryy};
         radius_y_q <= radius_y;
-        v250_q <= v250;
-        v253_q <= v253;
-        v273_q <= v273;
-        v279_q <= v279;
+        v251_q <= v251;
+        v254_q <= v254;
+        v275_q <= v275;
+        v281_q <= v281;
       end
     end
 
@@ -3008,18 +3014,18 @@ module flk_projection #(
     end
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v208 (.clk_i, .en_i, .a_i(u_v208_a_q), .b_i(u_v208_b_q), .prod_o(u_v208));
     assign v208 = u_v208;
-    assign v266 = u_v208;
+    assign v268 = u_v208;
     assign v179 = u_v208;
     assign v206 = u_v208;
     always_ff @(posedge clk_i) begin
       if (en_i) begin
-        u_v209_a_q <= phase_i == 2'd0 ? gu0_q[0] : phase_i == 2'd1 ? v266_q[0] : phase_i == 2'd2 ? v2 : gv2_q[0];
+        u_v209_a_q <= phase_i == 2'd0 ? gu0_q[0] : phase_i == 2'd1 ? v268_q[0] : phase_i == 2'd2 ? v2 : gv2_q[0];
         u_v209_b_q <= phase_i == 2'd0 ? gv2_q[0] : phase_i == 2'd1 ? ryy_q[4] : phase_i == 2'd2 ? r21_q[5] : gv2_q[0];
       end
     end
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v209 (.clk_i, .en_i, .a_i(u_v209_a_q), .b_i(u_v209_b_q), .prod_o(u_v209));
     assign v209 = u_v209;
-    assign v267 = u_v209;
+    assign v269 = u_v209;
     assign v180 = u_v209;
     assign v197 = u_v209;
     always_ff @(posedge clk_i) begin
@@ -3035,7 +3041,7 @@ module flk_projection #(
     assign gv1 = u_v216;
     always_ff @(posedge clk_i) begin
       if (en_i) begin
-        u_v211_a_q <= phase_i == 2'd0 ? gu0_q[0] : phase_i == 2'd1 ? v267_q[0] : phase_i == 2'd2 ? v0 : gv1_q[0];
+        u_v211_a_q <= phase_i == 2'd0 ? gu0_q[0] : phase_i == 2'd1 ? v269_q[0] : phase_i == 2'd2 ? v0 : gv1_q[0];
         u_v211_b_q <= phase_i == 2'd0 ? gv1_q[0] : phase_i == 2'd1 ? 20'h3f96b : phase_i == 2'd2 ? r02_q[5] : gv1_q[0];
       end
     end
@@ -3052,13 +3058,13 @@ module flk_projection #(
     end
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v212 (.clk_i, .en_i, .a_i(u_v212_a_q), .b_i(u_v212_b_q), .prod_o(u_v212));
     assign v212 = u_v212;
-    assign v269 = u_v212;
+    assign v271 = u_v212;
     assign v185 = u_v212;
     assign v191 = u_v212;
     always_ff @(posedge clk_i) begin
       if (en_i) begin
         u_v215_a_q <= phase_i == 2'd0 ? cross1_q[0] : phase_i == 2'd1 ? xy_q[2] : phase_i == 2'd2 ? v2 : v188;
-        u_v215_b_q <= phase_i == 2'd0 ? cross1_q[0] : phase_i == 2'd1 ? v269_q[0] : phase_i == 2'd2 ? r22_q[4] : s2_q[5];
+        u_v215_b_q <= phase_i == 2'd0 ? cross1_q[0] : phase_i == 2'd1 ? v271_q[0] : phase_i == 2'd2 ? r22_q[4] : s2_q[5];
       end
     end
     flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v215 (.clk_i, .en_i, .a_i(u_v215_a_q), .b_i(u_v215_b_q), .prod_o(u_v215));
@@ -3114,34 +3120,36 @@ module flk_projection #(
     flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_radius_x (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? v246 : v248_q[0]), .y_o(u_radius_x));
     assign radius_x = u_radius_x;
     assign radius_y = u_radius_x;
-    assign v250 = 32'(32'($signed(radius_x_q[0])) - 32'($signed(x_q[0])));
-    assign v251 = 25'($signed(v250_q[0]) >>> 7);
-    assign v252 = 25'(25'sd0 - v251);
-    assign v253 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
-    assign v254 = 25'($signed(v253_q[0]) >>> 7);
-    assign v255 = 24'($signed(v252_q[0]) < 25'sd0 ? 25'sd0 : $signed(v252_q[0]));
-    assign v256 = 12'(width_i - 13'd1);
-    assign v257 = 25'($signed(25'(v256)) < v254 ? $signed(25'(v256)) : v254);
-    assign v258 = 32'(32'($signed(radius_y_q[0])) - 32'($signed(y_q[0])));
-    assign v259 = 25'($signed(v258_q[0]) >>> 7);
-    assign v260 = 25'(25'sd0 - v259);
-    assign v261 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
-    assign v262 = 25'($signed(v261_q[0]) >>> 7);
-    assign v263 = 24'($signed(v260_q[0]) < 25'sd0 ? 25'sd0 : $signed(v260_q[0]));
-    assign v264 = 12'(height_i - 13'd1);
-    assign v265 = 25'($signed(25'(v264)) < v262 ? $signed(25'(v264)) : v262);
-    assign v272 = $signed(25'(v255_q[0])) > $signed(v257_q[0]);
-    assign v273 = $signed(25'(v263_q[0])) > $signed(v265_q[0]);
-    assign outside = v272_q[0] | v273_q[0];
-    assign v275 = square;
-    assign v276 = 27'(v275 >>> 1);
-    assign v277 = t2[27] ? '0 : t2;
-    assign v278 = v277;
-    assign v279 = by_distance_i ? 28'(v276) : v278_q[0];
-    assign v280 = by_distance_i ? 26'd31981568 : 26'd65011712;
-    assign v281 = 29'($signed(29'(v279_q[0])) - $signed(29'(v280)));
-    assign v282 = 28'($signed(v281_q[0]) < 29'sd0 ? 29'sd0 : $signed(v281_q[0]));
-    assign key = 24'(28'd16777215 < v282_q[0] ? 28'd16777215 : v282_q[0]);
+    assign v250 = ~$signed(radius_x_q[0]);
+    assign v251 = 32'(32'($signed(x_q[0])) + 32'(v250));
+    assign v252 = 25'($signed(v251_q[0]) >>> 7);
+    assign v253 = 25'(v252 + 25'sd1);
+    assign v254 = 32'(32'($signed(x_q[0])) + 32'($signed(radius_x_q[0])));
+    assign v255 = 25'($signed(v254_q[0]) >>> 7);
+    assign v256 = 24'($signed(v253_q[0]) < 25'sd0 ? 25'sd0 : $signed(v253_q[0]));
+    assign v257 = 12'(width_i - 13'd1);
+    assign v258 = 25'($signed(25'(v257)) < v255 ? $signed(25'(v257)) : v255);
+    assign v259 = ~$signed(radius_y_q[0]);
+    assign v260 = 32'(32'($signed(y_q[0])) + 32'(v259));
+    assign v261 = 25'($signed(v260_q[0]) >>> 7);
+    assign v262 = 25'(v261 + 25'sd1);
+    assign v263 = 32'(32'($signed(y_q[0])) + 32'($signed(radius_y_q[0])));
+    assign v264 = 25'($signed(v263_q[0]) >>> 7);
+    assign v265 = 24'($signed(v262_q[0]) < 25'sd0 ? 25'sd0 : $signed(v262_q[0]));
+    assign v266 = 12'(height_i - 13'd1);
+    assign v267 = 25'($signed(25'(v266)) < v264 ? $signed(25'(v266)) : v264);
+    assign v274 = $signed(25'(v256_q[0])) > $signed(v258_q[0]);
+    assign v275 = $signed(25'(v265_q[0])) > $signed(v267_q[0]);
+    assign outside = v274_q[0] | v275_q[0];
+    assign v277 = square;
+    assign v278 = 27'(v277 >>> 1);
+    assign v279 = t2[27] ? '0 : t2;
+    assign v280 = v279;
+    assign v281 = by_distance_i ? 28'(v278) : v280_q[0];
+    assign v282 = by_distance_i ? 26'd31981568 : 26'd65011712;
+    assign v283 = 29'($signed(29'(v281_q[0])) - $signed(29'(v282)));
+    assign v284 = 28'($signed(v283_q[0]) < 29'sd0 ? 29'sd0 : $signed(v283_q[0]));
+    assign key = 24'(28'd16777215 < v284_q[0] ? 28'd16777215 : v284_q[0]);
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_0 (.x_i(d0_q[0]), .y_o(direction_0));
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_1 (.x_i(d1_q[0]), .y_o(direction_1));
     flk_ff_narrow #(.FromBits(19), .ManBits(11)) i_direction_2 (.x_i(d2_q[0]), .y_o(direction_2));

@@ -159,34 +159,36 @@ module flk_splat_bounds #(
     logic [19:0] v18;  // cycle 11
     logic signed [29:0] v19;  // cycle 13
     logic signed [29:0] u_right;
-    logic signed [31:0] v20;  // cycle 14
-    logic signed [24:0] v21;  // cycle 15
+    logic signed [29:0] v20;  // cycle 14
+    logic signed [31:0] v21;  // cycle 14
     logic signed [24:0] v22;  // cycle 15
-    logic signed [31:0] v23;  // cycle 14
-    logic signed [24:0] v24;  // cycle 15
-    logic [23:0] v25;  // cycle 16
-    logic [11:0] v26;
-    logic signed [24:0] v27;  // cycle 15
-    logic [19:0] v28;  // cycle 11
-    logic [19:0] u_v39;
-    logic [19:0] u_v39_a, u_v39_a_even, u_v39_a_odd;
-    logic [19:0] u_v39_b, u_v39_b_even, u_v39_b_odd;
-    logic signed [29:0] v29;  // cycle 13
-    logic signed [29:0] u_v29;
-    logic signed [31:0] v30;  // cycle 14
-    logic signed [24:0] v31;  // cycle 15
-    logic signed [24:0] v32;  // cycle 15
-    logic signed [31:0] v33;  // cycle 14
+    logic signed [24:0] v23;  // cycle 15
+    logic signed [31:0] v24;  // cycle 14
+    logic signed [24:0] v25;  // cycle 15
+    logic [23:0] v26;  // cycle 16
+    logic [11:0] v27;
+    logic signed [24:0] v28;  // cycle 15
+    logic [19:0] v29;  // cycle 11
+    logic [19:0] u_v41;
+    logic [19:0] u_v41_a, u_v41_a_even, u_v41_a_odd;
+    logic [19:0] u_v41_b, u_v41_b_even, u_v41_b_odd;
+    logic signed [29:0] v30;  // cycle 13
+    logic signed [29:0] u_v30;
+    logic signed [29:0] v31;  // cycle 14
+    logic signed [31:0] v32;  // cycle 14
+    logic signed [24:0] v33;  // cycle 15
     logic signed [24:0] v34;  // cycle 15
-    logic [23:0] v35;  // cycle 16
-    logic [11:0] v36;
-    logic signed [24:0] v37;  // cycle 15
-    logic [19:0] v38;  // cycle 7
-    logic [19:0] v39;  // cycle 10
+    logic signed [31:0] v35;  // cycle 14
+    logic signed [24:0] v36;  // cycle 15
+    logic [23:0] v37;  // cycle 16
+    logic [11:0] v38;
+    logic signed [24:0] v39;  // cycle 15
+    logic [19:0] v40;  // cycle 7
+    logic [19:0] v41;  // cycle 10
     logic signed [29:0] right;  // cycle 18
     logic [19:0] limit;  // cycle 18
-    logic v42;  // cycle 17
-    logic v43;  // cycle 17
+    logic v44;  // cycle 17
+    logic v45;  // cycle 17
     logic empty;  // cycle 18
     logic [11:0] x0;  // cycle 18
     logic [11:0] x1;  // cycle 16
@@ -206,23 +208,23 @@ module flk_splat_bounds #(
     logic [0:0][19:0] v16_q;
     logic [0:0][19:0] v17_q;
     logic [0:0][29:0] v19_q;
-    logic [0:0][31:0] v20_q;
-    logic [0:0][24:0] v22_q;
-    logic [0:0][31:0] v23_q;
-    logic [0:0][23:0] v25_q;
-    logic [0:0][24:0] v27_q;
-    logic [0:0][29:0] v29_q;
-    logic [0:0][31:0] v30_q;
-    logic [0:0][24:0] v32_q;
-    logic [0:0][31:0] v33_q;
-    logic [0:0][23:0] v35_q;
-    logic [0:0][24:0] v37_q;
-    logic [0:0][19:0] v38_q;
-    logic [2:0][19:0] v39_q;
+    logic [0:0][31:0] v21_q;
+    logic [0:0][24:0] v23_q;
+    logic [0:0][31:0] v24_q;
+    logic [0:0][23:0] v26_q;
+    logic [0:0][24:0] v28_q;
+    logic [0:0][29:0] v30_q;
+    logic [0:0][31:0] v32_q;
+    logic [0:0][24:0] v34_q;
+    logic [0:0][31:0] v35_q;
+    logic [0:0][23:0] v37_q;
+    logic [0:0][24:0] v39_q;
+    logic [0:0][19:0] v40_q;
+    logic [2:0][19:0] v41_q;
     logic [0:0][29:0] right_q;
     logic [0:0][19:0] limit_q;
-    logic [0:0][0:0] v42_q;
-    logic [0:0][0:0] v43_q;
+    logic [0:0][0:0] v44_q;
+    logic [0:0][0:0] v45_q;
     logic [0:0][0:0] empty_q;
     logic [0:0][11:0] x0_q;
     logic [1:0][11:0] x1_q;
@@ -240,13 +242,13 @@ module flk_splat_bounds #(
         opacity_i_q <= opacity_i;
         v14_q <= v14;
         v17_q <= v17;
-        v20_q <= v20;
-        v23_q <= v23;
-        v25_q <= v25;
-        v30_q <= v30;
-        v33_q <= v33;
+        v21_q <= v21;
+        v24_q <= v24;
+        v26_q <= v26;
+        v32_q <= v32;
         v35_q <= v35;
-        v39_q <= {v39_q[1:0], v39};
+        v37_q <= v37;
+        v41_q <= {v41_q[1:0], v41};
         right_q <= right;
         limit_q <= limit;
         empty_q <= empty;
@@ -263,14 +265,14 @@ module flk_splat_bounds #(
         code_q <= {code_q[5:0], code};
         v16_q <= v16;
         v19_q <= v19;
-        v22_q <= v22;
-        v27_q <= v27;
-        v29_q <= v29;
-        v32_q <= v32;
-        v37_q <= v37;
-        v38_q <= v38;
-        v42_q <= v42;
-        v43_q <= v43;
+        v23_q <= v23;
+        v28_q <= v28;
+        v30_q <= v30;
+        v34_q <= v34;
+        v39_q <= v39;
+        v40_q <= v40;
+        v44_q <= v44;
+        v45_q <= v45;
       end
     end
 
@@ -294,47 +296,49 @@ module flk_splat_bounds #(
     assign code = 8'($signed(v14_q[0]));
     assign v16 = CUT[code];
     assign v17 = box_i ? 20'h40400 : v16_q[0];
-    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v39_q[2] : v18), .y_o(u_right));
+    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(phase_i == 1'd0 ? v41_q[2] : v18), .y_o(u_right));
     assign right = u_right;
     assign v19 = u_right;
-    assign v20 = 32'(32'($signed(v19_q[0])) - 32'($signed(x_i_q[6])));
-    assign v21 = 25'($signed(v20_q[0]) >>> 7);
-    assign v22 = 25'(25'sd0 - v21);
-    assign v23 = 32'(32'($signed(x_i_q[6])) + 32'($signed(v19_q[0])));
-    assign v24 = 25'($signed(v23_q[0]) >>> 7);
-    assign v25 = 24'($signed(v22_q[0]) < 25'sd0 ? 25'sd0 : $signed(v22_q[0]));
-    assign v26 = 12'(width_i - 13'd1);
-    assign v27 = 25'($signed(25'(v26)) < v24 ? $signed(25'(v26)) : v24);
-    assign u_v39_a_even = v38_q[0];
-    assign u_v39_a_odd = v17_q[0];
-    flk_phase_mux #(.Width(10)) i_u_v39_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v39_a_even[9:0]), .b_i(u_v39_a_odd[9:0]), .y_o(u_v39_a[9:0]));
-    flk_phase_mux #(.Width(10)) i_u_v39_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v39_a_even[19:10]), .b_i(u_v39_a_odd[19:10]), .y_o(u_v39_a[19:10]));
-    assign u_v39_b_even = lean_i_q[3];
-    assign u_v39_b_odd = sy_i_q[4];
-    flk_phase_mux #(.Width(10)) i_u_v39_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v39_b_even[9:0]), .b_i(u_v39_b_odd[9:0]), .y_o(u_v39_b[9:0]));
-    flk_phase_mux #(.Width(10)) i_u_v39_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v39_b_even[19:10]), .b_i(u_v39_b_odd[19:10]), .y_o(u_v39_b[19:10]));
-    flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v39 (.clk_i, .en_i, .a_i(u_v39_a), .b_i(u_v39_b), .prod_o(u_v39));
-    assign v39 = u_v39;
-    assign v28 = u_v39;
-    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v29 (.clk_i, .en_i, .x_i(v28), .y_o(u_v29));
-    assign v29 = u_v29;
-    assign v30 = 32'(32'($signed(v29_q[0])) - 32'($signed(y_i_q[6])));
-    assign v31 = 25'($signed(v30_q[0]) >>> 7);
-    assign v32 = 25'(25'sd0 - v31);
-    assign v33 = 32'(32'($signed(y_i_q[6])) + 32'($signed(v29_q[0])));
-    assign v34 = 25'($signed(v33_q[0]) >>> 7);
-    assign v35 = 24'($signed(v32_q[0]) < 25'sd0 ? 25'sd0 : $signed(v32_q[0]));
-    assign v36 = 12'(height_i - 13'd1);
-    assign v37 = 25'($signed(25'(v36)) < v34 ? $signed(25'(v36)) : v34);
-    assign v38 = SIGMAS[code];
+    assign v20 = ~$signed(v19_q[0]);
+    assign v21 = 32'(32'($signed(x_i_q[6])) + 32'(v20));
+    assign v22 = 25'($signed(v21_q[0]) >>> 7);
+    assign v23 = 25'(v22 + 25'sd1);
+    assign v24 = 32'(32'($signed(x_i_q[6])) + 32'($signed(v19_q[0])));
+    assign v25 = 25'($signed(v24_q[0]) >>> 7);
+    assign v26 = 24'($signed(v23_q[0]) < 25'sd0 ? 25'sd0 : $signed(v23_q[0]));
+    assign v27 = 12'(width_i - 13'd1);
+    assign v28 = 25'($signed(25'(v27)) < v25 ? $signed(25'(v27)) : v25);
+    assign u_v41_a_even = v40_q[0];
+    assign u_v41_a_odd = v17_q[0];
+    flk_phase_mux #(.Width(10)) i_u_v41_a_0 (.clk_i, .odd_i(next_odd), .a_i(u_v41_a_even[9:0]), .b_i(u_v41_a_odd[9:0]), .y_o(u_v41_a[9:0]));
+    flk_phase_mux #(.Width(10)) i_u_v41_a_1 (.clk_i, .odd_i(next_odd), .a_i(u_v41_a_even[19:10]), .b_i(u_v41_a_odd[19:10]), .y_o(u_v41_a[19:10]));
+    assign u_v41_b_even = lean_i_q[3];
+    assign u_v41_b_odd = sy_i_q[4];
+    flk_phase_mux #(.Width(10)) i_u_v41_b_0 (.clk_i, .odd_i(next_odd), .a_i(u_v41_b_even[9:0]), .b_i(u_v41_b_odd[9:0]), .y_o(u_v41_b[9:0]));
+    flk_phase_mux #(.Width(10)) i_u_v41_b_1 (.clk_i, .odd_i(next_odd), .a_i(u_v41_b_even[19:10]), .b_i(u_v41_b_odd[19:10]), .y_o(u_v41_b[19:10]));
+    flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v41 (.clk_i, .en_i, .a_i(u_v41_a), .b_i(u_v41_b), .prod_o(u_v41));
+    assign v41 = u_v41;
+    assign v29 = u_v41;
+    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_v30 (.clk_i, .en_i, .x_i(v29), .y_o(u_v30));
+    assign v30 = u_v30;
+    assign v31 = ~$signed(v30_q[0]);
+    assign v32 = 32'(32'($signed(y_i_q[6])) + 32'(v31));
+    assign v33 = 25'($signed(v32_q[0]) >>> 7);
+    assign v34 = 25'(v33 + 25'sd1);
+    assign v35 = 32'(32'($signed(y_i_q[6])) + 32'($signed(v30_q[0])));
+    assign v36 = 25'($signed(v35_q[0]) >>> 7);
+    assign v37 = 24'($signed(v34_q[0]) < 25'sd0 ? 25'sd0 : $signed(v34_q[0]));
+    assign v38 = 12'(height_i - 13'd1);
+    assign v39 = 25'($signed(25'(v38)) < v36 ? $signed(25'(v38)) : v36);
+    assign v40 = SIGMAS[code];
     assign limit = LOG[code_q[5]];
-    assign v42 = $signed(25'(v25_q[0])) > $signed(v27_q[0]);
-    assign v43 = $signed(25'(v35_q[0])) > $signed(v37_q[0]);
-    assign empty = v42_q[0] | v43_q[0];
-    assign x0 = 12'(v25_q[0]);
-    assign x1 = 12'($signed(v27_q[0]));
-    assign y0 = 12'(v35_q[0]);
-    assign y1 = 12'($signed(v37_q[0]));
+    assign v44 = $signed(25'(v26_q[0])) > $signed(v28_q[0]);
+    assign v45 = $signed(25'(v37_q[0])) > $signed(v39_q[0]);
+    assign empty = v44_q[0] | v45_q[0];
+    assign x0 = 12'(v26_q[0]);
+    assign x1 = 12'($signed(v28_q[0]));
+    assign y0 = 12'(v37_q[0]);
+    assign y1 = 12'($signed(v39_q[0]));
     assign unused_wrapped = ^{v14};
 
     assign empty_o = empty_q[0];
@@ -349,9 +353,9 @@ module flk_splat_bounds #(
     logic [15:0] v10;  // cycle 1
     logic [19:0] v11;  // cycle 1
     logic [19:0] v12;  // cycle 5
-    logic [19:0] u_v28;
-    logic [19:0] u_v28_a_q;
-    logic [19:0] u_v28_b_q;
+    logic [19:0] u_v29;
+    logic [19:0] u_v29_a_q;
+    logic [19:0] u_v29_b_q;
     logic signed [15:0] v13;  // cycle 7
     logic signed [15:0] u_v13;
     logic signed [15:0] v14;  // cycle 7
@@ -361,30 +365,32 @@ module flk_splat_bounds #(
     logic [19:0] v18;  // cycle 14
     logic signed [29:0] v19;  // cycle 16
     logic signed [29:0] u_right;
-    logic signed [31:0] v20;  // cycle 17
-    logic signed [24:0] v21;  // cycle 18
+    logic signed [29:0] v20;  // cycle 17
+    logic signed [31:0] v21;  // cycle 17
     logic signed [24:0] v22;  // cycle 18
-    logic signed [31:0] v23;  // cycle 17
-    logic signed [24:0] v24;  // cycle 18
-    logic [23:0] v25;  // cycle 19
-    logic [11:0] v26;
-    logic signed [24:0] v27;  // cycle 18
-    logic [19:0] v28;  // cycle 15
-    logic signed [29:0] v29;  // cycle 17
-    logic signed [31:0] v30;  // cycle 18
-    logic signed [24:0] v31;  // cycle 19
-    logic signed [24:0] v32;  // cycle 19
-    logic signed [31:0] v33;  // cycle 18
+    logic signed [24:0] v23;  // cycle 18
+    logic signed [31:0] v24;  // cycle 17
+    logic signed [24:0] v25;  // cycle 18
+    logic [23:0] v26;  // cycle 19
+    logic [11:0] v27;
+    logic signed [24:0] v28;  // cycle 18
+    logic [19:0] v29;  // cycle 15
+    logic signed [29:0] v30;  // cycle 17
+    logic signed [29:0] v31;  // cycle 18
+    logic signed [31:0] v32;  // cycle 18
+    logic signed [24:0] v33;  // cycle 19
     logic signed [24:0] v34;  // cycle 19
-    logic [23:0] v35;  // cycle 20
-    logic [11:0] v36;
-    logic signed [24:0] v37;  // cycle 19
-    logic [19:0] v38;  // cycle 8
-    logic [19:0] v39;  // cycle 12
+    logic signed [31:0] v35;  // cycle 18
+    logic signed [24:0] v36;  // cycle 19
+    logic [23:0] v37;  // cycle 20
+    logic [11:0] v38;
+    logic signed [24:0] v39;  // cycle 19
+    logic [19:0] v40;  // cycle 8
+    logic [19:0] v41;  // cycle 12
     logic signed [29:0] right;  // cycle 22
     logic [19:0] limit;  // cycle 20
-    logic v42;  // cycle 20
-    logic v43;  // cycle 21
+    logic v44;  // cycle 20
+    logic v45;  // cycle 21
     logic empty;  // cycle 22
     logic [11:0] x0;  // cycle 20
     logic [11:0] x1;  // cycle 20
@@ -404,23 +410,23 @@ module flk_splat_bounds #(
     logic [0:0][19:0] v16_q;
     logic [0:0][19:0] v17_q;
     logic [0:0][29:0] v19_q;
-    logic [0:0][31:0] v20_q;
-    logic [0:0][24:0] v22_q;
-    logic [0:0][31:0] v23_q;
-    logic [0:0][23:0] v25_q;
-    logic [0:0][24:0] v27_q;
-    logic [0:0][29:0] v29_q;
-    logic [0:0][31:0] v30_q;
-    logic [0:0][24:0] v32_q;
-    logic [0:0][31:0] v33_q;
-    logic [0:0][23:0] v35_q;
-    logic [0:0][24:0] v37_q;
-    logic [0:0][19:0] v38_q;
-    logic [1:0][19:0] v39_q;
+    logic [0:0][31:0] v21_q;
+    logic [0:0][24:0] v23_q;
+    logic [0:0][31:0] v24_q;
+    logic [0:0][23:0] v26_q;
+    logic [0:0][24:0] v28_q;
+    logic [0:0][29:0] v30_q;
+    logic [0:0][31:0] v32_q;
+    logic [0:0][24:0] v34_q;
+    logic [0:0][31:0] v35_q;
+    logic [0:0][23:0] v37_q;
+    logic [0:0][24:0] v39_q;
+    logic [0:0][19:0] v40_q;
+    logic [1:0][19:0] v41_q;
     logic [0:0][29:0] right_q;
     logic [0:0][19:0] limit_q;
-    logic [0:0][0:0] v42_q;
-    logic [0:0][0:0] v43_q;
+    logic [0:0][0:0] v44_q;
+    logic [0:0][0:0] v45_q;
     logic [0:0][0:0] empty_q;
     logic [0:0][11:0] x0_q;
     logic [0:0][11:0] x1_q;
@@ -438,11 +444,11 @@ module flk_splat_bounds #(
         code_q <= {code_q[2:0], code};
         v16_q <= v16;
         v19_q <= v19;
-        v35_q <= v35;
-        v38_q <= v38;
-        v39_q <= {v39_q[0:0], v39};
+        v37_q <= v37;
+        v40_q <= v40;
+        v41_q <= {v41_q[0:0], v41};
         limit_q <= limit;
-        v42_q <= v42;
+        v44_q <= v44;
         x0_q <= x0;
         x1_q <= x1;
         y1_q <= y1;
@@ -453,19 +459,19 @@ module flk_splat_bounds #(
       if (en_i && phase_i == 2'd1) begin
         v11_q <= v11;
         v17_q <= v17;
-        v20_q <= v20;
-        v23_q <= v23;
-        v29_q <= v29;
-        v43_q <= v43;
+        v21_q <= v21;
+        v24_q <= v24;
+        v30_q <= v30;
+        v45_q <= v45;
       end
     end
 
     always_ff @(posedge clk_i) begin
       if (en_i && phase_i == 2'd2) begin
-        v22_q <= v22;
-        v27_q <= v27;
-        v30_q <= v30;
-        v33_q <= v33;
+        v23_q <= v23;
+        v28_q <= v28;
+        v32_q <= v32;
+        v35_q <= v35;
         right_q <= right;
         empty_q <= empty;
       end
@@ -474,9 +480,9 @@ module flk_splat_bounds #(
     always_ff @(posedge clk_i) begin
       if (en_i && phase_i == 2'd3) begin
         v14_q <= v14;
-        v25_q <= v25;
-        v32_q <= v32;
-        v37_q <= v37;
+        v26_q <= v26;
+        v34_q <= v34;
+        v39_q <= v39;
       end
     end
 
@@ -484,50 +490,52 @@ module flk_splat_bounds #(
     flk_ff_from_fp16 #(.ManBits(11)) i_v11 (.x_i(v10), .y_o(v11));
     always_ff @(posedge clk_i) begin
       if (en_i) begin
-        u_v28_a_q <= phase_i == 2'd0 ? v17_q[0] : phase_i == 2'd1 ? v38_q[0] : phase_i == 2'd2 ? scale_i_q[0] : v17_q[0];
-        u_v28_b_q <= phase_i == 2'd0 ? sy_i_q[2] : phase_i == 2'd1 ? lean_i_q[2] : phase_i == 2'd2 ? v11_q[0] : sx_i_q[2];
+        u_v29_a_q <= phase_i == 2'd0 ? v17_q[0] : phase_i == 2'd1 ? v40_q[0] : phase_i == 2'd2 ? scale_i_q[0] : v17_q[0];
+        u_v29_b_q <= phase_i == 2'd0 ? sy_i_q[2] : phase_i == 2'd1 ? lean_i_q[2] : phase_i == 2'd2 ? v11_q[0] : sx_i_q[2];
       end
     end
-    flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v28 (.clk_i, .en_i, .a_i(u_v28_a_q), .b_i(u_v28_b_q), .prod_o(u_v28));
-    assign v28 = u_v28;
-    assign v39 = u_v28;
-    assign v12 = u_v28;
-    assign v18 = u_v28;
+    flk_ff_mul #(.ManBits(11), .Stages(2)) i_u_v29 (.clk_i, .en_i, .a_i(u_v29_a_q), .b_i(u_v29_b_q), .prod_o(u_v29));
+    assign v29 = u_v29;
+    assign v41 = u_v29;
+    assign v12 = u_v29;
+    assign v18 = u_v29;
     flk_ff_to_fixed #(.Bits(16), .FracBits(0), .Round(1), .ManBits(11), .Stages(2)) i_u_v13 (.clk_i, .en_i, .x_i(v12), .y_o(u_v13));
     assign v13 = u_v13;
     assign v14 = 16'(16'sd255 < v13 ? 16'sd255 : v13);
     assign code = 8'($signed(v14_q[0]));
     assign v16 = CUT[code];
     assign v17 = box_i ? 20'h40400 : v16_q[0];
-    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? v39_q[1] : phase_i == 2'd2 ? v18 : v28), .y_o(u_right));
+    flk_ff_to_fixed #(.Bits(30), .FracBits(7), .Round(1), .ManBits(11), .Stages(2)) i_u_right (.clk_i, .en_i, .x_i(phase_i == 2'd0 ? v41_q[1] : phase_i == 2'd2 ? v18 : v29), .y_o(u_right));
     assign right = u_right;
     assign v19 = u_right;
-    assign v29 = u_right;
-    assign v20 = 32'(32'($signed(v19_q[0])) - 32'($signed(x_i_q[4])));
-    assign v21 = 25'($signed(v20_q[0]) >>> 7);
-    assign v22 = 25'(25'sd0 - v21);
-    assign v23 = 32'(32'($signed(x_i_q[4])) + 32'($signed(v19_q[0])));
-    assign v24 = 25'($signed(v23_q[0]) >>> 7);
-    assign v25 = 24'($signed(v22_q[0]) < 25'sd0 ? 25'sd0 : $signed(v22_q[0]));
-    assign v26 = 12'(width_i - 13'd1);
-    assign v27 = 25'($signed(25'(v26)) < v24 ? $signed(25'(v26)) : v24);
-    assign v30 = 32'(32'($signed(v29_q[0])) - 32'($signed(y_i_q[4])));
-    assign v31 = 25'($signed(v30_q[0]) >>> 7);
-    assign v32 = 25'(25'sd0 - v31);
-    assign v33 = 32'(32'($signed(y_i_q[4])) + 32'($signed(v29_q[0])));
-    assign v34 = 25'($signed(v33_q[0]) >>> 7);
-    assign v35 = 24'($signed(v32_q[0]) < 25'sd0 ? 25'sd0 : $signed(v32_q[0]));
-    assign v36 = 12'(height_i - 13'd1);
-    assign v37 = 25'($signed(25'(v36)) < v34 ? $signed(25'(v36)) : v34);
-    assign v38 = SIGMAS[code];
+    assign v30 = u_right;
+    assign v20 = ~$signed(v19_q[0]);
+    assign v21 = 32'(32'($signed(x_i_q[4])) + 32'(v20));
+    assign v22 = 25'($signed(v21_q[0]) >>> 7);
+    assign v23 = 25'(v22 + 25'sd1);
+    assign v24 = 32'(32'($signed(x_i_q[4])) + 32'($signed(v19_q[0])));
+    assign v25 = 25'($signed(v24_q[0]) >>> 7);
+    assign v26 = 24'($signed(v23_q[0]) < 25'sd0 ? 25'sd0 : $signed(v23_q[0]));
+    assign v27 = 12'(width_i - 13'd1);
+    assign v28 = 25'($signed(25'(v27)) < v25 ? $signed(25'(v27)) : v25);
+    assign v31 = ~$signed(v30_q[0]);
+    assign v32 = 32'(32'($signed(y_i_q[4])) + 32'(v31));
+    assign v33 = 25'($signed(v32_q[0]) >>> 7);
+    assign v34 = 25'(v33 + 25'sd1);
+    assign v35 = 32'(32'($signed(y_i_q[4])) + 32'($signed(v30_q[0])));
+    assign v36 = 25'($signed(v35_q[0]) >>> 7);
+    assign v37 = 24'($signed(v34_q[0]) < 25'sd0 ? 25'sd0 : $signed(v34_q[0]));
+    assign v38 = 12'(height_i - 13'd1);
+    assign v39 = 25'($signed(25'(v38)) < v36 ? $signed(25'(v38)) : v36);
+    assign v40 = SIGMAS[code];
     assign limit = LOG[code_q[2]];
-    assign v42 = $signed(25'(v25_q[0])) > $signed(v27_q[0]);
-    assign v43 = $signed(25'(v35_q[0])) > $signed(v37_q[0]);
-    assign empty = v42_q[0] | v43_q[0];
-    assign x0 = 12'(v25_q[0]);
-    assign x1 = 12'($signed(v27_q[0]));
-    assign y0 = 12'(v35_q[0]);
-    assign y1 = 12'($signed(v37_q[0]));
+    assign v44 = $signed(25'(v26_q[0])) > $signed(v28_q[0]);
+    assign v45 = $signed(25'(v37_q[0])) > $signed(v39_q[0]);
+    assign empty = v44_q[0] | v45_q[0];
+    assign x0 = 12'(v26_q[0]);
+    assign x1 = 12'($signed(v28_q[0]));
+    assign y0 = 12'(v37_q[0]);
+    assign y1 = 12'($signed(v39_q[0]));
     assign unused_wrapped = ^{v14};
 
     assign empty_o = empty_q[0];

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -33,9 +34,9 @@ from flicker.scene.packing import pack_file
 from flicker.scene.real import REAL_VIEWS, RealView
 from flicker.scene.sources import Source, open_scene
 from flicker.scene.temporal import TemporalError
-from flicker.sim.chip import ChipSession
+from flicker.sim.chip import ChipSession, build
 from flicker.sim.half import MemoryOptions
-from flicker.sim.row import back_to_back
+from flicker.sim.row import RowFrame, back_to_back
 
 from .common import SIZE, Say, folder_of_scenes
 
@@ -144,21 +145,25 @@ ROW = 4  # frames back to back in RTL, the last of a path: its third is measured
 LOOSE = {"records": 0.02, "lists": 0.002}  # which lines are read again, and whether a list that is read again is left before that, depends on timing
 CHUNKS = 24_000  # of a list writer: enough for these views
 TURNING, MOVING = (next(case for case in MOTIONS if case.tolerance == t and case.share == s) for t, s in ((0, 0.0), (TWO, 0.001)))
-HARDWARE = (  # folder, path, with kept colours, memories, refresh
-    ("flowers", TURNING, False, "default", Refresh.ALL_BANKS), ("flowers", TURNING, False, "records", Refresh.ALL_BANKS),
-    ("flowers", TURNING, True, "records", Refresh.ALL_BANKS), ("flowers", MOVING, True, "records", Refresh.ALL_BANKS),
-    ("flowers", TURNING, False, "large", Refresh.PER_BANK), ("flowers", MOVING, True, "large", Refresh.PER_BANK),
-    ("playbot", MOVING, False, "records", Refresh.ALL_BANKS), ("playbot", MOVING, True, "records", Refresh.ALL_BANKS),
+DRAM, WIDER = DramConfig(), DramConfig(interleave_bytes=256)  # the channel changes every 64 bytes, every 256
+HARDWARE = (  # folder, path, with kept colours, memories, DRAM
+    ("flowers", TURNING, False, "default", DRAM), ("flowers", TURNING, False, "records", DRAM), ("flowers", TURNING, True, "records", DRAM),
+    ("flowers", MOVING, True, "records", DRAM),
+    ("flowers", TURNING, False, "records", WIDER), ("flowers", TURNING, True, "records", WIDER), ("flowers", MOVING, True, "records", WIDER),
+    ("flowers", TURNING, False, "records", replace(WIDER, refresh=Refresh.PER_BANK)),
+    ("flowers", MOVING, True, "records", replace(WIDER, refresh=Refresh.PER_BANK)),
+    ("playbot", MOVING, True, "records", DRAM), ("playbot", MOVING, True, "records", WIDER),
 )
+ROWS_OF = (3, 6)  # of these: what they open rows for
 
 
-def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, refresh: Refresh) -> tuple[tuple, tuple]:
-    """A row of each table. The frames before those in RTL are of the golden model, whose store the chip finds."""
+def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, dram: DramConfig) -> tuple[tuple, tuple, list[tuple]]:
+    """A row of the first two tables, and of the third. The frames before those in RTL are of the golden model, whose store the chip finds."""
     view = next(v for v in REAL_VIEWS if v.folder == folder)
     path = view.path(folder_of_scenes())
-    source, packed, dram = open_scene(path), pack_file(path).packed, DramConfig(refresh=refresh)
+    source, packed = open_scene(path), pack_file(path).packed
     title = f"{view.title}, {case.motion}" + (f", {case.tolerance or 0}" if keeps else "")
-    say(f"{title}: memories {memories}, refresh {refresh}")
+    say(f"{title}: memories {memories}, refresh {dram.refresh}, channels of {dram.interleave_bytes} bytes")
     config = CONFIG.with_(memories=memories)
     views, reuse = cameras(case, source, view, packed), Reuse(ColourStore(packed), float(case.tolerance)) if keeps else None
     for camera in views[:-ROW] if keeps else ():
@@ -177,18 +182,32 @@ def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, 
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
     assert found.interval is not None
     kept = str(case.tolerance or 0) if keeps else "-"
-    head = (view.title, case.motion, kept, memories, str(refresh))
+    head = (view.title, case.motion, kept, memories, str(dram.interleave_bytes), str(dram.refresh))
     moved, busy = sum(found.moved.values()), {name: clocks / sum(found.spent.values()) for name, clocks in found.spent.items()}
     return (
         (*head, f"{moved / 1e6:.1f}", f"{found.interval:,}", f"{model.interval / found.interval - 1:+.1%}", f"{1e9 / found.interval:,.0f}"),
         (*head, *(f"{share:.1%}" for share in busy.values())),
+        _rows_opened(head, found),
     )
 
 
+def _rows_opened(head: tuple, found: RowFrame) -> list[tuple]:
+    """By stream, those first that wait longest."""
+    clocks = sum(found.spent.values())
+    return [
+        (*head, name, f"{bursts:,}", f"{opened:,}", f"{bursts / opened:.1f}", f"{waited / clocks:.1%}")
+        for name, (bursts, opened, waited) in sorted(found.rows.items(), key=lambda row: -row[1][2]) if opened
+    ]
+
+
 def hardware_tables(say: Say) -> dict[str, str]:
-    rows, spent = zip(*(_in_hardware(say, *row) for row in HARDWARE))
-    head = ["view", "motion", "tolerance", "memories", "refresh"]
+    for memories in {row[3] for row in HARDWARE}:
+        build(CONFIG.with_(memories=memories))
+    with ThreadPoolExecutor(2) as pool:  # the simulators run outside of the interpreter's lock
+        rows, spent, opened = zip(*pool.map(lambda row: _in_hardware(say, *row), HARDWARE))
+    head = ["view", "motion", "tolerance", "memories", "bytes a channel", "refresh"]
     return {
         "cycles": table([*head, "MB", "interval back to back", "model off by", "frames a second"], list(rows), numbers=True),
         "spent": table([*head, "data", "nothing waits", "turns between reads and writes", "refresh", "rows"], list(spent), numbers=True),
+        "rows": table([*head, "stream", "bursts", "rows opened", "bursts a row", "waited for rows"], [row for k in ROWS_OF for row in opened[k]], numbers=True),
     }

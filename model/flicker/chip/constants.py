@@ -35,7 +35,6 @@ DRAM_TRFC_BANK = 224
 DRAM_INTERLEAVE_BYTES = 64
 DRAM_WINDOW = 32
 DRAM_WRITE_PLACES = 64
-DRAM_URGENT_LEAD = 24
 DRAM_BATCH_BURSTS = 256
 DRAM_REQUEST_BURSTS = 16
 DRAM_LATENCY_CYCLES = 100
@@ -116,7 +115,6 @@ SOURCES = {
     "DRAM_INTERLEAVE_BYTES": "assumption: 64 bytes of consecutive addresses a channel",
     "DRAM_WINDOW": "assumption: reads a channel's controller sees ahead, to open rows early",
     "DRAM_WRITE_PLACES": "assumption: writes a channel's controller gathers and answers at once, to turn the bus more rarely; as gem5's memory controller",
-    "DRAM_URGENT_LEAD": "assumption: clocks by which bursts of urgent transactions may move later than others and still go first",
     "DRAM_BATCH_BURSTS": "assumption: bursts of one purpose before the arbiter turns to the next (32 a channel)",
     "DRAM_REQUEST_BURSTS": "the same where both halves of the chip share the memory: a request for a chunk of a list, 512 bytes",
     "DRAM_LATENCY_CYCLES": "assumption: 100 ns from request to data, controller and interconnect included",

@@ -44,7 +44,6 @@ class DramConfig:
     interleave_bytes: int = c.DRAM_INTERLEAVE_BYTES
     window: int = c.DRAM_WINDOW
     write_places: int = c.DRAM_WRITE_PLACES
-    urgent_lead: int = c.DRAM_URGENT_LEAD
     trcd: int = c.DRAM_TRCD
     trp: int = c.DRAM_TRP
     trp_all: int = c.DRAM_TRP_ALL
@@ -77,8 +76,6 @@ class DramConfig:
             raise FlickerError(f"DRAM: window must be at least 1, not {self.window}")
         if self.write_places < 0:
             raise FlickerError(f"DRAM: write_places must be at least 0, not {self.write_places}")
-        if self.urgent_lead < 0:
-            raise FlickerError(f"DRAM: urgent_lead must be at least 0, not {self.urgent_lead}")
 
     @property
     def burst_bytes(self) -> int:
@@ -106,7 +103,7 @@ class DramConfig:
         half = self.burst_clocks
         return Timing(
             channels=self.channels, banks=self.banks, interleave_bytes=self.interleave_bytes, page_bytes=self.page_bytes,
-            burst_bytes=self.burst_bytes, window=self.window, writes=self.write_places, lead=self.urgent_lead,
+            burst_bytes=self.burst_bytes, window=self.window, writes=self.write_places,
             rcd=self.trcd, rp=self.trp, rp_all=self.trp_all, ras=self.tras, rrd=self.trrd, faw=self.tfaw, ccd=self.tccd,
             ccd_masked=self.tccd_masked, rtp=self.trtp,
             write_pre=self.wl + half + self.twr, write_read=self.wl + half + self.twtr + 1,

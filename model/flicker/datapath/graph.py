@@ -141,6 +141,9 @@ class Value:
     def __neg__(self) -> Value:
         return self.graph.integer(0) - self
 
+    def __invert__(self) -> Value:
+        return self.graph.wire("~{0}", Int(-self.range.high - 1, -self.range.low - 1), (self,))
+
     def __lshift__(self, places: int) -> Value:
         if not places:
             return self

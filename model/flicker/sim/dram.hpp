@@ -4,7 +4,7 @@
 // quarters of their places are taken, until a quarter is. Of a queue the burst whose data can move first is served, the oldest among equals, so that row hits go
 // first and activates overlap with the data of other banks; a burst is passed over at most 4 x its queue's places times. With `writes` 0 both kinds share the
 // `window`, and the bus turns as rarely as that allows.
-// Urgent bursts are chosen as if their data could move `lead` clocks earlier.
+// Urgent bursts enter a full queue before others; in it they are bursts like all.
 // Refresh: all banks of a channel every tREFI, for tRFCab; or one bank every tREFI / banks, for tRFCpb, while the others go on: of those that the round has still
 // to refresh the one that fewest bursts in the queue wait for. It counts as an activate for tRRD and tFAW.
 // Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed
@@ -30,7 +30,7 @@ enum Kind : int8_t { READ = 0, WRITE = 1, MASKED_WRITE = 2 };
 
 // Organisation and timing, as chip/dram.py hands them in: sim/memory.py has the same fields in the same order. Clocks unless named otherwise.
 struct Timing {
-  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window, writes, lead;
+  int64_t channels, banks, interleave_bytes, page_bytes, burst_bytes, window, writes;
   int64_t rcd, rp, rp_all, ras, rrd, faw, ccd, ccd_masked, rtp;
   int64_t write_pre, write_read, read_write;  // write to precharge, write to read, read to write
   int64_t refi, rfc, rfc_bank;                // refi 0: no refresh; rfc_bank 0: all banks at once, for rfc
@@ -47,6 +47,11 @@ struct Completion {
 
 struct Place {
   int64_t channel, bank, row;
+};
+
+// Of some bursts: rows that were opened for them, and clocks of their channels' buses that went to that (`Counts::rows`).
+struct Rows {
+  uint64_t opened = 0, clocks = 0;
 };
 
 // Of a channel's clocks up to its last column command each is one of: data (a burst's tCCD), nothing waits, the bus turns between reads and writes, a refresh
@@ -93,14 +98,13 @@ class Channel {
   bool full(int queue) const { return queue_[queue].waiting == queue_[queue].places; }
 
   // A burst that waits from `clock` on, or from the column command that freed its place. Not when its queue is full.
-  void push(int64_t bank, int64_t row, int8_t kind, int64_t clock = 0, Completion* done = nullptr, bool urgent = false) {
+  void push(int64_t bank, int64_t row, int8_t kind, int64_t clock = 0, Completion* done = nullptr, Rows* rows = nullptr) {
     Queue& q = queue_[queue_of(kind)];
     if (q.head + q.waiting == static_cast<int>(q.burst.size())) {  // at least half of the places lie before the queue
       std::copy(q.burst.begin() + q.head, q.burst.begin() + q.head + q.waiting, q.burst.begin());
       q.head = 0;
     }
-    q.burst[q.head + q.waiting++] = {row, std::max({clock, last_column_, int64_t{0}}), done, static_cast<int32_t>(bank), kind, urgent};
-    q.urgent += urgent;
+    q.burst[q.head + q.waiting++] = {row, std::max({clock, last_column_, int64_t{0}}), done, rows, static_cast<int32_t>(bank), kind};
     chosen_ = false;
   }
 
@@ -124,7 +128,11 @@ class Channel {
       bank.column = activate_ + t_.rcd;
       bank.precharge = activate_ + t_.ras;
     }
-    account(burst.kind);
+    const int64_t waited = account(burst.kind);
+    if (burst.rows) {
+      burst.rows->opened += activate_ >= 0;
+      burst.rows->clocks += waited;
+    }
     const bool read = burst.kind == READ;
     bank.precharge = std::max(bank.precharge, column_ + (read ? t_.rtp : t_.write_pre));
     if (!read) bank.wrote = column_;
@@ -137,7 +145,6 @@ class Channel {
     }
     last_column_ = column_;
     last_kind_ = burst.kind;
-    q.urgent -= burst.urgent;
     for (int w = best_; w > 0; --w) q.burst[q.head + w] = q.burst[q.head + w - 1];
     ++q.head;
     --q.waiting;
@@ -162,20 +169,20 @@ class Channel {
   struct Burst {
     int64_t row, arrived;
     Completion* done;
+    Rows* rows;
     int32_t bank;
     int8_t kind;
-    bool urgent;
   };
   struct Queue {
     explicit Queue(int64_t n) : places(static_cast<int>(n)), burst(2 * n) {}
     int places;
     std::vector<Burst> burst;  // `waiting` from `head` on, oldest first
-    int head = 0, waiting = 0, urgent = 0;
+    int head = 0, waiting = 0;
     int64_t passed_over = 0;
   };
 
-  // What the clocks since the last column command went to, before the one of a burst of this kind.
-  void account(int8_t kind) {
+  // What the clocks since the last column command went to, before the one of a burst of this kind; those of them that went to rows.
+  int64_t account(int8_t kind) {
     int64_t from = std::max<int64_t>(last_column_ + t_.ccd, 0), arrived = NEVER;
     for (const Queue& q : queue_) {
       if (q.waiting > 0) arrived = std::min(arrived, q.burst[q.head].arrived);
@@ -188,8 +195,10 @@ class Channel {
     until(arrived, counts.idle);
     if ((kind == READ) != (last_kind_ == READ)) until(last_column_ + (kind == READ ? t_.write_read : t_.read_write), counts.turning);
     until(refreshed_, counts.refreshing);
+    const int64_t before = counts.rows;
     until(column_, counts.rows);
     counts.data += t_.ccd;
+    return counts.rows - before;
   }
 
   // Whether writes or reads move next.
@@ -270,13 +279,11 @@ class Channel {
       }
       column = std::max({column, burst.arrived, burst.kind == READ ? read_min : write_min});
       if (burst.kind == MASKED_WRITE) column = std::max(column, bank.wrote + t_.ccd_masked);
-      const int64_t rank = column - (burst.urgent ? t_.lead : 0);
-      if (rank < best) {
+      if (column < best) {
         best_ = w;
-        best = rank;
-        column_ = column;
+        best = column_ = column;
         activate_ = activate;
-        if (column == last_column_ + t_.ccd && (burst.urgent || q.urgent == 0)) break;  // nothing can be earlier
+        if (column == last_column_ + t_.ccd) break;  // nothing can be earlier
       }
       if (!patient) break;  // the oldest has waited long enough
     }
@@ -336,13 +343,13 @@ class Engine {
   int64_t clock_of(int64_t cycle) const { return (cycle * clocks_ + cycles_ - 1) / cycles_; }
   int64_t cycle_of(int64_t clock) const { return (clock * cycles_ + clocks_ - 1) / clocks_; }
 
-  // A burst (byte address, taken down to a multiple of burst_bytes) at a clock not before that of `advance` nor of another push. `done` stays until it has been told.
-  // `urgent`: it takes the next place in its channel's queue before all that are not, and has a lead there.
-  void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr, bool urgent = false) {
+  // A burst (byte address, taken down to a multiple of burst_bytes) at a clock not before that of `advance` nor of another push. `done` stays until it has been told, `rows` with the engine.
+  // `urgent`: it takes the next place in its channel's queue before all that are not.
+  void push(int64_t clock, uint64_t address, int8_t kind, Completion* done = nullptr, bool urgent = false, Rows* rows = nullptr) {
     const Place p = map_(static_cast<int64_t>(address / static_cast<uint64_t>(t_.burst_bytes)));
     Lane& lane = lane_[p.channel];
     const int queue = lane.channel.queue_of(kind);
-    const Waiting burst{p.bank, p.row, clock, done, kind, urgent};
+    const Waiting burst{p.bank, p.row, clock, done, rows, kind};
     if (lane.channel.full(queue)) {
       if (done) ++done->waiting;
       lane.later[queue][!urgent].push_back(burst);
@@ -398,8 +405,8 @@ class Engine {
   struct Waiting {
     int64_t bank, row, clock;
     Completion* done;
+    Rows* rows;
     int8_t kind;
-    bool urgent;
   };
   struct Lane {
     Channel channel;
@@ -408,7 +415,7 @@ class Engine {
 
   // Writes that are gathered tell of their place, not of their data.
   static void enter(Lane& lane, const Waiting& w) {
-    lane.channel.push(w.bank, w.row, w.kind, w.clock, lane.channel.queue_of(w.kind) == 1 ? nullptr : w.done, w.urgent);
+    lane.channel.push(w.bank, w.row, w.kind, w.clock, lane.channel.queue_of(w.kind) == 1 ? nullptr : w.done, w.rows);
   }
 
   Timing t_;

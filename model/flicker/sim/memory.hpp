@@ -168,6 +168,7 @@ struct AxiCounts {
   uint64_t read_bursts, read_beats, read_bytes, write_bursts, write_beats, write_bytes;  // write_bytes: those with a strobe
   uint64_t dram_read_bytes, dram_write_bytes, dram_masked_bytes;                         // whole bursts of the DRAM; masked ones are among the written
   uint64_t errors;                                                                      // bursts answered with SLVERR or DECERR
+  dram::Rows rows;                                                                      // of its bursts of the DRAM
 };
 
 // One port. It must live as long as its memory ticks: the DRAM tells it what has moved.
@@ -465,7 +466,7 @@ class AxiPort {
         if (part == 0) continue;
         if (part != all || step < burst) how = dram::MASKED_WRITE;
       }
-      memory_.engine.push(memory_.engine.clock_of(static_cast<int64_t>(now_)), address + at, how, &done, urgent);
+      memory_.engine.push(memory_.engine.clock_of(static_cast<int64_t>(now_)), address + at, how, &done, urgent, &count.rows);
       moved += burst;
       if (how == dram::MASKED_WRITE) count.dram_masked_bytes += burst;
     }

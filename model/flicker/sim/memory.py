@@ -29,7 +29,7 @@ class Timing(ctypes.Structure):
     """Organisation and timing of the DRAM: bytes, clocks of the command bus, hertz. `flicker.chip.dram.DramConfig.timing` makes one."""
 
     _fields_ = [(name, c_int64) for name in (
-        "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window", "writes", "lead",
+        "channels", "banks", "interleave_bytes", "page_bytes", "burst_bytes", "window", "writes",
         "rcd", "rp", "rp_all", "ras", "rrd", "faw", "ccd", "ccd_masked", "rtp", "write_pre", "write_read", "read_write",
         "refi", "rfc", "rfc_bank", "rl", "wl", "half", "clock_hz", "chip_hz",
     )]
@@ -110,7 +110,7 @@ class PortConfig:
 
     order, write_order: see there.
 
-    urgent: transactions of at least that AXI quality of service (`ar_qos`, `aw_qos`) go first in a DRAM channel's queue, have a lead there and have their
+    urgent: transactions of at least that AXI quality of service (`ar_qos`, `aw_qos`) enter a DRAM channel's queue first and have their
     responses first, except IN_ORDER; 16: none does. Nothing bounds how long the others wait: for managers whose own work ends.
 
     hazards: a transaction that overlaps one under way, one of them a write, is an error (writes of one id excepted, which follow each other).
@@ -158,11 +158,12 @@ class _Config(ctypes.Structure):
 
 
 class PurposeCounts(ctypes.Structure):
-    """Traffic of one purpose. write_bytes: those with a strobe; dram_*: whole bursts, masked ones among the written; errors: bursts answered with one."""
+    """Traffic of one purpose. write_bytes: those with a strobe; dram_*: whole bursts, masked ones among the written; errors: bursts answered with one;
+    rows_opened: for its bursts of the DRAM, row_clocks: of a channel, that went to that (`Counts.rows`)."""
 
     _fields_ = [(name, c_uint64) for name in (
         "read_bursts", "read_beats", "read_bytes", "write_bursts", "write_beats", "write_bytes",
-        "dram_read_bytes", "dram_write_bytes", "dram_masked_bytes", "errors",
+        "dram_read_bytes", "dram_write_bytes", "dram_masked_bytes", "errors", "rows_opened", "row_clocks",
     )]
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,16 +29,38 @@ MORE = 4  # times as much list memory where it does not suffice
 TAGS, CYCLES = 1 << 16, 1 << 32  # that there are: tags of frames, cycles in a stamp
 
 
+class Opened(NamedTuple):
+    """Bursts of the DRAM, rows that were opened for them, and clocks of `Counts.rows` that went to that."""
+
+    bursts: int
+    rows: int
+    clocks: int
+
+
 @dataclass(frozen=True, eq=False)
 class RowFrame:
     """A frame of a row. number: in the row. moved: bytes of the DRAM, read and written, by purpose. interval: cycles since the frame before it ended; None of
-    the first one. spent: clocks of the DRAM's channels since then, or since the row began, by what they went to (`Counts`)."""
+    the first one. spent: clocks of the DRAM's channels since then, or since the row began, by what they went to (`Counts`). rows: of both frames under way in
+    that time, by purpose."""
 
     number: int
     frame: ChipFrame
     moved: dict[str, int]
     interval: int | None
     spent: dict[str, int]
+    rows: dict[str, Opened]
+
+
+def _rows(chip: ChipSession) -> dict[str, np.ndarray]:
+    """Until now, of the scene and of both places: bursts, rows opened, clocks of them."""
+    found: dict[str, np.ndarray] = {}
+    burst = chip.memory.timing.burst_bytes if chip.memory.timing else 1
+    for number in (1, 2):
+        for name, c in chip.purposes(number).items():
+            if number == 1 or name in OF_PLACE:
+                bursts = int(c.dram_read_bytes + c.dram_write_bytes) // burst
+                found[name] = found.get(name, np.zeros(3, np.int64)) + np.array([bursts, c.rows_opened, c.row_clocks], np.int64)
+    return found
 
 
 class _Counted:
@@ -73,7 +96,7 @@ def back_to_back(
     store: of `ChipSession.store`, colours that frames keep.
     FlickerError, naming the frame, for any other fault.
     """
-    given, before = 0, chip.dram_counts().spent
+    given, before, opened = 0, chip.dram_counts().spent, _rows(chip)
     while given < len(cameras):
         first = max(given - 1, 0)
         places = [chip.place(cameras[0], format_, chunks=chunks, number=1 + k) for k in range(2)]
@@ -103,9 +126,11 @@ def back_to_back(
             ended = end
             now = chip.dram_counts().spent
             spent, before = {name: value - before[name] for name, value in now.items()}, now
+            rows_now = _rows(chip)
+            rows, opened = {name: Opened(*map(int, value - opened[name])) for name, value in rows_now.items()}, rows_now
             if number == given:
                 given += 1
-                yield RowFrame(number, done, moved, interval, spent)
+                yield RowFrame(number, done, moved, interval, spent, rows)
 
 
 def differs(image: np.ndarray, want: np.ndarray) -> str | None:

@@ -167,6 +167,6 @@ def conic_one(p, S):
 @numba.njit
 def pixels(centre, reach, size, fraction=MEAN_FRACTION):
     """First and last pixel centre of 0..size - 1 within centre +- reach, both in 1/128 pixel; the first is past the last where there is none."""
-    first = -((reach - centre) >> fraction)  # rounded up
+    first = (centre + ~reach >> fraction) + 1  # rounded up: ~reach is -reach - 1
     last = (centre + reach) >> fraction
     return max(first, 0), min(last, size - 1)
