@@ -121,11 +121,11 @@ module flk_rendering
   typedef enum logic [1:0] {IDLE, START, RUN} state_e;
 
   state_e     state_q;
-  logic       start, pixels_done, lines_idle, quiet, done_q;
+  logic       start, forgot_q, pixels_done, lines_idle, quiet, done_q;
   logic [SortUnits-1:0] reader_idle, sorter_idle, buffer_empty, list_error, run_error, again;
   logic       delivery_idle, stage_idle, record_error, write_failed, write_error_q;
 
-  assign start  = state_q == START && delivery_idle;
+  assign start  = state_q == START && forgot_q;
   assign idle_o = state_q == IDLE;
   assign quiet  = pixels_done && lines_idle && (&reader_idle) && (&sorter_idle) &&
                   (&buffer_empty) && delivery_idle && stage_idle;
@@ -134,10 +134,12 @@ module flk_rendering
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q       <= IDLE;
+      forgot_q      <= 1'b0;
       done_q        <= 1'b0;
       write_error_q <= 1'b0;
     end else begin
-      done_q <= 1'b0;
+      forgot_q <= state_q == START && delivery_idle;
+      done_q   <= 1'b0;
       unique case (state_q)
         IDLE: begin
           if (start_i) begin

@@ -54,7 +54,7 @@ module flk_pair_fifo #(
       .clear_i,
       .in_valid_i (first || (push[1] && (write_q ^ push[0]) == 1'(k))),
       .in_ready_o (ready[k]),
-      .in_data_i  (first ? in_data_i[0] : in_data_i[1]),
+      .in_data_i  (in_valid_i[0] && write_q == 1'(k) ? in_data_i[0] : in_data_i[1]),
       .out_valid_o(valid[k]),
       .out_ready_i(read_q == 1'(k) ? pop[0] : pop[1]),
       .out_data_o (data[k]),

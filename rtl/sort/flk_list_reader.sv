@@ -90,6 +90,8 @@ module flk_list_reader #(
   localparam int unsigned WordBits = $clog2(PerLine);
   localparam int unsigned ListBits = 2 * (CoordBits - 1);
   localparam int unsigned OffsetBits = ChunkBits + 2 + $clog2(ChunkLines);
+  localparam int unsigned LowBits = OffsetBits / 2 + 4;  // of an address, less than an offset's
+  localparam int unsigned HighBits = AddressBits - LowBits;
   localparam int unsigned HeaderCount = 4;
   localparam int unsigned RestBits = Width - EntriesBits - HeaderCount - ChunkBits - 1;
   localparam int unsigned ChunkTag = SlotBits + CtxBits;
@@ -205,7 +207,9 @@ module flk_list_reader #(
   logic [AheadBits-1:0]   ahead_q;  // pointers asked for and not in a context
   logic                   c_valid_q, c_move, d_valid_q, read_ready;
   tag_t                   c_tag_q, d_tag_q;
-  logic [AddressBits-1:0] c_base_q, d_address_q;
+  logic [AddressBits-1:0] c_base_q;
+  logic [LowBits:0]       d_low_q;   // of the address, with what it carries
+  logic [HighBits-1:0]    d_high_q;  // without that
   logic [OffsetBits-1:0]  c_offset_q;
   logic [LinesBits-1:0]   c_lines_q, d_lines_q;
 
@@ -266,9 +270,10 @@ module flk_list_reader #(
       c_lines_q       <= pick_pointer ? LinesBits'(1) : lines_q[pick];
     end
     if (c_move) begin
-      d_tag_q     <= c_tag_q;
-      d_address_q <= c_base_q + AddressBits'(c_offset_q);
-      d_lines_q   <= c_lines_q;
+      d_tag_q   <= c_tag_q;
+      d_low_q   <= {1'b0, c_base_q[LowBits-1:0]} + (LowBits + 1)'(c_offset_q[LowBits-1:0]);
+      d_high_q  <= c_base_q[AddressBits-1:LowBits] + HighBits'(c_offset_q[OffsetBits-1:LowBits]);
+      d_lines_q <= c_lines_q;
     end
   end
 
@@ -300,7 +305,7 @@ module flk_list_reader #(
     .idle_o     (read_idle),
     .in_valid_i (d_valid_q),
     .in_ready_o (read_ready),
-    .in_addr_i  ({d_address_q, Shift'(0)}),
+    .in_addr_i  ({d_high_q + HighBits'(d_low_q[LowBits]), d_low_q[LowBits-1:0], Shift'(0)}),
     .in_beats_i (d_lines_q),
     .in_tag_i   (d_tag_q),
     .out_valid_o(beat_valid),

@@ -328,11 +328,12 @@ module flk_record_cache #(
       end
     end
 
-    // A row that has been changed and is not in the memory as it is read.
+    // A row that a lookup has in hand, changed or not, or that is not in the memory yet as it is read.
     logic [1:0] fresh, stored;
 
     for (genvar o = 0; o < 2; o++) begin : gen_changed
-      assign fresh[o]  = changed[o] && {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]};
+      assign fresh[o]  = b_valid_q[o] && !b_skip_q[o] &&
+                         {b_set[o], b_bank[o]} == {in_set[c], in_bank[c]};
       assign stored[o] = store_valid_q[o] &&
                          {store_set_q[o], store_bank_q[o]} == {in_set[c], in_bank[c]};
     end
@@ -543,11 +544,11 @@ module flk_record_cache #(
   assign came = {head[0].miss ? line_data[1] : line_data[0], line_data[0]};
 
   for (genvar b = 0; b < Banks; b++) begin : gen_data
-    logic [1:0] writes, reads;
+    logic [1:0] writes, reads;  // what the two do here, if they go: the second only where the first does not
 
     for (genvar c = 0; c < 2; c++) begin : gen_here
-      assign writes[c] = go[c] && !head[c].skip && head[c].bank == BankBits'(b) && head[c].miss;
-      assign reads[c]  = go[c] && !head[c].skip && head[c].bank == BankBits'(b) && !head[c].miss;
+      assign writes[c] = !head[c].skip && head[c].bank == BankBits'(b) && head[c].miss;
+      assign reads[c]  = !head[c].skip && head[c].bank == BankBits'(b) && !head[c].miss;
     end
 
     flk_sram #(
@@ -555,11 +556,11 @@ module flk_record_cache #(
       .Depth(Sets * Ways)
     ) i_data (
       .clk_i,
-      .wr_en_i  (writes != '0),
-      .wr_addr_i(writes[1] ? head[1].place : head[0].place),
-      .wr_data_i(writes[1] ? came[1] : came[0]),
-      .rd_en_i  (reads != '0),
-      .rd_addr_i(reads[1] ? head[1].place : head[0].place),
+      .wr_en_i  ((go & writes) != '0),
+      .wr_addr_i(writes[0] ? head[0].place : head[1].place),
+      .wr_data_i(writes[0] ? came[0] : came[1]),
+      .rd_en_i  ((go & reads) != '0),
+      .rd_addr_i(reads[0] ? head[0].place : head[1].place),
       .rd_data_o(data[b])
     );
   end
