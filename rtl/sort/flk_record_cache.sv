@@ -544,7 +544,8 @@ module flk_record_cache #(
   assign came = {head[0].miss ? line_data[1] : line_data[0], line_data[0]};
 
   for (genvar b = 0; b < Banks; b++) begin : gen_data
-    logic [1:0] writes, reads;  // what the two do here, if they go: the second only where the first does not
+    // What the two do here, if they go: the second only where the first does not.
+    logic [1:0] writes, reads;
 
     for (genvar c = 0; c < 2; c++) begin : gen_here
       assign writes[c] = !head[c].skip && head[c].bank == BankBits'(b) && head[c].miss;

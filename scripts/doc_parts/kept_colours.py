@@ -201,7 +201,7 @@ def _rows_opened(head: tuple, found: RowFrame) -> list[tuple]:
 
 
 def hardware_tables(say: Say) -> dict[str, str]:
-    for memories in {row[3] for row in HARDWARE}:
+    for memories in sorted({row[3] for row in HARDWARE}):
         build(CONFIG.with_(memories=memories))
     with ThreadPoolExecutor(2) as pool:  # the simulators run outside of the interpreter's lock
         rows, spent, opened = zip(*pool.map(lambda row: _in_hardware(say, *row), HARDWARE))
