@@ -160,12 +160,13 @@ class Reader:
 
 
 def make(reader: Reader, cols: int, rows: int, sizes: list[int], slot: int = 0, aligned: bool = True) -> Frame:
-    """A frame in memory of its own; not aligned: chunks lie across 4 KB."""
+    """A frame in memory of its own; not aligned: chunks lie across 4 KB, in slot 3 across 16 MB too, where both halves of an address change."""
     base = (0x1_0000_0000 if slot % 2 else 0x2_3400_0000) // LINE + slot * 0x10000
-    frame = Frame(reader.rng, cols, rows, sizes, base + (0x40 if aligned else reader.rng.choice([3, 29, 61])), base + 0x8000 + reader.rng.randrange(64))
+    lists = base + (0x40 if aligned else 0x10000 - reader.rng.choice([3, 29, 61]))
+    frame = Frame(reader.rng, cols, rows, sizes, lists, base + 0x8000 + reader.rng.randrange(64))
     if len(frame.memory) > 0x7000:
         raise ValueError("frame too large")
-    reader.memory.allocate(base * LINE, 0x10000 * LINE, reader.rng.getrandbits(30))
+    reader.memory.allocate(base * LINE, (0x10000 if aligned else 0x18000) * LINE, reader.rng.getrandbits(30))
     frame.put(reader.memory)
     return frame
 
