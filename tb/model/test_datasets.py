@@ -806,7 +806,7 @@ def test_interrupted_budget(tmp_path, monkeypatch) -> None:
 def test_full_disk(nerf, tmp_path, monkeypatch) -> None:
     """File and reason in one line; nothing half-written, of undistort not even the folder."""
     def full(path, *a, **k):
-        Path(getattr(path, "name", path)).write_bytes(b"some")
+        Path(path if isinstance(path, Path) else path.name).write_bytes(b"some")
         raise OSError(28, "No space left on device")
 
     original = undistorting.save_png

@@ -305,6 +305,19 @@ def test_urgent_bursts_pass_what_waits_for_the_dram():
     assert waits["urgency off"] == waits["not urgent"]
 
 
+@pytest.mark.parametrize("places", [0, 64])
+def test_urgent_bursts_are_like_all_in_the_queue(places):
+    """An urgent read of another row among row hits that came before it and wait in the same queue: it is the last, so that no row is opened twice."""
+    m = Memory(DramConfig(refresh=Refresh.NONE, write_places=places).timing)
+    m.allocate(0, 1 << 22)
+    manager = Manager(Port(m, port_config(max_reads=256, urgent=8)))
+    one_channel = DramConfig().channels * DramConfig().interleave_bytes
+    crowd = [manager.read(Burst(one_channel * k, 1, id=0)) for k in range(15)]
+    manager.read(urgent := Burst(DramConfig().channels * DramConfig().page_bytes, 1, id=1, qos=8))
+    manager.run(100_000)
+    assert max(c.ended for c in crowd) < urgent.ended and m.counts().activates == 2
+
+
 def test_gathered_writes_are_answered_before_they_move():
     """As soon as a channel has places for their bursts; those beyond wait for one. Without places of their own they are answered once they are written."""
     ended = {}
