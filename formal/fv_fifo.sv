@@ -4,7 +4,8 @@
 // The assertions l_* link registers and chosen element, which induction needs.
 module fv_fifo #(
   parameter int unsigned Width = 2,
-  parameter int unsigned Depth = 16
+  parameter int unsigned Depth = 16,
+  parameter bit HeadRegister = 1'b0
 ) (
   input logic             clk_i,
   input logic             again_i,
@@ -25,8 +26,9 @@ module fv_fifo #(
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
   flk_fifo #(
-    .Width(Width),
-    .Depth(Depth)
+    .Width       (Width),
+    .Depth       (Depth),
+    .HeadRegister(HeadRegister)
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),
@@ -67,6 +69,15 @@ module fv_fifo #(
     sum = SlotBits'(dut.read_q) + SlotBits'(distance);
     return sum >= SlotBits'(Depth) ? sum - SlotBits'(Depth) : sum;
   endfunction
+
+  if (HeadRegister) begin : gen_head
+    always_comb begin
+      if (rst_n) begin
+        l_next: assert (SlotBits'(dut.gen_head.next_q) == slot(UsageBits'(1)));
+        l_head: assert (entries == '0 || dut.gen_head.head_q == dut.storage_q[dut.read_q]);
+      end
+    end
+  end
 
   logic [SlotBits-1:0] watched_slot;
   logic                was_full_q;

@@ -1,7 +1,8 @@
 // flk_skid_buffer: a stream of two elements (fv_stream); ready while there is room, valid when it
 // is not empty. Ready is a register's output: it may not follow out_ready_i in the same cycle.
 module fv_skid_buffer #(
-  parameter int unsigned Width = 2
+  parameter int unsigned Width = 2,
+  parameter bit          Early = 1'b0
 ) (
   input logic             clk_i,
   input logic             again_i,
@@ -19,7 +20,8 @@ module fv_skid_buffer #(
   fv_reset i_reset (.clk_i, .again_i, .rst_no(rst_n));
 
   flk_skid_buffer #(
-    .Width(Width)
+    .Width(Width),
+    .Early(Early)
   ) dut (
     .clk_i,
     .rst_ni     (rst_n),

@@ -14,8 +14,8 @@ top/flk_top_pkg.sv
 common/flk_axi_arbiter.sv
 common/flk_axi_downsizer.sv
 common/flk_axi_fetch.sv
+common/flk_axi_half.sv
 common/flk_axi_hold.sv
-common/flk_axi_lane.sv
 common/flk_axi_read.sv
 common/flk_axi_read_mux.sv
 common/flk_axi_split.sv

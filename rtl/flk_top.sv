@@ -38,6 +38,7 @@ module flk_top
   parameter  int unsigned MergeLines     = 128,
   parameter  int unsigned Chunks         = 8,
   parameter  int unsigned Entries        = 704,
+  parameter  int unsigned Queue          = 128,
   parameter  int unsigned Pairs          = 4,
   parameter  int unsigned RecordLines    = 1024,
   parameter  int unsigned PreprocLanes   = 4,     // 1, 2 or 4
@@ -556,7 +557,7 @@ module flk_top
 
   assign read_ends = r_valid & {READERS{r_last}};
 
-  flk_axi_lane #(
+  flk_axi_half #(
     .Width   (Width / 2),
     .AddrBits(AddrBits)
   ) i_records (
@@ -717,6 +718,7 @@ module flk_top
     .MergeLines    (MergeLines),
     .Chunks        (Chunks),
     .Entries       (Entries),
+    .Queue         (Queue),
     .Pairs         (Pairs),
     .RecordLines   (RecordLines),
     .IdBits        (IdBits)

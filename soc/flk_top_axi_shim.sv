@@ -22,6 +22,7 @@ module flk_top_axi
   parameter int unsigned MergeLines     = 128,
   parameter int unsigned Chunks         = 8,
   parameter int unsigned Entries        = 704,
+  parameter int unsigned Queue          = 128,
   parameter int unsigned Pairs          = 4,
   parameter int unsigned RecordLines    = 1024,
   parameter int unsigned PreprocLanes   = 4,

@@ -192,7 +192,8 @@ class ChipMemories:
     wait for delivery. pairs: of tiles in the frame writer. survivors: of a preprocessing core that wait for their colours. sort_ways: runs that a sorting
     unit's last step merges, a power of two: the more, the fewer steps with memories of their own. gathered_lines: that the front end writes together.
     merge_lines: of the memory for lists that a sorting unit does not hold, a power of two; half as many runs at most (docs/reference/list_sorter.md).
-    record_lines: of 32 bytes that the record cache holds, a power of two: the more, the fewer are read again.
+    record_lines: of 32 bytes that the record cache holds, a power of two: the more, the fewer are read again. queued_records: of each core, between
+    delivery and the stage: the more, the further cores with little to do in a tile go ahead of the others.
     """
 
     sorted_entries: int = 2048
@@ -204,6 +205,7 @@ class ChipMemories:
     gathered_lines: int = 216
     merge_lines: int = 128
     record_lines: int = 1024
+    queued_records: int = 128
 
     def __post_init__(self) -> None:
         rules = {
@@ -216,6 +218,7 @@ class ChipMemories:
             "gathered_lines": (self.gathered_lines >= 8, "at least 8"),
             "merge_lines": (_power(self.merge_lines) and self.merge_lines >= 8, "a power of two from 8 on"),
             "record_lines": (_power(self.record_lines) and 32 <= self.record_lines <= 1 << 16, "a power of two, 32 to 65,536"),
+            "queued_records": (self.queued_records >= 8 and self.queued_records % 2 == 0, "even, at least 8"),
         }
         for name, (legal, text) in rules.items():
             if not legal:
@@ -243,7 +246,7 @@ class ChipMemories:
         """Of `flk_rendering` and `flk_top`; none where all sizes are the default ones."""
         values = {
             "SortStages": self.sort_stages, "SortWays": self.sort_ways, "MergeLines": self.merge_lines, "Chunks": self.list_chunks,
-            "Entries": self.sorted_ahead, "Pairs": self.pairs, "RecordLines": self.record_lines,
+            "Entries": self.sorted_ahead, "Pairs": self.pairs, "RecordLines": self.record_lines, "Queue": self.queued_records,
         }
         return values if self != ChipMemories() else {}
 
@@ -259,7 +262,7 @@ CHIP_MEMORIES = {
     "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64, 1024),  # within the paper's 288 KB
     # Fewer bytes a frame: within the default's size, and beyond it.
     "records": ChipMemories(list_chunks=6, sorted_ahead=448, pairs=2, survivors=64, gathered_lines=96, record_lines=2048),
-    "large": ChipMemories(record_lines=2048),
+    "large": ChipMemories(record_lines=2048, queued_records=256),
 }
 
 

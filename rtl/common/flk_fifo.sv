@@ -3,11 +3,12 @@
 // Latency 1 (no fall-through), throughput 1 per cycle for Depth >= 2, every second cycle for
 // Depth 1. in_ready_o and out_valid_o come from registers: a full queue takes nothing, even in the
 // cycle in which an element leaves. out_data_o is read combinationally from the storage by a
-// registered pointer. clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
+// registered pointer, or with HeadRegister comes from a register that holds the oldest element. clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
 // Storage is not reset; Depth need not be a power of two.
 module flk_fifo #(
   parameter  int unsigned Width     = 8,
   parameter  int unsigned Depth     = 16,
+  parameter  bit          HeadRegister = 1'b0,
   localparam int unsigned UsageBits = $clog2(Depth + 1)  // 0 to Depth
 ) (
   input  logic                 clk_i,
@@ -99,7 +100,31 @@ module flk_fifo #(
   assign usage_o     = usage_q;
   assign in_ready_o  = !full_o;
   assign out_valid_o = !empty_o;
-  assign out_data_o  = storage_q[read_q];
+
+  if (HeadRegister) begin : gen_head
+    logic [PtrBits-1:0] next_q;  // behind the oldest
+    logic [Width-1:0]   head_q;
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        next_q <= PtrBits'(Depth > 1);
+      end else if (clear_i) begin
+        next_q <= PtrBits'(Depth > 1);
+      end else if (pop) begin
+        next_q <= next_q == LAST ? '0 : next_q + 1'b1;
+      end
+    end
+
+    always_ff @(posedge clk_i) begin
+      if (pop || empty_o) begin
+        head_q <= usage_q <= UsageBits'(1) ? in_data_i : storage_q[next_q];
+      end
+    end
+
+    assign out_data_o = head_q;
+  end else begin : gen_head
+    assign out_data_o = storage_q[read_q];
+  end
 
 `ifndef SYNTHESIS
   assert property (@(posedge clk_i) disable iff (!rst_ni) usage_q <= UsageBits'(Depth))

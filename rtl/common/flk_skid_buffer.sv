@@ -5,9 +5,11 @@
 // accepted in the cycle in which the output stopped.
 // in_ready_o falls one cycle after a stall and rises one cycle after its end.
 // clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
-// Payload registers are not reset.
+// Payload registers are not reset. Early: they load in_data_i whenever they have room, with in_valid_i or without, so that wide enables
+// hang on fewer signals (an FPGA's paths are shorter, more registers toggle).
 module flk_skid_buffer #(
-  parameter int unsigned Width = 8
+  parameter int unsigned Width = 8,
+  parameter bit          Early = 1'b0
 ) (
   input  logic             clk_i,
   input  logic             rst_ni,
@@ -52,10 +54,10 @@ module flk_skid_buffer #(
   logic [Width-1:0] skid_data_q;
 
   always_ff @(posedge clk_i) begin
-    if (move && (skid_valid_q || in_valid_i)) begin
+    if (move && (Early || skid_valid_q || in_valid_i)) begin
       out_data_q <= skid_valid_q ? skid_data_q : in_data_i;
     end
-    if (!move && !skid_valid_q && in_valid_i) begin
+    if (!skid_valid_q && (Early || (!move && in_valid_i))) begin
       skid_data_q <= in_data_i;
     end
   end

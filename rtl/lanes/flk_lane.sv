@@ -23,7 +23,8 @@
 // colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next list may follow at once.
 // Pixels of one sub-tile, few, are flip-flops, which a token copies and sets. Those of more are two memories each of S and of colours, with a
 // write port and a read port without latency: in turn one has the pixels that are visited, one those that leave. A visit's are read a
-// cycle before STATE and COLOUR, or are what is written then. What a word held before counts as 0 until it is written: seen_q.
+// cycle before STATE and COLOUR, or are what is written then; S is written a cycle after STATE, so that no memory waits for what STATE
+// decides. What a word held before counts as 0 until it is written: seen_q.
 // Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
@@ -91,6 +92,7 @@ module flk_lane
   logic [STATE:1] valid_q;
   logic [COLOUR:1] eos_q;
   logic [FETCH:1] last_q;
+  logic [COLOUR:STATE+1] blend_q;
   logic [COLOUR-1:1][PixelW-1:0] pixel_q;
   logic [FETCH:1][SlotW-1:0] slot_q;
   logic [Pixels-1:0] select_s_q;  // the pixel at STATE, one bit each
@@ -144,8 +146,9 @@ module flk_lane
     end
   end
 
+  // Between visits what is read from memories stands still.
   always_ff @(posedge clk_i) begin
-    if (visit_valid_i) begin
+    if (MEMORY || visit_valid_i) begin
       shape_q  <= visit_shape_i;
       column_q <= column;
       row_q    <= row;
@@ -330,7 +333,25 @@ module flk_lane
 
   assign s_next = (S_BITS + 1)'(s_now) + (S_BITS + 1)'(h_q);
   assign total  = TOTAL_BITS'(s_now) + TOTAL_BITS'(x_q);
-  assign ends   = s_next > (S_BITS + 1)'(S_MAX);
+
+  if (MEMORY) begin : gen_ends
+    // Beside the sum, not behind it: what carries out of it and the constant.
+    localparam logic [S_BITS:0] REST = (S_BITS + 1)'((1 << S_BITS) - 1 - S_MAX);
+    logic [S_BITS:0] a, b, odd, two;
+    logic [S_BITS+1:0] beyond;
+    logic unused_beyond;
+
+    assign a      = (S_BITS + 1)'(s_now);
+    assign b      = (S_BITS + 1)'(h_q);
+    assign odd    = a ^ b ^ REST;
+    assign two    = (a & b) | ((a | b) & REST);
+    assign beyond = {1'b0, odd} + {two, 1'b0};
+    assign ends   = beyond[S_BITS+1:S_BITS] != '0;
+    assign unused_beyond = ^beyond[S_BITS-1:0];
+  end else begin : gen_ends
+    assign ends = s_next > (S_BITS + 1)'(S_MAX);
+  end
+
   assign live   = valid_q[STATE] && !skip_5_q && !was_done;
   assign blend  = live && !ends;
   assign finish = live && ends;
@@ -352,8 +373,9 @@ module flk_lane
     logic bank_d, bank_q;  // that is visited
     logic [Pixels-1:0] seen_q, seen_out_q;
     logic [1:0][S_BITS-1:0] word;
-    logic [S_BITS-1:0] s_q;
-    logic again_q, seen, seen_s_q;  // the pixel before STATE is the one at it; is seen
+    logic [S_BITS-1:0] s_q, written_q, stored;
+    logic again_q, late_q;  // the pixel before STATE is the one at it; the one behind it, which is written now
+    logic seen, seen_s_q;
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -381,20 +403,23 @@ module flk_lane
       logic [S_BITS-1:0] storage_q[Pixels];
 
       always_ff @(posedge clk_i) begin
-        if (blend && bank_q == 1'(b)) begin
-          storage_q[pixel_q[STATE]] <= s_next[S_BITS-1:0];
+        if (blend_q[STATE+1] && bank_q == 1'(b)) begin
+          storage_q[pixel_q[STATE+1]] <= written_q;
         end
       end
 
       assign word[b] = storage_q[bank_d==1'(b)?pixel_q[STATE-1] : place_q];
     end
 
-    assign seen = seen_q[pixel_q[STATE-1]] && !eos_q[STATE];
+    assign seen   = seen_q[pixel_q[STATE-1]] && !eos_q[STATE];
+    assign stored = late_q && blend_q[STATE+1] ? written_q : word[bank_d];
 
     always_ff @(posedge clk_i) begin
-      again_q  <= pixel_q[STATE-2] == pixel_q[STATE-1];
-      seen_s_q <= seen || (again_q && blend);
-      s_q      <= again_q && blend ? s_next[S_BITS-1:0] : word[bank_d] & {S_BITS{seen}};
+      again_q   <= pixel_q[STATE-2] == pixel_q[STATE-1];
+      late_q    <= pixel_q[STATE-2] == pixel_q[STATE];
+      seen_s_q  <= seen || (again_q && blend);
+      s_q       <= again_q && blend ? s_next[S_BITS-1:0] : stored & {S_BITS{seen}};
+      written_q <= s_next[S_BITS-1:0];
     end
 
     assign was_seen = seen_s_q;
@@ -465,7 +490,6 @@ module flk_lane
   localparam int unsigned PART_BITS = PRODUCT_BITS - SHIFT;
   localparam int unsigned FAR = (PART_BITS + 3) / 4;  // more than 4 FAR - 1 places leave nothing
 
-  logic [COLOUR:6] blend_q;
   logic [MANTISSA-1:0] address_q, mantissa_q;
   logic [COLOUR-1:6][EXPONENT_BITS-1:0] exponent_q;
   logic [3:0] near_q;     // one bit: places below a multiple of four

@@ -163,6 +163,7 @@ module flk_lane_core
   typedef struct packed {
     logic                         token;
     logic [SubtileW-1:0]          member;
+    logic [Lanes-1:0]             need;  // lanes that get an entry
     logic [Lanes-1:0][Pixels-1:0] bits;
     lane_shape_t                  shape;
     lane_colour_t                 colour;
@@ -172,7 +173,6 @@ module flk_lane_core
   logic [InWidth-1:0][63:0] live;
   logic [InWidth-1:0] wanted, sent, sent_q, left;  // sent: with the one of this cycle
   logic [Lanes-1:0] need, queue_ready;
-  logic [Slots-1:0] busy;
   logic [SlotW-1:0] slot;
   logic slot_free, room, dispatch, choice, tokens_ahead;
   logic choice_valid, choice_ready, given_valid, given_ready;
@@ -203,12 +203,14 @@ module flk_lane_core
       for (int unsigned p = 0; p < Pixels; p++) begin
         choice_visit.bits[l][p] = !eos_q[STAGES][choice] && chosen[lane_pixel(Lanes, l, p)];
       end
+      choice_visit.need[l] = choice_visit.token || choice_visit.bits[l] != '0;
     end
   end
 
   if (MEMORY) begin : gen_slice
     flk_skid_buffer #(
-      .Width($bits(visit_t))
+      .Width($bits(visit_t)),
+      .Early(1'b1)
     ) i_slice (
       .clk_i,
       .rst_ni,
@@ -247,22 +249,17 @@ module flk_lane_core
 
   // ---- Dispatch --------------------------------------------------------------------------------------------------
 
-  always_comb begin
-    for (int unsigned l = 0; l < Lanes; l++) begin
-      need[l] = given.token || given.bits[l] != '0;
-    end
-  end
+  assign need = given.need;
 
-  always_comb begin
-    slot = '0;
+  function automatic logic [SlotW-1:0] lowest(logic [Slots-1:0] free);
+    lowest = '0;
     for (int unsigned i = Slots; i > 0; i--) begin
-      if (!busy[i-1]) begin
-        slot = SlotW'(i - 1);
+      if (free[i-1]) begin
+        lowest = SlotW'(i - 1);
       end
     end
-  end
+  endfunction
 
-  assign slot_free = !(&busy);
   assign room      = (queue_ready | ~need) == '1;
   assign given_ready = slot_free && room;
   assign dispatch    = given_valid && given_ready;
@@ -287,22 +284,21 @@ module flk_lane_core
 
   // ---- Store -------------------------------------------------------------------------------------------------------
 
-  logic [Slots-1:0][Lanes-1:0] pending_d, pending_q;
+  logic [Slots-1:0][Lanes-1:0] rest, pending_d, pending_q;
+  logic [Slots-1:0] take;
   logic [Lanes-1:0] release_valid;
   logic [Lanes-1:0][SlotW-1:0] release_slot;
 
   always_comb begin
-    pending_d = pending_q;
+    rest = pending_q;
     for (int unsigned i = 0; i < Slots; i++) begin
-      busy[i] = pending_q[i] != '0;
       for (int unsigned l = 0; l < Lanes; l++) begin
         if (release_valid[l] && release_slot[l] == SlotW'(i)) begin
-          pending_d[i][l] = 1'b0;
+          rest[i][l] = 1'b0;
         end
       end
-      if (dispatch && slot == SlotW'(i)) begin
-        pending_d[i] = need;
-      end
+      take[i]      = dispatch && slot == SlotW'(i);
+      pending_d[i] = take[i] ? need : rest[i];
     end
     if (clear_i) begin
       pending_d = '0;
@@ -315,6 +311,47 @@ module flk_lane_core
     end else begin
       pending_q <= pending_d;
     end
+  end
+
+  // A free slot: found among those that are, or, in a shared core, a cycle before, so that nothing waits for the search.
+  if (MEMORY) begin : gen_slot
+    logic [SlotW-1:0] slot_q;
+    logic             free_q;
+    logic [Slots-1:0] free, other;  // in the next cycle, while nothing is given; and if it is
+
+    always_comb begin
+      for (int unsigned i = 0; i < Slots; i++) begin
+        free[i]  = rest[i] == '0;
+        other[i] = free[i] && slot_q != SlotW'(i);
+      end
+    end
+
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) begin
+        slot_q <= '0;
+        free_q <= 1'b1;
+      end else if (clear_i) begin
+        slot_q <= '0;
+        free_q <= 1'b1;
+      end else begin
+        slot_q <= dispatch ? lowest(other) : lowest(free);
+        free_q <= dispatch ? other != '0 : free != '0;
+      end
+    end
+
+    assign slot      = slot_q;
+    assign slot_free = free_q;
+  end else begin : gen_slot
+    logic [Slots-1:0] busy;
+
+    always_comb begin
+      for (int unsigned i = 0; i < Slots; i++) begin
+        busy[i] = pending_q[i] != '0;
+      end
+    end
+
+    assign slot      = lowest(~busy);
+    assign slot_free = !(&busy);
   end
 
   // What each lane reads.

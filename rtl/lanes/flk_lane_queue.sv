@@ -63,9 +63,11 @@ module flk_lane_queue #(
 
   assign push = push_i && ready_o;
 
+  // In a shared core the slot addresses memories, so the oldest entry lies in a register.
   flk_fifo #(
-    .Width(EntryW),
-    .Depth(Depth)
+    .Width       (EntryW),
+    .Depth       (Depth),
+    .HeadRegister(Subtiles > 1)
   ) i_fifo (
     .clk_i,
     .rst_ni,
@@ -101,7 +103,11 @@ module flk_lane_queue #(
   assign head_eos = head_pixels == '0;
   // The flags belong to the entry's list only when no token is on its way to them.
   assign todo = head_pixels & ~done_q & ~(token_i ? '0 : head_finished);
-  assign rest = todo & (todo - 1'b1);
+
+  assign rest[0] = 1'b0;
+  for (genvar p = 1; p < Pixels; p++) begin : gen_rest
+    assign rest[p] = todo[p] && todo[p-1:0] != '0;
+  end
 
   assign visit_eos_o   = head_valid && head_eos && bank_free_i;
   assign visit_valid_o = visit_eos_o || (head_valid && todo != '0);

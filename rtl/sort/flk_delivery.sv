@@ -13,7 +13,8 @@
 // the one that waits. The end of a list is the last of those that are given together. out_subtile_o: for which, nothing at an end.
 // finished_i of a sub-tile, a level, is about the tile whose elements its core is taking, until that has taken its
 // end; in the cycle after that it is about the next tile. Records of such a sub-tile that are not in its
-// core's queue yet do not come; an entry that no sub-tile wants is not looked up. When all four are finished
+// core's queue yet do not come; an entry that no sub-tile wants is not looked up. When all sub-tiles of a core are finished, its queue
+// drops their records, two a cycle: an element that was offered and not taken may be withdrawn then. When all four are finished
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // border_i: sub-tiles of the tile in turn that touch the one after it (0) and the one behind that (1): an entry there is probably in
 // that one's list too, and its line stays in the cache until then (flk_record_cache). taken_o: its end is taken, the next tile is in turn.
@@ -313,6 +314,9 @@ module flk_delivery #(
     logic [1:0]                  push, ended, unused_ready, queue_valid;
     logic [1:0][Share-1:0]       wanted;  // sub-tiles that want what was found
     logic [1:0][ElementBits-1:0] element;
+    logic [1:0]                  dropped;
+    logic [Share-1:0]            finished;
+    logic                        drop;  // the core wants no record, and the oldest element is one
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
@@ -321,6 +325,7 @@ module flk_delivery #(
 
     // What is behind an end is not of the tile that the core takes.
     for (genvar m = 0; m < Share; m++) begin : gen_wanted
+      assign finished[m]  = finished_q[Cores*m+s];
       assign wanted[0][m] = found[0].mask[Cores*m+s] &&
                             (found[0].last || !(finished_q[Cores*m+s] && unended[s]));
       assign wanted[1][m] = found[1].mask[Cores*m+s] &&
@@ -328,12 +333,15 @@ module flk_delivery #(
     end
 
     assign push = found_valid & {wanted[1] != '0, wanted[0] != '0};
+    // What the core says is of the tile that it was given from a cycle ago.
+    assign drop = (&finished) && !pop_end_q[s] && queue_valid[0] && !element[0][RecordBits];
+    assign dropped = {queue_valid[1] && !element[1][RecordBits], 1'b1};
 
     if (Share == 1) begin : gen_whole
       logic [1:0] given;
 
-      assign given  = queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
-      assign pop[s] = given & {2{out_ready_i[s]}};
+      assign given  = drop ? '0 : queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
+      assign pop[s] = drop ? dropped : given & {2{out_ready_i[s]}};
 
       for (genvar w = 0; w < InWidth; w++) begin : gen_way
         assign out_valid_o[s][w] = given[w];
@@ -360,7 +368,7 @@ module flk_delivery #(
       assign beyond = rest[0] & (rest[0] - 1'b1);
       assign same   = InWidth == 2 && !is_end[0] && rest[0] != '0;
       assign next   = InWidth == 2 && !is_end[0] && rest[0] == '0 && queue_valid[1];
-      assign pop[s] = goes & {2{out_ready_i[s]}};
+      assign pop[s] = drop ? dropped : goes & {2{out_ready_i[s]}};
 
       always_comb begin
         goes[0] = queue_valid[0] && (is_end[0] || (same ? beyond : rest[0]) == '0);
@@ -391,13 +399,13 @@ module flk_delivery #(
         end
       endfunction
 
-      assign out_valid_o[s][0]   = queue_valid[0];
+      assign out_valid_o[s][0]   = queue_valid[0] && !drop;
       assign out_end_o[s][0]     = is_end[0];
       assign out_record_o[s][0]  = element[0][RecordBits-1:0];
       assign out_subtile_o[s][0] = number(first[0]);
 
       if (InWidth == 2) begin : gen_second
-        assign out_valid_o[s][1]   = queue_valid[0] && (same || next);
+        assign out_valid_o[s][1]   = queue_valid[0] && !drop && (same || next);
         assign out_end_o[s][1]     = !same && is_end[1];
         assign out_record_o[s][1]  = element[!same][RecordBits-1:0];
         assign out_subtile_o[s][1] = number(same ? rest[0] & ~beyond : first[1]);
@@ -455,7 +463,7 @@ module flk_delivery #(
     else $error("flk_delivery: ends or places");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
-        out_valid_o[s][0] && !out_ready_i[s] && !stop |=>
+        out_valid_o[s][0] && !out_ready_i[s] && !stop |=> drop ||
         out_valid_o[s][0] && $stable({out_end_o[s][0], out_record_o[s][0], out_subtile_o[s][0]}))
     else $error("flk_delivery: output changed before its transfer");
 `endif

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from flicker.chip.dram import DramConfig
-from flicker.chip.rendering import QUEUE
 from flicker.errors import FlickerError
 from flicker.golden.chip import render_chip
 from flicker.golden.delivery import UNITS
@@ -73,7 +72,7 @@ def _row(done: list[ChipFrame], config: RenderConfig, stage: LaneCycles) -> tupl
 
 ENTRY_BITS = (SLOT_LIMIT - 1).bit_length() + CORES + 1  # number, mask, and the bit that marks an end
 RECORD_BITS = 8 * RecordKind.FACTORED16.bytes + 1
-DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": QUEUE, "Pairs": ChipMemories().pairs, "InWidth": 1}
+DEFAULT = {"Entries": ChipMemories().sorted_ahead, "Queue": ChipMemories().queued_records, "Pairs": ChipMemories().pairs, "InWidth": 1}
 # Entries that each sorting unit's buffer holds, records that each core's queue holds, pairs of tiles in the frame writer, records a cycle; the memory.
 HELD: tuple[tuple[dict[str, int], DramConfig | None], ...] = (
     ({"Entries": 4}, None), ({}, None), ({"InWidth": 2}, None), ({"Queue": 64}, None), ({"Entries": 1024, "Queue": 256}, None), ({"Pairs": 8}, None),

@@ -21,7 +21,7 @@ MEMORIES = {
     "sorted_ahead": ("`Entries`", "delivery.md"),
     "pairs": ("`Pairs`", "frame_writer.md"), "survivors": ("`Waiting`", "front_end.md"), "sort_ways": ("`SortWays`", "sorting_unit.md"),
     "gathered_lines": ("`Gather`", "front_end.md"), "merge_lines": ("`MergeLines`", "list_sorter.md"),
-    "record_lines": ("`RecordLines`", "delivery.md"),
+    "record_lines": ("`RecordLines`", "delivery.md"), "queued_records": ("`Queue`", "delivery.md"),
 }
 # Units that do an operation of flicker.arithmetic.ff; the others are of the model alone.
 FF_UNITS = {

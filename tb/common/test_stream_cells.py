@@ -2,8 +2,8 @@
 
 State space: every pair of idle and back-pressure patterns (flicker_tb.stalls), random payloads,
 random initial register values, blocked output, reset in mid-traffic. Parameter space: registers
-of one bit and of more than a machine word; FIFO depths 1, 2, 3, 17, 256; 3 and 4 arbiter inputs. With
-SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 2 and 6 inputs, registers of 8 bits.
+of one bit and of more than a machine word; FIFO depths 1, 2, 3, 17, 256; 3 and 4 arbiter inputs; a skid buffer that loads early, FIFOs
+of depths 1, 3 and 16 with their head in a register. With SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 2 and 6 inputs, registers of 8 bits.
 Not covered: other depths and widths (the code has no case for them).
 """
 
@@ -14,8 +14,9 @@ from flicker_tb.elaboration import refused
 from flicker_tb.runner import build_and_test
 
 SLOW = pytest.mark.slow  # the same with other numbers
-FIFO_SIZES = [  # width, depth
-    (8, 1), (1, 2), (1, 256), (8, 3), (8, 17), *(pytest.param(*size, marks=SLOW) for size in ((146, 5), (8, 16), (70, 256))),
+FIFOS = [  # width, depth, head in a register
+    *((*size, 0) for size in ((8, 1), (1, 2), (1, 256), (8, 3), (8, 17))), *((9, depth, 1) for depth in (1, 3, 16)),
+    *(pytest.param(*size, 0, marks=SLOW) for size in ((146, 5), (8, 16), (70, 256))),
 ]
 
 
@@ -29,22 +30,22 @@ def test_pipe_reg(width: int) -> None:
     )
 
 
-@pytest.mark.parametrize("width", [1, pytest.param(8, marks=SLOW), 146])
-def test_skid_buffer(width: int) -> None:
+@pytest.mark.parametrize(("width", "early"), [(1, 0), pytest.param(8, 0, marks=SLOW), (146, 0), (9, 1)])
+def test_skid_buffer(width: int, early: int) -> None:
     build_and_test(
         "flk_skid_buffer",
         "cocotb_stream_cells",
-        parameters={"Width": width},
+        parameters={"Width": width, "Early": early},
         config={"capacity": 2, "period": 1, "paths": []},
     )
 
 
-@pytest.mark.parametrize(("width", "depth"), FIFO_SIZES)
-def test_fifo(width: int, depth: int) -> None:
+@pytest.mark.parametrize(("width", "depth", "head"), FIFOS)
+def test_fifo(width: int, depth: int, head: int) -> None:
     build_and_test(
         "flk_fifo",
         "cocotb_stream_cells",
-        parameters={"Width": width, "Depth": depth},
+        parameters={"Width": width, "Depth": depth, "HeadRegister": head},
         config={"capacity": depth, "period": 2 if depth == 1 else 1, "paths": []},
     )
 

@@ -191,8 +191,7 @@ def test_narrow_port(bits: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [
     pytest.param(CONFIG.with_(port_bits=128), id="128 bits"), pytest.param(FEW, id="tiny"), pytest.param(chip_of("small").config, id="small"),
-    pytest.param(CONFIG.with_(port_bits=256), id="256 bits",
-                 marks=pytest.mark.xfail(reason="docs/reference/chips.md: the front end's model is early", strict=True)),
+    pytest.param(CONFIG.with_(port_bits=256), id="256 bits"),
 ])
 def test_cycles_of_a_narrow_port(config: RenderConfig) -> None:
     """As the model has them, within a tenth."""

@@ -15,8 +15,6 @@ from flicker_tb.elaboration import refused
 from flicker_tb.runner import build_and_test
 
 SLOW = pytest.mark.slow  # builds of 30 s each
-# busy and pending_d are of one block, so slot, which comes from busy, seems to lead back to it.
-ARGS = ["-Wno-UNOPTFLAT"]
 
 
 @pytest.mark.parametrize("numbers", [
@@ -27,7 +25,7 @@ ARGS = ["-Wno-UNOPTFLAT"]
 ], ids=lambda numbers: "-".join(map(str, numbers)))
 def test_lane_core(numbers: tuple[int, ...]) -> None:
     parameters = dict(zip(("Lanes", "InWidth", "Slots", "Depth", "Subtiles"), numbers))
-    build_and_test("flk_lane_core", "cocotb_lane_core", parameters=parameters, config={**parameters, "passes": 6, "aborts": 48}, args=ARGS)
+    build_and_test("flk_lane_core", "cocotb_lane_core", parameters=parameters, config={**parameters, "passes": 6, "aborts": 48})
 
 
 @pytest.mark.parametrize(("parameters", "message"), [

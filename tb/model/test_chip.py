@@ -19,7 +19,7 @@ from flicker import markdown
 from flicker.chip import constants
 from flicker.chip.compare import estimate
 from flicker.chip.cull import cull
-from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Refresh, Stream, interleave, port_config, simulate
+from flicker.chip.dram import MASKED_WRITE, READ, WRITE, DramConfig, Refresh, Stream, behind_port, interleave, port_config, simulate
 from flicker.chip.execute import run_scheme
 from flicker.chip.frame import ChipConfig, frame_estimate, prepare
 from flicker.chip.lists import collect
@@ -428,6 +428,24 @@ def test_narrow_port():
         assert DramConfig(port_bits=128, refresh=Refresh.PER_BANK).port_cycles(read, written) == 100
     d = DramConfig(port_bits=128)
     assert d.port_cycles(16 * d.trefi - 16 * d.trfc, 0) == d.trefi
+
+
+def test_bursts_behind_a_narrow_port():
+    """Reads alone, writes alone and both take the port's rate or what those that wait for each other add; few under way wait for the memory."""
+    narrow = DramConfig(port_bits=128, refresh=Refresh.NONE)
+    assert narrow.narrow_port and DramConfig(port_bits=256).narrow_port and not DramConfig().narrow_port
+    reads, writes = (Stream.span("", 0, 64_000, kind) for kind in (READ, WRITE))
+    alone = [behind_port(s, narrow, 64, 64) for s in (reads, writes)]
+    least = 64_000 // 16
+    assert all(least < cycles < least + 100 for cycles in alone)
+    order = interleave([reads, replace(writes, burst=writes.burst + 10_000)], 64)
+    both = Stream("both", *order, 128_000)
+    free, tied, few = (behind_port(both, narrow, *limits) for limits in ((64, 2000), (64, 1), (2, 2000)))
+    assert least < free < 1.1 * least and 1.6 * least < tied < 2.3 * least and few > 2 * free
+    assert behind_port(both, DramConfig(port_bits=256, refresh=Refresh.NONE), 64, 2000) > simulate(*order, DramConfig(refresh=Refresh.NONE)).cycles
+    assert behind_port(replace(reads, burst=reads.burst[:0], kind=reads.kind[:0]), narrow, 1, 1) == 0
+    with pytest.raises(ValueError, match="at least 1"):
+        behind_port(reads, narrow, 0, 1)
 
 
 def test_recommended_scheme_fits_the_feature_buffers():

@@ -104,7 +104,8 @@ def test_sizes() -> None:
     for top in ("flk_top", "preproc/flk_preprocessing"):
         assert sizes.gathered_lines == default(top, "Gather") == preprocessing.GATHER
     assert sizes.sort_stages == default("sort/flk_sorting_unit", "Stages") and sizes.sorted_ahead == default("sort/flk_entry_buffer", "Depth")
-    assert model.QUEUE == default("flk_rendering", "Queue") == default("sort/flk_delivery", "Queue")
+    for top in ("flk_top", "flk_top_axi", "flk_rendering", "sort/flk_delivery"):
+        assert sizes.queued_records == default(top, "Queue")
     for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
         assert (model.DEPTH, model.PLACES) == (default(unit, "Depth"), default(unit, "Places"))
     given = inspect.signature(estimate).parameters

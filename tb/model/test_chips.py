@@ -162,7 +162,7 @@ def test_smallest_chip(tmp_path: Path) -> None:
 
 def test_sizes_of_memories_reach_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
     """From the pins on; none is the default's."""
-    sizes = ChipMemories(1024, 6, 128, 2, 64, 4, 96, 64, 2048)
+    sizes = ChipMemories(1024, 6, 128, 2, 64, 4, 96, 64, 2048, 32)
     assert all(getattr(sizes, name) != value for name, value in vars(ChipMemories()).items())
     monkeypatch.setitem(CHIP_MEMORIES, "others", sizes)
     found = instances("flk_top_axi", RenderConfig(stage="lanes", memories="others").top_parameters())
@@ -175,5 +175,6 @@ def test_sizes_of_memories_reach_their_units(monkeypatch: pytest.MonkeyPatch) ->
     assert all_of("flk_frame_writer", "Pairs") == {sizes.pairs} and all_of("flk_preprocessing_core", "Waiting") == {sizes.survivors}
     assert all_of("flk_line_writer", "Gather") == {sizes.gathered_lines, 64}  # the front end's, and the rendering half's
     assert all_of("flk_run_merge", "Lines") == {sizes.merge_lines} and all_of("flk_run_merge", "Runs") == {sizes.sort_runs}
+    assert all_of("flk_delivery", "Queue") == {sizes.queued_records}
     (cache,) = found["flk_record_cache"]
     assert (cache["Banks"] * cache["Sets"] * cache["Ways"], cache["Ways"]) == (sizes.record_lines, CACHE_WAYS)

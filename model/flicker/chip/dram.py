@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import FlickerError
 from ..params import LINE_BITS, PORT_WIDTHS
-from ..sim.memory import MASKED_WRITE, READ, WRITE, PortConfig, Timing, run_bursts
+from ..sim.memory import MASKED_WRITE, READ, WRITE, Behind, PortConfig, Timing, run_behind, run_bursts
 from . import constants as c
 
 __all__ = ["MASKED_WRITE", "READ", "WRITE", "DramConfig", "DramResult", "Refresh", "Stream", "interleave", "port_config", "simulate"]
@@ -91,6 +91,11 @@ class DramConfig:
     def bytes_per_second(self) -> int:
         """Peak rate of all channels."""
         return self.channels * self.width_bits * self.rate // 8
+
+    @property
+    def narrow_port(self) -> bool:
+        """Whether the port moves less in a cycle than the memory."""
+        return self.port_bits * c.CLOCK_HZ < 8 * self.bytes_per_second
 
     def port_cycles(self, read_bytes: int, written_bytes: int) -> int:
         """Cycles of the chip that the port takes: reads and writes go side by side. While all banks are refreshed it stands still, and nothing catches up."""
@@ -170,6 +175,13 @@ def simulate(burst: np.ndarray, kind: np.ndarray | int = READ, config: DramConfi
     return DramResult(
         len(burst), len(burst) * config.burst_bytes, int(counts[:, 0].max()), int(counts[:, 1].sum()), int(counts[:, 2].sum()), config,
     )
+
+
+def behind_port(stream: Stream, config: DramConfig, reads: int, ahead: int) -> int:
+    """Cycles of the chip that one owner's bursts, in its order, take through the port. reads: lines under way at most; ahead: lines by which it asks before
+    the oldest line that it has still to write."""
+    each = LINE_BITS // 8 // config.burst_bytes
+    return run_behind(config.timing, stream.burst, stream.kind, Behind(config.port_bits // 8, each * reads, each * ahead))
 
 
 @dataclass

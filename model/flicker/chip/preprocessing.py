@@ -24,7 +24,7 @@ from ..params import CHIP_MEMORIES, PREPROC_INTERVALS, TILE, UNIT_COUNTS, ChipMe
 from ..scene.packed import BEAT, HEADER_BYTES
 from ..sim.preprocessing import Regions
 from . import constants as c
-from .dram import READ, WRITE, DramConfig, Stream, simulate
+from .dram import READ, WRITE, DramConfig, Stream, behind_port, simulate
 
 # Of the RTL, times in cycles.
 LANES, LIST_WRITERS = UNIT_COUNTS[-1], UNIT_COUNTS[-1]
@@ -37,6 +37,8 @@ SIZES = CHIP_MEMORIES["default"]
 WAITING = SIZES.survivors  # of a lane between front and entries
 MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
 GATHER = SIZES.gathered_lines  # lines that are written together
+UNDER_WAY = 112  # lines of colours, which wait for survivors or survivors for them: of geometry then
+AHEAD = 32  # lines that are read while all that are gathered leave, of a chip with a narrow port
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,8 +381,10 @@ def estimate(
     used["lists"] = -(-len(frame.entry_tile) * ENTRY_BITS // 8)
     units = unit_cycles(frame, sizes.survivors, lanes, writers, interval, c.DRAM_LATENCY_CYCLES if config else 0)
     order = in_order(beats, config, sizes.gathered_lines) if config else None
-    dram = simulate(order.burst, order.kind, config).cycles if config and order else 0
-    if config:
-        read, written = (sum(len(b.beat) for b in beats if b.write == write) * BEAT for write in (False, True))
-        dram = max(dram, config.port_cycles(read, written))
+    if config is None or order is None:
+        dram = 0
+    elif config.narrow_port:
+        dram = behind_port(order, config, UNDER_WAY, sizes.gathered_lines + AHEAD)
+    else:
+        dram = simulate(order.burst, order.kind, config).cycles
     return Preprocessing(beats, used, units.all, dram, phases(units, beats, dram, sizes.survivors, lanes), sizes.gathered_lines)

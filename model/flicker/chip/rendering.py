@@ -49,7 +49,7 @@ CONTEXTS = 4  # lists under way in a list reader
 SORTED_LISTS = 8  # that a sorting unit holds, as far as its memories reach
 OUTPUTS = 2  # of a buffer behind a sorting unit, places beside its memories
 BUFFERED = 3  # from the sorting unit through the buffer to a lookup
-QUEUE, MARGIN = 128, 6  # records of each core; places that have to be free in all queues for a record to come
+MARGIN = 6  # places that have to be free in all queues for a record to come
 ROOM = 4  # from a record's leaving a queue to the next one that comes
 CACHE_WAYS = 4  # of the record cache
 DEPTH, PLACES = 512, 256  # elements that wait in the cache, lines on their way
@@ -57,6 +57,7 @@ FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
 ELASTIC = 4  # registers between a queue and the stage: latency and places
 TOLD = 4  # from a sub-tile's last finished pixel to delivery
+TAKEN = 1  # from there to what is dropped from the core's queue
 DROPPED = 8  # from there to the end of a list that all cores have finished
 PAIR_CYCLES, PAIR_GAP = 128, 4  # of tiles in the frame writer
 ROUNDS = 12  # of a frame, at most: each with the share of the memory's time that what is not records has by those before, until it is the same
@@ -151,11 +152,11 @@ def _frame(
     elements of a tile. refresh: (period, length) of the memory's, cycles, or zeros. base: line of the first record; memory: of `_moves`, channels 0 for one
     without banks. gap: cycles from line to line of records at the port. sizes: entries in a
     sorting unit's steps, cycles from the end of a list that it does not hold to the first request for its runs, chunks in a list reader, entries that wait
-    behind a sorting unit, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
+    behind a sorting unit, records in a core's queue, pairs of tiles in the frame writer, sorting units. cores: that share the four sub-tiles of a tile.
     """
     tiles = len(tile_start) - 1
     ring = 256
-    sorted_held, back, slots, buffer, held_pairs, units = sizes
+    sorted_held, back, slots, buffer, queue, held_pairs, units = sizes
     # Sorting units: by tile, since unit i takes tiles i, i + units, ...
     gate_end = np.zeros(tiles, np.int64)
     out_begin, out_end = np.zeros((2, tiles), np.int64)
@@ -176,10 +177,11 @@ def _frame(
     emitted = np.zeros(4, np.int64)
     removed, removals = np.zeros((4, buffer), np.int64), np.zeros(4, np.int64)
     # Queues: when found; element in its list, or -1, the end; when taken
-    found = np.zeros((4, QUEUE), np.int64)
-    which = np.zeros((4, QUEUE), np.int64)
-    freed = np.zeros((4, QUEUE), np.int64)
+    found = np.zeros((4, queue), np.int64)
+    which = np.zeros((4, queue), np.int64)
+    freed = np.zeros((4, queue), np.int64)
     put, got = np.zeros(4, np.int64), np.zeros(4, np.int64)
+    dropped = np.zeros(4, np.int64)  # of the core's sub-tile, from its queue
     # Cache
     held = np.full((sets, ways), -1, np.int64)
     turn = np.zeros(sets, np.int64)
@@ -225,9 +227,25 @@ def _frame(
                     break
                 if t_now // 2 >= held_pairs and pair_free[t_now // 2 - held_pairs] == NEVER:
                     break
-                q = got[k] % QUEUE
+                q = got[k] % queue
                 n = count[k]
+                element = which[k, q]
+                is_end = element < 0
                 leave = max(found[k, q] + QUEUED, taken[k] + 1)
+                # What a core that is finished with its sub-tiles has in its queue is dropped, two a cycle.
+                over = np.int64(0)
+                for i in range(k % cores, 4, cores):
+                    if core_tile[i] <= t_now:
+                        over = max(over, finished[i])
+                if not is_end and leave >= over + TAKEN:
+                    if dropped[k] == 0:
+                        taken[k] = max(taken[k], over + TAKEN - 1)
+                    leave = max(found[k, q] + QUEUED, taken[k] + 1 - dropped[k] % 2)
+                    freed[k, q] = taken[k] = leave
+                    dropped[k] += 1
+                    got[k] += 1
+                    continue
+                dropped[k] = 0
                 if n >= ELASTIC:
                     leave = max(leave, accepted[k, (n - ELASTIC) % ring])
                 go = leave + ELASTIC
@@ -236,8 +254,6 @@ def _frame(
                 taken[k] = leave
                 freed[k, q] = leave
                 got[k] += 1
-                element = which[k, q]
-                is_end = element < 0
                 place = element_start[t_now, k] + element
                 # The mask generator takes it.
                 t = max(go, last_issue[k] + 1)
@@ -422,11 +438,11 @@ def _frame(
             come = max(come, max(last_found, found_before + 1))
             # All queues have places.
             for k in range(4):
-                first = put[k] - (QUEUE - MARGIN) - 1
+                first = put[k] - (queue - MARGIN) - 1
                 if first >= 0:
                     if first >= got[k]:
                         raise RuntimeError("rendering: nothing can go on")
-                    come = max(come, freed[k, first % QUEUE] + ROOM)
+                    come = max(come, freed[k, first % queue] + ROOM)
             found_before, last_found = last_found, come
             found_at[lookups % DEPTH] = come
             lookups += 1
@@ -435,7 +451,7 @@ def _frame(
                     continue
                 if not is_end and core_tile[k] == t_c and finished[k] <= come:
                     continue  # its element is never taken; those behind it are not either
-                q = put[k] % QUEUE
+                q = put[k] % queue
                 found[k, q] = come
                 which[k, q] = -1 if is_end else given[t_c, k]
                 put[k] += 1
@@ -588,12 +604,13 @@ def estimate(
             cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
             tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
             (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
-             sizes.sorted_ahead + OUTPUTS, sizes.pairs, config.sort_units), config.cores, missed,
+             sizes.sorted_ahead + OUTPUTS, sizes.queued_records, sizes.pairs, config.sort_units), config.cores, missed,
         )
         others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
         total = int(clock) + END + latency_cycles
         if dram:
-            now = min(sum(others.values()) * CLOCK_HZ / (EFFICIENCY * dram.bytes_per_second * total), MOST_BUSY)
+            least = min(EFFICIENCY * dram.bytes_per_second / CLOCK_HZ, config.port_bits / 8)  # bytes in a cycle, of the memory and its port
+            now = min(sum(others.values()) / (least * total), MOST_BUSY)
             if abs(now - busy) < SETTLED:
                 break
             busy = (busy + now) / 2

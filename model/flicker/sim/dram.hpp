@@ -10,7 +10,7 @@
 // Consecutive addresses go to the channels in turn, `interleave_bytes` each; within a channel page by page to the banks in turn, the bank number exclusive-or'ed
 // with the row. Left out: the command bus, latency of the controller, dependences between bursts.
 //
-// Times are clocks of the command bus. Two ways to use it: `run` takes a list of bursts that all wait from clock 0 on and enter the queues in this order; `Engine` takes them as they come
+// Times are clocks of the command bus. `run` takes a list of bursts that all wait from clock 0 on and enter the queues in this order, `run_behind` one of an owner with a narrow port; `Engine` takes them as they come
 // (`push`, in order of time) and decides no column command before `advance` has reached its clock, so that whatever comes earlier can still go first.
 // Numbers come from flicker/chip/constants.py through chip/dram.py; docs/reference/memory_model.md.
 #pragma once
@@ -359,6 +359,12 @@ class Engine {
     }
   }
 
+  // Whether the queue that a burst (address / burst_bytes) of this kind goes to has a place.
+  bool space(int64_t burst, int8_t kind) const {
+    const Channel& channel = lane_[map_.channel(burst)].channel;
+    return !channel.full(channel.queue_of(kind));
+  }
+
   // Issues the column commands before `clock`.
   void advance(int64_t clock) {
     for (Lane& lane : lane_) {
@@ -423,5 +429,51 @@ class Engine {
   std::vector<Lane> lane_;
   int64_t clocks_, cycles_;
 };
+
+// What lies between the bursts' owner and the channels. bytes: that its port moves in a cycle of the chip, of reads and of writes each; reads: bursts under
+// way at most; ahead: places in the list by which a read may be asked for before the oldest write that has not left.
+struct Behind {
+  int64_t bytes, reads, ahead;
+};
+
+// Bursts of one owner behind a port that is narrower than the memory: cycles of the chip until all have moved. burst, kind: in the order in which their owner comes to
+// them; a write leaves when the port has moved its data and all reads before it have come. Read data come in any order.
+inline int64_t run_behind(const Timing& t, int64_t size, const int64_t* burst, const int8_t* kind, const Behind& port) {
+  Engine engine(t);
+  std::vector<Completion> done(size);
+  std::vector<char> come(size, 0);
+  std::vector<int64_t> under_way;  // reads
+  const auto next = [&](int64_t i, bool read) {
+    while (i < size && (kind[i] == READ) != read) ++i;
+    return i;
+  };
+  const int64_t most = std::max(port.bytes, t.burst_bytes);
+  int64_t read = next(0, true), write = next(0, false), oldest = read, cycle = 0, in = 0, out = 0;  // in, out: bytes that the port has moved, of the next bursts
+  for (; read < size || write < size || !under_way.empty(); ++cycle) {
+    const int64_t clock = engine.clock_of(cycle);
+    engine.advance(clock);
+    in = std::min(in + port.bytes, most);
+    out = std::min(out + port.bytes, most);
+    const auto comes = [&](int64_t i) {
+      if (in < t.burst_bytes || done[i].waiting != 0 || done[i].clock > clock) return false;
+      in -= t.burst_bytes;
+      return static_cast<bool>(come[i] = 1);
+    };
+    under_way.erase(std::remove_if(under_way.begin(), under_way.end(), comes), under_way.end());
+    while (oldest < size && come[oldest]) oldest = next(oldest + 1, true);
+    while (read < size && static_cast<int64_t>(under_way.size()) < port.reads && (write == size || read - write < port.ahead)) {
+      under_way.push_back(read);
+      engine.push(clock, burst[read] * t.burst_bytes, READ, &done[read]);
+      read = next(read + 1, true);
+    }
+    while (write < size && out >= t.burst_bytes && write < oldest && engine.space(burst[write], kind[write])) {
+      out -= t.burst_bytes;
+      engine.push(clock, burst[write] * t.burst_bytes, kind[write]);
+      write = next(write + 1, false);
+    }
+  }
+  engine.finish();
+  return std::max(cycle, engine.cycle_of(engine.counts().clocks));
+}
 
 }  // namespace flk::dram

@@ -28,6 +28,10 @@ void flk_dram_run(const Timing* timing, int64_t size, const int64_t* burst, cons
   flk::dram::run(*timing, size, burst, kind, counts);
 }
 
+int64_t flk_dram_run_behind(const Timing* timing, int64_t size, const int64_t* burst, const int8_t* kind, const flk::dram::Behind* port) {
+  return flk::dram::run_behind(*timing, size, burst, kind, *port);
+}
+
 Channels* flk_dram_new(const Timing* timing) { return new Channels(*timing); }
 void flk_dram_delete(Channels* c) { delete c; }
 int64_t flk_dram_push(Channels* c, int64_t clock, uint64_t address, int kind) {

@@ -167,12 +167,20 @@ class PurposeCounts(ctypes.Structure):
     )]
 
 
+class Behind(ctypes.Structure):
+    """A port between an owner of bursts and the channels. bytes: that it moves in a cycle of the chip, of reads and of writes each; reads: bursts under way at
+    most; ahead: places in the list by which a read may be asked for before the oldest write that has not left."""
+
+    _fields_ = [(name, c_int64) for name in ("bytes", "reads", "ahead")]
+
+
 @functools.cache
 def library() -> ctypes.CDLL:
     """The compiled memory; built once, cached by content below build/."""
     lib = ctypes.CDLL(str(compile_library("flk_memory", [FOLDER / "memory.cpp"], depends=HEADERS)))
     for name, result, *arguments in (
         ("dram_run", None, POINTER(Timing), c_int64, c_void_p, c_void_p, c_void_p),
+        ("dram_run_behind", c_int64, POINTER(Timing), c_int64, c_void_p, c_void_p, POINTER(Behind)),
         ("dram_new", c_void_p, POINTER(Timing)),
         ("dram_delete", None, c_void_p),
         ("dram_push", c_int64, c_void_p, c_int64, c_uint64, c_int),
@@ -219,6 +227,14 @@ def run_bursts(timing: Timing, burst: np.ndarray, kind: np.ndarray) -> np.ndarra
     counts = np.zeros((timing.channels, len(Counts._fields_)), np.int64)
     library().flk_dram_run(ctypes.byref(timing), burst.size, burst.ctypes.data, kind.ctypes.data, counts.ctypes.data)
     return counts
+
+
+def run_behind(timing: Timing, burst: np.ndarray, kind: np.ndarray, port: Behind) -> int:
+    """Cycles of the chip until bursts, as of `run_bursts`, have moved through a port that is narrower than the memory."""
+    burst, kind = np.ascontiguousarray(burst, np.int64), np.ascontiguousarray(kind, np.int8)
+    if min(port.bytes, port.reads, port.ahead) < 1:
+        raise ValueError("bytes, reads and ahead must be at least 1")
+    return library().flk_dram_run_behind(ctypes.byref(timing), burst.size, burst.ctypes.data, kind.ctypes.data, ctypes.byref(port))
 
 
 class Dram:

@@ -103,7 +103,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_axi_downsizer": [SINGLE],
     "flk_frame_counters": [MEMORY],
     "flk_top": [
-        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold", "flk_axi_lane", "flk_preprocessing",
+        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold", "flk_axi_half", "flk_preprocessing",
         "flk_rendering",
     ],
     "flk_top_axi": ["flk_top", "flk_reset_sync"],
@@ -185,7 +185,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
         # Bits of identifiers that are not in use; no part is narrower than the port. Wires alone where the port is as wide.
         "flk_axi_downsizer": ["clk_i[0]", "rst_ni[0]", "clear_i[0]"] if parameters.get("PortBits", 128) == 512 else ["r_id_i[3]"],
-        "flk_axi_lane": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
+        "flk_axi_half": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
         # Of a magnitude.
         "flk_shape_field": [f"x_i[{8 + parameters.get('ManBits', 11)}]"],
         # The last pixel of 4096 has number 4095.
@@ -409,7 +409,7 @@ def _top() -> list[Unit]:
     """The chip around its two halves."""
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
-        unit("flk_axi_hold"), unit("flk_axi_lane"), unit("flk_axi_downsizer", "128 bit"), unit("flk_axi_downsizer", "256 bit", PortBits=256),
+        unit("flk_axi_hold"), unit("flk_axi_half"), unit("flk_axi_downsizer", "128 bit"), unit("flk_axi_downsizer", "256 bit", PortBits=256),
         unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
         *(unit("flk_top", CHIP_ROWS.get(chip.name, chip.name), **chip.parameters) for chip in chips().values() if chip.name != "channels"),
         unit("flk_top_axi"),

@@ -10,5 +10,5 @@ from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [{}, {"Width": 32, "AddrBits": 32, "Bursts": 8}, {"Width": 64, "Bursts": 1}], ids=str)
-def test_axi_lane(parameters: dict[str, int]) -> None:
-    build_and_test("flk_axi_lane", "cocotb_axi_lane", parameters=parameters)
+def test_axi_half(parameters: dict[str, int]) -> None:
+    build_and_test("flk_axi_half", "cocotb_axi_half", parameters=parameters)

@@ -1,4 +1,4 @@
-"""cocotb tests of flk_axi_lane."""
+"""cocotb tests of flk_axi_half."""
 
 from __future__ import annotations
 
