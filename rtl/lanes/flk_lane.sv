@@ -371,11 +371,12 @@ module flk_lane
 
   if (MEMORY) begin : gen_s
     logic bank_d, bank_q;  // that is visited
-    logic [Pixels-1:0] seen_q, seen_out_q;
+    logic [Pixels-1:0] select_late_q, seen_q, seen_d, seen_out_q;
     logic [1:0][S_BITS-1:0] word;
     logic [S_BITS-1:0] s_q, written_q, stored;
-    logic again_q, late_q;  // the pixel before STATE is the one at it; the one behind it, which is written now
-    logic seen, seen_s_q;
+    logic late_q;   // the pixel before STATE is the one behind it, which is written now: take, if it blends
+    logic twice_q;  // the pixel at STATE is the one behind it: own, if that blends
+    logic seen, seen_s_q, take, own;
 
     always_ff @(posedge clk_i or negedge rst_ni) begin
       if (!rst_ni) begin
@@ -383,19 +384,17 @@ module flk_lane
         seen_q <= '0;
       end else begin
         bank_q <= bank_d;
-        if (clear_i || eos_q[STATE]) begin
-          seen_q <= '0;
-        end else begin
-          seen_q <= seen_q | (blend ? select_s_q : '0);
-        end
+        seen_q <= (clear_i || eos_q[STATE]) ? '0 : seen_d;
       end
     end
 
     assign bank_d = bank_q ^ eos_q[STATE];
+    assign seen_d = seen_q | (blend_q[STATE+1] ? select_late_q : '0);
 
     always_ff @(posedge clk_i) begin
+      select_late_q <= select_s_q;
       if (eos_q[STATE]) begin
-        seen_out_q <= seen_q;
+        seen_out_q <= seen_d;
       end
     end
 
@@ -411,20 +410,23 @@ module flk_lane
       assign word[b] = storage_q[bank_d==1'(b)?pixel_q[STATE-1] : place_q];
     end
 
-    assign seen   = seen_q[pixel_q[STATE-1]] && !eos_q[STATE];
-    assign stored = late_q && blend_q[STATE+1] ? written_q : word[bank_d];
+    assign take   = late_q && blend_q[STATE+1];
+    assign seen   = (seen_q[pixel_q[STATE-1]] || take) && !eos_q[STATE];
+    assign stored = take ? written_q : word[bank_d];
 
+    // No enable and no choice of many bits waits for blend.
     always_ff @(posedge clk_i) begin
-      again_q   <= pixel_q[STATE-2] == pixel_q[STATE-1];
+      twice_q   <= pixel_q[STATE-1] == pixel_q[STATE];
       late_q    <= pixel_q[STATE-2] == pixel_q[STATE];
-      seen_s_q  <= seen || (again_q && blend);
-      s_q       <= again_q && blend ? s_next[S_BITS-1:0] : stored & {S_BITS{seen}};
+      seen_s_q  <= seen;
+      s_q       <= stored & {S_BITS{seen}};
       written_q <= s_next[S_BITS-1:0];
     end
 
-    assign was_seen = seen_s_q;
+    assign own      = twice_q && blend_q[STATE+1];
+    assign was_seen = seen_s_q || own;
     assign seen_out = seen_out_q[place_q];
-    assign s_now    = s_q;
+    assign s_now    = own ? written_q : s_q;
     assign s_out    = word[!bank_q][S_BITS-1-:RESULT_BITS] & {RESULT_BITS{seen_out}};
   end else begin : gen_s
     logic [Pixels-1:0][S_BITS-1:0] s_q;

@@ -42,7 +42,7 @@ COMMANDS = {
     ),
     # A block of memory gives its word ten times as late as a register: tables are logic.
     "ecp5": (
-        "synth_ecp5 -top {top} -run begin:map_ram", 'setattr -set rom_style "logic" t:$mem_v2 r:WR_PORTS=0 %i', "synth_ecp5 -top {top} -run map_ram:",
+        "synth_ecp5 -top {top} -run begin:map_ram", 'setattr -set rom_style "logic" t:$mem_v2 r:WR_PORTS=0 %i r:WIDTH<16 %i', "synth_ecp5 -top {top} -run map_ram:",
     ),
 }
 # Modules that are synthesised apart.
