@@ -374,7 +374,7 @@ module flk_lane
     logic [Pixels-1:0] select_late_q, seen_q, seen_d, seen_out_q;
     logic [1:0][S_BITS-1:0] word;
     logic [S_BITS-1:0] s_q, written_q, stored;
-    logic late_q;   // the pixel before STATE is the one behind it, which is written now: take, if it blends
+    logic late_q;   // the pixel before STATE is that behind it, written now: take, if it blends
     logic twice_q;  // the pixel at STATE is the one behind it: own, if that blends
     logic seen, seen_s_q, take, own;
 
