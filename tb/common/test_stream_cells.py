@@ -3,7 +3,7 @@
 State space: every pair of idle and back-pressure patterns (flicker_tb.stalls), random payloads,
 random initial register values, blocked output, reset in mid-traffic. Parameter space: registers
 of one bit and of more than a machine word; FIFO depths 1, 2, 3, 17, 256; 3 and 4 arbiter inputs; a skid buffer that loads early, FIFOs
-of depths 1, 3 and 16 with their head in a register. With SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 2 and 6 inputs, registers of 8 bits.
+of depths 2, 3 and 16 with their head in a register. With SLOW=1 also FIFOs of more than a machine word, depths 5, 16, 2 and 6 inputs, registers of 8 bits.
 Not covered: other depths and widths (the code has no case for them).
 """
 
@@ -15,7 +15,7 @@ from flicker_tb.runner import build_and_test
 
 SLOW = pytest.mark.slow  # the same with other numbers
 FIFOS = [  # width, depth, head in a register
-    *((*size, 0) for size in ((8, 1), (1, 2), (1, 256), (8, 3), (8, 17))), *((9, depth, 1) for depth in (1, 3, 16)),
+    *((*size, 0) for size in ((8, 1), (1, 2), (1, 256), (8, 3), (8, 17))), *((9, depth, 1) for depth in (2, 3, 16)),
     *(pytest.param(*size, 0, marks=SLOW) for size in ((146, 5), (8, 16), (70, 256))),
 ]
 
