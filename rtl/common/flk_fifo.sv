@@ -3,7 +3,8 @@
 // Latency 1 (no fall-through), throughput 1 per cycle for Depth >= 2, every second cycle for
 // Depth 1. in_ready_o and out_valid_o come from registers: a full queue takes nothing, even in the
 // cycle in which an element leaves. out_data_o is read combinationally from the storage by a
-// registered pointer, or with HeadRegister comes from a register that holds the oldest element. clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
+// registered pointer, or with HeadRegister comes from a register that holds the oldest element.
+// clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
 // Storage is not reset; Depth need not be a power of two.
 module flk_fifo #(
   parameter  int unsigned Width     = 8,

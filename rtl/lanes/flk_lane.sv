@@ -240,7 +240,7 @@ module flk_lane
   logic [PIECE_BITS-1:0] piece;
 
   always_ff @(posedge clk_i) begin
-    if (valid_q[2]) begin
+    if (MEMORY || valid_q[2]) begin  // no enable behind the sum: what is summed stands still
       la_q    <= la[LA_BITS-1:0];
       above_q <= la[LA_WIDE-DROP-1:LA_BITS] != '0;
     end
@@ -322,7 +322,7 @@ module flk_lane
   logic unused_total;
 
   always_ff @(posedge clk_i) begin
-    if (valid_q[4]) begin
+    if (MEMORY || valid_q[4]) begin  // as in cycle 3
       h_q      <= line[REST_BITS+LINE_GUARD+:H_BITS];  // the constant, too, is a line
       x_q      <= clamp_4_q ? X_BITS'(X_MAX) : {la_4_q, {(SUM - LOG) {1'b0}}};
       skip_5_q <= skip_4_q;
@@ -335,18 +335,18 @@ module flk_lane
   assign total  = TOTAL_BITS'(s_now) + TOTAL_BITS'(x_q);
 
   if (MEMORY) begin : gen_ends
-    // Beside the sum, not behind it: what carries out of it and the constant.
-    localparam logic [S_BITS:0] REST = (S_BITS + 1)'((1 << S_BITS) - 1 - S_MAX);
-    logic [S_BITS:0] a, b, odd, two;
-    logic [S_BITS+1:0] beyond;
+    // Beside the sum, not behind it: its carry, or that of it and the constant.
+    localparam logic [S_BITS-1:0] REST = S_BITS'((1 << S_BITS) - 1 - S_MAX);
+    logic [S_BITS-1:0] a, b, odd, two;
+    logic [S_BITS:0] beyond;
     logic unused_beyond;
 
-    assign a      = (S_BITS + 1)'(s_now);
-    assign b      = (S_BITS + 1)'(h_q);
+    assign a      = s_now;
+    assign b      = S_BITS'(h_q);
     assign odd    = a ^ b ^ REST;
     assign two    = (a & b) | ((a | b) & REST);
     assign beyond = {1'b0, odd} + {two, 1'b0};
-    assign ends   = beyond[S_BITS+1:S_BITS] != '0;
+    assign ends   = s_next[S_BITS] || beyond[S_BITS];
     assign unused_beyond = ^beyond[S_BITS-1:0];
   end else begin : gen_ends
     assign ends = s_next > (S_BITS + 1)'(S_MAX);

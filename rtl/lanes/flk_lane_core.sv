@@ -12,7 +12,7 @@
 //
 // Dispatch drops a splat whose mask is empty, or holds only pixels that are known to be finished; another takes a slot of the store, one a
 // cycle, and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it. In a core
-// that is shared a register slice stands before, which keeps an FPGA's paths short.
+// that is shared a register slice stands before, and results take a cycle more, which keeps an FPGA's paths short.
 // The end of a list goes through all queues in order.
 // clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no list and no pixel is inside.
 // finished_o, of each sub-tile of the list that in_* takes: all its pixels are finished, so that its splats change no pixel any
@@ -515,8 +515,18 @@ module flk_lane_core
 
   logic leaving_valid, leaving_ready, taken_valid, taken_ready;
   lane_pixel_t leaving_pixel, taken;
+  logic found_valid, found_ready;
   core_pixel_t converted;
   logic [$clog2(Lanes)-1:0] unused_lane;
+
+  // Where the pixel is.
+  typedef struct packed {
+    subtile_t   subtile;
+    logic [1:0] minitile;
+    logic [3:0] index;
+  } place_t;
+
+  place_t place, found;
 
   flk_stream_arbiter #(
     .Inputs(Lanes),
@@ -548,15 +558,43 @@ module flk_lane_core
     .out_data_o (taken)
   );
 
-  flk_lane_result i_result (
+  assign place.subtile  = taken.subtile;
+  assign place.minitile = {taken.row[2], taken.column[2]};
+  assign place.index    = {taken.row[1:0], taken.column[1:0]};
+
+  flk_lane_result #(
+    .Registered(Subtiles > 1)
+  ) i_result (
+    .clk_i,
+    .take_i  (taken_valid && taken_ready),
     .s_i     (taken.s),
     .colour_i(taken.colour),
     .pixel_o (converted.pixel)
   );
 
-  assign converted.subtile  = taken.subtile;
-  assign converted.minitile = {taken.row[2], taken.column[2]};
-  assign converted.index    = {taken.row[1:0], taken.column[1:0]};
+  if (Subtiles > 1) begin : gen_found
+    flk_pipe_reg #(
+      .Width($bits(place_t))
+    ) i_found (
+      .clk_i,
+      .rst_ni,
+      .clear_i,
+      .in_valid_i (taken_valid),
+      .in_ready_o (taken_ready),
+      .in_data_i  (place),
+      .out_valid_o(found_valid),
+      .out_ready_i(found_ready),
+      .out_data_o (found)
+    );
+  end else begin : gen_found
+    assign found_valid = taken_valid;
+    assign taken_ready = found_ready;
+    assign found       = place;
+  end
+
+  assign converted.subtile  = found.subtile;
+  assign converted.minitile = found.minitile;
+  assign converted.index    = found.index;
 
   flk_pipe_reg #(
     .Width(CORE_PIXEL_BITS)
@@ -564,8 +602,8 @@ module flk_lane_core
     .clk_i,
     .rst_ni,
     .clear_i,
-    .in_valid_i (taken_valid),
-    .in_ready_o (taken_ready),
+    .in_valid_i (found_valid),
+    .in_ready_o (found_ready),
     .in_data_i  (converted),
     .out_valid_o,
     .out_ready_i,
@@ -579,7 +617,8 @@ module flk_lane_core
 
   assign token_in   = move && (in_valid_i & in_eos) != '0;
   assign finished_o = finished_q;
-  assign idle_o     = valid_q == '0 && !given_valid && (&lane_idle) && !taken_valid && !out_valid_o;
+  assign idle_o     = valid_q == '0 && !given_valid && (&lane_idle) && !taken_valid &&
+                  !found_valid && !out_valid_o;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -11,7 +11,20 @@ extern "C" void run(int64_t n, const uint32_t* s, const uint64_t* colour, uint64
   for (int64_t i = 0; i < n; i++) {
     model.s_i = s[i];
     model.colour_i = colour[i];
+    model.take_i = 1;
+    model.clk_i = 0;
     model.eval();
+    model.clk_i = 1;
+    model.eval();
+    if (FLK_REGISTERED) {  // what comes next and is not taken changes nothing
+      model.s_i = ~s[i];
+      model.colour_i = ~colour[i];
+      model.take_i = 0;
+      model.clk_i = 0;
+      model.eval();
+      model.clk_i = 1;
+      model.eval();
+    }
     pixel[i] = model.pixel_o;
   }
 }

@@ -23,19 +23,24 @@ ONE = 0x3C00
 
 
 @cache
-def library() -> ctypes.CDLL:
-    path = verilate("flk_lane_result", cpp=[Path(__file__).with_name("lane_result_harness.cpp")], args=["--output-split", "0"], shared=True, name="lane_result")
+def library(registered: int) -> ctypes.CDLL:
+    path = verilate(
+        "flk_lane_result", parameters={"Registered": registered}, cpp=[Path(__file__).with_name("lane_result_harness.cpp")], args=["--output-split", "0"],
+        cflags=f"-DFLK_REGISTERED={registered}", shared=True, name="lane_result",
+    )
     return ctypes.CDLL(str(path))
 
 
 def convert(s: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """uint16 (n, 4): blue, green, red, transmittance of s (n,) and colours (n, 3), red first."""
+    """uint16 (n, 4): blue, green, red, transmittance of s (n,) and colours (n, 3), red first; the same with and without a register."""
     s = np.ascontiguousarray(s, np.uint32)
     red, green, blue = colour.astype(np.uint64).T
     packed = np.ascontiguousarray(red << np.uint64(2 * C_BITS) | green << np.uint64(C_BITS) | blue)
-    pixel = np.zeros(len(s), np.uint64)
-    library().run(ctypes.c_int64(len(s)), *(ctypes.c_void_p(a.ctypes.data) for a in (s, packed, pixel)))
-    return pixel.view(np.uint16).reshape(-1, 4)
+    pixels = np.zeros((2, len(s)), np.uint64)
+    for registered, pixel in enumerate(pixels):
+        library(registered).run(ctypes.c_int64(len(s)), *(ctypes.c_void_p(a.ctypes.data) for a in (s, packed, pixel)))
+    same(pixels[1], pixels[0], s)
+    return pixels[0].view(np.uint16).reshape(-1, 4)
 
 
 @numba.njit(cache=True)

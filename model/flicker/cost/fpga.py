@@ -40,9 +40,9 @@ COMMANDS = {
         "techmap -map +/techmap.v -D LUT_SIZE=6 -map +/xilinx/lut_map.v -map +/xilinx/cells_map.v -D LUT_WIDTH=6", "xilinx_dffopt",
         "opt_lut_ins -tech xilinx", "clean", "blackbox =A:whitebox",
     ),
-    # A block of memory gives its word ten times as late as a register: tables of few bits are logic.
+    # A block of memory gives its word ten times as late as a register: tables of few bits are logic, up to 2,048 words.
     "ecp5": (
-        "synth_ecp5 -top {top} -run begin:map_ram", 'setattr -set rom_style "logic" t:$mem_v2 r:WR_PORTS=0 %i r:WIDTH<16 %i',
+        "synth_ecp5 -top {top} -run begin:map_ram", 'setattr -set rom_style "logic" t:$mem_v2 r:WR_PORTS=0 %i r:WIDTH<16 %i r:ABITS<12 %i',
         "synth_ecp5 -top {top} -run map_ram:",
     ),
 }

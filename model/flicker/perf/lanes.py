@@ -33,7 +33,7 @@ from ..params import (
 STATE = 5  # the pixel's S and its finished flag are written at the end
 RELEASE = 6  # the slot is given back
 COLOUR = 8  # the token is at the end of the pipeline: the bank leaves from the next cycle on
-OUTPUT = 2  # registers behind the choice of a lane
+OUTPUT = 2  # registers behind the choice of a lane; one more in a core that several sub-tiles share
 TOKEN = -1  # positions below are tokens
 NOTHING = -(1 << 62)
 
@@ -305,7 +305,7 @@ def _core(
             own = share - 1 - (bank_left[served] - 1) // per_lane
             arrived[k, own] += 1
             if arrived[k, own] == SUBTILE_PIXELS:
-                subtile_end[subtile[order[k], own]] = t + OUTPUT
+                subtile_end[subtile[order[k], own]] = t
         # ---- lanes
         for l in range(lanes):
             taken = bank[l]
@@ -426,7 +426,7 @@ def _core(
                         count[GAUSSIANS_IN] += 1
             n_held = 0
         t += 1
-    return t, last_pixel + OUTPUT + 1
+    return t, last_pixel + 1
 
 
 @numba.njit(parallel=True, cache=True)
@@ -470,6 +470,9 @@ def simulate_lanes(
         pixels_of_lanes(lanes), LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, in_width or config.in_width, config.slots, config.fifo_depth, leave, dispatch,
         counters, end, ends,
     )
+    output = OUTPUT + (config.cores < CORES)
+    ends[:, 1] += output
+    end[end > 0] += output
     cycles = int(ends[:, 1].max())
     # A core that has ended goes on counting: no input, no entry in any queue.
     counters[:, CYCLES] = cycles

@@ -198,6 +198,7 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_entry_near": [f"{side}_i[{bit}]" for side in ("older", "newer") for bit in range(4)],
         "flk_line_entry": [f"newer_i[{bit}]" for bit in range(4)],
         "flk_splat_setup": ["record_i[127]"],  # what is spiky the lanes do not ask
+        "flk_lane_result": [] if parameters.get("Registered") else ["clk_i[0]", "take_i[0]"],  # combinational
         "flk_row_mask": [f"splat_i[{bit}]" for bit in range(30)],  # colours
         "flk_lane_queue": ["push_subtile_i[0]"] if parameters.get("Subtiles", 1) == 1 else [],  # a core of one sub-tile
         "flk_lane_core": [f"in_elem_i[{153 * way + 151}]" for way in range(parameters.get("InWidth", 1))],  # record_i[127]
