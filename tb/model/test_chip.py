@@ -446,6 +446,8 @@ def test_bursts_behind_a_narrow_port():
     assert behind_port(replace(reads, burst=reads.burst[:0], kind=reads.kind[:0]), narrow, 1, 1) == 0
     with pytest.raises(ValueError, match="at least 1"):
         behind_port(reads, narrow, 0, 1)
+    with pytest.raises(ValueError, match="differ in shape"):
+        behind_port(replace(reads, kind=reads.kind[1:]), narrow, 64, 64)
 
 
 def test_recommended_scheme_fits_the_feature_buffers():

@@ -112,6 +112,8 @@ def test_sizes() -> None:
     assert (given["latency_cycles"].default, given["reads"].default) == (PORT.latency, PORT.max_reads)
     margin = re.search(r"Margin = (\d+);", (ROOT / "rtl/sort/flk_delivery.sv").read_text())
     assert margin and model.MARGIN == int(margin[1])
+    beats = re.findall(r"\.BufferBeats\s*\((\d+)\)", (ROOT / "rtl/preproc/flk_preprocessing.sv").read_text())
+    assert beats == [str(preprocessing.UNDER_WAY)]
 
 
 def test_small_memories(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,6 +82,7 @@ class Delivery:
         self.dropped = [False] * SUBTILES  # a record did not come
         self.finishes: list[list[int | None]] = [[] for _ in range(SUBTILES)]  # by tile: records after which it is finished
         self.after = [0] * SUBTILES  # records since
+        self.over = [0] * CORES  # records since all of a core's are
         self.finish_seen = 0
         self.records = 0
         self.late = 0
@@ -189,6 +190,7 @@ class Delivery:
             self.tile[k] += 1
             for s in range(k, SUBTILES, CORES):
                 self.got[s], self.finished[s], self.dropped[s], self.after[s] = 0, False, False, 0
+            self.over[k] = 0
             return
         assert due[0] is not END, f"{where}: no end"
         number, s = due.popleft()
@@ -199,6 +201,8 @@ class Delivery:
         self.after[s] += self.finished[s]
         self.late += self.finished[s]
         assert self.after[s] <= int(self.dut.Queue.value) + 2, f"{where}: {self.after[s]} records since sub-tile {s} is finished"
+        self.over[k] += all(self.finished[m] for m in range(k, SUBTILES, CORES))
+        assert self.over[k] <= self.width, f"{where}: {self.over[k]} records since the core is finished"
         self.rest[k] = self.pace[k] - 1
 
     async def ready(self) -> None:

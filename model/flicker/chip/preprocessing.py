@@ -37,8 +37,10 @@ SIZES = CHIP_MEMORIES["default"]
 WAITING = SIZES.survivors  # of a lane between front and entries
 MERGE_DEPTH = 32  # entries of a lane that wait for a list writer
 GATHER = SIZES.gathered_lines  # lines that are written together
-UNDER_WAY = 112  # lines of colours, which wait for survivors or survivors for them: of geometry then
-AHEAD = 32  # lines that are read while all that are gathered leave, of a chip with a narrow port
+# A chip with a narrow port: lines of colours under way, which wait for survivors or survivors for them, of geometry then; lines that are read while all
+# that are gathered leave, fitted to frames of the RTL behind 128 and 256 bits.
+UNDER_WAY = 112
+AHEAD = 32
 
 
 @dataclass(frozen=True, eq=False)

@@ -236,7 +236,7 @@ def _frame(
                 over = np.int64(0)
                 for i in range(k % cores, 4, cores):
                     if core_tile[i] <= t_now:
-                        over = max(over, finished[i])
+                        over = max(over, finished[i] if core_tile[i] == t_now else NEVER)
                 if not is_end and leave >= over + TAKEN:
                     if dropped[k] == 0:
                         taken[k] = max(taken[k], over + TAKEN - 1)

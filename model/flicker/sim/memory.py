@@ -216,14 +216,20 @@ def library() -> ctypes.CDLL:
     return lib
 
 
+def _same_length(burst: np.ndarray, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as the library takes them. Raises ValueError if one has more bursts."""
+    burst, kind = np.ascontiguousarray(burst, np.int64), np.ascontiguousarray(kind, np.int8)
+    if burst.shape != kind.shape:
+        raise ValueError("burst and kind differ in shape")
+    return burst, kind
+
+
 def run_bursts(timing: Timing, burst: np.ndarray, kind: np.ndarray) -> np.ndarray:
     """`Counts` of every channel, int64 (channels, fields).
 
     burst: int64 (B,), address / burst_bytes, not negative; kind: int8 (B,), READ, WRITE or MASKED_WRITE. All wait from clock 0 on, in this order.
     """
-    burst, kind = np.ascontiguousarray(burst, np.int64), np.ascontiguousarray(kind, np.int8)
-    if burst.shape != kind.shape:
-        raise ValueError("burst and kind differ in shape")
+    burst, kind = _same_length(burst, kind)
     counts = np.zeros((timing.channels, len(Counts._fields_)), np.int64)
     library().flk_dram_run(ctypes.byref(timing), burst.size, burst.ctypes.data, kind.ctypes.data, counts.ctypes.data)
     return counts
@@ -231,7 +237,7 @@ def run_bursts(timing: Timing, burst: np.ndarray, kind: np.ndarray) -> np.ndarra
 
 def run_behind(timing: Timing, burst: np.ndarray, kind: np.ndarray, port: Behind) -> int:
     """Cycles of the chip until bursts, as of `run_bursts`, have moved through a port that is narrower than the memory."""
-    burst, kind = np.ascontiguousarray(burst, np.int64), np.ascontiguousarray(kind, np.int8)
+    burst, kind = _same_length(burst, kind)
     if min(port.bytes, port.reads, port.ahead) < 1:
         raise ValueError("bytes, reads and ahead must be at least 1")
     return library().flk_dram_run_behind(ctypes.byref(timing), burst.size, burst.ctypes.data, kind.ctypes.data, ctypes.byref(port))
