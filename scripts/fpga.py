@@ -18,7 +18,7 @@ from rich.table import Table
 from flicker.chips import chip_of, chips
 from flicker.cli.tables import Terminal
 from flicker.cost.fpga import COMMANDS, FOLDER, Fpga, Resources, boards
-from flicker.cost.place import SEED, delays, part_of, place
+from flicker.cost.place import delays, part_of, place
 from flicker.errors import FlickerError
 from flicker.output import write_text
 
@@ -30,7 +30,7 @@ def main() -> int:
     parser.add_argument("--board", help=f"name of a board: {', '.join(boards())}")
     parser.add_argument("--family", default=None, help=f"of the device, without a board: {', '.join(COMMANDS)} (default: xcup)")
     parser.add_argument("--route", action="store_true", help="place and route the rendering stage on the board: minutes")
-    parser.add_argument("--seed", type=int, help=f"of the placement (default: {SEED})")
+    parser.add_argument("--seed", type=int, help="of the placement (default: 1)")
     options = parser.parse_args()
     console, known = Terminal(), boards()
     if options.board and options.board not in known:
@@ -72,7 +72,7 @@ def route(options: argparse.Namespace, console: Terminal) -> int:
     board = options.board or next(name for name, known in boards().items() if known.nextpnr)
     chip = chip_of(options.chip, options.chips)
     with console.status(f"{chip.name} on {board}") as status:
-        found = place(chip, board, SEED if options.seed is None else options.seed, lambda phase: status.update(f"{chip.name} on {board}: {phase}"))
+        found = place(chip, board, 1 if options.seed is None else options.seed, lambda phase: status.update(f"{chip.name} on {board}: {phase}"))
     console.print(f"rendering stage of {chip.name} on {found.board}, seed {found.seed}: {found.mhz:.1f} MHz", highlight=False)
     for name, (used, there) in found.used.items():
         console.print(f"  {name:<14} {used:>7,} of {there:>7,}, {used / there:.0%}", highlight=False)
