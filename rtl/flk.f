@@ -104,6 +104,7 @@ render/flk_splat_input.sv
 render/flk_stage_control.sv
 render/flk_vru.sv
 lanes/flk_lane.sv
+lanes/flk_lane_arbiter.sv
 lanes/flk_lane_core.sv
 lanes/flk_lane_counters.sv
 lanes/flk_lane_queue.sv

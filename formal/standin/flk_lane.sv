@@ -31,6 +31,8 @@ module flk_lane
   output logic                        out_valid_o,
   input  logic                        out_ready_i,
   output lane_pixel_t                 out_data_o,
+  output logic                        out_start_o,
+  output logic                        out_last_o,
   output lane_events_t                events_o
 );
 
@@ -65,6 +67,8 @@ module flk_lane
   assign finished_o    = '0;
   assign out_valid_o   = full_q;
   assign out_data_o    = '0;
+  assign out_start_o   = token_q;
+  assign out_last_o    = 1'b1;
   assign events_o      = '0;
 
 endmodule

@@ -2,9 +2,9 @@
 // number of a pixel: sub-tile, then pixel of that sub-tile.
 //
 // in  a visit (visit_valid_i): pixel and shape of a splat, only pixels of its mask (flk_row_mask); or with visit_eos_i the end of the list,
-//     when bank_free_o is high, with the sub-tile in the shape's low bits. The splat's colours are asked for in cycle 6: colour_slot_o is
+//     when bank_free_o is high, with the sub-tile in the shape's low bits. The splat's colours are asked for behind STATE: colour_slot_o is
 //     the visit's slot, colour_i its colours. visit_last_i, with a visit or without one: the lane needs the slot no more after that;
-//     release_o says so in cycle 6, about colour_slot_o.
+//     release_o says so in the cycle behind STATE, about colour_slot_o.
 // out all Pixels of the list after its end, one per cycle, in order: sub-tile and place in it, S as far as the result needs it, and colours.
 //
 // | cycle | what |
@@ -19,13 +19,16 @@
 // | 7 | its products with the colours |
 // | 8 = COLOUR | are shifted; colours of the pixel are read and written |
 //
+// In a lane of several sub-tiles h comes in cycle 5 and all behind it is a cycle later: a memory of an FPGA, which has the lines, needs cycle 4.
+//
 // The loops of S and of the colours are one cycle long, so the same pixel may be visited in every cycle. A token moves S at STATE and the
 // colours at COLOUR into the bank that leaves, and sets all pixels to S = 0, black, unfinished; visits of the next list may follow at once.
 // Pixels of one sub-tile, few, are flip-flops, which a token copies and sets. Those of more are two memories each of S and of colours, with a
-// write port and a read port without latency: in turn one has the pixels that are visited, one those that leave. A visit's are read a
-// cycle before STATE and COLOUR, or are what is written then; S is written a cycle after STATE, so that no memory waits for what STATE
-// decides. What a word held before counts as 0 until it is written: seen_q.
+// write port and a read port without latency, whose address is a register: in turn one has the pixels that are visited, one those that
+// leave. A visit's are read a cycle before STATE and COLOUR, or are what is written then; S is written a cycle after STATE, so that no memory
+// waits for what STATE decides. What a word held before counts as 0 until it is written: seen_q.
 // Which pixels are a lane's: flk_lane_pkg, lane_column and lane_row.
+// out_start_o: out_valid_o is high in the next cycle, unless clear_i is. out_last_o: the pixel at the output is the list's last.
 // clear_i: visits, tokens, releases and the bank are dropped and all pixels set. token_o: a token is on its way to STATE, finished_o does not belong
 // to what is visited now; token_done_o: it is there. events_o is a cycle later than STATE, and what it says stands whatever
 // clear_i does. All outputs come from registers, out_data_o by a multiplexer.
@@ -63,6 +66,8 @@ module flk_lane
   output logic                        out_valid_o,
   input  logic                        out_ready_i,
   output lane_pixel_t                 out_data_o,
+  output logic                        out_start_o,
+  output logic                        out_last_o,
   // counters
   output lane_events_t                events_o
 );
@@ -79,13 +84,13 @@ module flk_lane
 
   localparam int unsigned Own = 64 / Lanes;  // pixels of a sub-tile
   localparam int unsigned OwnW = $clog2(Own);
-  localparam int unsigned STATE = 5;
-  localparam int unsigned FETCH = 6;  // of the splat's colours
-  localparam int unsigned COLOUR = 8;
+  localparam bit MEMORY = Subtiles > 1;  // of the pixels' state
+  localparam int unsigned STATE = MEMORY ? 6 : 5;
+  localparam int unsigned FETCH = STATE + 1;  // of the splat's colours
+  localparam int unsigned COLOUR = STATE + 3;
   localparam int unsigned GUARD = PLACE - UV;
   localparam int unsigned WIDE = UV_BITS + GUARD;  // sums of u and v before they are rounded
   localparam int unsigned MAG_BITS = UV_BITS - 1;
-  localparam bit MEMORY = Subtiles > 1;  // of the pixels' state
 
   // ---- Control: index s holds what came s cycles ago ---------------------------------------------------------
 
@@ -256,7 +261,7 @@ module flk_lane
   assign normal = (LA_BITS - 1)'(la_q << zeros);
   assign piece  = normal[REST_BITS+:PIECE_BITS];
 
-  // ---- Cycle 4: h ------------------------------------------------------------------------------------------------
+  // ---- Cycle 4, 5 where MEMORY: h ----------------------------------------------------------------------------------
 
   localparam int unsigned VALUE_BITS = $bits(H_VALUE[0][0]);
   localparam int unsigned FALL_BITS = $bits(H_FALL[0][0]);
@@ -278,41 +283,66 @@ module flk_lane
 
   localparam lines_t TABLE = lines();
 
-  logic [VALUE_BITS-1:0] value_q;
-  logic [FALL_BITS-1:0] fall_q;
-  logic [REST_BITS-1:0] left_q;  // less one
-  logic [LA_BITS-1:0] la_4_q;
-  logic skip_4_q, clamp_4_q;
+  typedef struct packed {
+    logic [REST_BITS-1:0] left;   // of the piece, less one
+    logic [LA_BITS-1:0]   la;
+    logic                 skip;
+    logic                 clamp;  // what is skipped has no use for it
+  } beside_t;
+
+  logic [VALUE_BITS-1:0] value_q, value;  // value, fall, beside: of the visit before STATE
+  logic [FALL_BITS-1:0] fall_q, fall;
+  beside_t beside_q, beside;
   logic [LINE_BITS-1:0] line;
   logic unused_line;
 
   always_ff @(posedge clk_i) begin
     if (valid_q[3]) begin
       {value_q, fall_q} <= TABLE[{zeros, piece}];
-      left_q    <= ~normal[REST_BITS-1:0];
-      la_4_q    <= la_q;
-      skip_4_q  <= above_q || la_q > LA_BITS'(LIMIT);
-      clamp_4_q <= la_q <= LA_BITS'(CLAMP);  // what is skipped has no use for it
+      beside_q.left  <= ~normal[REST_BITS-1:0];
+      beside_q.la    <= la_q;
+      beside_q.skip  <= above_q || la_q > LA_BITS'(LIMIT);
+      beside_q.clamp <= la_q <= LA_BITS'(CLAMP);
     end
   end
 
+  if (MEMORY) begin : gen_beside
+    logic [VALUE_BITS-1:0] value_5_q;
+    logic [FALL_BITS-1:0] fall_5_q;
+    beside_t beside_5_q;
+
+    always_ff @(posedge clk_i) begin
+      value_5_q  <= value_q;
+      fall_5_q   <= fall_q;
+      beside_5_q <= beside_q;
+    end
+
+    assign value  = value_5_q;
+    assign fall   = fall_5_q;
+    assign beside = beside_5_q;
+  end else begin : gen_beside
+    assign value  = value_q;
+    assign fall   = fall_q;
+    assign beside = beside_q;
+  end
+
   always_comb begin
-    line = {value_q, {REST_BITS{1'b0}}} + LINE_BITS'(fall_q);
+    line = {value, {REST_BITS{1'b0}}} + LINE_BITS'(fall);
     for (int unsigned i = 0; i < REST_BITS; i++) begin
-      line = line + (left_q[i] ? LINE_BITS'(fall_q) << i : '0);
+      line = line + (beside.left[i] ? LINE_BITS'(fall) << i : '0);
     end
   end
 
   assign unused_line = ^line;
 
-  // ---- Cycle 5: transmittance --------------------------------------------------------------------------------------
+  // ---- STATE: transmittance ----------------------------------------------------------------------------------------
 
   localparam int unsigned X_BITS = LA_BITS + SUM - LOG;
   localparam int unsigned TOTAL_BITS = EXPONENT_BITS + SUM;
 
   logic [H_BITS-1:0] h_q;
   logic [X_BITS-1:0] x_q;
-  logic skip_5_q;
+  logic skip_q;
   logic [Pixels-1:0] finished_q;
   logic [S_BITS-1:0] s_now;
   logic [RESULT_BITS-1:0] s_out;
@@ -322,10 +352,10 @@ module flk_lane
   logic unused_total;
 
   always_ff @(posedge clk_i) begin
-    if (MEMORY || valid_q[4]) begin  // as in cycle 3
-      h_q      <= line[REST_BITS+LINE_GUARD+:H_BITS];  // the constant, too, is a line
-      x_q      <= clamp_4_q ? X_BITS'(X_MAX) : {la_4_q, {(SUM - LOG) {1'b0}}};
-      skip_5_q <= skip_4_q;
+    if (MEMORY || valid_q[STATE-1]) begin  // as in cycle 3
+      h_q    <= line[REST_BITS+LINE_GUARD+:H_BITS];  // the constant, too, is a line
+      x_q    <= beside.clamp ? X_BITS'(X_MAX) : {beside.la, {(SUM - LOG) {1'b0}}};
+      skip_q <= beside.skip;
     end
   end
 
@@ -352,7 +382,7 @@ module flk_lane
     assign ends = s_next > (S_BITS + 1)'(S_MAX);
   end
 
-  assign live   = valid_q[STATE] && !skip_5_q && !was_done;
+  assign live   = valid_q[STATE] && !skip_q && !was_done;
   assign blend  = live && !ends;
   assign finish = live && ends;
   assign unused_total = ^total[SUM-MANTISSA-1:0];
@@ -372,6 +402,8 @@ module flk_lane
   if (MEMORY) begin : gen_s
     logic bank_d, bank_q;  // that is visited
     logic [Pixels-1:0] select_late_q, seen_q, seen_d, seen_out_q;
+    logic [1:0][PixelW-1:0] read_q;  // that each bank reads
+    logic leaves_q;  // the pixel that leaves was seen
     logic [1:0][S_BITS-1:0] word;
     logic [S_BITS-1:0] s_q, written_q, stored;
     logic late_q;   // the pixel before STATE is that behind it, written now: take, if it blends
@@ -396,6 +428,7 @@ module flk_lane
       if (eos_q[STATE]) begin
         seen_out_q <= seen_d;
       end
+      leaves_q <= seen_out_q[place_d];
     end
 
     for (genvar b = 0; b < 2; b++) begin : gen_bank
@@ -407,7 +440,11 @@ module flk_lane
         end
       end
 
-      assign word[b] = storage_q[bank_d==1'(b)?pixel_q[STATE-1] : place_q];
+      always_ff @(posedge clk_i) begin
+        read_q[b] <= (bank_d ^ eos_q[STATE-1]) == 1'(b) ? pixel_q[STATE-2] : place_d;
+      end
+
+      assign word[b] = storage_q[read_q[b]];
     end
 
     assign take   = late_q && blend_q[STATE+1];
@@ -425,7 +462,7 @@ module flk_lane
 
     assign own      = twice_q && blend_q[STATE+1];
     assign was_seen = seen_s_q || own;
-    assign seen_out = seen_out_q[place_q];
+    assign seen_out = leaves_q;
     assign s_now    = own ? written_q : s_q;
     assign s_out    = word[!bank_q][S_BITS-1-:RESULT_BITS] & {RESULT_BITS{seen_out}};
   end else begin : gen_s
@@ -476,7 +513,7 @@ module flk_lane
       events_q <= '0;
     end else begin
       events_q.visited  <= valid_q[STATE];
-      events_q.skipped  <= valid_q[STATE] && skip_5_q;
+      events_q.skipped  <= valid_q[STATE] && skip_q;
       events_q.blended  <= blend;
       events_q.finished <= finish;
     end
@@ -484,7 +521,7 @@ module flk_lane
 
   assign events_o = events_q;
 
-  // ---- Cycles 6 and 7: weight and its products with the colours ----------------------------------------------------
+  // ---- STATE + 1 and STATE + 2: weight and its products with the colours -----------------------------------------------
 
   localparam int unsigned PRODUCT_BITS = MANTISSA + COLOUR_BITS;
   // Places from the product to the accumulator, but for the exponent and the place that rounds.
@@ -493,7 +530,7 @@ module flk_lane
   localparam int unsigned FAR = (PART_BITS + 3) / 4;  // more than 4 FAR - 1 places leave nothing
 
   logic [MANTISSA-1:0] address_q, mantissa_q;
-  logic [COLOUR-1:6][EXPONENT_BITS-1:0] exponent_q;
+  logic [COLOUR-1:STATE+1][EXPONENT_BITS-1:0] exponent_q;
   logic [3:0] near_q;     // one bit: places below a multiple of four
   logic [FAR-1:0] far_q;  // one bit or none: that multiple
   lane_colour_t colour_q;
@@ -505,17 +542,17 @@ module flk_lane
     end else if (clear_i) begin
       blend_q <= '0;
     end else begin
-      blend_q <= {blend_q[COLOUR-1:6], blend};
+      blend_q <= {blend_q[COLOUR-1:STATE+1], blend};
     end
   end
 
   always_ff @(posedge clk_i) begin
-    exponent_q <= {exponent_q[6], total[TOTAL_BITS-1:SUM]};
+    exponent_q <= {exponent_q[STATE+1], total[TOTAL_BITS-1:SUM]};
     for (int unsigned k = 0; k < 4; k++) begin
-      near_q[k] <= exponent_q[7][1:0] == 2'(k);
+      near_q[k] <= exponent_q[STATE+2][1:0] == 2'(k);
     end
     for (int unsigned k = 0; k < FAR; k++) begin
-      far_q[k] <= exponent_q[7][EXPONENT_BITS-1:2] == (EXPONENT_BITS - 2)'(k);
+      far_q[k] <= exponent_q[STATE+2][EXPONENT_BITS-1:2] == (EXPONENT_BITS - 2)'(k);
     end
     address_q  <= total[SUM-1-:MANTISSA];
     mantissa_q <= {1'b1, EXP2[address_q]};
@@ -525,7 +562,7 @@ module flk_lane
     end
   end
 
-  // ---- Cycle 8: colours --------------------------------------------------------------------------------------------
+  // ---- COLOUR: colours ---------------------------------------------------------------------------------------------------
 
   logic [2:0][C_BITS-1:0] c_now, c_next, c_out;
   logic [2:0] unused_place;
@@ -548,6 +585,7 @@ module flk_lane
   if (MEMORY) begin : gen_c
     logic bank_d, bank_q;
     logic [COLOUR-1:STATE+1] was_seen_q;
+    logic [1:0][PixelW-1:0] read_q;
     logic [1:0][3*C_BITS-1:0] word;
     logic [3*C_BITS-1:0] c_q;
     logic [PixelW-1:0] at_q;  // the pixel at COLOUR
@@ -580,7 +618,11 @@ module flk_lane
         end
       end
 
-      assign word[b] = storage_q[bank_d==1'(b)?pixel_q[COLOUR-1] : place_q];
+      always_ff @(posedge clk_i) begin
+        read_q[b] <= (bank_d ^ eos_q[COLOUR-1]) == 1'(b) ? pixel_q[COLOUR-2] : place_d;
+      end
+
+      assign word[b] = storage_q[read_q[b]];
     end
 
     assign c_now = c_q;
@@ -629,7 +671,7 @@ module flk_lane
   subtile_t subtile_q;
   logic last;
 
-  assign last = out_valid_o && out_ready_i && place_q == '1;
+  assign last = out_valid_o && out_ready_i && out_last_o;
 
   always_comb begin
     place_d = place_q;
@@ -672,6 +714,8 @@ module flk_lane
 
   assign bank_free_o = !bank_q;
   assign out_valid_o = full_q;
+  assign out_start_o = eos_q[COLOUR];
+  assign out_last_o  = place_q == '1;
 
   always_comb begin
     out_data_o.column  = lane_column(Lanes, Lane, 32'(place_q[OwnW-1:0]));

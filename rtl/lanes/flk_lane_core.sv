@@ -433,7 +433,7 @@ module flk_lane_core
 
   logic [Lanes-1:0] lane_idle, starved, waits;
   logic [Subtiles-1:0][Lanes-1:0] lane_finished;
-  logic [Lanes-1:0] pixel_valid, pixel_ready;
+  logic [Lanes-1:0] pixel_valid, pixel_ready, pixel_start, pixel_last;
   lane_pixel_t [Lanes-1:0] pixel;
   lane_events_t [Lanes-1:0] lane_events;
   logic [Lanes-1:0][Subtiles-1:0][Pixels-1:0] lane_alive;
@@ -497,6 +497,8 @@ module flk_lane_core
       .out_valid_o  (pixel_valid[l]),
       .out_ready_i  (pixel_ready[l]),
       .out_data_o   (pixel[l]),
+      .out_start_o  (pixel_start[l]),
+      .out_last_o   (pixel_last[l]),
       .events_o     (lane_events[l])
     );
 
@@ -517,7 +519,6 @@ module flk_lane_core
   lane_pixel_t leaving_pixel, taken;
   logic found_valid, found_ready;
   core_pixel_t converted;
-  logic [$clog2(Lanes)-1:0] unused_lane;
 
   // Where the pixel is.
   typedef struct packed {
@@ -528,9 +529,8 @@ module flk_lane_core
 
   place_t place, found;
 
-  flk_stream_arbiter #(
-    .Inputs(Lanes),
-    .Width ($bits(lane_pixel_t))
+  flk_lane_arbiter #(
+    .Lanes(Lanes)
   ) i_arbiter (
     .clk_i,
     .rst_ni,
@@ -538,10 +538,11 @@ module flk_lane_core
     .in_valid_i (pixel_valid),
     .in_ready_o (pixel_ready),
     .in_data_i  (pixel),
+    .in_start_i (pixel_start),
+    .in_last_i  (pixel_last),
     .out_valid_o(leaving_valid),
     .out_ready_i(leaving_ready),
-    .out_data_o (leaving_pixel),
-    .out_index_o(unused_lane)
+    .out_data_o (leaving_pixel)
   );
 
   flk_pipe_reg #(

@@ -43,7 +43,7 @@ PAGES = (
         ("rendering_core.md", "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_*"),
     )),
     ("Stage of lanes", (
-        ("lane_stage.md", "flk_lane_stage flk_lane_core flk_lane_queue flk_lane_counters flk_lane_pkg"),
+        ("lane_stage.md", "flk_lane_stage flk_lane_core flk_lane_arbiter flk_lane_queue flk_lane_counters flk_lane_pkg"),
         ("lanes.md", "flk_lane flk_lane_result flk_splat_setup flk_row_mask"),
     )),
     ("Cells and packages", (
@@ -66,7 +66,7 @@ HEADS = {
     "frame_writer": "flk_frame_writer", "record_to_splat": "flk_record_to_splat flk_splat_input", "render_stage": "flk_render_stage",
     "ctu": "flk_ctu flk_ctu_controller flk_mmu", "prtu": "flk_prtu",
     "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_state flk_pixel_drain",
-    "lane_stage": "flk_lane_stage flk_lane_core flk_splat_setup flk_row_mask flk_lane_queue flk_lane flk_lane_result",
+    "lane_stage": "flk_lane_stage flk_lane_core flk_splat_setup flk_row_mask flk_lane_queue flk_lane flk_lane_arbiter flk_lane_result",
     "arithmetic": "flk_fp_add_pipe flk_fp_mul_pipe flk_weight flk_exp_neg_pipe flk_log_opacity_pipe",
 }
 COLUMNS = 200

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 from flicker.chip.dram import DramConfig, port_config
 from flicker.sim.memory import Memory, Order, PortConfig, Resp, WriteOrder
@@ -227,8 +227,8 @@ async def traffic(dut, idle, order, write_order, stall, dram):
     port = memory_of(test, dut, options(test, order, write_order, stall, dram), dram)
     test.start()
     await test.bench.reset()
-    test.make_reads(150)
-    test.make_writes(100)
+    test.make_reads(rounds(70, 150))
+    test.make_writes(rounds(45, 100))
     await test.bench.until(lambda: not test.busy, 200_000, "last answer")
     assert port.port.idle and not test.expected_ar and not test.expected_aw
     assert port.memory.read(WRITE_BASE, SIZE) == bytes(test.golden)

@@ -18,13 +18,13 @@ from flicker.golden.lanes.setup import SplatSetup, u_of, v_of
 from flicker.params import SUBTILE_COORD_BITS
 
 T = tables(FORMATS)
-# Cycles after the visit (rtl/lanes/flk_lane.sv).
+# Cycles after the visit (rtl/lanes/flk_lane.sv); of several sub-tiles one more.
 STATE, FETCH, COLOUR = 5, 6, 8
 # lane_shape_t, highest first.
 SHAPE = {"w": 17, "z": 17, "s0": 15, "s1": 16, "s2": 15, "lo": 12}
 SHAPE_BITS = sum(SHAPE.values())
 INPUTS = ("clear_i", "visit_valid_i", "visit_eos_i", "visit_last_i", "visit_pixel_i", "visit_slot_i", "visit_shape_i", "colour_i", "out_ready_i")
-OUTPUTS = ("release_o", "token_o", "token_done_o", "bank_free_o", "finished_o", "events_o", "out_valid_o")
+OUTPUTS = ("release_o", "token_o", "token_done_o", "bank_free_o", "finished_o", "events_o", "out_valid_o", "out_start_o", "out_last_o")
 RESULT_PLACES = 3  # of S, which the result does not take
 C_BITS = 16
 ROW = SUBTILE_COORD_BITS  # subtile_t: row, then column
@@ -139,6 +139,8 @@ class Lane:
         setting = config()
         self.lanes, self.lane, self.slots = setting["Lanes"], setting["Lane"], setting["Slots"]
         self.subtiles = setting.get("Subtiles", 1)
+        late = self.subtiles > 1
+        self.state_at, self.fetch_at, self.colour_at = STATE + late, FETCH + late, COLOUR + late
         self.pixels = self.subtiles * 64 // self.lanes
         self.of = self.lanes, self.lane, self.subtiles
         self.slot_bits, self.pixel_bits = (self.slots - 1).bit_length(), (self.pixels - 1).bit_length()
@@ -156,7 +158,7 @@ class Lane:
         """As after reset or clear_i."""
         self.state = self.subtile = Subtile(self.pixels, self.rng)  # at STATE, and of what comes now
         nothing = Item(self.subtile)
-        self.inside = deque([nothing] * (COLOUR + 1), COLOUR + 1)  # index: cycles since it came
+        self.inside = deque([nothing] * (self.colour_at + 1), self.colour_at + 1)  # index: cycles since it came
         self.bank = False
         self.leaves: list[int] = []  # pixels in the bank that leave, the next first
         self.free = list(range(self.slots))
@@ -172,7 +174,7 @@ class Lane:
         shape = item.splat.shape if item.splat else rng.getrandbits(SHAPE_BITS)
         if item.eos:
             shape = shape >> 2 * SUBTILE_COORD_BITS << 2 * SUBTILE_COORD_BITS | self.subtile.address
-        fetching = inside[FETCH]
+        fetching = inside[self.fetch_at]
         colour = self.table[fetching.slot] if fetching.splat else tuple(rng.getrandbits(10) for _ in range(3))
         values = (
             int(clear), int(valid), int(item.eos) if valid else rng.getrandbits(1), int(item.last), item.pixel, item.slot, shape,
@@ -193,9 +195,10 @@ class Lane:
         # The cycle that ends here: what it had on its outputs.
         leaves = bool(self.leaves)
         expected = (
-            fetching.last, any(inside[s].eos for s in range(1, STATE + 1)), inside[STATE].eos, not self.bank, self.state.finished, self.events, leaves,
+            fetching.last, any(inside[s].eos for s in range(1, self.state_at + 1)), inside[self.state_at].eos, not self.bank, self.state.finished,
+            self.events, leaves, inside[self.colour_at].eos, len(self.leaves) == 1,
         )
-        self.events = self.visit(inside[STATE])
+        self.events = self.visit(inside[self.state_at])
         outputs = tuple(int(port.value) for port in self.outputs)
         assert outputs == expected, [(name, got, int(want)) for name, got, want in zip(OUTPUTS, outputs, expected) if got != want]
         if fetching.splat or fetching.last:
@@ -221,8 +224,8 @@ class Lane:
             self.bank = True
             self.subtile = Subtile(self.pixels, rng)
         self.freed_now = leaves and not self.bank
-        if inside[COLOUR].eos:
-            self.fill(inside[COLOUR].subtile)
+        if inside[self.colour_at].eos:
+            self.fill(inside[self.colour_at].subtile)
         if fetching.last:
             self.free.append(fetching.slot)
             self.table[fetching.slot] = tuple(rng.getrandbits(10) for _ in range(3))
@@ -387,7 +390,7 @@ async def program_order(dut):
     never = [name for name in CASES if seen[name] < 5]
     assert not never, (never, dict(seen))
     assert seen["colour of 1.98 and more"] > 0
-    assert seen["no slot"] > 5 or lane.slots > FETCH
+    assert seen["no slot"] > 5 or lane.slots > lane.fetch_at
 
 
 CASES = (

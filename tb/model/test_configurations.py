@@ -17,6 +17,7 @@ import numba
 import numpy as np
 import pytest
 from flicker_tb import splats
+from flicker_tb.real import real_views
 from flicker_tb.runner import seed
 
 from flicker.arithmetic.formats import E4M3, E5M2, FP16
@@ -42,7 +43,7 @@ from flicker.params import LANE_COUNTERS, Form
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.scene.demo import demo_cameras, generate
 from flicker.scene.metrics import psnr
-from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.scene.real import real_scenes
 
 # One configuration of every pair of generator and stage, so that a new one is among them.
 KINDS = list({(type(c.generator), type(c.stage), c.generator.pixels): c.name for c in reversed(CONFIGURATIONS.values())}.values())
@@ -470,7 +471,7 @@ def test_constants():
         RowFormat(3, 3)
 
 
-@pytest.mark.parametrize("real_view", REAL_VIEWS, ids=lambda v: v.folder)
+@pytest.mark.parametrize("real_view", real_views())
 def test_real_scenes(real_view):
     """Real views at 480x270: no miss with the recommended masks, and the picture is at least as good as the goal says."""
     scenes = real_scenes()

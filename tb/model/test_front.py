@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flicker_tb.real import real_views
 from scene_samples import random_scene
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
@@ -30,7 +31,7 @@ from flicker.scene.files import Scene
 from flicker.scene.metrics import psnr
 from flicker.scene.packed import PackedFormat, PackedScene, decode
 from flicker.scene.packing import pack
-from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.scene.real import real_scenes
 
 SIZE = (320, 180)
 
@@ -122,7 +123,7 @@ def test_picture_of_the_demo_scene(demo: View, form: PackedFormat, least: float)
 
 
 @pytest.mark.parametrize("form", [PackedFormat.FP16_LOCAL, PackedFormat.CHUNK])
-@pytest.mark.parametrize("real", REAL_VIEWS, ids=lambda r: r.folder)
+@pytest.mark.parametrize("real", real_views())
 def test_real_scenes(real, form: PackedFormat) -> None:
     """The front end's own loss: at least 60 dB with FP16 relative to the cluster, 56 with chunks."""
     folder = real_scenes()

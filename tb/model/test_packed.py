@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flicker_tb.command import flicker
+from flicker_tb.real import real_views
 from flicker_tb.runner import seed
 from scene_samples import random_scene
 
@@ -43,7 +44,7 @@ from flicker.scene.packed import (
     values,
 )
 from flicker.scene.packing import Packing, Recipe, ShSteps, pack, pack_chunks, pack_file
-from flicker.scene.real import REAL_VIEWS, real_scenes
+from flicker.scene.real import real_scenes
 from flicker.view.frames import largest
 
 FORMATS = list(PackedFormat)
@@ -684,7 +685,7 @@ def picture_db(view: View, packing: Packing) -> float:
     return psnr(View(view.camera, decode(packing.packed)).reference, whole.reference)
 
 
-@pytest.mark.parametrize("real", [pytest.param(r, id=r.folder, marks=[pytest.mark.slow] * (r.folder in ("flowers", "playbot"))) for r in REAL_VIEWS])
+@pytest.mark.parametrize("real", real_views())
 def test_real_scenes_keep_their_picture(real) -> None:
     folder = real_scenes()
     if folder is None:

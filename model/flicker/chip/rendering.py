@@ -530,8 +530,9 @@ class _Cores:
                 own = np.stack([order[core_start[s] : core_start[s + 1]] for s in range(k, CORES, config.cores)])  # a row for each of its sub-tiles
                 cycles, share = np.maximum(np.diff(end[own].max(axis=0), prepend=0), 0), needed[own]
                 served[own] = cycles * share // np.maximum(share.sum(axis=0), 1) if len(own) > 1 else cycles
+            late = config.cores < CORES
             return _Cores(
-                15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE, COLOUR, config.slots, served, needed,
+                15 * ones, ones, work.finish, 1, LANE_SETUP_STAGES + LANE_ROW_MASK_STAGES, 0, False, STATE + late, COLOUR + late, config.slots, served, needed,
             )
         lists = tables.lists
         order, core_start = stream_order(lists, walk=chip_walk(lists))

@@ -30,10 +30,11 @@ from ..params import (
     RenderConfig,
 )
 
+# Cycles of a visit, one more each in a core that several sub-tiles share.
 STATE = 5  # the pixel's S and its finished flag are written at the end
 RELEASE = 6  # the slot is given back
 COLOUR = 8  # the token is at the end of the pipeline: the bank leaves from the next cycle on
-OUTPUT = 2  # registers behind the choice of a lane; one more in a core that several sub-tiles share
+OUTPUT = 2  # registers behind the choice of a lane
 TOKEN = -1  # positions below are tokens
 NOTHING = -(1 << 62)
 
@@ -141,6 +142,7 @@ def _core(
     member, subtile: of `CoreStreams`; position: of each element in its sub-tile's list."""
     lanes, per_lane = pixel.shape
     share = subtile.shape[1]
+    state, released, colour = STATE + (share > 1), RELEASE + (share > 1), COLOUR + (share > 1)
     n_sub = len(order)  # lists
     # Setup and masks: ring of groups, the youngest at `young`; the group at dispatch is `latency` moves old.
     pipe = np.full((latency, width), NOTHING, np.int64)
@@ -155,7 +157,7 @@ def _core(
     going = np.full(width, -1, np.int64)  # slot of those that dispatch gives to the lanes in this cycle
     # Store
     pending = np.zeros(slots, np.int64)  # lanes that have not released
-    release = np.zeros((RELEASE + 1, slots), np.int64)
+    release = np.zeros((released + 1, slots), np.int64)
     slot_at = np.zeros(slots, np.int64)
     # Queues
     q_slot = np.zeros((lanes, depth), np.int64)
@@ -168,7 +170,7 @@ def _core(
     token_at = np.full(lanes, NOTHING, np.int64)  # of the last token
     sub = np.zeros(lanes, np.int64)  # ordinal of the list that is visited
     flags = np.zeros((lanes, share), np.int64)  # finished pixels, as the register has them
-    ending = np.zeros((STATE + 1, lanes, share), np.int64)  # flags that are set STATE cycles after a visit
+    ending = np.zeros((state + 1, lanes, share), np.int64)  # flags that are set state cycles after a visit
     bank = np.zeros(lanes, np.bool_)
     full_at = np.full(lanes, -NOTHING, np.int64)
     bank_left = np.zeros(lanes, np.int64)
@@ -188,11 +190,11 @@ def _core(
     while pixels_left > 0:  # the last ones are on their way through the output's registers afterwards
         # ---- what this cycle sees
         for l in range(lanes):
-            if token_at[l] + STATE + 1 == t:  # the token has passed
+            if token_at[l] + state + 1 == t:  # the token has passed
                 flags[l, :] = 0
                 tokens[l] -= 1
-            flags[l] |= ending[t % (STATE + 1), l]
-            ending[t % (STATE + 1), l, :] = 0
+            flags[l] |= ending[t % (state + 1), l]
+            ending[t % (state + 1), l, :] = 0
         if n_held == 0 and sub_in < n_sub:
             leaves = sub_in if leave and began else -1
             while n_held < width and sub_in < n_sub:
@@ -327,13 +329,13 @@ def _core(
                     pop = True
                     bank[l] = True
                     bank_left[l] = per_lane * share
-                    full_at[l] = t + COLOUR + 1
+                    full_at[l] = t + colour + 1
                     token_at[l] = t
                     sub[l] += 1
             else:
                 todo &= ~done[l]
                 own = member[slot_at[q_slot[l, r]]]
-                if t - token_at[l] > STATE:
+                if t - token_at[l] > state:
                     todo &= ~flags[l, own]
                 if todo:
                     p = 0
@@ -351,19 +353,19 @@ def _core(
                         count[BLENDED] += 1
                     elif k == end:
                         count[FINISHED] += 1
-                        ending[(t + STATE + 1) % (STATE + 1), l, own] |= 1 << p
+                        ending[(t + state + 1) % (state + 1), l, own] |= 1 << p
                     todo &= todo - 1
                     done[l] |= 1 << p
                 pop = todo == 0
             if pop:
-                release[(t + RELEASE) % (RELEASE + 1), q_slot[l, r]] += 1
+                release[(t + released) % (released + 1), q_slot[l, r]] += 1
                 q_read[l] = (r + 1) % depth
                 q_used[l] -= 1
                 done[l] = 0
         # ---- the end of the cycle
         for s in range(slots):
-            pending[s] -= release[t % (RELEASE + 1), s]
-            release[t % (RELEASE + 1), s] = 0
+            pending[s] -= release[t % (released + 1), s]
+            release[t % (released + 1), s] = 0
         ahead = 0
         for k in range(n_given):
             ahead += given[k] <= TOKEN

@@ -49,7 +49,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_rendering_core": ["flk_fifo_monitor", "flk_channel", "flk_stream_arbiter"],
     "flk_mask_all": ["flk_pipe_reg"],
     "flk_lane_queue": ["flk_fifo"],
-    "flk_lane_core": ["flk_splat_setup", "flk_row_mask", "flk_delay", "flk_lane_queue", "flk_lane", "flk_lane_result", "flk_stream_arbiter", "flk_pipe_reg"],
+    "flk_lane_core": ["flk_splat_setup", "flk_row_mask", "flk_delay", "flk_lane_queue", "flk_lane", "flk_lane_result", "flk_lane_arbiter", "flk_pipe_reg"],
     "flk_lane_stage": ["flk_lane_core", "flk_lane_counters", "flk_stage_control"],
     "flk_render_stage": ["flk_mask_generator", "flk_rendering_core", "flk_perf_counters", "flk_stage_control"],
     **{p.module: list(FF_OPERATORS) for p in PIPELINES},
