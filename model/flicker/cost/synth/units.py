@@ -393,7 +393,7 @@ def lane_config(config: RenderConfig) -> str:
 
 def _lanes() -> list[Unit]:
     """Units of the lanes in the log domain."""
-    units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_counters")]
+    units = [unit("flk_splat_setup"), unit("flk_row_mask"), unit("flk_lane_result"), unit("flk_lane_arbiter"), unit("flk_lane_counters")]
     for config in lane_builds():
         ports, count, pixels = config.rtl_parameters(), config.lanes // config.cores, SUBTILE_PIXELS * config.cores // config.lanes
         if config.in_width == RenderConfig().in_width or config.lanes != LANE_COUNTS[0]:
