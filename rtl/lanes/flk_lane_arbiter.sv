@@ -75,6 +75,11 @@ module flk_lane_arbiter
   assign in_ready_o  = out_ready_i ? chosen : '0;
 
 `ifndef SYNTHESIS
+  assert property (@(posedge clk_i) disable iff (!rst_ni)
+      1'b1 |=> in_valid_i == $past(clear_i ? '0 : in_start_i | (in_valid_i & ~in_last_i)
+                                                  | (in_valid_i & ~in_ready_o)))
+  else $error("flk_lane_arbiter: lanes with a pixel are not those that were announced");
+
   assert property (@(posedge clk_i) disable iff (!rst_ni) out_valid_o |-> in_valid_i[choice_q])
   else $error("flk_lane_arbiter: the lane whose turn it is has no pixel");
 

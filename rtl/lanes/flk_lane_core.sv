@@ -12,7 +12,7 @@
 //
 // Dispatch drops a splat whose mask is empty, or holds only pixels that are known to be finished; another takes a slot of the store, one a
 // cycle, and each lane with pixels in its mask takes their bits and the slot. A slot is free again when every lane has done with it. In a core
-// that is shared a register slice stands before, and results take a cycle more, which keeps an FPGA's paths short.
+// that is shared a register slice stands before, visits and results take a cycle more, which keeps an FPGA's paths short.
 // The end of a list goes through all queues in order.
 // clear_i forgets everything: in the next cycle the core is as after reset. idle_o: no list and no pixel is inside.
 // finished_o, of each sub-tile of the list that in_* takes: all its pixels are finished, so that its splats change no pixel any

@@ -504,7 +504,7 @@ def test_frame_read_back_from_memory(kind: RecordKind) -> None:
     """What `--front rtl` hands to the rendering stage is what `--front golden` does."""
     packed = pack(some(1500), PackedFormat.CHUNK).packed
     golden = run_front(packed, plain_camera(), kind=kind).subtile_lists()
-    frame, _ = front_frame(packed, plain_camera(), kind=kind)
+    frame, _ = front_frame(packed, plain_camera(), kind=kind, **UNITS[kind])
     lists = frame.subtile_lists()
     assert lists.form is golden.form and np.array_equal(lists.start, golden.start) and np.array_equal(lists.mean, golden.mean)
     assert np.array_equal(lists.gauss[lists.entry], golden.gauss[golden.entry]) and np.array_equal(lists.spiky[lists.entry], golden.spiky[golden.entry])

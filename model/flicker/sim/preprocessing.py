@@ -265,11 +265,12 @@ class _Run:
 
 def front_frame(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH,
+    **units: int,
 ) -> tuple[FrontFrame, RtlFront]:
-    """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices."""
+    """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices. units: as of `front_rtl`."""
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     chunks = list_chunks(camera.width, camera.height, 2 * len(packed))
-    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks, order=order)).error >> LIST_ERROR & 1:
+    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks, order=order, **units)).error >> LIST_ERROR & 1:
         chunks *= 4
     if rtl.error:
         raise FlickerError("front end: " + ", ".join(text for k, text in enumerate(ERRORS) if rtl.error >> k & 1))
