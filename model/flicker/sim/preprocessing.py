@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -265,12 +266,14 @@ class _Run:
 
 def front_frame(
     packed: PackedScene, camera: Camera, lists: ListKind = ListKind.ELLIPSE, kind: RecordKind = RecordKind.FACTORED16, order: SortOrder = SortOrder.DEPTH,
-    **units: int,
+    *, lanes: int = UNIT_COUNTS[-1], writers: int = UNIT_COUNTS[-1], interval: int = PREPROC_INTERVALS[0],
 ) -> tuple[FrontFrame, RtlFront]:
-    """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices. units: as of `front_rtl`."""
+    """A frame of the RTL as the rendering stage takes one, read back from memory; list memory grows until it suffices. lanes, writers, interval: as of
+    `front_rtl`."""
+    run = partial(front_rtl, kind=kind, order=order, lanes=lanes, writers=writers, interval=interval)
     cols, rows = (-(-n // TILE) for n in (camera.width, camera.height))
     chunks = list_chunks(camera.width, camera.height, 2 * len(packed))
-    while (rtl := front_rtl(packed, camera, lists, kind=kind, chunks=chunks, order=order, **units)).error >> LIST_ERROR & 1:
+    while (rtl := run(packed, camera, lists, chunks=chunks)).error >> LIST_ERROR & 1:
         chunks *= 4
     if rtl.error:
         raise FlickerError("front end: " + ", ".join(text for k, text in enumerate(ERRORS) if rtl.error >> k & 1))
