@@ -19,7 +19,7 @@ module fv_delivery #(
 );
 
   localparam int unsigned Queue = 8;
-  localparam int unsigned Queued = Queue + 2;
+  localparam int unsigned Queued = Queue;
   localparam int unsigned Cached = 3;
   localparam int unsigned Held = Queued + Cached + 2;  // queue, cache, entries taken
 
@@ -153,7 +153,7 @@ module fv_delivery #(
 
   assign queued = 5'(dut.gen_core[Own].i_queue.used_q);
   assign push   = dut.gen_core[Own].push;
-  assign popped = 5'(dut.pop_q[Own][0]) + 5'(dut.pop_q[Own][1]);
+  assign popped = 5'(dut.left_q[Own]);
 
   // All that is inside, the oldest first, and which of it is the core's.
 
@@ -169,10 +169,10 @@ module fv_delivery #(
   assign cached = dut.i_cache.used_q;
 
   for (genvar d = 0; d < Queued; d++) begin : gen_queued
-    logic [WordBits-1:0] word;  // sub-tiles that want it where a core has several, end, record
+    logic [WordBits-1:0] word;  // end, sub-tiles that want it where a core has several, record
 
     assign word    = dut.gen_core[Own].i_queue.words_q[d];
-    assign item[d] = word[1:0];
+    assign item[d] = {word[WordBits-1], word[0]};
 
     if (Share == 1) begin : gen_one
       assign present[d] = 5'(d) < queued;
@@ -180,11 +180,11 @@ module fv_delivery #(
     end else begin : gen_several
       logic [Share-1:0] wanted, given;
 
-      assign wanted     = word[WordBits-1-:Share];
+      assign wanted     = word[WordBits-2-:Share];
       assign given      = (d == 0) ? dut.gen_core[Own].gen_split.given_q : '0;
       assign present[d] = 5'(d) < queued && wanted[Core/Cores] && !given[Core/Cores];
       assign whole[d]   = 5'(d) >= queued || ((wanted & ~given) != '0 && (given & ~wanted) == '0 &&
-                                              (!word[1] || ((&wanted) && given == '0)));
+                                              (!word[WordBits-1] || ((&wanted) && given == '0)));
     end
   end
 
@@ -232,8 +232,8 @@ module fv_delivery #(
       l_used: assert (5'(dut.used_q[Own]) == queued + popped && 5'(dut.used_q[Own]) <= 5'(Queue));
       l_room: assert (!dut.room_q || 5'(dut.used_q[Own]) <= 5'(Queue - 4));
       l_next: assert (!dut.i_cache.ready_q || 5'(dut.used_q[Own]) <= 5'(Queue - 2));
-      l_pop: assert (!dut.pop_end_q[Own] || dut.pop_q[Own][0]);
-      l_pops: assert (!dut.pop_q[Own][1] || (InWidth == 2 && dut.pop_q[Own][0]));
+      l_pop: assert (!dut.pop_end_q[Own] || dut.left_q[Own] != '0);
+      l_pops: assert (dut.left_q[Own] <= 4'(InWidth));
       l_whole: assert (whole == '1 && none);
       a_together: assert (!out_valid[Own][InWidth-1] || InWidth == 1 || !out_end[Own][0]);
       l_ends: assert (5'(dut.ends_q[Own]) == ends + 5'(dut.pop_end_q[Own]));

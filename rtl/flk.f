@@ -119,6 +119,7 @@ sort/flk_line_entry.sv
 sort/flk_list_reader.sv
 sort/flk_list_sorter.sv
 sort/flk_record_cache.sv
+sort/flk_record_queue.sv
 sort/flk_run_merge.sv
 sort/flk_run_writer.sv
 sort/flk_sort_memory.sv

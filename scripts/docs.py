@@ -147,6 +147,7 @@ PARTS = (
     Part("packing", "memory images in every format, and choices in making chunks", ("alternatives", "alone"), packing.tables, scenes_missing),
     Part("sh_bits", "SH codes of fewer bits: bytes, cycles and pictures", ("",), sh_bits.tables, scenes_missing),
     Part("kept_colours", "frames that keep colours: clusters, bytes, cycles, pictures", ("",), kept_colours.tables, scenes_missing),
+    Part("path_hardware", "paths through larger chips in RTL, beside GSCore; half an hour", ("",), kept_colours.chip_tables, scenes_missing),
     Part("kept_hardware", "such frames in the whole chip's RTL; an hour", ("cycles", "spent", "rows"), kept_colours.hardware_tables, scenes_missing),
     Part("front", "bit-true front end: pictures, what becomes of Gaussians, number formats",
          ("pictures", "outcomes", "formats", "cells", "fixed", "opacity"), front.tables, scenes_missing),

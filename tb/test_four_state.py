@@ -21,7 +21,8 @@ from flicker.toolchain import ROOT
 UNITS = {
     "axi": "split", "axi_arbiter": "Width", "axi_fetch": "parameters0", "axi_half": "", "colour_fetch": "", "delay": "8-4", "entry_merge": "test_entry_merge",
     "event_counter": "1", "frame_control": "", "line_writer": "", "list_writer": "64-64", "pair_fifo": "3-4", "pointer_port": "test_pointer_port",
-    "priority_arbiter": "", "record_writer": "", "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg", "top": "test_top",
+    "priority_arbiter": "", "record_queue": "3-8", "record_writer": "",
+    "reset_sync": "2", "sram_fifo": "1-2", "stream_cells": "fifo or pipe_reg", "top": "test_top",
 }
 
 

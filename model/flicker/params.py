@@ -218,7 +218,7 @@ class ChipMemories:
             "gathered_lines": (self.gathered_lines >= 8, "at least 8"),
             "merge_lines": (_power(self.merge_lines) and self.merge_lines >= 8, "a power of two from 8 on"),
             "record_lines": (_power(self.record_lines) and 32 <= self.record_lines <= 1 << 16, "a power of two, 32 to 65,536"),
-            "queued_records": (self.queued_records >= 8 and self.queued_records % 2 == 0, "even, at least 8"),
+            "queued_records": (self.queued_records >= 8 and self.queued_records % 8 == 0, "a multiple of 8"),
         }
         for name, (legal, text) in rules.items():
             if not legal:

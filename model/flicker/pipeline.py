@@ -183,10 +183,11 @@ def bit_true_front(view: View, config: RenderConfig, front: Front, options: Fron
     if front is Front.GOLDEN:
         with steps.step("preprocessing with the golden model"):
             return golden_front(view, packed, options.lists, kind), stats
-    with steps.step("building the front end's simulator (once for each form)"):
-        build_front(kind=kind)
+    units = {"lanes": config.preproc_lanes, "writers": config.list_writers, "interval": config.preproc_interval}
+    with steps.step("building the front end's simulator (once for each form and size)"):
+        build_front(kind, **units)
     with steps.step("preprocessing with the RTL"):
-        frame, rtl = front_frame(packed, view.camera, options.lists, kind, view.order)
+        frame, rtl = front_frame(packed, view.camera, options.lists, kind, view.order, **units)
     return frame, stats | {"front_cycles": rtl.cycles, "front_beats": {k: int(c.read_beats + c.write_beats) for k, c in rtl.traffic.items()}}
 
 

@@ -22,9 +22,7 @@ package flk_front_pkg;
   typedef logic signed [20:0] constant_t;
 
   // Cycles from an element to its outputs
-  function automatic int unsigned cluster_test_latency(int unsigned interval);
-    return (interval == 16) ? 48 : 36;
-  endfunction
+  localparam int unsigned CLUSTER_TEST_LATENCY = 48;
   localparam int unsigned COLOURS_LAST_LATENCY = 48;
   localparam int unsigned CLUSTER_HEADER_LATENCY = 8;
   function automatic int unsigned geometry_decode_latency(int unsigned interval);

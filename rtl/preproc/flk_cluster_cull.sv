@@ -9,7 +9,7 @@
 // the counts mean nothing. A box or sigma with exponent code 255, which no packed scene has: the
 // same, with damaged_o. Floats of the table with exponent code 0 count as 0.
 //
-// Throughput: a cluster every Interval cycles; the first one leaves about the memory's latency and 40
+// Throughput: a cluster every 16 cycles; the first one leaves about the memory's latency and 60
 // cycles after start_i. Beats wait in a buffer of BufferBeats, requests in its free places: the
 // port never waits. Back-pressure of the clusters stops the test. No combinational paths but
 // r_*_i to the buffer and ar_ready_i to the requests.
@@ -17,9 +17,8 @@ module flk_cluster_cull
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
-  parameter  int unsigned Interval    = 4,   // of flk_cluster_test
-  parameter  int unsigned BufferBeats = 32,  // less MaxBeats, times 8: cycles of latency it hides
-  parameter  int unsigned MaxBeats    = 8,   // of a burst
+  parameter  int unsigned BufferBeats = 16,  // less MaxBeats, times 32: cycles of latency it hides
+  parameter  int unsigned MaxBeats    = 4,   // of a burst
   parameter  int unsigned Bursts      = 4,   // under way
   parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
@@ -61,10 +60,10 @@ module flk_cluster_cull
   input  logic                 r_last_i
 );
 
+  localparam int unsigned Interval = 16;  // of flk_cluster_test
   localparam int unsigned PhaseBits = $clog2(Interval);
-  localparam int unsigned Latency = cluster_test_latency(Interval);
-  localparam int unsigned Inside = (Latency + Interval - 1) / Interval;
-  localparam logic [PhaseBits-1:0] OUT_PHASE = PhaseBits'(Latency % Interval);
+  localparam int unsigned Inside = (CLUSTER_TEST_LATENCY + Interval - 1) / Interval;
+  localparam logic [PhaseBits-1:0] OUT_PHASE = PhaseBits'(CLUSTER_TEST_LATENCY % Interval);
 
   // ---- frame ----------------------------------------------------------------------------------------
 
@@ -339,9 +338,7 @@ module flk_cluster_cull
     .q_o ({slope, low, high})
   );
 
-  flk_cluster_test #(
-    .Interval(Interval)
-  ) i_test (
+  flk_cluster_test i_test (
     .clk_i,
     .en_i        (move),
     .phase_i     (phase_q),

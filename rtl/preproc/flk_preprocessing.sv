@@ -242,8 +242,7 @@ module flk_preprocessing
   logic              unused_cull_done, unused_geometry_done;
 
   flk_cluster_cull #(
-    .Interval(PreprocInterval == 2 ? 4 : 16),
-    .IdBits  (IdBits)
+    .IdBits(IdBits)
   ) i_cull (
     .clk_i,
     .rst_ni,

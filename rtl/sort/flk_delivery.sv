@@ -14,7 +14,7 @@
 // finished_i of a sub-tile, a level, is about the tile whose elements its core is taking, until that has taken its
 // end; in the cycle after that it is about the next tile. Records of such a sub-tile that are not in its
 // core's queue yet do not come; an entry that no sub-tile wants is not looked up. When all sub-tiles of a core are finished, its queue
-// drops their records, two a cycle: an element that was offered and not taken may be withdrawn then. When all four are finished
+// drops their records, up to eight a cycle (flk_record_queue): an element that was offered and not taken may be withdrawn then. When all four are finished
 // with the tile that is taken from a unit, finish_o of that unit rises, until its end is taken.
 // border_i: sub-tiles of the tile in turn that touch the one after it (0) and the one behind that (1): an entry there is probably in
 // that one's list too, and its line stays in the cache until then (flk_record_cache). taken_o: its end is taken, the next tile is in turn.
@@ -85,13 +85,13 @@ module flk_delivery #(
   input  logic                              r_last_i
 );
 
-  localparam int unsigned FillBits = $clog2(Queue + 3);  // the queue holds two more
+  localparam int unsigned FillBits = $clog2(Queue + 1);
   localparam int unsigned EndBits = $clog2(Depth + Queue + 16);
   localparam int unsigned UnitBits = Units > 1 ? $clog2(Units) : 1;
   localparam int unsigned Margin = 6;  // records under way when a queue is seen to be nearly full
 
-  if (Queue < 8 || Queue % 2 != 0) begin : gen_check_queue
-    $error("flk_delivery: Queue must be even, at least 8");
+  if (Queue < 8 || Queue % 8 != 0) begin : gen_check_queue
+    $error("flk_delivery: Queue must be a multiple of 8, at least 8");
   end
   if (Units != 1 && Units != 2 && Units != 4) begin : gen_check_units
     $error("flk_delivery: Units must be 1, 2 or 4");
@@ -131,7 +131,8 @@ module flk_delivery #(
   logic [Cores-1:0][FillBits-1:0] ends_q, used_q;
   logic [Cores-1:0]               unopened, unended;
   logic [Subtiles-1:0]            finished_q, over;
-  logic [Cores-1:0][1:0]          pop, pop_q;        // counted a cycle later: ready comes late
+  logic [Cores-1:0][1:0]          pop;
+  logic [Cores-1:0][3:0]          left_q;            // counted a cycle later: ready comes late
   logic [Cores-1:0]               pop_end_q;
   logic                           ready_q;           // the cache is
   logic [1:0]                     head_waits;
@@ -307,16 +308,16 @@ module flk_delivery #(
     end
   end
 
-  // Mask, where a core has several sub-tiles; end; record.
-  localparam int unsigned ElementBits = RecordBits + 1 + ((Share > 1) ? Share : 0);
+  // Mask, where a core has several sub-tiles; record.
+  localparam int unsigned ElementBits = RecordBits + ((Share > 1) ? Share : 0);
 
   for (genvar s = 0; s < Cores; s++) begin : gen_core
-    logic [1:0]                  push, ended, unused_ready, queue_valid;
+    logic [1:0]                  push, ended, queue_valid, is_end;
     logic [1:0][Share-1:0]       wanted;  // sub-tiles that want what was found
     logic [1:0][ElementBits-1:0] element;
-    logic [1:0]                  dropped;
     logic [Share-1:0]            finished;
-    logic                        drop;  // the core wants no record, and the oldest element is one
+    logic                        drop;  // the core wants no record of the list that it takes
+    logic [3:0]                  left;
 
     assign unopened[s] = opened_q[s] == '0;
     assign unended[s]  = ends_q[s] == '0;
@@ -334,19 +335,25 @@ module flk_delivery #(
 
     assign push = found_valid & {wanted[1] != '0, wanted[0] != '0};
     // What the core says is of the tile that it was given from a cycle ago.
-    assign drop = (&finished) && !pop_end_q[s] && queue_valid[0] && !element[0][RecordBits];
-    assign dropped = {queue_valid[1] && !element[1][RecordBits], 1'b1};
+    assign drop = (&finished) && !pop_end_q[s];
 
     if (Share == 1) begin : gen_whole
       logic [1:0] given;
 
-      assign given  = drop ? '0 : queue_valid & {InWidth == 2 && !element[0][RecordBits], 1'b1};
-      assign pop[s] = drop ? dropped : given & {2{out_ready_i[s]}};
+      assign given  = queue_valid & {InWidth == 2 && !is_end[0], 1'b1};
+      assign pop[s] = given & {2{out_ready_i[s]}};
 
       for (genvar w = 0; w < InWidth; w++) begin : gen_way
         assign out_valid_o[s][w] = given[w];
-        assign {out_end_o[s][w], out_record_o[s][w]} = element[w];
+        assign out_end_o[s][w] = is_end[w];
+        assign out_record_o[s][w] = element[w];
         assign out_subtile_o[s][w] = 2'(s);
+      end
+
+      if (InWidth == 1) begin : gen_one
+        logic unused_second;
+
+        assign unused_second = ^element[1];
       end
     end else begin : gen_split
       // An element for each sub-tile: the lowest of the oldest record's and its next one, or the lowest of the next record's. A mask has bits.
@@ -354,7 +361,7 @@ module flk_delivery #(
       // Of the two oldest: all, without the lowest, it alone.
       logic [1:0][Share-1:0] todo, rest, first;
       logic [Share-1:0]      beyond;  // of the oldest, without the two lowest
-      logic [1:0]            is_end, goes;
+      logic [1:0]            goes;
       // What is given beside the lowest: of the same record, or of the next.
       logic                  same, next;
 
@@ -362,13 +369,12 @@ module flk_delivery #(
         assign todo[w]   = element[w][ElementBits-1-:Share] & ~(w == 0 ? given_q : '0);
         assign rest[w]   = todo[w] & (todo[w] - 1'b1);
         assign first[w]  = todo[w] & ~rest[w];
-        assign is_end[w] = element[w][RecordBits];
       end
 
       assign beyond = rest[0] & (rest[0] - 1'b1);
       assign same   = InWidth == 2 && !is_end[0] && rest[0] != '0;
       assign next   = InWidth == 2 && !is_end[0] && rest[0] == '0 && queue_valid[1];
-      assign pop[s] = drop ? dropped : goes & {2{out_ready_i[s]}};
+      assign pop[s] = goes & {2{out_ready_i[s]}};
 
       always_comb begin
         goes[0] = queue_valid[0] && (is_end[0] || (same ? beyond : rest[0]) == '0);
@@ -399,20 +405,20 @@ module flk_delivery #(
         end
       endfunction
 
-      assign out_valid_o[s][0]   = queue_valid[0] && !drop;
+      assign out_valid_o[s][0]   = queue_valid[0];
       assign out_end_o[s][0]     = is_end[0];
       assign out_record_o[s][0]  = element[0][RecordBits-1:0];
       assign out_subtile_o[s][0] = number(first[0]);
 
       if (InWidth == 2) begin : gen_second
-        assign out_valid_o[s][1]   = queue_valid[0] && !drop && (same || next);
+        assign out_valid_o[s][1]   = queue_valid[0] && (same || next);
         assign out_end_o[s][1]     = !same && is_end[1];
         assign out_record_o[s][1]  = element[!same][RecordBits-1:0];
         assign out_subtile_o[s][1] = number(same ? rest[0] & ~beyond : first[1]);
       end
     end
 
-    flk_pair_fifo #(
+    flk_record_queue #(
       .Width(ElementBits),
       .Depth(Queue)
     ) i_queue (
@@ -420,12 +426,15 @@ module flk_delivery #(
       .rst_ni,
       .clear_i    (stop),
       .in_valid_i (push),
-      .in_ready_o (unused_ready),  // there is room
-      .in_data_i  ({ElementBits'({wanted[1], found[1].last, found_record[1]}),
-                    ElementBits'({wanted[0], found[0].last, found_record[0]})}),
+      .in_last_i  ({found[1].last, found[0].last}),
+      .in_data_i  ({ElementBits'({wanted[1], found_record[1]}),
+                    ElementBits'({wanted[0], found_record[0]})}),
+      .drop_i     (drop),
       .out_valid_o(queue_valid),
       .out_ready_i(pop[s]),
+      .out_last_o (is_end),
       .out_data_o (element),
+      .left_o     (left),
       .empty_o    (queue_empty[s])
     );
 
@@ -434,19 +443,18 @@ module flk_delivery #(
         used_q[s]    <= '0;
         opened_q[s]  <= '0;
         ends_q[s]    <= '0;
-        pop_q[s]     <= '0;
+        left_q[s]    <= '0;
         pop_end_q[s] <= 1'b0;
       end else if (stop) begin
         used_q[s]    <= '0;
         opened_q[s]  <= '0;
         ends_q[s]    <= '0;
-        pop_q[s]     <= '0;
+        left_q[s]    <= '0;
         pop_end_q[s] <= 1'b0;
       end else begin
-        pop_q[s]     <= pop[s];
-        pop_end_q[s] <= (pop[s] & {element[1][RecordBits], element[0][RecordBits]}) != '0;
-        used_q[s]    <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1])
-                         - FillBits'(pop_q[s][0]) - FillBits'(pop_q[s][1]);
+        left_q[s]    <= left;
+        pop_end_q[s] <= (pop[s] & is_end) != '0;
+        used_q[s]    <= used_q[s] + FillBits'(push[0]) + FillBits'(push[1]) - FillBits'(left_q[s]);
         opened_q[s]  <= opened_q[s] + EndBits'(e_end_taken) - EndBits'(pop_end_q[s]);
         ends_q[s]    <= ends_q[s] + FillBits'(ended[0]) + FillBits'(ended[1])
                          - FillBits'(pop_end_q[s]);

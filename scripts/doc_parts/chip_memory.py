@@ -18,7 +18,7 @@ from .common import Say
 TOP = "flk_top"
 PAPER_KB = 288
 # Cells that only hold something for the unit that has them.
-HOLDERS = {"flk_pair_fifo", "flk_sram_fifo", "flk_delay_ram", "flk_axi_fetch"}
+HOLDERS = {"flk_pair_fifo", "flk_record_queue", "flk_sram_fifo", "flk_delay_ram", "flk_axi_fetch"}
 # Instances of the top, and what they are called.
 SIDES = {"i_front": "front end", "i_rendering": "rendering", "": "top"}
 SHAPES = 4  # so many kinds of memories are listed in a row

@@ -1,5 +1,5 @@
 """`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, pictures;
-`make docs PART=kept_hardware`: such frames in the verilated chip; both in docs/results/kept_colours.md.
+`make docs PART=kept_hardware`: such frames in the verilated chip; `make docs PART=path_hardware`: larger chips beside GSCore; in docs/results/kept_colours.md.
 
 An error: a frame buffer that differs from the golden model's; bytes of the chip that are not the model's, of records and lists by more than `LOOSE`.
 """
@@ -14,10 +14,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from flicker.chip.compare import chip_estimates
 from flicker.chip.dram import DramConfig, Refresh
-from flicker.chip.whole import halves, whole_frame
+from flicker.chip.whole import WholeFrame, halves, whole_frame
+from flicker.chips import chip_of
 from flicker.errors import FlickerError
 from flicker.front.paths import Asked, path_of
+from flicker.front.view import load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.front.cull import cull
 from flicker.golden.front.frame import FrontFrame, run_front
@@ -142,6 +145,7 @@ def tables(say: Say) -> dict[str, str]:
 
 
 ROW = 4  # frames back to back in RTL, the last of a path: its third is measured, beside whose rendering the front end works on the fourth
+GSCORE = "gscore-conic"
 LOOSE = {"records": 0.02, "lists": 0.002}  # which lines are read again, and whether a list that is read again is left before that, depends on timing
 CHUNKS = 24_000  # of a list writer: enough for these views
 TURNING, MOVING = (next(case for case in MOTIONS if case.tolerance == t and case.share == s) for t, s in ((0, 0.0), (TWO, 0.001)))
@@ -157,14 +161,13 @@ HARDWARE = (  # folder, path, with kept colours, memories, DRAM
 ROWS_OF = (3, 6)  # of these: what they open rows for
 
 
-def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, dram: DramConfig) -> tuple[tuple, tuple, list[tuple]]:
-    """A row of the first two tables, and of the third. The frames before those in RTL are of the golden model, whose store the chip finds."""
-    view = next(v for v in REAL_VIEWS if v.folder == folder)
+def _third(say: Say, view: RealView, case: Case, keeps: bool, config: RenderConfig, dram: DramConfig) -> tuple[RowFrame, WholeFrame]:
+    """The third of the last frames of a path, in RTL and by the chip model. The frames before those in RTL are of the golden model, whose store the chip
+    finds."""
     path = view.path(folder_of_scenes())
     source, packed = open_scene(path), pack_file(path).packed
     title = f"{view.title}, {case.motion}" + (f", {case.tolerance or 0}" if keeps else "")
-    say(f"{title}: memories {memories}, refresh {dram.refresh}, channels of {dram.interleave_bytes} bytes")
-    config = CONFIG.with_(memories=memories)
+    say(f"{title}: {config.lanes} lanes, memories {config.memories}, refresh {dram.refresh}, channels of {dram.interleave_bytes} bytes")
     views, reuse = cameras(case, source, view, packed), Reuse(ColourStore(packed), float(case.tolerance)) if keeps else None
     for camera in views[:-ROW] if keeps else ():
         run_front(packed, camera, reuse=reuse)
@@ -181,6 +184,13 @@ def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, 
         if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
     assert found.interval is not None
+    return found, model
+
+
+def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, dram: DramConfig) -> tuple[tuple, tuple, list[tuple]]:
+    """A row of the first two tables, and of the third."""
+    view = next(v for v in REAL_VIEWS if v.folder == folder)
+    found, model = _third(say, view, case, keeps, CONFIG.with_(memories=memories), dram)
     kept = str(case.tolerance or 0) if keeps else "-"
     head = (view.title, case.motion, kept, memories, str(dram.interleave_bytes), str(dram.refresh))
     moved, busy = sum(found.moved.values()), {name: clocks / sum(found.spent.values()) for name, clocks in found.spent.items()}
@@ -211,3 +221,29 @@ def hardware_tables(say: Say) -> dict[str, str]:
         "spent": table([*head, "data", "nothing waits", "turns between reads and writes", "refresh", "rows"], list(spent), numbers=True),
         "rows": table([*head, "stream", "bursts", "rows opened", "bursts a row", "waited for rows"], [row for k in ROWS_OF for row in opened[k]], numbers=True),
     }
+
+
+CHIPS = (  # folder, chip, DRAM
+    ("guitar", "max", DRAM), ("stpeter", "wide", DRAM), ("playbot", "wide", DRAM), ("playbot", "wide", replace(WIDER, refresh=Refresh.PER_BANK)),
+)
+
+
+def _beside_gscore(say: Say, folder: str, chip: str, dram: DramConfig) -> tuple:
+    view = next(v for v in REAL_VIEWS if v.folder == folder)
+    found, model = _third(say, view, MOVING, True, chip_of(chip).config, dram)
+    rival = chip_estimates(load_view(view.path(folder_of_scenes()), view.number, SIZE), [GSCORE], dram=dram)[GSCORE]["interval_cycles"]
+    return (
+        view.title, f"`{chip}`", str(dram.interleave_bytes), str(dram.refresh), f"{sum(found.moved.values()) / 1e6:.1f}", f"{found.interval:,}",
+        f"{model.interval / found.interval - 1:+.1%}", f"{1e9 / found.interval:,.0f}", f"{rival:,}", f"{rival / found.interval:.2f}",
+    )
+
+
+def chip_tables(say: Say) -> dict[str, str]:
+    for chip in sorted({row[1] for row in CHIPS}):
+        build(chip_of(chip).config)
+    with ThreadPoolExecutor(2) as pool:
+        rows = list(pool.map(lambda row: _beside_gscore(say, *row), CHIPS))
+    return {"": table(
+        ["view", "chip", "bytes a channel", "refresh", "MB", "interval back to back", "model off by", "frames a second", "GSCore's interval",
+         "frames over GSCore's"], rows, numbers=True,
+    )}

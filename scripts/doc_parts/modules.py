@@ -34,7 +34,7 @@ PAGES = (
         ("rendering.md", "flk_rendering flk_rendering_pkg flk_stage flk_tile_walk"), ("list_reader.md", "flk_list_reader"),
         ("list_layout.md", "flk_line_entry flk_entry_near"),
         ("list_sorter.md", "flk_list_sorter flk_run_*"), ("bitonic_sorter.md", "flk_bitonic_sorter flk_compare_exchange"), ("sorting_unit.md", "flk_sort*"),
-        ("delivery.md", "flk_delivery flk_entry_buffer flk_record_cache"), ("frame_writer.md", "flk_frame_writer flk_pixel_out"),
+        ("delivery.md", "flk_delivery flk_entry_buffer flk_record_cache flk_record_queue"), ("frame_writer.md", "flk_frame_writer flk_pixel_out"),
     )),
     ("Stage of channels", (
         ("render_stage.md", "flk_render_stage flk_stage_control flk_perf_counters flk_splat_input"),
@@ -62,7 +62,7 @@ HEADS = {
     "entries_and_records": "flk_tile_walker flk_entry_merge flk_record_writer", "list_writer": "flk_list_writer flk_pointer_port",
     "rendering": "flk_rendering flk_tile_walk", "list_reader": "flk_list_reader", "bitonic_sorter": "flk_bitonic_sorter",
     "sorting_unit": "flk_sorting_unit flk_sort_runs flk_sort_merge flk_sort_select",
-    "list_sorter": "flk_list_sorter flk_run_writer flk_run_merge", "delivery": "flk_entry_buffer flk_delivery flk_record_cache",
+    "list_sorter": "flk_list_sorter flk_run_writer flk_run_merge", "delivery": "flk_entry_buffer flk_delivery flk_record_cache flk_record_queue",
     "frame_writer": "flk_frame_writer", "record_to_splat": "flk_record_to_splat flk_splat_input", "render_stage": "flk_render_stage",
     "ctu": "flk_ctu flk_ctu_controller flk_mmu", "prtu": "flk_prtu",
     "rendering_core": "flk_rendering_core flk_fifo_monitor flk_channel flk_vru flk_blend_pipe flk_pixel_state flk_pixel_drain",

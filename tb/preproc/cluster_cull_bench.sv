@@ -2,8 +2,7 @@
 module cluster_cull_bench
   import flk_preproc_pkg::*;
 #(
-  parameter int unsigned Interval    = 4,
-  parameter int unsigned BufferBeats = 32
+  parameter int unsigned BufferBeats = 16
 ) (
   input  logic            clk_i,
   input  logic            rst_ni,
@@ -46,7 +45,6 @@ module cluster_cull_bench
   assign out_data_o = 288'({box, 9'b0, out_end, cluster});
 
   flk_cluster_cull #(
-    .Interval   (Interval),
     .BufferBeats(BufferBeats)
   ) i_dut (
     .clk_i,

@@ -28,8 +28,8 @@ PORT = {"stall": {"AR": 0.3, "R": 0.3}, "run": {"R": 5}}
 
 
 @cache
-def bench(interval: int = 4) -> FetchBench:
-    return FetchBench("cluster_cull_bench", 3, 960, {"Interval": interval})
+def bench() -> FetchBench:
+    return FetchBench("cluster_cull_bench", 3, 960)
 
 
 @cache
@@ -142,7 +142,7 @@ def test_a_long_table() -> None:
     table["high"][:-5] *= -1
     unit = bench()
     unit.open({BASE: contents(table)}, latency=7)
-    want = check(unit.frame(registers(near, BASE // BEAT, n), limit=4 * n + 2000), scene(table), near)
+    want = check(unit.frame(registers(near, BASE // BEAT, n), limit=16 * n + 2000), scene(table), near)
     assert want[-5:].any() and want[: 1 << 16].mean() < 0.5
 
 
@@ -205,26 +205,26 @@ def test_reset_in_a_frame() -> None:
     check(unit.frame(what), packed, setup)
 
 
-@pytest.mark.parametrize(("latency", "perfect", "interval"), [(1, True, 4), (100, True, 4), (200, True, 4), (100, False, 4), (100, False, 16)])
-def test_rate(latency: int, perfect: bool, interval: int) -> None:
-    """A cluster every four cycles, or sixteen, whatever the latency. perfect: a memory without DRAM."""
+@pytest.mark.parametrize(("latency", "perfect"), [(1, True), (100, True), (200, True), (100, False)])
+def test_rate(latency: int, perfect: bool) -> None:
+    """A cluster every sixteen cycles, whatever the latency. perfect: a memory without DRAM."""
     packed, setup = demo()
     n = len(packed.table)
-    unit = bench(interval)
+    unit = bench()
     unit.open({BASE: packed.sections()["table"]}, perfect, latency=latency)
     dram = 0 if perfect else 50  # an access to a closed row
     outcome = unit.frame(registers(setup, BASE // BEAT, n))
     want = check(outcome, packed, setup)
     print(f"latency {latency}: {n} clusters in {outcome.cycles} cycles, first kept cluster in cycle {outcome.when[0]}, last element in {outcome.when[-1]}")
-    assert (interval - 4) * n < outcome.cycles <= interval * n + latency + dram + 100
-    assert outcome.when[0] - interval * int(np.flatnonzero(want)[0]) <= latency + dram + 70
+    assert 16 * n < outcome.cycles <= 16 * n + latency + dram + 100
+    assert outcome.when[0] - 16 * int(np.flatnonzero(want)[0]) <= latency + dram + 70
 
 
-@pytest.mark.parametrize(("perfect", "interval"), [(True, 4), (False, 4), (True, 16)])
-def test_demo(perfect: bool, interval: int) -> None:
+@pytest.mark.parametrize("perfect", [True, False])
+def test_demo(perfect: bool) -> None:
     packed, setup = demo()
     part = packed.sections()["table"]
-    unit = bench(interval)
+    unit = bench()
     unit.open({BASE: part}, perfect, **PORT)
     for stall in PAUSES:
         outcome = unit.frame(registers(setup, BASE // BEAT, len(packed.table)), stall=stall)

@@ -95,8 +95,7 @@ def cluster_registers(setup: FrameSetup) -> dict[str, float]:
     return registers | {f"offset_{k}": setup.offset[k] for k in range(5)} | {f"reach_{k}": setup.reach[k] for k in range(5)}
 
 
-@by_interval("flk_cluster_test")
-def test_cluster_test(interval: int) -> None:
+def test_cluster_test() -> None:
     s, rng = demo(PackedFormat.CHUNK), random(2)
     table, n = s.packed.table, 300
     low = np.concatenate([table["low"], np.stack([wild(rng, n, CLUSTER_M) for _ in range(3)], 1)]).astype(np.float64)
@@ -105,7 +104,7 @@ def test_cluster_test(interval: int) -> None:
     keep = np.zeros(len(low), np.bool_)
     cull._cull(low, high, sigma, s.setup.position, s.setup.normal, s.setup.offset, s.setup.reach, keep)
     assert keep[: len(table)].any() and not keep[: len(table)].all()
-    got = bench("flk_cluster_test", interval)(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
+    got = bench("flk_cluster_test")(cluster_registers(s.setup), **of("low", low), **of("high", high), sigma=sigma)
     same(got, {"keep": keep.astype(np.int64)})
 
 

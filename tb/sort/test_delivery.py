@@ -35,7 +35,7 @@ def test_ends_of_the_product() -> None:
 
 
 def test_illegal_parameters() -> None:
-    refused("flk_delivery", {"Queue": 6}, "Queue must be even, at least 8")
+    refused("flk_delivery", {"Queue": 12}, "Queue must be a multiple of 8, at least 8")
     refused("flk_delivery", {"InWidth": 3}, "InWidth must be 1 or 2")
     refused("flk_delivery", {"Cores": 3}, "Cores must be 1, 2 or 4")
     refused("flk_delivery", {"Units": 3}, "Units must be 1, 2 or 4")

@@ -29,8 +29,8 @@ from .dram import READ, WRITE, DramConfig, Stream, behind_port, simulate
 # Of the RTL, times in cycles.
 LANES, LIST_WRITERS = UNIT_COUNTS[-1], UNIT_COUNTS[-1]
 INTERVAL = PREPROC_INTERVALS[0]  # a Gaussian of each lane enters the front
-CLUSTER_CYCLES = {2: 4, 4: 16}  # of the cluster test, by that interval,
-LATENCY = {2: 110, 4: 142}  # from a group to its entries, colours at hand,
+CLUSTER_CYCLES = 16  # of the cluster test
+LATENCY = {2: 110, 4: 142}  # from a group to its entries, colours at hand, by that interval,
 BAND_CYCLES = {2: 1, 4: 2}  # and of a band
 LANE_CYCLES = (2, 2, 2, 4)  # a survivor in its lane, by SH degree, at least
 SIZES = CHIP_MEMORIES["default"]
@@ -313,7 +313,7 @@ def unit_cycles(
     within = frame.gaussian - packed.start[cluster]
     slot = np.searchsorted(keep, cluster)
     # A cluster enters when it has been tested and those before it have.
-    enters = interval * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES[interval] * (keep + 1) - interval * start[:-1])
+    enters = interval * start[:-1] + np.maximum.accumulate(CLUSTER_CYCLES * (keep + 1) - interval * start[:-1])
     place = np.concatenate([[0], np.cumsum(packed.counts[keep])])[slot] + within
     degree = packed.degrees[cluster]
     lane = within % lanes
@@ -333,7 +333,7 @@ def unit_cycles(
     # At the end a writer closes its banks one after the other; those of the first are within what the estimate leaves out.
     closed = COMBINER_SETS * COMBINER_WAYS + POINTERS_PER_LINE * pointer_lines(cols, -(-frame.camera.height // TILE)) // WRITERS
     more = (WRITERS // writers - 1) * closed
-    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES[interval] * len(packed.table))) + more)
+    return UnitCycles(place.astype(np.float64), went, int(max(front, fed, CLUSTER_CYCLES * len(packed.table))) + more)
 
 
 def phases(units: UnitCycles, beats: Sequence[Beats], dram: int, waiting: int = WAITING, lanes: int = LANES) -> int:

@@ -57,7 +57,8 @@ FOUND = 6  # from a lookup to its record without a miss, into the queue
 QUEUED = 3  # through a queue
 ELASTIC = 4  # registers between a queue and the stage: latency and places
 TOLD = 4  # from a sub-tile's last finished pixel to delivery
-TAKEN = 1  # from there to what is dropped from the core's queue
+TAKEN = 1  # from there to what is dropped from the core's queue,
+DROP = 8  # so many records a cycle
 DROPPED = 8  # from there to the end of a list that all cores have finished
 PAIR_CYCLES, PAIR_GAP = 128, 4  # of tiles in the frame writer
 ROUNDS = 12  # of a frame, at most: each with the share of the memory's time that what is not records has by those before, until it is the same
@@ -232,7 +233,7 @@ def _frame(
                 element = which[k, q]
                 is_end = element < 0
                 leave = max(found[k, q] + QUEUED, taken[k] + 1)
-                # What a core that is finished with its sub-tiles has in its queue is dropped, two a cycle.
+                # What a core that is finished with its sub-tiles has in its queue is dropped, in groups.
                 over = np.int64(0)
                 for i in range(k % cores, 4, cores):
                     if core_tile[i] <= t_now:
@@ -240,7 +241,7 @@ def _frame(
                 if not is_end and leave >= over + TAKEN:
                     if dropped[k] == 0:
                         taken[k] = max(taken[k], over + TAKEN - 1)
-                    leave = max(found[k, q] + QUEUED, taken[k] + 1 - dropped[k] % 2)
+                    leave = max(found[k, q] + QUEUED, taken[k] + (dropped[k] % DROP == 0))
                     freed[k, q] = taken[k] = leave
                     dropped[k] += 1
                     got[k] += 1

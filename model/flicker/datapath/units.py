@@ -307,7 +307,7 @@ def constant_range(formats: FrontFormats) -> Int:
     return Int(2 * one.low, 2 * one.high)
 
 PIPELINES = [
-    Pipeline("flk_cluster_test", (4, 16), cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
+    Pipeline("flk_cluster_test", (16,), cluster_test, "Cluster test: keep, and the nearest and farthest depth of the box."),
     Pipeline("flk_colours_last", (16,), colours_last, "Whether a cluster's stored colours may be shown."),
     Pipeline("flk_cluster_header", (4,), cluster_header, "Header of a cluster to the numbers that the lanes take."),
     Pipeline("flk_geometry_decode", (2, 4), geometry_decode, "Geometry of a Gaussian from the image."),
