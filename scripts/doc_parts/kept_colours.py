@@ -224,7 +224,8 @@ def hardware_tables(say: Say) -> dict[str, str]:
 
 
 CHIPS = (  # folder, chip, DRAM
-    ("guitar", "max", DRAM), ("stpeter", "wide", DRAM), ("playbot", "wide", DRAM), ("playbot", "wide", replace(WIDER, refresh=Refresh.PER_BANK)),
+    ("flowers", "wide", DRAM), ("playbot", "wide", DRAM), ("playbot", "wide", replace(WIDER, refresh=Refresh.PER_BANK)), ("guitar", "max", DRAM),
+    ("stpeter", "wide", DRAM),
 )
 
 
