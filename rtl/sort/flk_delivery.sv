@@ -467,6 +467,10 @@ module flk_delivery #(
     else $error("flk_delivery: a record without a place");
 
     assert property (@(posedge clk_i) disable iff (!rst_ni)
+        queue_empty[s] && left_q[s] == '0 |-> used_q[s] == '0)
+    else $error("flk_delivery: places of an empty queue are taken");
+
+    assert property (@(posedge clk_i) disable iff (!rst_ni)
         32'(ends_q[s]) <= 32'(opened_q[s]) && ends_q[s] <= used_q[s])
     else $error("flk_delivery: ends or places");
 

@@ -301,6 +301,17 @@ async def all_finished(dut, deaf):
 
 
 @cocotb.test()
+async def dropped(dut):
+    """Slow cores that finish with full queues: what these hold makes room for the next tile."""
+    test = Delivery(dut, pace=(4, 4, 4, 4), finish=1.0)
+    await test.bench.reset()
+    await test.ready()
+    test.rng.choice = lambda _: 40
+    cycles = await test.run([[(test.rng.randrange(RECORDS), 15) for _ in range(400)] for _ in range(12)])
+    assert test.finish_seen and cycles < 12 * (4 * SUBTILES // CORES * 42 + 150), f"{cycles} cycles"
+
+
+@cocotb.test()
 async def rate(dut):
     """Two entries a cycle, nearly, for cores that take all; records in the cache."""
     test = Delivery(dut)
