@@ -17,6 +17,7 @@ from flicker.params import RenderConfig
 from flicker.pipeline import Engine
 
 from .common import Say
+from .fpga import mapped
 
 BOARD_HZ = 150_000_000  # of a chip on an FPGA
 SIZES = ((160, 90),)
@@ -40,17 +41,26 @@ def _area(chip: Chip) -> list[str]:
     return [f"{found.ge:,.0f}", f"{found.sram_bits / 8192:.0f}", f"{found.sram_bits * UM2_PER_BIT / 1e6:.2f}"]
 
 
+def _on_fpga(chip: Chip) -> list[str]:
+    """LUTs with memories in LUTs, DSPs, blocks of RAM."""
+    found = mapped().get((chip.name, "xcup"))
+    if found is None:
+        return ["not mapped", "", ""]
+    all_ = found["all"]
+    return [f"{all_['lut'] + all_['lutram']:,}", f"{all_['dsp']:,}", f"{all_['bram']:,.1f}"]
+
+
 def tables(say: Say) -> dict[str, str]:
-    """Area, memories, cycles. A chip without a row of make synth says so."""
+    """Area, memories, what UltraScale+ needs, cycles. A chip without a row of make synth or without make fpga says so."""
     rows = []
     for chip in chips().values():
-        row = [f"`{chip.name}`", str(chip.config.port_bits), *_area(chip)]
+        row = [f"`{chip.name}`", chip.status, str(chip.config.port_bits), *_area(chip), *_on_fpga(chip)]
         for size in SIZES:
             say(f"frame of {chip.name}, {size[0]}x{size[1]}")
             cost = frame_cost(load_view(DEMO, 0, size), Drawing(Engine.CHIP, chip.config))
             row += [f"{cost['front_cycles']:,}", f"{cost['render_cycles']:,}", f"{CLOCK_HZ / cost['cycles']:,.0f}", f"{BOARD_HZ / cost['cycles']:,.0f}"]
         rows.append(row)
-    head = ["chip", "port, bits", "GE", "memory, KB", "memory, mm2"]
+    head = ["chip", "status", "port, bits", "GE", "memory, KB", "memory, mm2", "LUT6 with memory", "DSP", "BRAM36"]
     for width, height in SIZES:
         head += [f"{width}x{height}: front end, cycles", "rendering, cycles", "frames a second at 1 GHz", "at 150 MHz"]
     return {"": markdown.table(head, rows)}

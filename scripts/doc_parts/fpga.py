@@ -16,16 +16,17 @@ from flicker.toolchain import ROOT
 
 from .common import Say
 
-WANTED = ("tiny", "small", "default")
 NEXT = "`make fpga CHIP=tiny`, then `make docs PART=fpga`"
+BY_UNIT = ("tiny", "small")
 
 
-def _kept() -> dict[tuple[str, str], dict]:
+def mapped() -> dict[tuple[str, str], dict]:
+    """What make fpga has left of the chips of chips.toml with their present parameters, by chip and family."""
     found = {}
-    for name in WANTED:
+    for name, chip in chips().items():
         for family in COMMANDS:
             path = FOLDER / f"{name}-{family}.json"
-            if path.exists() and (data := json.loads(path.read_text()))["parameters"] == chips()[name].parameters:
+            if path.exists() and (data := json.loads(path.read_text()))["parameters"] == chip.parameters:
                 found[name, family] = data
     return found
 
@@ -35,7 +36,7 @@ def _row(of: Resources) -> list[str]:
 
 
 def tables(say: Say) -> dict[str, str]:
-    kept, known = _kept(), boards()
+    kept, known = mapped(), boards()
     full, units = [], []
     for (chip, family), data in kept.items():
         all_ = Resources(**data["all"])
@@ -43,6 +44,8 @@ def tables(say: Say) -> dict[str, str]:
             if board.family == family:
                 shares = board.full(all_)
                 full.append([f"`{chip}`", board.name, *(f"{share:.0%}" for share in shares.values()), "yes" if max(shares.values()) <= 1 else "no"])
+        if chip not in BY_UNIT:
+            continue
         order = sorted(data["units"].items(), key=lambda item: -item[1][1]["lut"])
         units += [[f"`{chip}`", family, f"`{module}`", str(number), *_row(Resources(**own))] for module, (number, own) in order]
         units.append([f"`{chip}`", family, "all", "", *_row(all_)])
