@@ -25,8 +25,9 @@ from flicker.golden.front.frame import FrontFrame, ListKind, run_front
 from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lists import ListError
-from flicker.params import SortOrder
-from flicker.pipeline import packed_scene
+from flicker.params import Form, RenderConfig, SortOrder
+from flicker.pipeline import Front, FrontOptions, bit_true_front, packed_scene
+from flicker.progress import Steps
 from flicker.scene import packing
 from flicker.scene.camera import Camera
 from flicker.scene.files import Scene
@@ -312,6 +313,16 @@ def test_one_slow_lane() -> None:
     for memory in (QUICK, lpddr4()):
         golden, rtl = check(packed, plain_camera(), memory=memory, kind=RecordKind.CONIC32)
         assert len(golden.number) == count and rtl.counters["lane_waits"] > 0
+
+
+def test_front_of_a_configuration() -> None:
+    """--front rtl is the front end of the configuration: its lanes, list writers and interval."""
+    view, units = demo(), UNITS[RecordKind.CONIC32]
+    config = RenderConfig(Form.CONIC, preproc_lanes=units["lanes"], list_writers=units["writers"], preproc_interval=units["interval"])
+    found, stats = bit_true_front(view, config, Front.RTL, FrontOptions(), Steps())
+    packed = packed_scene(view, PackedFormat.CHUNK)
+    want, rtl = front_frame(packed, view.camera, kind=RecordKind.CONIC32, **units)
+    assert np.array_equal(found.records, want.records) and stats["front_cycles"] == rtl.cycles > 2 * len(packed)
 
 
 @pytest.mark.slow
