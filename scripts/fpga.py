@@ -18,6 +18,7 @@ from rich.table import Table
 from flicker.chips import chip_of, chips
 from flicker.cli.tables import Terminal
 from flicker.cost.fpga import COMMANDS, FOLDER, Fpga, Resources, boards
+from flicker.cost.fpga_budgets import over_budget
 from flicker.cost.place import delays, part_of, place
 from flicker.errors import FlickerError
 from flicker.output import write_text
@@ -64,7 +65,10 @@ def main() -> int:
     write_text(FOLDER / f"{chip.name}-{family}.json", json.dumps({
         "parameters": chip.parameters, "all": asdict(all_), "units": {module: [number, asdict(own)] for module, (number, own) in units.items()},
     }, indent=1) + "\n")
-    return 0 if fits or options.board is None else 1
+    over = over_budget(chip.name, units, all_) if family == "xcup" and chip.parameters == chips().get(chip.name, chip).parameters else []
+    for line in over:
+        console.print(f"over its budget: {line}", highlight=False)
+    return 1 if over or not (fits or options.board is None) else 0
 
 
 def route(options: argparse.Namespace, console: Terminal) -> int:

@@ -7,12 +7,14 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from flicker.chips import chip_of
-from flicker.cost.fpga import COMMANDS, Fpga, Resources, boards, count
+from flicker.chips import chip_of, chips
+from flicker.cost.fpga import COMMANDS, UNITS, Fpga, Resources, boards, count
+from flicker.cost.fpga_budgets import BUDGETED, BUDGETS, over_budget
 from flicker.cost.place import Placed, delays, harness, part_of, place
 from flicker.cost.synth.flow import Yosys
 from flicker.errors import FlickerError
@@ -36,6 +38,24 @@ def test_boards() -> None:
     assert known["kv260"].full(Resources(100_000, 17_120, 0, 624, 36.0)) == {"lut": 1.0, "ff": 0.0, "dsp": 0.5, "bram": 0.25}
     with pytest.raises(FlickerError, match="family: one of xcup, ecp5, not ice40"):
         Fpga("ice40")
+
+
+def test_budgets() -> None:
+    """Budgets are of chips and units that there are, and their sum leaves the chip within its own; what is above one or has none is said."""
+    table = tomllib.loads(BUDGETS.read_text())
+    assert table.keys() <= chips().keys() and "tiny" in table
+    for most in table.values():
+        assert most.keys() - {"all"} <= UNITS and all(limit.keys() == {"lut", "dsp", "bram"} for limit in most.values())
+        assert sum(limit["lut"] for name, limit in most.items() if name != "all") < 1.05 * most["all"]["lut"]
+    most = table["tiny"]["flk_lane"]
+    lane = Resources(lut=most["lut"] - 10, lutram=10, dsp=most["dsp"], bram=most["bram"])
+    assert over_budget("tiny", {"flk_lane": (8, lane)}, lane) == []
+    assert over_budget("tiny", {"flk_lane": (8, lane + Resources(lutram=1))}, lane) == [f"flk_lane: {most['lut'] + 1:,} lut, budget {most['lut']:,}"]
+    assert over_budget("tiny", {"flk_lane": (8, lane + Resources(bram=0.5))}, lane) == [f"flk_lane: {most['bram'] + 0.5:g} bram, budget {most['bram']:g}"]
+    assert over_budget("tiny", {"flk_new": (1, Resources(lut=BUDGETED - 1))}, lane) == []
+    assert over_budget("tiny", {"flk_new": (1, Resources(lut=BUDGETED))}, lane) == ["flk_new: 1,000 lut, no budget (fpga_budgets.toml)"]
+    assert over_budget("tiny", {}, Resources(dsp=301)) == ["all: 301 dsp, budget 300"]
+    assert over_budget("wide", {}, Resources(lut=10**9)) == []
 
 
 @pytest.mark.parametrize("family", [pytest.param("xcup", marks=pytest.mark.slow), "ecp5"])
