@@ -20,6 +20,7 @@ from flicker.cli.tables import Terminal
 from flicker.cost.fpga import COMMANDS, FOLDER, Fpga, Resources, boards
 from flicker.cost.fpga_budgets import over_budget
 from flicker.cost.place import delays, part_of, place
+from flicker.cost.stamp import rtl_stamp
 from flicker.errors import FlickerError
 from flicker.output import write_text
 
@@ -63,7 +64,8 @@ def main() -> int:
             fits &= max(shares.values()) <= 1.0
             console.print(f"{name}: " + ", ".join(f"{what} {share:.0%}" for what, share in shares.items()), highlight=False)
     write_text(FOLDER / f"{chip.name}-{family}.json", json.dumps({
-        "parameters": chip.parameters, "all": asdict(all_), "units": {module: [number, asdict(own)] for module, (number, own) in units.items()},
+        "rtl": rtl_stamp(), "parameters": chip.parameters, "all": asdict(all_),
+        "units": {module: [number, asdict(own)] for module, (number, own) in units.items()},
     }, indent=1) + "\n")
     over = over_budget(chip.name, units, all_) if family == "xcup" and chip.parameters == chips().get(chip.name, chip).parameters else []
     for line in over:

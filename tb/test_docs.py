@@ -5,6 +5,7 @@ Not covered: whether tables that take minutes (pictures, cycles, chip, stability
 
 from __future__ import annotations
 
+import json
 import re
 from enum import Enum
 from pathlib import Path
@@ -14,8 +15,9 @@ import docs
 import pages
 import pytest
 import typer
-from doc_parts import areas, commands, frames, proofs
+from doc_parts import areas, commands, fpga, frames, proofs
 
+from flicker.chips import chips
 from flicker.cost import stamp
 from flicker.cost.area import TABLE, parts
 from flicker.errors import FlickerError, Interrupted
@@ -199,6 +201,17 @@ def test_areas_without_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert areas.missing() is None and "stays" in areas.save(quiet)
     monkeypatch.setattr(areas, "rtl_stamp", lambda: "0" * 12)
     assert re.fullmatch(r"model/flicker/cost/areas.csv is not of the RTL beside it, and make synth has not run: run make synth first", areas.missing() or "")
+
+
+def test_chips_mapped_before(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Of chips on FPGAs the tables show what was mapped of this RTL with these parameters, and say where there is nothing."""
+    monkeypatch.setattr(fpga, "FOLDER", tmp_path)
+    tiny = chips()["tiny"]
+    for rtl, parameters, taken in (
+        (stamp.rtl_stamp(), tiny.parameters, True), ("0" * 12, tiny.parameters, False), (stamp.rtl_stamp(), tiny.parameters | {"Lanes": 16}, False),
+    ):
+        (tmp_path / "tiny-xcup.json").write_text(json.dumps({"rtl": rtl, "parameters": parameters, "all": {"lut": 1}, "units": {}}))
+        assert ("tiny", "xcup") in fpga.mapped() if taken else "none mapped" in fpga.tables(quiet)["boards"]
 
 
 # ---- what tables say ----------------------------------------------------------------------------

@@ -6,9 +6,9 @@
 // The two oldest words are at the outputs: out_valid_o[1] implies out_valid_o[0], and out_ready_i[1] is heard with out_ready_i[0]
 // alone. Of what stays, the oldest word is at output 0 in the next cycle.
 // drop_i, a level: records that no end is before leave unseen, and out_valid_o[1] is low; ends stay until they are taken. Two leave a
-// cycle, and where the oldest is in the first memory and eight that are all inside begin a group, those eight too, if none of
-// them is an end; the next word is then at the output a cycle later.
-// left_o: words that leave in this cycle, 0 to 2, or 8 more.
+// cycle, one where the oldest is in the second memory. Eight that follow in one group, all of them inside and none an end, leave with
+// the two before them or after those; the next word is then at the output a cycle later.
+// left_o: words that leave in this cycle, 0 to 2, 8 or 10.
 // Latency 2. out_* and empty_o come from registers through a multiplexer, out_valid_o also from drop_i; out_ready_i and drop_i reach the
 // memories' read enables. clear_i (synchronous) empties it: what it holds, and what it takes in that cycle, is gone in the next.
 module flk_record_queue #(

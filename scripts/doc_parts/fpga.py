@@ -11,6 +11,7 @@ from flicker import markdown
 from flicker.chips import chip_of, chips
 from flicker.cost.fpga import COMMANDS, FOLDER, Resources, boards
 from flicker.cost.place import Placed, delays, part_of, place
+from flicker.cost.stamp import rtl_stamp
 from flicker.report.figures import STYLE
 from flicker.toolchain import ROOT
 
@@ -21,12 +22,13 @@ BY_UNIT = ("tiny", "small")
 
 
 def mapped() -> dict[tuple[str, str], dict]:
-    """What make fpga has left of the chips of chips.toml with their present parameters, by chip and family."""
-    found = {}
+    """What make fpga has left of the chips of chips.toml with their present parameters and RTL, by chip and family."""
+    found, rtl = {}, rtl_stamp()
     for name, chip in chips().items():
         for family in COMMANDS:
             path = FOLDER / f"{name}-{family}.json"
-            if path.exists() and (data := json.loads(path.read_text()))["parameters"] == chip.parameters:
+            data = json.loads(path.read_text()) if path.exists() else {}
+            if (data.get("rtl"), data.get("parameters")) == (rtl, chip.parameters):
                 found[name, family] = data
     return found
 
@@ -50,10 +52,10 @@ def tables(say: Say) -> dict[str, str]:
         units += [[f"`{chip}`", family, f"`{module}`", str(number), *_row(Resources(**own))] for module, (number, own) in order]
         units.append([f"`{chip}`", family, "all", "", *_row(all_)])
     if not kept:  # said rather than left empty
-        full, units = [[f"none mapped with its present parameters: {NEXT}", *[""] * 6]], [["none mapped", *[""] * 8]]
+        full, units = [[f"none mapped with its present RTL and parameters: {NEXT}", *[""] * 6]], [["none mapped", *[""] * 8]]
     head = ["LUT", "memory in LUTs", "FF", "DSP", "BRAM"]
     return {
-        "boards": markdown.table(["chip", "board", "LUT with memory", "FF", "DSP", "BRAM", "fits"], full),
+        "boards": f"Mapped from RTL {rtl_stamp()}.\n\n" + markdown.table(["chip", "board", "LUT with memory", "FF", "DSP", "BRAM", "fits"], full),
         "units": markdown.table(["chip", "family", "unit", "number", *head], units),
         "known": markdown.table(["board", "LUT", "FF", "DSP", "BRAM", "source"], [
             [b.name, f"{b.lut:,}", f"{b.ff:,}", f"{b.dsp:,}", str(b.bram), b.source] for b in known.values()

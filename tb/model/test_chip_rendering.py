@@ -106,6 +106,8 @@ def test_sizes() -> None:
     assert sizes.sort_stages == default("sort/flk_sorting_unit", "Stages") and sizes.sorted_ahead == default("sort/flk_entry_buffer", "Depth")
     for top in ("flk_top", "flk_top_axi", "flk_rendering", "sort/flk_delivery"):
         assert sizes.queued_records == default(top, "Queue")
+    queue, cull = ((ROOT / "rtl" / f"{unit}.sv").read_text() for unit in ("sort/flk_record_queue", "preproc/flk_cluster_cull"))
+    assert f"Groups = Half / {model.DROP // 2};" in queue and f"Interval = {preprocessing.CLUSTER_CYCLES};" in cull
     for unit in ("sort/flk_delivery", "sort/flk_record_cache"):
         assert (model.DEPTH, model.PLACES) == (default(unit, "Depth"), default(unit, "Places"))
     given = inspect.signature(estimate).parameters

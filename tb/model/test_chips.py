@@ -77,6 +77,7 @@ def test_own_file(tmp_path: Path) -> None:
     (LINE + "memories = {sorted_entries = 1000}", "own.toml: chip mine: memories: sorted_entries must be a power of two from 64 on, not 1000"),
     (LINE + "memories = {merge_lines = 4096}", "own.toml: chip mine: memories: merge_lines must be at most 128 with sorted_entries 2048, not 4096"),
     (LINE + "memories = {record_lines = 48}", "own.toml: chip mine: memories: record_lines must be a power of two, 32 to 65,536, not 48"),
+    (LINE + "memories = {queued_records = 12}", "own.toml: chip mine: memories: queued_records must be a multiple of 8, not 12"),
     (LINE + "memories = {pairs = 0}", "own.toml: chip mine: memories.pairs must be a whole number from 1 on, not 0"),
 ])
 def test_refused(tmp_path: Path, text: str, says: str) -> None:

@@ -71,6 +71,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"make record(?: REASON=.*)?", "tb/model/test_gates.py::test_holding"),
     (r"make site", "tb/test_pages.py::test_site_is_built"),
     (r"make fpga(?: .*)? ROUTE=1", "tb/model/test_fpga.py::test_placed"),
+    (r"make fpga CHIP=tiny", "tb/model/test_fpga.py::test_within_budget"),
     (r"make fpga(?: .*)?", "tb/model/test_fpga.py::test_unit"),
     (r"make (?:sim|waves|synth|formal|mutants|docs) \w+=.*", "names"),
     (r"make (?:generate|synth|formal|mutants|docs)(?: \[.*\])?", "targets"),

@@ -58,6 +58,13 @@ def test_budgets() -> None:
     assert over_budget("wide", {}, Resources(lut=10**9)) == []
 
 
+@pytest.mark.slow
+def test_within_budget() -> None:
+    """The smallest chip: ten minutes where no unit is kept."""
+    done = subprocess.run(["make", "fpga", "CHIP=tiny"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0 and "over its budget" not in done.stdout and "kv260: lut" in done.stdout, done.stdout + done.stderr
+
+
 @pytest.mark.parametrize("family", [pytest.param("xcup", marks=pytest.mark.slow), "ecp5"])
 def test_unit(family: str) -> None:
     """Multipliers become DSPs, a memory blocks or LUTs; parts are counted once for each instance."""
