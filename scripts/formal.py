@@ -46,7 +46,7 @@ TIMEOUT = 1500  # seconds for a task, on a busy machine
 
 PROOF_KEYS = {"name", "top", "method", "steps", "parameters", "cover_depth", "cover_sets", "cover_parameters",
               "standins", "cut", "fast", "fast_set", "long", "mutant_depth", "mutant"}
-MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters", "slow"}
+MUTANT_KEYS = {"file", "find", "regex", "replace", "depth", "parameters"}
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,6 @@ class Mutant:
     replace: str
     depth: int
     parameters: Mapping[str, int]
-    slow: bool = False
     regex: bool = False
 
 
@@ -146,14 +145,13 @@ def read_proofs(path: Path = PROOFS) -> list[Proof]:
 
 
 def tasks_of(proof: Proof, fast: bool) -> list[Task]:
-    """Tasks of a proof; with ``fast`` those of one set of parameters (all of them tasks of the whole run too)."""
+    """Tasks of a proof; with ``fast`` those of one set of parameters and the first mutant (all of them tasks of the whole run too)."""
     sets = [proof.parameters[proof.fast_set]] if fast else proof.parameters
     covered = proof.cover_parameters or proof.parameters[: 1 if fast else proof.cover_sets or len(proof.parameters)]
     return [
         *(Task(proof, "proof", parameters) for parameters in sets),
         *(Task(proof, "cover", parameters) for parameters in covered),
-        *(Task(proof, "mutant", mutant.parameters, mutant) for mutant in proof.mutants
-          if not (fast and mutant.slow)),
+        *(Task(proof, "mutant", mutant.parameters, mutant) for mutant in proof.mutants[: 1 if fast else None]),
     ]
 
 

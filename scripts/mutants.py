@@ -3,8 +3,8 @@
 
     scripts/mutants.py [--unit NAME ...] [--jobs N] [--seed N] [--match TEXT] [--check]
 
-Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them. One that
-survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
+Each mutant is a source with one piece of text replaced, in a copy of the checkout; then the unit's own tests run as `make sim UNIT=` runs them, and with SLOW=1
+where none of these fails. One that survives goes on to the tests of LEVELS, to say who notices. A mutant that does not build counts as wrong, not as killed.
 Prints a table, writes tb/mutants/results.csv, which is kept with the sources (finished mutants are not run again while what their unit's tests use stays
 as it is); exits 1 when fewer than KILLED_AT_HOME die at home, when a survivor has no reason, or when a mutant is wrong. `make docs PART=mutants` puts the table
 into docs/results/mutants.md, with the mutants that were run on sources or tests that have changed since, and says how many these are.
@@ -40,20 +40,20 @@ LISTS = ROOT / "tb" / "mutants"
 FOLDER = toolchain.BUILD / "mutants"
 RESULTS = LISTS / "results.csv"
 COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint", "formal", "sw")
-LEVELS = (("rendering_core",), ("render_stage",), ("frames",))  # who may notice what a unit's own tests do not, from below
+LEVELS = ("rendering_core", "render_stage", "frames")  # who may notice what a unit's own tests do not, from below
 KILLED_AT_HOME = 0.95
 TIMEOUT = 900  # seconds of a test run, on a busy machine
 # Modules that build, simulate memory, show and report. Outcomes are not run anew when they change: what kills a mutant is not in them.
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 # Modules whose numbers stand in a generated package: an outcome depends on that.
 PACKAGES = {"flicker.params": ROOT / "rtl/generated/flk_param_pkg.sv", "flicker.layout": ROOT / "rtl/generated/flk_pkg.sv"}
-KEYS = {"file", "find", "replace", "unit", "note", "survives", "slow", "times"}
+KEYS = {"file", "find", "replace", "unit", "note", "survives", "times"}
 
 
 @dataclass(frozen=True)
 class Mutant:
     """find occurs `times` in file and is replaced everywhere. unit: whose tests must kill it (tb/**/test_UNIT.py). note: what it breaks. survives: why none
-    can notice. slow: its unit's tests that are marked slow run too."""
+    can notice."""
 
     number: int
     file: str
@@ -62,7 +62,6 @@ class Mutant:
     unit: str
     note: str = ""
     survives: str = ""
-    slow: bool = False
     times: int = 1
 
     @property
@@ -102,7 +101,7 @@ def load(folder: Path = LISTS) -> list[Mutant]:
             where = f"{path}: mutant {i + 1}"
             if unknown := entry.keys() - KEYS:
                 raise FlickerError(f"{where}: unknown key '{sorted(unknown)[0]}'")
-            if missing := KEYS - {"note", "survives", "slow", "times"} - entry.keys():
+            if missing := KEYS - {"note", "survives", "times"} - entry.keys():
                 raise FlickerError(f"{where}: key '{sorted(missing)[0]}' is missing")
             source = ROOT / entry["file"]
             if not source.is_file():
@@ -142,20 +141,20 @@ class Copies:
         text = source.read_text()
         try:
             source.write_text(text.replace(mutant.find, mutant.replace))
-            for units in ((mutant.unit,), *_above(mutant)):
-                for unit in units:
-                    died, wrong = _test(folder, unit, seed, mutant.slow)
-                    if wrong:
-                        return Outcome(mutant, wrong=wrong)
-                    if died:
-                        return Outcome(mutant, unit)
+            home = [(mutant.unit, slow) for slow in (False, True)]
+            for unit, slow in (*home, *((unit, False) for unit in _above(mutant))):
+                died, wrong = _test(folder, unit, seed, slow)
+                if wrong:
+                    return Outcome(mutant, wrong=wrong)
+                if died:
+                    return Outcome(mutant, unit)
             return Outcome(mutant)
         finally:
             source.write_text(text)
             self.free.put(folder)
 
 
-def _above(mutant: Mutant) -> tuple[tuple[str, ...], ...]:
+def _above(mutant: Mutant) -> tuple[str, ...]:
     """LEVELS for what is part of the rendering stage, nothing for the rest."""
     return LEVELS if ROOT / mutant.file in toolchain.sources_of("flk_render_stage") else ()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import csv
 import functools
+import inspect
 import os
 import sys
 from pathlib import Path
@@ -41,7 +42,7 @@ demo.generate = _made_once(demo.generate)  # before a test module takes it
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also the tests marked slow (as with SLOW=1)")
     parser.addoption("--cached", action="store_true", help="leave out tests that passed on the same inputs (FRESH=1: none)")
-    parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py; slow ones too where it has no others")
+    parser.addoption("--unit", help="only the tests of one unit: NAME of tb/**/test_NAME.py; slow ones too where it has no others that simulate")
 
 
 def _simulates(path: Path) -> bool:
@@ -51,6 +52,11 @@ def _simulates(path: Path) -> bool:
 
 def _slow(config: pytest.Config) -> bool:
     return config.getoption("--slow") or os.environ.get("SLOW") == "1"
+
+
+def _refusal(item: pytest.Item) -> bool:
+    """Whether a test expects that parameters are refused, and simulates nothing."""
+    return isinstance(item, pytest.Function) and "refused(" in inspect.getsource(item.function)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -63,6 +69,8 @@ def pytest_configure(config: pytest.Config) -> None:
         runner.seed()
     except FlickerError as error:
         raise pytest.UsageError(str(error)) from None
+    if _slow(config):
+        os.environ["SLOW"] = "1"  # what cocotb modules look at
     unit = config.getoption("--unit")
     files = sorted(TB.rglob("test_*.py"))
     sim = config.getoption("markexpr") == "sim"
@@ -90,7 +98,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     slow = _slow(config)
-    named = config.getoption("--unit") is not None and all(item.get_closest_marker("slow") for item in items)
+    named = config.getoption("--unit") is not None and all(item.get_closest_marker("slow") or _refusal(item) for item in items)
     if not slow and not named:
         left_out = [item for item in items if item.get_closest_marker("slow")]
         items[:] = [item for item in items if not item.get_closest_marker("slow")]

@@ -72,6 +72,7 @@ def test_bad_list_is_one_line(tmp_path: Path, text: str, message: str) -> None:
     assert done.returncode == 1 and message in done.stderr and done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_proof_without_teeth_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "proofs.toml"
     path.write_text(

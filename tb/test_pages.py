@@ -127,6 +127,7 @@ def test_questions_are_answered_within_three_links() -> None:
         assert far[ROOT / page] <= 3, (question, far[ROOT / page])
 
 
+@pytest.mark.slow
 def test_site_is_built(tmp_path: Path) -> None:
     """Strict: mkdocs finds nothing; the pages outside docs/ are in it and search knows them."""
     done = subprocess.run([Path(sys.executable).parent / "mkdocs", "build", "--strict", "--site-dir", tmp_path], cwd=ROOT, capture_output=True, text=True)

@@ -117,7 +117,9 @@ def test_netlist_by_hand(library: Library) -> None:
 ABC = Path(pyosys.__file__).parent / "yosys-abc"
 
 
-@pytest.mark.parametrize("parameters", [dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1), {}], ids=["e4m3", "fp16"])
+@pytest.mark.parametrize("parameters", [
+    pytest.param(dict(ExpBits=4, ManBits=3, Fn=1, Saturate=1), id="e4m3"), pytest.param({}, id="fp16", marks=pytest.mark.slow),
+])
 @pytest.mark.parametrize("top", ["flk_fp_add", "flk_fp_mul"])
 def test_timing_equals_abc(top: str, parameters: dict, library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """ABC's own static timing (`stime`) of the mapped netlist with the same Liberty file, port to port.

@@ -100,6 +100,7 @@ def test_names_of_tests_are_unique() -> None:
     assert len(set(stems)) == len(stems), sorted({stem for stem in stems if stems.count(stem) > 1})
 
 
+@pytest.mark.slow
 def test_every_named_unit_has_simulations() -> None:
     """Each test file outside tb/model and tb/sw gives tests under ``-m sim``, and only these; but for files that need a package that is not here. Of tb/model,
     whose imports take longest, one file is collected: the mark comes from the folder, and no file of it sets it."""

@@ -6,12 +6,13 @@ Settings: ``top``.
 
 from __future__ import annotations
 
+import itertools
 import random
 
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort, ram_read, ram_write
-from flicker_tb.bench import Bench, StreamTest, config
+from flicker_tb.bench import Bench, StreamTest, config, rounds
 from flicker_tb.streams import Checker, Monitor, Stream, StreamSink, StreamSource
 
 from flicker.chip.dram import DramConfig, port_config
@@ -20,6 +21,7 @@ from flicker.sim.memory import Memory, PortConfig, WriteOrder
 TOP = config()["top"]
 BASE, SIZE = 0x8000, 0x10000
 REQUEST = ("addr", "beats", "tag")
+WRITES = list(itertools.product(["never", "half", "bursts"], WriteOrder, [0.0, 0.5]))[:: rounds(5, 1)]
 
 
 class Anything:
@@ -209,7 +211,7 @@ class WriteTest:
 
 
 @cocotb.test(skip=TOP != "flk_axi_write")
-@cocotb.parametrize(idle=["never", "half", "bursts"], order=list(WriteOrder), share=[0.0, 0.5])
+@cocotb.parametrize((("idle", "order", "share"), WRITES))
 async def write(dut, idle, order, share):
     """Contents, answers in order with their errors, whatever the memory wants first."""
     test = WriteTest(dut, idle)

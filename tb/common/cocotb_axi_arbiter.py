@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
@@ -10,7 +11,7 @@ import cocotb
 from cocotb.triggers import RisingEdge
 from cocotb_priority_arbiter import PriorityModel
 from flicker_tb.axi import MemoryPort, ram_read, ram_write
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 from flicker.chip.dram import DramConfig, port_config
 from flicker.sim.memory import Memory, Order, PortConfig, WriteOrder
@@ -18,6 +19,9 @@ from flicker.sim.memory import Memory, Order, PortConfig, WriteOrder
 READ_BASE, WRITE_BASE, SIZE = 0x8000, 0x80000, 0x8000
 PAGE = 4096
 NEVER = 1 << 30
+# Pauses of managers, of the memory, orders; all of them with SLOW=1.
+TRAFFIC = list(itertools.product(["never", "half"], [0.0, 0.5], Order, [True, False]))[:: rounds(5, 1)]
+DRAINS = list(itertools.product(["never", "half"], [0.0, 0.5], WriteOrder))[:: rounds(5, 1)]
 
 
 @dataclass
@@ -330,7 +334,7 @@ class WithMemory(ArbiterTest):
 
 
 @cocotb.test()
-@cocotb.parametrize(idle=["never", "half"], share=[0.0, 0.5], order=list(Order), perfect=[True, False])
+@cocotb.parametrize((("idle", "share", "order", "perfect"), TRAFFIC))
 async def traffic(dut, idle, share, order, perfect):
     """Data, identifiers, order, quality of service, who is served; under pauses of every channel."""
     write_order = list(WriteOrder)[(order + (share > 0) + (idle == "half")) % 3]
@@ -394,7 +398,7 @@ async def other_memory(dut):
 
 
 @cocotb.test()
-@cocotb.parametrize(idle=["never", "half"], share=[0.0, 0.5], write_order=list(WriteOrder))
+@cocotb.parametrize((("idle", "share", "write_order"), DRAINS))
 async def drain(dut, idle, share, write_order):
     """Held at random times, again and again: all that was asked for comes, missing data leave old bytes, managers go on after their reset."""
     test = WithMemory(

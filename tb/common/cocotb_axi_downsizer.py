@@ -227,8 +227,8 @@ async def traffic(dut, idle, order, write_order, stall, dram):
     port = memory_of(test, dut, options(test, order, write_order, stall, dram), dram)
     test.start()
     await test.bench.reset()
-    test.make_reads(rounds(70, 150))
-    test.make_writes(rounds(45, 100))
+    test.make_reads(rounds(40, 150))
+    test.make_writes(rounds(25, 100))
     await test.bench.until(lambda: not test.busy, 200_000, "last answer")
     assert port.port.idle and not test.expected_ar and not test.expected_aw
     assert port.memory.read(WRITE_BASE, SIZE) == bytes(test.golden)
@@ -260,8 +260,8 @@ async def errors(dut):
     port = memory_of(test, dut, options(test, Order.INTERLEAVED, WriteOrder.ANY, 1, False), False)
     test.start()
     await test.bench.reset()
-    test.make_reads(60)
-    test.make_writes(40)
+    test.make_reads(rounds(30, 60))
+    test.make_writes(rounds(20, 40))
     for queue, fail in ((test.reads, port.port.fail_read), (test.writes, port.port.fail_write)):
         for k in test.rng.sample(range(len(queue)), 12):
             queue[k].resp = int(test.rng.choice([Resp.SLVERR, Resp.DECERR]))
@@ -303,7 +303,7 @@ async def clears(dut):
     port = memory_of(test, dut, config, False)
     test.start()
     await test.bench.reset()
-    for _ in range(6):
+    for _ in range(rounds(3, 6)):
         test.make_reads(60)
         test.make_writes(40)
         for _ in range(test.rng.randint(20, 300)):

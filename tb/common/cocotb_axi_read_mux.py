@@ -6,7 +6,7 @@ from collections import deque
 
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 
 class Ports:
@@ -106,10 +106,11 @@ async def all_managers(dut, idle, address, beats):
     """Requests and beats of all managers."""
     ports = Ports(dut, [idle] * len(dut.ar_valid_i), address, beats)
     await ports.bench.reset()
+    count = rounds(60, 100)
     for k in range(ports.managers):
-        ports.ask(k, 100)
+        ports.ask(k, count)
     await ports.bench.until(lambda: not ports.busy, 60_000, "last beat")
-    assert ports.got == ports.due and [ports.order.count(k) for k in range(ports.managers)] == [100] * ports.managers
+    assert ports.got == ports.due and [ports.order.count(k) for k in range(ports.managers)] == [count] * ports.managers
 
 
 @cocotb.test()

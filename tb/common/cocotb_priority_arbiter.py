@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
+
+PAIRS = list(itertools.product(["never", "rare", "half", "heavy"], stalls.PATTERNS))[:: rounds(5, 1)]
 
 
 class PriorityModel:
@@ -34,7 +38,7 @@ class PriorityModel:
 
 
 @cocotb.test()
-@cocotb.parametrize(idle=["never", "rare", "half", "heavy"], stall=stalls.PATTERNS)
+@cocotb.parametrize((("idle", "stall"), PAIRS))
 async def against_model(dut, idle, stall):
     """Choice, data, ready of every input, bound on waiting; an input that gives up before it is served starts anew."""
     bench = Bench(dut)

@@ -10,14 +10,14 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 from flicker_tb import splats
-from flicker_tb.bench import PERIOD_NS, config, netlist
+from flicker_tb.bench import PERIOD_NS, config, netlist, rounds
 
 from flicker.arithmetic.formats import E4M3, E5M2, FP16
 from flicker.arithmetic.fp import rounding
 from flicker.golden.weight import conic_axis, conic_pixel, factored_pixel, factored_row, mul
 from flicker.params import Form, weight_latency, weight_shape_delay, weight_stages
 
-ITEMS = 3_000
+ITEMS = rounds(1_200, 3_000)
 
 
 @numba.njit(cache=True)

@@ -1,4 +1,4 @@
-"""Leading-zero counter: every input, of 1, 3, 9 and 14 bits; with SLOW=1 also of 2, 8 and 11. Not covered: other widths."""
+"""Leading-zero counter: every input, of 3 and 14 bits; with SLOW=1 also of 1, 2, 8, 9 and 11. Not covered: other widths."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from flicker_tb.elaboration import refused
 from flicker_tb.runner import build_and_test
 
 
-@pytest.mark.parametrize("width", [1, 3, 9, 14, *(pytest.param(width, marks=pytest.mark.slow) for width in (2, 8, 11))])
+@pytest.mark.parametrize("width", [3, 14, *(pytest.param(width, marks=pytest.mark.slow) for width in (1, 2, 8, 9, 11))])
 def test_lzc(width: int) -> None:
     build_and_test("flk_lzc", "cocotb_lzc", parameters={"Width": width})
 

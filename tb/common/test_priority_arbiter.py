@@ -1,7 +1,7 @@
 """Priority arbiter with a bound on waiting: choice, data, ready in every cycle against a model of its counts.
 
 State space: inputs that pause, wait and give up, outputs that stall in every pattern; all inputs busy; reset while some are urgent.
-Parameter space: 2, 4, 5 inputs, Patience at its least value and 16; with SLOW=1 also 3 and 8 inputs and Patience between.
+Parameter space: 2 and 4 inputs, Patience at its least value and 16; with SLOW=1 also 3, 5 and 8 inputs and Patience between.
 For all traces: formal/fv_priority_arbiter.sv.
 """
 
@@ -13,8 +13,8 @@ from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [
-    {}, {"Inputs": 2, "Patience": 1, "Width": 1}, {"Inputs": 5, "Patience": 4},
-    *(pytest.param(case, marks=pytest.mark.slow) for case in ({"Inputs": 3, "Patience": 5}, {"Inputs": 8, "Patience": 9})),
+    {}, {"Inputs": 2, "Patience": 1, "Width": 1},
+    *(pytest.param(case, marks=pytest.mark.slow) for case in ({"Inputs": 5, "Patience": 4}, {"Inputs": 3, "Patience": 5}, {"Inputs": 8, "Patience": 9})),
 ], ids=str)
 def test_priority_arbiter(parameters: dict[str, int]) -> None:
     build_and_test("flk_priority_arbiter", "cocotb_priority_arbiter", parameters=parameters)

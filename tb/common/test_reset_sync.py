@@ -1,5 +1,7 @@
 """Reset synchroniser: resets that begin and end anywhere in a cycle, of any length, in use and in a scan test; a chain of one flip-flop is refused.
 
+With SLOW=1 also a chain of three.
+
 Not covered: metastability, which no simulation has.
 """
 
@@ -10,7 +12,7 @@ from flicker_tb.elaboration import refused
 from flicker_tb.runner import build_and_test
 
 
-@pytest.mark.parametrize("stages", [2, 3])
+@pytest.mark.parametrize("stages", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_reset_sync(stages: int) -> None:
     build_and_test("flk_reset_sync", "cocotb_reset_sync", parameters={"Stages": stages}, config={"stages": stages})
 

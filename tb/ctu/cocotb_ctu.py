@@ -113,7 +113,7 @@ def covering(rng) -> splats.Splat:
 async def lists(dut, mode, patterns):
     """Elements and masks in order, whatever the stalls; nothing lost, nothing twice; counters add up."""
     test = CtuTest(dut, CatMode[mode], PATTERNS[patterns])
-    await test.check(items_of(random_lists(test.bench.rng, rounds(7, 12))))
+    await test.check(items_of(random_lists(test.bench.rng, rounds(5, 12))))
 
 
 @cocotb.test()

@@ -26,7 +26,7 @@ from flicker.params import (
     prtu_shape_delay,
 )
 
-ITEMS = rounds(2_500, 4_000)
+ITEMS = rounds(1_500, 4_000)
 RECT = ("x_i", "y_i")
 INPUTS = ("x_i", "y_i", "mean_x_i", "mean_y_i", "shape_i", "threshold_i")
 LEADERS = (*DENSE_RECTS.tolist(), *SPARSE_RECTS.tolist())

@@ -2,10 +2,10 @@
 
 State space: lists of random splats (as in scenes, thin, covering, special numbers), empty sub-tiles, sub-tiles of one and of 5,000 splats; all modes;
 idle input, blocked output and blocked acceptance (stall_i) in many patterns; automatic mode with lists that make it fall and return, under different
-stalls; reset and clear in mid-traffic. Parameter space: without output FIFO the factored form in fixed point; an output FIFO of one place, and that of the
-faithful configuration, conic in mixed precision; VRU cycles of channels with 1 and 2 VRUs; illegal parameters. With SLOW=1 also the other precisions of
-each form, output FIFOs of 2 and 3 places, channels with 4 VRUs. Not covered: a change of mode in mid-frame, which the contract
-excludes (tb/render/test_stage_control.py: the mode is latched).
+stalls; reset and clear in mid-traffic. Parameter space: without output FIFO the factored form in fixed point; the output FIFO of the faithful configuration,
+conic in mixed precision; VRU cycles of channels with 2 VRUs; illegal parameters. With SLOW=1 also the other precisions of each form, output FIFOs of 1, 2 and 3
+places, channels with 1 and 4 VRUs. Not covered: a change of mode in mid-frame, which the contract excludes (tb/render/test_stage_control.py: the mode is
+latched).
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def test_ctu(form: Form, precision: Precision) -> None:
     run(form, precision, 0, tests)
 
 
-@pytest.mark.parametrize("depth", [1, *(pytest.param(depth, marks=pytest.mark.slow) for depth in (2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("depth", [1, 2, 3])
 def test_fifo_depth(depth: int) -> None:
     run(Form.FACTORED, Precision.MIXED, depth, ["lists", "automatic"])
 
@@ -53,7 +54,8 @@ def test_faithful() -> None:
     run(FAITHFUL.form, FAITHFUL.precision, FAITHFUL.ctu_fifo_depth, ["lists", "rate", "automatic", "rejected_drain"])
 
 
-@pytest.mark.parametrize("cycles", [pytest.param(4, marks=pytest.mark.slow), 16])
+@pytest.mark.slow
+@pytest.mark.parametrize("cycles", [4, 16])
 def test_vru_cycles(cycles: int) -> None:
     """Of a channel with four VRUs and with one: the fall compares with them."""
     run(Form.FACTORED, Precision.FIXED, 0, ["automatic"], VruCycles=cycles)

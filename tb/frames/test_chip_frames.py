@@ -2,8 +2,8 @@
 
 State space: the demo scene and small ones, both pixel formats, pauses on every channel with answers in every order, DRAM timing, frames back to back with
 cameras and modes of their own, overlapped or not; aborts and resets at random times with a right frame behind; errors of the memory in every region; channels
-that stop; too little list memory; descriptors and images with faults; registers written in mid-frame.
-Parameter space: a stage of 32 lanes; 8 in one core, with one sorting unit, list writer and preprocessing lane; with SLOW=1 of two cores, of channels too, with
+that stop; too little list memory; descriptors and images with faults; registers written in mid-frame; with SLOW=1 more lists than pointers are held.
+Parameter space: a stage of 32 lanes; with SLOW=1 8 in one core, with one sorting unit, list writer and preprocessing lane, two cores, channels too, with
 modes that travel with their frame, the paper's configuration, with records of 32 bytes, and real scenes (tb/frames/test_rendering.py has the rendering half
 with channels); ports of 128 and 256 bits. Units: tb/top, tb/common, tb/preproc, tb/sort; driver: tb/sw.
 """
@@ -203,6 +203,7 @@ def test_cycles_of_a_narrow_port(config: RenderConfig) -> None:
             assert cost[name] == pytest.approx(done.phases[phase], rel=0.1), phase
 
 
+@pytest.mark.slow
 def test_few_units() -> None:
     """The smallest chip, one core of 8 lanes, one sorting unit, list writer and preprocessing lane with small memories and a port of 128 bits: the picture of
     the default one; the model of the rendering half. A second frame, of a picture that is no whole number of tiles."""
@@ -267,6 +268,7 @@ def test_sh_codes_of_fewer_bits() -> None:
     assert set(packed.sh_bits) == set(SH_BITS)
 
 
+@pytest.mark.slow
 def test_pointers_beyond_those_held() -> None:
     """A picture above 1080p, then one below it: lines of pointers go to memory and come back; all is counted."""
     with session() as chip:
@@ -291,6 +293,7 @@ def test_pointers_that_cannot_be_read_back() -> None:
         check(chip, camera())
 
 
+@pytest.mark.slow
 def test_abort_while_pointers_move() -> None:
     """At any time of a move, with pauses; the frame after it is right."""
     rng = random.Random(f"{seed()} moves")
@@ -704,7 +707,7 @@ def test_kept_colours_behind_aborts() -> None:
         pictures = {k: render_chip(front_lists(run_front(chip.packed, view)), CONFIG, PixelFormat.RGB8, BLUE).buffer for k, view in enumerate(views)}
         place, store = chip.place(views[0]), chip.store(0.0)
         cut = 0
-        for turn in range(14):
+        for turn in range(rounds(8, 14)):
             frame = chip.frame(views[turn % 3], place, background=BLUE, tag=turn, store=store)
             late = turn % 2 == 0
             frame.deadline = rng.randint(800, 5000) if late else 0
@@ -722,7 +725,7 @@ def test_kept_colours_behind_aborts() -> None:
                 chip.start(after)
                 done = chip.finish(after, LIMIT)
                 assert done.error == 0 and np.array_equal(done.buffer, pictures[k]), (turn, k)
-        assert cut > 3
+        assert cut > rounds(1, 3)
         chip.start(chip.frame(views[0], place, background=BLUE, store=store))
         chip.step(5000)
         chip.hold_memory(True)

@@ -1,8 +1,9 @@
 """Frames through the verilated chip back to back: a row of them, and `flicker path --engine chip`.
 
 State space: cameras that move, on two regions in turn, with DRAM timing; too little list memory in the middle of a row; Ctrl-C, in a register's callback too,
-and --resume; a picture that is wrong; a frame that ends with an error. Parameter space: a stage of 32 lanes; with SLOW=1 flowers at 640x360. What a frame
-leaves by itself: tb/frames/test_chip_frames.py; everything else of `flicker path`: tb/model/test_path.py.
+and --resume; a picture that is wrong; a frame that ends with an error; with SLOW=1 bytes and cycles beside the model, of the demo scene and of flowers at
+640x360. Parameter space: a stage of 32 lanes. What a frame leaves by itself: tb/frames/test_chip_frames.py; everything else of `flicker path`:
+tb/model/test_path.py.
 """
 
 from __future__ import annotations
@@ -157,6 +158,7 @@ def near_model(scene: str | Path, view: int, size: str, motion: tuple, frames: i
     assert sum(int(row_["cycles"]) for row_ in found[1:]) == pytest.approx(modelled, rel=0.1)
 
 
+@pytest.mark.slow
 def test_eight_frames_of_the_demo_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every third of its Gaussians, seen by its own camera."""
     monkeypatch.chdir(tmp_path)

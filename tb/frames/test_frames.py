@@ -2,11 +2,11 @@
 cycles and every counter. The default design is built with its assertions, which make a build take three times as long (with SLOW=1 also the two others
 that matter most, faithful and without CTU; an assertion that fails: test_plugs.py); the harness also changes mode_i inside every frame and checks idle_o.
 
-State space: every third splat of the demo scene in every mode, in the two builds that matter most (default, faithful), with random idle and
-back-pressure; all of it at 320x180 (with SLOW=1 at 640x360); channels of one and of four VRUs (SLOW=1), each at another FIFO depth; the stage without
-a contribution test (mask generator `all`); frames aborted at random times; a view of a real scene at 320x180 when FLICKER_SCENES names their
-folder (with SLOW=1 of all four), and with SLOW=1 view 0 of flowers at 1280x720. Builds of the remaining precisions, one of each form, on a small frame,
-and of FIFOs of 1 and 128 places (FP8 and one place in one build; the others with SLOW=1).
+State space: every third splat of the demo scene in every mode of the default build and in the paper's of `faithful` (with SLOW=1 in every mode of both), with
+random idle and back-pressure; frames aborted at random times. With SLOW=1: all of the demo scene at 320x180 and 640x360; channels of one and of four VRUs,
+each at another FIFO depth; the stage without a contribution test (mask generator `all`); a view of each real scene at 320x180 when FLICKER_SCENES names their
+folder, and view 0 of flowers at 1280x720; builds of the remaining precisions, one of each form, on a small frame, and of FIFOs of 1 and 128 places (FP8 and
+one place in one build).
 Not covered: pictures above 1280x720; frames that follow each other without a pause.
 """
 
@@ -42,7 +42,13 @@ from flicker.sim.render_stage import render_rtl
 DEFAULT = RenderConfig()
 NO_CTU = RenderConfig(cat=CatMode.OFF, mask_generator="all")
 SHALLOW = RenderConfig(form=Form.CONIC, precision=Precision.FP8, fifo_depth=1)  # tb/model/test_cli.py takes this build, too
-SLOW = pytest.mark.slow  # each is a build of its own, a minute or more
+SLOW = pytest.mark.slow
+
+
+def modes(base: RenderConfig, *usual: CatMode) -> list:
+    """A parameter for every mode; those that are not usual are slow."""
+    name = "faithful" if base is FAITHFUL else "default"
+    return [pytest.param(base, cat, id=f"{name}-{cat.name.lower()}", marks=[SLOW] * (cat not in usual)) for cat in CatMode]
 
 
 @cache
@@ -112,15 +118,13 @@ def random_splats(seed: int, count: int, size: int):
     return type(projected)(**fields), camera.resized(size, size)
 
 
-@pytest.mark.parametrize("cat", list(CatMode), ids=lambda m: m.name.lower())
-@pytest.mark.parametrize("base", [DEFAULT, FAITHFUL], ids=["default", "faithful"])
+@pytest.mark.parametrize(("base", "cat"), modes(DEFAULT, *CatMode) + modes(FAITHFUL, FAITHFUL.cat))
 def test_demo_modes(base, cat):
     """Every mode on a small frame of the demo scene, with stalls; one seed per mode."""
     compare(*some(160, 90), base.with_(cat=cat), seed=int(cat) + 1, idle=0.2, stall=0.3)
 
 
-@pytest.mark.parametrize("cat", list(CatMode), ids=lambda m: m.name.lower())
-@pytest.mark.parametrize("base", [DEFAULT, FAITHFUL], ids=["default", "faithful"])
+@pytest.mark.parametrize(("base", "cat"), modes(DEFAULT, DEFAULT.cat, CatMode.AUTO) + modes(FAITHFUL, FAITHFUL.cat))
 def test_cycle_model(base, cat):
     """Every mode without stalls, cycle for cycle: a small frame, and random streams with few and with thousands of splats per sub-tile."""
     compare(*some(96, 54), base.with_(cat=cat))
@@ -128,15 +132,17 @@ def test_cycle_model(base, cat):
     compare(*random_splats(10 + int(cat), 4000, 24), base.with_(cat=cat))
 
 
+@SLOW
 @pytest.mark.parametrize("config", [
-    SHALLOW, pytest.param(RenderConfig(precision=Precision.FP16), marks=SLOW), pytest.param(RenderConfig(precision=Precision.MIXED), marks=SLOW),
+    SHALLOW, RenderConfig(precision=Precision.FP16), RenderConfig(precision=Precision.MIXED),
 ], ids=lambda c: f"{c.precision.name.lower()}-{c.form.name.lower()}")
 def test_demo_formats(config):
     """Builds of the other precisions, one of each form."""
     compare(*some(160, 90), config)
 
 
-@pytest.mark.parametrize("config", [SHALLOW, *(pytest.param(DEFAULT.with_(fifo_depth=n), marks=SLOW) for n in (1, 128))], ids=lambda c: str(c.fifo_depth))
+@SLOW
+@pytest.mark.parametrize("config", [SHALLOW, *(DEFAULT.with_(fifo_depth=n) for n in (1, 128))], ids=lambda c: str(c.fifo_depth))
 def test_fifo_depth(config):
     """Shallowest and deepest feature FIFO: the same picture, and the cycles of the model."""
     compare(*some(96, 54), config)
@@ -144,7 +150,8 @@ def test_fifo_depth(config):
     compare(*some(96, 54), config, stall=0.1)
 
 
-@pytest.mark.parametrize("vrus,fifo_depth", [pytest.param(4, 7, marks=SLOW), pytest.param(1, 16, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("vrus,fifo_depth", [(4, 7), (1, 16)])
 def test_vrus_per_channel(vrus, fifo_depth):
     """Other numbers of VRUs: cycles of the model, and the picture of two VRUs except where the automatic mode looks at them."""
     config = DEFAULT.with_(vrus_per_channel=vrus, fifo_depth=fifo_depth)
@@ -155,7 +162,8 @@ def test_vrus_per_channel(vrus, fifo_depth):
     assert (golden.pixels == render_golden(golden.lists, DEFAULT).pixels).all()
 
 
-@pytest.mark.parametrize("vrus", [2, pytest.param(4, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("vrus", [2, 4])
 def test_no_ctu(vrus):
     """Mask generator `all`: the picture of the test switched off, cycles and counters of the model; other latencies than the CTU's."""
     config = RenderConfig(cat=CatMode.OFF, mask_generator="all", vrus_per_channel=vrus)
@@ -167,8 +175,9 @@ def test_no_ctu(vrus):
         config.with_(cat=CatMode.SMOOTH)
 
 
-@pytest.mark.parametrize("base", [DEFAULT.with_(cat=CatMode.AUTO), FAITHFUL, NO_CTU],
-                         ids=["default", "faithful", "no ctu"])
+@pytest.mark.parametrize("base", [
+    pytest.param(DEFAULT.with_(cat=CatMode.AUTO), id="default"), pytest.param(FAITHFUL, id="faithful"), pytest.param(NO_CTU, id="no ctu", marks=SLOW),
+])
 def test_aborted_frames(base):
     """clear_i at random times and for random lengths; the frame after it is right in pixels, cycles and counters, as if it were the first."""
     scene = random_splats(3, 400, 32)
@@ -189,13 +198,15 @@ def test_assertions(base):
     compare(*random_splats(3, 400, 32), base, checks=True, aborts=[(20, 1), (300, 3)])
 
 
-@pytest.mark.parametrize("width,height", [(320, 180), pytest.param(640, 360, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("width,height", [(320, 180), (640, 360)])
 def test_demo_full(width, height):
-    """The demo picture with all its splats; with SLOW=1 at its own size."""
+    """The demo picture with all its splats, small and at its own size."""
     golden, rtl = compare(*demo(width, height), DEFAULT)
     assert golden.image().std() > 0.05  # not a flat picture
 
 
+@SLOW
 def test_stalls_do_not_change_the_picture():
     """Automatic mode under different stall patterns: same pixels, same decisions, other cycle counts."""
     projected, camera = some(160, 90)
@@ -206,8 +217,8 @@ def test_stalls_do_not_change_the_picture():
         assert (f.pixels == frames[0].pixels).all()
 
 
-# One of them every time, of thin splats.
-@pytest.mark.parametrize("real_view", [pytest.param(v, id=v.folder, marks=() if v.folder == "guitar" else SLOW) for v in REAL_VIEWS])
+@SLOW
+@pytest.mark.parametrize("real_view", [pytest.param(v, id=v.folder) for v in REAL_VIEWS])
 def test_real_scene(real_view):
     """One view of each real scene at 320x180."""
     scenes = real_scenes()

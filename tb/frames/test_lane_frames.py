@@ -2,8 +2,8 @@
 cycles and every counter. The default build has its assertions.
 
 State space: the demo scene, random splats of many opacities, thousands to a sub-tile, hard families of the stability suite, random bits for records; lists
-read to their end and left, empty ones streamed and not; random idle and back-pressure; frames aborted at random times. Builds: 32 lanes, and one core of 8
-for all sub-tiles; with SLOW=1 64 and 128 lanes, one core of 4, two cores, and one element a cycle with the smallest store and queues. Real scenes at 320x180
+read to their end and left, empty ones streamed and not; random idle and back-pressure; frames aborted at random times. Builds: 32 lanes; with SLOW=1 one core
+of 8 for all sub-tiles, 64 and 128 lanes, one core of 4, two cores, and one element a cycle with the smallest store and queues. Real scenes at 320x180
 when FLICKER_SCENES names their folder (one of them; with SLOW=1 all four, and view 0 of flowers at 1280x720).
 Not covered: frames that follow each other without a pause.
 """
@@ -135,6 +135,7 @@ def test_demo():
     assert frames[0].cycles > frames[1].cycles >= frames[2].cycles
 
 
+@SLOW
 def test_demo_full():
     """The demo picture at 320x180."""
     rtl = compare(demo(320, 180), DEFAULT, leave=True, empty=False)
@@ -181,6 +182,7 @@ def test_aborted_frames():
         compare(scene, DEFAULT, aborts=aborts, **stalls)
 
 
+@SLOW
 def test_one_core():
     """A core that is shared by four sub-tiles: the same picture, and cycles of the model; pictures that are no whole tiles."""
     for scene in (demo(96, 54), random_splats(2, 4000, 24), random_bits(3, 300, 3)):

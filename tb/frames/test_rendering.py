@@ -1,10 +1,11 @@
-"""The rendering half of the chip, from lists and records in memory to a frame buffer: every byte as in the golden model.
+"""The rendering half of the chip, from lists and records in memory to a frame buffer: every byte as in the golden model. All frames with SLOW=1: by default
+tb/frames/test_chip_frames.py has the half in the whole chip.
 
-State space: the middle of the demo scene (the whole with SLOW=1), both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing,
+State space: the demo scene and the middle of it, both pixel formats, a background, strides with a gap, pauses on every channel, DRAM timing,
 frames one after the other, an odd number of tiles in a row and of sub-tiles in a column, errors of the memory in every region with a right frame behind.
 Sub-tiles that finish early: what each core gets is enough, and what is left out is no more than what finishes; the automatic mode loses nothing.
-Parameter space: channels with every mode; with SLOW=1 one and two sorting units, small memories, one and four VRUs, no contribution test, and 32, 64 and 128
-lanes, one core and two, which tb/frames/test_chip_frames.py has in the whole chip. `faithful` wants records of 32 bytes, which only the golden front end
+Parameter space: channels with every mode; one and two sorting units, small memories, one and four VRUs, no contribution test, and 32, 64 and 128
+lanes, one core and two. `faithful` wants records of 32 bytes, which only the golden front end
 makes. Not covered: resets within a frame.
 """
 
@@ -139,6 +140,7 @@ def left_out(rtl: RtlRendering, front: FrontFrame) -> float:
     return 1 - rtl.given.sum() / len(front.subtile_lists().entry)
 
 
+@pytest.mark.slow
 def test_demo_scene() -> None:
     rtl = check((40, 24), scene="middle")
     assert left_out(rtl, view_of(40, 24, "middle")[0]) > 0.2
@@ -150,6 +152,7 @@ def test_demo_scene_whole() -> None:
     assert left_out(rtl, view_of(96, 54, "demo")[0]) > 0.14 and rtl.counters["dropped"].any()  # 0.195 come behind the last pixel
 
 
+@pytest.mark.slow
 def test_opaque_layers() -> None:
     """Lists of thousands of opaque splats: few are looked up, and of the runs of long lists few lines are read."""
     rtl = check((32, 32), scene="layers")
@@ -159,29 +162,34 @@ def test_opaque_layers() -> None:
     assert due.runs and rtl.traffic["lists"].read_beats < due.lines + 0.5 * due.runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format_", list(PixelFormat), ids=lambda f: f.name)
 def test_formats(format_: PixelFormat) -> None:
     """Sub-tiles that the picture lacks; rows with a gap, a background."""
     check((96, 54), format_=format_, gap=3, background=(10, 200, 30))
 
 
+@pytest.mark.slow
 def test_odd_number_of_tiles() -> None:
     """A row of five tiles: the sixth is empty and background. Two frames of 18 tiles, no multiple of the units' number."""
     check((80, 40), background=(1, 2, 3), frames=2)
 
 
+@pytest.mark.slow
 def test_nothing_visible() -> None:
     """All Gaussians behind the camera: no list, no record, a picture of the background."""
     rtl = check((80, 40), background=(7, 8, 9), scene="behind")
     assert (rtl.buffer.reshape(-1, 3) == (7, 8, 9)).all() and rtl.counters["lines"] == 0
 
 
+@pytest.mark.slow
 def test_modes() -> None:
     """Every mode of the contribution test, the automatic one over sub-tiles that the picture lacks too."""
     for mode in CatMode:
         check((80, 40), CONFIG.with_(cat=mode))
 
 
+@pytest.mark.slow
 def test_automatic_mode() -> None:
     """Its decisions rest on whole lists, of finished sub-tiles too, and begin anew with a frame."""
     check((24, 16), CONFIG.with_(cat=CatMode.AUTO), scene="middle", frames=2)
@@ -241,6 +249,7 @@ def test_fewer_sorting_units(units: int) -> None:
     check((32, 32), few.with_(memories="small"), scene="haze")
 
 
+@pytest.mark.slow
 def test_pauses_and_dram() -> None:
     """DRAM behind ports that pause; two frames one after the other."""
     shares = {"AR": 0.2, "R": 0.2, "AW": 0.2, "W": 0.2, "B": 0.2}
@@ -249,6 +258,7 @@ def test_pauses_and_dram() -> None:
     assert all(rtl.counters[f"{name}_waits"] > 0 for name in ("list", "entry", "queue", "cache", "record")) and rtl.counters["entry_missing"] > 0
 
 
+@pytest.mark.slow
 def test_slow_writes() -> None:
     """A memory that takes a line now and then: cores wait with their tiles for places in the frame writer, which holds four pairs."""
     slow = {**PORTS, "write": replace(PORTS["write"], stall={"W": 0.95}, seed=seed())}
@@ -256,6 +266,7 @@ def test_slow_writes() -> None:
     assert rtl.counters["pair_waits"] > 0 and rtl.counters["frame_waits"] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", PURPOSES)
 def test_errors_of_the_memory(part: str) -> None:
     """The frame ends with a code; the next one, of a mended memory, is right."""

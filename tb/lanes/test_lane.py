@@ -3,8 +3,8 @@
 State space: visits in every cycle and with bubbles, the same pixel in successive cycles, thousands of layers on one pixel, ends of lists as soon
 as the bank is free with visits right behind them, releases with and without a visit, pixels that wait, clear_i at any time, registers beginning
 with random values. Splats: random ones about the sub-tile, every La twice on a pixel, both sides of the skip limit and of the clamp, layers
-of 0.99, opacities of 1/255 at their centre. Parameter space: 8, 16 and 32 lanes of one sub-tile, whose pixels are flip-flops, 8 of four
-and 16 of two, whose pixels are memories, one lane of each; slots that are no power of two.
+of 0.99, opacities of 1/255 at their centre. Parameter space: 8 lanes of one sub-tile, whose pixels are flip-flops;
+with SLOW=1 also 16 and 32, and 8 of four and 16 of two, whose pixels are memories; one lane of each; slots that are no power of two.
 Not covered: pixels outside of a splat's mask, which an assertion refuses.
 """
 
@@ -19,9 +19,12 @@ from flicker.golden.lanes.formats import ACCUMULATOR_INT_BITS, FORMATS, tables
 
 
 @pytest.mark.parametrize(("parameters", "sweep"), [
-    ({"Lanes": 8, "Lane": 5, "Slots": 20}, 1.0), ({"Lanes": 16, "Lane": 14, "Slots": 6}, 0.2), ({"Lanes": 32, "Lane": 19, "Slots": 33}, 0.2),
-    ({"Lanes": 8, "Lane": 3, "Slots": 20, "Subtiles": 4}, 0.2), ({"Lanes": 16, "Lane": 9, "Slots": 6, "Subtiles": 2}, 0.2),
-], ids=["8", "16", "32", "8 of four sub-tiles", "16 of two"])
+    pytest.param({"Lanes": 8, "Lane": 5, "Slots": 20}, 1.0, id="8"),
+    *(pytest.param(parameters, 0.2, id=name, marks=pytest.mark.slow) for name, parameters in (
+        ("16", {"Lanes": 16, "Lane": 14, "Slots": 6}), ("32", {"Lanes": 32, "Lane": 19, "Slots": 33}),
+        ("8 of four sub-tiles", {"Lanes": 8, "Lane": 3, "Slots": 20, "Subtiles": 4}), ("16 of two", {"Lanes": 16, "Lane": 9, "Slots": 6, "Subtiles": 2}),
+    )),
+])
 def test_lane(parameters: dict[str, int], sweep: float) -> None:
     build_and_test("flk_lane", "cocotb_lane", parameters=parameters, config={**parameters, "sweep": sweep})
 

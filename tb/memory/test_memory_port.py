@@ -1,8 +1,8 @@
 """A memory port on the pins of a verilated design: a traffic generator writes and reads back, in the loop that docs/reference/memory_model.md shows to
 harnesses.
 
-Covered: wide and narrow data buses (arrays of words, integers), pauses, every order, LPDDR4 and perfect memory, an answer with an error, a broken rule,
-a memory that does not answer. The port itself: tb/model/test_memory.py.
+Covered: wide and, with SLOW=1, narrow data buses (arrays of words, integers), pauses, every order, LPDDR4 and perfect memory, an answer with an error, a broken
+rule (three with SLOW=1), a memory that does not answer. The port itself: tb/model/test_memory.py.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from flicker_tb.bench import rounds
 from flicker_tb.runner import seed
 
 from flicker.chip.dram import DramConfig, port_config
@@ -48,7 +49,7 @@ def simulate(
     return state, result, library.traffic_error().decode()
 
 
-@pytest.mark.parametrize("bits", [512, 64, 32])
+@pytest.mark.parametrize("bits", [512, *(pytest.param(bits, marks=pytest.mark.slow) for bits in (64, 32))])
 @pytest.mark.parametrize("perfect", [False, True])
 def test_traffic(bits, perfect):
     stall = {"AW": 0.3, "W": 0.3, "B": 0.3, "AR": 0.3, "R": 0.3}
@@ -75,11 +76,12 @@ def test_errors_reach_the_design():
 
 def test_a_broken_manager_is_seen(tmp_path):
     text = (HERE / "axi_traffic.sv").read_text()
-    for good, bad, message in (
+    faults = (
         ("assign mem_w_last_o   = w_beat_q == len(w_q);", "assign mem_w_last_o   = w_beat_q == 8'd0;", "is marked last"),
         ("mem_ar_valid_o = b_q == 16'(Bursts)", "mem_ar_valid_o = b_q > 16'd1", "that has no answer yet"),
         ("base_i + 40'(n) * 40'(Stride)", "base_i + 40'd64 + 40'(n) * 40'(Stride)", "crosses a 4 KB boundary"),
-    ):
+    )
+    for good, bad, message in faults[:: rounds(3, 1)]:
         assert text.count(good) == 1
         source = tmp_path / "axi_traffic.sv"
         source.write_text(text.replace(good, bad))

@@ -7,6 +7,7 @@ import io
 import json
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import factorial, pi, sqrt
 from pathlib import Path
 
@@ -20,6 +21,11 @@ from flicker.scene.packed import PackedFormat
 from flicker.scene.packing import pack
 
 C0 = 0.28209479177387814
+
+
+def thinned(scene: Scene, step: int) -> Scene:
+    """Every step-th Gaussian of a scene."""
+    return replace(scene, **{name: getattr(scene, name)[::step] for name in ("means", "scales", "quats", "opacities", "sh")})
 
 
 def random_scene(seed: int, count: int = 300, degree: int = 3) -> Scene:

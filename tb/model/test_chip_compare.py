@@ -74,6 +74,7 @@ def test_stages(view: View) -> None:
         chip_estimates(view, ["rows-ellipse"])
 
 
+@pytest.mark.slow
 def test_rivals_have_their_own_sorter(view: View, monkeypatch: pytest.MonkeyPatch) -> None:
     """GSCore and stages without a contribution test, lanes not: an ideal one, so that ours slows none of them."""
     assert {name for name in group("chip") if own_sorter(get_configuration(name))} == {"no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic"}

@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from flicker_tb.bench import rounds
 from flicker_tb.command import flicker
 from flicker_tb.elaboration import instances
+from scene_samples import thinned
 from test_scene_cost import camera, some
 
 from flicker.chip.dram import DramConfig
@@ -22,6 +24,7 @@ from flicker.chip.sizing import Rate, rates, smallest
 from flicker.chips import STATUS, TABLE, chip_of, chips, name_of
 from flicker.errors import FlickerError
 from flicker.params import CHIP_MEMORIES, FAITHFUL, RECOMMENDED, ChipMemories, Form, RenderConfig
+from flicker.scene.demo import generate
 
 LINE = '[mine]\npurpose = "x"\nstatus = "untested"\nstage = "lanes"\n'
 
@@ -136,9 +139,11 @@ def test_rate_of_the_slowest_view() -> None:
     assert (both.view, turned.view, both.waits) == (0, 1, one.waits) and both.per_second(2e9) == 2e9 / one.cycles
 
 
-def test_smallest_chip(tmp_path: Path) -> None:
+def test_smallest_chip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """flicker cost --fps names the chip of the least area that makes the rate in every view, and what it waits for; chips of a file of one's own take part,
-    one of the same name without the table's area."""
+    one of the same name without the table's area. A part of the demo scene, with SLOW=1 all of it."""
+    scene = thinned(generate(), rounds(8, 1))
+    monkeypatch.setattr("flicker.scene.demo.generate", lambda seed=1: scene)
     own = tmp_path / "own.toml"
     own.write_text(LINE + "lanes = 64\nport_bits = 128\n" + LINE.replace("mine", "max"))
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene_samples as samples
+from flicker_tb.bench import rounds
 from flicker_tb.command import flicker
 
 from flicker.scene.demo import write_demo
@@ -32,12 +33,13 @@ def demo(tmp_path_factory) -> Path:
 
 
 def test_engines_and_files(demo, tmp_path):
-    """Golden and RTL give the same picture and counts; the reference is what they are compared with."""
+    """Golden and RTL give the same picture and counts; the reference is what they are compared with. A build of tb/frames/test_frames.py: FAITHFUL, with SLOW=1
+    SHALLOW."""
     stats, pictures = {}, {}
+    options = (["--faithful"], ["--form", "conic", "--precision", "fp8", "--fifo-depth", 1])[rounds(0, 1)]
     for engine in ("reference", "golden", "rtl"):
-        # The build SHALLOW of tb/frames/test_frames.py.
-        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, "--form", "conic", "--precision", "fp8", "--fifo-depth", 1,
-                      "--compare", "reference", "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
+        run = flicker("render", demo / "demo.ply", "--size", "160x90", "--engine", engine, *options, "--compare", "reference",
+                      "--out", tmp_path / f"{engine}.png", "--stats", tmp_path / f"{engine}.json")
         assert run.returncode == 0, run.stderr
         stats[engine] = json.loads((tmp_path / f"{engine}.json").read_text())
         pictures[engine] = load_picture(tmp_path / f"{engine}.png")

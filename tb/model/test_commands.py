@@ -55,7 +55,7 @@ ACCOUNTS: tuple[tuple[str, str], ...] = (
     (r"\.venv/bin/python soc/.*", "tb/soc/test_other_ways.py::test_boards"),
     (r"make soc(?: .*)?", "tb/soc/test_soc.py::test_whole"),
     (r"(?:\.venv/bin/)?flicker (?:render|path) .*--engine (?:rtl|chip)\b(?!-).*", "slow"),
-    (r"flicker (?:chip .* --.*|cost .* --size .*)", "slow"),
+    (r"flicker (?:chip .* --.*|cost .* --size .*|cost demo --fps .*)", "slow"),
     (r"(?:\.venv/bin/)?flicker render .*", "run"),
     (r"(?:\.venv/bin/)?flicker path .*", "run"),
     (r"flicker (?:chip|convert|cost|grow|pack) .*|\.venv/bin/flicker pack .*", "run"),

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 import pytest
 from flicker_tb import splats
-from flicker_tb.real import real_views
+from flicker_tb.bench import rounds
 from flicker_tb.runner import seed
 
 from flicker.arithmetic.formats import E4M3, E5M2, FP16
@@ -43,12 +43,24 @@ from flicker.params import LANE_COUNTERS, Form
 from flicker.perf.lanes import lane_work, simulate_lanes
 from flicker.scene.demo import demo_cameras, generate
 from flicker.scene.metrics import psnr
-from flicker.scene.real import real_scenes
+from flicker.scene.real import REAL_VIEWS, real_scenes
 
 # One configuration of every pair of generator and stage, so that a new one is among them.
 KINDS = list({(type(c.generator), type(c.stage), c.generator.pixels): c.name for c in reversed(CONFIGURATIONS.values())}.values())
 # Lanes are exact by their own arithmetic, not by the VRU's: test_equals_golden_lanes.
 PROVED = [c.name for c in CONFIGURATIONS.values() if c.generator.exact and not c.generator.free and not c.stop and c.family != "lanes"]
+
+
+# By default one with every mode of the contribution test, every precision in the paper's form, and without a test.
+MODES = ("no-ctu-32", "faithful", "flicker", *(f"flicker-{mode}-fixed-factored" for mode in ("dense", "sparse", "spiky", "auto")),
+         *(f"flicker-smooth-{precision}-conic" for precision in ("fp16", "mixed", "fp8")))
+MASKS = ("exact", "exact-fp16-bound", "exact-e4m3-conic-scaled-bound", "rows-ellipse", "rows-minitile", "lanes", "pixels")
+
+
+def usual(names: list[str], few: tuple[str, ...]) -> list:
+    """Parameters; those that are not among the few are slow."""
+    assert set(few) <= set(names)
+    return [pytest.param(name, marks=[pytest.mark.slow] * (name not in few)) for name in names]
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +174,7 @@ def test_lanes_that_take_more(demo):
         assert found.total("dispatched") <= most * 4 * found.cycles
 
 
-@pytest.mark.parametrize("name", [c.name for c in CONFIGURATIONS.values() if c.render_config and not c.render_config.by_lanes])
+@pytest.mark.parametrize("name", usual([c.name for c in CONFIGURATIONS.values() if c.render_config and not c.render_config.by_lanes], MODES))
 def test_equals_golden(name, demo):
     """Configurations that the RTL has: the golden model's pixels, counts and automatic mode."""
     result = run(name, demo)
@@ -182,7 +194,7 @@ def test_equals_golden(name, demo):
 def test_work_is_consistent(demo):
     """Contributing pixels are visited and unfinished; finish positions are those of the last pixel; oracles visit what contributes."""
     assert len(KINDS) >= 9
-    for name in dict.fromkeys(("vanilla", "flicker", "faithful", *KINDS)):
+    for name in dict.fromkeys(("vanilla", "flicker", "faithful", *KINDS[:: rounds(3, 1)])):
         result = run(name, demo)
         work = result.work
         assert np.array_equal(work.unfinished(), alive(work))
@@ -438,7 +450,7 @@ def test_no_miss_on_odd_records(form):
         assert not missed_pixels(lists, mask, visit).any(), name
 
 
-@pytest.mark.parametrize("name", PROVED)
+@pytest.mark.parametrize("name", usual(PROVED, MASKS))
 def test_no_miss_in_demo(name, demo):
     """Proved masks give the picture of the test switched off on VRUs with the same accumulators."""
     result = run(name, demo)
@@ -471,7 +483,7 @@ def test_constants():
         RowFormat(3, 3)
 
 
-@pytest.mark.parametrize("real_view", real_views())
+@pytest.mark.parametrize("real_view", [pytest.param(view, id=view.folder, marks=[pytest.mark.slow] * (view.folder != "stpeter")) for view in REAL_VIEWS])
 def test_real_scenes(real_view):
     """Real views at 480x270: no miss with the recommended masks, and the picture is at least as good as the goal says."""
     scenes = real_scenes()

@@ -10,6 +10,7 @@ import hashlib
 
 import numpy as np
 import pytest
+from flicker_tb.bench import rounds
 
 from flicker.errors import FlickerError
 from flicker.front.projection import project
@@ -62,13 +63,15 @@ def test_about_half_of_the_footprints_are_spiky(scene, size):
 
 
 def test_deterministic(scene):
-    again = generate.__wrapped__(1)  # made anew: that of tb/conftest.py is kept
+    """Made by other processes and, with SLOW=1, made anew: tb/conftest.py keeps what is made."""
+    again = generate.__wrapped__(1) if rounds(0, 1) else scene
     for name in ARRAYS:
         assert np.array_equal(getattr(scene, name), getattr(again, name)), name
     digest = hashlib.sha256(b"".join(getattr(scene, name).astype("<f4").tobytes() for name in ARRAYS)).hexdigest()
     assert digest == DIGEST
 
 
+@pytest.mark.slow
 def test_seed_matters(scene):
     other = generate(2)
     assert 20_000 <= len(other) <= 60_000

@@ -142,6 +142,7 @@ def test_integer_adders_beside_published_figures(bits):
     assert energy.switching_pj(part("op", f"add fixed {bits}").load) == pytest.approx(published, rel=1 / 3)
 
 
+@pytest.mark.slow
 def test_float32_beside_published_figures():
     """Our multiplier and adder as float32, which nothing in the design uses: synthesised here, four times the energy of those ACTIVITY was chosen by."""
     from doc_parts.areas import loads

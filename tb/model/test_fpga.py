@@ -11,6 +11,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from flicker_tb.bench import rounds
 
 from flicker.chips import chip_of, chips
 from flicker.cost.fpga import COMMANDS, UNITS, Fpga, Resources, boards, count
@@ -67,13 +68,15 @@ def test_within_budget() -> None:
 
 @pytest.mark.parametrize("family", [pytest.param("xcup", marks=pytest.mark.slow), "ecp5"])
 def test_unit(family: str) -> None:
-    """Multipliers become DSPs, a memory blocks or LUTs; parts are counted once for each instance."""
+    """Multipliers become DSPs (of a lane, with SLOW=1), a memory blocks or LUTs; parts are counted once for each instance."""
     found = Fpga(family)
     down = found.unit("flk_axi_downsizer", {"PortBits": 256})
     assert not down["parts"] and down["own"].lut > 100 and down["own"].ff > 200 and down["own"].lutram + down["own"].bram > 0
-    lane = found.unit("flk_lane", {"Lanes": 32, "Lane": 0, "Slots": 20})["own"]
-    assert lane.dsp >= 2 and lane.ff > 400
-    assert found.unit("flk_lane", {"Lanes": 32, "Lane": 0, "Slots": 20})["own"] is lane
+    assert found.unit("flk_axi_downsizer", {"PortBits": 256})["own"] is down["own"]
+    if rounds(0, 1):
+        lane = found.unit("flk_lane", {"Lanes": 32, "Lane": 0, "Slots": 20})["own"]
+        assert lane.dsp >= 2 and lane.ff > 400
+        assert found.unit("flk_lane", {"Lanes": 32, "Lane": 0, "Slots": 20})["own"] is lane
     found.found["two"] = {"top": "x", "key": "two", "own": Resources(lut=1), "parts": [down["key"], down["key"]]}
     assert found.total("two") == Resources(lut=1) + down["own"].times(2)
     assert found.by_unit("two")["flk_axi_downsizer"] == (2, down["own"].times(2))

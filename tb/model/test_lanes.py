@@ -390,7 +390,7 @@ def demo_lists(demo) -> RecordLists:
     return float_lists(demo.projected, demo.lists(Form.FACTORED))
 
 
-@by_width
+@pytest.mark.parametrize("formats", [pytest.param(f, id=f.name, marks=[pytest.mark.slow] * (f is not FORMATS)) for f in WIDTHS])
 def test_frames_are_pairs(formats, demo_lists):
     """A frame's kernel, with masks and early exit, gives what every pair gives alone; records of any bits, too."""
     rng = np.random.default_rng(seed())

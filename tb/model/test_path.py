@@ -116,6 +116,7 @@ def test_frames_are_those_of_render() -> None:
     assert found[0]["temporal_psnr_db"] == "" and f"frame {1 + int(np.argmin(changes))}: " in done.stdout
 
 
+@pytest.mark.slow
 def test_processes_make_the_same() -> None:
     """Two processes and none: the same pictures and figures; a process that dies is one line, and what is there is kept."""
     path("-o", "one", *PAN, "--stats", "a.csv", "--workers", 1)

@@ -358,6 +358,7 @@ def test_parse_background():
 # -- a real photograph ----------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_lego_loses_what_photographs_show():
     """Test view 1 of the fit of lego: float64 and lanes are as near to the photograph, `faithful` is more than a decibel farther."""
     scenes = real_scenes()

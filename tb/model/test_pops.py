@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene_samples as samples
+from flicker_tb.bench import rounds
 from flicker_tb.command import flicker
 from flicker_tb.runner import seed
 from PIL import Image
@@ -121,10 +122,10 @@ def test_pixels_of_records(kind: RecordKind) -> None:
 def test_none_by_distance_on_the_spot() -> None:
     """Families that turn: pairs change by depth, in float64 and in the front end's numbers; none by distance. Sideways they change by distance, too."""
     assert {"swap", "turned", "culled"} <= set(MOVING)
-    names, speeds = ["no-ctu-32", "front-chunk-16", "front-fp16-local-16", "image-chunk"], (1.0, 16.0)
+    names, speeds = ["no-ctu-32", "front-chunk-16", "front-fp16-local-16", "image-chunk"][: rounds(2, 4)], (1.0, 16.0)
     by_depth = run_moving(["swap", "turned", "culled"], names, speeds)
     by_distance = run_moving(["swap", "turned", "culled"], names, speeds, order=SortOrder.DISTANCE)
-    assert all(p.pops > 0 for p in by_depth if p.speed == 16.0) and len(by_distance) == 24
+    assert all(p.pops > 0 for p in by_depth if p.speed == 16.0) and len(by_distance) == 6 * len(names)
     assert all(p.pops == 0 for p in by_distance)
     assert all(p.psnr_db > 35 for p in by_distance)
     assert run_moving(["moved"], names[:2], (16.0,), order=SortOrder.DISTANCE)[1].pops > 0
@@ -165,9 +166,9 @@ def test_render_takes_an_order(options: tuple[str, ...], place: Path) -> None:
 
 
 def test_path_counts_pops(place: Path) -> None:
-    """Of a pan by depth some, by distance none; by one process and by two; resumed with another order it is another path."""
+    """Of a pan by depth some, by distance none; by one process and by two (with SLOW=1 the same pops); resumed with another order it is another path."""
     by_depth = []
-    for order, workers in (("depth", 1), ("depth", 2), ("distance", 2)):
+    for order, workers in [("depth", 1), ("depth", 2), ("distance", 2)][:: rounds(2, 1)]:
         done = run("path", "scene.ply", "--pan", 4, "--frames", 4, "--order", order, "--front", "golden", "-o", f"{order}{workers}", "--stats", "a.csv",
                    "--workers", workers)
         found = list(csv.DictReader(Path("a.csv").open()))
@@ -179,7 +180,7 @@ def test_path_counts_pops(place: Path) -> None:
         else:
             assert numbers == [(0, 0.0)] * 3
         assert f"{sum(pairs for pairs, _ in numbers) / 3:,.1f} pairs" in done.stdout
-    assert by_depth[0] == by_depth[1]
+    assert by_depth[0] == by_depth[-1]
     assert "order" in run("path", "scene.ply", "--pan", 4, "--frames", 4, "--front", "golden", "-o", "distance2", "--stats", "a.csv", "--resume", code=2).stderr
 
 

@@ -17,9 +17,10 @@ from inspect import signature
 
 import numpy as np
 import pytest
+from flicker_tb.bench import rounds
 from flicker_tb.runner import seed
 from PIL import Image
-from scene_samples import random_scene
+from scene_samples import random_scene, thinned
 from scipy.signal import convolve2d
 from typer.testing import CliRunner
 
@@ -43,6 +44,7 @@ from flicker.params import FAITHFUL, RECOMMENDED, Form
 from flicker.report import claims, collect, figures, moving, page
 from flicker.report.write import SUMMARY, check, write_report
 from flicker.scene import metrics
+from flicker.scene.demo import generate
 from flicker.scene.files import save_ply
 from flicker.scene.sources import open_scene
 
@@ -50,6 +52,15 @@ SIZE = 160, 90
 NAMES = ["vanilla", "no-ctu-32-conic", "no-ctu-64-conic", "gscore-conic", "faithful", "lanes"] + [
     f"flicker-{mode}-mixed-conic" for mode in ("dense", "sparse", "smooth", "spiky")
 ] + ["flicker-smooth-fp16-conic", "flicker-smooth-fp8-conic", "log-lanes"]  # stages with other parts of energy than the first
+
+
+@pytest.fixture(scope="module", autouse=True)
+def demo_scene():
+    """A part of the demo scene in its place; with SLOW=1 all of it."""
+    scene = thinned(generate(), rounds(6, 1))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("flicker.scene.demo.generate", lambda seed=1: scene)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -264,7 +275,7 @@ def test_resumed_in_seconds(made):
 DRAWN = {"faithful": FAITHFUL, "log-lanes": RECOMMENDED}
 
 
-@pytest.mark.parametrize("motion", moving.MOTIONS)
+@pytest.mark.parametrize("motion", [pytest.param(name, marks=[pytest.mark.slow] * (name != "pan")) for name in moving.MOTIONS])
 def test_figures_in_motion(made, motion, tmp_path):
     """Temporal figures are those that `flicker.motion` finds along the same path, cycles the mean of those of the frames."""
     job, _, _ = made
@@ -342,6 +353,7 @@ def test_what_moves(scene, tmp_path):
     figure.write(tmp_path)
 
 
+@pytest.mark.slow
 def test_sweeps_rows_are_read(scene, tmp_path):
     """What a sweep has computed is not computed again, along paths too; what only the report shows of it is."""
     out = tmp_path / "sweep"
@@ -471,6 +483,7 @@ def scene(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_few_configurations(scene, tmp_path):
     """A run without the paper's configurations and without motion still gives a page, and says what is missing."""
     job = check([f"{scene}:1"], tmp_path / "out", (64, 48), ["flicker"], tmp_path / "store", frames=0)

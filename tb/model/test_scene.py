@@ -391,7 +391,7 @@ def test_forms_of_sog(version: int, tmp_path: Path, no_leftovers: None) -> None:
         assert is_scene_path(path) and scene_kind(path) == ("SOG" if name in ("folder", "meta") else "zip")
 
 
-@pytest.mark.parametrize("name", ["playbot/playbot.sog", "stpeter/st-peter.sog"])
+@pytest.mark.parametrize("name", [pytest.param("playbot/playbot.sog", marks=pytest.mark.slow), "stpeter/st-peter.sog"])
 def test_forms_of_real_sog(name: str, tmp_path: Path, no_leftovers: None) -> None:
     if "FLICKER_SCENES" not in os.environ:
         pytest.skip("FLICKER_SCENES names no folder of real scenes")

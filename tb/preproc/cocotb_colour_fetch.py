@@ -5,7 +5,7 @@ from __future__ import annotations
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 from flicker_tb.streams import Stream, StreamSource
 
 from flicker.chip.dram import DramConfig
@@ -182,7 +182,7 @@ async def parts(dut, chunked, idle, stall):
     """Parts of all lanes, of clusters of all degrees; frames one after the other."""
     fetch = Fetch(dut, chunked, stall == "never", idle, stall)
     await fetch.bench.reset()
-    for _ in range(2):
+    for _ in range(rounds(1, 2)):
         await fetch.run(frame(fetch.bench.rng, chunked, 14))
 
 
@@ -213,7 +213,7 @@ async def clusters_without_survivors(dut, gap):
     fetch = Fetch(dut, True, True, latency=3)
     await fetch.bench.reset()
     rng = fetch.bench.rng
-    for _ in range(2):
+    for _ in range(rounds(1, 2)):
         alive = [rng.randrange(1, 16) for _ in range(6)]
         groups = [Survivors(c, 20 * c, 3, rng.randrange(2), alive[c // gap] if c % gap == 0 else 0) for c in range(5 * gap + 1)]
         await fetch.run(groups)
@@ -227,7 +227,7 @@ async def codes_of_fewer_bits(dut, bits):
     fetch = Fetch(dut, True, True)
     await fetch.bench.reset()
     for degree in range(4):
-        await fetch.run(frame(fetch.bench.rng, True, 2, degree, full=True, bits=bits))
+        await fetch.run(frame(fetch.bench.rng, True, rounds(1, 2), degree, full=True, bits=bits))
 
 
 @cocotb.test()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 from flicker.chip.dram import DramConfig
 from flicker.sim.memory import Memory, PortConfig
@@ -176,7 +176,7 @@ async def lines(dut, share, timing, often):
     """Requests of all writers: memory and places are right at the end of each; nobody is passed over."""
     test = PortTest(dut, share, timing)
     await test.bench.reset()
-    for _ in range(2):
+    for _ in range(rounds(1, 2)):
         await test.start()
         await test.some(80, often)
     assert test.puts > 20 and test.gets > 20
@@ -193,7 +193,7 @@ async def errors(dut, reads_only):
     rng = test.bench.rng
     await test.bench.reset()
     failed = 0
-    for turn in range(6):
+    for turn in range(rounds(4, 6)):
         await test.start()
         if turn:
             for known in rng.sample(sorted(test.table), 4):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
-from flicker_tb.bench import Bench
+from flicker_tb.bench import Bench, rounds
 
 LANES = 4
 
@@ -134,7 +134,7 @@ async def records(dut, kind):
     """Full and partial beats, records before and after their beat is known, in any order within the ring."""
     test = Writer(dut)
     await test.reset()
-    for count in (1, 2, 45, 300):
+    for count in (1, 2, 45, rounds(150, 300)):
         pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
         idle, stall, beat = ([pick() for _ in range(LANES)], pick(), pick()) if kind == "mixed" else ([kind.split()[0]] * LANES, *kind.split()[1:])
         await test.run(test.beats(count), idle, stall, beat, shuffle=test.rng.random() < 0.7)

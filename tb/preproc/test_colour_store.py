@@ -3,7 +3,8 @@
 State space: cameras that stay, turn, walk and jump, so that clusters' colours last, do not last, lose and gain survivors; tolerances of 0, some and 1; clusters
 of 1 to 256 Gaussians, all SH degrees, few bits, antialiased scenes, images without slopes; generations that change; memories (perfect, LPDDR4 with
 pauses on all channels); errors of the memory in heads and rows, with the frames behind; a store of noise. Colours never differ by more than the tolerance from
-those of the frame's own camera, and the slopes of the table hold for every direction. Parameter space: with SLOW=1 one and two lanes.
+those of the frame's own camera, and the slopes of the table hold for every direction. With SLOW=1 also the demo scene, more than 2^14 clusters; parameter
+space: one and two lanes.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def colours(frame: FrontFrame) -> np.ndarray:
     return high[:, None] >> np.array([33, 43, 53]) & 1023
 
 
-@pytest.mark.parametrize("memory", [QUICK, lpddr4()], ids=["perfect", "lpddr4"])
+@pytest.mark.parametrize("memory", [pytest.param(QUICK, id="perfect", marks=pytest.mark.slow), pytest.param(lpddr4(), id="lpddr4")])
 def test_a_path(memory: MemoryOptions) -> None:
     """Every kind of frame, and every kind of cluster in one."""
     frames = check(scene(), memory=memory)
@@ -119,7 +120,7 @@ def test_a_path(memory: MemoryOptions) -> None:
     assert any(0.0 < f.lasting.mean() < 1.0 for f in found)
 
 
-@pytest.mark.parametrize("degree", range(3))
+@pytest.mark.parametrize("degree", [0, pytest.param(1, marks=pytest.mark.slow), 2])
 def test_degrees(degree: int) -> None:
     """Of degree 0 the slope is least: a step changes no colour but where it is large beside the distance."""
     frames = check(scene(degree), memory=lpddr4())
@@ -193,6 +194,7 @@ def test_noise() -> None:
     assert len(golden[0][0].reused.cleared) == len(golden[0][0].reused.kept)
 
 
+@pytest.mark.slow
 def test_demo_scene() -> None:
     """As the formats have it, with the camera's own path: what lasts is most of it."""
     view = demo()
@@ -210,6 +212,7 @@ def test_fewer_lanes(lanes: int) -> None:
         check(scene(), memory=memory, lanes=lanes)
 
 
+@pytest.mark.slow
 def test_many_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a Gaussian each, so that those with a survivor have numbers of more than the lower half of a slot's."""
     rng, count, few = np.random.default_rng([seed(), 9]), 16_600, 200

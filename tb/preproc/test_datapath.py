@@ -1,6 +1,7 @@
 """Pipelines of the front end against the golden functions they were made from: Gaussians of the demo scene, and numbers from all over their range.
 
-Inputs are noise but in the cycle in which an element is taken, and enables are random.
+Inputs are noise but in the cycle in which an element is taken, and enables are random. Parameter space: the usual interval of each pipeline, with SLOW=1
+all that it can be built for.
 """
 
 from __future__ import annotations
@@ -73,9 +74,9 @@ INTERVALS = {p.module: p.intervals for p in PIPELINES}
 
 
 def by_interval(*names: str) -> pytest.MarkDecorator:
-    """Once for each interval that pipelines can be built for: all the same ones."""
-    (intervals,) = {INTERVALS[name] for name in names}
-    return pytest.mark.parametrize("interval", intervals)
+    """Once for each interval that pipelines can be built for: all the same ones. Slow but the usual one."""
+    ((usual, *others),) = {INTERVALS[name] for name in names}
+    return pytest.mark.parametrize("interval", [usual, *(pytest.param(n, marks=pytest.mark.slow) for n in others)])
 
 
 def same(got: dict[str, np.ndarray], want: dict[str, np.ndarray], where: np.ndarray | None = None) -> None:

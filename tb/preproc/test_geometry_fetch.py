@@ -2,7 +2,7 @@
 
 Covered: the demo scene in chunks and in FP16, clusters of every size, headers of numbers from all over their range (subnormal ones too), none, one cluster
 of one Gaussian, frames one after the other and after a reset in a frame, arrays that begin anywhere, errors of the memory in headers and geometry, headers
-with numbers that are not finite, rates, the last clusters and slots that there are.
+with numbers that are not finite, rates, the last clusters and slots that there are; with SLOW=1 small buffers.
 Not covered: counts of more than 2**16 beats.
 """
 
@@ -298,6 +298,7 @@ def test_the_last_places(form: PackedFormat) -> None:
     assert got["index"][-2, 0] == (1 << 24) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [PackedFormat.CHUNK, PackedFormat.FP16_LOCAL])
 def test_small_buffers(form: PackedFormat) -> None:
     clusters(form, 8, 2)

@@ -3,7 +3,7 @@
 State space: formats, list kinds, records of 16 and of 32 bytes, memories (perfect, LPDDR4 with pauses on all channels), frames one after the other, clusters
 all culled, one Gaussian, pictures of 4096x4096, 4096x1 and 1x4096, a Gaussian over the whole of the largest (SLOW=1), a camera inside a cluster, errors of the
 memory by address, list memory that runs out, a table that points beyond the records. Registers and memories begin random; bytes that no one should write are
-compared too. Parameter space: records of 16 bytes in four lanes, of 32 in a slow one; with SLOW=1 others of lanes and list writers.
+compared too. Parameter space: records of 16 bytes in four lanes; with SLOW=1 of 32 in a slow one, and others of lanes and list writers, and real scenes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from flicker_tb.bench import rounds
 from flicker_tb.elaboration import refused
 from flicker_tb.real import real_views
 from flicker_tb.runner import seed
@@ -40,7 +41,8 @@ from flicker.sim.preprocessing import ERRORS, LIST_ERROR, PORTS, Regions, RtlFro
 from flicker.sim.preprocessing import front_rtl as any_front_rtl
 
 QUICK = MemoryOptions()
-KINDS = [pytest.param(kind, id=f"{kind.bytes} bytes") for kind in RecordKind]
+SLOW = pytest.mark.slow
+KINDS = [pytest.param(kind, id=f"{kind.bytes} bytes", marks=[SLOW] * (kind is RecordKind.CONIC32)) for kind in RecordKind]  # a build of its own
 # Preprocessing lanes, list writers and interval of the front end that each kind is tested in.
 UNITS = {RecordKind.FACTORED16: {"lanes": 4, "writers": 4, "interval": 2}, RecordKind.CONIC32: {"lanes": 1, "writers": 1, "interval": 4}}
 
@@ -116,8 +118,8 @@ def untouched(rtl: RtlFront, written: np.ndarray, lines: np.ndarray) -> None:
 
 @pytest.mark.parametrize(("form", "lists", "kind"), [
     (PackedFormat.CHUNK, ListKind.ELLIPSE, RecordKind.FACTORED16), (PackedFormat.FP16_LOCAL, ListKind.BOX, RecordKind.FACTORED16),
-    pytest.param(PackedFormat.CHUNK, ListKind.ELLIPSE, RecordKind.CONIC32, marks=pytest.mark.slow),
-    pytest.param(PackedFormat.FP16, ListKind.BOX, RecordKind.CONIC32, marks=pytest.mark.slow),  # the paper's
+    pytest.param(PackedFormat.CHUNK, ListKind.ELLIPSE, RecordKind.CONIC32, marks=SLOW),
+    pytest.param(PackedFormat.FP16, ListKind.BOX, RecordKind.CONIC32, marks=SLOW),  # the paper's
 ])
 def test_demo_scene(form: PackedFormat, lists: ListKind, kind: RecordKind) -> None:
     view = demo()
@@ -252,7 +254,7 @@ def test_opacities_of_nothing(kind: RecordKind, monkeypatch: pytest.MonkeyPatch)
         assert rtl.counters["faint"] > 50 and len(golden.entry_tile) > 100
 
 
-@pytest.mark.slow
+@SLOW
 def test_three_beats_of_a_group() -> None:
     """Two records in a beat: a cluster's last four survivors fill the open beat and another one and leave a third, which is told when the next cluster's
     first group could come."""
@@ -266,7 +268,7 @@ def test_three_beats_of_a_group() -> None:
     assert np.count_nonzero((survivors % 2 == 1) & (last == 4)) > 2
 
 
-@pytest.mark.slow
+@SLOW
 def test_one_gaussian_over_the_largest_picture() -> None:
     """65,536 tiles of a picture of 4096x4096."""
     packed = pack(some(1, means=[0.0, 0.0, 1.0], scales=100.0, opacities=0.9), PackedFormat.FP16).packed
@@ -287,7 +289,7 @@ def wide(count: int = 400, **changes) -> tuple[PackedScene, Camera]:
 FEWER = [(1, 1, 4), (2, 2, 2), (4, 1, 4), (1, 4, 2)]
 
 
-@pytest.mark.slow
+@SLOW
 @pytest.mark.parametrize(("lanes", "writers", "interval"), FEWER)
 def test_fewer_lanes_and_writers(lanes: int, writers: int, interval: int) -> None:
     """The same bytes: the demo scene, groups of one to four Gaussians and all degrees behind a slow memory, lines of pointers that move."""
@@ -304,6 +306,7 @@ def test_fewer_lanes_and_writers(lanes: int, writers: int, interval: int) -> Non
     check(packed, camera, lanes=lanes, writers=writers, interval=interval)
 
 
+@SLOW
 def test_one_slow_lane() -> None:
     """All survive, with entries and four parts of a colour each: the lane's queue is full, and so is the order of stored and computed colours beside it."""
     count, rng = 2000, np.random.default_rng([seed(), 6])
@@ -315,6 +318,7 @@ def test_one_slow_lane() -> None:
         assert len(golden.number) == count and rtl.counters["lane_waits"] > 0
 
 
+@SLOW
 def test_front_of_a_configuration() -> None:
     """--front rtl is the front end of the configuration: its lanes, list writers and interval."""
     view, units = demo(), UNITS[RecordKind.CONIC32]
@@ -325,7 +329,7 @@ def test_front_of_a_configuration() -> None:
     assert np.array_equal(found.records, want.records) and stats["front_cycles"] == rtl.cycles > 2 * len(packed)
 
 
-@pytest.mark.slow
+@SLOW
 @pytest.mark.parametrize(("lanes", "writers", "interval"), FEWER[:2])
 def test_fewer_writers_out_of_list_memory(lanes: int, writers: int, interval: int) -> None:
     """Each bank ends by itself, in pictures with all pointers held and with more."""
@@ -352,7 +356,7 @@ def test_illegal_interval(interval: int) -> None:
     refused("flk_preprocessing", {"PreprocInterval": interval}, "PreprocInterval must be 2 or 4")
 
 
-@pytest.mark.parametrize("memory", [QUICK, lpddr4()], ids=["perfect", "lpddr4"])
+@pytest.mark.parametrize("memory", [pytest.param(QUICK, id="perfect"), pytest.param(lpddr4(), id="lpddr4", marks=SLOW)])
 def test_pointers_beyond_those_held(memory: MemoryOptions) -> None:
     """Lines of pointers go to their table and come back; two frames one after the other."""
     packed, camera = wide()
@@ -362,9 +366,10 @@ def test_pointers_beyond_those_held(memory: MemoryOptions) -> None:
 
 def test_the_largest_picture() -> None:
     """4096x4096 pixels, of a scene that is listed everywhere."""
-    packed, camera = wide(150, size=(4096, 4096))
+    packed, camera = wide(rounds(60, 150), size=(4096, 4096))
     golden, rtl = check(packed, camera)
-    assert len(golden.entry_tile) > 20_000 and rtl.counters["spilled"] > 1000 and rtl.counters["fetched"] > 500
+    least = rounds(5_000, 20_000)
+    assert len(golden.entry_tile) > least and rtl.counters["spilled"] > least // 20 and rtl.counters["fetched"] > least // 40
 
 
 @pytest.mark.parametrize(("width", "height"), [(4096, 1), (1, 4096)])
@@ -521,7 +526,7 @@ def test_frame_read_back_from_memory(kind: RecordKind) -> None:
     assert np.array_equal(lists.gauss[lists.entry], golden.gauss[golden.entry]) and np.array_equal(lists.spiky[lists.entry], golden.spiky[golden.entry])
 
 
-@pytest.mark.slow
+@SLOW
 def test_sixteen_million() -> None:
     """As many Gaussians as numbers of records reach, seen from outside through a long lens: most clusters go, those that stay have numbers up to the end."""
     rng, n, side = np.random.default_rng(seed()), 16_700_000, 400.0
@@ -534,10 +539,11 @@ def test_sixteen_million() -> None:
     assert len(packed) == n and golden.number.max() > 15 << 20
 
 
+@SLOW
 @pytest.mark.parametrize("real", real_views())
-@pytest.mark.parametrize("size", [(640, 360), pytest.param((320, 180), marks=pytest.mark.slow)], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("size", [(640, 360), (320, 180)], ids=lambda size: f"{size[0]}x{size[1]}")
 def test_real_scenes(real: RealView, size: tuple[int, int]) -> None:
-    """At 640x360, and at 320x180 with SLOW=1, where many Gaussians of kept clusters lie beside the picture or have no pixel."""
+    """At 640x360, and at 320x180, where many Gaussians of kept clusters lie beside the picture or have no pixel."""
     folder = real_scenes()
     if folder is None:
         pytest.skip("FLICKER_SCENES is not set")

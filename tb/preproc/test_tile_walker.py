@@ -1,8 +1,8 @@
 """Tile walker: every entry, in order, and each splat's end against the golden `tiles_of`; splats of the demo scene and made-up ones.
 
 State space: splats of one band to 512, of one tile to 65,536, without pixels, with bands that hold nothing, with gaps between two bands' intervals, at the
-edges of pictures up to 4096x4096; idle and back-pressure patterns; reset with splats inside. Both kinds of lists. Parameter space: the defaults, the least
-queues, and a band every two cycles.
+edges of pictures up to 4096x4096; idle and back-pressure patterns; reset with splats inside. Both kinds of lists. Parameter space: the defaults; with SLOW=1
+the least queues, and a band every two cycles.
 Noise at the input beside splats; the bounds of empty splats are noise.
 """
 
@@ -238,10 +238,12 @@ def test_whole_picture(box: bool) -> None:
     assert run.count == 65536 and run.cycles - run.first == 65536
 
 
+@pytest.mark.slow
 def test_least_queues() -> None:
     check(made_up(random(4), 300, largest=50.0), False, "rare", "half", Splats=2, Rows=1, Interval=2)
 
 
+@pytest.mark.slow
 def test_every_other_cycle() -> None:
     """A band every two cycles in: splats without entries take two each."""
     n = 300

@@ -133,7 +133,7 @@ async def reset_values(dut: Any) -> None:
 async def _traffic(dut: Any, pauses: tuple[str, ...]) -> None:
     regs = Registers(dut, pauses)
     await regs.bench.reset()
-    for turn in range(rounds(2, 4)):
+    for turn in range(rounds(1, 4)):
         regs.random_inputs()
         for word in regs.rng.sample(WORDS, len(WORDS)):
             value, first = regs.rng.getrandbits(32), regs.rng.randrange(4)
@@ -354,7 +354,7 @@ async def any_order_address_and_protection(dut: Any) -> None:
     await pins.bench.reset()
     held = {word.path: word.reset & word.mask("written", "read", "!clear") for word in STORED}
     seen = set()
-    for turn in range(rounds(300, 1000)):
+    for turn in range(rounds(150, 1000)):
         word, data, strobes = pins.rng.choice(STORED), pins.rng.getrandbits(32), pins.rng.getrandbits(4)
         first, low = pins.rng.choice(("aw", "w", "both")), pins.rng.randrange(4)
         await pins.write(word.address + low, data, strobes, first)

@@ -157,7 +157,7 @@ async def bytes_of_frames(dut, form, kind):
     test = Writer(dut)
     await test.bench.reset()
     heavy = CORES < 4 and ("heavy" in kind or kind == "mixed")  # the fewer cores, the longer a pair takes
-    for cols, rows in ((1, 1), (5, 3), (12, 2))[: 1 if heavy else rounds(2, 3) if LANES and kind != "mixed" else 3]:
+    for cols, rows in ((1, 1), (5, 3), (12, 2))[: 1 if heavy else rounds(2, 3)]:
         pick = lambda: test.rng.choice(stalls.PATTERNS)  # noqa: E731
         idle, stall = ([pick() for _ in range(CORES)], pick()) if kind == "mixed" else ([kind.split()[0]] * CORES, kind.split()[1])
         walk, order = test.rng.choice(("rows", "any")), test.rng.choice(("any", "ahead", "pairs"))
@@ -182,7 +182,7 @@ async def one_core_late(dut, form):
     """Three cores run ahead as far as they may, the fourth comes seldom."""
     test = Writer(dut)
     await test.bench.reset()
-    for late in test.rng.sample(range(CORES), min(rounds(2, CORES), CORES)):
+    for late in test.rng.sample(range(CORES), min(rounds(1, CORES), CORES)):
         await test.frame(24, 2, form, ["heavy" if k == late else "never" for k in range(CORES)], "half")
 
 
@@ -203,7 +203,7 @@ async def abort(dut):
     """clear_i at any time; the next frame is right."""
     test = Writer(dut)
     await test.bench.reset()
-    for _ in range(12):
+    for _ in range(rounds(6, 12)):
         form = test.rng.choice(list(PixelFormat))
         await test.frame(24, 2, form, ["half"] * CORES, "half", stop=test.rng.randrange(1, 700))
         await test.frame(4, 2, form, ["never"] * CORES, "half")

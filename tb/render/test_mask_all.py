@@ -1,7 +1,7 @@
 """Generator of full masks: every element comes out once, in order, with all bits set; acceptance stops at stall_i; counters, idle, clear.
 
 State space: random elements and tokens under idle input, blocked output and blocked acceptance; clear in mid-traffic. Parameter space: masks of
-mini-tiles and of pixels. Not covered: reset in mid-traffic (its register slice: tb/common/test_stream_cells.py).
+mini-tiles, with SLOW=1 of pixels. Not covered: reset in mid-traffic (its register slice: tb/common/test_stream_cells.py).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from flicker_tb.runner import build_and_test
 from flicker.params import CHANNELS, SUBTILE_PIXELS
 
 
-@pytest.mark.parametrize("bits", [CHANNELS, SUBTILE_PIXELS])
+@pytest.mark.parametrize("bits", [CHANNELS, pytest.param(SUBTILE_PIXELS, marks=pytest.mark.slow)])
 def test_mask_all(bits: int) -> None:
     settings = {"MaskBits": bits}
     build_and_test("flk_mask_all", "cocotb_mask_all", parameters=settings, config=settings)

@@ -1,8 +1,8 @@
 """Records to splats: flk_record_to_splat against the scalar golden model, and that against what the golden stage takes of whole frames.
 
 State space: every code of shape, opacity and colour, every exponent of a mean; means beside ties and limits, sub-tiles of the whole coordinate; all patterns
-of idling and back-pressure, clear_i. Parameter space: both forms. Not covered: NaN and infinity in a record of 32 bytes against the golden frame (they pass
-as they are).
+of idling and back-pressure, clear_i. Parameter space: the factored form, with SLOW=1 the conic one. Not covered:
+NaN and infinity in a record of 32 bytes against the golden frame (they pass as they are).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from flicker.scene.packing import pack
 COLS = 1 << SUBTILE_COORD_BITS
 
 
-@pytest.mark.parametrize("form", Form)
+@pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form is Form.CONIC)) for form in Form])
 def test_record_to_splat(form: Form) -> None:
     build_and_test("flk_record_to_splat", "cocotb_record_to_splat", parameters={"Form": int(form)}, config={"Form": int(form)})
 

@@ -1,7 +1,7 @@
 """Rendering stage on a few lists: pixels against the golden models, counters through their port, stall of the mask generator.
 
-State space: one short frame of random lists on four cores, random back-pressure; a stream of tokens against blocked pixels. Parameter space: the CTU,
-with SLOW=1 also the generator of full masks, one VRU per channel; illegal parameters. Not covered:
+State space: one short frame of random lists on four cores, random back-pressure; a stream of tokens against blocked pixels. Parameter space: every mask
+generator with one VRU per channel, with SLOW=1 only; illegal parameters. The default's frames: tb/frames. Not covered:
 everything that whole frames cover (tb/frames): modes, aborts, other sizes, cycle counts.
 """
 
@@ -14,8 +14,8 @@ from flicker_tb.runner import build_and_test
 from flicker.params import MASK_GENERATORS
 
 
-# Minutes of building each; whole frames run every generator with assertions.
-@pytest.mark.parametrize("generator", [name if name == "ctu" else pytest.param(name, marks=pytest.mark.slow) for name in MASK_GENERATORS])
+@pytest.mark.slow  # minutes of building each; whole frames run every generator with assertions
+@pytest.mark.parametrize("generator", MASK_GENERATORS)
 def test_render_stage(generator: str) -> None:
     settings = {"FifoDepth": 4, "VrusPerChannel": 1, "MaskGenerator": list(MASK_GENERATORS).index(generator)}
     build_and_test("flk_render_stage", "cocotb_render_stage", parameters=settings, config=settings)

@@ -2,8 +2,8 @@
 
 State space: random splats (as in real scenes, thin, special numbers, covering), pixels in order, bubbles between and within splats, splats
 broken off, empty sub-tiles, lists that finish pixels; opacity and transmittance exactly at their bounds; aborts (clear_i) at random times,
-registers beginning with random values. Parameter space: both forms, 4, 8 and 16 pixels. Not covered: other positions than the second
-column and row of units (the channel's test has all of them).
+registers beginning with random values. Parameter space: both forms with 8 pixels and a blocked output;
+with SLOW=1 also without, and 4 and 16 pixels. Not covered: other positions than the second column and row of units (the channel's test has all of them).
 The arithmetic of flk_blend_pipe is tested here; flk_weight, flk_pixel_state and flk_pixel_drain also on their own.
 """
 
@@ -17,7 +17,12 @@ from flicker.params import Form
 
 @pytest.mark.parametrize(
     ("form", "pixels", "stall"),
-    [*((form, 8, stall) for form in Form for stall in ("never", "heavy")), (Form.CONIC, 4, "never"), (Form.FACTORED, 4, "heavy"), (Form.CONIC, 16, "never")],
+    [
+        *((form, 8, "heavy") for form in Form),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in (
+            *((form, 8, "never") for form in Form), (Form.CONIC, 4, "never"), (Form.FACTORED, 4, "heavy"), (Form.CONIC, 16, "never"),
+        )),
+    ],
 )
 def test_vru(form: Form, pixels: int, stall: str) -> None:
     settings = {"Form": int(form), "Pixels": pixels}

@@ -189,7 +189,7 @@ async def records(dut, idle, pauses, latency, stall):
     cache = Cache(dut, idle, latency, pauses, stall=stall)
     await cache.bench.reset()
     await cache.ready()
-    fill(cache, rounds(900, 2200))
+    fill(cache, rounds(600, 2200))
     await cache.through()
     assert cache.hits > 100
 

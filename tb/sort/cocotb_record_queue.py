@@ -6,7 +6,7 @@ from collections import deque
 
 import cocotb
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, config
+from flicker_tb.bench import Bench, config, rounds
 from flicker_tb.stalls import PATTERNS
 
 Word = tuple[int, int]  # whether it is an end, data
@@ -120,7 +120,7 @@ async def dropping(dut, idle, stall, drop):
     test = Queue(dut, idle, stall, drop)
     await test.bench.reset()
     for ends in (0.4, 0.03, 0.0, 0.1):
-        test.words(20 * test.depth, ends)
+        test.words(rounds(4, 20) * test.depth, ends)
     test.words(1, 1.0)
     due = list(test.todo)
     await test.empty()

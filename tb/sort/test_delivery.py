@@ -1,9 +1,9 @@
 """Delivery: every core gets the records of the entries with its bit, in order, tile by tile; none twice, none more after it is finished than were on their way.
 
 State space: lists of 0 to 300 entries, masks of all kinds, cores of different pace, idle and back-pressure patterns, memory with and without pauses; cores
-that finish with their sub-tiles at random, none or all of them; latency; clear at any time. Parameter space: two units, short queues and a small cache; two
-elements a cycle for a core; one core for all sub-tiles and one unit, with SLOW=1 two cores; the default for as many ends of empty lists as there may be, with
-SLOW=1 for all; with SLOW=1 records of 32 bytes, a small cache with two elements.
+that finish with their sub-tiles at random, none or all of them; latency; clear at any time. Parameter space: the default; with SLOW=1
+also two units, short queues and a small cache; two elements a cycle for a core; one core for all sub-tiles and one unit, two cores; records of 32 bytes;
+`sim.delivery`.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from flicker.sim.delivery import deliver
 SMALL = {"Units": 2, "Queue": 8, "Banks": 2, "Sets": 2, "Ways": 2, "Depth": 8, "Places": 4}
 WIDE = {"InWidth": 2, "Queue": 32}
 ONE = SMALL | {"Units": 1, "Cores": 1, "InWidth": 2}
-SLOW = ({}, {"RecordBits": 256}, SMALL | {"InWidth": 2}, SMALL | {"Cores": 1}, SMALL | {"Cores": 2}, WIDE | {"Cores": 2})
+OTHERS = ({"RecordBits": 256}, SMALL | {"InWidth": 2}, SMALL | {"Cores": 1}, SMALL | {"Cores": 2}, WIDE | {"Cores": 2}, SMALL, WIDE, ONE)
 
 
-@pytest.mark.parametrize("parameters", [*(pytest.param(p, marks=pytest.mark.slow) for p in SLOW), SMALL, WIDE, ONE])
+@pytest.mark.parametrize("parameters", [{}, *(pytest.param(p, marks=pytest.mark.slow) for p in OTHERS)])
 def test_delivery(parameters: dict[str, int]) -> None:
     tests = [] if parameters in ({}, WIDE) else ["tiles", "finishing", "ends_alone", "all_finished", "latency", "clear"]
     build_and_test("flk_delivery", "cocotb_delivery", parameters=parameters, tests=tests, config=parameters)
 
 
+@pytest.mark.slow
 def test_ends_of_the_product() -> None:
     """Ends are counted as far as the product's own queues let them come."""
     build_and_test("flk_delivery", "cocotb_delivery", tests=["ends_alone"])
@@ -41,6 +42,7 @@ def test_illegal_parameters() -> None:
     refused("flk_delivery", {"Units": 3}, "Units must be 1, 2 or 4")
 
 
+@pytest.mark.slow
 def test_alone() -> None:
     """`sim.delivery`: whole lists read the lines that the golden cache reads; cores that finish take what they need, and less is read."""
     rng = np.random.default_rng(seed())

@@ -2,8 +2,8 @@
 
 State space: lists of 0 to 3,000 entries, chunks begun and full, chunks across 4 KB, idle and back-pressure patterns on tiles, lines and
 answers, memory with and without pauses, latency 1 to 100 and DRAM timing; faults of the memory and of each field of pointer and header; clear at any time.
-Chunks all over the largest region, up to its last one, at the end of the address space. Parameter space: two, four, eight contexts; 4, 11, 32 slots. Not
-covered: several managers at one port.
+Chunks all over the largest region, up to its last one, at the end of the address space. Parameter space: the default; with SLOW=1 two
+and eight contexts, 4 and 11 slots, frames. Not covered: several managers at one port.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS, real_scenes
 
 
-@pytest.mark.parametrize("parameters", [{}, {"Contexts": 2, "Slots": 4, "Ahead": 1}, {"Contexts": 8, "Slots": 11, "Ahead": 3, "Bursts": 3}])
+@pytest.mark.parametrize("parameters", [
+    {}, *(pytest.param(p, marks=pytest.mark.slow) for p in (
+        {"Contexts": 2, "Slots": 4, "Ahead": 1}, {"Contexts": 8, "Slots": 11, "Ahead": 3, "Bursts": 3},
+    )),
+])
 def test_list_reader(parameters: dict[str, int]) -> None:
     tests = [] if not parameters else ["lists", "faults"]
     build_and_test("flk_list_reader", "cocotb_list_reader", parameters=parameters, tests=tests)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import cocotb
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, four_state, netlist
+from flicker_tb.bench import Bench, four_state, netlist, rounds
 
 from flicker.golden.frame_buffer import PixelFormat, least_stride
 from flicker.golden.lists import WRITERS, pointer_lines, writer_columns
@@ -33,6 +33,9 @@ RENDERING = (
 # Bits of a frame's error, from bit 0: registers.md.
 RENDERING_BITS, DESCRIPTOR_ERROR, ABORTED, TIMED_OUT, BAD_TABLE, LATE = 4, 1 << 7, 1 << 8, 1 << 9, 10, 1 << 12
 RESET = 4  # cycles
+# Mean latencies of front end, rendering half, copies, acknowledgement and host. `frames` takes every other one, `deadlines` a slow half of either kind;
+# with SLOW=1 both take all.
+SPEEDS = [(20, 20, 5, 10, 1), (5, 60, 5, 1, 1), (60, 5, 5, 5, 1), (8, 8, 30, 60, 1), (10, 10, 5, 5, 80)]
 
 
 def pack(fields, values) -> int:
@@ -500,7 +503,7 @@ class ControlTest:
 
 
 @cocotb.test()
-@cocotb.parametrize(speeds=[(1, 1, 1, 1, 1), (20, 20, 5, 10, 1), (5, 60, 5, 1, 1), (60, 5, 5, 5, 1), (8, 8, 30, 60, 1), (10, 10, 5, 5, 80)])
+@cocotb.parametrize(speeds=[(1, 1, 1, 1, 1), *SPEEDS][:: rounds(2, 1)])
 async def frames(dut, speeds):
     """Random descriptors, legal or not; errors of either half; a host, halves and counters of every speed."""
     test = ControlTest(dut, speeds)
@@ -516,13 +519,14 @@ async def frames(dut, speeds):
 
 
 @cocotb.test()
-@cocotb.parametrize(speeds=[(20, 20, 5, 10, 1), (5, 60, 5, 1, 1), (60, 5, 5, 5, 1), (8, 8, 30, 60, 1), (10, 10, 5, 5, 80)])
+@cocotb.parametrize(speeds=SPEEDS[rounds(1, 0) : rounds(3, 5)])
 async def deadlines(dut, speeds):
     """Random ones, about as long as a frame takes: each half is stopped at its time and reset, the other goes on; what has not been reached is passed by."""
     test = ControlTest(dut, speeds, share_illegal=0.1, share_error=0.1, deadline=sum(speeds[:4]))
     await test.bench.reset()
-    await test.run(300)
-    assert len(test.posted) == 300 and test.stops > 20
+    count = rounds(120, 300)
+    await test.run(count)
+    assert len(test.posted) == count and test.stops > 20
     kinds = {(f.late, f.ended, f.skipped, f.cut) for f in test.posted if f.legal}
     wanted = {(False, True, False, False), (True, True, True, False)}
     if speeds[0] >= 10:
@@ -581,7 +585,7 @@ async def forgets(dut, command):
     await test.bench.reset()
     edge = RisingEdge(dut.clk_i)
     posts = 0
-    for _ in range(400 if command == "reset before" else 60):  # a post that reset_i alone must hold back is rare
+    for _ in range(rounds(60, 400) if command == "reset before" else 60):  # a post that reset_i alone must hold back is rare
         test.left = 100
         test.acknowledge = test.draw(test.rng.choice([4, 60]))
         for _ in range(test.rng.randrange(60)):

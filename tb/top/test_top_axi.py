@@ -1,9 +1,9 @@
 """The chip with the pins of AMBA: what of it is wrapper, with nothing but a header in the chip's place, and, with SLOW=1, frames.
 
-State space: every pin of both sides with random values, resets with and without the synchroniser, test enable; what is refused. With SLOW=1 the whole chip
-between cocotbext-axi's AXI4-Lite manager and its AXI4 memory, which knows narrow reads: a frame byte for byte as the golden model has it, and every access
-of that frame against the table of docs/reference/chip_ports.md.
-Parameter space: identifiers as wide as the chip's and wider; with SLOW=1 a chip of 32 lanes with small memories. Frames of flk_top: tb/frames.
+State space: every pin of both sides with random values, resets with the synchroniser, with SLOW=1 without it, test enable; what is refused. With SLOW=1 the
+whole chip between cocotbext-axi's AXI4-Lite manager and its AXI4 memory, which knows narrow reads: a frame byte for byte as the golden model has it, and every
+access of that frame against the table of docs/reference/chip_ports.md.
+Parameter space: identifiers wider than the chip's; with SLOW=1 as wide, a chip of 32 lanes with small memories. Frames of flk_top: tb/frames.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def pins() -> list[tuple[str, str, bool]]:
     return found
 
 
-@pytest.mark.parametrize("id_width,stages", [(7, 0), (11, 3)])
+@pytest.mark.parametrize("id_width,stages", [pytest.param(7, 0, marks=pytest.mark.slow), (11, 3)])
 def test_wiring(id_width: int, stages: int) -> None:
     build_and_test(
         "flk_top_axi", "cocotb_top_axi_wiring", sources=sources(), inner=True,
