@@ -148,6 +148,7 @@ preproc/flk_tile_walker.sv
 top/flk_descriptor.sv
 top/flk_frame_control.sv
 top/flk_frame_counters.sv
+top/flk_front_throttle.sv
 flk_lane_stage.sv
 flk_render_stage.sv
 flk_rendering.sv

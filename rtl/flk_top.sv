@@ -510,6 +510,21 @@ module flk_top
     .b_resp_i
   );
 
+  logic few;  // of the front end's bursts
+
+  flk_front_throttle i_throttle (
+    .clk_i,
+    .rst_ni,
+    .clear_i   (forget || rendering_reset),
+    .start_i   (rendering_start),
+    .done_i    (rendering_end),
+    .pairs_i   (rendering.all_pairs),
+    .left_i    (rendering_left),
+    .clusters_i(front.clusters),
+    .line_i    (r_valid[READ_TABLE]),
+    .few_o     (few)
+  );
+
   // A half that is stopped asks for nothing more. The rendering half goes on writing until the pairs of tiles that it has begun are there.
   flk_axi_hold #(
     .Readers(READERS - RENDERING_READERS),
@@ -521,6 +536,7 @@ module flk_top
     .hold_reads_i (front_stop),
     .hold_writes_i(front_stop),
     .drained_o    (front_stopped),
+    .few_i        (few),
     .ar_valid_i   (ar_valid[READERS-1:RENDERING_READERS]),
     .ar_ready_o   (ar_ready[READERS-1:RENDERING_READERS]),
     .aw_valid_i   (aw_valid[WRITERS-1:RENDERING_WRITERS]),
@@ -543,6 +559,7 @@ module flk_top
     .hold_reads_i (rendering_stop),
     .hold_writes_i(rendering_stop && pairs_stopped),
     .drained_o    (rendering_drained),
+    .few_i        (1'b0),
     .ar_valid_i   (ar_valid[RENDERING_READERS-1:0]),
     .ar_ready_o   (ar_ready[RENDERING_READERS-1:0]),
     .aw_valid_i   (aw_valid[RENDERING_WRITERS-1:0]),

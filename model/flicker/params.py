@@ -262,7 +262,7 @@ CHIP_MEMORIES = {
     "small": ChipMemories(1024, 8, 128, 2, 64, 8, 64, 64, 1024),  # within the paper's 288 KB
     # Fewer bytes a frame: within the default's size, and beyond it.
     "records": ChipMemories(list_chunks=6, sorted_ahead=448, pairs=2, survivors=64, gathered_lines=96, record_lines=2048),
-    "large": ChipMemories(record_lines=2048, queued_records=256),
+    "large": ChipMemories(pairs=8, record_lines=2048, queued_records=512),
 }
 
 

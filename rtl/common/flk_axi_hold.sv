@@ -4,12 +4,13 @@
 // hold_reads_i, hold_writes_i: no address of a reader, of a writer passes; what has passed comes. drained_o: both are held, and every
 // burst that has passed has its last read beat or its write response. Data of writes do not pass here: managers must
 // give them for every address that has passed, which those do that have their data before their address.
-// At most 2^CountBits - 1 bursts are under way; an address beyond that waits.
-// Combinational: hold_*_i, *_valid_i and *_ready_i to the other side; drained_o depends on registers and hold_*_i.
+// At most 2^CountBits - 1 bursts of a manager are under way, and while few_i is high Few; an address beyond that waits.
+// Combinational: hold_*_i, few_i, *_valid_i and *_ready_i to the other side; drained_o depends on registers and hold_*_i.
 module flk_axi_hold #(
   parameter int unsigned Readers   = 4,
   parameter int unsigned Writers   = 2,
-  parameter int unsigned CountBits = 12
+  parameter int unsigned CountBits = 12,
+  parameter int unsigned Few       = 3
 ) (
   input  logic               clk_i,
   input  logic               rst_ni,
@@ -17,6 +18,7 @@ module flk_axi_hold #(
   input  logic               hold_reads_i,
   input  logic               hold_writes_i,
   output logic               drained_o,
+  input  logic               few_i,
   // Managers
   input  logic [Readers-1:0] ar_valid_i,
   output logic [Readers-1:0] ar_ready_o,
@@ -33,6 +35,10 @@ module flk_axi_hold #(
 );
 
   localparam int unsigned Managers = Readers + Writers;
+
+  if (Few == 0 || Few >= 1 << CountBits) begin : gen_check_few
+    $error("flk_axi_hold: Few must be 1 to 2^CountBits - 1");
+  end
 
   logic [Managers-1:0] taken, ended, full, none;
 
@@ -56,7 +62,7 @@ module flk_axi_hold #(
       end
     end
 
-    assign full[k] = &count_q;
+    assign full[k] = &count_q || (few_i && count_q >= CountBits'(Few));
     assign none[k] = count_q == '0;
 
 `ifndef SYNTHESIS

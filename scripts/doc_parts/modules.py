@@ -21,7 +21,8 @@ PAGES = (
     ("Chip", (
         ("chip.md", "flk_top"), ("chip_ports.md", "flk_top_axi"), ("registers.md", "flk_registers flk_registers_pkg"),
         ("frame_control.md", "flk_frame_control flk_frame_counters flk_counter_pkg flk_descriptor flk_top_pkg"),
-        ("memory_port.md", "flk_axi_arbiter flk_axi_half flk_axi_hold flk_axi_downsizer flk_priority_arbiter"), ("chip_memory.md", "flk_sram flk_sram_single"),
+        ("memory_port.md", "flk_axi_arbiter flk_axi_half flk_axi_hold flk_axi_downsizer flk_priority_arbiter flk_front_throttle"),
+        ("chip_memory.md", "flk_sram flk_sram_single"),
         ("chip_ports.md", "flk_clock_gate flk_reset_sync"),
     )),
     ("Front end", (
@@ -56,7 +57,8 @@ PAGES = (
 HEADS = {
     "axi": "flk_axi_split flk_axi_read flk_axi_fetch flk_axi_write flk_line_writer flk_axi_read_mux",
     "streams": "flk_pipe_reg flk_skid_buffer flk_fifo flk_sram_fifo flk_pair_fifo flk_stream_arbiter",
-    "frame_control": "flk_frame_control flk_frame_counters", "memory_port": "flk_axi_arbiter flk_priority_arbiter flk_axi_hold flk_axi_half flk_axi_downsizer",
+    "frame_control": "flk_frame_control flk_frame_counters",
+    "memory_port": "flk_axi_arbiter flk_priority_arbiter flk_axi_hold flk_front_throttle flk_axi_half flk_axi_downsizer",
     "front_end": "flk_preprocessing flk_preprocessing_core flk_colour_fetch", "cluster_cull": "flk_cluster_cull flk_geometry_fetch",
     "colour_store": "flk_colour_store flk_colour_heads flk_colour_rows flk_colour_keeper",
     "entries_and_records": "flk_tile_walker flk_entry_merge flk_record_writer", "list_writer": "flk_list_writer flk_pointer_port",

@@ -104,8 +104,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_axi_downsizer": [SINGLE],
     "flk_frame_counters": [MEMORY],
     "flk_top": [
-        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold", "flk_axi_half", "flk_preprocessing",
-        "flk_rendering",
+        "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_front_throttle", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold",
+        "flk_axi_half", "flk_preprocessing", "flk_rendering",
     ],
     "flk_top_axi": ["flk_top", "flk_reset_sync"],
     # The wrapper has no logic of its own.
@@ -412,7 +412,7 @@ def _top() -> list[Unit]:
     return [
         unit("flk_priority_arbiter", "5 x 55 bit", Inputs=5, Width=55, Patience=16), unit("flk_axi_arbiter"),
         unit("flk_axi_hold"), unit("flk_axi_half"), unit("flk_axi_downsizer", "128 bit"), unit("flk_axi_downsizer", "256 bit", PortBits=256),
-        unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_reset_sync"), unit("flk_top"),
+        unit("flk_frame_control"), unit("flk_frame_counters"), unit("flk_front_throttle"), unit("flk_reset_sync"), unit("flk_top"),
         *(unit("flk_top", CHIP_ROWS.get(chip.name, chip.name), **chip.parameters) for chip in chips().values() if chip.name != "channels"),
         unit("flk_top_axi"),
     ]
