@@ -311,6 +311,15 @@ class ControlTest:
         ):
             getattr(dut, f"{name}_i").value = value
 
+    def hand_over(self, now: int) -> None:
+        """The frame leaves the front end's place for the rendering half's in cycle `now`."""
+        self.in_rendering, self.in_front = self.in_front, None
+        self.rendering_stage = None
+        r = self.in_rendering
+        r.late |= r.legal and r.due(now)
+        r.skipped = r.late
+        r.left = self.rng.choice([0, self.rng.randint(0, rendering_registers(r.d)["all_pairs"])])
+
     def check(self):
         if self.given:
             self.check_cleared()
@@ -325,6 +334,8 @@ class ControlTest:
         acknowledged = pins["acknowledged"] and self.unacknowledged
         self.stray += pins["acknowledged"] and not self.unacknowledged
         if self.pending and not (refused if pins["start"] else locked):  # taken in the cycle before
+            if self.in_front and self.front_stage == "over" and self.in_rendering is None:  # the rendering half was not idle
+                self.hand_over(now - 2)
             assert self.in_front is None, "a second frame in the front end"
             self.in_front, self.pending = self.pending, None
             self.in_front.stamps[0] = (now - 1) % (1 << 32)
@@ -336,13 +347,8 @@ class ControlTest:
         # Rendering half: the frame that has left the front end.
         start_r = self.value("rendering_start_o")
         if self.in_rendering is None and self.in_front and self.front_stage == "over" and (start_r or self.value("copy_rendering_o")):
-            self.in_rendering, self.in_front = self.in_front, None
-            self.rendering_stage = None
-            r = self.in_rendering
-            r.late |= r.legal and r.due(now - 1)
-            r.skipped = r.late
-            assert not start_r or not r.late, "a late frame is rendered"
-            r.left = rng.choice([0, rng.randint(0, rendering_registers(r.d)["all_pairs"])])
+            self.hand_over(now - 1)
+            assert not start_r or not self.in_rendering.late, "a late frame is rendered"
         elif start_r or self.value("copy_rendering_o"):
             assert self.in_rendering, "the rendering half is given nothing"
         r = self.in_rendering
