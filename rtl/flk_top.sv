@@ -510,6 +510,7 @@ module flk_top
     .b_resp_i
   );
 
+  logic [23:0] front_cluster;
   logic few;  // of the front end's bursts
 
   flk_front_throttle i_throttle (
@@ -521,7 +522,7 @@ module flk_top
     .pairs_i   (rendering.all_pairs),
     .left_i    (rendering_left),
     .clusters_i(front.clusters),
-    .line_i    (r_valid[READ_TABLE]),
+    .cluster_i (front_cluster),
     .few_o     (few)
   );
 
@@ -627,6 +628,7 @@ module flk_top
     .start_i             (front_start),
     .idle_o              (front_idle),
     .done_o              (front_end),
+    .cluster_o           (front_cluster),
     .registers_i         (front),
     .error_o             (front_error),
     .counters_o          (front_counters),

@@ -42,7 +42,7 @@ RESULTS = LISTS / "results.csv"
 COPIED = ("Makefile", "pyproject.toml", "rtl", "tb", "model", "scripts", "lint", "formal", "sw")
 LEVELS = ("rendering_core", "render_stage", "frames")  # who may notice what a unit's own tests do not, from below
 KILLED_AT_HOME = 0.95
-TIMEOUT = 900  # seconds of a test run, on a busy machine
+TIMEOUT = {False: 900, True: 5400}  # seconds of a test run on a busy machine, without and with SLOW=1
 # Modules that build, simulate memory, show and report. Outcomes are not run anew when they change: what kills a mutant is not in them.
 HOUSEHOLD = {"flicker", *(f"flicker.{name}" for name in ("toolchain", "errors", "progress", "markdown", "sim.memory", "sim.half"))}
 # Modules whose numbers stand in a generated package: an outcome depends on that.
@@ -165,7 +165,7 @@ def _test(folder: Path, unit: str, seed: int, slow: bool) -> tuple[bool, str]:
     environment.pop("FLICKER_SCENES", None)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "sim", "--unit", unit, "tb"]
     try:
-        done = subprocess.run(command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT)
+        done = subprocess.run(command, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT[slow])
     except subprocess.TimeoutExpired:
         return True, ""  # a hang is noticed
     (FOLDER / f"last-{unit}.log").write_text(done.stdout)

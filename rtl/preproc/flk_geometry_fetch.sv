@@ -5,6 +5,7 @@
 // none; the groups come in order, then an element with out_end_o. done_o is high for a cycle when
 // that has been taken. chunked_i, position_i (of the camera), headers_i and geometry_i (beats where
 // the arrays begin) stay from start_i to done_o; the counts of beats until the next start.
+// cluster_o: of the table, whose groups leave next; 0 while there is none.
 // An error of the memory: error_o rises and stays until the next start, no group is added, what is
 // under way is read and dropped, clusters are taken and dropped up to the one with in_end_i, an
 // end element follows. A float of a header with exponent code 255, which no packed scene has: the
@@ -45,6 +46,7 @@ module flk_geometry_fetch
   output logic                 damaged_o,
   output logic [31:0]          header_beats_o,
   output logic [31:0]          geometry_beats_o,
+  output logic [23:0]          cluster_o,
   // Kept clusters
   input  logic                 in_valid_i,
   output logic                 in_ready_o,
@@ -557,9 +559,10 @@ module flk_geometry_fetch
     .empty_o    (unused_fifo_empty[2])
   );
 
-  assign groups = state_q == RUN && queue_valid && !queue_end;
-  assign last   = group_q == cluster.last[7:2];
-  assign over   = last ? cluster.last[1:0] : 2'd3;
+  assign groups    = state_q == RUN && queue_valid && !queue_end;
+  assign cluster_o = groups ? cluster.index : '0;
+  assign last      = group_q == cluster.last[7:2];
+  assign over      = last ? cluster.last[1:0] : 2'd3;
 
   always_comb begin
     need = 3'(over) + 3'd2;  // 20 bytes each

@@ -38,6 +38,7 @@ module flk_preprocessing
   input  logic               start_i,
   output logic               idle_o,
   output logic               done_o,
+  output logic [23:0]        cluster_o,  // of the table, that its lanes take next; 0: none
   input  front_registers_t   registers_i,
   output logic [FRONT_ERRORS-1:0] error_o,
   output front_counters_t    counters_o,
@@ -296,6 +297,7 @@ module flk_preprocessing
     .damaged_o       (geometry_damaged),
     .header_beats_o  (header_beats),
     .geometry_beats_o(geometry_beats),
+    .cluster_o,
     .in_valid_i      (kept_valid),
     .in_ready_o      (kept_ready),
     .in_end_i        (kept_end),

@@ -6,13 +6,12 @@ Settings: ``top``.
 
 from __future__ import annotations
 
-import itertools
 import random
 
 import cocotb
 from cocotb.triggers import RisingEdge
 from flicker_tb.axi import MemoryPort, ram_read, ram_write
-from flicker_tb.bench import Bench, StreamTest, config, rounds
+from flicker_tb.bench import Bench, StreamTest, combinations, config
 from flicker_tb.streams import Checker, Monitor, Stream, StreamSink, StreamSource
 
 from flicker.chip.dram import DramConfig, port_config
@@ -21,7 +20,7 @@ from flicker.sim.memory import Memory, PortConfig, WriteOrder
 TOP = config()["top"]
 BASE, SIZE = 0x8000, 0x10000
 REQUEST = ("addr", "beats", "tag")
-WRITES = list(itertools.product(["never", "half", "bursts"], WriteOrder, [0.0, 0.5]))[:: rounds(5, 1)]
+WRITES = combinations(["never", "half", "bursts"], WriteOrder, [0.0, 0.5])
 
 
 class Anything:

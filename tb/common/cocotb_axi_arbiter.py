@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import random
 from collections import Counter, defaultdict, deque
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ import cocotb
 from cocotb.triggers import RisingEdge
 from cocotb_priority_arbiter import PriorityModel
 from flicker_tb.axi import MemoryPort, ram_read, ram_write
-from flicker_tb.bench import Bench, rounds
+from flicker_tb.bench import Bench, combinations
 
 from flicker.chip.dram import DramConfig, port_config
 from flicker.sim.memory import Memory, Order, PortConfig, WriteOrder
@@ -20,8 +19,8 @@ READ_BASE, WRITE_BASE, SIZE = 0x8000, 0x80000, 0x8000
 PAGE = 4096
 NEVER = 1 << 30
 # Pauses of managers, of the memory, orders; all of them with SLOW=1.
-TRAFFIC = list(itertools.product(["never", "half"], [0.0, 0.5], Order, [True, False]))[:: rounds(5, 1)]
-DRAINS = list(itertools.product(["never", "half"], [0.0, 0.5], WriteOrder))[:: rounds(5, 1)]
+TRAFFIC = combinations(["never", "half"], [0.0, 0.5], Order, [True, False])
+DRAINS = combinations(["never", "half"], [0.0, 0.5], WriteOrder)
 
 
 @dataclass

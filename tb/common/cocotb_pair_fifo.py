@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import deque
 
 import cocotb
 from cocotb.triggers import RisingEdge
-from flicker_tb.bench import Bench, config, rounds
+from flicker_tb.bench import Bench, combinations, config
 from flicker_tb.stalls import PATTERNS
 
-PAIRS = list(itertools.product(["never", "half", "bursts"], PATTERNS))[:: rounds(5, 1)]
+PAIRS = combinations(["never", "half", "bursts"], PATTERNS)
 
 
 class Queue:

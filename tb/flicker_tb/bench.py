@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import cocotb
@@ -37,6 +38,11 @@ def netlist() -> bool:
 def rounds(few: int, many: int) -> int:
     """How often a random test repeats itself: `few`, with SLOW=1 `many`."""
     return many if os.environ.get("SLOW") == "1" else few
+
+
+def combinations(*values: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Combinations of the values, of a random test's patterns: every fifth, with SLOW=1 all."""
+    return list(itertools.product(*values))[:: rounds(5, 1)]
 
 
 class Bench:

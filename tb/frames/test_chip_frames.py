@@ -459,6 +459,16 @@ def test_back_to_back(overlap: bool) -> None:
         assert chip.field("frames", "started") == chip.field("frames", "finished") == 4
 
 
+def test_the_front_end_waits() -> None:
+    """Beside a slower rendering half the front end takes longer than alone, of its own will, and nobody waits for it."""
+    with session(small(4000), port=replace(PORT, latency=20)) as chip:
+        first, *rest = list(back_to_back(chip, [camera(192, 108)] * 3, background=BLUE))
+    front, rendering = first.frame.phases["front end"], first.frame.phases["rendering"]
+    assert rendering > 2 * front
+    for done in rest:
+        assert done.frame.phases["front end"] > 1.8 * front and done.interval < 1.02 * rendering
+
+
 @pytest.mark.parametrize("config", ALL_CONFIGS)
 def test_modes_travel_with_their_frame(config: RenderConfig) -> None:
     """Two frames under way, the second one's mode (which lanes do not have), format and background written while the first is rendered."""

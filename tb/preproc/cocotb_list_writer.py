@@ -237,8 +237,8 @@ async def frames(dut, idle, stall):
     rng = test.bench.rng
     await test.bench.reset()
     evicted = 0
-    for entries in (0, 1, 300, rounds(600, 2000), 30, 9, 10, rounds(300, 1200)):
-        frame = random_frame(rng, config()["lists"], entries, wide=entries in (300, 600, 1200))
+    for entries, wide in ((0, False), (1, False), (300, True), (rounds(600, 2000), False), (30, False), (9, False), (10, False), (rounds(300, 1200), True)):
+        frame = random_frame(rng, config()["lists"], entries, wide)
         await test.run(frame)
         evicted += int(frame.image.evicted[frame.writer])
     assert evicted > rounds(25, 100)

@@ -36,10 +36,18 @@ module geometry_fetch_bench
   logic error, damaged, out_end, unused;
   logic [31:0] header_beats, geometry_beats;
   group_t group;
+  logic [23:0] cluster, cluster_q;
 
   assign unused = ^{in_data_i[95:55], registers_i[191:165]};
   assign status_o = 192'({geometry_beats, header_beats, 30'b0, damaged, error});
-  assign out_data_o = 1440'({out_end, group});
+  assign out_data_o = 1440'({cluster_q, out_end, group});
+
+  // The cluster that the unit is at when it gives a group.
+  always_ff @(posedge clk_i) begin
+    if (!out_valid_o || out_ready_i) begin
+      cluster_q <= cluster;
+    end
+  end
 
   if ($bits(group_t) != 1347) begin : gen_check
     $error("geometry_fetch_bench: group_t is not as test_geometry_fetch.py reads it");
@@ -62,6 +70,7 @@ module geometry_fetch_bench
     .damaged_o       (damaged),
     .header_beats_o  (header_beats),
     .geometry_beats_o(geometry_beats),
+    .cluster_o       (cluster),
     .in_valid_i,
     .in_ready_o,
     .in_end_i        (in_data_i[54]),

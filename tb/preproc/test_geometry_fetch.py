@@ -28,12 +28,12 @@ HEADERS, GEOMETRY = 0x3_0000_0FC0, 0x3_4567_8040  # beats of their own, not at a
 PORT = {"stall": {"AR": 0.3, "R": 0.3}, "run": {"R": 5}}
 P, C = FORMATS.position, FORMATS.colour
 
-# group_t, the last field lowest: name, fields of it, bits of each.
+# group_t, the last field lowest, the end and cluster_o with it: name, fields of it, bits of each.
 LAYOUT = [
     ("word", 20, 32), ("used", 1, 4), ("group", 1, 6), ("last", 1, 1), ("first", 1, 1),
     ("sh_step", 9, 9 + C), ("dc_step", 3, 9 + C), ("dc_low", 3, TERM_BITS), ("scale_step", 3, SCALE_STEP_BITS), ("scale_low", 3, 27),
     ("step", 3, 9 + P), ("low", 3, 9 + P),
-    ("sh_zero", 1, 9), ("colour", 1, 32), ("degree", 1, 2), ("count", 1, 8), ("slots", 1, 20), ("index", 1, 24), ("end", 1, 1),
+    ("sh_zero", 1, 9), ("colour", 1, 32), ("degree", 1, 2), ("count", 1, 8), ("slots", 1, 20), ("index", 1, 24), ("end", 1, 1), ("cluster", 1, 24),
 ]
 
 
@@ -83,10 +83,10 @@ def registers(packed: PackedScene, setup: FrameSetup, headers: int = HEADERS, ge
 
 
 def items(packed: PackedScene, kept: np.ndarray, index: int = 0, first: int = 0) -> list[int]:
-    """The stream of kept clusters, with its end; index, first: of the scene's first cluster."""
+    """The stream of kept clusters, with its end, whose cluster means nothing; index, first: of the scene's first cluster."""
     t = packed.table[kept]
     rows = zip(t["flags"].tolist(), t["last"].tolist(), (t["first"].astype(np.int64) + first).tolist(), (kept + index).tolist())
-    return [*(packed_bits((flags & 3, 2), (last, 8), (first, 20), (index, 24)) for flags, last, first, index in rows), 1 << 54]
+    return [*(packed_bits((flags & 3, 2), (last, 8), (first, 20), (index, 24)) for flags, last, first, index in rows), (1 << 55) - 1]
 
 
 def contents(packed: PackedScene, headers: int = HEADERS, geometry: int = GEOMETRY) -> dict[int, bytes]:
@@ -124,7 +124,7 @@ def expected(packed: PackedScene, setup: FrameSetup, kept: np.ndarray) -> dict[s
         "scale_step": fixed(v.scale_step, SCALE_STEP_BITS)[c], "scale_low": fixed(v.scale_low)[c],
         "step": codes_of(v.step, P)[c], "low": codes_of(v.low, P)[c],
         "sh_zero": column(h["sh_zero"][c] if chunked else np.zeros(len(c))), "colour": column(h["colour"][c]),
-        "degree": column(t["flags"][c] & 3), "count": column(t["last"][c]), "slots": column(t["first"][c]), "index": column(c),
+        "degree": column(t["flags"][c] & 3), "count": column(t["last"][c]), "slots": column(t["first"][c]), "index": column(c), "cluster": column(c),
     }
 
 
@@ -133,6 +133,7 @@ def check(outcome: Outcome, packed: PackedScene, setup: FrameSetup, kept: np.nda
     assert outcome.done and outcome.status[0] == (0 if whole else error)
     got, want = fields(outcome), expected(packed, setup, kept)
     assert got["end"][:, 0].tolist() == [0] * (len(outcome.when) - 1) + [1]
+    assert not got["cluster"][-1]
     n = len(outcome.when) - 1
     assert n <= len(want["group"]) if not whole else n == len(want["group"])
     for name, values in want.items():
@@ -293,7 +294,7 @@ def test_the_last_places(form: PackedFormat) -> None:
     got, want = fields(outcome), expected(packed, setup, kept)
     assert outcome.done and outcome.status[0] == 0 and len(got["group"]) == len(want["group"]) + 1
     for name, values in want.items():
-        ahead = {"index": index, "slots": first}.get(name, 0)
+        ahead = {"index": index, "cluster": index, "slots": first}.get(name, 0)
         assert ((got[name][:-1] == values + ahead) | (values < 0)).all(), name
     assert got["index"][-2, 0] == (1 << 24) - 1
 

@@ -1,8 +1,8 @@
 """When the front end has few bursts under way: while the rendering half runs and is no further in its frame.
 
-State space: lines of the table and pairs of tiles at any pace, together and alone, to the last of both; frames of one cluster, of one pair and of the most of
-both; a front end that begins with or behind the rendering half; reset under way. Parameter space: the chip's widths, and so few bits that frames are as
-large as they allow.
+State space: clusters, one by one and many at once, and pairs of tiles at any pace, together and alone, to the last of both; frames of one cluster, of one
+pair and of the most of both; a front end that begins with or behind the rendering half, and ends before it; reset under way. Parameter space: the chip's
+widths, and so few bits that frames are as large as they allow.
 """
 
 from __future__ import annotations
