@@ -14,16 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.tile_lists import TileLists
-from flicker.chip.whole import WholeFrame, whole_frame
+from flicker.chip.whole import WholeFrame, first_half, whole_frame
 from flicker.chip_counters import FRONT, RENDERING
 from flicker.errors import FlickerError
 from flicker.front.view import DEMO, View, load_view
 from flicker.golden.chip import render_chip
 from flicker.golden.front.frame import ListKind, run_front
-from flicker.golden.front.memory import front_memory
 from flicker.golden.front.record import RecordKind
 from flicker.golden.lanes.lists import front_lists
 from flicker.markdown import table
@@ -32,7 +30,7 @@ from flicker.pipeline import packed_scene
 from flicker.scene.camera import Camera
 from flicker.scene.packed import PackedFormat
 from flicker.scene.real import REAL_VIEWS
-from flicker.sim.chip import PORT, ChipFrame, ChipSession, build
+from flicker.sim.chip import ChipFrame, ChipSession, build
 from flicker.sim.half import MemoryOptions
 from flicker.sim.row import RowFrame, back_to_back
 
@@ -113,14 +111,11 @@ def measure(
     build(config)
     packed = packed_scene(view, format_)
     front = run_front(packed, camera, lists, RecordKind.of(config.form))
-    image = front_memory(front)
     golden = render_chip(front_lists(front) if config.by_lanes else front.subtile_lists(), config)
-    sizes = config.chip_memories
-    lists_there = TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines)
-    second = rendering.estimate(lists_there, config, dram, PORT.latency, PORT.max_reads)
+    first, lists_there = first_half(front, config, dram)
     # Which lines of records are read again depends on timing, and whether a list that is read again is left before that.
     loose = {"records"} | ({"lists"} if lists_there.run_lines.any() else set())
-    model = whole_frame(preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval), second, dram)
+    model = whole_frame(first, lists_there, config, dram)
     say(f"{title}: alone")
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         begin = time.process_time()

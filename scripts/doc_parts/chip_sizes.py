@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 
 from flicker.chip.constants import CLOCK_HZ
 from flicker.chip.dram import DramConfig
-from flicker.chip.whole import WholeFrame, halves, whole_frame
+from flicker.chip.whole import WholeFrame, first_half, whole_frame
 from flicker.chips import Chip, chips
 from flicker.cost.area import parts
 from flicker.cost.chip_area import square_millimetres
@@ -60,7 +60,7 @@ def _measured(say: Say, table_: list[Chip]) -> list[Of]:
             frames = {}
             for chip in table_:
                 dram = DramConfig(port_bits=chip.config.port_bits)
-                frames[chip.name] = whole_frame(*halves(front, chip.config, dram), dram)
+                frames[chip.name] = whole_frame(*first_half(front, chip.config, dram), chip.config, dram)
             found.append(Of(title, decibels, frames))
     return found
 

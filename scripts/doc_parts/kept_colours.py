@@ -16,7 +16,7 @@ import numpy as np
 
 from flicker.chip.compare import chip_estimates
 from flicker.chip.dram import DramConfig, Refresh
-from flicker.chip.whole import WholeFrame, halves, whole_frame
+from flicker.chip.whole import WholeFrame, first_half, whole_frame
 from flicker.chips import chip_of
 from flicker.errors import FlickerError
 from flicker.front.paths import Asked, path_of
@@ -119,8 +119,8 @@ def rows_of(view: RealView, say: Say) -> Iterator[tuple]:
             if change is not None:
                 drift.append(change)
             if number in MODELLED:
-                frames.append(whole_frame(*halves(front, CONFIG, dram), dram))
-                plain_frames.append(whole_frame(*halves(plain, CONFIG, dram), dram))
+                frames.append(whole_frame(*first_half(front, CONFIG, dram), CONFIG, dram))
+                plain_frames.append(whole_frame(*first_half(plain, CONFIG, dram), CONFIG, dram))
         mean = lambda found, what: sum(map(what, found)) / len(found) / 1e6  # noqa: E731
         moved = [mean(found, lambda f: sum(f.bytes.values())) for found in (plain_frames, frames)]
         cycles = [mean(found, lambda f: f.interval) for found in (plain_frames, frames)]
@@ -179,7 +179,7 @@ def _third(say: Say, view: RealView, case: Case, keeps: bool, config: RenderConf
             if not np.array_equal(done.frame.buffer, render_chip(front_lists(front), config).buffer):
                 raise FlickerError(f"{title}: frame {number}: the picture differs from the golden model's")
             if number == 2:
-                model, found = whole_frame(*halves(front, config, dram), dram), done
+                model, found = whole_frame(*first_half(front, config, dram), config, dram), done
     for purpose, due in model.bytes.items():
         if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
@@ -224,8 +224,8 @@ def hardware_tables(say: Say) -> dict[str, str]:
 
 
 CHIPS = (  # folder, chip, DRAM
-    ("flowers", "wide", DRAM), ("playbot", "wide", DRAM), ("playbot", "wide", replace(WIDER, refresh=Refresh.PER_BANK)), ("guitar", "max", DRAM),
-    ("stpeter", "wide", DRAM),
+    ("flowers", "wide", DRAM), ("flowers", "wide", WIDER), ("playbot", "wide", DRAM), ("playbot", "wide", replace(WIDER, refresh=Refresh.PER_BANK)),
+    ("guitar", "max", DRAM), ("stpeter", "wide", DRAM),
 )
 
 

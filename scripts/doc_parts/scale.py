@@ -8,14 +8,11 @@ from dataclasses import dataclass
 import matplotlib.pyplot as plt
 import numpy as np
 
-from flicker.chip import preprocessing, rendering
 from flicker.chip.dram import DramConfig
-from flicker.chip.tile_lists import TileLists
-from flicker.chip.whole import WholeFrame, whole_frame
+from flicker.chip.whole import WholeFrame, first_half, whole_frame
 from flicker.front.view import View, load_view
 from flicker.golden.chip import whole_pairs
 from flicker.golden.front.frame import run_front
-from flicker.golden.front.memory import front_memory
 from flicker.golden.lanes.lists import front_lists
 from flicker.markdown import table
 from flicker.params import RenderConfig
@@ -58,11 +55,10 @@ class Point:
 
 
 def point(name: str, view: View) -> Point:
-    dram, sizes = DramConfig(), CONFIG.chip_memories
+    dram = DramConfig()
     front = run_front(packed_scene(view, PackedFormat.CHUNK), view.camera)
-    image = front_memory(front)
-    tables = TileLists.of(front, image, sizes.sorted_entries)
-    frame = whole_frame(preprocessing.estimate(front, image, dram, sizes), rendering.estimate(tables, CONFIG, dram), dram)
+    first, tables = first_half(front, CONFIG, dram)
+    frame = whole_frame(first, tables, CONFIG, dram)
     alone = simulate_lanes(lane_work(whole_pairs(front_lists(front))), CONFIG.with_(in_width=CONFIG.delivered), leave=True).cycles
     return Point(
         name, len(view.scene), (view.camera.width, view.camera.height), view.scene.sh_degree, len(front.number), len(front.entry_tile),

@@ -11,7 +11,7 @@ import numpy as np
 
 from flicker.budget.sh_bits import choose
 from flicker.chip.dram import DramConfig
-from flicker.chip.whole import halves, whole_frame
+from flicker.chip.whole import first_half, whole_frame
 from flicker.front.view import DEMO, View
 from flicker.golden.front.frame import run_front
 from flicker.golden.lanes.lists import front_lists
@@ -51,7 +51,7 @@ def tables(say: Say) -> dict[str, str]:
         for name, packed in _packings(view):
             say(f"{title}: {name}")
             front = run_front(packed, view.camera)
-            frame = whole_frame(*halves(front, CONFIG, dram), dram)
+            frame = whole_frame(*first_half(front, CONFIG, dram), CONFIG, dram)
             picture = render_lanes(front_lists(front)).image()
             full = picture if name == f"{FULL_SH_BITS}" else full
             assert full is not None

@@ -28,7 +28,7 @@ async def shares(dut):
         dut.start_i.value = 1
         await edge
         dut.start_i.value = 0
-        passed, seen, before = 0, 0, [(0, 0)] * 4  # clusters and pairs of the cycles before, the oldest first: registers take them, the step, the sum's two parts
+        passed, seen, before = 0, 0, [(0, 0)] * 4  # clusters and pairs of cycles before: registers take them, the step, the sum's two parts
         state = 0
         for cycle in range(600):
             ends = cycle == 599 or (at + 1 == clusters and written == pairs) or (cut and cycle == 40)

@@ -22,20 +22,19 @@ from ..front.lists import obb_masks
 from ..front.records import LOG2E
 from ..front.view import View
 from ..golden.front.frame import FrontFrame, ListKind, run_front
-from ..golden.front.memory import front_memory
 from ..golden.front.record import RecordKind
 from ..golden.front.setup import MEAN_FRACTION
 from ..params import TILE, Coords, Form, RenderConfig
 from ..perf.render_stage import StageCycles
 from ..pipeline import Engine, Front, FrontOptions, golden_front, packed_scene
 from ..scene.packed import PackedFormat
-from . import preprocessing, rendering
+from . import preprocessing
 from .dram import DramConfig
 from .drawing import Drawing
 from .execute import SchemeResult
 from .frame import DEFAULT_CHIP, ChipConfig, FrameEstimate, Prepared, frame_estimate
 from .tile_lists import TileLists
-from .whole import whole_frame
+from .whole import first_half, whole_frame
 
 # The front end by form of the stage: what the scene is packed in, and how splats are listed (the command line's defaults with and without --faithful).
 FRONTS = {Form.FACTORED: (PackedFormat.CHUNK, ListKind.ELLIPSE), Form.CONIC: (PackedFormat.FP16, ListKind.BOX)}
@@ -77,13 +76,6 @@ def by_oriented_boxes(frame: FrontFrame) -> FrontFrame:
     return replace(frame, entry_splat=frame.entry_splat[kept], entry_tile=frame.entry_tile[kept], entry_mask=mask[kept])
 
 
-def _first_half(front: FrontFrame, config: RenderConfig, dram: DramConfig, sorter: bool = True) -> tuple[preprocessing.Preprocessing, TileLists]:
-    """Preprocessing of a frame, and the lists that it leaves. sorter: False: for an ideal one, which costs the bytes of one reading and no time."""
-    image, sizes = front_memory(front), config.chip_memories
-    tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
-    return preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval), tables
-
-
 def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
     """What a frame takes on the chip around the stage of a drawing: `cycles` from frame to frame while the front end works on the next one, `latency_cycles`
     of a frame alone, `front_cycles`, `render_cycles`, and bytes by purpose, `bytes_geometry` and so on. The front end is the drawing's, of one in float64
@@ -97,8 +89,8 @@ def frame_cost(view: View, drawing: Drawing) -> dict[str, int]:
     if not drawing.engine.whole and drawing.front is Front.FLOAT:
         options = FrontOptions(*FRONTS[config.form])
     packed, dram = packed_scene(view, options.format, options.rechunk), replace(drawing.dram, port_bits=config.port_bits)
-    first, tables = _first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, dram)
-    found = whole_frame(first, rendering.estimate(tables, config, dram), dram)
+    first, tables = first_half(golden_front(view, packed, options.lists, RecordKind.of(config.form)), config, dram)
+    found = whole_frame(first, tables, config, dram)
     return {
         "cycles": found.interval, "latency_cycles": found.latency, "front_cycles": found.front.cycles, "render_cycles": found.back.cycles,
         **{f"bytes_{purpose}": count for purpose, count in found.bytes.items()},
@@ -128,9 +120,9 @@ def chip_estimates(view: View, names: Sequence[str], memories: str = "default", 
             format_, lists = FRONTS[configuration.form]
             front = run_front(packed_scene(view, format_), view.camera, lists, RecordKind.of(configuration.form), order=view.order)
             front = by_oriented_boxes(front) if key[1] else front
-            fronts[key] = _first_half(front, stage.with_(memories=memories), dram, not key[2])
+            fronts[key] = first_half(front, stage.with_(memories=memories), dram, not key[2])
         first, tables = fronts[key]
-        frame = whole_frame(first, rendering.estimate(tables, stage.with_(memories=memories), dram), dram)
+        frame = whole_frame(first, tables, stage.with_(memories=memories), dram)
         facts[name] = {
             "front_cycles": frame.front.cycles, "render_cycles": frame.back.cycles, "interval_cycles": frame.interval, "latency_cycles": frame.latency,
             "bottleneck": frame.bottleneck, "dram_bytes": sum(frame.bytes.values()), "dram_cycles": frame.dram_cycles,

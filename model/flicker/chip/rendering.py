@@ -68,6 +68,7 @@ MOST_BUSY = 0.9
 # Cycles by which a line of records or lists comes later at the chip's port where what else moves takes half of the memory's time: fitted to its frames with
 # 32 lanes (`make docs PART=scale_hardware`).
 LOADED = 170
+BESIDE = 0.8  # of the front end's bytes, which go last, count for that: fitted to frames on paths (`make docs PART=path_hardware`)
 END = 60  # from the last line of a picture to its answer, beside the memory's latency
 
 NEVER = np.int64(1) << 60
@@ -484,12 +485,13 @@ def _frame(
 @dataclass(frozen=True, eq=False)
 class Rendering:
     """A frame of the rendering half. bytes: by purpose. given: int64 (S,), records that a core gets of each sub-tile, in the order of `whole_pairs`.
-    traffic: bursts of the DRAM by purpose, each in its order; empty of a perfect memory."""
+    traffic: bursts of the DRAM by purpose, each in its order; empty of a perfect memory. beside_cycles: while the front end works on the next frame."""
 
     cycles: int
     bytes: dict[str, int]
     given: np.ndarray
     traffic: list[Stream]
+    beside_cycles: int
 
 
 def frame_beats(width: int, height: int, format_: PixelFormat, stride: int) -> int:
@@ -550,11 +552,10 @@ class _Cores:
 
 def estimate(
     tables: TileLists, config: RenderConfig, dram: DramConfig | None, latency_cycles: int = 20, reads: int = 256, format_: PixelFormat = PixelFormat.RGB8,
-    stride: int | None = None,
+    stride: int | None = None, beside: int = 0,
 ) -> Rendering:
-    """Cycles and bytes of a frame. dram: None: a perfect memory. latency_cycles, reads: of the memory's ports, `PortConfig.latency` and
-    `max_reads`, by default those of `sim.chip.PORT`. stride: bytes from
-    row to row; None: as few as a row needs.
+    """Cycles and bytes of a frame. dram: None: a perfect memory. latency_cycles, reads: of the memory's ports, `PortConfig.latency` and `max_reads`, by default
+    those of `sim.chip.PORT`. stride: bytes from row to row; None: as few as a row needs. beside: bytes that the front end moves for the next frame.
 
     Lists of an ideal sorting unit (`TileLists.capacity`) are sorted in no time once their last line is there, any number of entries at once.
 
@@ -593,30 +594,38 @@ def estimate(
     others = {"pointers": LINE_BYTES * len(tables.lines), "frame": BEAT * frame_beats(lists.width, lists.height, format_, stride)}
     if dram and dram.port_bits != config.port_bits:
         raise ValueError(f"the memory's port has {dram.port_bits} bits, the chip's {config.port_bits}")
-    busy = 0.0  # share of the memory's time that is not the records'
     gap = max(1, 8 * RECORD_LINE // config.port_bits)  # lists, asked for ahead, stand back while lines of records come
-    for _ in range(ROUNDS if dram else 1):
-        # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits.
-        rate, later = (*memory[:-1], memory[-1] / (1.0 - busy)), round(LOADED * busy / (1.0 - busy))
-        clock, misses, batches, given = _frame(
-            tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
-            tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
-            tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, sizes.record_lines // CACHE_WAYS, CACHE_WAYS,
-            READ + list_latency + later, line_latency + later, refresh, reads, early,
-            cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after, tables.by_tile(cores.served),
-            tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
-            (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
-             sizes.sorted_ahead + OUTPUTS, sizes.queued_records, sizes.pairs, config.sort_units), config.cores, missed,
-        )
-        others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
-        total = int(clock) + END + latency_cycles
-        if dram:
-            least = min(EFFICIENCY * dram.bytes_per_second / CLOCK_HZ, config.port_bits / 8)  # bytes in a cycle, of the memory and its port
-            now = min(sum(others.values()) / (least * total), MOST_BUSY)
-            if abs(now - busy) < SETTLED:
-                break
-            busy = (busy + now) / 2
-    moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * int(misses), "frame": others["frame"]}
+
+    def settle(beside: int) -> tuple[int, int, np.ndarray, np.ndarray]:
+        """Cycles, lines of records, their places in `missed`, batches, records given: with the shares of the memory's time that they make."""
+        busy = np.zeros(2)  # of what is not the records', and of that and what the front end moves
+        for _ in range(ROUNDS if dram else 1):
+            # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits. The front end takes nothing of the rate:
+            # it goes last.
+            rate, later = (*memory[:-1], memory[-1] / (1.0 - busy[0])), round(LOADED * busy[1] / (1.0 - busy[1]))
+            clock, misses, batches, given = _frame(
+                tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
+                tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
+                tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, sizes.record_lines // CACHE_WAYS, CACHE_WAYS,
+                READ + list_latency + later, line_latency + later, refresh, reads, early,
+                cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after,
+                tables.by_tile(cores.served), tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
+                (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
+                 sizes.sorted_ahead + OUTPUTS, sizes.queued_records, sizes.pairs, config.sort_units), config.cores, missed,
+            )
+            others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
+            total = int(clock) + END + latency_cycles
+            if dram:
+                least = min(EFFICIENCY * dram.bytes_per_second / CLOCK_HZ, config.port_bits / 8)  # bytes in a cycle, of the memory and its port
+                now = np.minimum((sum(others.values()) + np.array([0, BESIDE * beside])) / (least * total), MOST_BUSY)
+                if np.abs(now - busy).max() < SETTLED:
+                    break
+                busy = (busy + now) / 2
+        return total, int(misses), batches, given
+
+    beside_cycles = settle(beside)[0] if beside else 0
+    total, misses, batches, given = settle(0)
+    moved = {"lists": others["lists"], "pointers": others["pointers"], "records": RECORD_LINE * misses, "frame": others["frame"]}
     traffic: list[Stream] = []
     if dram:
         written = moved["frame"] + BEAT * int(tables.run_lines.sum())
@@ -628,4 +637,4 @@ def estimate(
     grid = np.zeros((2 * tables.rows, 2 * tables.cols), np.int64)
     for k in range(CORES):
         grid[2 * tables.y + k // 2, 2 * tables.x + k % 2] = given[:, k]
-    return Rendering(total, moved, grid.ravel(), traffic)
+    return Rendering(total, moved, grid.ravel(), traffic, max(total, beside_cycles))

@@ -33,7 +33,7 @@ from ..scene.packed import PackedFormat, decode
 from ..scene.packing import Packing
 from .constants import CLOCK_HZ
 from .dram import DramConfig
-from .whole import halves, whole_frame
+from .whole import halves, shared_cycles
 
 CONFIG = RenderConfig()  # of the stage by whose visits Gaussians are judged, and of the chip unless another is asked for
 ENTRY_BYTES = 64 / 14  # most lines of 64 bytes have fourteen or fifteen entries
@@ -269,7 +269,7 @@ def frame_cost(front: FrontFrame, dram: DramConfig, config: RenderConfig = CONFI
         bytes_[name] = bytes_.get(name, 0) + more
     cycles = {"front end": first.cycles, "rendering": second.cycles}
     if config.port_bits != LINE_BITS:
-        cycles["memory port"] = whole_frame(first, second, dram).dram_cycles
+        cycles["memory port"] = shared_cycles(first, second, dram)
     return cycles, bytes_
 
 

@@ -22,7 +22,7 @@ from ..scene.camera import Camera
 from ..scene.packing import Packing
 from .constants import CLOCK_HZ
 from .dram import DramConfig
-from .whole import halves, whole_frame
+from .whole import first_half, whole_frame
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def rates(packing: Packing, cameras: Sequence[Camera], table: Iterable[Chip], st
             for n, chip in enumerate(those):
                 report(k * len(those) + n, len(cameras) * len(those))
                 dram = DramConfig(port_bits=chip.config.port_bits)
-                frame = whole_frame(*halves(front, chip.config, dram), dram)
+                frame = whole_frame(*first_half(front, chip.config, dram), chip.config, dram)
                 if chip.name not in worst or frame.interval > worst[chip.name][0]:
                     worst[chip.name] = frame.interval, k, frame.bottleneck
     found = []

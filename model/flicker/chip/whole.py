@@ -40,26 +40,39 @@ class WholeFrame:
     @property
     def interval(self) -> int:
         """Cycles from frame to frame when the front end works on the next one while one is rendered."""
-        return max(self.front.cycles, self.back.cycles, self.dram_cycles)
+        return max(self.front.cycles, self.back.beside_cycles, self.dram_cycles)
 
     @property
     def bottleneck(self) -> str:
-        """What sets the interval."""
-        return {self.dram_cycles: "DRAM", self.back.cycles: "rendering", self.front.cycles: "front end"}[self.interval]
+        """What takes longest by itself."""
+        parts = {"front end": self.front.cycles, "rendering": self.back.cycles, "DRAM": self.dram_cycles}
+        return max(parts, key=lambda name: parts[name])
+
+
+def first_half(front: FrontFrame, config: RenderConfig, dram: DramConfig, sorter: bool = True) -> tuple[Preprocessing, TileLists]:
+    """The front end of a chip for what it makes of a frame, with the memory to itself, and the lists that it leaves. sorter: False: for an ideal one, which
+    costs the bytes of one reading and no time."""
+    image, sizes = front_memory(front), config.chip_memories
+    tables = TileLists.of(front, image, sizes.sorted_entries if sorter else None, sizes.merge_lines)
+    return preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval), tables
 
 
 def halves(front: FrontFrame, config: RenderConfig, dram: DramConfig) -> tuple[Preprocessing, Rendering]:
-    """Both halves of a chip for what its front end makes of a frame, each with the memory to itself."""
-    image, sizes = front_memory(front), config.chip_memories
-    first = preprocessing.estimate(front, image, dram, sizes, config.preproc_lanes, config.list_writers, config.preproc_interval)
-    return first, rendering.estimate(TileLists.of(front, image, sizes.sorted_entries, sizes.merge_lines), config, dram)
+    """Both halves, each with the memory to itself."""
+    first, tables = first_half(front, config, dram)
+    return first, rendering.estimate(tables, config, dram)
 
 
-def whole_frame(front: Preprocessing, back: Rendering, dram: DramConfig) -> WholeFrame:
-    """Both halves, estimated with this memory, where their requests take turns: rows are opened and the bus is turned more
-    often than for one after the other."""
+def shared_cycles(front: Preprocessing, back: Rendering, dram: DramConfig) -> int:
+    """Of the DRAM or its port for both halves, whose requests take turns: rows are opened and the bus is turned more often than for one after the other."""
     streams = [in_order(front.beats, dram, front.gather), *back.traffic]
     bursts, kinds = interleave(streams, c.DRAM_REQUEST_BURSTS)
     written = int((kinds != READ).sum()) * dram.burst_bytes
     port = dram.port_cycles(len(kinds) * dram.burst_bytes - written, written)
-    return WholeFrame(front, back, max(simulate(bursts, kinds, dram).cycles, port))
+    return max(simulate(bursts, kinds, dram).cycles, port)
+
+
+def whole_frame(first: Preprocessing, tables: TileLists, config: RenderConfig, dram: DramConfig) -> WholeFrame:
+    """A frame of a row of them, of what `first_half` returns."""
+    back = rendering.estimate(tables, config, dram, beside=sum(first.bytes.values()))
+    return WholeFrame(first, back, shared_cycles(first, back, dram))
