@@ -5,12 +5,12 @@
 // none; the groups come in order, then an element with out_end_o. done_o is high for a cycle when
 // that has been taken. chunked_i, position_i (of the camera), headers_i and geometry_i (beats where
 // the arrays begin) stay from start_i to done_o; the counts of beats until the next start.
-// cluster_o: of the table, whose groups leave next; 0 while there is none.
 // An error of the memory: error_o rises and stays until the next start, no group is added, what is
 // under way is read and dropped, clusters are taken and dropped up to the one with in_end_i, an
 // end element follows. A float of a header with exponent code 255, which no packed scene has: the
 // same, with damaged_o. Words of Gaussians that do not exist mean nothing. Floats of a header with
 // exponent code 0 count as 0.
+// cluster_o: of the table, whose groups leave next; 0 while there is none.
 //
 // For each cluster its header and those beats of its geometry that hold Gaussians are read. Headers
 // and geometry wait in memories of their own, Clusters headers and BufferBeats beats of geometry;
