@@ -510,8 +510,8 @@ module flk_top
     .b_resp_i
   );
 
-  logic [23:0] front_cluster;
-  logic few;  // of the front end's bursts
+  logic [23:0] front_cluster;  // of the table, that the front end is at
+  logic        few;            // of its bursts
 
   flk_front_throttle i_throttle (
     .clk_i,

@@ -597,7 +597,7 @@ def estimate(
     gap = max(1, 8 * RECORD_LINE // config.port_bits)  # lists, asked for ahead, stand back while lines of records come
 
     def settle(beside: int) -> tuple[int, int, np.ndarray, np.ndarray]:
-        """Cycles, lines of records, their places in `missed`, batches, records given: with the shares of the memory's time that they make."""
+        """Cycles, lines of records (`missed` says which), batches, records given: with the shares of the memory's time that they make."""
         busy = np.zeros(2)  # of what is not the records', and of that and what the front end moves
         for _ in range(ROUNDS if dram else 1):
             # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits. The front end takes nothing of the rate:
