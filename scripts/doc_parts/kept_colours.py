@@ -158,6 +158,7 @@ HARDWARE = (  # folder, path, with kept colours, memories, DRAM
     ("flowers", MOVING, True, "records", replace(WIDER, refresh=Refresh.PER_BANK)),
     ("playbot", MOVING, True, "records", DRAM), ("playbot", MOVING, True, "records", WIDER),
 )
+LIMIT = 0.1  # by which the chip model's interval may be off
 ROWS_OF = (3, 6)  # of these: what they open rows for
 
 
@@ -184,6 +185,8 @@ def _third(say: Say, view: RealView, case: Case, keeps: bool, config: RenderConf
         if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
     assert found.interval is not None
+    if abs(off := model.interval / found.interval - 1.0) > LIMIT:
+        raise FlickerError(f"{title}: the chip model's interval is {off:+.1%} off")
     return found, model
 
 
