@@ -602,22 +602,23 @@ def estimate(
         for _ in range(ROUNDS if dram else 1):
             # What else moves goes on all the time: a line of records has the rest of the memory's rate, and waits. The front end takes nothing of the rate:
             # it goes last.
-            rate, later = (*memory[:-1], memory[-1] / (1.0 - busy[0])), round(LOADED * busy[1] / (1.0 - busy[1]))
+            paced, later = (*memory[:-1], memory[-1] / (1.0 - busy[0])), round(LOADED * busy[1] / (1.0 - busy[1]))
             clock, misses, batches, given = _frame(
                 tables.start, tables.record, tables.mask, borders(tables.cols // 2, tables.rows), tables.chunk_start, chunk_entries, delay,
                 tables.batch_start, tables.batch_size, tables.batch_given, batch_delay, tables.by_tile(lists.start[:-1]), cores.mask, cores.cycles,
                 tables.by_tile(finish), tables.by_tile(finish_op), listed, RECORD_LINE // tables.frame.kind.bytes, sizes.record_lines // CACHE_WAYS, CACHE_WAYS,
                 READ + list_latency + later, line_latency + later, refresh, reads, early,
                 cores.generator_latency, cores.generator_fifo, cores.one_token, cores.depth, cores.finished_after, cores.leaves_after,
-                tables.by_tile(cores.served), tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, rate, gap,
+                tables.by_tile(cores.served), tables.by_tile(cores.needed), tables.regions.records // RECORD_LINE, paced, gap,
                 (held, latency(sizes.sorted_entries, **ways) + BEGIN + list_latency, sizes.list_chunks,
                  sizes.sorted_ahead + OUTPUTS, sizes.queued_records, sizes.pairs, config.sort_units), config.cores, missed,
             )
             others["lists"] = BEAT * int((tables.lines + tables.run_lines + tables.runs_read(batches)).sum())
             total = int(clock) + END + latency_cycles
             if dram:
-                least = min(EFFICIENCY * dram.bytes_per_second / CLOCK_HZ, config.port_bits / 8)  # bytes in a cycle, of the memory and its port
-                now = np.minimum((sum(others.values()) + np.array([0, BESIDE * beside])) / (least * total), MOST_BUSY)
+                rate = EFFICIENCY * dram.bytes_per_second / CLOCK_HZ  # bytes in a cycle
+                own = sum(others.values()) / (min(rate, config.port_bits / 8) * total)  # of the memory or its port, where the front end goes last
+                now = np.minimum(own + np.array([0.0, BESIDE * beside / (rate * total)]), MOST_BUSY)
                 if np.abs(now - busy).max() < SETTLED:
                     break
                 busy = (busy + now) / 2
