@@ -8,14 +8,15 @@
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
 // lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
-// Three AXI4 ports: lists (read, 512 bits, identifiers 0 to SortUnits - 1, of runs SortUnits to 2 SortUnits - 1), records (read, 256 bits), frame buffer and
-// runs (write, 512 bits).
+// Three AXI4 ports of 512 bits (flk_axi_pkg): lists (read, identifiers 0 to SortUnits - 1, of runs SortUnits to 2 SortUnits - 1), records (read, one beat of
+// 32 bytes, in the lower half whatever the address), frame buffer and runs (write).
 // stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
 // nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four of a tile say so the
 // sorting unit drops the list (not in the automatic mode, flk_render_stage).
 // No combinational path but those of flk_axi_read_mux and flk_line_writer.
 module flk_rendering
+  import flk_axi_pkg::*;
   import flk_pkg::*;
   import flk_counter_pkg::*;
   import flk_param_pkg::*;
@@ -42,9 +43,7 @@ module flk_rendering
   parameter  int unsigned Queue          = 128,  // records of each core
   parameter  int unsigned Gather         = 64,   // lines that are written together
   parameter  int unsigned Pairs          = 4,    // of tiles that the frame writer holds
-  parameter  int unsigned RecordLines    = 1024, // cached, of 32 bytes; a power of two
-  parameter  int unsigned IdBits         = 4,
-  localparam int unsigned AddrBits       = RENDERING_BEAT_BITS + 6
+  parameter  int unsigned RecordLines    = 1024  // cached, of 32 bytes; a power of two
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
@@ -60,51 +59,23 @@ module flk_rendering
   // The stage's counters of the last frame (flk_render_stage)
   input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
   output logic [COUNTER_BITS-1:0]      counter_data_o,
-  // Lists
-  output logic                 list_ar_valid_o,
-  input  logic                 list_ar_ready_i,
-  output logic [IdBits-1:0]    list_ar_id_o,
-  output logic [AddrBits-1:0]  list_ar_addr_o,
-  output logic [7:0]           list_ar_len_o,
-  output logic [2:0]           list_ar_size_o,
-  output logic [1:0]           list_ar_burst_o,
-  input  logic                 list_r_valid_i,
-  output logic                 list_r_ready_o,
-  input  logic [IdBits-1:0]    list_r_id_i,
-  input  logic [511:0]         list_r_data_i,
-  input  logic [1:0]           list_r_resp_i,
-  input  logic                 list_r_last_i,
-  // Records
-  output logic                 record_ar_valid_o,
-  input  logic                 record_ar_ready_i,
-  output logic [IdBits-1:0]    record_ar_id_o,
-  output logic [AddrBits-1:0]  record_ar_addr_o,
-  output logic [7:0]           record_ar_len_o,
-  output logic [2:0]           record_ar_size_o,
-  output logic [1:0]           record_ar_burst_o,
-  input  logic                 record_r_valid_i,
-  output logic                 record_r_ready_o,
-  input  logic [IdBits-1:0]    record_r_id_i,
-  input  logic [255:0]         record_r_data_i,
-  input  logic [1:0]           record_r_resp_i,
-  input  logic                 record_r_last_i,
-  // Frame buffer
-  output logic                 aw_valid_o,
-  input  logic                 aw_ready_i,
-  output logic [IdBits-1:0]    aw_id_o,
-  output logic [AddrBits-1:0]  aw_addr_o,
-  output logic [7:0]           aw_len_o,
-  output logic [2:0]           aw_size_o,
-  output logic [1:0]           aw_burst_o,
-  output logic                 w_valid_o,
-  input  logic                 w_ready_i,
-  output logic [511:0]         w_data_o,
-  output logic [63:0]          w_strb_o,
-  output logic                 w_last_o,
-  input  logic                 b_valid_i,
-  output logic                 b_ready_o,
-  input  logic [IdBits-1:0]    b_id_i,
-  input  logic [1:0]           b_resp_i
+  // AXI4: readers RENDERING_READ_*; of records only the lower half of a beat counts
+  output logic    [RENDERING_READERS-1:0] ar_valid_o,
+  input  logic    [RENDERING_READERS-1:0] ar_ready_i,
+  output axi_ax_t [RENDERING_READERS-1:0] ar_o,
+  input  logic    [RENDERING_READERS-1:0] r_valid_i,
+  output logic    [RENDERING_READERS-1:0] r_ready_o,
+  input  axi_r_t  [RENDERING_READERS-1:0] r_i,
+  // Frame buffer and runs
+  output logic                            aw_valid_o,
+  input  logic                            aw_ready_i,
+  output axi_ax_t                         aw_o,
+  output logic                            w_valid_o,
+  input  logic                            w_ready_i,
+  output axi_w_t                          w_o,
+  input  logic                            b_valid_i,
+  output logic                            b_ready_o,
+  input  axi_b_t                          b_i
 );
 
   localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? 128 : 256;
@@ -177,10 +148,7 @@ module flk_rendering
   logic [SortUnits-1:0]        tile_ready, tile_valid;
   logic [Readers-1:0]                 ask_valid, ask_ready, beat_valid, beat_ready;  // lists, runs
   logic [SortUnits-1:0]               list_valid, list_ready;  // lines
-  logic [Readers-1:0][AddrBits-1:0]   ask_addr;
-  logic [Readers-1:0][7:0]            ask_len;
-  logic [Readers-1:0][2:0]            ask_size;
-  logic [Readers-1:0][1:0]            ask_burst;
+  axi_ax_t [Readers-1:0]              ask;
   logic [SortUnits-1:0]               sorted_valid, sorted_ready, sorted_end, finish;
   logic [SortUnits-1:0][27:0]         sorted_entry;
   logic [SortUnits-1:0]               finish_unit, entry_ready;
@@ -239,14 +207,12 @@ module flk_rendering
     logic              line_last;
     logic [471:0]      line_entries;
     logic [3:0]        line_count;
-    logic [IdBits-1:0] unused_id, unused_run_id;
 
     assign tile_valid[u] = !walk_done && turn_q == TurnBits'(u);
 
     flk_list_reader #(
-      .Slots (Chunks),
-      .IdBits(IdBits),
-      .Id    (u)
+      .Slots(Chunks),
+      .Id   (u)
     ) i_reader (
       .clk_i,
       .rst_ni,
@@ -269,17 +235,10 @@ module flk_rendering
       .out_last_o    (line_last),
       .ar_valid_o    (ask_valid[u]),
       .ar_ready_i    (ask_ready[u]),
-      .ar_id_o       (unused_id),
-      .ar_addr_o     (ask_addr[u]),
-      .ar_len_o      (ask_len[u]),
-      .ar_size_o     (ask_size[u]),
-      .ar_burst_o    (ask_burst[u]),
+      .ar_o          (ask[u]),
       .r_valid_i     (beat_valid[u]),
       .r_ready_o     (beat_ready[u]),
-      .r_id_i        (list_r_id_i),
-      .r_data_i      (list_r_data_i),
-      .r_resp_i      (list_r_resp_i),
-      .r_last_i      (list_r_last_i)
+      .r_i           (r_i[RENDERING_READ_LISTS])
     );
 
     always_ff @(posedge clk_i) begin
@@ -292,7 +251,6 @@ module flk_rendering
       .Ways      (SortWays),
       .Runs      (Runs),
       .MergeLines(MergeLines),
-      .IdBits    (IdBits),
       .Id        (SortUnits + u)
     ) i_sorter (
       .clk_i,
@@ -323,17 +281,10 @@ module flk_rendering
       .written_i    (!run_open_q[u]),
       .ar_valid_o   (ask_valid[SortUnits+u]),
       .ar_ready_i   (ask_ready[SortUnits+u]),
-      .ar_id_o      (unused_run_id),
-      .ar_addr_o    (ask_addr[SortUnits+u]),
-      .ar_len_o     (ask_len[SortUnits+u]),
-      .ar_size_o    (ask_size[SortUnits+u]),
-      .ar_burst_o   (ask_burst[SortUnits+u]),
+      .ar_o         (ask[SortUnits+u]),
       .r_valid_i    (beat_valid[SortUnits+u]),
       .r_ready_o    (beat_ready[SortUnits+u]),
-      .r_id_i       (list_r_id_i),
-      .r_data_i     (list_r_data_i),
-      .r_resp_i     (list_r_resp_i),
-      .r_last_i     (list_r_last_i)
+      .r_i          (r_i[RENDERING_READ_LISTS])
     );
 
     flk_entry_buffer #(
@@ -357,30 +308,21 @@ module flk_rendering
   end
 
   flk_axi_read_mux #(
-    .Managers(Readers),
-    .AddrBits(AddrBits),
-    .IdBits  (IdBits)
+    .Managers(Readers)
   ) i_lists (
     .clk_i,
     .rst_ni,
     .ar_valid_i(ask_valid),
     .ar_ready_o(ask_ready),
-    .ar_addr_i (ask_addr),
-    .ar_len_i  (ask_len),
-    .ar_size_i (ask_size),
-    .ar_burst_i(ask_burst),
+    .ar_i      (ask),
     .r_valid_o (beat_valid),
     .r_ready_i (beat_ready),
-    .ar_valid_o(list_ar_valid_o),
-    .ar_ready_i(list_ar_ready_i),
-    .ar_id_o   (list_ar_id_o),
-    .ar_addr_o (list_ar_addr_o),
-    .ar_len_o  (list_ar_len_o),
-    .ar_size_o (list_ar_size_o),
-    .ar_burst_o(list_ar_burst_o),
-    .r_valid_i (list_r_valid_i),
-    .r_ready_o (list_r_ready_o),
-    .r_id_i    (list_r_id_i)
+    .ar_valid_o(ar_valid_o[RENDERING_READ_LISTS]),
+    .ar_ready_i(ar_ready_i[RENDERING_READ_LISTS]),
+    .ar_o      (ar_o[RENDERING_READ_LISTS]),
+    .r_valid_i (r_valid_i[RENDERING_READ_LISTS]),
+    .r_ready_o (r_ready_o[RENDERING_READ_LISTS]),
+    .r_id_i    (r_i[RENDERING_READ_LISTS].id)
   );
 
   // ---- records --------------------------------------------------------------------------------------
@@ -420,8 +362,8 @@ module flk_rendering
     .Sets      (RecordLines / (RecordBanks * RecordWays)),
     .Banks     (RecordBanks),
     .Ways      (RecordWays),
-    .AddrBits  (AddrBits),
-    .IdBits    (IdBits),
+    .AddrBits  (AXI_ADDR_BITS),
+    .IdBits    (AXI_ID_BITS),
     .Cores     (Cores)
   ) i_delivery (
     .clk_i,
@@ -446,20 +388,23 @@ module flk_rendering
     .out_record_o (record),
     .out_subtile_o(record_subtile),
     .finished_i   (finished),
-    .ar_valid_o   (record_ar_valid_o),
-    .ar_ready_i   (record_ar_ready_i),
-    .ar_id_o      (record_ar_id_o),
-    .ar_addr_o    (record_ar_addr_o),
-    .ar_len_o     (record_ar_len_o),
-    .ar_size_o    (record_ar_size_o),
-    .ar_burst_o   (record_ar_burst_o),
-    .r_valid_i    (record_r_valid_i),
-    .r_ready_o    (record_r_ready_o),
-    .r_id_i       (record_r_id_i),
-    .r_data_i     (record_r_data_i),
-    .r_resp_i     (record_r_resp_i),
-    .r_last_i     (record_r_last_i)
+    .ar_valid_o   (ar_valid_o[RENDERING_READ_RECORDS]),
+    .ar_ready_i   (ar_ready_i[RENDERING_READ_RECORDS]),
+    .ar_id_o      (ar_o[RENDERING_READ_RECORDS].id),
+    .ar_addr_o    (ar_o[RENDERING_READ_RECORDS].addr),
+    .ar_len_o     (ar_o[RENDERING_READ_RECORDS].len),
+    .ar_size_o    (ar_o[RENDERING_READ_RECORDS].size),
+    .ar_burst_o   (ar_o[RENDERING_READ_RECORDS].burst),
+    .r_valid_i    (r_valid_i[RENDERING_READ_RECORDS]),
+    .r_ready_o    (r_ready_o[RENDERING_READ_RECORDS]),
+    .r_id_i       (r_i[RENDERING_READ_RECORDS].id),
+    .r_data_i     (r_i[RENDERING_READ_RECORDS].data[255:0]),
+    .r_resp_i     (r_i[RENDERING_READ_RECORDS].resp),
+    .r_last_i     (r_i[RENDERING_READ_RECORDS].last)
   );
+
+  logic unused_half;
+  assign unused_half = ^r_i[RENDERING_READ_RECORDS].data[511:256];
 
   // ---- pixels ---------------------------------------------------------------------------------------
 
@@ -526,7 +471,7 @@ module flk_rendering
     end
 
     flk_tile_walk #(
-      .CoordBits(TILE_COORD_BITS)
+    .CoordBits(TILE_COORD_BITS)
     ) i_walk (
       .clk_i,
       .rst_ni,
@@ -704,7 +649,7 @@ module flk_rendering
     .Gather  (Gather),
     .Bursts  (Gather),
     .BeatBits(BeatBits),
-    .IdBits  (IdBits)
+    .IdBits  (AXI_ID_BITS)
   ) i_lines (
     .clk_i,
     .rst_ni,
@@ -720,20 +665,20 @@ module flk_rendering
     .in_data_i  (store[511:0]),
     .aw_valid_o,
     .aw_ready_i,
-    .aw_id_o,
-    .aw_addr_o,
-    .aw_len_o,
-    .aw_size_o,
-    .aw_burst_o,
+    .aw_id_o    (aw_o.id),
+    .aw_addr_o  (aw_o.addr),
+    .aw_len_o   (aw_o.len),
+    .aw_size_o  (aw_o.size),
+    .aw_burst_o (aw_o.burst),
     .w_valid_o,
     .w_ready_i,
-    .w_data_o,
-    .w_strb_o,
-    .w_last_o,
+    .w_data_o   (w_o.data),
+    .w_strb_o   (w_o.strb),
+    .w_last_o   (w_o.last),
     .b_valid_i,
     .b_ready_o,
-    .b_id_i,
-    .b_resp_i
+    .b_id_i     (b_i.id),
+    .b_resp_i   (b_i.resp)
   );
 
   // ---- counters -------------------------------------------------------------------------------------

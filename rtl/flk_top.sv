@@ -14,6 +14,7 @@
 // irq_o: a waiting interrupt that is enabled. Outputs depend on registers alone; w_ready_i and b_* reach
 // the writers combinationally.
 module flk_top
+  import flk_axi_pkg::*;
   import flk_counter_pkg::*;
   import flk_param_pkg::*;
   import flk_preproc_pkg::*;
@@ -51,9 +52,8 @@ module flk_top
   parameter  int unsigned Lists          = 16384, // of a list writer at most: up to 4096x4096
   parameter  int unsigned Patience       = 16,    // of the memory port's arbiters
   parameter  int unsigned PortBits       = 512,   // of the memory port: 128, 256, 512
-  localparam int unsigned IdBits         = 4,
-  localparam int unsigned PortIdBits     = IdBits + 3,
-  localparam int unsigned AddrBits       = TOP_ADDR_BITS,
+  localparam int unsigned PortIdBits     = AXI_ID_BITS + 3,
+  localparam int unsigned AddrBits       = AXI_ADDR_BITS,
   localparam int unsigned RegisterBits   = flk_registers_pkg::FLK_REGISTERS_MIN_ADDR_WIDTH
 ) (
   input  logic                    clk_i,
@@ -114,7 +114,7 @@ module flk_top
   input  logic [1:0]              b_resp_i
 );
 
-  localparam int unsigned Width = 512;  // of a line, which units read and write
+  localparam int unsigned Width = AXI_DATA_BITS;  // of a line, which units read and write
   localparam bit Keeps = ColourStore && Form == FORM_FACTORED;
 
   if (PortBits != 128 && PortBits != 256 && PortBits != Width) begin : gen_check_port
@@ -326,50 +326,58 @@ module flk_top
 
   // ---- memory port --------------------------------------------------------------------------------------
 
-  logic [READERS-1:0]               ar_valid, ar_ready, r_valid, read_ends;
-  logic [READERS-1:0]               port_ar_valid, port_ar_ready;
-  logic [READERS-1:0][IdBits-1:0]   ar_id;
-  logic [READERS-1:0][AddrBits-1:0] ar_addr;
-  logic [READERS-1:0][7:0]          ar_len;
-  logic [READERS-1:0][2:0]          ar_size;
-  logic [READERS-1:0][1:0]          unused_ar_burst;
-  logic [READERS-1:0]               r_ready;
-  logic [IdBits-1:0]                r_id;
-  logic [Width-1:0]                 r_data;
-  logic [1:0]                       r_resp;
-  logic                             r_last;
-  logic [WRITERS-1:0]               aw_valid, aw_ready, w_valid, w_ready, b_valid, b_ready;
-  logic [WRITERS-1:0]               port_aw_valid, port_aw_ready;
-  logic [WRITERS-1:0][IdBits-1:0]   aw_id;
-  logic [WRITERS-1:0][AddrBits-1:0] aw_addr;
-  logic [WRITERS-1:0][7:0]          aw_len;
-  logic [WRITERS-1:0][2:0]          aw_size;
-  logic [WRITERS-1:0][1:0]          unused_aw_burst;
-  logic [WRITERS-1:0][Width-1:0]    w_data;
-  logic [WRITERS-1:0][Width/8-1:0]  w_strb;
-  logic [WRITERS-1:0]               unused_w_last;
-  logic [IdBits-1:0]                b_id;
-  logic [1:0]                       b_resp;
-  logic [Width/2-1:0]               record_data;
-  logic                             line_ar_valid, line_ar_ready, line_aw_valid, line_aw_ready;
-  logic                             line_r_valid, line_r_last, unused_line_r_ready;  // always 1
-  logic                             line_w_valid, line_w_ready, line_w_last;
-  logic                             line_b_valid, line_b_ready;
-  logic [PortIdBits-1:0]            line_ar_id, line_r_id, line_aw_id, line_b_id;
-  logic [AddrBits-1:0]              line_ar_addr, line_aw_addr;
-  logic [7:0]                       line_ar_len, line_aw_len;
-  logic [2:0]                       line_ar_size, line_aw_size;
-  logic [1:0]                       line_ar_burst, line_aw_burst, line_r_resp, line_b_resp;
-  logic [3:0]                       line_ar_qos, line_aw_qos;
-  logic [Width-1:0]                 line_r_data, line_w_data;
-  logic [Width/8-1:0]               line_w_strb;
+  // Of the halves, the rendering half's first. A beat of reads and an answer go to all of them.
+  logic    [READERS-1:0] ar_valid, ar_ready, port_ar_valid, port_ar_ready;
+  logic    [READERS-1:0] r_valid, r_ready, read_ends;
+  axi_ax_t [READERS-1:0] ar;
+  axi_r_t                r, r_record;
+  logic    [WRITERS-1:0] aw_valid, aw_ready, port_aw_valid, port_aw_ready;
+  logic    [WRITERS-1:0] w_valid, w_ready, b_valid, b_ready;
+  axi_ax_t [WRITERS-1:0] aw;
+  axi_w_t  [WRITERS-1:0] w;
+  axi_b_t                b;
+  // Field by field, for the arbiter.
+  logic [READERS-1:0][AXI_ID_BITS-1:0] ar_id;
+  logic [READERS-1:0][AddrBits-1:0]    ar_addr;
+  logic [READERS-1:0][7:0]             ar_len;
+  logic [READERS-1:0][2:0]             ar_size;
+  logic [WRITERS-1:0][AXI_ID_BITS-1:0] aw_id;
+  logic [WRITERS-1:0][AddrBits-1:0]    aw_addr;
+  logic [WRITERS-1:0][7:0]             aw_len;
+  logic [WRITERS-1:0][2:0]             aw_size;
+  logic [WRITERS-1:0][Width-1:0]       w_data;
+  logic [WRITERS-1:0][Width/8-1:0]     w_strb;
+  logic [Width/2-1:0]                  record_data;
+  logic                                line_ar_valid, line_ar_ready, line_aw_valid, line_aw_ready;
+  logic                                line_r_valid, line_r_last, unused_line_r_ready;  // always 1
+  logic                                line_w_valid, line_w_ready, line_w_last;
+  logic                                line_b_valid, line_b_ready;
+  logic [PortIdBits-1:0]               line_ar_id, line_r_id, line_aw_id, line_b_id;
+  logic [AddrBits-1:0]                 line_ar_addr, line_aw_addr;
+  logic [7:0]                          line_ar_len, line_aw_len;
+  logic [2:0]                          line_ar_size, line_aw_size;
+  logic [1:0]                          line_ar_burst, line_aw_burst, line_r_resp, line_b_resp;
+  logic [3:0]                          line_ar_qos, line_aw_qos;
+  logic [Width-1:0]                    line_r_data, line_w_data;
+  logic [Width/8-1:0]                  line_w_strb;
+
+  for (genvar k = 0; k < READERS; k++) begin : gen_reader
+    logic [1:0] unused_burst;  // INCR
+    assign {ar_id[k], ar_addr[k], ar_len[k], ar_size[k], unused_burst} = ar[k];
+  end
+  for (genvar k = 0; k < WRITERS; k++) begin : gen_writer
+    logic [1:0] unused_burst;
+    logic       unused_last;  // of w: the arbiter counts beats
+    assign {aw_id[k], aw_addr[k], aw_len[k], aw_size[k], unused_burst} = aw[k];
+    assign {unused_last, w_strb[k], w_data[k]} = w[k];
+  end
 
   flk_axi_arbiter #(
     .Readers (READERS),
     .Writers (WRITERS),
     .AddrBits(AddrBits),
     .Width   (Width),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Patience(Patience)
   ) i_port (
     .clk_i,
@@ -386,10 +394,10 @@ module flk_top
     .ar_len_i  (ar_len),
     .ar_size_i (ar_size),
     .r_valid_o (r_valid),
-    .r_id_o    (r_id),
-    .r_data_o  (r_data),
-    .r_resp_o  (r_resp),
-    .r_last_o  (r_last),
+    .r_id_o    (r.id),
+    .r_data_o  (r.data),
+    .r_resp_o  (r.resp),
+    .r_last_o  (r.last),
     .aw_valid_i(port_aw_valid),
     .aw_ready_o(port_aw_ready),
     .aw_id_i   (aw_id),
@@ -401,8 +409,8 @@ module flk_top
     .w_data_i  (w_data),
     .w_strb_i  (w_strb),
     .b_valid_o (b_valid),
-    .b_id_o    (b_id),
-    .b_resp_o  (b_resp),
+    .b_id_o    (b.id),
+    .b_resp_o  (b.resp),
     .ar_valid_o(line_ar_valid),
     .ar_ready_i(line_ar_ready),
     .ar_id_o   (line_ar_id),
@@ -441,7 +449,7 @@ module flk_top
     .Width   (Width),
     .PortBits(PortBits),
     .IdBits  (PortIdBits),
-    .OwnBits (IdBits),
+    .OwnBits (AXI_ID_BITS),
     .UsedBits(READ_ID_BITS)
   ) i_downsizer (
     .clk_i,
@@ -573,7 +581,7 @@ module flk_top
     .b_valid_i    (b_valid[RENDERING_WRITERS-1:0])
   );
 
-  assign read_ends = r_valid & {READERS{r_last}};
+  assign read_ends = r_valid & {READERS{r.last}};
 
   flk_axi_half #(
     .Width   (Width / 2),
@@ -581,12 +589,18 @@ module flk_top
   ) i_records (
     .clk_i,
     .rst_ni   (rendering_rst_n),
-    .ar_move_i(ar_valid[READ_RECORDS] && ar_ready[READ_RECORDS]),
-    .ar_addr_i(ar_addr[READ_RECORDS]),
-    .r_valid_i(r_valid[READ_RECORDS]),
-    .r_data_i (r_data),
+    .ar_move_i(ar_valid[RENDERING_READ_RECORDS] &&
+               ar_ready[RENDERING_READ_RECORDS]),
+    .ar_addr_i(ar_addr[RENDERING_READ_RECORDS]),
+    .r_valid_i(r_valid[RENDERING_READ_RECORDS]),
+    .r_data_i (r.data),
     .r_data_o (record_data)
   );
+
+  always_comb begin
+    r_record      = r;
+    r_record.data = Width'(record_data);
+  end
 
   // ---- halves -------------------------------------------------------------------------------------------
 
@@ -612,110 +626,40 @@ module flk_top
   logic [COUNTER_BITS-1:0]      stage_data;
 
   flk_preprocessing #(
-    .Form        (Form),
-    .PreprocLanes(PreprocLanes),
+    .Form           (Form),
+    .PreprocLanes   (PreprocLanes),
     .PreprocInterval(PreprocInterval),
-    .ListWriters (ListWriters),
-    .ColourStore (ColourStore),
-    .Pointers    (Pointers),
-    .Lists       (Lists),
-    .Gather      (Gather),
-    .Waiting     (Waiting),
-    .IdBits      (IdBits)
+    .ListWriters    (ListWriters),
+    .ColourStore    (ColourStore),
+    .Pointers       (Pointers),
+    .Lists          (Lists),
+    .Gather         (Gather),
+    .Waiting        (Waiting)
   ) i_front (
-    .clk_i               (front_clk),
-    .rst_ni              (front_rst_n),
-    .start_i             (front_start),
-    .idle_o              (front_idle),
-    .done_o              (front_end),
-    .cluster_o           (front_cluster),
-    .registers_i         (front),
-    .error_o             (front_error),
-    .counters_o          (front_counters),
-    .table_ar_valid_o    (ar_valid[READ_TABLE]),
-    .table_ar_ready_i    (ar_ready[READ_TABLE]),
-    .table_ar_id_o       (ar_id[READ_TABLE]),
-    .table_ar_addr_o     (ar_addr[READ_TABLE]),
-    .table_ar_len_o      (ar_len[READ_TABLE]),
-    .table_ar_size_o     (ar_size[READ_TABLE]),
-    .table_ar_burst_o    (unused_ar_burst[READ_TABLE]),
-    .table_r_valid_i     (r_valid[READ_TABLE]),
-    .table_r_ready_o     (r_ready[READ_TABLE]),
-    .table_r_id_i        (r_id),
-    .table_r_data_i      (r_data),
-    .table_r_resp_i      (r_resp),
-    .table_r_last_i      (r_last),
-    .geometry_ar_valid_o (ar_valid[READ_GEOMETRY]),
-    .geometry_ar_ready_i (ar_ready[READ_GEOMETRY]),
-    .geometry_ar_id_o    (ar_id[READ_GEOMETRY]),
-    .geometry_ar_addr_o  (ar_addr[READ_GEOMETRY]),
-    .geometry_ar_len_o   (ar_len[READ_GEOMETRY]),
-    .geometry_ar_size_o  (ar_size[READ_GEOMETRY]),
-    .geometry_ar_burst_o (unused_ar_burst[READ_GEOMETRY]),
-    .geometry_r_valid_i  (r_valid[READ_GEOMETRY]),
-    .geometry_r_ready_o  (r_ready[READ_GEOMETRY]),
-    .geometry_r_id_i     (r_id),
-    .geometry_r_data_i   (r_data),
-    .geometry_r_resp_i   (r_resp),
-    .geometry_r_last_i   (r_last),
-    .colour_ar_valid_o   (ar_valid[READ_COLOURS]),
-    .colour_ar_ready_i   (ar_ready[READ_COLOURS]),
-    .colour_ar_id_o      (ar_id[READ_COLOURS]),
-    .colour_ar_addr_o    (ar_addr[READ_COLOURS]),
-    .colour_ar_len_o     (ar_len[READ_COLOURS]),
-    .colour_ar_size_o    (ar_size[READ_COLOURS]),
-    .colour_ar_burst_o   (unused_ar_burst[READ_COLOURS]),
-    .colour_r_valid_i    (r_valid[READ_COLOURS]),
-    .colour_r_ready_o    (r_ready[READ_COLOURS]),
-    .colour_r_id_i       (r_id),
-    .colour_r_data_i     (r_data),
-    .colour_r_resp_i     (r_resp),
-    .colour_r_last_i     (r_last),
-    .pointer_ar_valid_o  (ar_valid[READ_POINTERS]),
-    .pointer_ar_ready_i  (ar_ready[READ_POINTERS]),
-    .pointer_ar_id_o     (ar_id[READ_POINTERS]),
-    .pointer_ar_addr_o   (ar_addr[READ_POINTERS]),
-    .pointer_ar_len_o    (ar_len[READ_POINTERS]),
-    .pointer_ar_size_o   (ar_size[READ_POINTERS]),
-    .pointer_ar_burst_o  (unused_ar_burst[READ_POINTERS]),
-    .pointer_r_valid_i   (r_valid[READ_POINTERS]),
-    .pointer_r_ready_o   (r_ready[READ_POINTERS]),
-    .pointer_r_id_i      (r_id),
-    .pointer_r_data_i    (r_data),
-    .pointer_r_resp_i    (r_resp),
-    .pointer_r_last_i    (r_last),
-    .pointer_aw_valid_o  (aw_valid[WRITE_POINTERS]),
-    .pointer_aw_ready_i  (aw_ready[WRITE_POINTERS]),
-    .pointer_aw_id_o     (aw_id[WRITE_POINTERS]),
-    .pointer_aw_addr_o   (aw_addr[WRITE_POINTERS]),
-    .pointer_aw_len_o    (aw_len[WRITE_POINTERS]),
-    .pointer_aw_size_o   (aw_size[WRITE_POINTERS]),
-    .pointer_aw_burst_o  (unused_aw_burst[WRITE_POINTERS]),
-    .pointer_w_valid_o   (w_valid[WRITE_POINTERS]),
-    .pointer_w_ready_i   (w_ready[WRITE_POINTERS]),
-    .pointer_w_data_o    (w_data[WRITE_POINTERS]),
-    .pointer_w_strb_o    (w_strb[WRITE_POINTERS]),
-    .pointer_w_last_o    (unused_w_last[WRITE_POINTERS]),
-    .pointer_b_valid_i   (b_valid[WRITE_POINTERS]),
-    .pointer_b_ready_o   (b_ready[WRITE_POINTERS]),
-    .pointer_b_id_i      (b_id),
-    .pointer_b_resp_i    (b_resp),
-    .aw_valid_o          (aw_valid[WRITE_FRONT]),
-    .aw_ready_i          (aw_ready[WRITE_FRONT]),
-    .aw_id_o             (aw_id[WRITE_FRONT]),
-    .aw_addr_o           (aw_addr[WRITE_FRONT]),
-    .aw_len_o            (aw_len[WRITE_FRONT]),
-    .aw_size_o           (aw_size[WRITE_FRONT]),
-    .aw_burst_o          (unused_aw_burst[WRITE_FRONT]),
-    .w_valid_o           (w_valid[WRITE_FRONT]),
-    .w_ready_i           (w_ready[WRITE_FRONT]),
-    .w_data_o            (w_data[WRITE_FRONT]),
-    .w_strb_o            (w_strb[WRITE_FRONT]),
-    .w_last_o            (unused_w_last[WRITE_FRONT]),
-    .b_valid_i           (b_valid[WRITE_FRONT]),
-    .b_ready_o           (b_ready[WRITE_FRONT]),
-    .b_id_i              (b_id),
-    .b_resp_i            (b_resp)
+    .clk_i      (front_clk),
+    .rst_ni     (front_rst_n),
+    .start_i    (front_start),
+    .idle_o     (front_idle),
+    .done_o     (front_end),
+    .cluster_o  (front_cluster),
+    .registers_i(front),
+    .error_o    (front_error),
+    .counters_o (front_counters),
+    .ar_valid_o (ar_valid[READERS-1:RENDERING_READERS]),
+    .ar_ready_i (ar_ready[READERS-1:RENDERING_READERS]),
+    .ar_o       (ar[READERS-1:RENDERING_READERS]),
+    .r_valid_i  (r_valid[READERS-1:RENDERING_READERS]),
+    .r_ready_o  (r_ready[READERS-1:RENDERING_READERS]),
+    .r_i        ({FRONT_READERS{r}}),
+    .aw_valid_o (aw_valid[WRITERS-1:RENDERING_WRITERS]),
+    .aw_ready_i (aw_ready[WRITERS-1:RENDERING_WRITERS]),
+    .aw_o       (aw[WRITERS-1:RENDERING_WRITERS]),
+    .w_valid_o  (w_valid[WRITERS-1:RENDERING_WRITERS]),
+    .w_ready_i  (w_ready[WRITERS-1:RENDERING_WRITERS]),
+    .w_o        (w[WRITERS-1:RENDERING_WRITERS]),
+    .b_valid_i  (b_valid[WRITERS-1:RENDERING_WRITERS]),
+    .b_ready_o  (b_ready[WRITERS-1:RENDERING_WRITERS]),
+    .b_i        ({FRONT_WRITERS{b}})
   );
 
   flk_rendering #(
@@ -739,64 +683,36 @@ module flk_top
     .Entries       (Entries),
     .Queue         (Queue),
     .Pairs         (Pairs),
-    .RecordLines   (RecordLines),
-    .IdBits        (IdBits)
+    .RecordLines   (RecordLines)
   ) i_rendering (
-    .clk_i              (rendering_clk),
-    .rst_ni             (rendering_rst_n),
-    .start_i            (rendering_start),
-    .idle_o             (rendering_idle),
-    .registers_i        (rendering),
-    .done_o             (rendering_end),
-    .error_o            (rendering_error),
-    .stop_i             (rendering_stop),
-    .stopped_o          (pairs_stopped),
-    .left_o             (rendering_left),
-    .counters_o         (rendering_counters),
-    .counter_addr_i     (stage_addr),
-    .counter_data_o     (stage_data),
-    .list_ar_valid_o    (ar_valid[READ_LISTS]),
-    .list_ar_ready_i    (ar_ready[READ_LISTS]),
-    .list_ar_id_o       (ar_id[READ_LISTS]),
-    .list_ar_addr_o     (ar_addr[READ_LISTS]),
-    .list_ar_len_o      (ar_len[READ_LISTS]),
-    .list_ar_size_o     (ar_size[READ_LISTS]),
-    .list_ar_burst_o    (unused_ar_burst[READ_LISTS]),
-    .list_r_valid_i     (r_valid[READ_LISTS]),
-    .list_r_ready_o     (r_ready[READ_LISTS]),
-    .list_r_id_i        (r_id),
-    .list_r_data_i      (r_data),
-    .list_r_resp_i      (r_resp),
-    .list_r_last_i      (r_last),
-    .record_ar_valid_o  (ar_valid[READ_RECORDS]),
-    .record_ar_ready_i  (ar_ready[READ_RECORDS]),
-    .record_ar_id_o     (ar_id[READ_RECORDS]),
-    .record_ar_addr_o   (ar_addr[READ_RECORDS]),
-    .record_ar_len_o    (ar_len[READ_RECORDS]),
-    .record_ar_size_o   (ar_size[READ_RECORDS]),
-    .record_ar_burst_o  (unused_ar_burst[READ_RECORDS]),
-    .record_r_valid_i   (r_valid[READ_RECORDS]),
-    .record_r_ready_o   (r_ready[READ_RECORDS]),
-    .record_r_id_i      (r_id),
-    .record_r_data_i    (record_data),
-    .record_r_resp_i    (r_resp),
-    .record_r_last_i    (r_last),
-    .aw_valid_o         (aw_valid[WRITE_FRAME]),
-    .aw_ready_i         (aw_ready[WRITE_FRAME]),
-    .aw_id_o            (aw_id[WRITE_FRAME]),
-    .aw_addr_o          (aw_addr[WRITE_FRAME]),
-    .aw_len_o           (aw_len[WRITE_FRAME]),
-    .aw_size_o          (aw_size[WRITE_FRAME]),
-    .aw_burst_o         (unused_aw_burst[WRITE_FRAME]),
-    .w_valid_o          (w_valid[WRITE_FRAME]),
-    .w_ready_i          (w_ready[WRITE_FRAME]),
-    .w_data_o           (w_data[WRITE_FRAME]),
-    .w_strb_o           (w_strb[WRITE_FRAME]),
-    .w_last_o           (unused_w_last[WRITE_FRAME]),
-    .b_valid_i          (b_valid[WRITE_FRAME]),
-    .b_ready_o          (b_ready[WRITE_FRAME]),
-    .b_id_i             (b_id),
-    .b_resp_i           (b_resp)
+    .clk_i         (rendering_clk),
+    .rst_ni        (rendering_rst_n),
+    .start_i       (rendering_start),
+    .idle_o        (rendering_idle),
+    .registers_i   (rendering),
+    .done_o        (rendering_end),
+    .error_o       (rendering_error),
+    .stop_i        (rendering_stop),
+    .stopped_o     (pairs_stopped),
+    .left_o        (rendering_left),
+    .counters_o    (rendering_counters),
+    .counter_addr_i(stage_addr),
+    .counter_data_o(stage_data),
+    .ar_valid_o    (ar_valid[RENDERING_READERS-1:0]),
+    .ar_ready_i    (ar_ready[RENDERING_READERS-1:0]),
+    .ar_o          (ar[RENDERING_READERS-1:0]),
+    .r_valid_i     (r_valid[RENDERING_READERS-1:0]),
+    .r_ready_o     (r_ready[RENDERING_READERS-1:0]),
+    .r_i           ({r, r_record}),
+    .aw_valid_o    (aw_valid[0]),
+    .aw_ready_i    (aw_ready[0]),
+    .aw_o          (aw[0]),
+    .w_valid_o     (w_valid[0]),
+    .w_ready_i     (w_ready[0]),
+    .w_o           (w[0]),
+    .b_valid_i     (b_valid[0]),
+    .b_ready_o     (b_ready[0]),
+    .b_i           (b)
   );
 
   // ---- counters -------------------------------------------------------------------------------------------

@@ -85,6 +85,18 @@ RECORDS: dict[str, Record] = {
         ),
     )
 }
+# Channels of AXI4 inside the chip, each beside its valid and ready.
+AXI_ID_BITS, AXI_ADDR_BITS, AXI_DATA_BITS = 4, 40, 512
+_ID, _ADDR, _DATA = ((bits, "", f"AXI_{name}_BITS") for name, bits in (("ID", AXI_ID_BITS), ("ADDR", AXI_ADDR_BITS), ("DATA", AXI_DATA_BITS)))
+RECORDS |= {
+    record.name: record
+    for record in (
+        _record("axi_ax", "AR, AW.", ("id", *_ID), ("addr", *_ADDR), ("len", 8), ("size", 3), ("burst", 2), package="flk_axi_pkg"),
+        _record("axi_r", "R.", ("id", *_ID), ("last", 1), ("resp", 2), ("data", *_DATA), package="flk_axi_pkg"),
+        _record("axi_w", "W.", ("last", 1), ("strb", AXI_DATA_BITS // 8, "", "AXI_DATA_BITS/8"), ("data", *_DATA), package="flk_axi_pkg"),
+        _record("axi_b", "B.", ("id", *_ID), ("resp", 2), package="flk_axi_pkg"),
+    )
+}
 # Records whose size the package gives a name.
 SIZED = ("splat_elem", "feature_elem", "channel_pixel", "core_pixel")
 

@@ -1,40 +1,33 @@
 // Read managers that share an AXI4 port: addresses in turn, answers by identifier.
 //
-// Manager k uses the identifier k alone, in the low bits, and is ready for its beats whenever they come (it asks only for what has a
+// Manager k gets the identifier k, in the low bits, and is ready for its beats whenever they come (it asks only for what has a
 // place), so no manager waits for another one's beats. An address that is offered stays until it is taken. Latency 0: addresses pass
-// combinationally, ar_ready_i to ar_ready_o too, in turn while several ask; beats go to all managers, valid only for the one that is
-// meant. r_ready_o is 1.
-module flk_axi_read_mux #(
+// combinationally, ar_ready_i to ar_ready_o too, in turn while several ask; beats go to all managers past this unit, valid only for
+// the one that is meant. r_ready_o is 1.
+module flk_axi_read_mux
+  import flk_axi_pkg::*;
+#(
   parameter  int unsigned Managers = 4,
-  parameter  int unsigned AddrBits = 40,
-  parameter  int unsigned IdBits   = 4,
   localparam int unsigned OwnBits  = $clog2(Managers)
 ) (
-  input  logic                              clk_i,
-  input  logic                              rst_ni,
+  input  logic                   clk_i,
+  input  logic                   rst_ni,
   // Managers
-  input  logic [Managers-1:0]               ar_valid_i,
-  output logic [Managers-1:0]               ar_ready_o,
-  input  logic [Managers-1:0][AddrBits-1:0] ar_addr_i,
-  input  logic [Managers-1:0][7:0]          ar_len_i,
-  input  logic [Managers-1:0][2:0]          ar_size_i,
-  input  logic [Managers-1:0][1:0]          ar_burst_i,
-  output logic [Managers-1:0]               r_valid_o,
-  input  logic [Managers-1:0]               r_ready_i,
+  input  logic    [Managers-1:0] ar_valid_i,
+  output logic    [Managers-1:0] ar_ready_o,
+  input  axi_ax_t [Managers-1:0] ar_i,  // identifiers do not matter
+  output logic    [Managers-1:0] r_valid_o,
+  input  logic    [Managers-1:0] r_ready_i,
   // Port
-  output logic                              ar_valid_o,
-  input  logic                              ar_ready_i,
-  output logic [IdBits-1:0]                 ar_id_o,
-  output logic [AddrBits-1:0]               ar_addr_o,
-  output logic [7:0]                        ar_len_o,
-  output logic [2:0]                        ar_size_o,
-  output logic [1:0]                        ar_burst_o,
-  input  logic                              r_valid_i,
-  output logic                              r_ready_o,
-  input  logic [IdBits-1:0]                 r_id_i
+  output logic                   ar_valid_o,
+  input  logic                   ar_ready_i,
+  output axi_ax_t                ar_o,
+  input  logic                   r_valid_i,
+  output logic                   r_ready_o,
+  input  logic [AXI_ID_BITS-1:0] r_id_i
 );
 
-  localparam int unsigned AskBits = AddrBits + 13;
+  localparam int unsigned AskBits = $bits(axi_ax_t) - AXI_ID_BITS;
 
   logic [Managers-1:0][AskBits-1:0] ask;
   logic [OwnBits-1:0]               index;
@@ -42,8 +35,10 @@ module flk_axi_read_mux #(
   logic [AskBits-1:0]               out;
 
   for (genvar k = 0; k < Managers; k++) begin : gen_manager
-    assign ask[k]       = {ar_addr_i[k], ar_len_i[k], ar_size_i[k], ar_burst_i[k]};
-    assign r_valid_o[k] = r_valid_i && r_id_i == IdBits'(k);
+    logic unused_id;
+    assign unused_id    = ^ar_i[k].id;
+    assign ask[k]       = ar_i[k][AskBits-1:0];
+    assign r_valid_o[k] = r_valid_i && r_id_i == AXI_ID_BITS'(k);
 `ifndef SYNTHESIS
     assert property (@(posedge clk_i) disable iff (!rst_ni) r_valid_o[k] |-> r_ready_i[k])
     else $error("flk_axi_read_mux: a manager is not ready for what it asked for");
@@ -68,8 +63,7 @@ module flk_axi_read_mux #(
 
   assign ar_valid_o = out_valid;
   assign out_ready  = ar_ready_i;
-  assign ar_id_o    = IdBits'(index);
-  assign {ar_addr_o, ar_len_o, ar_size_o, ar_burst_o} = out;
+  assign ar_o       = {AXI_ID_BITS'(index), out};
   assign r_ready_o  = 1'b1;
 
   logic unused_ready;

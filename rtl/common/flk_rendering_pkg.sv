@@ -1,9 +1,16 @@
-// Rendering half of the chip: registers of a frame.
+// Rendering half of the chip: registers of a frame, ports.
 package flk_rendering_pkg;
+  import flk_axi_pkg::*;
 
-  localparam int unsigned RENDERING_BEAT_BITS = 34;  // of an address in 64 bytes
+  localparam int unsigned RENDERING_BEAT_BITS = AXI_BEAT_BITS;
   localparam int unsigned TILE_COORD_BITS = 8;
   localparam int unsigned STRIDE_BITS = 12;
+
+  // Ports, in the order in which they go at the chip's.
+  localparam int unsigned RENDERING_READERS = 2;
+  localparam int unsigned RENDERING_READ_RECORDS = 0;
+  localparam int unsigned RENDERING_READ_LISTS = 1;
+  localparam int unsigned RENDERING_WRITERS = 1;
 
   typedef struct packed {
     logic [2:0]                     mode;        // of the contribution test, CAT_*

@@ -12,18 +12,17 @@
 // Throughput: a cluster every 16 cycles; the first one leaves about the memory's latency and 60
 // cycles after start_i. Beats wait in a buffer of BufferBeats, requests in its free places: the
 // port never waits. Back-pressure of the clusters stops the test. No combinational paths but
-// r_*_i to the buffer and ar_ready_i to the requests.
+// r_valid_i and r_i to the buffer and ar_ready_i to the requests.
 module flk_cluster_cull
+  import flk_axi_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned BufferBeats = 16,  // less MaxBeats, times 32: cycles of latency it hides
   parameter  int unsigned MaxBeats    = 4,   // of a burst
   parameter  int unsigned Bursts      = 4,   // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
-  localparam int unsigned Width       = 512,
-  localparam int unsigned AddrBits    = BEAT_BITS + 6
+  localparam int unsigned Width       = AXI_DATA_BITS
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
@@ -47,17 +46,10 @@ module flk_cluster_cull
   // AXI4
   output logic                 ar_valid_o,
   input  logic                 ar_ready_i,
-  output logic [IdBits-1:0]    ar_id_o,
-  output logic [AddrBits-1:0]  ar_addr_o,
-  output logic [7:0]           ar_len_o,
-  output logic [2:0]           ar_size_o,
-  output logic [1:0]           ar_burst_o,
+  output axi_ax_t              ar_o,
   input  logic                 r_valid_i,
   output logic                 r_ready_o,
-  input  logic [IdBits-1:0]    r_id_i,
-  input  logic [Width-1:0]     r_data_i,
-  input  logic [1:0]           r_resp_i,
-  input  logic                 r_last_i
+  input  axi_r_t               r_i
 );
 
   localparam int unsigned Interval = 16;  // of flk_cluster_test
@@ -130,12 +122,12 @@ module flk_cluster_cull
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(24),
     .Width   (Width),
     .MaxBeats(MaxBeats),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_fetch (
     .clk_i,
@@ -155,17 +147,17 @@ module flk_cluster_cull
     .out_error_o(beat_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   logic not_finite_q;  // the entry that was loaded has a float that is not

@@ -8,8 +8,9 @@
 // A frame: start_i while idle_o; registers stay until idle_o after the last survivors. An error of
 // the memory: error_o rises and stays until the next start; parts come, but mean nothing.
 // Throughput: a beat a cycle, a part a cycle and lane, a group every two cycles. Latency is the
-// memory's and 10. Combinational: ar_ready_i to the requests, r_*_i to the buffer's write port.
+// memory's and 10. Combinational: ar_ready_i to the requests, r_valid_i and r_i to the buffer's write port.
 module flk_colour_fetch
+  import flk_axi_pkg::*;
   import flk_preproc_pkg::*;
 #(
   parameter  int unsigned Lanes       = LANES, // 1, 2 or 4
@@ -17,10 +18,8 @@ module flk_colour_fetch
   parameter  int unsigned Items       = 128, // Gaussians of a lane that wait for colours
   parameter  int unsigned MaxBeats    = 16,
   parameter  int unsigned Bursts      = 64,  // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
-  localparam int unsigned Width       = 512,
-  localparam int unsigned AddrBits    = BEAT_BITS + 6
+  localparam int unsigned Width       = AXI_DATA_BITS
 ) (
   input  logic                     clk_i,
   input  logic                     rst_ni,
@@ -44,17 +43,10 @@ module flk_colour_fetch
   // AXI4
   output logic                     ar_valid_o,
   input  logic                     ar_ready_i,
-  output logic [IdBits-1:0]        ar_id_o,
-  output logic [AddrBits-1:0]      ar_addr_o,
-  output logic [7:0]               ar_len_o,
-  output logic [2:0]               ar_size_o,
-  output logic [1:0]               ar_burst_o,
+  output axi_ax_t                  ar_o,
   input  logic                     r_valid_i,
   output logic                     r_ready_o,
-  input  logic [IdBits-1:0]        r_id_i,
-  input  logic [Width-1:0]         r_data_i,
-  input  logic [1:0]               r_resp_i,
-  input  logic                     r_last_i
+  input  axi_r_t                   r_i
 );
 
   localparam int unsigned BYTE_BITS = 15;  // of an offset in a cluster's colours: 256 x 100 bytes
@@ -213,13 +205,13 @@ module flk_colour_fetch
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(BeatBits),
     .TagBits ($bits(mark_t)),
     .Width   (Width),
     .MaxBeats(MaxBeats),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_fetch (
     .clk_i,
@@ -239,17 +231,17 @@ module flk_colour_fetch
     .out_error_o(fetch_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   // The tag is that of a request's first beat; the others count on.

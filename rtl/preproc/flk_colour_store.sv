@@ -8,8 +8,9 @@
 // A frame: start_i while idle_o; registers stay until idle_o. flush_i, from the front's end on: clusters whose turns do not come
 // any more go. failing_i, until the frame's end: what has been read is wrong, and turns of some clusters do not come; nothing is shown or
 // kept any more. An error of the memory: error_o rises and stays until the next start; the same holds, so that no wrong colour is kept.
-// Combinational: out_ready_i to in_ready_o, in_* to out_*; ar_ready_i to the requests, r_*_i to the buffer's write port.
+// Combinational: out_ready_i to in_ready_o, in_* to out_*; ar_ready_i to the requests, r_valid_i and r_i to the buffer's write port.
 module flk_colour_store
+  import flk_axi_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
@@ -17,10 +18,8 @@ module flk_colour_store
   parameter  int unsigned Waiting     = 128,   // survivors of a lane that wait for colours
   parameter  int unsigned BufferBeats = 32,
   parameter  int unsigned Bursts      = 32,    // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
-  localparam int unsigned Width       = 512,
-  localparam int unsigned AddrBits    = BEAT_BITS + 6
+  localparam int unsigned Width       = AXI_DATA_BITS
 ) (
   input  logic                     clk_i,
   input  logic                     rst_ni,
@@ -65,17 +64,10 @@ module flk_colour_store
   // AXI4
   output logic                     ar_valid_o,
   input  logic                     ar_ready_i,
-  output logic [IdBits-1:0]        ar_id_o,
-  output logic [AddrBits-1:0]      ar_addr_o,
-  output logic [7:0]               ar_len_o,
-  output logic [2:0]               ar_size_o,
-  output logic [1:0]               ar_burst_o,
+  output axi_ax_t                  ar_o,
   input  logic                     r_valid_i,
   output logic                     r_ready_o,
-  input  logic [IdBits-1:0]        r_id_i,
-  input  logic [Width-1:0]         r_data_i,
-  input  logic [1:0]               r_resp_i,
-  input  logic                     r_last_i
+  input  axi_r_t                   r_i
 );
 
   typedef struct packed {
@@ -230,12 +222,12 @@ module flk_colour_store
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(2),
     .Width   (Width),
     .MaxBeats(2),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_fetch (
     .clk_i,
@@ -255,17 +247,17 @@ module flk_colour_store
     .out_error_o(fetch_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   flk_sram_fifo #(

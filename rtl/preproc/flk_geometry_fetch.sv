@@ -18,8 +18,9 @@
 // ready behind flk_cluster_header, stopped with it at its output, when the present one's last group
 // leaves. Throughput: four groups in four cycles (chunked_i) or five, while BufferBeats beats hide
 // the latency; a cluster takes at least five cycles. Combinational: out_ready_i to the read enable
-// of the buffer, r_*_i to its write port, ar_ready_i to the requests.
+// of the buffer, r_valid_i and r_i to its write port, ar_ready_i to the requests.
 module flk_geometry_fetch
+  import flk_axi_pkg::*;
   import flk_front_pkg::*;
   import flk_preproc_pkg::*;
 #(
@@ -27,10 +28,8 @@ module flk_geometry_fetch
   parameter  int unsigned Clusters    = 8,   // under way
   parameter  int unsigned MaxBeats    = 8,   // of a burst
   parameter  int unsigned Bursts      = 32,  // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
-  localparam int unsigned Width       = 512,
-  localparam int unsigned AddrBits    = BEAT_BITS + 6
+  localparam int unsigned Width       = AXI_DATA_BITS
 ) (
   input  logic                 clk_i,
   input  logic                 rst_ni,
@@ -60,17 +59,10 @@ module flk_geometry_fetch
   // AXI4
   output logic                 ar_valid_o,
   input  logic                 ar_ready_i,
-  output logic [IdBits-1:0]    ar_id_o,
-  output logic [AddrBits-1:0]  ar_addr_o,
-  output logic [7:0]           ar_len_o,
-  output logic [2:0]           ar_size_o,
-  output logic [1:0]           ar_burst_o,
+  output axi_ax_t              ar_o,
   input  logic                 r_valid_i,
   output logic                 r_ready_o,
-  input  logic [IdBits-1:0]    r_id_i,
-  input  logic [Width-1:0]     r_data_i,
-  input  logic [1:0]           r_resp_i,
-  input  logic                 r_last_i
+  input  axi_r_t               r_i
 );
 
   localparam cluster_t ONE = 32'h3F80_0000;
@@ -213,12 +205,12 @@ module flk_geometry_fetch
 
   flk_axi_fetch #(
     .Places  (BufferBeats),
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(7),
     .Width   (Width),
     .MaxBeats(MaxBeats),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_fetch (
     .clk_i,
@@ -238,17 +230,17 @@ module flk_geometry_fetch
     .out_error_o(beat_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin

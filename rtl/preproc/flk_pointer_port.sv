@@ -11,16 +11,16 @@
 // Errors of the memory are kept until start_i, which comes while nothing is asked for. After one,
 // zeros stand for what is read: what comes of it are lists of the writer's own chunks, in any case.
 // Combinational: in_valid_i to in_ready_o (of several writers); all else depends on registers alone.
-module flk_pointer_port #(
+module flk_pointer_port
+  import flk_axi_pkg::*;
+#(
   parameter  int unsigned Writers     = 4,
   parameter  int unsigned NumberBits  = 10,  // of a line
-  parameter  int unsigned AddressBits = 34,  // of a line
   parameter  int unsigned PointerBits = 32,
   parameter  int unsigned MoveBits    = 28,  // of a pointer that are not always zero
-  parameter  int unsigned IdBits      = 4,
-  localparam int unsigned Width       = 512,
+  localparam int unsigned AddressBits = AXI_BEAT_BITS,  // of a line
+  localparam int unsigned Width       = AXI_DATA_BITS,
   localparam int unsigned Bytes       = Width / 8,
-  localparam int unsigned AddrBits    = AddressBits + $clog2(Bytes),
   localparam int unsigned WriterShift = $clog2(Writers),
   localparam int unsigned WriterBits  = Writers > 1 ? WriterShift : 1,
   localparam int unsigned PerLine     = Width / PointerBits,
@@ -51,33 +51,19 @@ module flk_pointer_port #(
   // AXI4
   output logic                                ar_valid_o,
   input  logic                                ar_ready_i,
-  output logic [IdBits-1:0]                   ar_id_o,
-  output logic [AddrBits-1:0]                 ar_addr_o,
-  output logic [7:0]                          ar_len_o,
-  output logic [2:0]                          ar_size_o,
-  output logic [1:0]                          ar_burst_o,
+  output axi_ax_t                             ar_o,
   input  logic                                r_valid_i,
   output logic                                r_ready_o,
-  input  logic [IdBits-1:0]                   r_id_i,
-  input  logic [Width-1:0]                    r_data_i,
-  input  logic [1:0]                          r_resp_i,
-  input  logic                                r_last_i,
+  input  axi_r_t                              r_i,
   output logic                                aw_valid_o,
   input  logic                                aw_ready_i,
-  output logic [IdBits-1:0]                   aw_id_o,
-  output logic [AddrBits-1:0]                 aw_addr_o,
-  output logic [7:0]                          aw_len_o,
-  output logic [2:0]                          aw_size_o,
-  output logic [1:0]                          aw_burst_o,
+  output axi_ax_t                             aw_o,
   output logic                                w_valid_o,
   input  logic                                w_ready_i,
-  output logic [Width-1:0]                    w_data_o,
-  output logic [Bytes-1:0]                    w_strb_o,
-  output logic                                w_last_o,
+  output axi_w_t                              w_o,
   input  logic                                b_valid_i,
   output logic                                b_ready_o,
-  input  logic [IdBits-1:0]                   b_id_i,
-  input  logic [1:0]                          b_resp_i
+  input  axi_b_t                              b_i
 );
 
   if (Writers != 1 << WriterShift) begin : gen_check
@@ -243,12 +229,12 @@ module flk_pointer_port #(
   logic unused_read_idle, unused_write_idle;
 
   flk_axi_write #(
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(1),
     .MaxBeats(1),
     .Bursts  (1),
     .Tagged  (1'b0),
-    .IdBits  (IdBits)
+    .IdBits  (AXI_ID_BITS)
   ) i_write (
     .clk_i,
     .rst_ni,
@@ -267,28 +253,28 @@ module flk_pointer_port #(
     .done_tag_o  (unused_tag),
     .aw_valid_o,
     .aw_ready_i,
-    .aw_id_o,
-    .aw_addr_o,
-    .aw_len_o,
-    .aw_size_o,
-    .aw_burst_o,
+    .aw_id_o     (aw_o.id),
+    .aw_addr_o   (aw_o.addr),
+    .aw_len_o    (aw_o.len),
+    .aw_size_o   (aw_o.size),
+    .aw_burst_o  (aw_o.burst),
     .w_valid_o,
     .w_ready_i,
-    .w_data_o,
-    .w_strb_o,
-    .w_last_o,
+    .w_data_o    (w_o.data),
+    .w_strb_o    (w_o.strb),
+    .w_last_o    (w_o.last),
     .b_valid_i,
     .b_ready_o,
-    .b_id_i,
-    .b_resp_i
+    .b_id_i      (b_i.id),
+    .b_resp_i    (b_i.resp)
   );
 
   flk_axi_read #(
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(1),
     .MaxBeats(1),
     .Bursts  (1),
-    .IdBits  (IdBits)
+    .IdBits  (AXI_ID_BITS)
   ) i_read (
     .clk_i,
     .rst_ni,
@@ -306,18 +292,18 @@ module flk_pointer_port #(
     .out_error_o(get_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .ar_tag_o   (unused_ar_tag),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   // ---- errors and counters --------------------------------------------------------------------------

@@ -1,12 +1,23 @@
 // Types of the preprocessing core: what its units hand to each other (docs/reference/front_end.md).
 package flk_preproc_pkg;
+  import flk_axi_pkg::*;
   import flk_front_pkg::*;
 
   localparam int unsigned LANES = 4;             // at most, and Gaussians of a group
   localparam int unsigned SEQ_BITS = 12;         // of a survivor's number in its frame, modulo
   localparam int unsigned NUMBER_BITS = 24;      // of a record
-  localparam int unsigned BEAT_BITS = 34;        // address of 64 bytes
+  localparam int unsigned BEAT_BITS = AXI_BEAT_BITS;
   localparam int unsigned PLACE_BEAT_BITS = 7;   // of a beat of records that is being put together
+
+  // Ports of the front end, in the order in which they go at the chip's.
+  localparam int unsigned FRONT_READERS = 4;
+  localparam int unsigned FRONT_READ_POINTERS = 0;  // where not all are held
+  localparam int unsigned FRONT_READ_COLOURS = 1;
+  localparam int unsigned FRONT_READ_GEOMETRY = 2;  // and headers
+  localparam int unsigned FRONT_READ_TABLE = 3;
+  localparam int unsigned FRONT_WRITERS = 2;
+  localparam int unsigned FRONT_WRITE_POINTERS = 0;
+  localparam int unsigned FRONT_WRITE_LINES = 1;    // of records, lists, colours and pointers
 
   // Registers of a frame that the cluster test takes: ff numbers of 23 bits.
   typedef struct packed {

@@ -14,6 +14,7 @@
 // Nothing is written outside the regions of records, lists and pointers. pointer_lines of the
 // registers is at most Lists / 16.
 module flk_preprocessing
+  import flk_axi_pkg::*;
   import flk_counter_pkg::*;
   import flk_param_pkg::*;
   import flk_front_pkg::*;
@@ -27,11 +28,7 @@ module flk_preprocessing
   parameter  int unsigned Pointers     = 2048,  // of a bank of lists, held on the chip
   parameter  int unsigned Lists        = 16384, // of a bank, at most
   parameter  int unsigned Gather       = 216,   // lines that are written together
-  parameter  int unsigned Waiting      = 128,   // survivors of a lane that wait for colours
-  parameter  int unsigned IdBits       = 4,
-  localparam int unsigned Width    = 512,
-  localparam int unsigned Bytes    = Width / 8,
-  localparam int unsigned AddrBits = BEAT_BITS + 6
+  parameter  int unsigned Waiting      = 128    // survivors of a lane that wait for colours
 ) (
   input  logic               clk_i,
   input  logic               rst_ni,
@@ -42,97 +39,25 @@ module flk_preprocessing
   input  front_registers_t   registers_i,
   output logic [FRONT_ERRORS-1:0] error_o,
   output front_counters_t    counters_o,
-  // Cluster table
-  output logic               table_ar_valid_o,
-  input  logic               table_ar_ready_i,
-  output logic [IdBits-1:0]  table_ar_id_o,
-  output logic [AddrBits-1:0] table_ar_addr_o,
-  output logic [7:0]         table_ar_len_o,
-  output logic [2:0]         table_ar_size_o,
-  output logic [1:0]         table_ar_burst_o,
-  input  logic               table_r_valid_i,
-  output logic               table_r_ready_o,
-  input  logic [IdBits-1:0]  table_r_id_i,
-  input  logic [Width-1:0]   table_r_data_i,
-  input  logic [1:0]         table_r_resp_i,
-  input  logic               table_r_last_i,
-  // Headers and geometry
-  output logic               geometry_ar_valid_o,
-  input  logic               geometry_ar_ready_i,
-  output logic [IdBits-1:0]  geometry_ar_id_o,
-  output logic [AddrBits-1:0] geometry_ar_addr_o,
-  output logic [7:0]         geometry_ar_len_o,
-  output logic [2:0]         geometry_ar_size_o,
-  output logic [1:0]         geometry_ar_burst_o,
-  input  logic               geometry_r_valid_i,
-  output logic               geometry_r_ready_o,
-  input  logic [IdBits-1:0]  geometry_r_id_i,
-  input  logic [Width-1:0]   geometry_r_data_i,
-  input  logic [1:0]         geometry_r_resp_i,
-  input  logic               geometry_r_last_i,
-  // Colours
-  output logic               colour_ar_valid_o,
-  input  logic               colour_ar_ready_i,
-  output logic [IdBits-1:0]  colour_ar_id_o,
-  output logic [AddrBits-1:0] colour_ar_addr_o,
-  output logic [7:0]         colour_ar_len_o,
-  output logic [2:0]         colour_ar_size_o,
-  output logic [1:0]         colour_ar_burst_o,
-  input  logic               colour_r_valid_i,
-  output logic               colour_r_ready_o,
-  input  logic [IdBits-1:0]  colour_r_id_i,
-  input  logic [Width-1:0]   colour_r_data_i,
-  input  logic [1:0]         colour_r_resp_i,
-  input  logic               colour_r_last_i,
-  // List pointers, where not all are held
-  output logic               pointer_ar_valid_o,
-  input  logic               pointer_ar_ready_i,
-  output logic [IdBits-1:0]  pointer_ar_id_o,
-  output logic [AddrBits-1:0] pointer_ar_addr_o,
-  output logic [7:0]         pointer_ar_len_o,
-  output logic [2:0]         pointer_ar_size_o,
-  output logic [1:0]         pointer_ar_burst_o,
-  input  logic               pointer_r_valid_i,
-  output logic               pointer_r_ready_o,
-  input  logic [IdBits-1:0]  pointer_r_id_i,
-  input  logic [Width-1:0]   pointer_r_data_i,
-  input  logic [1:0]         pointer_r_resp_i,
-  input  logic               pointer_r_last_i,
-  output logic               pointer_aw_valid_o,
-  input  logic               pointer_aw_ready_i,
-  output logic [IdBits-1:0]  pointer_aw_id_o,
-  output logic [AddrBits-1:0] pointer_aw_addr_o,
-  output logic [7:0]         pointer_aw_len_o,
-  output logic [2:0]         pointer_aw_size_o,
-  output logic [1:0]         pointer_aw_burst_o,
-  output logic               pointer_w_valid_o,
-  input  logic               pointer_w_ready_i,
-  output logic [Width-1:0]   pointer_w_data_o,
-  output logic [Bytes-1:0]   pointer_w_strb_o,
-  output logic               pointer_w_last_o,
-  input  logic               pointer_b_valid_i,
-  output logic               pointer_b_ready_o,
-  input  logic [IdBits-1:0]  pointer_b_id_i,
-  input  logic [1:0]         pointer_b_resp_i,
-  // Records, lists, pointers
-  output logic               aw_valid_o,
-  input  logic               aw_ready_i,
-  output logic [IdBits-1:0]  aw_id_o,
-  output logic [AddrBits-1:0] aw_addr_o,
-  output logic [7:0]         aw_len_o,
-  output logic [2:0]         aw_size_o,
-  output logic [1:0]         aw_burst_o,
-  output logic               w_valid_o,
-  input  logic               w_ready_i,
-  output logic [Width-1:0]   w_data_o,
-  output logic [Bytes-1:0]   w_strb_o,
-  output logic               w_last_o,
-  input  logic               b_valid_i,
-  output logic               b_ready_o,
-  input  logic [IdBits-1:0]  b_id_i,
-  input  logic [1:0]         b_resp_i
+  // AXI4: readers FRONT_READ_*, writers FRONT_WRITE_*
+  output logic    [FRONT_READERS-1:0] ar_valid_o,
+  input  logic    [FRONT_READERS-1:0] ar_ready_i,
+  output axi_ax_t [FRONT_READERS-1:0] ar_o,
+  input  logic    [FRONT_READERS-1:0] r_valid_i,
+  output logic    [FRONT_READERS-1:0] r_ready_o,
+  input  axi_r_t  [FRONT_READERS-1:0] r_i,
+  output logic    [FRONT_WRITERS-1:0] aw_valid_o,
+  input  logic    [FRONT_WRITERS-1:0] aw_ready_i,
+  output axi_ax_t [FRONT_WRITERS-1:0] aw_o,
+  output logic    [FRONT_WRITERS-1:0] w_valid_o,
+  input  logic    [FRONT_WRITERS-1:0] w_ready_i,
+  output axi_w_t  [FRONT_WRITERS-1:0] w_o,
+  input  logic    [FRONT_WRITERS-1:0] b_valid_i,
+  output logic    [FRONT_WRITERS-1:0] b_ready_o,
+  input  axi_b_t  [FRONT_WRITERS-1:0] b_i
 );
 
+  localparam int unsigned Width = AXI_DATA_BITS;
   localparam int unsigned ProjectionLatency =
       (Form == FORM_FACTORED) ? projection_latency(PreprocInterval)
                               : projection_conic_latency(PreprocInterval);
@@ -242,9 +167,7 @@ module flk_preprocessing
   logic [31:0]       culled_clusters, culled_gaussians, header_beats, geometry_beats, colour_beats;
   logic              unused_cull_done, unused_geometry_done;
 
-  flk_cluster_cull #(
-    .IdBits(IdBits)
-  ) i_cull (
+  flk_cluster_cull i_cull (
     .clk_i,
     .rst_ni,
     .start_i           (start),
@@ -262,28 +185,19 @@ module flk_preprocessing
     .out_end_o         (kept_end),
     .out_cluster_o     (kept),
     .out_box_o         (kept_box),
-    .ar_valid_o        (table_ar_valid_o),
-    .ar_ready_i        (table_ar_ready_i),
-    .ar_id_o           (table_ar_id_o),
-    .ar_addr_o         (table_ar_addr_o),
-    .ar_len_o          (table_ar_len_o),
-    .ar_size_o         (table_ar_size_o),
-    .ar_burst_o        (table_ar_burst_o),
-    .r_valid_i         (table_r_valid_i),
-    .r_ready_o         (table_r_ready_o),
-    .r_id_i            (table_r_id_i),
-    .r_data_i          (table_r_data_i),
-    .r_resp_i          (table_r_resp_i),
-    .r_last_i          (table_r_last_i)
+    .ar_valid_o        (ar_valid_o[FRONT_READ_TABLE]),
+    .ar_ready_i        (ar_ready_i[FRONT_READ_TABLE]),
+    .ar_o              (ar_o[FRONT_READ_TABLE]),
+    .r_valid_i         (r_valid_i[FRONT_READ_TABLE]),
+    .r_ready_o         (r_ready_o[FRONT_READ_TABLE]),
+    .r_i               (r_i[FRONT_READ_TABLE])
   );
 
   // The geometry and the colour store take a cluster together.
   assign kept_valid = cull_valid && (store_kept || kept_end);
   assign cull_ready = kept_ready && (store_kept || kept_end);
 
-  flk_geometry_fetch #(
-    .IdBits(IdBits)
-  ) i_geometry (
+  flk_geometry_fetch i_geometry (
     .clk_i,
     .rst_ni,
     .start_i         (start),
@@ -306,19 +220,12 @@ module flk_preprocessing
     .out_ready_i     (group_ready),
     .out_end_o       (group_end),
     .out_group_o     (group),
-    .ar_valid_o      (geometry_ar_valid_o),
-    .ar_ready_i      (geometry_ar_ready_i),
-    .ar_id_o         (geometry_ar_id_o),
-    .ar_addr_o       (geometry_ar_addr_o),
-    .ar_len_o        (geometry_ar_len_o),
-    .ar_size_o       (geometry_ar_size_o),
-    .ar_burst_o      (geometry_ar_burst_o),
-    .r_valid_i       (geometry_r_valid_i),
-    .r_ready_o       (geometry_r_ready_o),
-    .r_id_i          (geometry_r_id_i),
-    .r_data_i        (geometry_r_data_i),
-    .r_resp_i        (geometry_r_resp_i),
-    .r_last_i        (geometry_r_last_i)
+    .ar_valid_o      (ar_valid_o[FRONT_READ_GEOMETRY]),
+    .ar_ready_i      (ar_ready_i[FRONT_READ_GEOMETRY]),
+    .ar_o            (ar_o[FRONT_READ_GEOMETRY]),
+    .r_valid_i       (r_valid_i[FRONT_READ_GEOMETRY]),
+    .r_ready_o       (r_ready_o[FRONT_READ_GEOMETRY]),
+    .r_i             (r_i[FRONT_READ_GEOMETRY])
   );
 
   // ---- a group enters the lanes ---------------------------------------------------------------------
@@ -667,17 +574,12 @@ module flk_preprocessing
   colour_part_t [PreprocLanes-1:0] made, part;
 
   // Both read at one port: computed colours' data, and stored ones.
-  logic [1:0]               shared_ar_valid, shared_ar_ready, shared_r_valid, shared_r_ready;
-  logic [1:0][AddrBits-1:0] shared_ar_addr;
-  logic [1:0][7:0]          shared_ar_len;
-  logic [1:0][2:0]          shared_ar_size;
-  logic [1:0][1:0]          shared_ar_burst;
-  logic [1:0][IdBits-1:0]   unused_id;
+  logic    [1:0] shared_ar_valid, shared_ar_ready, shared_r_valid, shared_r_ready;
+  axi_ax_t [1:0] shared_ar;
 
   flk_colour_fetch #(
     .Lanes      (PreprocLanes),
-    .BufferBeats(112),
-    .IdBits     (IdBits)
+    .BufferBeats(112)
   ) i_colours (
     .clk_i,
     .rst_ni,
@@ -697,17 +599,10 @@ module flk_preprocessing
     .out_data_o (made),
     .ar_valid_o (shared_ar_valid[0]),
     .ar_ready_i (shared_ar_ready[0]),
-    .ar_id_o    (unused_id[0]),
-    .ar_addr_o  (shared_ar_addr[0]),
-    .ar_len_o   (shared_ar_len[0]),
-    .ar_size_o  (shared_ar_size[0]),
-    .ar_burst_o (shared_ar_burst[0]),
+    .ar_o       (shared_ar[0]),
     .r_valid_i  (shared_r_valid[0]),
     .r_ready_o  (shared_r_ready[0]),
-    .r_id_i     (colour_r_id_i),
-    .r_data_i   (colour_r_data_i),
-    .r_resp_i   (colour_r_resp_i),
-    .r_last_i   (colour_r_last_i)
+    .r_i        (r_i[FRONT_READ_COLOURS])
   );
 
   // ---- colours that are stored ----------------------------------------------------------------------
@@ -724,7 +619,6 @@ module flk_preprocessing
     flk_colour_store #(
       .Lanes  (PreprocLanes),
       .Waiting(Waiting),
-      .IdBits (IdBits),
       .Id     (1)
     ) i_store (
       .clk_i,
@@ -763,44 +657,28 @@ module flk_preprocessing
       .line_o        (keep_data),
       .ar_valid_o    (shared_ar_valid[1]),
       .ar_ready_i    (shared_ar_ready[1]),
-      .ar_id_o       (unused_id[1]),
-      .ar_addr_o     (shared_ar_addr[1]),
-      .ar_len_o      (shared_ar_len[1]),
-      .ar_size_o     (shared_ar_size[1]),
-      .ar_burst_o    (shared_ar_burst[1]),
+      .ar_o          (shared_ar[1]),
       .r_valid_i     (shared_r_valid[1]),
       .r_ready_o     (shared_r_ready[1]),
-      .r_id_i        (colour_r_id_i),
-      .r_data_i      (colour_r_data_i),
-      .r_resp_i      (colour_r_resp_i),
-      .r_last_i      (colour_r_last_i)
+      .r_i           (r_i[FRONT_READ_COLOURS])
     );
 
     flk_axi_read_mux #(
-      .Managers(2),
-      .AddrBits(AddrBits),
-      .IdBits  (IdBits)
+      .Managers(2)
     ) i_shared (
       .clk_i,
       .rst_ni,
       .ar_valid_i(shared_ar_valid),
       .ar_ready_o(shared_ar_ready),
-      .ar_addr_i (shared_ar_addr),
-      .ar_len_i  (shared_ar_len),
-      .ar_size_i (shared_ar_size),
-      .ar_burst_i(shared_ar_burst),
+      .ar_i      (shared_ar),
       .r_valid_o (shared_r_valid),
       .r_ready_i (shared_r_ready),
-      .ar_valid_o(colour_ar_valid_o),
-      .ar_ready_i(colour_ar_ready_i),
-      .ar_id_o   (colour_ar_id_o),
-      .ar_addr_o (colour_ar_addr_o),
-      .ar_len_o  (colour_ar_len_o),
-      .ar_size_o (colour_ar_size_o),
-      .ar_burst_o(colour_ar_burst_o),
-      .r_valid_i (colour_r_valid_i),
-      .r_ready_o (colour_r_ready_o),
-      .r_id_i    (colour_r_id_i)
+      .ar_valid_o(ar_valid_o[FRONT_READ_COLOURS]),
+      .ar_ready_i(ar_ready_i[FRONT_READ_COLOURS]),
+      .ar_o      (ar_o[FRONT_READ_COLOURS]),
+      .r_valid_i (r_valid_i[FRONT_READ_COLOURS]),
+      .r_ready_o (r_ready_o[FRONT_READ_COLOURS]),
+      .r_id_i    (r_i[FRONT_READ_COLOURS].id)
     );
   end else begin : gen_no_store
     assign store_idle         = 1'b1;
@@ -816,31 +694,21 @@ module flk_preprocessing
     assign keep_valid         = 1'b0;
     assign keep_beat          = '0;
     assign keep_data          = '0;
-    assign colour_ar_valid_o  = shared_ar_valid[0];
-    assign shared_ar_ready[0] = colour_ar_ready_i;
-    assign colour_ar_id_o     = '0;
-    assign colour_ar_addr_o   = shared_ar_addr[0];
-    assign colour_ar_len_o    = shared_ar_len[0];
-    assign colour_ar_size_o   = shared_ar_size[0];
-    assign colour_ar_burst_o  = shared_ar_burst[0];
-    assign shared_r_valid[0]  = colour_r_valid_i;
-    assign colour_r_ready_o   = shared_r_ready[0];
 
+    // One manager alone, whose identifier is 0.
+    assign ar_valid_o[FRONT_READ_COLOURS] = shared_ar_valid[0];
+    assign ar_o[FRONT_READ_COLOURS]       = shared_ar[0];
+    assign r_ready_o[FRONT_READ_COLOURS]  = shared_r_ready[0];
     assign shared_ar_valid[1] = 1'b0;
-    assign shared_ar_ready[1] = 1'b0;
-    assign shared_ar_addr[1]  = '0;
-    assign shared_ar_len[1]   = '0;
-    assign shared_ar_size[1]  = '0;
-    assign shared_ar_burst[1] = '0;
-    assign shared_r_valid[1]  = 1'b0;
+    assign shared_ar[1]       = '0;
     assign shared_r_ready[1]  = 1'b0;
-    assign unused_id[1]       = '0;
+    assign shared_ar_ready    = {1'b0, ar_ready_i[FRONT_READ_COLOURS]};
+    assign shared_r_valid     = {1'b0, r_valid_i[FRONT_READ_COLOURS]};
 
     logic unused_store;
     assign unused_store = ^{registers_i.store, kept_box, keep_record, kept_record, keep_ready,
-                            record_opacity, shared_ar_valid[1], shared_ar_ready[1],
-                            shared_ar_addr[1], shared_ar_len[1], shared_ar_size[1],
-                            shared_ar_burst[1], shared_r_valid[1], shared_r_ready[1]};
+                            record_opacity, shared_ar_valid[1], shared_ar_ready[1], shared_ar[1],
+                            shared_r_valid[1], shared_r_ready[1]};
   end
 
   // ---- lanes ----------------------------------------------------------------------------------------
@@ -1088,11 +956,9 @@ module flk_preprocessing
   logic [31:0] pointer_lines_spilled, pointer_lines_fetched;
 
   flk_pointer_port #(
-    .Writers    (ListWriters),
-    .NumberBits (NumberBits),
-    .AddressBits(BEAT_BITS),
-    .MoveBits   (MoveBits),
-    .IdBits     (IdBits)
+    .Writers   (ListWriters),
+    .NumberBits(NumberBits),
+    .MoveBits  (MoveBits)
   ) i_pointers (
     .clk_i,
     .rst_ni,
@@ -1114,35 +980,21 @@ module flk_preprocessing
     .write_o      (move_write),
     .pointer_o    (move_to),
     .done_o       (move_done),
-    .ar_valid_o   (pointer_ar_valid_o),
-    .ar_ready_i   (pointer_ar_ready_i),
-    .ar_id_o      (pointer_ar_id_o),
-    .ar_addr_o    (pointer_ar_addr_o),
-    .ar_len_o     (pointer_ar_len_o),
-    .ar_size_o    (pointer_ar_size_o),
-    .ar_burst_o   (pointer_ar_burst_o),
-    .r_valid_i    (pointer_r_valid_i),
-    .r_ready_o    (pointer_r_ready_o),
-    .r_id_i       (pointer_r_id_i),
-    .r_data_i     (pointer_r_data_i),
-    .r_resp_i     (pointer_r_resp_i),
-    .r_last_i     (pointer_r_last_i),
-    .aw_valid_o   (pointer_aw_valid_o),
-    .aw_ready_i   (pointer_aw_ready_i),
-    .aw_id_o      (pointer_aw_id_o),
-    .aw_addr_o    (pointer_aw_addr_o),
-    .aw_len_o     (pointer_aw_len_o),
-    .aw_size_o    (pointer_aw_size_o),
-    .aw_burst_o   (pointer_aw_burst_o),
-    .w_valid_o    (pointer_w_valid_o),
-    .w_ready_i    (pointer_w_ready_i),
-    .w_data_o     (pointer_w_data_o),
-    .w_strb_o     (pointer_w_strb_o),
-    .w_last_o     (pointer_w_last_o),
-    .b_valid_i    (pointer_b_valid_i),
-    .b_ready_o    (pointer_b_ready_o),
-    .b_id_i       (pointer_b_id_i),
-    .b_resp_i     (pointer_b_resp_i)
+    .ar_valid_o   (ar_valid_o[FRONT_READ_POINTERS]),
+    .ar_ready_i   (ar_ready_i[FRONT_READ_POINTERS]),
+    .ar_o         (ar_o[FRONT_READ_POINTERS]),
+    .r_valid_i    (r_valid_i[FRONT_READ_POINTERS]),
+    .r_ready_o    (r_ready_o[FRONT_READ_POINTERS]),
+    .r_i          (r_i[FRONT_READ_POINTERS]),
+    .aw_valid_o   (aw_valid_o[FRONT_WRITE_POINTERS]),
+    .aw_ready_i   (aw_ready_i[FRONT_WRITE_POINTERS]),
+    .aw_o         (aw_o[FRONT_WRITE_POINTERS]),
+    .w_valid_o    (w_valid_o[FRONT_WRITE_POINTERS]),
+    .w_ready_i    (w_ready_i[FRONT_WRITE_POINTERS]),
+    .w_o          (w_o[FRONT_WRITE_POINTERS]),
+    .b_valid_i    (b_valid_i[FRONT_WRITE_POINTERS]),
+    .b_ready_o    (b_ready_o[FRONT_WRITE_POINTERS]),
+    .b_i          (b_i[FRONT_WRITE_POINTERS])
   );
 
   assign out_valid[ListWriters]   = line_valid && keep_room;
@@ -1183,7 +1035,7 @@ module flk_preprocessing
     .Gather  (Gather),
     .Bursts  (256),
     .BeatBits(BEAT_BITS),
-    .IdBits  (IdBits)
+    .IdBits  (AXI_ID_BITS)
   ) i_write (
     .clk_i,
     .rst_ni,
@@ -1197,22 +1049,22 @@ module flk_preprocessing
     .in_beat_i  (chosen.beat),
     .in_strobe_i(chosen.strobe),
     .in_data_i  (chosen.data),
-    .aw_valid_o,
-    .aw_ready_i,
-    .aw_id_o,
-    .aw_addr_o,
-    .aw_len_o,
-    .aw_size_o,
-    .aw_burst_o,
-    .w_valid_o,
-    .w_ready_i,
-    .w_data_o,
-    .w_strb_o,
-    .w_last_o,
-    .b_valid_i,
-    .b_ready_o,
-    .b_id_i,
-    .b_resp_i
+    .aw_valid_o (aw_valid_o[FRONT_WRITE_LINES]),
+    .aw_ready_i (aw_ready_i[FRONT_WRITE_LINES]),
+    .aw_id_o    (aw_o[FRONT_WRITE_LINES].id),
+    .aw_addr_o  (aw_o[FRONT_WRITE_LINES].addr),
+    .aw_len_o   (aw_o[FRONT_WRITE_LINES].len),
+    .aw_size_o  (aw_o[FRONT_WRITE_LINES].size),
+    .aw_burst_o (aw_o[FRONT_WRITE_LINES].burst),
+    .w_valid_o  (w_valid_o[FRONT_WRITE_LINES]),
+    .w_ready_i  (w_ready_i[FRONT_WRITE_LINES]),
+    .w_data_o   (w_o[FRONT_WRITE_LINES].data),
+    .w_strb_o   (w_o[FRONT_WRITE_LINES].strb),
+    .w_last_o   (w_o[FRONT_WRITE_LINES].last),
+    .b_valid_i  (b_valid_i[FRONT_WRITE_LINES]),
+    .b_ready_o  (b_ready_o[FRONT_WRITE_LINES]),
+    .b_id_i     (b_i[FRONT_WRITE_LINES].id),
+    .b_resp_i   (b_i[FRONT_WRITE_LINES].resp)
   );
 
   // ---- errors and counters --------------------------------------------------------------------------
@@ -1345,7 +1197,7 @@ module flk_preprocessing
 
   logic unused;
   assign unused = ^{cull_idle, geometry_idle, group.cluster.index, beat_ready,
-                    unused_cull_done, unused_geometry_done, unused_done, unused_index, unused_id,
+                    unused_cull_done, unused_geometry_done, unused_done, unused_index,
                     fill[3]};
 
 `ifndef SYNTHESIS

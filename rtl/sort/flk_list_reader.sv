@@ -19,8 +19,10 @@
 // Latency, L the memory's: 11 + L cycles from a tile to an empty list, 17 + 2 L to the first line of
 // another; 12 + L from a line with a link to the first line of its chunk.
 // Throughput: a line a cycle, a tile every second one, a list every third one. Combinational:
-// out_ready_i to the line memory's read port, ar_ready_i to the requests, r_*_i to its write port.
-module flk_list_reader #(
+// out_ready_i to the line memory's read port, ar_ready_i to the requests, r_valid_i and r_i to its write port.
+module flk_list_reader
+  import flk_axi_pkg::*;
+#(
   parameter  int unsigned Contexts    = 4,   // lists under way
   parameter  int unsigned Slots       = 32,  // chunks in the line memory
   parameter  int unsigned Ahead       = 4,   // pointers beyond those
@@ -31,14 +33,12 @@ module flk_list_reader #(
   parameter  int unsigned LineEntries = 9,   // of a plain line; more: a short one
   parameter  int unsigned TailBits    = 4,   // of a short line, behind what a plain one has
   parameter  int unsigned PointerBits = 32,
-  parameter  int unsigned AddressBits = 34,  // of a line
-  parameter  int unsigned Width       = 512,
   parameter  int unsigned Bursts      = 16,  // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
+  localparam int unsigned AddressBits = AXI_BEAT_BITS,  // of a line
+  localparam int unsigned Width       = AXI_DATA_BITS,
   localparam int unsigned Shift       = $clog2(Width / 8),
-  localparam int unsigned EntriesBits = LineEntries * EntryBits + TailBits,
-  localparam int unsigned AddrBits    = AddressBits + Shift
+  localparam int unsigned EntriesBits = LineEntries * EntryBits + TailBits
 ) (
   input  logic                                  clk_i,
   input  logic                                  rst_ni,
@@ -65,17 +65,10 @@ module flk_list_reader #(
   // AXI4
   output logic                                  ar_valid_o,
   input  logic                                  ar_ready_i,
-  output logic [IdBits-1:0]                     ar_id_o,
-  output logic [AddrBits-1:0]                   ar_addr_o,
-  output logic [7:0]                            ar_len_o,
-  output logic [2:0]                            ar_size_o,
-  output logic [1:0]                            ar_burst_o,
+  output axi_ax_t                               ar_o,
   input  logic                                  r_valid_i,
   output logic                                  r_ready_o,
-  input  logic [IdBits-1:0]                     r_id_i,
-  input  logic [Width-1:0]                      r_data_i,
-  input  logic [1:0]                            r_resp_i,
-  input  logic                                  r_last_i
+  input  axi_r_t                                r_i
 );
 
   localparam int unsigned CtxBits = $clog2(Contexts);
@@ -277,27 +270,27 @@ module flk_list_reader #(
     end
   end
 
-  logic                beat_valid, beat_last, beat_error, write;
-  logic [Width-1:0]    beat_data;
-  tag_t                beat_tag, ask_tag;
-  logic [AddrBits-1:0] ask_addr;
-  logic [2:0]          ask_size;
-  logic                unused_addr;
+  logic                     beat_valid, beat_last, beat_error, write;
+  logic [Width-1:0]         beat_data;
+  tag_t                     beat_tag, ask_tag;
+  logic [AXI_ADDR_BITS-1:0] ask_addr;
+  logic [2:0]               ask_size;
+  logic                     unused_addr;
 
   // Of a pointer's line only the half that has it.
-  assign ar_addr_o = {ask_addr[AddrBits-1:Shift], ask_tag.pointer && ask_tag.which[WordBits-1],
-                      (Shift-1)'(0)};
-  assign ar_size_o = ask_size - 3'(ask_tag.pointer);
+  assign ar_o.addr = {ask_addr[AXI_ADDR_BITS-1:Shift],
+                      ask_tag.pointer && ask_tag.which[WordBits-1], (Shift-1)'(0)};
+  assign ar_o.size = ask_size - 3'(ask_tag.pointer);
   assign unused_addr = ^ask_addr[Shift-1:0];
 
   flk_axi_read #(
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(LinesBits),
     .TagBits ($bits(tag_t)),
     .Width   (Width),
     .MaxBeats(ChunkLines),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_read (
     .clk_i,
@@ -316,18 +309,18 @@ module flk_list_reader #(
     .out_error_o(beat_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
+    .ar_id_o    (ar_o.id),
     .ar_addr_o  (ask_addr),
-    .ar_len_o,
+    .ar_len_o   (ar_o.len),
     .ar_size_o  (ask_size),
-    .ar_burst_o,
+    .ar_burst_o (ar_o.burst),
     .ar_tag_o   (ask_tag),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   // ---- what has come: header or pointer -----------------------------------------------------------------

@@ -8,7 +8,9 @@
 // again_o: an entry goes into a run, and will be sorted a second time.
 // error_o, until start_i: the list has more runs than fit, of which the far ones of the reading are left out, or what
 // was read of them is wrong; what there is leaves all the same. start_i while idle_o.
-module flk_list_sorter #(
+module flk_list_sorter
+  import flk_axi_pkg::*;
+#(
   parameter  int unsigned Cells       = 16,
   parameter  int unsigned Stages      = 7,
   parameter  int unsigned Ways        = 8,
@@ -21,13 +23,11 @@ module flk_list_sorter #(
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
   parameter  int unsigned OutBits     = 28,
-  parameter  int unsigned AddressBits = 34,   // of a line
-  parameter  int unsigned Width       = 512,
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
+  localparam int unsigned AddressBits = AXI_BEAT_BITS,  // of a line
+  localparam int unsigned Width       = AXI_DATA_BITS,
   localparam int unsigned LineBits    = LineEntries * EntryBits + TailBits,
-  localparam int unsigned CountBits   = $clog2(ShortEntries + 1),
-  localparam int unsigned AddrBits    = AddressBits + $clog2(Width / 8)
+  localparam int unsigned CountBits   = $clog2(ShortEntries + 1)
 ) (
   input  logic                                  clk_i,
   input  logic                                  rst_ni,
@@ -62,17 +62,10 @@ module flk_list_sorter #(
   // AXI4
   output logic                                  ar_valid_o,
   input  logic                                  ar_ready_i,
-  output logic [IdBits-1:0]                     ar_id_o,
-  output logic [AddrBits-1:0]                   ar_addr_o,
-  output logic [7:0]                            ar_len_o,
-  output logic [2:0]                            ar_size_o,
-  output logic [1:0]                            ar_burst_o,
+  output axi_ax_t                               ar_o,
   input  logic                                  r_valid_i,
   output logic                                  r_ready_o,
-  input  logic [IdBits-1:0]                     r_id_i,
-  input  logic [Width-1:0]                      r_data_i,
-  input  logic [1:0]                            r_resp_i,
-  input  logic                                  r_last_i
+  input  axi_r_t                                r_i
 );
 
   localparam int unsigned KeyBits    = EntryBits - MaskBits;
@@ -211,18 +204,15 @@ module flk_list_sorter #(
   assign begin_merge  = waits_o && written_i;
 
   flk_run_merge #(
-    .Runs       (Runs),
-    .Lines      (MergeLines),
-    .Capacity   (Capacity),
-    .LineEntries(LineEntries),
+    .Runs        (Runs),
+    .Lines       (MergeLines),
+    .Capacity    (Capacity),
+    .LineEntries (LineEntries),
     .ShortEntries(ShortEntries),
-    .TailBits   (TailBits),
-    .EntryBits  (EntryBits),
-    .MaskBits   (MaskBits),
-    .AddressBits(AddressBits),
-    .Width      (Width),
-    .IdBits     (IdBits),
-    .Id         (Id)
+    .TailBits    (TailBits),
+    .EntryBits   (EntryBits),
+    .MaskBits    (MaskBits),
+    .Id          (Id)
   ) i_merge (
     .clk_i,
     .rst_ni,
@@ -248,17 +238,10 @@ module flk_list_sorter #(
     .out_final_o  (is_final),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_o,
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_i
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin

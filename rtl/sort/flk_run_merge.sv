@@ -14,7 +14,9 @@
 // fault_o, for a cycle: the memory answered with an error, or what it gave is no line; what it gave counts as
 // one entry. The read port never waits.
 // A line every nine cycles with up to 16 chains, every eleven with 64, while its chain's next one has come.
-module flk_run_merge #(
+module flk_run_merge
+  import flk_axi_pkg::*;
+#(
   parameter  int unsigned Runs        = 64,   // most runs of a list, a power of two
   parameter  int unsigned Lines       = 128,  // of the line memory, a power of two, at least 2 Runs
   parameter  int unsigned Capacity    = 2048,  // entries of a run, and of the largest batch
@@ -24,17 +26,15 @@ module flk_run_merge #(
   parameter  int unsigned TailBits    = 4,    // of a short line, behind what a plain one has
   parameter  int unsigned EntryBits   = 52,
   parameter  int unsigned MaskBits    = 4,
-  parameter  int unsigned AddressBits = 34,   // of a line
-  parameter  int unsigned Width       = 512,
   parameter  int unsigned Bursts      = 16,   // under way
-  parameter  int unsigned IdBits      = 4,
   parameter  int unsigned Id          = 0,
+  localparam int unsigned AddressBits = AXI_BEAT_BITS,  // of a line
+  localparam int unsigned Width       = AXI_DATA_BITS,
   localparam int unsigned KeyBits     = EntryBits - MaskBits,
   localparam int unsigned LineBits    = LineEntries * EntryBits + TailBits,
   localparam int unsigned RunLines    = (Capacity + LineEntries - 1) / LineEntries,
   localparam int unsigned RunBits     = $clog2(RunLines + 1),
-  localparam int unsigned Shift       = $clog2(Width / 8),
-  localparam int unsigned AddrBits    = AddressBits + Shift
+  localparam int unsigned Shift       = $clog2(Width / 8)
 ) (
   input  logic                                  clk_i,
   input  logic                                  rst_ni,
@@ -63,17 +63,10 @@ module flk_run_merge #(
   // AXI4
   output logic                                  ar_valid_o,
   input  logic                                  ar_ready_i,
-  output logic [IdBits-1:0]                     ar_id_o,
-  output logic [AddrBits-1:0]                   ar_addr_o,
-  output logic [7:0]                            ar_len_o,
-  output logic [2:0]                            ar_size_o,
-  output logic [1:0]                            ar_burst_o,
+  output axi_ax_t                               ar_o,
   input  logic                                  r_valid_i,
   output logic                                  r_ready_o,
-  input  logic [IdBits-1:0]                     r_id_i,
-  input  logic [Width-1:0]                      r_data_i,
-  input  logic [1:0]                            r_resp_i,
-  input  logic                                  r_last_i
+  input  axi_r_t                                r_i
 );
 
   localparam int unsigned RB = $clog2(Runs);       // number of a run, of a chain
@@ -399,13 +392,13 @@ module flk_run_merge #(
   assign unused_tag = ^{ar_tag, beat_data[Width-1:LineBits+4]};
 
   flk_axi_read #(
-    .AddrBits(AddrBits),
+    .AddrBits(AXI_ADDR_BITS),
     .BeatBits(NB),
     .TagBits ($bits(tag_t)),
     .Width   (Width),
     .MaxBeats(Beats),
     .Bursts  (Bursts),
-    .IdBits  (IdBits),
+    .IdBits  (AXI_ID_BITS),
     .Id      (Id)
   ) i_read (
     .clk_i,
@@ -424,18 +417,18 @@ module flk_run_merge #(
     .out_error_o(beat_error),
     .ar_valid_o,
     .ar_ready_i,
-    .ar_id_o,
-    .ar_addr_o,
-    .ar_len_o,
-    .ar_size_o,
-    .ar_burst_o,
+    .ar_id_o    (ar_o.id),
+    .ar_addr_o  (ar_o.addr),
+    .ar_len_o   (ar_o.len),
+    .ar_size_o  (ar_o.size),
+    .ar_burst_o (ar_o.burst),
     .ar_tag_o   (ar_tag),
     .r_valid_i,
     .r_ready_o,
-    .r_id_i,
-    .r_data_i,
-    .r_resp_i,
-    .r_last_i
+    .r_id_i     (r_i.id),
+    .r_data_i   (r_i.data),
+    .r_resp_i   (r_i.resp),
+    .r_last_i   (r_i.last)
   );
 
   assign beat_place = place_of(beat_tag.chain, beat_tag.place + SB'(beat_q), levels_q, slot_mask_q);

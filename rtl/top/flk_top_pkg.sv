@@ -1,9 +1,10 @@
 // The chip: descriptor of a frame, errors, managers of the memory port.
 package flk_top_pkg;
+  import flk_axi_pkg::*;
   import flk_preproc_pkg::*;
+  import flk_rendering_pkg::*;
 
-  localparam int unsigned TOP_ADDR_BITS = 40;
-  typedef logic [TOP_ADDR_BITS-1:0] address_t;
+  typedef logic [AXI_ADDR_BITS-1:0] address_t;
 
   // A frame, as the registers describe it (docs/reference/registers.md).
   typedef struct packed {
@@ -50,19 +51,8 @@ package flk_top_pkg;
   } frame_error_t;
 
   // Managers of the memory port; the first reader and the first writer go first. The rendering half's come before the front end's.
-  localparam int unsigned RENDERING_READERS = 2;
-  localparam int unsigned RENDERING_WRITERS = 1;
-  localparam int unsigned READERS = 6;
-  localparam int unsigned READ_RECORDS = 0;
-  localparam int unsigned READ_LISTS = 1;
-  localparam int unsigned READ_POINTERS = 2;  // of the front end
-  localparam int unsigned READ_COLOURS = 3;
-  localparam int unsigned READ_GEOMETRY = 4;
-  localparam int unsigned READ_TABLE = 5;
+  localparam int unsigned READERS = RENDERING_READERS + FRONT_READERS;
+  localparam int unsigned WRITERS = RENDERING_WRITERS + FRONT_WRITERS;
   localparam int unsigned READ_ID_BITS = 3;  // of identifiers of its own that a reader has in use
-  localparam int unsigned WRITERS = 3;
-  localparam int unsigned WRITE_FRAME = 0;
-  localparam int unsigned WRITE_POINTERS = 1;
-  localparam int unsigned WRITE_FRONT = 2;
 
 endpackage

@@ -45,19 +45,22 @@ DUTIES = (
     (r"b_(id|resp)_i", "of several identifiers in any order"),
 )
 
-# Managers behind the memory port: purpose, name in flk_top_pkg, place of the unit of AXI in the hierarchy, what it does beside whole beats.
+# Managers behind the memory port: purpose, half and name of its port there (`HALVES`), place of the unit of AXI in the half, what it does beside whole beats.
 MANAGERS = (
-    ("records", "READ_RECORDS", "i_rendering.i_delivery", "always narrow: one beat of 32 bytes"),
-    ("lists", "READ_LISTS", "i_rendering.gen_unit", "a pointer is a narrow beat of 32 bytes"),
-    ("pointers that were written", "READ_POINTERS", "i_front.i_pointers", ""),
-    ("colours", "READ_COLOURS", "i_front.i_colours", ""),
-    ("kept colours", "READ_COLOURS", "i_front.gen_store.i_store", ""),
-    ("cluster headers, geometry", "READ_GEOMETRY", "i_front.i_geometry", ""),
-    ("cluster table", "READ_TABLE", "i_front.i_cull", ""),
-    ("frame buffer", "WRITE_FRAME", "i_rendering.i_lines", ""),
-    ("pointers that make room", "WRITE_POINTERS", "i_front.i_pointers", ""),
-    ("records, lists, pointers, kept colours", "WRITE_FRONT", "i_front.i_write", ""),
+    ("records", "RENDERING", "READ_RECORDS", "i_delivery", "always narrow: one beat of 32 bytes"),
+    ("lists", "RENDERING", "READ_LISTS", "gen_unit", "a pointer is a narrow beat of 32 bytes"),
+    ("pointers that were written", "FRONT", "READ_POINTERS", "i_pointers", ""),
+    ("colours", "FRONT", "READ_COLOURS", "i_colours", ""),
+    ("kept colours", "FRONT", "READ_COLOURS", "gen_store.i_store", ""),
+    ("cluster headers, geometry", "FRONT", "READ_GEOMETRY", "i_geometry", ""),
+    ("cluster table", "FRONT", "READ_TABLE", "i_cull", ""),
+    ("frame buffer", "RENDERING", "", "i_lines", ""),
+    ("pointers that make room", "FRONT", "WRITE_POINTERS", "i_pointers", ""),
+    ("records, lists, pointers, kept colours", "FRONT", "WRITE_LINES", "i_write", ""),
 )
+HALVES = {  # package, instance in flk_top; the first one's ports go first
+    "RENDERING": ("common/flk_rendering_pkg", "i_rendering"), "FRONT": ("preproc/flk_preproc_pkg", "i_front"),
+}
 AXI_SIZES = ("MaxBeats", "Bursts", "Width", "Id")  # parameters of the units of AXI
 OWN_ID_BITS = 4  # of a manager's identifier, below its number
 BEAT = 64
@@ -188,16 +191,20 @@ def managers(parameters: Mapping[str, int] | None = None) -> list[Manager]:
         )
         for instance in _instances(next(iter(tops.values())).body) if instance.definition.name in ("flk_axi_read", "flk_axi_write")
     ]
-    package = (ROOT / "rtl" / "top" / "flk_top_pkg.sv").read_text()
+    constants = {
+        name: int(value) for package, _ in HALVES.values() for name, value in re.findall(r" (\w+) = (\d+);", (ROOT / "rtl" / f"{package}.sv").read_text())
+    }
     found, taken = [], 0
-    for name, constant, place, note in MANAGERS:
-        write = constant.startswith("WRITE_")
-        number = re.search(rf" {constant} = (\d+);", package)
-        own = [values for path, kind, values in units if f".{place}" in path and kind == f"flk_axi_{'write' if write else 'read'}"]
-        if not own or number is None or len({(v["MaxBeats"], v["Bursts"], v["Width"]) for v in own}) != 1:
+    for name, half, port, place, note in MANAGERS:
+        write = not port.startswith("READ_")
+        first = constants["RENDERING_WRITERS" if write else "RENDERING_READERS"] if half == "FRONT" else 0
+        own = [
+            values for path, kind, values in units if f".{HALVES[half][1]}.{place}" in path and kind == f"flk_axi_{'write' if write else 'read'}"
+        ]
+        if not own or len({(v["MaxBeats"], v["Bursts"], v["Width"]) for v in own}) != 1:
             raise FlickerError(f"scripts/doc_parts/instance.py: MANAGERS: {name}: no unit of AXI, or several kinds")
         taken += len(own)
-        index, one = int(number[1]), own[0]
+        index, one = first + (constants[f"{half}_{port}"] if port else 0), own[0]
         beats = 1 if one["Width"] < 8 * BEAT else one["MaxBeats"]
         found.append(Manager(
             name, write, index, tuple(index << OWN_ID_BITS | v["Id"] for v in own), (one["Width"] // 8).bit_length() - 1, beats, one["Bursts"] * len(own), note,

@@ -6,6 +6,7 @@ from collections import deque
 
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly
+from flicker_tb.axi import CHANNELS, pack, unpack
 from flicker_tb.bench import Bench, rounds
 
 
@@ -15,8 +16,7 @@ class Ports:
     def __init__(self, dut, idle: list[str], address: str, beats: str) -> None:
         self.dut, self.bench = dut, Bench(dut)
         self.managers = len(dut.ar_valid_i)
-        widths = {"addr": len(dut.ar_addr_i) // self.managers, "len": 8, "size": 3, "burst": 2}
-        self.widths = widths
+        self.widths = {name: place.bits for name, place in CHANNELS["ar"].items() if name != "id"}
         self.idle = [self.bench.stall(name) for name in idle]
         self.address, self.beats = self.bench.stall(address), self.bench.stall(beats)
         self.queue: list[deque[dict[str, int]]] = [deque() for _ in range(self.managers)]
@@ -31,8 +31,7 @@ class Ports:
         self.waiting: tuple[int, ...] | None = None
         dut.ar_valid_i.value = dut.ar_ready_i.value = dut.r_valid_i.value = dut.r_id_i.value = 0
         dut.r_ready_i.value = (1 << self.managers) - 1
-        for name in widths:
-            getattr(dut, f"ar_{name}_i").value = 0
+        dut.ar_i.value = 0
         cocotb.start_soon(self._run())
 
     def ask(self, manager: int, count: int) -> None:
@@ -56,9 +55,12 @@ class Ports:
             for k in range(self.managers):
                 self.offered[k] = bool(self.queue[k]) and (self.offered[k] or not next(self.idle[k]))
             dut.ar_valid_i.value = sum(o << k for k, o in enumerate(self.offered))
-            for name, width in self.widths.items():
-                values = [self.queue[k][0][name] if self.offered[k] else rng.getrandbits(width) for k in range(self.managers)]
-                getattr(dut, f"ar_{name}_i").value = sum(v << width * k for k, v in enumerate(values))
+            # A manager's identifier may be anything.
+            own = [
+                {name: rng.getrandbits(place.bits) for name, place in CHANNELS["ar"].items()} | (self.queue[k][0] if self.offered[k] else {})
+                for k in range(self.managers)
+            ]
+            dut.ar_i.value = sum(pack("ar", fields) << len(dut.ar_o) * k for k, fields in enumerate(own))
             ready = not next(self.address)
             dut.ar_ready_i.value = int(ready)
             open_ = [k for k in range(self.managers) if self.owed[k]]
@@ -81,7 +83,8 @@ class Ports:
                     self.asked[k].append(self.queue[k].popleft())
                     self.offered[k] = False
             valid = dut.ar_valid_o.value == 1
-            seen = tuple(int(getattr(dut, f"ar_{name}_o").value) for name in ("id", *self.widths)) if valid else None
+            fields = unpack("ar", int(dut.ar_o.value)) if valid else {}
+            seen = tuple(fields[name] for name in ("id", *self.widths)) if valid else None
             assert self.waiting is None or seen == self.waiting, f"the address changed from {self.waiting} to {seen}"
             self.waiting = seen if valid and not ready else None
             if valid and ready:

@@ -11,7 +11,7 @@ from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [
-    {}, *(pytest.param(case, marks=pytest.mark.slow) for case in ({"Managers": 3}, {"Managers": 2, "AddrBits": 32, "IdBits": 2})),
+    {}, *(pytest.param(case, marks=pytest.mark.slow) for case in ({"Managers": 3}, {"Managers": 2})),
 ], ids=str)
 def test_axi_read_mux(parameters: dict[str, int]) -> None:
     build_and_test("flk_axi_read_mux", "cocotb_axi_read_mux", parameters=parameters)

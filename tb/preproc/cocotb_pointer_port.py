@@ -43,7 +43,7 @@ class PortTest:
         size = LINE * count << self.number_bits
         self.memory.allocate(self.base, size, noise=rng.getrandbits(30))
         self.port = MemoryPort(dut, self.memory, PortConfig(
-            id_bits=int(dut.IdBits.value), max_beats=1, max_reads=1, max_writes=1, latency=10, stall=dict.fromkeys(("AR", "R", "AW", "W", "B"), share),
+            max_beats=1, max_reads=1, max_writes=1, latency=10, stall=dict.fromkeys(("AR", "R", "AW", "W", "B"), share),
             seed=rng.getrandbits(30),
         ))
         self.writers = [Writer(self, k) for k in range(count)]
@@ -236,4 +236,4 @@ async def reset_in_a_request(dut):
         dut.rst_ni.value = 0
         await test.bench.cycles(3)
         test.table.clear()
-        test.port.restart(PortConfig(id_bits=int(dut.IdBits.value), max_beats=1, max_reads=1, max_writes=1, latency=10, seed=rng.getrandbits(30)))
+        test.port.restart(PortConfig(max_beats=1, max_reads=1, max_writes=1, latency=10, seed=rng.getrandbits(30)))

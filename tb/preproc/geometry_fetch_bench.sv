@@ -81,17 +81,10 @@ module geometry_fetch_bench
     .out_group_o     (group),
     .ar_valid_o      (mem_ar_valid_o),
     .ar_ready_i      (mem_ar_ready_i),
-    .ar_id_o         (mem_ar_id_o),
-    .ar_addr_o       (mem_ar_addr_o),
-    .ar_len_o        (mem_ar_len_o),
-    .ar_size_o       (mem_ar_size_o),
-    .ar_burst_o      (mem_ar_burst_o),
+    .ar_o            ({mem_ar_id_o, mem_ar_addr_o, mem_ar_len_o, mem_ar_size_o, mem_ar_burst_o}),
     .r_valid_i       (mem_r_valid_i),
     .r_ready_o       (mem_r_ready_o),
-    .r_id_i          (mem_r_id_i),
-    .r_data_i        (mem_r_data_i),
-    .r_resp_i        (mem_r_resp_i),
-    .r_last_i        (mem_r_last_i)
+    .r_i             ({mem_r_id_i, mem_r_last_i, mem_r_resp_i, mem_r_data_i})
   );
 
 endmodule

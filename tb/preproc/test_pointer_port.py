@@ -12,7 +12,7 @@ from flicker_tb.runner import build_and_test
 
 
 @pytest.mark.parametrize("parameters", [
-    {}, *(pytest.param({"Writers": few, "NumberBits": 5, "MoveBits": 20, "IdBits": 2}, marks=pytest.mark.slow) for few in (1, 2)),
+    {}, *(pytest.param({"Writers": few, "NumberBits": 5, "MoveBits": 20}, marks=pytest.mark.slow) for few in (1, 2)),
 ], ids=str)
 def test_pointer_port(parameters: dict[str, int]) -> None:
     build_and_test("flk_pointer_port", "cocotb_pointer_port", parameters=parameters)

@@ -7,7 +7,7 @@ from collections import Counter, deque
 import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
-from flicker_tb.axi import MemoryPort
+from flicker_tb.axi import MemoryPort, unpack
 from flicker_tb.bench import Bench
 from flicker_tb.streams import Monitor, Stream, StreamSink, StreamSource
 
@@ -118,8 +118,9 @@ class Reader:
             if dut.rst_ni.value != 1:
                 continue
             if dut.ar_valid_o.value == 1 and dut.ar_ready_i.value == 1:
-                first = int(dut.ar_addr_o.value) // LINE
-                self.beats.update(range(first, first + int(dut.ar_len_o.value) + 1))
+                ar = unpack("ar", int(dut.ar_o.value))
+                first = ar["addr"] // LINE
+                self.beats.update(range(first, first + ar["len"] + 1))
             if dut.r_valid_i.value == 1:
                 assert dut.r_ready_o.value == 1, "the port waits"
 

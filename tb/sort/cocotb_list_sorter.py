@@ -9,7 +9,7 @@ import cocotb
 import numpy as np
 from cocotb.triggers import RisingEdge
 from flicker_tb import stalls
-from flicker_tb.axi import MemoryPort
+from flicker_tb.axi import MemoryPort, unpack
 from flicker_tb.bench import Bench, config, rounds
 from flicker_tb.list_lines import lines_of
 
@@ -105,8 +105,9 @@ class Sorter:
                 if pause and came == CAPACITY:
                     not_before = cycle + pause
             if int(dut.ar_valid_o.value) and int(dut.ar_ready_i.value):
-                at = int(dut.ar_addr_o.value) // LINE
-                self.read.update(range(at, at + int(dut.ar_len_o.value) + 1))
+                ar = unpack("ar", int(dut.ar_o.value))
+                at = ar["addr"] // LINE
+                self.read.update(range(at, at + ar["len"] + 1))
             if int(dut.write_valid_o.value) and accept:
                 beat, data = int(dut.write_beat_o.value), int(dut.write_data_o.value)
                 written_at = max(written_at, cycle + rng.randrange(*self.written_after))

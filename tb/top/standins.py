@@ -7,17 +7,19 @@ but for the last one, which counts the edges of its clock since reset. The rende
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 from flicker import toolchain
 
-# Module: (turns, prefix of the port that reads, address of reads, address of writes, error, further assignments).
+# Module: (turns, reader, writer, as indices of its ports, address of reads, address of writes, error, further assignments).
 HALVES = {
     "flk_preprocessing": (
-        "registers_i.clusters[7:0]", "table_", "{registers_i.table_beat, 6'b0}", "{registers_i.records_beat, 6'b0}", "FRONT_ERRORS'(failed_q)", "",
+        "registers_i.clusters[7:0]", "[FRONT_READ_TABLE]", "[FRONT_WRITE_LINES]", "{registers_i.table_beat, 6'b0}", "{registers_i.records_beat, 6'b0}",
+        "FRONT_ERRORS'(failed_q)", "",
     ),
     "flk_rendering": (
-        "registers_i.chunks[7:0]", "list_", "{registers_i.lists_beat, 6'b0}", "{registers_i.frame_beat, 6'b0}", "3'(failed_q)",
+        "registers_i.chunks[7:0]", "[RENDERING_READ_LISTS]", "", "{registers_i.lists_beat, 6'b0}", "{registers_i.frame_beat, 6'b0}", "3'(failed_q)",
         """  logic [COUNTER_LATENCY-1:0][COUNTER_BITS-1:0] counter_q;  // the oldest highest
   always_ff @(posedge clk_i) begin
     counter_q <= $bits(counter_q)'({counter_q, COUNTER_BITS'(counter_addr_i) + COUNTER_BITS'(turns)});
@@ -58,16 +60,16 @@ BODY = """
           turn_q   <= turns;
           failed_q <= 1'b0;
         end
-        READ:  if ({port}ar_ready_i) state_q <= BEAT;
+        READ:  if (ar_ready_i{reader}) state_q <= BEAT;
         BEAT:
-        if ({port}r_valid_i) begin
+        if (r_valid_i{reader}) begin
           state_q  <= WRITE;
-          failed_q <= failed_q || {port}r_resp_i != '0;
+          failed_q <= failed_q || r_i{reader}.resp != '0;
         end
-        WRITE: if (aw_ready_i) state_q <= DATA;
-        DATA:  if (w_ready_i) state_q <= ANSWER;
+        WRITE: if (aw_ready_i{writer}) state_q <= DATA;
+        DATA:  if (w_ready_i{writer}) state_q <= ANSWER;
         ANSWER:
-        if (b_valid_i) begin
+        if (b_valid_i{writer}) begin
           state_q <= turn_q <= 8'd1 ? DONE : READ;
           turn_q  <= turn_q - 1'b1;
         end
@@ -83,19 +85,26 @@ BODY = """
   logic [(Bits + 7) / 8 * 8 - 1:0] repeated;
   assign repeated = {{((Bits + 7) / 8){{turns}}}};
   assign counters_o = {{repeated[$bits(repeated)-1-:Bits-32], edges_q}};
-  assign {port}ar_valid_o = state_q == READ;
-  assign {port}ar_addr_o = {read};
-  assign {port}ar_size_o = 3'd6;
-  assign {port}ar_burst_o = 2'd1;
-  assign aw_valid_o = state_q == WRITE;
-  assign aw_addr_o = {write};
-  assign aw_size_o = 3'd6;
-  assign aw_burst_o = 2'd1;
-  assign w_valid_o = state_q == DATA;
-  assign w_data_o = '1;
-  assign w_strb_o = '1;
-  assign w_last_o = 1'b1;
-{further}{ready}{zero}
+  always_comb begin
+    ar_valid_o = '0;
+    ar_o = '0;
+    aw_valid_o = '0;
+    aw_o = '0;
+    w_valid_o = '0;
+    w_o = '1;
+    ar_valid_o{reader} = state_q == READ;
+    ar_o{reader}.addr = {read};
+    ar_o{reader}.size = 3'd6;
+    ar_o{reader}.burst = 2'd1;
+    aw_valid_o{writer} = state_q == WRITE;
+    aw_o{writer}.addr = {write};
+    aw_o{writer}.size = 3'd6;
+    aw_o{writer}.burst = 2'd1;
+    w_valid_o{writer} = state_q == DATA;
+  end
+  assign r_ready_o = '1;
+  assign b_ready_o = '1;
+{further}{zero}
 endmodule
 """
 
@@ -104,16 +113,14 @@ def sources() -> list[Path]:
     """Sources of flk_top with the stand-ins in place of its halves, which are written anew."""
     folder = toolchain.BUILD / "standins"
     folder.mkdir(parents=True, exist_ok=True)
-    for module, (turns, port, read, write, error, further) in HALVES.items():
+    for module, (turns, reader, writer, read, write, error, further) in HALVES.items():
         source = next(path for path in toolchain.filelist() if path.stem == module)
         header = re.search(rf"^module {module}\b.*?^\);\n", source.read_text(), re.M | re.S)
         assert header is not None
         outputs = re.findall(r"^\s*output\s.*?(\w+)\s*(?:,|$)", re.sub(r"//.*", "", header[0]), re.M)
-        body = BODY.format(turns=turns, port=port, read=read, write=write, error=error, further=further, ready="", zero="")
-        left = [name for name in outputs if f"assign {name} " not in body + further]
-        ready = "".join(f"  assign {name} = 1'b1;\n" for name in left if re.search(r"[rb]_ready_o$", name))
-        zero = "".join(f"  assign {name} = '0;\n" for name in left if not re.search(r"[rb]_ready_o$", name))
-        text = header[0] + BODY.format(turns=turns, port=port, read=read, write=write, error=error, further=further, ready=ready, zero=zero)
+        body = partial(BODY.format, turns=turns, reader=reader, writer=writer, read=read, write=write, error=error, further=further)
+        zero = "".join(f"  assign {name} = '0;\n" for name in outputs if not re.search(rf"\b{name} = ", body(zero="")))
+        text = header[0] + body(zero=zero)
         path = folder / f"{module}.sv"
         if not path.exists() or path.read_text() != text:
             path.write_text(text)

@@ -3,6 +3,7 @@
 // registers behind AXI4-Lite and an interrupt. FLK_SORT_UNITS, FLK_PREPROC_LANES, FLK_LIST_WRITERS: parameters of the half.
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,19 +18,17 @@
 
 namespace {
 
-// Ports that read and write: number, prefix of their pins.
 #if defined(FLK_CHIP)
-#define FLK_READERS(X) X(0, )
-#define FLK_WRITERS(X) X(0, )
 constexpr int PORTS = 1;
-#elif defined(FLK_RENDERING)
-#define FLK_READERS(X) X(0, list_) X(1, record_)
-#define FLK_WRITERS(X) X(2, )
+#else
+// Numbers of the ports behind the half's readers and writers, in the order of flk_rendering_pkg and flk_preproc_pkg.
+#if defined(FLK_RENDERING)
+constexpr int READERS[] = {1, 0}, WRITERS[] = {2};  // records, lists; frame buffer
 constexpr int PORTS = 3;
 #else
-#define FLK_READERS(X) X(0, table_) X(1, geometry_) X(2, colour_) X(3, pointer_)
-#define FLK_WRITERS(X) X(3, pointer_) X(4, )
+constexpr int READERS[] = {3, 2, 1, 0}, WRITERS[] = {3, 4};  // pointers, colours, geometry, table; pointers, lines
 constexpr int PORTS = 5;
+#endif
 #endif
 
 struct Sim {
@@ -54,11 +53,6 @@ struct Sim {
 
   ~Sim() { top->final(); }
 
-#define FLK_DRIVE_R(k, prefix) FLK_AXI_DRIVE_READ(ports[k]->reply(), *top, prefix);
-#define FLK_DRIVE_W(k, prefix) FLK_AXI_DRIVE_WRITE(ports[k]->reply(), *top, prefix);
-#define FLK_SAMPLE_R(k, prefix) FLK_AXI_SAMPLE_READ(requests[k], *top, prefix);
-#define FLK_SAMPLE_W(k, prefix) FLK_AXI_SAMPLE_WRITE(requests[k], *top, prefix);
-
   // Nothing is asked of the design.
   void stop() {
 #ifdef FLK_CHIP
@@ -73,15 +67,21 @@ struct Sim {
   }
 
   void drive() {
-    FLK_READERS(FLK_DRIVE_R)
-    FLK_WRITERS(FLK_DRIVE_W)
+#ifdef FLK_CHIP
+    FLK_AXI_DRIVE(ports[0]->reply(), *top, );
+#else
+    for (size_t k = 0; k < std::size(READERS); ++k) flk::channels::drive_read(ports[READERS[k]]->reply(), *top, k);
+    for (size_t k = 0; k < std::size(WRITERS); ++k) flk::channels::drive_write(ports[WRITERS[k]]->reply(), *top, k);
+#endif
   }
 
   void sample() {
-    FLK_READERS(FLK_SAMPLE_R)
-    FLK_WRITERS(FLK_SAMPLE_W)
 #ifdef FLK_CHIP
+    FLK_AXI_SAMPLE(requests[0], *top, );
     FLK_AXI_SAMPLE_QOS(requests[0], *top, );
+#else
+    for (size_t k = 0; k < std::size(READERS); ++k) flk::channels::sample_read(requests[READERS[k]], *top, k);
+    for (size_t k = 0; k < std::size(WRITERS); ++k) flk::channels::sample_write(requests[WRITERS[k]], *top, k);
 #endif
   }
 

@@ -1,6 +1,6 @@
 // Memory behind AXI4 ports, for harnesses of verilated designs and for tests: contents (`Store`), time (`dram::Engine`), ports (`AxiPort`).
 //
-// Nothing here needs Verilator; the macros at the end connect a port to the pins of a model. docs/reference/memory_model.md has the options, what is checked and how
+// Nothing here needs Verilator; the macros at the end, and `channels`, connect a port to the pins of a model. docs/reference/memory_model.md has the options, what is checked and how
 // a harness calls it. A cycle n of the chip's clock:
 //
 //   top.clk_i = 0; FLK_AXI_DRIVE(port.reply(), top, prefix); top.eval();   // the design sees the replies of cycle n and settles
@@ -651,7 +651,87 @@ void store(T& port, const uint32_t* words) {
   }
 }
 
+// At most 64 bits of a port, from bit `low` on.
+template <class T>
+uint64_t bits(const T& port, int low, int count) {
+  uint64_t value = 0;
+  for (int k = 0, at = low; k < count; k += 32 - at % 32, at = low + k) value |= static_cast<uint64_t>(word(port, at / 32) >> at % 32) << k;
+  return count < 64 ? value & ((1ull << count) - 1) : value;
+}
+// Any number of bits of a port, to and from bit 0 of `words`.
+template <class T>
+void take(const T& port, int low, int count, uint32_t* words) {
+  for (int k = 0; k < count; k += 32) words[k / 32] = static_cast<uint32_t>(bits(port, low + k, std::min(count - k, 32)));
+}
+template <class T>
+void put(T& port, int low, int count, const uint32_t* words) {
+  for (int k = 0; k < count; k += 32) {
+    const int size = std::min(count - k, 32), at = low + k, shift = at % 32;
+    const uint64_t mask = ((1ull << size) - 1) << shift, value = static_cast<uint64_t>(words[k / 32]) << shift & mask;
+    if constexpr (std::is_integral_v<T>) {
+      port = static_cast<T>((port & ~mask) | value);  // of at most 32 bits
+    } else {
+      port[at / 32] = static_cast<uint32_t>((port[at / 32] & ~mask) | value);
+      if (size > 32 - shift) port[at / 32 + 1] = static_cast<uint32_t>((port[at / 32 + 1] & ~(mask >> 32)) | value >> 32);
+    }
+  }
+}
+template <class T>
+void put(T& port, int low, int count, uint32_t value) {
+  put(port, low, count, &value);
+}
+
 }  // namespace pins
+
+// Channels of flk_axi_pkg, packed structs of model/flicker/layout.py: element `k` of the ports `ar_valid_o`, `ar_o`, ... of a model (arrays; a single one is element 0).
+namespace channels {
+
+constexpr int ID = 4, ADDR = 40, DATA = 512, STRB = DATA / 8;
+constexpr int AX = ID + ADDR + 8 + 3 + 2, R = ID + 1 + 2 + DATA, W = 1 + STRB + DATA, B = ID + 2;
+
+template <class T>
+void sample_address(AxiAddress& to, bool valid, const T& port, int k) {
+  to.valid = valid;
+  if (!valid) return;
+  const uint64_t ax = pins::bits(port, k * AX, AX);
+  to.burst = ax & 3;
+  to.size = ax >> 2 & 7;
+  to.len = ax >> 5 & 255;
+  to.addr = ax >> 13 & ((1ull << ADDR) - 1);
+  to.id = static_cast<uint32_t>(ax >> (13 + ADDR));
+}
+template <class Top>
+void sample_read(AxiRequest& request, const Top& top, int k) {
+  sample_address(request.ar, top.ar_valid_o >> k & 1, top.ar_o, k);
+  request.r_ready = top.r_ready_o >> k & 1;
+}
+template <class Top>
+void sample_write(AxiRequest& request, const Top& top, int k) {
+  sample_address(request.aw, top.aw_valid_o >> k & 1, top.aw_o, k);
+  request.w_valid = top.w_valid_o >> k & 1;
+  if (request.w_valid) {
+    pins::take(top.w_o, k * W, DATA, request.w_data);
+    request.w_strb = pins::bits(top.w_o, k * W + DATA, STRB);
+    request.w_last = pins::bits(top.w_o, k * W + DATA + STRB, 1);
+  }
+  request.b_ready = top.b_ready_o >> k & 1;
+}
+template <class Top>
+void drive_read(const AxiReply& reply, Top& top, int k) {
+  pins::put(top.ar_ready_i, k, 1, reply.ar_ready);
+  pins::put(top.r_valid_i, k, 1, reply.r_valid);
+  pins::put(top.r_i, k * R, DATA, reply.r_data);
+  pins::put(top.r_i, k * R + DATA, ID + 3, reply.r_id << 3 | reply.r_last << 2 | reply.r_resp);
+}
+template <class Top>
+void drive_write(const AxiReply& reply, Top& top, int k) {
+  pins::put(top.aw_ready_i, k, 1, reply.aw_ready);
+  pins::put(top.w_ready_i, k, 1, reply.w_ready);
+  pins::put(top.b_valid_i, k, 1, reply.b_valid);
+  pins::put(top.b_i, k * B, B, reply.b_id << 2 | reply.b_resp);
+}
+
+}  // namespace channels
 }  // namespace flk
 
 // Ports `<prefix>aw_valid_o`, ... of a model with Verilator's names, for example FLK_AXI_SAMPLE(request, *top_, dram_). Separate ones for designs that only

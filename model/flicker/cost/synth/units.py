@@ -149,11 +149,24 @@ def ctu_parameters(form: int, precision: int, fifo_depth: int = 0) -> dict[str, 
     return {"Form": int(form), "Precision": int(precision), "VruCycles": PIXELS_PER_VRU, "CtuFifoDepth": fifo_depth}
 
 
+def _bits(port: str, record: str, field: str, k: int = 0) -> list[str]:
+    """Bits of a field of element k of a port that has records (`layout`)."""
+    place = layout.place(record, field)
+    return [f"{port}[{layout.bits(record) * k + place.at + bit}]" for bit in range(place.bits)]
+
+
+def _of_one_identifier(channel: str, k: int = 0) -> list[str]:
+    """Bits of element k of `r_i` or `b_i` that say nothing where one identifier answers and no access is exclusive."""
+    port, record = f"{channel}_i", f"axi_{channel}"
+    return [_bits(port, record, "resp", k)[0], *_bits(port, record, "id", k)]
+
+
 def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
     """Port bits that are rightly not connected, by the meaning of the unit's parameters."""
     factored = parameters.get("Form", 1) == 1
     keeps = factored and parameters.get("ColourStore", 1) == 1
     width = 1 + parameters.get("ExpBits", 5) + parameters.get("ManBits", 10)
+    managers = parameters.get("Managers", 4)
     bits = {
         "flk_log_opacity": ["opacity_i[15]"],  # an opacity is not negative
         "flk_log_opacity_pipe": ["opacity_i[15]"],
@@ -162,11 +175,11 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         "flk_vru": [f"op_feature_i[{bit}]" for bit in (111, 127, 143)],  # colours are not negative
         # Answers come under the one identifier there is, and no access is exclusive.
         "flk_preprocessing": [
-            f"{port}{name}" for port in ("table_r_", "geometry_r_", "colour_r_", "pointer_r_", "pointer_b_", "b_")
-            for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))
+            *(bit for k in range(4) for bit in _of_one_identifier("r", k)), *(bit for k in range(2) for bit in _of_one_identifier("b", k)),
         ] + ([] if keeps else [f"registers_i[{bit}]" for bit in range(329, 423)]),  # of kept colours
         "flk_frame_control": [] if keeps else [f"descriptor_i[{bit}]" for bit in range(185, 220)],  # room and place of kept colours
-        "flk_pointer_port": [f"{channel}_{name}" for channel in "rb" for name in ("resp_i[0]", *(f"id_i[{bit}]" for bit in range(4)))],
+        "flk_pointer_port": [*_of_one_identifier("r"), *_of_one_identifier("b")],
+        "flk_rendering": _bits("r_i", "axi_r", "data")[layout.AXI_DATA_BITS // 2 :],  # of records the lower half of a beat
         "flk_preprocessing_core": ["part_i[268]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
@@ -183,7 +196,10 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         # Words are addressed; protection means nothing here.
         "flk_registers": [f"s_axil_{channel}{name}[{bit}]" for channel in ("aw", "ar") for name, bits in (("addr", 2), ("prot", 3)) for bit in range(bits)],
         "flk_top_axi": ["m_axi_buser[0]", "m_axi_ruser[0]"],  # answers carry nothing beside them
-        "flk_axi_read_mux": [f"r_ready_i[{k}]" for k in range(parameters.get("Managers", 4))],  # always 1 when it matters
+        # Readiness is always 1 when it matters; identifiers of axi_ax_t are its own.
+        "flk_axi_read_mux": [
+            *(f"r_ready_i[{k}]" for k in range(managers)), *(bit for k in range(managers) for bit in _bits("ar_i", "axi_ax", "id", k)),
+        ],
         # Bits of identifiers that are not in use; no part is narrower than the port. Wires alone where the port is as wide.
         "flk_axi_downsizer": ["clk_i[0]", "rst_ni[0]", "clear_i[0]"] if parameters.get("PortBits", 128) == 512 else ["r_id_i[3]"],
         "flk_axi_half": [f"ar_addr_i[{bit}]" for bit in range(40) if bit != 5],  # one bit says which half
