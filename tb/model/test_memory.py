@@ -8,16 +8,18 @@ Not covered here: connection to the pins of a verilated design (tb/memory).
 from __future__ import annotations
 
 import random
+import re
 from collections import defaultdict, deque
 from dataclasses import dataclass, field, replace
 
 import pytest
 from flicker_tb.runner import seed
 
+from flicker import layout
 from flicker.chip.constants import DRAM_LATENCY_CYCLES
 from flicker.chip.dram import DramConfig, Refresh, port_config
 from flicker.errors import FlickerError
-from flicker.sim.memory import Memory, Order, Port, PortConfig, Resp, WriteOrder
+from flicker.sim.memory import FOLDER, Memory, Order, Port, PortConfig, Resp, WriteOrder
 
 TIMING = DramConfig().timing
 BASE, SIZE = 0x10000, 0x8000
@@ -637,3 +639,11 @@ def test_bad_options(options, message):
     with pytest.raises(FlickerError, match=message):
         memory(**options)
     assert replace(PortConfig(), seed=2).seed == 2
+
+
+def test_channels_are_those_of_the_packages():
+    """`flk::channels` takes structs of flk_axi_pkg apart as `flicker.layout` makes them: widths, and fields in its order."""
+    found = re.search(r"constexpr int ID = (\d+), ADDR = (\d+), DATA = (\d+), STRB = DATA / 8;", (FOLDER / "memory.hpp").read_text())
+    assert found is not None and tuple(map(int, found.groups())) == (layout.AXI_ID_BITS, layout.AXI_ADDR_BITS, layout.AXI_DATA_BITS)
+    orders = {"axi_ax": "burst size len addr id", "axi_r": "data resp last id", "axi_w": "data strb last", "axi_b": "resp id"}
+    assert {record: " ".join(reversed(layout.fields(record))) for record in orders} == orders
