@@ -31,6 +31,7 @@ from pathlib import Path
 import registers
 
 from flicker import toolchain
+from flicker.chips import chip_of
 from flicker.errors import FlickerError
 
 ROOT = toolchain.ROOT
@@ -44,7 +45,7 @@ VERSIONS = (ROOT / "requirements.lock").read_text() + Path(__file__).read_text()
 SMALLER: dict[str, dict[str, int]] = {"flk_render_stage": {"VrusPerChannel": 1}}
 
 # Parameters, beside those, under which a module takes another shape. What a parent has below it with all its parameters needs no entry of its own:
-# the tables of flk_ff_rom stand under flk_ff_poly, the sizes of a channel under flk_channel.
+# the tables of flk_ff_rom stand under flk_ff_poly, the sizes of a channel under flk_channel, halves of small chips under flk_top.
 VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_fifo": [{"Width": 1, "Depth": 1}, {"Depth": 5}, {"Depth": 128}],
     "flk_pipe_reg": [{"Width": 1}],
@@ -61,12 +62,11 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_lane": [{"Lanes": 16}, {"Lanes": 32}],
     "flk_frame_writer": [{"Lanes": 32}, {"Lanes": 128}, {"Cores": 1, "Lanes": 8}],
     "flk_stage": [{"Stage": 1}],
-    "flk_preprocessing": [{"Form": 0, "PreprocLanes": 1, "PreprocInterval": 4, "ListWriters": 1}, {"PreprocInterval": 4},
-        {"PreprocLanes": 2, "ListWriters": 2}],
-    "flk_top_axi": [{"Stage": 1, "IdWidth": 12, "UserWidth": 4, "ResetStages": 0}],
-    "flk_rendering": [{"Stage": 1, "SortUnits": 1}],
+    "flk_preprocessing": [{"Form": 0, "PreprocLanes": 1, "PreprocInterval": 4, "ListWriters": 1}],
+    "flk_top_axi": [{**chip_of("small").parameters, "IdWidth": 12, "UserWidth": 4, "ResetStages": 0}],
+    "flk_rendering": [chip_of("default").config.chip_parameters()],
     "flk_axi_downsizer": [{"PortBits": 256}, {"PortBits": 512}],
-    "flk_top": [{"PortBits": 128}, {"PortBits": 256}],
+    "flk_top": [chip_of("tiny").parameters],
     "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}, {"Cores": 1, "Lanes": 8}],
     "flk_ctu_controller": [{"VruCycles": 4}, {"VruCycles": 16}],
     "flk_prtu": [{"Form": f, "Precision": p} for f in (0, 1) for p in (0, 1, 2)],
@@ -128,7 +128,7 @@ class Shape:
 
     name: str
     module: str
-    parameters: Mapping[str, int]
+    parameters: Mapping[str, int | str]
     outputs: tuple[str, ...]
 
 
@@ -147,7 +147,11 @@ def check_filelist(listed: list[Path]) -> list[str]:
 
 
 def shapes_of(listed: Sequence[Path]) -> list[Shape]:
-    """All shapes, in the order of the file list."""
+    """All shapes, in the order of the file list. A default that is a package's constant is given with every instance: Verilator would take a parent's
+    instance, which gives it too, for another shape.
+    """
+    packages = [path for path in listed if path.stem.endswith("_pkg")]
+    homes = {name: path.stem for path in packages for name in re.findall(r"\b(?:localparam|parameter)\b[^=;]*?(\w+)\s*=", path.read_text())}
     found = []
     for path in listed:
         module = path.stem
@@ -157,8 +161,10 @@ def shapes_of(listed: Sequence[Path]) -> list[Shape]:
         if header is None:
             raise FlickerError(f"{path.relative_to(ROOT)}: no header of {module} that ends with a line `);`")
         outputs = tuple(re.findall(r"\boutput\b[^,;]*?(\w+)\s*(?=,|\n\))", header[0]))
+        constants = re.findall(r"\bparameter\b[^,=]*?(\w+)\s*=\s*(?:\w+::)?([A-Z][A-Z0-9_]+)\s*(?=[,\n])", header[0])
+        named = {name: f"{homes[value]}::{value}" for name, value in constants}
         for number, parameters in enumerate([SMALLER.get(module, {}), *VARIANTS.get(module, [])]):
-            found.append(Shape(f"{module}_{number}", module, parameters, outputs))
+            found.append(Shape(f"{module}_{number}", module, {**named, **parameters}, outputs))
     return found
 
 
