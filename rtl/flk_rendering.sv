@@ -8,8 +8,8 @@
 // failed; the frame goes on to its end, with what there is.
 // Lists that a sorting unit does not hold are written back as runs, behind the lists: unit u has its region of the runs of the longest one at
 // lists_beat + 32 chunks + u times its lines (flk_list_sorter, docs/reference/list_sorter.md).
-// Three AXI4 ports of 512 bits (flk_axi_pkg): lists (read, identifiers 0 to SortUnits - 1, of runs SortUnits to 2 SortUnits - 1), records (read, one beat of
-// 32 bytes, in the lower half whatever the address), frame buffer and runs (write).
+// Three AXI4 ports of 512 bits (flk_axi_pkg): lists (read, identifiers 0 to SortUnits - 1, of runs SortUnits to 2 SortUnits - 1), records (read, narrow
+// bursts of one beat of 32 bytes), frame buffer and runs (write).
 // stop_i (a level, until a reset): no further pair of tiles is written; stopped_o: those that were begun are in memory, and the unit may be reset once
 // nothing is under way at its ports. left_o: pairs of tiles that are not written, the last ones of the walk.
 // A sub-tile whose pixels are all finished leaves its list: delivery drops its records, and when all four of a tile say so the
@@ -59,7 +59,7 @@ module flk_rendering
   // The stage's counters of the last frame (flk_render_stage)
   input  logic [COUNTER_ADDR_BITS-1:0] counter_addr_i,
   output logic [COUNTER_BITS-1:0]      counter_data_o,
-  // AXI4: readers RENDERING_READ_*; of records only the lower half of a beat counts
+  // AXI4: readers RENDERING_READ_*
   output logic    [RENDERING_READERS-1:0] ar_valid_o,
   input  logic    [RENDERING_READERS-1:0] ar_ready_i,
   output axi_ax_t [RENDERING_READERS-1:0] ar_o,
@@ -78,6 +78,7 @@ module flk_rendering
   input  axi_b_t                          b_i
 );
 
+  localparam int unsigned RecordBeat = AXI_DATA_BITS / 2;  // of a narrow read
   localparam int unsigned RecordBits = (Form == FORM_FACTORED) ? 128 : 256;
   localparam int unsigned BeatBits = RENDERING_BEAT_BITS;
   localparam int unsigned Readers  = 2 * SortUnits;  // of lists, of runs
@@ -332,6 +333,7 @@ module flk_rendering
   logic [Cores-1:0][InWidth-1:0]                 record_valid, record_end;
   logic [Cores-1:0][InWidth-1:0][RecordBits-1:0] record;
   logic [Cores-1:0][InWidth-1:0][1:0]            record_subtile;
+  logic [RecordBeat-1:0]                         record_data;
   logic [31:0]                                   cache_lines;
   logic [3:0]                                    delivery_waits;
   logic [1:0][3:0]                               border;  // of the tile in turn
@@ -352,6 +354,19 @@ module flk_rendering
     .tile_y_o(unused_taken_y),
     .second_o(unused_taken_second),
     .border_o(border)
+  );
+
+  flk_axi_half #(
+    .Width   (RecordBeat),
+    .AddrBits(AXI_ADDR_BITS)
+  ) i_half (
+    .clk_i,
+    .rst_ni,
+    .ar_move_i(ar_valid_o[RENDERING_READ_RECORDS] && ar_ready_i[RENDERING_READ_RECORDS]),
+    .ar_addr_i(ar_o[RENDERING_READ_RECORDS].addr),
+    .r_valid_i(r_valid_i[RENDERING_READ_RECORDS]),
+    .r_data_i (r_i[RENDERING_READ_RECORDS].data),
+    .r_data_o (record_data)
   );
 
   flk_delivery #(
@@ -398,13 +413,10 @@ module flk_rendering
     .r_valid_i    (r_valid_i[RENDERING_READ_RECORDS]),
     .r_ready_o    (r_ready_o[RENDERING_READ_RECORDS]),
     .r_id_i       (r_i[RENDERING_READ_RECORDS].id),
-    .r_data_i     (r_i[RENDERING_READ_RECORDS].data[255:0]),
+    .r_data_i     (record_data),
     .r_resp_i     (r_i[RENDERING_READ_RECORDS].resp),
     .r_last_i     (r_i[RENDERING_READ_RECORDS].last)
   );
-
-  logic unused_half;
-  assign unused_half = ^r_i[RENDERING_READ_RECORDS].data[511:256];
 
   // ---- pixels ---------------------------------------------------------------------------------------
 

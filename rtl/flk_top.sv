@@ -330,7 +330,7 @@ module flk_top
   logic    [READERS-1:0] ar_valid, ar_ready, port_ar_valid, port_ar_ready;
   logic    [READERS-1:0] r_valid, r_ready, read_ends;
   axi_ax_t [READERS-1:0] ar;
-  axi_r_t                r, r_record;
+  axi_r_t                r;
   logic    [WRITERS-1:0] aw_valid, aw_ready, port_aw_valid, port_aw_ready;
   logic    [WRITERS-1:0] w_valid, w_ready, b_valid, b_ready;
   axi_ax_t [WRITERS-1:0] aw;
@@ -347,7 +347,6 @@ module flk_top
   logic [WRITERS-1:0][2:0]             aw_size;
   logic [WRITERS-1:0][Width-1:0]       w_data;
   logic [WRITERS-1:0][Width/8-1:0]     w_strb;
-  logic [Width/2-1:0]                  record_data;
   logic                                line_ar_valid, line_ar_ready, line_aw_valid, line_aw_ready;
   logic                                line_r_valid, line_r_last, unused_line_r_ready;  // always 1
   logic                                line_w_valid, line_w_ready, line_w_last;
@@ -583,25 +582,6 @@ module flk_top
 
   assign read_ends = r_valid & {READERS{r.last}};
 
-  flk_axi_half #(
-    .Width   (Width / 2),
-    .AddrBits(AddrBits)
-  ) i_records (
-    .clk_i,
-    .rst_ni   (rendering_rst_n),
-    .ar_move_i(ar_valid[RENDERING_READ_RECORDS] &&
-               ar_ready[RENDERING_READ_RECORDS]),
-    .ar_addr_i(ar_addr[RENDERING_READ_RECORDS]),
-    .r_valid_i(r_valid[RENDERING_READ_RECORDS]),
-    .r_data_i (r.data),
-    .r_data_o (record_data)
-  );
-
-  always_comb begin
-    r_record      = r;
-    r_record.data = Width'(record_data);
-  end
-
   // ---- halves -------------------------------------------------------------------------------------------
 
   logic front_clk, rendering_clk;
@@ -703,7 +683,7 @@ module flk_top
     .ar_o          (ar[RENDERING_READERS-1:0]),
     .r_valid_i     (r_valid[RENDERING_READERS-1:0]),
     .r_ready_o     (r_ready[RENDERING_READERS-1:0]),
-    .r_i           ({r, r_record}),
+    .r_i           ({RENDERING_READERS{r}}),
     .aw_valid_o    (aw_valid[0]),
     .aw_ready_i    (aw_ready[0]),
     .aw_o          (aw[0]),

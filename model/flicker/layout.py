@@ -42,6 +42,9 @@ def _record(name: str, note: str, *fields: tuple, package: str = "flk_pkg") -> R
 
 
 _COORD = "flk_param_pkg::SUBTILE_COORD_BITS"
+# Of AXI4 inside the chip; a record of a channel goes beside its valid and ready.
+AXI_ID_BITS, AXI_ADDR_BITS, AXI_DATA_BITS = 4, 40, 512
+_ID, _ADDR, _DATA = ((bits, "", f"AXI_{name}_BITS") for name, bits in (("ID", AXI_ID_BITS), ("ADDR", AXI_ADDR_BITS), ("DATA", AXI_DATA_BITS)))
 
 RECORDS: dict[str, Record] = {
     record.name: record
@@ -83,14 +86,6 @@ RECORDS: dict[str, Record] = {
             ("fifo_full", 1), ("vru_busy", 1, "issued a pixel to each VRU"), ("sent", 1, "a splat met the unfinished mini-tile, in program order"),
             ("discarded", 1, "dropped a splat of the finished mini-tile"), ("finished", 3, "pixels that ended, at most one in each VRU"),
         ),
-    )
-}
-# Channels of AXI4 inside the chip, each beside its valid and ready.
-AXI_ID_BITS, AXI_ADDR_BITS, AXI_DATA_BITS = 4, 40, 512
-_ID, _ADDR, _DATA = ((bits, "", f"AXI_{name}_BITS") for name, bits in (("ID", AXI_ID_BITS), ("ADDR", AXI_ADDR_BITS), ("DATA", AXI_DATA_BITS)))
-RECORDS |= {
-    record.name: record
-    for record in (
         _record("axi_ax", "AR, AW.", ("id", *_ID), ("addr", *_ADDR), ("len", 8), ("size", 3), ("burst", 2), package="flk_axi_pkg"),
         _record("axi_r", "R.", ("id", *_ID), ("last", 1), ("resp", 2), ("data", *_DATA), package="flk_axi_pkg"),
         _record("axi_w", "W.", ("last", 1), ("strb", AXI_DATA_BITS // 8, "", "AXI_DATA_BITS/8"), ("data", *_DATA), package="flk_axi_pkg"),

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ from .half import BEAT, PAGE, Half, MemoryOptions
 from .memory import PortConfig, PurposeCounts
 
 PORT = PortConfig(max_reads=64, max_writes=64, latency=20, hazards=False)
-PORTS = {"list": PORT, "record": replace(PORT, data_bits=256), "write": PORT}
+PORTS = dict.fromkeys(("list", "record", "write"), PORT)
 PURPOSES = ("lists", "pointers", "records", "frame")
 ERRORS = ("lists could not be read", "records could not be read", "a write failed")
 

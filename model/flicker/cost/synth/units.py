@@ -95,8 +95,8 @@ COMPOSED: dict[str, list[str]] = {
     "flk_line_writer": ["flk_sram_fifo", "flk_axi_write"],
     "flk_axi_read_mux": ["flk_stream_arbiter"],
     "flk_rendering": [
-        "flk_tile_walk", "flk_list_reader", "flk_list_sorter", "flk_stream_arbiter", "flk_axi_read_mux", "flk_entry_buffer", "flk_delivery", "flk_stage",
-        "flk_frame_writer", "flk_line_writer", "flk_pipe_reg", "flk_event_counters",
+        "flk_tile_walk", "flk_list_reader", "flk_list_sorter", "flk_stream_arbiter", "flk_axi_read_mux", "flk_axi_half", "flk_entry_buffer", "flk_delivery",
+        "flk_stage", "flk_frame_writer", "flk_line_writer", "flk_pipe_reg", "flk_event_counters",
     ],
     "flk_splat_input": ["flk_record_to_splat"],
     "flk_stage": ["flk_splat_input", *(stage.module for stage in RENDERING_STAGES.values())],
@@ -105,7 +105,7 @@ COMPOSED: dict[str, list[str]] = {
     "flk_frame_counters": [MEMORY],
     "flk_top": [
         "flk_registers", "flk_frame_control", "flk_frame_counters", "flk_front_throttle", "flk_axi_arbiter", "flk_axi_downsizer", "flk_axi_hold",
-        "flk_axi_half", "flk_preprocessing", "flk_rendering",
+        "flk_preprocessing", "flk_rendering",
     ],
     "flk_top_axi": ["flk_top", "flk_reset_sync"],
     # The wrapper has no logic of its own.
@@ -179,7 +179,6 @@ def open_bits(top: str, parameters: dict[str, int]) -> list[str]:
         ] + ([] if keeps else [f"registers_i[{bit}]" for bit in range(329, 423)]),  # of kept colours
         "flk_frame_control": [] if keeps else [f"descriptor_i[{bit}]" for bit in range(185, 220)],  # room and place of kept colours
         "flk_pointer_port": [*_of_one_identifier("r"), *_of_one_identifier("b")],
-        "flk_rendering": _bits("r_i", "axi_r", "data")[layout.AXI_DATA_BITS // 2 :],  # of records the lower half of a beat
         "flk_preprocessing_core": ["part_i[268]"],  # of eight clusters the low bits tell
         # FP16 opacities are positive.
         "flk_splat_bounds": ["width_i[12]", "height_i[12]", "opacity_i[15]"],
