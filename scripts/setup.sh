@@ -31,7 +31,8 @@ case $PWD in
   *[[:space:]]*) fail "Verilator cannot build in a path with spaces: $PWD" ;;
 esac
 
-pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off)
+# Without bytecode of all packages, half of the time: Python compiles what is imported.
+pip=("$venv/bin/python" -m pip --disable-pip-version-check install --quiet --progress-bar off --no-compile)
 if [[ -n ${2-} ]]; then
   echo "setup: installing the packages of the extra $2 into $venv"
   sed -n "s/ *; *extra == \"$2\"\$//p" requirements.lock > "$venv/extra-$2.txt"

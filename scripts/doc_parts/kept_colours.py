@@ -1,5 +1,6 @@
 """`make docs PART=kept_colours`: frames of paths that keep colours: clusters that last, bytes and cycles of a chip with 64 lanes by its models, pictures;
-`make docs PART=kept_hardware`: such frames in the verilated chip; `make docs PART=path_hardware`: larger chips beside GSCore; in docs/results/kept_colours.md.
+`make docs PART=kept_hardware`: such frames in the verilated chip; `make docs PART=path_hardware`: larger chips beside GSCore; `make docs PART=path_sizes`:
+larger pictures; in docs/results/kept_colours.md.
 
 An error: a frame buffer that differs from the golden model's; bytes of the chip that are not the model's, of records and lists by more than `LOOSE`.
 """
@@ -18,6 +19,7 @@ from flicker.chip.compare import chip_estimates
 from flicker.chip.dram import DramConfig, Refresh
 from flicker.chip.whole import WholeFrame, first_half, whole_frame
 from flicker.chips import chip_of
+from flicker.cost.energy import memory_energy
 from flicker.errors import FlickerError
 from flicker.front.paths import Asked, path_of
 from flicker.front.view import load_view
@@ -144,10 +146,10 @@ def tables(say: Say) -> dict[str, str]:
     )}
 
 
-ROW = 4  # frames back to back in RTL, the last of a path: its third is measured, beside whose rendering the front end works on the fourth
+ROW = 4  # frames back to back in RTL, the last of a path: the last but one is measured, beside whose rendering the front end works on the last
 GSCORE = "gscore-conic"
 LOOSE = {"records": 0.02, "lists": 0.002}  # which lines are read again, and whether a list that is read again is left before that, depends on timing
-CHUNKS = 24_000  # of a list writer: enough for these views
+CHUNKS = 24_000  # of a list writer at 1280x720: enough for these views
 TURNING, MOVING = (next(case for case in MOTIONS if case.tolerance == t and case.share == s) for t, s in ((0, 0.0), (TWO, 0.001)))
 DRAM, WIDER = DramConfig(), DramConfig(interleave_bytes=256)  # the channel changes every 64 bytes, every 256
 HARDWARE = (  # folder, path, with kept colours, memories, DRAM
@@ -162,38 +164,41 @@ LIMIT = 0.1  # by which the chip model's interval may be off
 ROWS_OF = (3, 6)  # of these: what they open rows for
 
 
-def _third(say: Say, view: RealView, case: Case, keeps: bool, config: RenderConfig, dram: DramConfig) -> tuple[RowFrame, WholeFrame]:
-    """The third of the last frames of a path, in RTL and by the chip model. The frames before those in RTL are of the golden model, whose store the chip
-    finds."""
+def _one_frame(
+    say: Say, view: RealView, case: Case, keeps: bool, config: RenderConfig, dram: DramConfig, count: int = ROW, limit: float = LIMIT,
+) -> tuple[RowFrame, WholeFrame]:
+    """The last but one of the last `count` frames of a path, in RTL and by the chip model. The frames before those in RTL are of the golden model, whose store
+    the chip finds. limit: by which the model's interval may be off."""
     path = view.path(folder_of_scenes())
     source, packed = open_scene(path), pack_file(path).packed
     title = f"{view.title}, {case.motion}" + (f", {case.tolerance or 0}" if keeps else "")
-    say(f"{title}: {config.lanes} lanes, memories {config.memories}, refresh {dram.refresh}, channels of {dram.interleave_bytes} bytes")
+    size = "x".join(map(str, case.size))
+    say(f"{title}, {size}: {config.lanes} lanes, memories {config.memories}, refresh {dram.refresh}, channels of {dram.interleave_bytes} bytes")
     views, reuse = cameras(case, source, view, packed), Reuse(ColourStore(packed), float(case.tolerance)) if keeps else None
-    for camera in views[:-ROW] if keeps else ():
+    for camera in views[:-count] if keeps else ():
         run_front(packed, camera, reuse=reuse)
     with ChipSession(packed, config, memory=MemoryOptions(dram.timing)) as chip:
         store = chip.store(reuse.epsilon, reuse.generation, reuse.store.image().tobytes()) if reuse else None
-        row = back_to_back(chip, views[-ROW:], chunks=CHUNKS, store=store)
-        for number, (camera, done) in enumerate(zip(views[-ROW:], row, strict=True)):
+        row = back_to_back(chip, views[-count:], chunks=CHUNKS * math.prod(case.size) // math.prod(SIZE), store=store)
+        for number, (camera, done) in enumerate(zip(views[-count:], row, strict=True)):
             front = run_front(packed, camera, reuse=reuse)
             if not np.array_equal(done.frame.buffer, render_chip(front_lists(front), config).buffer):
                 raise FlickerError(f"{title}: frame {number}: the picture differs from the golden model's")
-            if number == 2:
+            if number == count - 2:
                 model, found = whole_frame(*first_half(front, config, dram), config, dram), done
     for purpose, due in model.bytes.items():
         if abs(due - found.moved[purpose]) > LOOSE.get(purpose, 0.0) * due:
             raise FlickerError(f"{title}: {purpose}: the chip moves {found.moved[purpose]:,} bytes, the chip model {due:,}")
     assert found.interval is not None
-    if abs(off := model.interval / found.interval - 1.0) > LIMIT:
-        raise FlickerError(f"{title}: the chip model's interval is {off:+.1%} off")
+    if abs(off := model.interval / found.interval - 1.0) > limit:
+        raise FlickerError(f"{title}, {size}: the chip model's interval is {off:+.1%} off")
     return found, model
 
 
 def _in_hardware(say: Say, folder: str, case: Case, keeps: bool, memories: str, dram: DramConfig) -> tuple[tuple, tuple, list[tuple]]:
     """A row of the first two tables, and of the third."""
     view = next(v for v in REAL_VIEWS if v.folder == folder)
-    found, model = _third(say, view, case, keeps, CONFIG.with_(memories=memories), dram)
+    found, model = _one_frame(say, view, case, keeps, CONFIG.with_(memories=memories), dram)
     kept = str(case.tolerance or 0) if keeps else "-"
     head = (view.title, case.motion, kept, memories, str(dram.interleave_bytes), str(dram.refresh))
     moved, busy = sum(found.moved.values()), {name: clocks / sum(found.spent.values()) for name, clocks in found.spent.items()}
@@ -234,7 +239,7 @@ CHIPS = (  # folder, chip, DRAM
 
 def _beside_gscore(say: Say, folder: str, chip: str, dram: DramConfig) -> tuple:
     view = next(v for v in REAL_VIEWS if v.folder == folder)
-    found, model = _third(say, view, MOVING, True, chip_of(chip).config, dram)
+    found, model = _one_frame(say, view, MOVING, True, chip_of(chip).config, dram)
     rival = chip_estimates(load_view(view.path(folder_of_scenes()), view.number, SIZE), [GSCORE], dram=dram)[GSCORE]["interval_cycles"]
     return (
         view.title, f"`{chip}`", str(dram.interleave_bytes), str(dram.refresh), f"{sum(found.moved.values()) / 1e6:.1f}", f"{found.interval:,}",
@@ -251,3 +256,23 @@ def chip_tables(say: Say) -> dict[str, str]:
         ["view", "chip", "bytes a channel", "refresh", "MB", "interval back to back", "model off by", "frames a second", "GSCore's interval",
          "frames over GSCore's"], rows, numbers=True,
     )}
+
+
+LARGE_CHIP = "wide"
+
+
+def _at_size(say: Say, size: tuple[int, int]) -> tuple:
+    view = REAL_VIEWS[0]
+    found, model = _one_frame(say, view, replace(MOVING, size=size), True, chip_of(LARGE_CHIP).config, DRAM, count=3, limit=math.inf)
+    moved = sum(found.moved.values())
+    return (
+        view.title, f"{size[0]}x{size[1]}", f"{moved / 1e6:.1f}", f"{found.interval:,}", f"{model.interval / found.interval - 1:+.1%}",
+        f"{1e9 / found.interval:,.0f}", f"{memory_energy(moved)['LPDDR4'] / 1e3:.2f}",
+    )
+
+
+def size_tables(say: Say) -> dict[str, str]:
+    build(chip_of(LARGE_CHIP).config)
+    with ThreadPoolExecutor(2) as pool:
+        rows = list(pool.map(lambda size: _at_size(say, size), SIZES[1:]))
+    return {"": table(["view", "picture", "MB", "interval back to back", "model off by", "frames a second", "mJ of the DRAM"], rows, numbers=True)}

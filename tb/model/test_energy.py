@@ -6,6 +6,7 @@ That area and energy are right in silicon is not covered; operators that no cons
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -201,3 +202,14 @@ def test_memories():
     assert energy.sram_pj(64, 32768) == pytest.approx(20 * 28 / 45)
     assert energy.sram_pj(64, 1 << 20) == pytest.approx(100 * 28 / 45, rel=0.15)
     assert energy.memory_energy(1_000_000)["LPDDR4"] == pytest.approx(64)
+
+
+def test_a_busy_unit_takes_no_less_than_what_is_counted(view: View) -> None:
+    """Of the stage of lanes: each cycle all of it, against its events; in proportion to cycles."""
+    found = evaluate(view, "log-lanes")
+    stage = part("lane_stage", "32 lanes")
+    most = energy.busy_energy(stage, found.row["cycles"])
+    assert sum(found.energy.values()) < most
+    assert energy.busy_energy(stage, 2 * found.row["cycles"]) == pytest.approx(2 * most)
+    idle = energy.busy_energy(replace(stage, load=0.0, clock_free=0.0, clock_gated=0.0), 1_000_000)
+    assert idle == pytest.approx(stage.ge * 2e-9 * 1e-3 * 1e6)  # leakage: 2 nW a gate, for a millisecond

@@ -198,6 +198,12 @@ def _free_fifo(depth: int) -> float:
     return float(np.interp(depth, [d for d, _ in known], [v for _, v in known]))
 
 
+def busy_energy(unit: Part, cycles: int) -> float:
+    """Microjoules of a unit of which nothing is counted, at most: its logic switches and all its clocks run in each of `cycles`. With leakage."""
+    leakage = unit.ge * LEAKAGE_NW_PER_GE * 1e-9 * cycles / CLOCK_HZ * 1e12
+    return (cycles * (switching_pj(unit.load) + clock_pj(unit.clock_free + unit.clock_gated)) + leakage) * 1e-6
+
+
 def memory_energy(dram_bytes: int, sram_bits: int = 0, capacity_bytes: int = 288 * 1024) -> dict[str, float]:
     """Microjoules of a frame in memories: bytes moved to and from LPDDR4; bits written to and read from an on-chip SRAM of a capacity
     (the paper's feature buffers have 288 KiB)."""
