@@ -62,9 +62,10 @@ VARIANTS: dict[str, list[dict[str, int]]] = {
     "flk_lane": [{"Lanes": 16}, {"Lanes": 32}],
     "flk_frame_writer": [{"Lanes": 32}, {"Lanes": 128}, {"Cores": 1, "Lanes": 8}],
     "flk_stage": [{"Stage": 1}],
-    "flk_preprocessing": [{"Form": 0, "PreprocLanes": 1, "PreprocInterval": 4, "ListWriters": 1}],
+    "flk_preprocessing": [{"Form": 0, "PreprocLanes": 1, "PreprocInterval": 4, "ListWriters": 1}, {"PreprocInterval": 4},
+        {"PreprocLanes": 2, "ListWriters": 2}],
     "flk_top_axi": [{**chip_of("small").parameters, "IdWidth": 12, "UserWidth": 4, "ResetStages": 0}],
-    "flk_rendering": [chip_of("default").config.chip_parameters()],
+    "flk_rendering": [{"Stage": 1, "SortUnits": 1}, chip_of("default").config.chip_parameters()],
     "flk_axi_downsizer": [{"PortBits": 256}, {"PortBits": 512}],
     "flk_top": [chip_of("tiny").parameters],
     "flk_lane_stage": [{"Lanes": 128, "InWidth": 1, "Slots": 2, "Depth": 2}, {"Cores": 1, "Lanes": 8}],
@@ -162,7 +163,7 @@ def shapes_of(listed: Sequence[Path]) -> list[Shape]:
             raise FlickerError(f"{path.relative_to(ROOT)}: no header of {module} that ends with a line `);`")
         outputs = tuple(re.findall(r"\boutput\b[^,;]*?(\w+)\s*(?=,|\n\))", header[0]))
         constants = re.findall(r"\bparameter\b[^,=]*?(\w+)\s*=\s*(?:\w+::)?([A-Z][A-Z0-9_]+)\s*(?=[,\n])", header[0])
-        named = {name: f"{homes[value]}::{value}" for name, value in constants}
+        named = {name: f"{homes[value]}::{value}" for name, value in constants if value in homes}
         for number, parameters in enumerate([SMALLER.get(module, {}), *VARIANTS.get(module, [])]):
             found.append(Shape(f"{module}_{number}", module, {**named, **parameters}, outputs))
     return found

@@ -319,6 +319,9 @@ def test_lint_flattens_every_shape_once() -> None:
     assert sizes.keys() == {outer.name, default.name} and sizes[outer.name] > 2 and sizes[default.name] == 1
     _, sizes = lint.elaborate([inner, default], "-DSYNTHESIS")
     assert sizes == {inner.name: 1, default.name: 1}
+    # A parent that gives its child a package's constant, which is the child's default too.
+    parent, child = (shape for shape in lint.shapes_of(filelist()) if shape.name in ("flk_channel_0", "flk_vru_0"))
+    assert lint.elaborate([parent, child], "-DSYNTHESIS")[1].keys() == {"flk_channel_0"}
     groups = lint.groups_of([inner, outer, default], {"inner": lint.GROUP, outer.name: 2 * lint.GROUP, default.name: 1})
     assert groups == [[outer], [inner], [default]]
 
